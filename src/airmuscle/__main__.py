@@ -1,0 +1,5 @@
+"""`python -m airmuscle` is the command `airmuscle`."""
+
+from .cli import main
+
+main()

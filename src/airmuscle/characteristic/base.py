@@ -1,0 +1,178 @@
+"""The static surface that binds gauge pressure p [Pa], contraction eps [1] and tension F [N].
+
+A paper gives it solved for one of the three. A law implements its own direction; the classes here give the other
+two by a safeguarded root search, and exact slopes by the implicit function theorem. Where several answers exist
+it is the one reached from rest: the smallest contraction, pressure or force at which the muscle balances.
+"""
+
+from __future__ import annotations
+
+import abc
+from typing import ClassVar, NamedTuple
+
+from .. import trace
+from ..ops import Value
+from ..reference import Reference
+from .solve import first_crossing
+
+
+class Slopes(NamedTuple):
+    """How the tension changes at a point of the surface."""
+
+    by_pressure: Value
+    """dF/dp at constant contraction [N/Pa]."""
+    by_contraction: Value
+    """dF/deps at constant pressure [N]; its negative is the stiffness per unit of contraction."""
+
+
+class Characteristic(abc.ABC):
+    """Gauge pressure [Pa], contraction [1] and tension [N] of a muscle at rest; pulling is positive."""
+
+    references: ClassVar[tuple[Reference, ...]] = ()
+    traceable: ClassVar[bool] = True
+    """Whether the law is closed-form over `ops`; otherwise it enters a plant through `as_force_law`."""
+
+    pressure_reach: ClassVar[tuple[float, float]] = (0.0, 1.0e6)
+    """Gauge pressures [Pa] that a search may answer with."""
+    force_reach: ClassVar[tuple[float, float]] = (0.0, 1.0e4)
+    """Tensions [N] that a search may answer with."""
+
+    @property
+    def contraction_reach(self) -> tuple[float, float]:
+        """Contractions [1] that a search may answer with; a geometric law narrows it."""
+        return (-0.05, 0.6)
+
+    @abc.abstractmethod
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        """Tension [N] at gauge pressure [Pa] and contraction [1]; arrays broadcast. Raises NoSolution."""
+
+    @abc.abstractmethod
+    def contraction(self, pressure: Value, force: Value) -> Value:
+        """Contraction [1] at gauge pressure [Pa] under a tension [N]; arrays broadcast. Raises NoSolution."""
+
+    @abc.abstractmethod
+    def pressure(self, contraction: Value, force: Value) -> Value:
+        """Gauge pressure [Pa] that holds a tension [N] at a contraction [1]; arrays broadcast. Raises NoSolution."""
+
+    @abc.abstractmethod
+    def slopes(self, pressure: Value, contraction: Value) -> Slopes:
+        """Exact partial derivatives of the tension at gauge pressure [Pa] and contraction [1]."""
+
+    def stiffness(self, pressure: Value, contraction: Value) -> Value:
+        """-dF/deps at constant pressure [N]; divide by the resting length for N/m."""
+        return -self.slopes(pressure, contraction).by_contraction
+
+    def _no_contraction(self, pressure: float, force: float) -> str:
+        start, end = self.contraction_reach
+        return (
+            f"{type(self).__name__}: no contraction between {start:.1%} and {end:.1%} balances {force:.6g} N at "
+            f"{pressure / 1e3:.6g} kPa. "
+        )
+
+    def _no_pressure(self, contraction: float, force: float) -> str:
+        start, end = (p / 1e3 for p in self.pressure_reach)
+        return (
+            f"{type(self).__name__}: no gauge pressure between {start:.6g} and {end:.6g} kPa gives {force:.6g} N at "
+            f"a contraction of {contraction:.2%}. "
+        )
+
+    def _no_force(self, pressure: float, contraction: float) -> str:
+        start, end = self.force_reach
+        return (
+            f"{type(self).__name__}: no force between {start:.6g} and {end:.6g} N holds a contraction of "
+            f"{contraction:.2%} at {pressure / 1e3:.6g} kPa. "
+        )
+
+
+class ForceLaw(Characteristic):
+    """A law given as F(p, eps)."""
+
+    def unclamped(self, pressure: Value, contraction: Value) -> Value:
+        """The tension [N] before the law holds it within a range: what a fit determines from measured points."""
+        return self.force(pressure, contraction)
+
+    def contraction(self, pressure: Value, force: Value) -> Value:
+        def unbalance(contraction: Value, p: Value, load: Value) -> Value:
+            return load - self.force(p, contraction)
+
+        def message(p: float, load: float, low: float, high: float) -> str:
+            possible = f"Between these the muscle pulls {load - high:.6g} to {load - low:.6g} N at this pressure."
+            return self._no_contraction(p, load) + possible
+
+        return first_crossing(unbalance, self.contraction_reach, (pressure, force), message)
+
+    def pressure(self, contraction: Value, force: Value) -> Value:
+        def excess(pressure: Value, c: Value, load: Value) -> Value:
+            return self.force(pressure, c) - load
+
+        def message(c: float, load: float, low: float, high: float) -> str:
+            possible = f"Between these the muscle pulls {low + load:.6g} to {high + load:.6g} N there."
+            return self._no_pressure(c, load) + possible
+
+        return first_crossing(excess, self.pressure_reach, (contraction, force), message)
+
+    def slopes(self, pressure: Value, contraction: Value) -> Slopes:
+        return Slopes(
+            trace.slope(self, "force", pressure, contraction, wrt=0),
+            trace.slope(self, "force", pressure, contraction, wrt=1),
+        )
+
+
+class ContractionLaw(Characteristic):
+    """A law given as eps(p, F)."""
+
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        def shortfall(force: Value, p: Value, c: Value) -> Value:
+            return c - self.contraction(p, force)
+
+        def message(p: float, c: float, low: float, high: float) -> str:
+            possible = f"Between these it contracts by {c - high:.2%} to {c - low:.2%} at this pressure."
+            return self._no_force(p, c) + possible
+
+        return first_crossing(shortfall, self.force_reach, (pressure, contraction), message)
+
+    def pressure(self, contraction: Value, force: Value) -> Value:
+        def excess(pressure: Value, c: Value, load: Value) -> Value:
+            return self.contraction(pressure, load) - c
+
+        def message(c: float, load: float, low: float, high: float) -> str:
+            possible = f"Between these it contracts by {low + c:.2%} to {high + c:.2%} under this load."
+            return self._no_pressure(c, load) + possible
+
+        return first_crossing(excess, self.pressure_reach, (contraction, force), message)
+
+    def slopes(self, pressure: Value, contraction: Value) -> Slopes:
+        force = self.force(pressure, contraction)
+        by_pressure = trace.slope(self, "contraction", pressure, force, wrt=0)
+        by_force = trace.slope(self, "contraction", pressure, force, wrt=1)
+        return Slopes(-by_pressure / by_force, 1.0 / by_force)
+
+
+class PressureLaw(Characteristic):
+    """A law given as p(eps, F)."""
+
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        def excess(force: Value, p: Value, c: Value) -> Value:
+            return self.pressure(c, force) - p
+
+        def message(p: float, c: float, low: float, high: float) -> str:
+            possible = f"Between these it needs {(low + p) / 1e3:.6g} to {(high + p) / 1e3:.6g} kPa there."
+            return self._no_force(p, c) + possible
+
+        return first_crossing(excess, self.force_reach, (pressure, contraction), message)
+
+    def contraction(self, pressure: Value, force: Value) -> Value:
+        def excess(contraction: Value, p: Value, load: Value) -> Value:
+            return self.pressure(contraction, load) - p
+
+        def message(p: float, load: float, low: float, high: float) -> str:
+            possible = f"Between these it needs {(low + p) / 1e3:.6g} to {(high + p) / 1e3:.6g} kPa under this load."
+            return self._no_contraction(p, load) + possible
+
+        return first_crossing(excess, self.contraction_reach, (pressure, force), message)
+
+    def slopes(self, pressure: Value, contraction: Value) -> Slopes:
+        force = self.force(pressure, contraction)
+        by_contraction = trace.slope(self, "pressure", contraction, force, wrt=0)
+        by_force = trace.slope(self, "pressure", contraction, force, wrt=1)
+        return Slopes(1.0 / by_force, -by_contraction / by_force)

@@ -1,0 +1,164 @@
+"""Contractile surface of Hill's muscle model: a polynomial of total degree n in contraction and pressure."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from .. import ops
+from ..declare import model, parameter
+from ..errors import ParameterError
+from ..ops import Value
+from ..reference import Reference
+from .base import ForceLaw
+
+HOSOVSKY_HILL = Reference(
+    "hosovsky-hill",
+    "Hosovsky, A. et al.",
+    "Pneumatic artificial muscle modelling based on modified Hill's muscle model",
+    "TU Kosice",
+    note="polynomial of total degree five in contraction and pressure, 21 coefficients, clamped to 0..1200 N; "
+    "the coefficients are not printed",
+)
+
+
+def exponents(degree: int) -> tuple[tuple[int, int], ...]:
+    """The powers (i, j) of contraction and pressure with i + j <= degree, in the order of the coefficients."""
+    return tuple((i, j) for j in range(degree + 1) for i in range(degree + 1 - j))
+
+
+@model
+class ContractileSurface(ForceLaw):
+    """F = clamp( Sum_{i+j<=n} a_ij x^i q^j ), with x and q the contraction and pressure scaled to -1..1 on the box.
+
+        x = (2 eps - eps_low - eps_high)/(eps_high - eps_low),   q likewise from p
+
+    eps contraction [1], p gauge pressure [Pa], a_ij scaled coefficients [N], n = 5 gives the 21 of the paper.
+    Scaling is what keeps the fit well conditioned. Outside the box, where there was no data, the surface goes on
+    by its tangent. Reference: Hosovsky et al., F_KE = f(k, P) under their equation (1).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (HOSOVSKY_HILL,)
+    linear_in: ClassVar[str] = "coefficients"
+    """The parameters in which the law is linear, so that a fit solves for them directly."""
+
+    coefficients: tuple[float, ...] = parameter("N", "a_ij", "coefficients of the scaled powers, by pressure's power")
+    least_pressure: float = parameter("Pa", "p_low", "lower end of the box in gauge pressure", fitted=False)
+    greatest_pressure: float = parameter("Pa", "p_high", "upper end of the box in gauge pressure", fitted=False)
+    least_contraction: float = parameter("1", "eps_low", "lower end of the box in contraction", fitted=False)
+    greatest_contraction: float = parameter("1", "eps_high", "upper end of the box in contraction", fitted=False)
+    least_force: float = parameter("N", "F_min", "force that the clamp lets through at least", fitted=False, default=0.0)
+    greatest_force: float = parameter(
+        "N", "F_max", "force that the clamp lets through at most", fitted=False, default=1200.0
+    )
+    degree: int = 5
+
+    def check(self) -> None:
+        wanted = len(exponents(self.degree))
+        if len(self.coefficients) != wanted:
+            raise ParameterError(
+                f"ContractileSurface of degree {self.degree} needs {wanted} coefficients; {len(self.coefficients)} given."
+            )
+        for name, low, high in (
+            ("pressure", self.least_pressure, self.greatest_pressure),
+            ("contraction", self.least_contraction, self.greatest_contraction),
+            ("force", self.least_force, self.greatest_force),
+        ):
+            if not low < high:
+                raise ParameterError(f"ContractileSurface: least_{name} {low:g} must lie below greatest_{name} {high:g}.")
+
+    @classmethod
+    def blank(cls, degree: int = 5, *, least_force: float = 0.0, greatest_force: float = 1200.0) -> ContractileSurface:
+        """A surface without coefficients yet, for `fit`, which takes its box from the data."""
+        size = len(exponents(degree))
+        return cls((0.0,) * size, 0.0, 1.0, 0.0, 1.0, least_force, greatest_force, degree)
+
+    def with_box(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> ContractileSurface:
+        """The surface with the same coefficients on another box; `fit` calls it before it solves."""
+        return ContractileSurface(
+            self.coefficients, *pressure, *contraction, self.least_force, self.greatest_force, self.degree
+        )
+
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        return ops.clip(self.polynomial(pressure, contraction), self.least_force, self.greatest_force)
+
+    def unclamped(self, pressure: Value, contraction: Value) -> Value:
+        return self.polynomial(pressure, contraction)
+
+    def basis(self, pressure: Value, contraction: Value) -> list[Value]:
+        """What each coefficient multiplies at points inside the box: the columns of the matrix that a fit solves."""
+        x, q = self._scaled(pressure, contraction)
+        powers_x, powers_q = [x * 0.0 + 1.0], [q * 0.0 + 1.0]
+        for _ in range(self.degree):
+            powers_x.append(powers_x[-1] * x)
+            powers_q.append(powers_q[-1] * q)
+        return [powers_x[i] * powers_q[j] for i, j in exponents(self.degree)]
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """What each coefficient multiplies, in words for tables and messages: `x^2 q`."""
+        return tuple(f"{_power('x', i)} {_power('q', j)}".strip() or "1" for i, j in exponents(self.degree))
+
+    def polynomial(self, pressure: Value, contraction: Value) -> Value:
+        """The force [N] before the clamp, continued by its tangent outside the box."""
+        x, q = self._scaled(pressure, contraction)
+        inner_q, inner_x = ops.clip(q, -1.0, 1.0), ops.clip(x, -1.0, 1.0)
+        value, by_x, by_q = self._horner(inner_x, inner_q)
+        return value + by_x * (x - inner_x) + by_q * (q - inner_q)
+
+    def _scaled(self, pressure: Value, contraction: Value) -> tuple[Value, Value]:
+        """Contraction and pressure as x and q, from -1 to 1 on the box."""
+        half_p = (self.greatest_pressure - self.least_pressure) / 2
+        half_c = (self.greatest_contraction - self.least_contraction) / 2
+        return (contraction - self.least_contraction) / half_c - 1, (pressure - self.least_pressure) / half_p - 1
+
+    def _horner(self, x: Value, q: Value) -> tuple[Value, Value, Value]:
+        """The polynomial and its slopes by x and q, by Horner's scheme in both variables."""
+        value: Value = 0.0
+        by_x: Value = 0.0
+        by_q: Value = 0.0
+        start = len(self.coefficients)
+        for j in range(self.degree, -1, -1):
+            start -= self.degree + 1 - j
+            row: Value = 0.0
+            slope: Value = 0.0
+            for a in reversed(self.coefficients[start : start + self.degree + 1 - j]):
+                slope = slope * x + row
+                row = row * x + a
+            by_q = by_q * q + value
+            value = value * q + row
+            by_x = by_x * q + slope
+        return value, by_x, by_q
+
+    def plain_coefficients(self, pressure_unit: float = 1.0) -> dict[tuple[int, int], float]:
+        """Coefficients of eps^i p^j inside the box, p in multiples of `pressure_unit` [Pa] (1e5 for bar).
+
+        Returns {(i, j): value in N per pressure_unit^j}. Plain powers are badly conditioned: for export, not for fits.
+        """
+        scale_c = 2 / (self.greatest_contraction - self.least_contraction)
+        scale_p = 2 / (self.greatest_pressure - self.least_pressure)
+        powers_c = _powers(-1 - scale_c * self.least_contraction, scale_c, self.degree)
+        powers_p = _powers(-1 - scale_p * self.least_pressure, scale_p * pressure_unit, self.degree)
+        plain = dict.fromkeys(exponents(self.degree), 0.0)
+        for (i, j), a in zip(exponents(self.degree), self.coefficients, strict=True):
+            for m, by_c in enumerate(powers_c[i]):
+                for n, by_p in enumerate(powers_p[j]):
+                    plain[m, n] += a * by_c * by_p
+        return plain
+
+
+def _power(symbol: str, exponent: int) -> str:
+    return "" if exponent == 0 else symbol if exponent == 1 else f"{symbol}^{exponent}"
+
+
+def _powers(constant: float, factor: float, degree: int) -> list[list[float]]:
+    """The coefficients of (constant + factor t)^i in t, for i up to `degree`."""
+    powers = [[1.0]]
+    for _ in range(degree):
+        last = powers[-1]
+        powers.append(
+            [
+                constant * (last[m] if m < len(last) else 0.0) + factor * (last[m - 1] if m else 0.0)
+                for m in range(len(last) + 1)
+            ]
+        )
+    return powers

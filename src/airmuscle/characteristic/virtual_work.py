@@ -1,0 +1,52 @@
+"""The tension of any geometry by virtual work: a muscle without wall or friction, which keeps energy."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from ..declare import model
+from ..errors import TraceError
+from ..geometry.base import Geometry
+from ..geometry.braid import CHOU_HANNAFORD_1996
+from ..ops import Value
+from ..reference import Reference
+from .base import ForceLaw, Slopes
+from .solve import within_reach
+
+
+@model
+class VirtualWork(ForceLaw):
+    """F = -p dV/dL = p (dV/deps)/L_0.
+
+    p gauge pressure, V enclosed volume, L = L_0 (1 - eps) length. The work of the air, p dV, is all given to
+    the load, so the Maxwell defect dF/dp + dV/dL is zero everywhere. Past the contraction of greatest volume
+    the muscle pushes; clamp it where it must not. Reference: Chou and Hannaford (1996), the derivation of
+    their force.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (CHOU_HANNAFORD_1996,)
+
+    geometry: Geometry
+
+    @property
+    def contraction_reach(self) -> tuple[float, float]:
+        return self.geometry.contraction_reach
+
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        return pressure * self.area(contraction)
+
+    def pressure(self, contraction: Value, force: Value) -> Value:
+        found = force / self.area(contraction)
+        return within_reach(found, self.pressure_reach, (contraction, force), self._no_pressure)
+
+    def area(self, contraction: Value) -> Value:
+        """F/p [m2]: the piston that the muscle is worth at a contraction [1]."""
+        return self.geometry.volume_growth(contraction) / self.geometry.resting_length
+
+    def slopes(self, pressure: Value, contraction: Value) -> Slopes:
+        if not type(self.geometry).traceable:
+            raise TraceError(
+                f"VirtualWork: {type(self.geometry).__name__} is not closed-form, so its second derivative is not "
+                "known exactly. Replace it by airmuscle.geometry.chebyshev.as_polynomial(geometry)."
+            )
+        return super().slopes(pressure, contraction)

@@ -1,0 +1,106 @@
+"""Commands in time: what opens valves and latches. Between two instants every input is linear in time."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import ParameterError, suggestion
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Segments:
+    """A command cut at its instants: ends (S,), inputs at each start (S, m), and their slopes [1/s] (S, m)."""
+
+    ends: Array
+    values: Array
+    slopes: Array
+
+    def inputs_at(self, times: Array, start: float) -> Array:
+        """The inputs (N, m) at times (N,); at an instant those that begin there."""
+        starts = np.concatenate([[start], self.ends[:-1]])
+        index = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, self.ends.size - 1)
+        return np.asarray(self.values[index] + (times - starts[index])[:, None] * self.slopes[index])
+
+
+class Command(abc.ABC):
+    """What the inputs of a plant do in time."""
+
+    @abc.abstractmethod
+    def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
+        """The command for these inputs from `start` on, cut so that every input is linear within a segment."""
+
+
+def _refuse_unknown(given: Sequence[str], inputs: Sequence[str]) -> None:
+    for name in given:
+        if name not in inputs:
+            known = ", ".join(inputs) or "none"
+            raise ParameterError(f"the plant has no input '{name}'; there are {known}.{suggestion(name, inputs)}")
+
+
+@dataclasses.dataclass(frozen=True)
+class Schedule(Command):
+    """Piecewise constant inputs, each a sequence of (instant [s], value from then on); before the first it is 0.
+
+    `Schedule({"fill": ((5, 1), (15, 0)), "discharge": ((19, 1),)})`
+    """
+
+    changes: Mapping[str, Sequence[tuple[float, float]]]
+
+    def __post_init__(self) -> None:
+        for name, changes in self.changes.items():
+            times = [time for time, _ in changes]
+            if not np.isfinite(changes).all() if changes else False:
+                raise ParameterError(f"the schedule of '{name}' holds a number that is not finite: {list(changes)}.")
+            if any(b <= a for a, b in zip(times, times[1:], strict=False)):
+                raise ParameterError(f"the schedule of '{name}' must name its instants in rising order; it has {times}.")
+
+    def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
+        _refuse_unknown(list(self.changes), inputs)
+        end = start + duration
+        instants = {time for changes in self.changes.values() for time, _ in changes if start < time < end}
+        ends = np.array([*sorted(instants), end])
+        starts = np.concatenate([[start], ends[:-1]])
+        values = np.zeros((ends.size, len(inputs)))
+        for i, name in enumerate(inputs):
+            for time, value in self.changes.get(name, ()):
+                values[starts >= time, i] = value
+        return Segments(ends, values, np.zeros_like(values))
+
+
+@dataclasses.dataclass(frozen=True)
+class Signal(Command):
+    """Piecewise linear inputs, each a sequence of (time [s], value); held constant before the first and after the last."""
+
+    points: Mapping[str, Sequence[tuple[float, float]]]
+
+    def __post_init__(self) -> None:
+        for name, points in self.points.items():
+            times = [time for time, _ in points]
+            if not points or not np.isfinite(points).all():
+                raise ParameterError(f"the signal of '{name}' must be finite points (time, value); it is {list(points)}.")
+            if any(b <= a for a, b in zip(times, times[1:], strict=False)):
+                raise ParameterError(f"the signal of '{name}' must name its times in rising order; it has {times}.")
+
+    def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
+        _refuse_unknown(list(self.points), inputs)
+        end = start + duration
+        corners = {time for points in self.points.values() for time, _ in points if start < time < end}
+        ends = np.array([*sorted(corners), end])
+        edges = np.concatenate([[start], ends])
+        values = np.zeros((edges.size, len(inputs)))
+        for i, name in enumerate(inputs):
+            if name in self.points:
+                times, levels = np.array(self.points[name], dtype=float).T
+                values[:, i] = np.interp(edges, times, levels)
+        return Segments(ends, values[:-1], np.diff(values, axis=0) / np.diff(edges)[:, None])
+
+
+REST = Schedule({})
+"""Every input stays at zero: valves shut, latch open."""

@@ -1,0 +1,194 @@
+"""How a parameter is declared, once, and how a frozen model is taken apart and put together again.
+
+A declared field is a leaf (a float or a tuple of floats) with unit, symbol, meaning and bounds.
+Any other field is structure: another model, a tuple of models, a whole number, a name.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, TypeVar, dataclass_transform
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import ParameterError, suggestion
+
+T = TypeVar("T")
+INFINITY = math.inf
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameter:
+    """What is declared about one parameter of a model."""
+
+    name: str
+    unit: str
+    symbol: str
+    meaning: str
+    bounds: tuple[float, float]
+    fitted: bool
+    default: Any
+
+
+def parameter(
+    unit: str,
+    symbol: str,
+    meaning: str,
+    *,
+    bounds: tuple[float, float] = (-INFINITY, INFINITY),
+    fitted: bool = True,
+    **field: Any,
+) -> Any:
+    """Declare a parameter on the field; docs, fits, TOML, command line and page read it here.
+
+    `bounds` are closed and physical; `fitted=False` marks what a fit must leave alone (a length measured
+    with a ruler, a clamp). Values are SI, in `unit`.
+    """
+    return dataclasses.field(
+        metadata={"unit": unit, "symbol": symbol, "meaning": meaning, "bounds": bounds, "fitted": fitted},
+        **field,
+    )
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(parameter, dataclasses.field))
+def model(cls: type[T]) -> type[T]:
+    """A frozen dataclass whose declared parameters are checked when it is made.
+
+    A model may define `check(self)` for what several parameters must satisfy together; it raises ParameterError.
+    """
+    if "__post_init__" not in cls.__dict__:
+        cls.__post_init__ = _validate  # type: ignore[attr-defined]
+    return dataclasses.dataclass(frozen=True)(cls)
+
+
+def parameters(thing: Any) -> tuple[Parameter, ...]:
+    """The declared parameters of a model or model class, in order, without those of nested models."""
+    return tuple(
+        Parameter(name=f.name, default=f.default, **f.metadata)
+        for f in dataclasses.fields(thing)
+        if "unit" in f.metadata
+    )
+
+
+def _validate(thing: Any) -> None:
+    for declared in parameters(thing):
+        value = getattr(thing, declared.name)
+        object.__setattr__(thing, declared.name, _checked(type(thing).__name__, declared, value))
+    if hasattr(thing, "check"):
+        thing.check()
+
+
+def _checked(owner: str, declared: Parameter, value: Any) -> Any:
+    if isinstance(value, tuple | list | np.ndarray):
+        return tuple(_checked(owner, declared, v) for v in value)
+    low, high = declared.bounds
+    where = f"{owner}.{declared.name} ({declared.symbol}, {declared.meaning})"
+    if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
+        raise ParameterError(f"{where} is {value!r}; it must be a number in {declared.unit}.")
+    if not math.isfinite(value):
+        raise ParameterError(f"{where} is {value}; it must be finite, in {declared.unit}.")
+    if not low <= value <= high:
+        raise ParameterError(
+            f"{where} is {value:g} {declared.unit}; allowed are {low:g} to {high:g} {declared.unit}. "
+            "Values are SI: check the unit."
+        )
+    return float(value)
+
+
+@dataclasses.dataclass(frozen=True)
+class Leaf:
+    """One number inside a model: its dotted path, its value and what is declared about it."""
+
+    path: str
+    value: Any
+    declared: Parameter
+
+
+def leaves(thing: Any, path: str = "") -> Iterator[Leaf]:
+    """Every declared number of a model and of the models inside it, in a fixed order."""
+    if isinstance(thing, tuple):
+        for i, item in enumerate(thing):
+            yield from leaves(item, f"{path}[{i}]")
+    elif dataclasses.is_dataclass(thing) and not isinstance(thing, type):
+        declared = {p.name: p for p in parameters(thing)}
+        for field in dataclasses.fields(thing):
+            value = getattr(thing, field.name)
+            inner = f"{path}.{field.name}" if path else field.name
+            if field.name not in declared:
+                yield from leaves(value, inner)
+            elif isinstance(value, tuple):
+                yield from (Leaf(f"{inner}[{i}]", v, declared[field.name]) for i, v in enumerate(value))
+            else:
+                yield Leaf(inner, value, declared[field.name])
+
+
+def flatten(thing: Any) -> npt.NDArray[np.float64]:
+    """The values of all leaves as one vector, in the order of `leaves`."""
+    return np.array([leaf.value for leaf in leaves(thing)], dtype=np.float64)
+
+
+def structure(thing: Any) -> Any:
+    """A hashable description of everything about a model but the values of its parameters."""
+    if isinstance(thing, tuple):
+        return tuple(structure(item) for item in thing)
+    if not dataclasses.is_dataclass(thing) or isinstance(thing, type):
+        return thing
+    declared = {p.name for p in parameters(thing)}
+    fields = []
+    for field in dataclasses.fields(thing):
+        value = getattr(thing, field.name)
+        size = len(value) if isinstance(value, tuple) else 1
+        fields.append((field.name, size) if field.name in declared else (field.name, structure(value)))
+    return (type(thing), *fields)
+
+
+def rebuild(thing: T, values: Sequence[Any]) -> T:
+    """The same model with other leaf values, in the order of `leaves`; symbols are put in unchecked."""
+    feed = iter(values)
+    return _rebuild(thing, feed)
+
+
+def _rebuild(thing: Any, feed: Iterator[Any]) -> Any:
+    if isinstance(thing, tuple):
+        return tuple(_rebuild(item, feed) for item in thing)
+    if not dataclasses.is_dataclass(thing) or isinstance(thing, type):
+        return thing
+    declared = {p.name for p in parameters(thing)}
+    new = object.__new__(type(thing))
+    for field in dataclasses.fields(thing):
+        value = getattr(thing, field.name)
+        if field.name not in declared:
+            value = _rebuild(value, feed)
+        elif isinstance(value, tuple):
+            value = tuple(next(feed) for _ in value)
+        else:
+            value = next(feed)
+        object.__setattr__(new, field.name, value)
+    return new
+
+
+def with_parameters(thing: T, values: Sequence[float]) -> T:
+    """The same model with other leaf values, checked as if it were newly made."""
+    return _revalidated(rebuild(thing, [float(v) for v in values]))
+
+
+def _revalidated(thing: Any) -> Any:
+    if isinstance(thing, tuple):
+        return tuple(_revalidated(item) for item in thing)
+    if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
+        return dataclasses.replace(thing, **{f.name: _revalidated(getattr(thing, f.name)) for f in dataclasses.fields(thing)})
+    return thing
+
+
+def field_or_suggestion(cls: type[Any], name: str) -> None:
+    """Raise ParameterError, with the nearest name, where a model class has no field of this name."""
+    known = [f.name for f in dataclasses.fields(cls) if f.init]
+    if name not in known:
+        raise ParameterError(
+            f"{cls.__name__} has no parameter '{name}'; there are {', '.join(known)}.{suggestion(name, known)}"
+        )
+
+

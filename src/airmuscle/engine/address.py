@@ -1,0 +1,35 @@
+"""How a kernel calls a function that it knows by address alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def invoke(typing_context: Any, address: Any, arguments: Any) -> Any:
+    """Call the function at `address`, which returns nothing, with addresses and floats."""
+    signature = types.void(types.intp, arguments)
+
+    def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        items = [builder.extract_value(values[1], i) for i in range(len(arguments))]
+        kind = ir.FunctionType(ir.VoidType(), [item.type for item in items])
+        builder.call(builder.inttoptr(values[0], kind.as_pointer()), items)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def pointer(typing_context: Any, array: Any) -> Any:
+    """The address of an array's first element."""
+    signature = types.intp(array)
+
+    def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        data = context.make_array(sig.args[0])(context, builder, values[0]).data
+        return builder.ptrtoint(data, ir.IntType(64))
+
+    return signature, generate

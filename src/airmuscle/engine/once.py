@@ -1,0 +1,17 @@
+"""The one line that tells why the first run on a machine takes longer."""
+
+from __future__ import annotations
+
+import pathlib
+import sys
+from typing import Any
+
+
+def announce_compilation(kernel: Any) -> None:
+    """Say on stderr that a kernel is about to be compiled, if this machine has not compiled it before."""
+    if kernel.signatures:
+        return
+    cache = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
+    index = getattr(cache, "_index_path", None)
+    if index is None or not pathlib.Path(index).exists():
+        print(f"compiling {kernel.__name__}, once on this machine (some seconds) ...", file=sys.stderr, flush=True)

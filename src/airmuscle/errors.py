@@ -1,0 +1,98 @@
+"""Everything airmuscle raises on purpose. A message says where, what, what is allowed, what to do.
+
+AirmuscleError
+├── InputError               something given from outside cannot be used
+│   ├── FileError            a file or folder that cannot be read or written
+│   ├── ColumnError          a recording lacks a column, or a column holds no numbers
+│   ├── UnitError            a unit that is unknown or of the wrong kind
+│   ├── ParameterError       a parameter missing, misspelt, mistyped or physically impossible
+│   └── UnknownName          no muscle, characteristic, component or paper of that name
+├── PhysicsError             the question has no answer in this model
+│   ├── NoSolution           no pressure, contraction or force satisfies the request
+│   ├── OutOfReach           a contraction that the geometry cannot take
+│   └── NoEquilibrium        a plant that cannot rest: names the muscle and the forces
+├── TraceError               a law that cannot be traced into a program
+├── IdentificationError      data that cannot determine what is asked
+└── SimulationError          a run that ended early; `.recording` holds what it has
+
+AirmuscleWarning             works, but not as expected: a Python warning, not an error
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .recording import Recording
+
+
+class AirmuscleError(Exception):
+    """Base of everything airmuscle raises on purpose."""
+
+
+class AirmuscleWarning(UserWarning):
+    """Something that works, but not as its reader may expect; the message says what."""
+
+
+class InputError(AirmuscleError):
+    """Something given from outside cannot be used."""
+
+
+class FileError(InputError):
+    """A file or folder that cannot be read or written."""
+
+
+class ColumnError(InputError):
+    """A recording lacks a column, or a column holds no numbers."""
+
+
+class UnitError(InputError):
+    """A unit that is unknown or of the wrong kind."""
+
+
+class ParameterError(InputError):
+    """A parameter that is missing, misspelt, mistyped or physically impossible."""
+
+
+class UnknownName(InputError):
+    """No muscle, characteristic, component or paper of that name."""
+
+
+class PhysicsError(AirmuscleError):
+    """The question has no answer in this model."""
+
+
+class NoSolution(PhysicsError):
+    """No pressure, contraction or force satisfies the request."""
+
+
+class OutOfReach(PhysicsError):
+    """A contraction that the geometry cannot take."""
+
+
+class NoEquilibrium(PhysicsError):
+    """A plant that cannot rest; the message names the muscle and the forces."""
+
+
+class TraceError(AirmuscleError):
+    """A law that cannot be traced into a program."""
+
+
+class IdentificationError(AirmuscleError):
+    """Data that cannot determine what is asked."""
+
+
+class SimulationError(AirmuscleError):
+    """A run that ended early; `.recording` holds what it computed until then."""
+
+    def __init__(self, message: str, recording: Recording | None = None) -> None:
+        super().__init__(message)
+        self.recording = recording
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """A closing sentence for messages about unknown names: the nearest known one, or nothing."""
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f" Did you mean '{near[0]}'?" if near else ""

@@ -1,0 +1,71 @@
+"""A mechanism in generalised coordinates: how far it shortens each muscle, and how it moves under their pull."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+from .. import trace
+from ..ops import Value
+
+
+@dataclasses.dataclass(frozen=True)
+class Coordinate:
+    """One generalised coordinate with the name of its speed; `nominal` are sizes below which errors do not matter."""
+
+    name: str
+    speed: str
+    unit: str
+    nominal: float
+    nominal_speed: float
+
+
+class Mechanism(abc.ABC):
+    """What muscles pull at. Coordinates q and speeds v are mappings by the names of `coordinates`."""
+
+    @property
+    @abc.abstractmethod
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """The generalised coordinates, in order."""
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs that act on the mechanism."""
+        return ()
+
+    @abc.abstractmethod
+    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+        """Contraction [1] of every muscle, of resting lengths [m], at coordinates q."""
+
+    def contraction_speeds(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], resting_lengths: Sequence[Value]
+    ) -> tuple[Value, ...]:
+        """Speed of shortening [m/s] of every muscle, derived from `contractions`."""
+        names = [c.name for c in self.coordinates]
+        if not names:
+            return tuple(0.0 for _ in resting_lengths)
+        rates = trace.directional(
+            lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths),
+            [q[name] for name in names],
+            [v[c.speed] for c in self.coordinates],
+        )
+        return tuple(length * rate for length, rate in zip(resting_lengths, rates, strict=True))
+
+    @abc.abstractmethod
+    def acceleration(
+        self,
+        q: Mapping[str, Value],
+        v: Mapping[str, Value],
+        tensions: Sequence[Value],
+        inputs: Mapping[str, Value],
+    ) -> Mapping[str, Value]:
+        """Acceleration of every coordinate under the muscles' tensions [N]."""
+
+    def potential_energy(self, q: Mapping[str, Value]) -> Value:
+        """Energy of position [J]."""
+        return 0.0
+
+    def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
+        """Energy of motion [J]."""
+        return 0.0

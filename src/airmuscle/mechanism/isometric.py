@@ -1,0 +1,32 @@
+"""A frame that holds the muscle at one length."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ..declare import model, parameter
+from ..ops import Value
+from .base import Coordinate, Mechanism
+
+
+@model
+class Isometric(Mechanism):
+    """eps stays what it is; the muscle only builds up tension."""
+
+    contraction: float = parameter("1", "eps", "contraction at which the muscle is held", bounds=(-0.2, 0.9))
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        return ()
+
+    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+        return tuple(self.contraction for _ in resting_lengths)
+
+    def acceleration(
+        self,
+        q: Mapping[str, Value],
+        v: Mapping[str, Value],
+        tensions: Sequence[Value],
+        inputs: Mapping[str, Value],
+    ) -> Mapping[str, Value]:
+        return {}

@@ -1,0 +1,106 @@
+"""A system ready to run: machine code shared by all of its structure, and its own parameters."""
+
+from __future__ import annotations
+
+import ctypes
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import declare
+from . import llvm
+from .printed import Sizes, Traced, explicit_module, implicit_module, traced
+from .system import System
+
+_FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "drift", "outputs")
+
+
+class Program:
+    """The compiled functions of one structure; it keeps the machine code alive and is never pickled."""
+
+    def __init__(self, system: System) -> None:
+        self.traced: Traced = traced(system)
+        text, self.sizes = implicit_module(self.traced)
+        self._engine = llvm.compiled(text)
+        self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
+        self._steps: dict[Any, tuple[Any, int]] = {}
+
+    def held(self, parameters: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """What the functions need of a set of parameters, computed once."""
+        return _handed(self._engine, parameters, self.sizes.held)
+
+    def step(
+        self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...], parameters: npt.NDArray[np.float64]
+    ) -> tuple[int, npt.NDArray[np.float64]]:
+        """The address of an explicit step of this tableau, and what it needs of the parameters."""
+        if (a, b) not in self._steps:
+            text, held = explicit_module(self.traced, a, b)
+            self._steps[a, b] = llvm.compiled(text), held
+        engine, held = self._steps[a, b]
+        return int(engine.get_function_address("step")), _handed(engine, parameters, held)
+
+
+def _handed(engine: Any, parameters: npt.NDArray[np.float64], size: int) -> npt.NDArray[np.float64]:
+    pointer = ctypes.c_void_p
+    handed = np.zeros(max(size, 1))
+    prepare = ctypes.CFUNCTYPE(None, pointer, pointer)(engine.get_function_address("prepare"))
+    prepare(parameters.ctypes.data, handed.ctypes.data)
+    return handed
+
+
+_programs: dict[Any, Program] = {}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Prepared:
+    """A system with its program: addresses, parameters, and the layout of its arrays."""
+
+    system: System
+    program: Program
+    parameters: npt.NDArray[np.float64]
+    held: npt.NDArray[np.float64]
+
+    @property
+    def sizes(self) -> Sizes:
+        """Lengths of the arrays that the functions read and write."""
+        return self.program.sizes
+
+    @property
+    def address(self) -> dict[str, int]:
+        """The functions' addresses by name."""
+        return self.program.address
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """The outputs, in the order of their vector."""
+        return self.program.traced.output_names
+
+    def nominal(self) -> npt.NDArray[np.float64]:
+        """The size of each state below which its relative error no longer matters."""
+        return np.array([s.nominal for s in self.system.states])
+
+    def call(self, name: str, *arrays: npt.NDArray[np.float64] | float) -> None:
+        """Call one printed function by hand; arrays are passed by address, floats by value."""
+        kinds = [ctypes.c_double if isinstance(a, float) else ctypes.c_void_p for a in arrays]
+        values = [a if isinstance(a, float) else a.ctypes.data for a in arrays]
+        ctypes.CFUNCTYPE(None, *kinds)(self.address[name])(*values)
+
+    def rates(self, state: Sequence[float], inputs: Sequence[float]) -> npt.NDArray[np.float64]:
+        """The compiled rates at a state vector (n,) under inputs (m,)."""
+        x, u = np.array(state, dtype=float), np.array(inputs, dtype=float)
+        f = np.empty(self.sizes.states)
+        self.call("rhs", x, u, self.held, f)
+        return f
+
+
+def prepared(system: System) -> Prepared:
+    """The system with compiled functions. Another parameter set of the same structure costs nothing."""
+    key = declare.structure(system)
+    if key not in _programs:
+        _programs[key] = Program(system)
+    program = _programs[key]
+    parameters = declare.flatten(system)
+    return Prepared(system, program, parameters, program.held(parameters))

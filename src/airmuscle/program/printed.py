@@ -1,0 +1,143 @@
+"""The functions that a system is printed as, and their LLVM text."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import casadi
+
+from .. import trace
+from ..errors import TraceError
+from . import llvm, lu
+from .instructions import Code, hoisted, instructions
+from .system import System
+
+PARAMETERS = "p"
+"""The argument of a traced function that holds parameters; it is replaced by what `prepare` left in `c`."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Traced:
+    """A system as CasADi expressions: states x, inputs u, their slopes w, parameters p, rates f, outputs o."""
+
+    x: Any
+    u: Any
+    w: Any
+    p: Any
+    f: Any
+    o: Any
+    output_names: tuple[str, ...]
+
+
+def traced(system: System) -> Traced:
+    """Call a system once with symbols; raises TraceError where that does not give finite expressions."""
+    model, p = trace.symbolic(system)
+    names = [s.name for s in system.states]
+    x, u = casadi.SX.sym("x", len(names)), casadi.SX.sym("u", len(system.inputs))
+    w = casadi.SX.sym("w", len(system.inputs))
+    state = {name: x[i] for i, name in enumerate(names)}
+    inputs = {name: u[i] for i, name in enumerate(system.inputs)}
+    rates, outputs = model.rates(state, inputs), model.outputs(state, inputs)
+    if set(rates) != set(names):
+        raise TraceError(f"{type(system).__name__}: states are {names}, but rates are given for {list(rates)}.")
+    f = casadi.vertcat(*(rates[name] for name in names))
+    o = casadi.vertcat(*outputs.values()) if outputs else casadi.SX(0, 1)
+    trace.refuse_non_finite(casadi.vertcat(f, o), type(system).__name__)
+    return Traced(x, u, w, p, f, o, tuple(outputs))
+
+
+@dataclasses.dataclass(frozen=True)
+class Sizes:
+    """Lengths of the arrays that the printed functions read and write."""
+
+    states: int
+    inputs: int
+    parameters: int
+    held: int
+    jacobian: int
+    factors: int
+    outputs: int
+
+
+class Printer:
+    """Collects functions; what each needs of the parameters alone is gathered into one `prepare(p, c)`."""
+
+    def __init__(self) -> None:
+        self.text: list[str] = []
+        self._prepare = llvm.Block()
+        self.held = 0
+
+    def add(self, name: str, inputs: dict[str, Any], outputs: dict[str, Any], scalars: Sequence[str] = ()) -> None:
+        """Print `name(inputs..., outputs...)`, with `c` in place of the parameters."""
+        code = instructions(list(inputs.values()), list(outputs.values()))
+        names, targets = list(inputs), dict(enumerate(outputs))
+        block = llvm.Block(scalars)
+        if PARAMETERS in inputs:
+            code, once, handed = hoisted(code, names.index(PARAMETERS))
+            llvm.hand_over(self._prepare, once, handed, names, self.held)
+            held = {operand: self.held + k for k, operand in enumerate(handed)}
+            self.held += len(handed)
+        else:
+            code, held = Code(code.body, code.outputs), {}
+        llvm.write(block, code, names, targets, held)
+        arguments = ["c" if n == PARAMETERS else n for n in names] + list(outputs)
+        self.text.append(llvm.function(name, arguments, block))
+
+    def module(self) -> str:
+        """All functions and `prepare`, as one LLVM text."""
+        return "\n".join([llvm.function("prepare", ["p", "c"], self._prepare), *self.text])
+
+
+def implicit_module(t: Traced) -> tuple[str, Sizes]:
+    """What an implicit method needs: rhs, jac, factor, solve, stage, drift and outputs.
+
+        rhs(x, u, c, f)              f = rates
+        jac(x, u, c, f, J)           rates, and the non-zeros of df/dx
+        factor(J, d, A)              LU of d I - J
+        solve(A, b, y)               y = (d I - J)^-1 b
+        stage(x, u, c, A, g, k)      k = (d I - J)^-1 (f(x, u) + g)
+        drift(x, u, c, w, f)         (df/du) w, the rates' own slope in time while inputs move at w
+        outputs(x, u, c, o)
+    """
+    size = t.x.shape[0]
+    jacobian = casadi.jacobian(t.f, t.x)
+    places = lu.non_zeros(jacobian)
+    values = casadi.vertcat(*(jacobian[i, j] for i, j in places)) if places else casadi.SX(0, 1)
+    matrix, js, d = lu.shifted(places, size)
+    factors = lu.factorised(matrix)
+    pattern = lu.pattern_of(factors)
+    a, g, b = (casadi.SX.sym(n, k) for n, k in (("A", len(pattern)), ("g", size), ("b", size)))
+    stage = lu.solved(pattern, a, [t.f[i] + g[i] for i in range(size)])
+    solve = lu.solved(pattern, a, [b[i] for i in range(size)])
+    point = {"x": t.x, "u": t.u, PARAMETERS: t.p}
+    printer = Printer()
+    printer.add("rhs", point, {"f": t.f})
+    printer.add("jac", point, {"f": t.f, "J": values})
+    printer.add("factor", {"J": js, "d": d}, {"A": casadi.vertcat(*(factors[i][j] for i, j in pattern))}, ["d"])
+    printer.add("solve", {"A": a, "b": b}, {"y": casadi.vertcat(*solve)})
+    printer.add("stage", {**point, "A": a, "g": g}, {"k": casadi.vertcat(*stage)})
+    printer.add("drift", {**point, "w": t.w}, {"f": casadi.jtimes(t.f, t.u, t.w) if t.u.numel() else casadi.SX(size, 1)})
+    printer.add("outputs", point, {"o": t.o})
+    sizes = Sizes(size, t.u.shape[0], t.p.shape[0], printer.held, len(places), len(pattern), t.o.shape[0])
+    return printer.module(), sizes
+
+
+def explicit_module(t: Traced, a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[str, int]:
+    """One whole step of an explicit Runge-Kutta method: step(x, u, c, w, h, y), and how long `c` must be.
+
+    `a` are the rows of the tableau below its first, `b` its weights; nodes are the row sums. Inputs move at w.
+    """
+    rates = casadi.Function("rates", [t.x, t.u, t.p], [t.f])
+    h = casadi.SX.sym("h")
+    slopes: list[Any] = []
+    for row in ([], *a):
+        increment = sum((weight * k for weight, k in zip(row, slopes, strict=True) if weight), casadi.SX(0))
+        slopes.append(rates(t.x + h * increment if row else t.x, t.u + sum(row) * h * t.w, t.p))
+    step = t.x + h * sum((weight * k for weight, k in zip(b, slopes, strict=True) if weight), casadi.SX(0))
+    printer = Printer()
+    printer.add("step", {"x": t.x, "u": t.u, PARAMETERS: t.p, "w": t.w, "h": h}, {"y": step}, ["h"])
+    return printer.module(), printer.held
+
+

@@ -1,0 +1,6 @@
+"""One run, measured or simulated: the same type, so that the two always compare."""
+
+from .columns import QUANTITIES as QUANTITIES
+from .columns import Quantity as Quantity
+from .read_csv import read_csv as read_csv
+from .recording import Recording as Recording

@@ -1,0 +1,38 @@
+"""The quantities that a recording knows, with the unit each is kept in."""
+
+from __future__ import annotations
+
+import dataclasses
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantity:
+    """A measurable quantity: the SI unit it is kept in, its symbol, what it means."""
+
+    unit: str
+    symbol: str
+    meaning: str
+
+
+QUANTITIES: dict[str, Quantity] = {
+    "time": Quantity("s", "t", "time"),
+    "pressure": Quantity("Pa", "p", "gauge pressure in the muscle"),
+    "contraction": Quantity("1", "eps", "contraction (L0 - L)/L0; negative when stretched"),
+    "force": Quantity("N", "F", "tension of the muscle, pulling positive"),
+    "length": Quantity("m", "L", "length between the fittings"),
+    "position": Quantity("m", "y", "displacement of the load, positive as the muscle contracts"),
+    "speed": Quantity("m/s", "v", "speed of the load, positive as the muscle contracts"),
+    "acceleration": Quantity("m/s^2", "a", "acceleration of the load"),
+    "volume": Quantity("m3", "V", "enclosed volume"),
+    "air_mass": Quantity("kg", "m_air", "mass of the air in the muscle"),
+    "mass_flow": Quantity("kg/s", "qm", "mass flow into the muscle"),
+    "fill": Quantity("1", "u_fill", "opening of the fill valve, 0 shut to 1 open"),
+    "discharge": Quantity("1", "u_dis", "opening of the discharge valve, 0 shut to 1 open"),
+    "held": Quantity("1", "u_held", "1 while the load is latched, 0 released"),
+    "temperature": Quantity("K", "T", "absolute temperature of the air"),
+}
+
+
+def quantity_of(column: str) -> Quantity | None:
+    """The quantity behind a column name; `left.pressure` is a pressure."""
+    return QUANTITIES.get(column.rpartition(".")[2])

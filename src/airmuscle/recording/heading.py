@@ -1,0 +1,86 @@
+"""What the heading of a column says: which quantity it is, and in which unit it was written."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Iterator
+
+from .columns import QUANTITIES
+
+# Letters that mean something else in the other case are told apart; every other name is not.
+_LETTERS = {"t": "time", "T": "temperature", "v": "speed", "V": "volume"}
+_SYNONYMS = {
+    "p": "pressure", "druck": "pressure", "gauge_pressure": "pressure",
+    "f": "force", "load": "force", "tension": "force", "kraft": "force",
+    "k": "contraction", "eps": "contraction", "epsilon": "contraction", "ε": "contraction",
+    "kontraktion": "contraction", "l": "length", "länge": "length", "y": "position",
+    "displacement": "position", "velocity": "speed", "a": "acceleration", "zeit": "time",
+    "temperatur": "temperature", "volumen": "volume",
+    **{quantity.symbol.lower(): name for name, quantity in QUANTITIES.items() if len(quantity.symbol) > 1},
+    **{name: name for name in QUANTITIES},
+}  # fmt: skip
+
+SPELLINGS: dict[str, tuple[str, ...]] = {
+    "Pa": (
+        "Pa", "kPa", "MPa", "bar", "mbar", "psi", "bara", "barg", "kPa(a)", "kPa(g)", "kPaa", "kPag", "psia", "psig",
+        "bar(a)", "bar(g)", "Pa(a)", "Pa(g)",
+    ),
+    "m": ("m", "mm", "cm"), "1": ("1", "%", "-"), "N": ("N", "kN"), "s": ("s", "ms", "min"), "m/s": ("m/s", "mm/s"),
+    "m/s^2": ("m/s^2", "m/s2"), "m3": ("m3", "cm3"), "kg": ("kg", "g"), "kg/s": ("kg/s", "g/s"), "K": ("K", "°C"),
+}  # fmt: skip
+"""How units of each kind are usually written: what messages suggest, and what counts in `pressure_kPa`."""
+
+_MARKED = tuple(
+    re.compile(pattern)
+    for pattern in (
+        r"(?P<name>.*?)\s*\[(?P<unit>.*)\]",
+        r"(?P<name>.*?)\s*\((?P<unit>.*)\)",
+        r"(?P<name>.+?)\s*/\s*(?P<unit>.+)",
+    )
+)
+_LOOSE = re.compile(r"(?P<name>.+)[_\s](?P<unit>\S+)")
+
+
+@dataclasses.dataclass(frozen=True)
+class Heading:
+    """A heading taken apart. `name` is a quantity's, or the whole text where no quantity is known by it."""
+
+    text: str
+    name: str
+    unit: str | None
+    known: bool
+
+    @property
+    def target(self) -> str | None:
+        """The SI unit of the quantity; None where it is not known."""
+        return QUANTITIES[self.name.rpartition(".")[2]].unit if self.known else None
+
+
+def known_name(text: str) -> str | None:
+    """The quantity meant by a name or a synonym in any case; `left.p` is `left.pressure`."""
+    prefix, dot, last = text.strip().rpartition(".")
+    found = _LETTERS.get(last) or _SYNONYMS.get(re.sub(r"[\s-]+", "_", last.strip()).lower())
+    return prefix + dot + found if found else None
+
+
+def read_heading(text: str) -> Heading:
+    """`pressure [kPa]`, `pressure (kPa)`, `pressure_kPa`, `Pressure / kPa` and `p` say that it is the pressure."""
+    text = text.strip()
+    for name, unit in _splits(text):
+        return Heading(text, name, unit.strip(), True)
+    known = known_name(text)
+    return Heading(text, known or text, None, known is not None)
+
+
+def _splits(text: str) -> Iterator[tuple[str, str]]:
+    """Quantity and unit, where a heading holds both; after a mere blank or _ it must be a usual unit."""
+    for form in _MARKED:
+        found = form.fullmatch(text)
+        name = known_name(found["name"]) if found else None
+        if found and name:
+            yield name, found["unit"]
+    found = _LOOSE.fullmatch(text)
+    name = known_name(found["name"]) if found else None
+    if found and name and found["unit"] in SPELLINGS[QUANTITIES[name.rpartition(".")[2]].unit]:
+        yield name, found["unit"]

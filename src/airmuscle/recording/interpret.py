@@ -1,0 +1,159 @@
+"""From a table of headings and cells, whatever file it came from, to a Recording in SI units.
+
+Here gauge is told from absolute, units are converted, and what cannot have been measured is refused.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..errors import ColumnError, UnitError, suggestion
+from ..units import AMBIENT_PRESSURE, Conversion, conversion, quantity
+from .columns import QUANTITIES
+from .heading import SPELLINGS, Heading, known_name, read_heading
+from .plausible import refuse_implausible
+from .recording import Array, Recording
+from .table import Cells, RawTable
+
+
+def interpret(table: RawTable, *, units: Mapping[str, str], constants: Mapping[str, float | str]) -> Recording:
+    """The Recording that a table holds; `units` and `constants` given by the user go before the file's own.
+
+    Raises ColumnError or UnitError with file, row, value and remedy.
+    """
+    constants = _constants(table, constants)
+    ambient = float(constants.get("ambient", AMBIENT_PRESSURE))
+    headings = _headings(table, units)
+    columns: dict[str, Array] = {}
+    notes: list[str] = list(table.notes)
+    for heading, cells in zip(headings, table.columns, strict=True):
+        if heading.known:
+            converted, note = _in_si(table, heading, cells, ambient)
+            columns[heading.name] = converted
+        else:
+            note = _kept(heading, cells, columns)
+        notes += [note] if note and note not in notes else []
+    refuse_implausible(table, columns, constants.get("resting_length"), ambient)
+    return Recording(columns, table.origin, constants, tuple(notes))
+
+
+def _constants(table: RawTable, given: Mapping[str, float | str]) -> dict[str, Any]:
+    """The constants of the run, lengths and pressures in SI."""
+    found: dict[str, Any] = {**table.remarks, **given}
+    for name, unit in (("resting_length", "m"), ("ambient", "Pa")):
+        if name in found:
+            found[name] = quantity(found[name], unit, ambient=0.0, where=f"{table.origin}: {name}")
+            if not found[name] > 0:
+                raise ColumnError(f"{table.origin}: {name} is {found[name]:g} {unit}; it must be greater than zero.")
+    return found
+
+
+def _headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
+    """The headings with their units: the user's, the unit row's or their own, in this order."""
+    read = [read_heading(text) for text in table.headings]
+    stated = {known_name(key) or key: unit for key, unit in units.items()}
+    keys = [key for heading in read for key in (heading.name, heading.text)]
+    for key in stated:
+        if key not in keys:
+            known = [heading.name for heading in read]
+            there = f"there are {', '.join(known)}.{suggestion(key, known)}"
+            raise ColumnError(f"{table.origin}: a unit is given for '{key}', but {there}")
+    row = table.units or ()
+    found = [
+        Heading(h.text, h.name, stated.get(h.name, stated.get(h.text)) or below or h.unit, h.known)
+        for h, below in zip(read, [*row, *[""] * (len(read) - len(row))], strict=False)
+    ]
+    _refuse_twins(table, found)
+    if not any(heading.known for heading in found):
+        _refuse_all(table, found)
+    return found
+
+
+def _refuse_twins(table: RawTable, headings: list[Heading]) -> None:
+    seen: dict[str, str] = {}
+    for heading in headings:
+        if heading.name in seen and heading.text:
+            raise ColumnError(
+                f"{table.origin}: columns '{seen[heading.name]}' and '{heading.text}' both hold the {heading.name}. "
+                f"Rename or delete one; of several muscles, write 'left.{heading.name}' and 'right.{heading.name}'."
+            )
+        seen[heading.name] = heading.text
+
+
+def _refuse_all(table: RawTable, headings: list[Heading]) -> None:
+    names = [heading.text for heading in headings]
+    near = [n for name in names for n in difflib.get_close_matches(name.lower(), QUANTITIES, n=1)]
+    hint = f" Did you mean '{near[0]}'?" if near else ""
+    raise ColumnError(
+        f"{table.origin}: none of the columns ({', '.join(names)}) is known; known are {', '.join(QUANTITIES)}.{hint}"
+    )
+
+
+def _in_si(table: RawTable, heading: Heading, cells: Cells, ambient: float) -> tuple[Array, str]:
+    """A known column in SI units, and a note where its unit left something open."""
+    change = _conversion(table, heading, ambient)
+    values = _numbers(table, heading, cells)
+    if change.assumed_gauge:
+        said = f"unit '{heading.unit}' does not say; write bara or kPa(a) if it is absolute."
+        return change(values), f"The {heading.name} is taken as gauge: its {said}"
+    if heading.unit is None:
+        return values, f"The {heading.name} has no unit and is taken as a ratio."
+    return change(values), ""
+
+
+def _conversion(table: RawTable, heading: Heading, ambient: float) -> Conversion:
+    target = heading.target or "1"
+    where = f"{table.origin}, column '{heading.text}'"
+    usual = ", ".join(SPELLINGS[target])
+    if heading.unit is None:
+        if target == "1":
+            return Conversion(1.0)
+        raise UnitError(
+            f"{where}: no unit is stated. Head it '{heading.name} [{SPELLINGS[target][1 % len(SPELLINGS[target])]}]' "
+            f"or give units={{'{heading.name}': ...}}; usual are {usual}."
+        )
+    try:
+        return conversion(heading.unit, target, ambient=ambient, where=where)
+    except UnitError as reason:
+        cases = {spelling.lower(): spelling for spelling in SPELLINGS[target]}
+        near = difflib.get_close_matches(heading.unit.lower(), cases, n=1)
+        hint = f" Did you mean '{cases[near[0]]}'?" if near else f" The {heading.name} is usually in {usual}."
+        raise UnitError(f"{reason}{hint}") from None
+
+
+def _numbers(table: RawTable, heading: Heading, cells: Cells) -> Array:
+    """The cells as numbers. Raises ColumnError at the first that is none, or not finite."""
+    if isinstance(cells, list):
+        for row, cell in enumerate(cells):
+            try:
+                float(cell)
+            except ValueError:
+                said = f"'{cell}' is not a number" if cell else "has an empty cell"
+                raise ColumnError(
+                    f"{table.place(row)}: {heading.name} {said}. Correct the cell or delete the {table.row_word}."
+                ) from None
+    values = np.array(cells, dtype=float)
+    bad = ~np.isfinite(values)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise ColumnError(
+            f"{table.place(row)}: {heading.name} is {values[row]}, which no sensor measures (the column has "
+            f"{np.count_nonzero(bad)} such cells). Delete the {table.row_word}, or fill the gap before reading."
+        )
+    return values
+
+
+def _kept(heading: Heading, cells: Cells, columns: dict[str, Array]) -> str:
+    """Keep an unknown column as it is where it holds numbers; the note on it, if any."""
+    if isinstance(cells, list):
+        if not any(cells):
+            return ""
+        return f"Column '{heading.text}' holds text and is left out."
+    columns[heading.text or "unnamed"] = cells
+    near = difflib.get_close_matches(heading.text.partition(" ")[0].lower(), QUANTITIES, n=1)
+    hint = f" Did you mean '{near[0]}'?" if near else ""
+    return f"Column '{heading.text}' is no known quantity and is kept as it is, without conversion.{hint}"

@@ -1,0 +1,107 @@
+"""The recording itself: SI columns on common rows, constants, and where it came from."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import ColumnError, suggestion
+from .columns import quantity_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Recording:
+    """Columns in SI units, each of shape (N,), that share their rows.
+
+    `constants` hold what does not change in the run (resting_length [m], ambient [Pa], specimen);
+    `origin` is a file's name, or how it was simulated; `notes` are what the reader should know of it.
+    """
+
+    columns: Mapping[str, Array]
+    origin: str
+    constants: Mapping[str, float | str] = dataclasses.field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        arrays = {name: np.asarray(values, dtype=float) for name, values in self.columns.items()}
+        sizes = {name: values.shape for name, values in arrays.items()}
+        if len(set(sizes.values())) > 1 or any(len(shape) != 1 for shape in sizes.values()):
+            raise ColumnError(f"{self.origin}: columns must be vectors of one length; they are {sizes}.")
+        for values in arrays.values():
+            values.setflags(write=False)
+        object.__setattr__(self, "columns", arrays)
+
+    def __getitem__(self, name: str) -> Array:
+        """A column by its name; `contraction` and `length` follow from each other when L0 is known."""
+        if name in self.columns:
+            return self.columns[name]
+        resting_length = self.constants.get("resting_length")
+        if isinstance(resting_length, float | int):
+            if name == "contraction" and "length" in self.columns:
+                return (resting_length - self.columns["length"]) / resting_length
+            if name == "length" and "contraction" in self.columns:
+                return resting_length * (1.0 - self.columns["contraction"])
+        known = list(self.columns)
+        remedy = " Give the resting length to have it from the length." if name == "contraction" and "length" in known else ""
+        raise ColumnError(
+            f"{self.origin}: no column '{name}'; there are {', '.join(known)}.{suggestion(name, known)}{remedy}"
+        )
+
+    def __contains__(self, name: str) -> bool:
+        try:
+            self[name]
+        except ColumnError:
+            return False
+        return True
+
+    def __len__(self) -> int:
+        return next(iter(self.columns.values())).size if self.columns else 0
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    def rows(self, chosen: Any) -> Recording:
+        """The recording with only the rows picked by a mask, slice or index array."""
+        return dataclasses.replace(self, columns={name: values[chosen] for name, values in self.columns.items()})
+
+    def with_columns(self, **columns: Any) -> Recording:
+        """The recording with further, or other, columns in SI units."""
+        return dataclasses.replace(self, columns={**self.columns, **columns})
+
+    def with_constants(self, **constants: float | str) -> Recording:
+        """The recording with further, or other, constants."""
+        return dataclasses.replace(self, constants={**self.constants, **constants})
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A data frame whose headers carry the units: `pressure [Pa]`."""
+        import pandas as pd  # noqa: PLC0415
+
+        return pd.DataFrame({header(name): values for name, values in self.columns.items()})
+
+    def plot(self, *names: str) -> Any:
+        """Columns over time, or over the row number, one axis each; a Matplotlib figure."""
+        from .plot import plot_recording  # noqa: PLC0415
+
+        return plot_recording(self, names)
+
+    def __repr__(self) -> str:
+        return f"Recording({self.origin}: {len(self)} rows of {', '.join(self.columns)})"
+
+    def _repr_html_(self) -> str:
+        note = "".join(f"<br>{n}" for n in self.notes)
+        return f"<b>{self.origin}</b>{note}{self.to_pandas().describe().to_html(float_format='%.6g')}"
+
+
+def header(name: str) -> str:
+    """A column's heading with its unit, as files and data frames carry it."""
+    quantity = quantity_of(name)
+    return f"{name} [{quantity.unit}]" if quantity else name

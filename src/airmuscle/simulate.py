@@ -1,0 +1,180 @@
+"""Carrying a plant through time. A simulation returns a Recording, the type that a bench file becomes."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .command import Command, Schedule, Segments
+from .equilibrium import equilibrium
+from .errors import ParameterError, SimulationError, suggestion
+from .method import REASONS, Course, Method, Rodas4
+from .plant import Plant
+from .program import Prepared, System, prepared
+from .recording import Recording
+
+Array = npt.NDArray[np.float64]
+COARSEST = 0.01
+"""Output is at least this fine [s] unless asked otherwise."""
+
+
+def simulate(
+    plant: System,
+    command: Command,
+    *,
+    duration: float,
+    start: Mapping[str, float] | None = None,
+    start_time: float = 0.0,
+    method: Method | None = None,
+    output: float | Sequence[float] | None = None,
+    complete: bool = True,
+) -> Recording:
+    """Run a plant under a command for `duration` [s], and return its states, outputs and inputs as a Recording.
+
+    plant     any System: a Plant, or one's own
+    start     state by name; by default a Plant's equilibrium at ambient pressure
+    method    Rodas4(rtol=1e-6) unless given
+    output    spacing [s] or instants [s] of the rows; by default 1/1000 of the run, 10 ms at the coarsest. The
+              command's instants are always among the rows, with the inputs that begin there
+    complete  whether a run that ends early raises SimulationError (its `.recording` holds what was computed);
+              otherwise that part is returned, with the reason in its notes
+
+    The result does not depend on `output`. Raises ParameterError for an input or state that the plant lacks.
+    """
+    if not (np.isfinite(duration) and duration > 0):
+        raise ParameterError(f"simulate: duration is {duration!r} s; it must be positive and finite.")
+    if start is None:
+        start = _rest(plant)
+    method = method or Rodas4()
+    ready = prepared(plant)
+    segments = command.segments(plant.inputs, start_time, duration)
+    times = output_times(output, start_time, duration, segments.ends)
+    state = _vector(plant, start)
+    course = method.run(ready, segments, start_time, state, times)
+    recording = _recorded(ready, course, segments, times, start_time, method)
+    if course.status != 0:
+        problem = _problem(plant, course, start_time + duration)
+        recording = dataclasses.replace(recording, notes=(*recording.notes, problem))
+        if complete:
+            raise SimulationError(problem, recording)
+    return recording
+
+
+def advance(
+    plant: System,
+    state: Mapping[str, float],
+    inputs: Mapping[str, float],
+    dt: float,
+    method: Method | None = None,
+) -> dict[str, float]:
+    """The state after `dt` [s] with the inputs held: the seam that controllers and exports call.
+
+    Raises SimulationError where the step fails, ParameterError for an unknown name.
+    """
+    hold = Schedule({name: ((0.0, float(value)),) for name, value in inputs.items()})
+    segments = hold.segments(plant.inputs, 0.0, dt)
+    course = (method or Rodas4()).run(prepared(plant), segments, 0.0, _vector(plant, state), np.empty(0))
+    if course.status != 0:
+        raise SimulationError(_problem(plant, course, dt))
+    return {s.name: float(v) for s, v in zip(plant.states, course.state, strict=True)}
+
+
+def output_times(output: float | Sequence[float] | None, start: float, duration: float, instants: Array) -> Array:
+    """The instants [s] at which a run is recorded, in rising order, the command's instants among them."""
+    end = start + duration
+    if output is None:
+        output = min(duration / 1000, COARSEST)
+    if isinstance(output, float | int):
+        if not output > 0:
+            raise ParameterError(f"simulate: an output spacing of {output!r} s is not positive.")
+        grid = start + output * np.arange(int(np.floor(duration / output * (1 + 1e-12))) + 1)
+    else:
+        grid = np.sort(np.asarray(output, dtype=float))
+        if grid.size and not (grid[0] >= start and grid[-1] <= end):
+            raise ParameterError(f"simulate: output instants must lie within {start:g} to {end:g} s.")
+    apart = np.min(np.abs(grid[:, None] - instants[None, :]), axis=1) > 1e-9 * duration if grid.size else grid > 0
+    return np.unique(np.concatenate([grid[apart], instants]))
+
+
+def _rest(plant: System) -> Mapping[str, float]:
+    if isinstance(plant, Plant):
+        return equilibrium(plant, pressure=0.0)
+    raise ParameterError(f"simulate: give the start of {type(plant).__name__}, a value for each state.")
+
+
+def _vector(plant: System, state: Mapping[str, float]) -> Array:
+    names = [s.name for s in plant.states]
+    for name in state:
+        if name not in names:
+            raise ParameterError(f"the plant has no state '{name}'; there are {', '.join(names)}.{suggestion(name, names)}")
+    missing = [name for name in names if name not in state]
+    if missing:
+        raise ParameterError(f"the start lacks {', '.join(missing)}; use plant.state_at(pressure=...) or equilibrium.")
+    values = np.array([state[name] for name in names], dtype=float)
+    if not np.isfinite(values).all():
+        raise ParameterError(f"the start must be finite; it is {dict(zip(names, values.tolist(), strict=True))}.")
+    return values
+
+
+def _recorded(
+    ready: Prepared, course: Course, segments: Segments, times: Array, start: float, method: Method
+) -> Recording:
+    from .engine.evaluate import evaluate  # noqa: PLC0415
+    from .engine.once import announce_compilation  # noqa: PLC0415
+
+    plant, reached = ready.system, course.reached
+    states = np.ascontiguousarray(course.rows[:reached])
+    inputs = np.ascontiguousarray(segments.inputs_at(times[:reached], start))
+    results = np.empty((reached, ready.sizes.outputs))
+    announce_compilation(evaluate)
+    evaluate(ready.address["outputs"], ready.held, states, inputs, results)
+    columns: dict[str, Any] = {"time": times[:reached]}
+    columns |= {s.name: states[:, i] for i, s in enumerate(plant.states)}
+    columns |= {name: results[:, i] for i, name in enumerate(ready.output_names)}
+    columns |= {name: inputs[:, i] for i, name in enumerate(plant.inputs)}
+    notes: list[str] = [f"simulated by {method}: {course.steps} steps, {course.rejected} rejected"]
+    constants: dict[str, float | str] = {}
+    if isinstance(plant, Plant):
+        constants = {"ambient": plant.ambient.pressure}
+        if len(plant.muscles) == 1:
+            constants["resting_length"] = plant.muscles[0].geometry.resting_length
+        notes += [f"gas: {plant.gas}", "friction: off", *outside_box(plant, columns)]
+    return Recording(columns, "simulation", constants, tuple(notes))
+
+
+def outside_box(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
+    """When and how far a run left the box in which a muscle's characteristic has data."""
+    found = []
+    for prefix, muscle in zip(plant.prefixes, plant.muscles, strict=True):
+        box = getattr(muscle.contractile, "box", None)
+        if box is None:
+            continue
+        for name, scale, unit in (("pressure", 1e3, "kPa"), ("contraction", 0.01, "%")):
+            low, high = getattr(box, name)
+            values = columns[f"{prefix}{name}"]
+            beyond = np.maximum(low - values, values - high)
+            if (beyond > 1e-9 * (high - low)).any():
+                worst = int(np.argmax(beyond))
+                when = columns["time"][beyond > 0]
+                found.append(
+                    f"{muscle.name} left the box of its characteristic in {name} ({low / scale:.4g} to "
+                    f"{high / scale:.4g} {unit}) between {when[0]:.4g} and {when[-1]:.4g} s, by at most "
+                    f"{beyond[worst] / scale:.4g} {unit} at {columns['time'][worst]:.4g} s; there it goes on by its tangent"
+                )
+    return found
+
+
+def _problem(plant: System, course: Course, end: float) -> str:
+    state = ", ".join(f"{s.name} {v:.6g} {s.unit}" for s, v in zip(plant.states, course.state, strict=True))
+    remedy = {
+        4: "Raise the tolerance, or look for a valve that chatters.",
+        5: "Nothing is lost; what was computed is in the recording.",
+    }.get(course.status, "Look at the last state: a parameter may be far from physical, or a fixed step too long.")
+    return (
+        f"the run ended at {course.time:.6g} of {end:.6g} s because {REASONS[course.status]}, after {course.steps} "
+        f"steps, at {state}. {remedy}"
+    )

@@ -1,0 +1,121 @@
+"""A law becomes symbols, and symbols give exact derivatives.
+
+`slope` differentiates a law by one of its arguments wherever it is called: on numbers and arrays, inside a
+trace, or on JAX arrays. `jacobian` adds the derivatives by every parameter, which is what a fit needs.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import declare, ops
+from .errors import TraceError
+
+_functions: dict[Any, Any] = {}
+
+
+def symbolic(thing: Any) -> tuple[Any, Any]:
+    """The model with a CasADi symbol in place of every leaf, and the vector of these symbols."""
+    import casadi  # noqa: PLC0415  (60 ms that a command without derivatives need not pay)
+
+    count = sum(1 for _ in declare.leaves(thing))
+    vector = casadi.SX.sym("p", count)
+    return declare.rebuild(thing, [vector[i] for i in range(count)]), vector
+
+
+def refuse_non_finite(expression: Any, owner: str) -> None:
+    """Raise TraceError where a trace holds NaN or infinity: math.sqrt or float() of a symbol makes them silently."""
+    import casadi  # noqa: PLC0415
+
+    function = casadi.Function("probe", casadi.symvar(expression), [expression])
+    for i in range(function.n_instructions()):
+        if function.instruction_id(i) == casadi.OP_CONST and not math.isfinite(function.instruction_constant(i)):
+            raise TraceError(
+                f"{owner} traced to a constant that is not finite. Use airmuscle.ops instead of math and numpy, "
+                "and no float() of an argument."
+            )
+
+
+def _function(thing: Any, method: str, count: int) -> Any:
+    """The CasADi function (arguments, parameters) -> (value, by each argument, by parameters), traced once."""
+    import casadi  # noqa: PLC0415
+
+    key = (declare.structure(thing), method, count)
+    if key not in _functions:
+        model, parameters = symbolic(thing)
+        arguments = [casadi.SX.sym(f"x{i}") for i in range(count)]
+        value = casadi.SX(getattr(model, method)(*arguments))
+        refuse_non_finite(value, f"{type(thing).__name__}.{method}")
+        outputs = [value, *(casadi.jacobian(value, x) for x in arguments), casadi.jacobian(value, parameters)]
+        _functions[key] = casadi.Function("law", [*arguments, parameters], casadi.cse(outputs))
+    return _functions[key]
+
+
+def _evaluated(thing: Any, method: str, arguments: tuple[Any, ...]) -> tuple[list[Any], tuple[int, ...], int]:
+    broadcast = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in arguments))
+    rows = [x.reshape(1, -1) for x in broadcast]
+    results = _function(thing, method, len(arguments))(*rows, declare.flatten(thing))
+    return [np.asarray(r) for r in results], broadcast[0].shape, rows[0].size
+
+
+def slope(thing: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
+    """The exact derivative of `thing.method(*arguments)` by argument number `wrt`, shaped like the arguments."""
+    if ops.is_symbol(*arguments):
+        return _symbolic_slope(thing, method, arguments, wrt)
+    if any(type(x).__module__.startswith("jax") for x in arguments):
+        return _jax_slope(thing, method, arguments, wrt)
+    results, shape, _ = _evaluated(thing, method, arguments)
+    found = results[1 + wrt].reshape(shape)
+    return float(found) if found.ndim == 0 else found
+
+
+def _symbolic_slope(thing: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
+    import casadi  # noqa: PLC0415
+
+    symbol = casadi.SX.sym("x")
+    inner = [symbol if i == wrt else x for i, x in enumerate(arguments)]
+    derivative = casadi.jacobian(casadi.SX(getattr(thing, method)(*inner)), symbol)
+    return casadi.substitute(derivative, symbol, arguments[wrt])
+
+
+def _jax_slope(thing: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
+    import jax  # type: ignore[import-not-found, unused-ignore]  # noqa: PLC0415  (an optional extra)
+
+    def along(x: Any) -> Any:
+        return getattr(thing, method)(*(x if i == wrt else a for i, a in enumerate(arguments)))
+
+    at = jax.numpy.asarray(arguments[wrt], dtype=float)
+    return jax.jvp(along, (at,), (jax.numpy.ones_like(at),))[1]
+
+
+def directional(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], along: Sequence[Any]) -> tuple[Any, ...]:
+    """The exact derivative of a vector function over `ops` at a point, along a direction: J(at) along.
+
+    `at` and `along` hold numbers or CasADi symbols; `function` takes the point as one sequence.
+    """
+    import casadi  # noqa: PLC0415
+
+    point, direction = casadi.SX.sym("x", len(at)), casadi.vertcat(*along)
+    values = casadi.vertcat(*(casadi.SX(v) for v in function([point[i] for i in range(len(at))])))
+    derivative = casadi.substitute(casadi.jtimes(values, point, direction), point, casadi.vertcat(*at))
+    parts = tuple(derivative[i] for i in range(derivative.numel()))
+    return parts if ops.is_symbol(*at, *along) else tuple(float(part) for part in parts)
+
+
+def jacobian(thing: Any, method: str, *arguments: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Values (N,) of `thing.method` at N points, and their derivatives (N, P) by the P leaves of `thing`."""
+    results, _, count = _evaluated(thing, method, arguments)
+    size = results[-1].size // max(count, 1)
+    return results[0].reshape(-1), results[-1].reshape(count, size)
+
+
+@functools.cache
+def is_traceable(cls: type[Any]) -> bool:
+    """Whether a class of laws can be traced; a law that cannot says so in `traceable = False`."""
+    return bool(getattr(cls, "traceable", True))
