@@ -1,1 +1,64 @@
-"""airmuscle."""
+"""Pneumatic artificial muscles: from a bench file to a fitted muscle, from a muscle to a plant with valves and load.
+
+Nouns are frozen models, verbs are functions. Everything inside is SI, pressure is gauge, contraction is
+(L0 - L)/L0, pulling is positive. Laws stand in `airmuscle.characteristic`, units in `airmuscle.units`.
+"""
+
+from . import characteristic, geometry, units
+from .circuit import Circuit, FillDischarge, Supply, Valve
+from .command import Schedule, Signal
+from .equilibrium import equilibrium
+from .errors import AirmuscleError
+from .gas import Ambient, Isothermal, Polytropic
+from .identify import Fit, fit
+from .library.catalogue import load, measured, names, save
+from .mechanism import HangingMass, Held, Isometric, Mechanism
+from .method import DormandPrince8, Rodas4, RungeKutta4
+from .muscle import LinearDamper, LinearSpring, Muscle
+from .plant import Plant
+from .recording import Recording, read_csv, write_csv
+from .reference import Reference, cite
+from .simulate import advance, simulate
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "AirmuscleError",
+    "Ambient",
+    "Circuit",
+    "DormandPrince8",
+    "FillDischarge",
+    "Fit",
+    "HangingMass",
+    "Held",
+    "Isometric",
+    "Isothermal",
+    "LinearDamper",
+    "LinearSpring",
+    "Mechanism",
+    "Muscle",
+    "Plant",
+    "Polytropic",
+    "Recording",
+    "Reference",
+    "Rodas4",
+    "RungeKutta4",
+    "Schedule",
+    "Signal",
+    "Supply",
+    "Valve",
+    "advance",
+    "characteristic",
+    "cite",
+    "equilibrium",
+    "fit",
+    "geometry",
+    "load",
+    "measured",
+    "names",
+    "read_csv",
+    "save",
+    "simulate",
+    "units",
+    "write_csv",
+]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -58,8 +59,10 @@ class Schedule(Command):
             times = [time for time, _ in changes]
             if not np.isfinite(changes).all() if changes else False:
                 raise ParameterError(f"the schedule of '{name}' holds a number that is not finite: {list(changes)}.")
-            if any(b <= a for a, b in zip(times, times[1:], strict=False)):
-                raise ParameterError(f"the schedule of '{name}' must name its instants in rising order; it has {times}.")
+            if any(b <= a for a, b in itertools.pairwise(times)):
+                raise ParameterError(
+                    f"the schedule of '{name}' must name its instants in rising order; it has {times}."
+                )
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
         _refuse_unknown(list(self.changes), inputs)
@@ -76,7 +79,7 @@ class Schedule(Command):
 
 @dataclasses.dataclass(frozen=True)
 class Signal(Command):
-    """Piecewise linear inputs, each a sequence of (time [s], value); held constant before the first and after the last."""
+    """Piecewise linear inputs, each a sequence of (time [s], value); constant before the first and after the last."""
 
     points: Mapping[str, Sequence[tuple[float, float]]]
 
@@ -84,8 +87,10 @@ class Signal(Command):
         for name, points in self.points.items():
             times = [time for time, _ in points]
             if not points or not np.isfinite(points).all():
-                raise ParameterError(f"the signal of '{name}' must be finite points (time, value); it is {list(points)}.")
-            if any(b <= a for a, b in zip(times, times[1:], strict=False)):
+                raise ParameterError(
+                    f"the signal of '{name}' must be finite points (time, value); it is {list(points)}."
+                )
+            if any(b <= a for a, b in itertools.pairwise(times)):
                 raise ParameterError(f"the signal of '{name}' must name its times in rising order; it has {times}.")
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:

@@ -148,7 +148,8 @@ def structure(thing: Any) -> Any:
 def rebuild(thing: T, values: Sequence[Any]) -> T:
     """The same model with other leaf values, in the order of `leaves`; symbols are put in unchecked."""
     feed = iter(values)
-    return _rebuild(thing, feed)
+    rebuilt: T = _rebuild(thing, feed)
+    return rebuilt
 
 
 def _rebuild(thing: Any, feed: Iterator[Any]) -> Any:
@@ -172,14 +173,17 @@ def _rebuild(thing: Any, feed: Iterator[Any]) -> Any:
 
 def with_parameters(thing: T, values: Sequence[float]) -> T:
     """The same model with other leaf values, checked as if it were newly made."""
-    return _revalidated(rebuild(thing, [float(v) for v in values]))
+    checked: T = _revalidated(rebuild(thing, [float(v) for v in values]))
+    return checked
 
 
 def _revalidated(thing: Any) -> Any:
     if isinstance(thing, tuple):
         return tuple(_revalidated(item) for item in thing)
     if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
-        return dataclasses.replace(thing, **{f.name: _revalidated(getattr(thing, f.name)) for f in dataclasses.fields(thing)})
+        return dataclasses.replace(
+            thing, **{f.name: _revalidated(getattr(thing, f.name)) for f in dataclasses.fields(thing)}
+        )
     return thing
 
 
@@ -190,5 +194,3 @@ def field_or_suggestion(cls: type[Any], name: str) -> None:
         raise ParameterError(
             f"{cls.__name__} has no parameter '{name}'; there are {', '.join(known)}.{suggestion(name, known)}"
         )
-
-

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
 
 from .errors import NoEquilibrium, NoSolution
 from .plant import Plant
@@ -32,6 +31,8 @@ def equilibria(plant: Plant, *, pressure: float | tuple[float, ...]) -> tuple[Re
     """
     if not plant.mechanism.coordinates:
         return (Rest(plant.state_at(pressure=pressure), True),)
+    from scipy.optimize import brentq  # a slow import that a run with a given start need not pay
+
     search = _Search(plant, pressure)
     positions = search.positions()
     pulls = np.array([search.acceleration(x) for x in positions])

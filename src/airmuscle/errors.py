@@ -22,10 +22,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from .recording import Recording
+from typing import Any
 
 
 class AirmuscleError(Exception):
@@ -85,9 +82,9 @@ class IdentificationError(AirmuscleError):
 
 
 class SimulationError(AirmuscleError):
-    """A run that ended early; `.recording` holds what it computed until then."""
+    """A run that ended early; `.recording` is a Recording of what it computed until then, or None."""
 
-    def __init__(self, message: str, recording: Recording | None = None) -> None:
+    def __init__(self, message: str, recording: Any = None) -> None:
         super().__init__(message)
         self.recording = recording
 

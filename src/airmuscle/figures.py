@@ -15,7 +15,7 @@ DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)
 """The order in which they take dashes, so that a grey print still tells them apart."""
 MARKERS = ("o", "s", "^", "D", "v", "x", "+")
 
-_STYLE = {
+_STYLE: Any = {
     "font.size": 9, "axes.titlesize": 9, "axes.labelsize": 9, "legend.fontsize": 8, "xtick.labelsize": 8,
     "ytick.labelsize": 8, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
     "grid.alpha": 0.25, "grid.linewidth": 0.5, "lines.linewidth": 1.4, "lines.markersize": 4,
@@ -29,9 +29,9 @@ def new_figure(rows: int = 1, columns: int = 1, *, width: float = 6.3, height: f
 
     The figure belongs to no window and no global state; save it with `figure.savefig`.
     """
-    import matplotlib as mpl  # noqa: PLC0415  (slow to import, needed only for figures)
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
-    from matplotlib.figure import Figure  # noqa: PLC0415
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
 
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(width, height), layout="constrained")
@@ -42,13 +42,32 @@ def new_figure(rows: int = 1, columns: int = 1, *, width: float = 6.3, height: f
 
 def save(figure: Any, path: Any) -> None:
     """Write a figure byte-identically for the same content, to the format that the path's suffix names."""
-    import matplotlib as mpl  # noqa: PLC0415
+    import matplotlib as mpl
 
+    _dress(figure)
     with mpl.rc_context(_STYLE):
         metadata = {"Date": None} if str(path).endswith(".svg") else None
         figure.savefig(path, metadata=metadata)
 
 
+def _dress(figure: Any) -> None:
+    """Give titles and legends the house style: Matplotlib sets it when they are made, outside our reach."""
+    legends = [*figure.legends, *(a.get_legend() for a in figure.axes if a.get_legend() is not None)]
+    for legend in legends:
+        legend.set_frame_on(False)
+        for text in (*legend.get_texts(), legend.get_title()):
+            text.set_fontsize(_STYLE["legend.fontsize"])
+    for axes in figure.axes:
+        axes.title.set_fontsize(_STYLE["axes.titlesize"])
+
+
 def legend_outside(axes: Any, **options: Any) -> Any:
     """A legend beside the axes, where it covers no data."""
-    return axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, **options)
+    style = {"fontsize": 8, "title_fontsize": 8, "frameon": False}  # the style's own hold only while a figure is made
+    return axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, **{**style, **options})
+
+
+def legend_below(figure: Any, axes: Any, columns: int = 2) -> Any:
+    """One legend under all axes of a figure, for the curves of one of them."""
+    handles, labels = axes.get_legend_handles_labels()
+    return figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)

@@ -35,7 +35,12 @@ class Ambient:
     references: ClassVar[tuple[Reference, ...]] = (ISO8778,)
 
     pressure: float = parameter(
-        "Pa", "p_amb", "absolute pressure of the surroundings", bounds=(1e3, 2e5), fitted=False, default=AMBIENT_PRESSURE
+        "Pa",
+        "p_amb",
+        "absolute pressure of the surroundings",
+        bounds=(1e3, 2e5),
+        fitted=False,
+        default=AMBIENT_PRESSURE,
     )
     temperature: float = parameter(
         "K", "T_amb", "temperature of the surroundings", bounds=(200.0, 400.0), fitted=False, default=293.15

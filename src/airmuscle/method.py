@@ -46,10 +46,16 @@ class Method(abc.ABC):
         """The kernel, its leading and its trailing arguments, and the length of its workspace."""
 
     def run(
-        self, prepared: Prepared, segments: Segments, start: float, state: Array, times: Array, most_steps: int = 50_000_000
+        self,
+        prepared: Prepared,
+        segments: Segments,
+        start: float,
+        state: Array,
+        times: Array,
+        most_steps: int = 50_000_000,
     ) -> Course:
         """Carry `state` (n,) from `start` through the segments; rows (N, n) at `times` (N,), which must rise."""
-        from .engine.once import announce_compilation  # noqa: PLC0415
+        from .engine.once import announce_compilation
 
         kernel, leading, trailing, size = self._kernel(prepared)
         announce_compilation(kernel)
@@ -73,7 +79,7 @@ class Rodas4(Method):
     rtol: float = parameter("1", "rtol", "relative tolerance of a step", bounds=(1e-13, 0.1), default=1e-6)
 
     def _kernel(self, prepared: Prepared) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
-        from .engine.rodas4 import rodas4  # noqa: PLC0415  (numba starts only where something runs)
+        from .engine.rodas4 import rodas4
 
         sizes, at = prepared.sizes, prepared.address
         addresses = (at["stage"], at["jac"], at["factor"], at["solve"], at["drift"], sizes.jacobian, sizes.factors)
@@ -91,7 +97,7 @@ class Explicit(Method):
         """Rows of the tableau below its first, and the weights."""
 
     def _kernel(self, prepared: Prepared) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
-        from .engine.fixed_step import fixed_step  # noqa: PLC0415
+        from .engine.fixed_step import fixed_step
 
         address, held = prepared.program.step(*self.tableau(), prepared.parameters)
         return fixed_step, (address, held), (self.step,), prepared.sizes.states + 2 * prepared.sizes.inputs

@@ -110,7 +110,9 @@ def _vector(plant: System, state: Mapping[str, float]) -> Array:
     names = [s.name for s in plant.states]
     for name in state:
         if name not in names:
-            raise ParameterError(f"the plant has no state '{name}'; there are {', '.join(names)}.{suggestion(name, names)}")
+            raise ParameterError(
+                f"the plant has no state '{name}'; there are {', '.join(names)}.{suggestion(name, names)}"
+            )
     missing = [name for name in names if name not in state]
     if missing:
         raise ParameterError(f"the start lacks {', '.join(missing)}; use plant.state_at(pressure=...) or equilibrium.")
@@ -123,8 +125,8 @@ def _vector(plant: System, state: Mapping[str, float]) -> Array:
 def _recorded(
     ready: Prepared, course: Course, segments: Segments, times: Array, start: float, method: Method
 ) -> Recording:
-    from .engine.evaluate import evaluate  # noqa: PLC0415
-    from .engine.once import announce_compilation  # noqa: PLC0415
+    from .engine.evaluate import evaluate
+    from .engine.once import announce_compilation
 
     plant, reached = ready.system, course.reached
     states = np.ascontiguousarray(course.rows[:reached])
@@ -159,11 +161,11 @@ def outside_box(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
             beyond = np.maximum(low - values, values - high)
             if (beyond > 1e-9 * (high - low)).any():
                 worst = int(np.argmax(beyond))
-                when = columns["time"][beyond > 0]
+                share = float(np.mean(beyond > 0))
                 found.append(
                     f"{muscle.name} left the box of its characteristic in {name} ({low / scale:.4g} to "
-                    f"{high / scale:.4g} {unit}) between {when[0]:.4g} and {when[-1]:.4g} s, by at most "
-                    f"{beyond[worst] / scale:.4g} {unit} at {columns['time'][worst]:.4g} s; there it goes on by its tangent"
+                    f"{high / scale:.4g} {unit}) in {share:.0%} of the rows, by at most {beyond[worst] / scale:.4g} "
+                    f"{unit} at {columns['time'][worst]:.4g} s; there it goes on by its tangent"
                 )
     return found
 

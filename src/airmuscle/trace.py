@@ -22,7 +22,7 @@ _functions: dict[Any, Any] = {}
 
 def symbolic(thing: Any) -> tuple[Any, Any]:
     """The model with a CasADi symbol in place of every leaf, and the vector of these symbols."""
-    import casadi  # noqa: PLC0415  (60 ms that a command without derivatives need not pay)
+    import casadi
 
     count = sum(1 for _ in declare.leaves(thing))
     vector = casadi.SX.sym("p", count)
@@ -31,7 +31,7 @@ def symbolic(thing: Any) -> tuple[Any, Any]:
 
 def refuse_non_finite(expression: Any, owner: str) -> None:
     """Raise TraceError where a trace holds NaN or infinity: math.sqrt or float() of a symbol makes them silently."""
-    import casadi  # noqa: PLC0415
+    import casadi
 
     function = casadi.Function("probe", casadi.symvar(expression), [expression])
     for i in range(function.n_instructions()):
@@ -44,7 +44,7 @@ def refuse_non_finite(expression: Any, owner: str) -> None:
 
 def _function(thing: Any, method: str, count: int) -> Any:
     """The CasADi function (arguments, parameters) -> (value, by each argument, by parameters), traced once."""
-    import casadi  # noqa: PLC0415
+    import casadi
 
     key = (declare.structure(thing), method, count)
     if key not in _functions:
@@ -76,7 +76,7 @@ def slope(thing: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
 
 
 def _symbolic_slope(thing: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
-    import casadi  # noqa: PLC0415
+    import casadi
 
     symbol = casadi.SX.sym("x")
     inner = [symbol if i == wrt else x for i, x in enumerate(arguments)]
@@ -85,7 +85,7 @@ def _symbolic_slope(thing: Any, method: str, arguments: tuple[Any, ...], wrt: in
 
 
 def _jax_slope(thing: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
-    import jax  # type: ignore[import-not-found, unused-ignore]  # noqa: PLC0415  (an optional extra)
+    import jax  # type: ignore[import-not-found, unused-ignore]
 
     def along(x: Any) -> Any:
         return getattr(thing, method)(*(x if i == wrt else a for i, a in enumerate(arguments)))
@@ -99,7 +99,7 @@ def directional(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], alo
 
     `at` and `along` hold numbers or CasADi symbols; `function` takes the point as one sequence.
     """
-    import casadi  # noqa: PLC0415
+    import casadi
 
     point, direction = casadi.SX.sym("x", len(at)), casadi.vertcat(*along)
     values = casadi.vertcat(*(casadi.SX(v) for v in function([point[i] for i in range(len(at))])))

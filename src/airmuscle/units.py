@@ -54,7 +54,7 @@ class Conversion:
 
 @functools.cache
 def _registry() -> Any:
-    import pint  # noqa: PLC0415  (slow to import, and seldom needed)
+    import pint
 
     return pint.UnitRegistry()
 
@@ -66,7 +66,7 @@ def _pint_text(unit: str) -> str:
 
 
 def _by_pint(unit: str, target: str, where: str) -> Conversion:
-    import pint  # noqa: PLC0415
+    import pint
 
     try:
         registry = _registry()

@@ -27,9 +27,9 @@ FILES = sorted(SOURCE.rglob("*.py"))
 PHYSICS = re.compile(
     r"(?<![a-z])(muscle|pressure|valve|gas|contraction|force)(s|es)?(?![a-z])", re.IGNORECASE
 )
-# May be imported by their siblings: the base, the search, and laws made of other laws.
-SHARED_LAWS = {"base", "solve"}
-COMPOSITES = {"__init__", "scaled", "tangent", "adapters"}
+# May be imported by their siblings: the base, the search, a wall's rubber, and laws made of other laws.
+SHARED_LAWS = {"base", "solve", "box", "rubber"}
+COMPOSITES = {"__init__", "scaled", "tangent", "as_force_law"}
 
 
 def name_of(path: Path) -> str:

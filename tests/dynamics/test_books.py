@@ -114,7 +114,10 @@ def test_a_muscle_never_pushes():
     assert run["force"].min() == 0.0
 
 
-@pytest.mark.parametrize(("pressure", "position", "message"), [(-2e5, 0.0, "below absolute zero"), (1e5, 0.25, "cannot take a contraction of 125")])
+@pytest.mark.parametrize(
+    ("pressure", "position", "message"),
+    [(-2e5, 0.0, "below absolute zero"), (1e5, 0.25, "cannot take a contraction of 125")],
+)
 def test_a_state_that_cannot_be_is_refused(pressure, position, message):
     plant = Plant(chosen_muscle(), CIRCUIT, HangingMass(1.0))
     with pytest.raises(Exception, match=message) as caught:

@@ -26,8 +26,18 @@ def hanging() -> Plant:
 
 
 CASES = {
-    3: (hanging(), hanging().state_at(pressure=1e5, position=0.002), Schedule({"fill": ((0.2, 1), (1.0, 0)), "discharge": ((1.5, 1), (1.8, 0))}), 2.5),
-    6: (joint(), joint_start(joint()), Schedule({"left.fill": ((0.2, 1), (0.25, 0)), "right.discharge": ((0.2, 1), (0.25, 0))}), 1.0),
+    3: (
+        hanging(),
+        hanging().state_at(pressure=1e5, position=0.002),
+        Schedule({"fill": ((0.2, 1), (1.0, 0)), "discharge": ((1.5, 1), (1.8, 0))}),
+        2.5,
+    ),
+    6: (
+        joint(),
+        joint_start(joint()),
+        Schedule({"left.fill": ((0.2, 1), (0.25, 0)), "right.discharge": ((0.2, 1), (0.25, 0))}),
+        1.0,
+    ),
     10: (
         joint(heat=True),
         joint_start(joint(heat=True)),
@@ -71,7 +81,7 @@ def test_plants_of_every_size_agree_with_scipy(size):
 
 @pytest.mark.parametrize("size", CASES)
 def test_the_printed_rates_are_the_rates(size):
-    plant, start, command, _ = CASES[size]
+    plant, start, _, _ = CASES[size]
     ready, rng = prepared(plant), np.random.default_rng(size)
     for _ in range(20):
         state = {n: v * (1 + 0.05 * rng.standard_normal()) + 1e-3 * (v == 0) for n, v in start.items()}
@@ -143,7 +153,9 @@ def test_the_solution_does_not_depend_on_the_output():
         many = simulate(plant, command, duration=duration, start=start, method=method, output=1e-3)
         for name in ("position", "air_mass"):
             assert few[name][-1] == many[name][-1]
-        assert few["position"][few["time"] == 0.5] == pytest.approx(many["position"][np.isclose(many["time"], 0.5)], rel=1e-12)
+        assert few["position"][few["time"] == 0.5] == pytest.approx(
+            many["position"][np.isclose(many["time"], 0.5)], rel=1e-12
+        )
 
 
 def test_rows_between_fixed_steps_are_as_exact_as_the_steps():
@@ -190,7 +202,9 @@ class Explodes:
 
 @pytest.mark.parametrize("method", [Rodas4(1e-6), DormandPrince8(1e-3)])
 def test_a_run_that_fails_returns_what_it_has(method):
-    with pytest.raises(SimulationError, match=r"the run ended at (0\.99\d*|1) of 2 s because .*, after \d+ steps, at y ") as caught:
+    with pytest.raises(
+        SimulationError, match=r"the run ended at (0\.99\d*|1) of 2 s because .*, after \d+ steps, at y "
+    ) as caught:
         simulate(Explodes(), REST, duration=2.0, start={"y": 1.0}, method=method, output=0.1)
     kept = caught.value.recording
     np.testing.assert_allclose(kept["y"][:10], 1 / (1 - kept["time"][:10]), rtol=1e-4)

@@ -14,7 +14,9 @@ class Clamped(ForceLaw):
     """F = min(max(F_inner, F_min), F_max): a muscle pulls and never pushes, and a compensator limits its force."""
 
     inner: ForceLaw
-    least_force: float = parameter("N", "F_min", "force that the clamp lets through at least", fitted=False, default=0.0)
+    least_force: float = parameter(
+        "N", "F_min", "force that the clamp lets through at least", fitted=False, default=0.0
+    )
     greatest_force: float = parameter(
         "N", "F_max", "force that the clamp lets through at most", fitted=False, default=1.0e5
     )

@@ -10,6 +10,7 @@ from ..errors import ParameterError
 from ..ops import Value
 from ..reference import Reference
 from .base import ForceLaw
+from .box import Box
 
 HOSOVSKY_HILL = Reference(
     "hosovsky-hill",
@@ -46,7 +47,9 @@ class ContractileSurface(ForceLaw):
     greatest_pressure: float = parameter("Pa", "p_high", "upper end of the box in gauge pressure", fitted=False)
     least_contraction: float = parameter("1", "eps_low", "lower end of the box in contraction", fitted=False)
     greatest_contraction: float = parameter("1", "eps_high", "upper end of the box in contraction", fitted=False)
-    least_force: float = parameter("N", "F_min", "force that the clamp lets through at least", fitted=False, default=0.0)
+    least_force: float = parameter(
+        "N", "F_min", "force that the clamp lets through at least", fitted=False, default=0.0
+    )
     greatest_force: float = parameter(
         "N", "F_max", "force that the clamp lets through at most", fitted=False, default=1200.0
     )
@@ -56,7 +59,7 @@ class ContractileSurface(ForceLaw):
         wanted = len(exponents(self.degree))
         if len(self.coefficients) != wanted:
             raise ParameterError(
-                f"ContractileSurface of degree {self.degree} needs {wanted} coefficients; {len(self.coefficients)} given."
+                f"ContractileSurface: degree {self.degree} needs {wanted} coefficients, not {len(self.coefficients)}."
             )
         for name, low, high in (
             ("pressure", self.least_pressure, self.greatest_pressure),
@@ -64,7 +67,9 @@ class ContractileSurface(ForceLaw):
             ("force", self.least_force, self.greatest_force),
         ):
             if not low < high:
-                raise ParameterError(f"ContractileSurface: least_{name} {low:g} must lie below greatest_{name} {high:g}.")
+                raise ParameterError(
+                    f"ContractileSurface: least_{name} {low:g} must lie below greatest_{name} {high:g}."
+                )
 
     @classmethod
     def blank(cls, degree: int = 5, *, least_force: float = 0.0, greatest_force: float = 1200.0) -> ContractileSurface:
@@ -77,6 +82,11 @@ class ContractileSurface(ForceLaw):
         return ContractileSurface(
             self.coefficients, *pressure, *contraction, self.least_force, self.greatest_force, self.degree
         )
+
+    @property
+    def box(self) -> Box:
+        """Where the surface has data; outside it goes on by its tangent."""
+        return Box(self.least_pressure, self.greatest_pressure, self.least_contraction, self.greatest_contraction)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         return ops.clip(self.polynomial(pressure, contraction), self.least_force, self.greatest_force)

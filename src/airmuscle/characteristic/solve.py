@@ -27,7 +27,7 @@ def first_crossing(
     that broadcast; the answer has their shape. `message(a, b, lowest, greatest)` words the NoSolution raised for
     the first pair without a crossing, from the least and greatest value that `function` takes in `reach`.
     """
-    from scipy.optimize import elementwise  # noqa: PLC0415  (0.4 s that `airmuscle list` need not pay)
+    from scipy.optimize import elementwise
 
     first, second = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in given))
     a, b = first.reshape(-1), second.reshape(-1)

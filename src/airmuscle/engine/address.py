@@ -9,7 +9,7 @@ from numba import types
 from numba.extending import intrinsic
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def invoke(typing_context: Any, address: Any, arguments: Any) -> Any:
     """Call the function at `address`, which returns nothing, with addresses and floats."""
     signature = types.void(types.intp, arguments)
@@ -23,7 +23,7 @@ def invoke(typing_context: Any, address: Any, arguments: Any) -> Any:
     return signature, generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def pointer(typing_context: Any, array: Any) -> Any:
     """The address of an array's first element."""
     signature = types.intp(array)

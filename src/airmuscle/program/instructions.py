@@ -94,9 +94,10 @@ def hoisted(code: Code, parameter_input: int) -> tuple[Code, tuple[Instruction, 
     def depends(operand: Operand) -> bool:
         if operand[0] == "t":
             return varies[operand]
-        return operand[0] == "in" and operand[1] != parameter_input
+        return bool(operand[0] == "in" and operand[1] != parameter_input)
 
-    once, always = [], []
+    once: list[Instruction] = []
+    always: list[Instruction] = []
     for line in code.body:
         varies[line.result] = any(depends(a) for a in line.arguments)
         (always if varies[line.result] else once).append(line)

@@ -32,7 +32,7 @@ def _constant(value: float) -> str:
     return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
 
 
-ONE, ZERO = _constant(1.0), _constant(0.0)
+ONE, ZERO, LESS = _constant(1.0), _constant(0.0), _constant(-1.0)
 
 
 class Block:
@@ -90,7 +90,7 @@ class Block:
             casadi.OP_FMIN: lambda: self.choose("ole", x[0], x[1], x[0], x[1]),
             casadi.OP_FMAX: lambda: self.choose("oge", x[0], x[1], x[0], x[1]),
             casadi.OP_IF_ELSE_ZERO: lambda: self.choose("une", x[0], ZERO, x[1], ZERO),
-            casadi.OP_SIGN: lambda: self.choose("ogt", x[0], ZERO, ONE, self.choose("olt", x[0], ZERO, _constant(-1.0), ZERO)),
+            casadi.OP_SIGN: lambda: self.choose("ogt", x[0], ZERO, ONE, self.choose("olt", x[0], ZERO, LESS, ZERO)),
             SELECT: lambda: self.choose("une", x[0], ZERO, x[1], x[2]),
             casadi.OP_ASSIGN: lambda: x[0],
         }  # fmt: skip
@@ -99,7 +99,9 @@ class Block:
         return simple[operation]()
 
 
-def write(block: Block, code: Code, inputs: Sequence[str], stores: Mapping[int, str], held: Mapping[Operand, int]) -> None:
+def write(
+    block: Block, code: Code, inputs: Sequence[str], stores: Mapping[int, str], held: Mapping[Operand, int]
+) -> None:
     """Append code to a block: `inputs` and `stores` name the arrays; `held` says which operands stand in `c`."""
     values = run(block, code.body, inputs, held)
     for output, index, operand in code.outputs:
@@ -129,7 +131,9 @@ def _value(
     return values[operand]
 
 
-def hand_over(block: Block, once: Sequence[Instruction], handed: Sequence[Operand], inputs: Sequence[str], offset: int) -> None:
+def hand_over(
+    block: Block, once: Sequence[Instruction], handed: Sequence[Operand], inputs: Sequence[str], offset: int
+) -> None:
     """Append the parameters-only part of a function: its results go into `c` from `offset` on."""
     values = run(block, once, inputs, {})
     for k, operand in enumerate(handed):
@@ -144,7 +148,7 @@ def function(name: str, arguments: Sequence[str], block: Block) -> str:
 
 @functools.cache
 def _target() -> Any:
-    import llvmlite.binding as llvm  # noqa: PLC0415  (LLVM starts only where something is compiled)
+    import llvmlite.binding as llvm
 
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
@@ -155,7 +159,7 @@ def _target() -> Any:
 
 def compiled(text: str) -> Any:
     """Machine code of LLVM text; the returned engine must stay alive as long as its addresses are used."""
-    import llvmlite.binding as llvm  # noqa: PLC0415
+    import llvmlite.binding as llvm
 
     machine = _target()()
     module = llvm.parse_assembly(_DECLARATIONS + text)

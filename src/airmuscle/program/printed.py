@@ -93,13 +93,13 @@ class Printer:
 def implicit_module(t: Traced) -> tuple[str, Sizes]:
     """What an implicit method needs: rhs, jac, factor, solve, stage, drift and outputs.
 
-        rhs(x, u, c, f)              f = rates
-        jac(x, u, c, f, J)           rates, and the non-zeros of df/dx
-        factor(J, d, A)              LU of d I - J
-        solve(A, b, y)               y = (d I - J)^-1 b
-        stage(x, u, c, A, g, k)      k = (d I - J)^-1 (f(x, u) + g)
-        drift(x, u, c, w, f)         (df/du) w, the rates' own slope in time while inputs move at w
-        outputs(x, u, c, o)
+    rhs(x, u, c, f)              f = rates
+    jac(x, u, c, f, J)           rates, and the non-zeros of df/dx
+    factor(J, d, A)              LU of d I - J
+    solve(A, b, y)               y = (d I - J)^-1 b
+    stage(x, u, c, A, g, k)      k = (d I - J)^-1 (f(x, u) + g)
+    drift(x, u, c, w, f)         (df/du) w, the rates' own slope in time while inputs move at w
+    outputs(x, u, c, o)
     """
     size = t.x.shape[0]
     jacobian = casadi.jacobian(t.f, t.x)
@@ -118,7 +118,9 @@ def implicit_module(t: Traced) -> tuple[str, Sizes]:
     printer.add("factor", {"J": js, "d": d}, {"A": casadi.vertcat(*(factors[i][j] for i, j in pattern))}, ["d"])
     printer.add("solve", {"A": a, "b": b}, {"y": casadi.vertcat(*solve)})
     printer.add("stage", {**point, "A": a, "g": g}, {"k": casadi.vertcat(*stage)})
-    printer.add("drift", {**point, "w": t.w}, {"f": casadi.jtimes(t.f, t.u, t.w) if t.u.numel() else casadi.SX(size, 1)})
+    printer.add(
+        "drift", {**point, "w": t.w}, {"f": casadi.jtimes(t.f, t.u, t.w) if t.u.numel() else casadi.SX(size, 1)}
+    )
     printer.add("outputs", point, {"o": t.o})
     sizes = Sizes(size, t.u.shape[0], t.p.shape[0], printer.held, len(places), len(pattern), t.o.shape[0])
     return printer.module(), sizes
@@ -139,5 +141,3 @@ def explicit_module(t: Traced, a: Sequence[Sequence[float]], b: Sequence[float])
     printer = Printer()
     printer.add("step", {"x": t.x, "u": t.u, PARAMETERS: t.p, "w": t.w, "h": h}, {"y": step}, ["h"])
     return printer.module(), printer.held
-
-

@@ -51,7 +51,11 @@ class Recording:
             if name == "length" and "contraction" in self.columns:
                 return resting_length * (1.0 - self.columns["contraction"])
         known = list(self.columns)
-        remedy = " Give the resting length to have it from the length." if name == "contraction" and "length" in known else ""
+        remedy = (
+            " Give the resting length to have it from the length."
+            if name == "contraction" and "length" in known
+            else ""
+        )
         raise ColumnError(
             f"{self.origin}: no column '{name}'; there are {', '.join(known)}.{suggestion(name, known)}{remedy}"
         )
@@ -83,13 +87,13 @@ class Recording:
 
     def to_pandas(self) -> pd.DataFrame:
         """A data frame whose headers carry the units: `pressure [Pa]`."""
-        import pandas as pd  # noqa: PLC0415
+        import pandas as pd
 
         return pd.DataFrame({header(name): values for name, values in self.columns.items()})
 
     def plot(self, *names: str) -> Any:
         """Columns over time, or over the row number, one axis each; a Matplotlib figure."""
-        from .plot import plot_recording  # noqa: PLC0415
+        from .plot import plot_recording
 
         return plot_recording(self, names)
 

@@ -1,0 +1,163 @@
+"""Writes docs/nomenclature.md from the declared fields: python docs/make_nomenclature.py"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from airmuscle.declare import parameters
+from airmuscle.library.models import model_class, model_names
+from airmuscle.recording import QUANTITIES
+
+PAGE = Path(__file__).with_name("nomenclature.md")
+
+ARGUMENTS = {
+    "name": "name of an entry, a column or a part",
+    "names": "several such names",
+    "name_or_path": "name in the library, or path of a file of the same form",
+    "path": "file to read or to write",
+    "recording": "one run, measured or simulated",
+    "characteristic": "static law that binds pressure, contraction and force",
+    "plant": "muscles, circuits, mechanism and surroundings",
+    "state": "values of a plant's states by name",
+    "inputs": "values of a plant's inputs by name",
+    "command": "what the inputs do in time",
+    "changes": "instants and values of each input",
+    "points": "corners of each input's course in time",
+    "duration": "length of a run [s]",
+    "start": "state that a run begins at",
+    "start_time": "time that a run begins at [s]",
+    "dt": "length of one advance [s]",
+    "method": "numerical method that carries a plant through time",
+    "output": "spacing or instants of the recorded rows [s]",
+    "complete": "whether a run that ends early is an error",
+    "thing": "any noun of airmuscle",
+    "muscle": "one muscle, or a tuple of them",
+    "circuit": "what feeds a muscle, or a tuple of them",
+    "mechanism": "what the muscles pull at",
+    "gas": "how the air takes up pressure",
+    "ambient": "the surroundings: pressure, temperature",
+    "geometry": "volume and outline from contraction",
+    "contractile": "contractile characteristic of a Hill muscle",
+    "spring": "parallel spring",
+    "damper": "damper",
+    "supply": "source of air",
+    "fill": "valve from the supply",
+    "discharge": "valve to the surroundings",
+    "inner": "what a wrapper wraps",
+    "upstream": "absolute pressure before a valve [Pa]",
+    "downstream": "absolute pressure behind a valve [Pa]",
+    "opening": "0 shut to 1 open",
+    "openings": "opening of every valve by name",
+    "resting_lengths": "resting length of every muscle [m]",
+    "q": "generalised coordinates by name",
+    "v": "speeds of the coordinates by name",
+    "tensions": "pull of every muscle [N]",
+    "ports": "pneumatic and mechanical state of every muscle",
+    "coordinates": "coordinates and speeds by name",
+    "entry": "one file of the library",
+    "key": "short name of a reference",
+    "authors": "of a reference",
+    "title": "of a reference, a file or a table",
+    "where": "journal, standard or place of a reference",
+    "year": "of a reference",
+    "doi": "of a reference",
+    "note": "what the reader should know",
+    "columns": "columns of a recording by name",
+    "constants": "what does not change in a recording",
+    "origin": "where a recording comes from",
+    "notes": "what to know of a recording",
+    "chosen": "rows to pick",
+    "specimen": "name of the measured muscle",
+    "loss": "how residuals are weighed",
+    "censoring": "how rows cut off by a clamp are treated",
+    "resolution": "smallest difference that a sensor shows",
+    "prepared": "a system with its compiled functions",
+    "segments": "a command cut at its instants",
+    "times": "instants of the recorded rows [s]",
+    "most_steps": "ceiling of the number of steps",
+    "tables": "tables of a file",
+    "angle_squared": "square of half the angle that a circular outline spans [rad2]",
+    "arc_excess": "integral of the radius beyond its resting value over the arc [m2]",
+    "arc_excess_squared": "integral of its square over the arc [m3]",
+    "condition": "condition number of a scaled design",
+    "correlations": "correlation matrix of fitted parameters",
+    "degree": "greatest total power of a polynomial",
+    "direction": "which of pressure, contraction and force a law was fitted in",
+    "end_radius": "radius at the ends of a straight-fibre muscle [m]",
+    "error": "greatest error of a stand-in, or error of a residual",
+    "estimates": "fitted values with their standard deviations",
+    "fibre_length": "length of the fibres of one segment [m]",
+    "fibre_sum": "how the fibres of a half shell add up",
+    "fibres": "number of fibres",
+    "fixed": "parameters that a fit leaves alone",
+    "force_degree": "greatest power of force",
+    "pressure_degree": "greatest power of pressure",
+    "index": "correlation index",
+    "meridian": "outline of a straight-fibre muscle",
+    "model": "the law or muscle that was fitted",
+    "pressure_unit": "size of the unit of pressure [Pa]",
+    "rank": "number of directions that data determine",
+    "rings": "number of rings that divide a muscle into equal segments",
+    "rmse": "root mean square error",
+    "rows_censored": "rows cut off by a clamp",
+    "rows_dropped": "rows left out",
+    "rubber": "hoop stress of the rubber against its strain",
+    "rubber_integral": "whether hoop stress is summed over the axis or the arc",
+    "segment": "one segment between two rings, its integrals",
+    "sides": "which rows are cut off below or above",
+    "sigma": "standard deviation of one reading",
+    "stands_for": "the law that a stand-in replaces",
+    "strain": "hoop strain [1]",
+    "surface": "polynomial surface",
+    "units": "units of columns whose headers carry none",
+}
+"""Arguments of public functions that are neither a declared parameter nor a measurable quantity."""
+
+
+def rows(cells: list[tuple[str, ...]]) -> str:
+    """Lines of a Markdown table."""
+    return "\n".join("| " + " | ".join(c.replace("|", "\\|") for c in row) + " |" for row in cells)
+
+
+def table(header: tuple[str, ...], cells: list[tuple[str, ...]]) -> str:
+    """A Markdown table."""
+    return f"{rows([header])}\n{rows([('---',) * len(header)])}\n{rows(cells)}\n"
+
+
+def bounds(low: float, high: float) -> str:
+    """Bounds as text; empty where there are none."""
+    return "" if (low, high) == (-float("inf"), float("inf")) else f"{low:g} to {high:g}"
+
+
+def page() -> str:
+    """The whole page."""
+    parts = [
+        "# Names, symbols and units\n",
+        "Generated from the code by `docs/make_nomenclature.py`; all values are SI.\n",
+    ]
+    parts.append("## Quantities of a recording\n")
+    parts.append(
+        table(
+            ("name", "unit", "symbol", "meaning"),
+            [(f"`{n}`", q.unit, q.symbol, q.meaning) for n, q in QUANTITIES.items()],
+        )
+    )
+    parts.append("## Parameters of the models\n")
+    for name in model_names():
+        declared = (
+            parameters(model_class(name, "nomenclature"))
+            if hasattr(model_class(name, ""), "__dataclass_fields__")
+            else ()
+        )
+        if declared:
+            parts.append(f"### {name}\n")
+            cells = [(f"`{p.name}`", p.unit, p.symbol, p.meaning, bounds(*p.bounds)) for p in declared]
+            parts.append(table(("name", "unit", "symbol", "meaning", "allowed"), cells))
+    parts.append("## Arguments\n")
+    parts.append(table(("name", "meaning"), [(f"`{n}`", meaning) for n, meaning in sorted(ARGUMENTS.items())]))
+    return "\n".join(parts)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
+    print(f"wrote {PAGE}")

@@ -1,0 +1,38 @@
+"""The part of the surface that something was measured, printed or fitted on."""
+
+from __future__ import annotations
+
+from ..declare import model, parameter
+from ..errors import ParameterError
+from ..ops import Value
+
+
+@model
+class Box:
+    """A rectangle of gauge pressure and contraction."""
+
+    least_pressure: float = parameter("Pa", "p_low", "lower end of the box in gauge pressure", fitted=False)
+    greatest_pressure: float = parameter("Pa", "p_high", "upper end of the box in gauge pressure", fitted=False)
+    least_contraction: float = parameter("1", "eps_low", "lower end of the box in contraction", fitted=False)
+    greatest_contraction: float = parameter("1", "eps_high", "upper end of the box in contraction", fitted=False)
+
+    def check(self) -> None:
+        for name in ("pressure", "contraction"):
+            low, high = getattr(self, name)
+            if not low < high:
+                raise ParameterError(f"Box: least_{name} {low:g} must lie below greatest_{name} {high:g}.")
+
+    @property
+    def pressure(self) -> tuple[float, float]:
+        """Lower and upper end in gauge pressure [Pa]."""
+        return (self.least_pressure, self.greatest_pressure)
+
+    @property
+    def contraction(self) -> tuple[float, float]:
+        """Lower and upper end in contraction [1]."""
+        return (self.least_contraction, self.greatest_contraction)
+
+    def holds(self, pressure: Value, contraction: Value) -> Value:
+        """Whether points lie inside, ends included."""
+        in_pressure = (pressure >= self.least_pressure) & (pressure <= self.greatest_pressure)
+        return in_pressure & (contraction >= self.least_contraction) & (contraction <= self.greatest_contraction)

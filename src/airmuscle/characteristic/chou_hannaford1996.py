@@ -1,0 +1,62 @@
+"""Chou and Hannaford 1996: the ideal McKibben muscle, a braided cylinder without a wall."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from .. import ops
+from ..declare import model
+from ..geometry.braid import CHOU_HANNAFORD_1996, Braid
+from ..ops import Value
+from ..reference import Reference
+from .base import ForceLaw
+from .solve import within_reach
+
+
+@model
+class ChouHannaford1996(ForceLaw):
+    """F = p b^2/(4 pi n^2) (3 L^2/b^2 - 1).
+
+        b = L_0/cos(theta_0),   n = b sin(theta_0)/(2 pi r_0),   L = L_0 (1 - eps)
+
+    b length of a thread, n its turns, p gauge pressure; r_0, theta_0 and L_0 stand in the braid. No wall, friction
+    or end caps. The force ends at cos(theta) = 1/sqrt(3), where the volume is greatest. The law can be solved for
+    each of the three. Reference: Chou and Hannaford (1996), from F = -p dV/dL.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (CHOU_HANNAFORD_1996,)
+
+    geometry: Braid
+
+    @property
+    def thread(self) -> Value:
+        """Length b of a thread [m]."""
+        return self.geometry.resting_length / ops.cos(self.geometry.braid_angle)
+
+    @property
+    def turns(self) -> Value:
+        """How often n a thread winds around the muscle [1]."""
+        return self.thread * ops.sin(self.geometry.braid_angle) / (2 * ops.pi * self.geometry.radius)
+
+    @property
+    def contraction_reach(self) -> tuple[float, float]:
+        """From straight threads to the greatest volume."""
+        start, _ = self.geometry.contraction_reach
+        return (start, float(1.0 - self.thread / (ops.sqrt(3.0) * self.geometry.resting_length)))
+
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        return pressure * self._area(contraction)
+
+    def pressure(self, contraction: Value, force: Value) -> Value:
+        found = force / self._area(contraction)
+        return within_reach(found, self.pressure_reach, (contraction, force), self._no_pressure)
+
+    def contraction(self, pressure: Value, force: Value) -> Value:
+        ratio = force / pressure * 4 * ops.pi * self.turns**2 / self.thread**2
+        found = 1.0 - self.thread * ops.sqrt((ratio + 1) / 3) / self.geometry.resting_length
+        return within_reach(found, self.contraction_reach, (pressure, force), self._no_contraction)
+
+    def _area(self, contraction: Value) -> Value:
+        """F/p [m2]."""
+        length = self.geometry.resting_length * (1.0 - contraction)
+        return self.thread**2 / (4 * ops.pi * self.turns**2) * (3 * length**2 / self.thread**2 - 1)

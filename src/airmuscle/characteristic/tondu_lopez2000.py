@@ -1,0 +1,72 @@
+"""Tondu and Lopez 2000: the braided muscle with a correction for its ends."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from .. import ops
+from ..declare import model, parameter
+from ..geometry.braid import Braid
+from ..ops import Value
+from ..reference import Reference
+from .base import ForceLaw
+from .solve import within_reach
+
+TONDU_LOPEZ_2000 = Reference(
+    "tondu-lopez-2000",
+    "Tondu, B., Lopez, P.",
+    "Modeling and control of McKibben artificial muscle robot actuators",
+    "IEEE Control Systems Magazine 20(2):15-38",
+    2000,
+    "10.1109/37.833638",
+    "the static law in its usual form, with a constant end correction",
+)
+
+
+@model
+class TonduLopez2000(ForceLaw):
+    """F = pi r_0^2 p (a (1 - k eps)^2 - b),   a = 3/tan(alpha_0)^2,   b = 1/sin(alpha_0)^2.
+
+    r_0 radius and alpha_0 angle of the braid at rest, p gauge pressure, eps contraction. The end correction k is
+    above 1 because the tapered ends do not contract: the middle contracts by k eps. With k = 1 the law is
+    Chou and Hannaford's. The law can be solved for each of the three. Reference: Tondu and Lopez (2000).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (TONDU_LOPEZ_2000,)
+
+    geometry: Braid
+    end_correction: float = parameter(
+        "1", "k", "how much more the middle contracts than the whole muscle", bounds=(1.0, 3.0), default=1.0
+    )
+
+    @property
+    def contraction_reach(self) -> tuple[float, float]:
+        """From straight threads in the middle to the end of the force."""
+        start, _ = self.geometry.contraction_reach
+        force_ends = 1.0 - ops.sqrt(self._b / self._a)
+        return (float(start / self.end_correction), float(force_ends / self.end_correction))
+
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        return pressure * self._area(contraction)
+
+    def pressure(self, contraction: Value, force: Value) -> Value:
+        found = force / self._area(contraction)
+        return within_reach(found, self.pressure_reach, (contraction, force), self._no_pressure)
+
+    def contraction(self, pressure: Value, force: Value) -> Value:
+        ratio = force / (pressure * ops.pi * self.geometry.radius**2)
+        found = (1.0 - ops.sqrt((ratio + self._b) / self._a)) / self.end_correction
+        return within_reach(found, self.contraction_reach, (pressure, force), self._no_contraction)
+
+    def _area(self, contraction: Value) -> Value:
+        """F/p [m2]."""
+        middle = 1.0 - self.end_correction * contraction
+        return ops.pi * self.geometry.radius**2 * (self._a * middle**2 - self._b)
+
+    @property
+    def _a(self) -> Value:
+        return 3.0 / ops.tan(self.geometry.braid_angle) ** 2
+
+    @property
+    def _b(self) -> Value:
+        return 1.0 / ops.sin(self.geometry.braid_angle) ** 2

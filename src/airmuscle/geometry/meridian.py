@@ -1,0 +1,82 @@
+"""The assumed outline of one segment between two end rings, and what its integrals are called."""
+
+from __future__ import annotations
+
+import abc
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import ops
+from ..ops import Value
+from ..reference import Reference
+
+SAGA_2007 = Reference(
+    "saga-2007",
+    "Saga, N., Nakamura, T., Yaegashi, K.",
+    "Mathematical Model of Pneumatic Artificial Muscle Reinforced by Straight Fibers",
+    "Journal of Intelligent Material Systems and Structures 18:175-180",
+    2007,
+    "10.1177/1045389X06063462",
+    "equations (1) to (19), Table 1; restored from a damaged copy and derived again",
+)
+
+
+class Segment(NamedTuple):
+    """One segment of the muscle at a contraction: x along the axis, r the radius, s the arc, r_0 at the ends."""
+
+    end_radius: Value
+    """r_0 [m]."""
+    length: Value
+    """Chord l [m]."""
+    arc: Value
+    """Int ds [m]; the fibre's length, but for an outline that only nearly keeps it."""
+    largest_radius: Value
+    """Radius in the middle [m]."""
+    end_sine: Value
+    """Sine of the end slope angle phi_0."""
+    end_cosine: Value
+    """Cosine of the end slope angle; negative beyond a right angle."""
+    excess: Value
+    """Int (r - r_0) dx [m2]."""
+    arc_excess: Value
+    """G = Int (r - r_0) ds [m2]."""
+    arc_excess_squared: Value
+    """Q = Int (r - r_0)^2 ds [m3]."""
+    volume: Value
+    """Enclosed volume [m3]."""
+
+    @property
+    def half_section(self) -> Value:
+        """A_1 = Int r dx [m2], on which the pressure drives the half shell apart."""
+        return self.excess + self.end_radius * self.length
+
+    @property
+    def end_slope(self) -> Value:
+        """tan(phi_0)."""
+        return self.end_sine / self.end_cosine
+
+
+class Meridian(abc.ABC):
+    """The curve that straight fibres are taken to follow, in one segment of fibre length l_0 and end radius r_0."""
+
+    references: ClassVar[tuple[Reference, ...]] = (SAGA_2007,)
+    greatest_contraction: ClassVar[float] = 0.5
+    """Past 50 % every outline has long passed its largest volume or, the parabola (3), its largest radius."""
+
+    @abc.abstractmethod
+    def segment(self, contraction: Value, fibre_length: Value, end_radius: Value) -> Segment:
+        """Everything about the segment at a contraction [1]; lengths [m]; arrays broadcast."""
+
+    @abc.abstractmethod
+    def profile(self, contraction: float, fibre_length: float, end_radius: float, points: int) -> Profile:
+        """Axial positions from the middle [m] and radii there [m], each of shape (points,)."""
+
+
+Profile = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]
+
+
+def volume_of(end_radius: Value, length: Value, excess: Value, excess_squared: Value) -> Value:
+    """pi Int r^2 dx from Int (r - r_0) dx and Int (r - r_0)^2 dx."""
+    return ops.pi * (end_radius**2 * length + 2 * end_radius * excess + excess_squared)

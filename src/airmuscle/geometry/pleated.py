@@ -1,0 +1,174 @@
+"""The exact outline of inextensible fibres under pressure alone, as in the pleated muscle."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..declare import model
+from ..ops import Value
+from ..reference import Reference
+from .meridian import Profile, Segment
+from .straight_fibre import FibreTube
+
+DAERDEN_LEFEBER_2001 = Reference(
+    "daerden-lefeber-2001",
+    "Daerden, F., Lefeber, D.",
+    "The concept and design of pleated pneumatic artificial muscles",
+    "International Journal of Fluid Power 2(3):41-50",
+    2001,
+    note="elliptic integrals of a membrane without hoop stress; derived again here, not copied",
+)
+_ROOTS = (1e-6, 0.9)
+"""Where sqrt(mu) is looked for."""
+_EXACT = {"xatol": 0.0, "xrtol": 4 * float(np.finfo(float).eps), "fatol": 0.0, "frtol": 0.0}
+
+
+class Ellipse(NamedTuple):
+    """What fixes one outline: the parameter mu, the angle theta_0 and the integrals at them."""
+
+    parameter: Any
+    """mu = R^2/(2 (R^2 + A)) with A = F/(pi p): 1/2 pulls nothing, beyond it must be pushed."""
+    angle: Any
+    """theta_0 with cos(theta_0) = r_0/R."""
+    first: Any
+    """F(theta_0 | mu), incomplete elliptic integral of the first kind."""
+    deficit: Any
+    """F(theta_0 | mu) - E(theta_0 | mu), without cancellation."""
+
+
+@model
+class PleatedTube(FibreTube):
+    """Fibres that carry all the load, no hoop stress: N cos(phi) = F + pi p r^2 with N constant along the fibre.
+
+        l_0 = (R/sqrt mu) F,  l = (R/sqrt mu)(2 E - F),  eps = 2 (1 - E/F),  F/p = pi R^2 (1 - 2 mu)/(2 mu)
+        V = (pi R^3/(3 mu^1.5)) [(1 - mu) F - (1 - 2 mu) E + 2 mu sin(theta_0) cos(theta_0) D_0]
+
+    R the largest radius, F and E the incomplete elliptic integrals F(theta_0 | mu), E(theta_0 | mu) with parameter
+    mu = R^2/(2 (R^2 + A)), A = F/(pi p), cos(theta_0) = r_0/R, D_0 = sqrt(1 - mu sin^2 theta_0); Carlson's forms
+    keep all digits at small contraction. Same form as Daerden and Lefeber 2001.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (DAERDEN_LEFEBER_2001,)
+    traceable: ClassVar[bool] = False
+
+    @property
+    def contraction_reach(self) -> tuple[float, float]:
+        """From straight fibres to half the length, less for a short tube; past `free_contraction` it must be pushed."""
+        return (0.0, _reach(self._slenderness))
+
+    @property
+    def free_contraction(self) -> float:
+        """The contraction [1] of the largest volume, where the tension is zero."""
+        return float(_contraction(np.asarray(0.5), self._slenderness))
+
+    @property
+    def _slenderness(self) -> float:
+        return float(self.fibre_length / self.end_radius)
+
+    def ellipse(self, contraction: Value) -> Ellipse:
+        """The parameter, angle and integrals at a contraction [1], by a bracketed search for the parameter."""
+        from scipy.optimize import elementwise
+
+        self.refuse_out_of_reach(contraction)
+        wanted = np.asarray(contraction, dtype=float)
+
+        def surplus(root: Any, c: Any) -> Any:
+            return _contraction(root * root, self._slenderness) - c
+
+        # searched in sqrt(mu), which starts like contraction^(1/4): nothing is lost near zero
+        found = elementwise.find_root(surplus, _ROOTS, args=(wanted,), tolerances=_EXACT, maxiter=300)
+        mu = np.where(wanted > 0, found.x, np.nan) ** 2
+        angle = _angle(mu, self._slenderness)
+        return Ellipse(mu, angle, *_integrals(mu, angle))
+
+    def area(self, contraction: Value) -> Value:
+        """F/p [m2], tension over pressure of the ideal muscle; infinite at zero contraction."""
+        shape = self.ellipse(contraction)
+        radius = self.end_radius / np.cos(shape.angle)
+        return _as_given(np.pi * radius**2 * (1 - 2 * shape.parameter) / (2 * shape.parameter))
+
+    def volume_growth(self, contraction: Value) -> Value:
+        """dV/deps = L_0 F/p, by virtual work; the tests hold it against the volume's slope."""
+        return self.resting_length * self.area(contraction)
+
+    def segment(self, contraction: Value) -> Segment:
+        shape = self.ellipse(contraction)
+        mu, sine, cosine = shape.parameter, np.sin(shape.angle), np.cos(shape.angle)
+        root = np.sqrt(mu)
+        radius = self.end_radius / cosine
+        delta = np.sqrt(1 - mu * sine**2)
+        length = self.fibre_length * (1.0 - np.asarray(contraction))
+        section = radius**2 / root * sine * delta
+        along = radius**2 / mu * np.arcsin(root * sine)
+        squares = radius**3 / root * (shape.first - shape.deficit / mu)
+        bracket = shape.deficit + mu * (shape.first - 2 * shape.deficit) + 2 * mu * sine * cosine * delta
+        # with A + r^2 = R^2 (1 - 2 mu + 2 mu cos^2)/(2 mu) and N/(pi p) = R^2/(2 mu)
+        values = (
+            length,
+            np.full_like(length, self.fibre_length),
+            radius,
+            2 * root * sine * delta,
+            1 - 2 * mu * sine**2,
+            section - self.end_radius * length,
+            along - self.end_radius * self.fibre_length,
+            squares - 2 * self.end_radius * along + self.end_radius**2 * self.fibre_length,
+            np.pi * radius**3 / (3 * mu**1.5) * bracket,
+        )
+        return Segment(self.end_radius, *(_as_given(self._straight(v, contraction, i)) for i, v in enumerate(values)))
+
+    def _straight(self, value: Any, contraction: Value, index: int) -> Any:
+        """The value, or at zero contraction that of the cylinder, where mu = 0."""
+        radius, length = self.end_radius, self.fibre_length
+        cylinder = (length, length, radius, 0.0, 1.0, 0.0, 0.0, 0.0, np.pi * radius**2 * length)
+        return np.where(np.asarray(contraction) > 0, value, cylinder[index])
+
+    def profile(self, contraction: float, points: int) -> Profile:
+        from scipy.special import ellipeinc, ellipkinc
+
+        if contraction == 0:
+            return np.linspace(-0.5, 0.5, points) * self.fibre_length, np.full(points, self.end_radius)
+        shape = self.ellipse(contraction)
+        theta = np.linspace(-1.0, 1.0, points) * shape.angle
+        radius = self.end_radius / np.cos(shape.angle)
+        mu = shape.parameter
+        axial = radius / np.sqrt(mu) * (2 * ellipeinc(theta, mu) - ellipkinc(theta, mu)) / 2
+        return axial, radius * np.cos(theta)
+
+
+def _integrals(mu: Any, angle: Any) -> tuple[Any, Any]:
+    """F(angle | mu) and F - E by Carlson's symmetric integrals."""
+    from scipy.special import elliprd, elliprf
+
+    sine, cosine = np.sin(angle), np.cos(angle)
+    delta_squared = 1 - mu * sine**2
+    first = sine * elliprf(cosine**2, delta_squared, 1.0)
+    return first, mu / 3 * sine**3 * elliprd(cosine**2, delta_squared, 1.0)
+
+
+def _angle(mu: Any, slenderness: float) -> Any:
+    """theta_0 at which F(theta_0 | mu) = lambda sqrt(mu) cos(theta_0); the difference rises with the angle."""
+    from scipy.optimize import elementwise
+    from scipy.special import ellipkinc
+
+    def surplus(angle: Any, mu: Any) -> Any:
+        return ellipkinc(angle, mu) - slenderness * np.sqrt(mu) * np.cos(angle)
+
+    return elementwise.find_root(surplus, (0.0, np.pi / 2), args=(np.asarray(mu),), tolerances=_EXACT, maxiter=300).x
+
+
+def _contraction(mu: Any, slenderness: float) -> Any:
+    first, deficit = _integrals(mu, _angle(mu, slenderness))
+    return 2 * deficit / first
+
+
+@functools.cache
+def _reach(slenderness: float) -> float:
+    return min(0.5, float(_contraction(np.asarray(_ROOTS[1] ** 2), slenderness)))
+
+
+def _as_given(value: Any) -> npt.NDArray[np.float64] | float:
+    return float(value) if np.ndim(value) == 0 else value

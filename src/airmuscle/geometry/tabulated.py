@@ -1,0 +1,63 @@
+"""Volume from a table: measured, or computed elsewhere."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from ..declare import model, parameter
+from ..errors import ParameterError
+from ..ops import Value
+from .base import Geometry
+
+
+@model
+class TabulatedGeometry(Geometry):
+    """V(eps) a monotone cubic (PCHIP) through the rows (eps_i, V_i); its outline is the cylinder of this volume.
+
+    Contractions outside the table raise OutOfReach. Not closed-form: a plant takes it through `as_polynomial`,
+    which states what it changes. Reference for the cubic: Fritsch and Carlson, SIAM J. Numer. Anal. 17:238 (1980).
+    """
+
+    traceable: ClassVar[bool] = False
+
+    contractions: tuple[float, ...] = parameter("1", "eps_i", "contractions of the rows, rising", fitted=False)
+    volumes: tuple[float, ...] = parameter("m3", "V_i", "volumes of the rows", bounds=(0.0, 1.0), fitted=False)
+    resting_length: float = parameter(
+        "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
+    )
+
+    def check(self) -> None:
+        rows = len(self.contractions)
+        if rows < 2 or rows != len(self.volumes) or (np.diff(self.contractions) <= 0).any():
+            raise ParameterError(
+                f"TabulatedGeometry: {rows} contractions and {len(self.volumes)} volumes; it needs two rows at least, "
+                "each with both, in the order of rising contraction."
+            )
+
+    @property
+    def contraction_reach(self) -> tuple[float, float]:
+        return (self.contractions[0], self.contractions[-1])
+
+    def volume(self, contraction: Value) -> Value:
+        self.refuse_out_of_reach(contraction)
+        return _curve(self)(contraction)[()]
+
+    def volume_growth(self, contraction: Value) -> Value:
+        self.refuse_out_of_reach(contraction)
+        return _curve(self).derivative()(contraction)[()]
+
+    def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        length = self.resting_length * (1.0 - contraction)
+        radius = float(np.sqrt(self.volume(contraction) / (np.pi * length)))
+        return np.linspace(-length / 2, length / 2, points), np.full(points, radius)
+
+
+@functools.lru_cache(maxsize=64)
+def _curve(geometry: TabulatedGeometry) -> Any:
+    from scipy.interpolate import PchipInterpolator  # slow to import, and most laws do without
+
+    return PchipInterpolator(geometry.contractions, geometry.volumes, extrapolate=False)

@@ -1,0 +1,42 @@
+"""Points that say only on which side of them the truth lies: a slack muscle, a sensor at its end."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from ..characteristic.base import Characteristic, ForceLaw
+
+
+@dataclasses.dataclass(frozen=True)
+class Censoring:
+    """The range of force [N] within which a point was measured; at its ends, and beyond, it was cut off.
+
+    A row at or below `least_force` says that the muscle, could it push, would give this much or less; a row at
+    or above `greatest_force` that it would give this much or more. A fit counts such a row only where the law
+    contradicts it. Give the resolution of the sensor as `least_force` where slack rows read a little more than 0.
+    """
+
+    least_force: float = 0.0
+    greatest_force: float = math.inf
+
+    def sides(self, force: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """By row: 0 measured, 1 cut off below (the truth is less), -1 cut off above."""
+        return (force <= self.least_force) * 1.0 - (force >= self.greatest_force) * 1.0
+
+
+UNCENSORED = Censoring(-math.inf, math.inf)
+"""Every row is fitted as it stands."""
+
+
+def censoring_of(law: Characteristic) -> Censoring:
+    """What a fit assumes: the range that a law in force is clamped to, from zero where it has none.
+
+    Laws in contraction or pressure come from hung loads, of which zero is one like any other: nothing is cut off.
+    """
+    if not isinstance(law, ForceLaw):
+        return UNCENSORED
+    return Censoring(getattr(law, "least_force", 0.0), getattr(law, "greatest_force", math.inf))

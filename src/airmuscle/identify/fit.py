@@ -1,0 +1,187 @@
+"""A static characteristic from measured points: `fit`."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import declare
+from ..characteristic.base import Characteristic
+from ..errors import IdentificationError
+from ..recording import Recording
+from .censoring import Censoring, censoring_of
+from .correlation_index import correlation_index
+from .loss import Array, LeastSquares, Loss
+from .problem import Problem, pose
+from .result import Estimate, Extreme, Fit
+from .solve import Solution, solve
+from .statistics import Statistics, statistics
+
+POINT = ("pressure", "contraction", "force")
+ILL_CONDITIONED = 1e5
+"""Condition of the scaled design above which a note is made (chosen): half of the digits of a float are lost."""
+
+
+def fit(
+    characteristic: Characteristic,
+    recording: Recording | Sequence[Recording],
+    *,
+    loss: Loss = LeastSquares(),
+    censoring: Censoring | None = None,
+    sigma: npt.ArrayLike | None = None,
+    fixed: Collection[str] = (),
+) -> Fit:
+    """The parameters of a characteristic that meet measured points best.
+
+    `characteristic` gives the structure and the start values; its parameters that are declared as not fitted, and
+    those named in `fixed`, stay. Errors are taken in the direction that the law gives (force, contraction or
+    pressure), within the declared bounds. Rows at zero or full force are cut off and count only where the law
+    contradicts them; `censoring` states another range, `UNCENSORED` takes every row as it stands.
+    `sigma` are the standard deviations of the rows, of which only the ratios matter. `loss` is LeastSquares(),
+    Huber(scale) or SoftL1(scale), the scale in the unit of the fitted quantity.
+
+    Raises IdentificationError where the points cannot determine the parameters, and says which.
+    """
+    data, dropped = _points(recording)
+    weights = _weights(data, dropped, sigma)
+    data, weights = data.rows(~dropped), weights[~dropped]
+    law = _with_box(characteristic, data)
+    problem = pose(law, data, censoring or censoring_of(law), weights, fixed)
+    solution = solve(problem, loss)
+    found = statistics(problem, solution, loss)
+    notes = _notes(problem, found, loss, int(np.count_nonzero(dropped)))
+    return _result(problem, solution, found, int(np.count_nonzero(dropped)), notes)
+
+
+def _points(recording: Recording | Sequence[Recording]) -> tuple[Recording, npt.NDArray[np.bool_]]:
+    """Pressure, contraction and force of one or several recordings, and the rows where one of them is missing."""
+    runs = [recording] if isinstance(recording, Recording) else list(recording)
+    columns = {name: np.concatenate([run[name] for run in runs]) for name in POINT} if runs else {}
+    origin = " + ".join(dict.fromkeys(run.origin for run in runs)) or "no recording"
+    for name, values in columns.items():
+        if np.isinf(values).any():
+            row = int(np.argmax(np.isinf(values)))
+            raise IdentificationError(
+                f"{origin}, row {row + 1}: {name} is {values[row]}. Leave such rows out, as with "
+                f"recording.rows(np.isfinite(recording['{name}']))."
+            )
+    missing = np.isnan(np.stack(list(columns.values()))).any(axis=0) if columns else np.zeros(0, dtype=bool)
+    lengths = {run.constants.get("resting_length") for run in runs} - {None}
+    constants = {"resting_length": lengths.pop()} if len(lengths) == 1 else {}
+    return Recording(columns, origin, constants), missing
+
+
+def _weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLike | None) -> Array:
+    if sigma is None:
+        return np.ones(len(data))
+    deviations = np.broadcast_to(np.asarray(sigma, dtype=float), (len(data),))
+    if not (np.isfinite(deviations) & (deviations > 0))[~dropped].all():
+        raise IdentificationError(f"{data.origin}: every sigma must be finite and greater than zero.")
+    weights = 1.0 / deviations
+    return np.asarray(weights / np.sqrt(np.mean(weights[~dropped] ** 2)))
+
+
+def _with_box(law: Characteristic, data: Recording) -> Characteristic:
+    """The law on the box of the data, where it has one."""
+    with_box = getattr(law, "with_box", None)
+    if with_box is None or not len(data):
+        return law
+    for name, unit in (("pressure", "Pa"), ("contraction", "1")):
+        if np.ptp(data[name]) == 0:
+            raise IdentificationError(
+                f"{data.origin}: {name} is {data[name][0]:g} {unit} in every row, so no surface over it can be fitted. "
+                f"Measure at several levels of {name}."
+            )
+    boxed: Characteristic = with_box(
+        *((float(data[n].min()), float(data[n].max())) for n in ("pressure", "contraction"))
+    )
+    return boxed
+
+
+def _result(problem: Problem, solution: Solution, found: Statistics, dropped: int, notes: tuple[str, ...]) -> Fit:
+    data, quantity = problem.data, problem.direction.quantity
+    model = declare.with_parameters(problem.law, problem.leaf_values(solution.values))
+    clamped = np.asarray(getattr(model, quantity)(*problem.arguments), dtype=float)
+    measured = problem.sides == 0
+    errors = clamped - data[quantity]
+    # a row cut off is wrong only where the law contradicts it; what it reads is not what was there
+    contradicted = np.where(measured, errors, problem.errors(clamped) / problem.weights)
+    worst = int(np.argmax(np.abs(contradicted)))
+    varies = bool(np.ptp(data[quantity][measured]) > 0)
+    return Fit(
+        model=model,
+        estimates=_estimates(problem, solution, found),
+        correlations=found.correlations,
+        rank=found.rank,
+        condition=found.condition,
+        sigma=found.sigma,
+        rmse=float(np.sqrt(np.mean(errors[measured] ** 2))),
+        greatest_error=Extreme(float(contradicted[worst]), *(float(data[name][worst]) for name in POINT)),
+        index=correlation_index(data[quantity][measured], clamped[measured]) if varies else None,
+        rows_censored=int(np.count_nonzero(~measured)),
+        rows_dropped=dropped,
+        recording=data,
+        direction=problem.direction,
+        sides=problem.sides,
+        notes=notes,
+    )
+
+
+def _estimates(problem: Problem, solution: Solution, found: Statistics) -> tuple[Estimate, ...]:
+    leaves = (problem.leaves[i] for i in problem.free)
+    columns = zip(
+        leaves,
+        problem.labels,
+        solution.values.tolist(),
+        found.deviations.tolist(),
+        found.on_bound.tolist(),
+        strict=True,
+    )
+    return tuple(
+        Estimate(leaf.path, label, value, deviation, leaf.declared.unit, leaf.declared.meaning, bound)
+        for leaf, label, value, deviation, bound in columns
+    )
+
+
+def _notes(problem: Problem, found: Statistics, loss: Loss, dropped: int) -> tuple[str, ...]:
+    """What a reader of the fit must know, in sentences."""
+    notes = []
+    cut_off = int(np.count_nonzero(problem.sides))
+    at_zero = int(np.count_nonzero((problem.data["force"] <= 0) & (problem.sides == 0)))
+    if dropped:
+        notes.append(f"{dropped} rows with a missing value (NaN) were left out.")
+    if cut_off:
+        notes.append(
+            f"{cut_off} rows are cut off at the ends of the range of force and count only where the law contradicts "
+            "them; censoring=UNCENSORED fits them as they stand."
+        )
+    if at_zero:
+        notes.append(
+            f"{at_zero} rows at zero force or below are fitted as they stand; give censoring=Censoring() if the muscle "
+            "was slack there."
+        )
+    notes += _other_lengths(problem)
+    notes += [f"{name} stopped at its bound; the value is not a measured one." for name in _bounded(problem, found)]
+    if not np.isfinite(found.sigma):
+        notes.append("As many points as parameters: the standard deviations are unknown.")
+    if found.condition > ILL_CONDITIONED:
+        notes.append(f"The parameters are nearly indistinct (condition {found.condition:.2g}).")
+    if not isinstance(loss, LeastSquares):
+        notes.append(f"Robust: {loss}, in {problem.direction.unit}.")
+    return tuple(notes)
+
+
+def _other_lengths(problem: Problem) -> list[str]:
+    """A law made for another specimen: its contraction, and so its parameters, mean something else."""
+    rest = problem.data.constants.get("resting_length")
+    return [
+        f"The recording is of a muscle of {rest:.6g} m, {leaf.path} is {leaf.value:.6g} m."
+        for leaf in problem.leaves
+        if leaf.declared.name == "resting_length" and rest is not None and abs(leaf.value - float(rest)) > 1e-6
+    ]
+
+
+def _bounded(problem: Problem, found: Statistics) -> list[str]:
+    return [problem.leaves[i].path for i, bound in zip(problem.free, found.on_bound, strict=True) if bound]

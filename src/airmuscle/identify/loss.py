@@ -1,0 +1,73 @@
+"""How much an error counts in a fit: its square, or less than its square where it may be an outlier."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import ParameterError
+
+Array = npt.NDArray[np.float64]
+
+
+class Loss(abc.ABC):
+    """The sum of scale^2 rho((error/scale)^2) over the points is what a fit makes least."""
+
+    scale: float
+
+    @abc.abstractmethod
+    def rho(self, z: Array) -> Array:
+        """rho(z) and its first and second derivative, shape (3, N), for z = (error/scale)^2."""
+
+
+@dataclasses.dataclass(frozen=True)
+class LeastSquares(Loss):
+    """rho = z: every error counts by its square."""
+
+    scale: float = 1.0
+
+    def rho(self, z: Array) -> Array:
+        return np.stack([z, np.ones_like(z), np.zeros_like(z)])
+
+
+@dataclasses.dataclass(frozen=True)
+class Huber(Loss):
+    """rho = z up to 1, 2 sqrt(z) - 1 beyond: errors above `scale`, in the unit of the fitted quantity, count linearly.
+
+    Reference: Huber, P. J. (1964), "Robust estimation of a location parameter", Annals of Mathematical Statistics.
+    """
+
+    scale: float
+
+    def __post_init__(self) -> None:
+        _refuse_scale(self)
+
+    def rho(self, z: Array) -> Array:
+        root = np.sqrt(np.maximum(z, 1.0))
+        inside = z <= 1.0
+        return np.stack([np.where(inside, z, 2 * root - 1), 1 / root, np.where(inside, 0.0, -0.5 / root**3)])
+
+
+@dataclasses.dataclass(frozen=True)
+class SoftL1(Loss):
+    """rho = 2 (sqrt(1 + z) - 1): a smooth passage from the square to the size of the error around `scale`."""
+
+    scale: float
+
+    def __post_init__(self) -> None:
+        _refuse_scale(self)
+
+    def rho(self, z: Array) -> Array:
+        root = np.sqrt(1.0 + z)
+        return np.stack([2 * (root - 1), 1 / root, -0.5 / root**3])
+
+
+def _refuse_scale(loss: Loss) -> None:
+    if not 0 < loss.scale < np.inf:
+        raise ParameterError(
+            f"{type(loss).__name__}.scale is {loss.scale!r}; it must be greater than zero, in the unit of the fitted "
+            "quantity: about three times the noise."
+        )

@@ -1,0 +1,187 @@
+"""What a fit is to do: the law, its free parameters, and the points in the direction that the law gives."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import declare, trace
+from ..characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
+from ..declare import Leaf
+from ..errors import IdentificationError, ParameterError, suggestion
+from ..recording import Recording
+from ..recording.columns import QUANTITIES
+from .censoring import Censoring
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True)
+class Direction:
+    """Which of the three a law gives: the method that a fit compares, its arguments and its answer."""
+
+    method: str
+    arguments: tuple[str, str]
+    quantity: str
+
+    @property
+    def unit(self) -> str:
+        return QUANTITIES[self.quantity].unit
+
+
+FORCE = Direction("unclamped", ("pressure", "contraction"), "force")
+CONTRACTION = Direction("contraction", ("pressure", "force"), "contraction")
+PRESSURE = Direction("pressure", ("contraction", "force"), "pressure")
+
+
+def direction_of(law: Characteristic) -> Direction:
+    """The direction in which a law is given, where its errors are compared."""
+    for kind, direction in ((ForceLaw, FORCE), (ContractionLaw, CONTRACTION), (PressureLaw, PRESSURE)):
+        if isinstance(law, kind):
+            return direction
+    raise IdentificationError(f"{type(law).__name__} is no law in force, contraction or pressure; it cannot be fitted.")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Problem:
+    """N points and the P parameters to be found from them."""
+
+    law: Any
+    direction: Direction
+    data: Recording
+    goal: Array
+    """Measured values, or the bound of a row that was cut off, in the law's direction; shape (N,)."""
+    sides: Array
+    """0 where the law shall meet the goal, 1 where it may lie below, -1 where it may lie above; shape (N,)."""
+    weights: Array
+    """By which the errors are multiplied, 1 in the mean; shape (N,)."""
+    leaves: tuple[Leaf, ...]
+    free: tuple[int, ...]
+    """Which of the leaves are to be found."""
+
+    @property
+    def arguments(self) -> tuple[Array, Array]:
+        first, second = self.direction.arguments
+        return self.data[first], self.data[second]
+
+    @property
+    def start(self) -> Array:
+        return np.array([self.leaves[i].value for i in self.free], dtype=float)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        pairs = np.array([self.leaves[i].declared.bounds for i in self.free], dtype=float)
+        return pairs[:, 0], pairs[:, 1]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """A short name for each free parameter: its term in a sum, else its symbol."""
+        terms = getattr(self.law, "terms", ())
+        field = getattr(self.law, "linear_in", None)
+        texts = {f"{field}[{i}]": f"a({term})" for i, term in enumerate(terms)}
+        return tuple(texts.get(self.leaves[i].path, self.leaves[i].declared.symbol) for i in self.free)
+
+    def leaf_values(self, values: Sequence[float] | Array) -> list[float]:
+        """All leaves of the law, with these values of the free ones."""
+        found = [leaf.value for leaf in self.leaves]
+        for i, value in zip(self.free, values, strict=True):
+            found[i] = float(value)
+        return found
+
+    def modelled(self, values: Array) -> Array:
+        """What the law gives with these parameters; shape (N,)."""
+        law = declare.rebuild(self.law, self.leaf_values(values))
+        with np.errstate(all="ignore"):  # what is not finite is refused, or the search steps back from it
+            found = getattr(law, self.direction.method)(*self.arguments)
+        return np.asarray(found, dtype=float) + np.zeros(len(self.data))
+
+    def errors(self, modelled: Array) -> Array:
+        """Weighted errors; a row that was cut off has one only where the law contradicts it."""
+        difference = modelled - self.goal
+        return self.weights * np.where(self.sides * difference < 0, 0.0, difference)
+
+    def counting(self, modelled: Array) -> npt.NDArray[np.bool_]:
+        """The rows that have a say: those measured, and those cut off that the law contradicts."""
+        return np.asarray((self.sides == 0) | (self.sides * (modelled - self.goal) > 0))
+
+    def slopes(self, values: Array) -> Array:
+        """The derivatives of `modelled` by the free parameters, shape (N, P): exact where the law can be traced."""
+        if _can_be_traced(self.law):
+            law = declare.rebuild(self.law, self.leaf_values(values))
+            return trace.jacobian(law, self.direction.method, *self.arguments)[1][:, list(self.free)]
+        return self._differences(values)
+
+    def _differences(self, values: Array) -> Array:
+        low, high = self.bounds
+        columns = []
+        for i, value in enumerate(values):
+            step = np.cbrt(np.finfo(float).eps) * max(abs(value), abs(self.start[i]), 1e-8)
+            up, down = values.copy(), values.copy()
+            up[i], down[i] = min(value + step, high[i]), max(value - step, low[i])
+            columns.append((self.modelled(up) - self.modelled(down)) / (up[i] - down[i]))
+        return np.column_stack(columns)
+
+
+def _can_be_traced(thing: Any) -> bool:
+    """Whether a law and all models inside it are closed-form."""
+    if isinstance(thing, tuple):
+        return all(_can_be_traced(item) for item in thing)
+    kind: type[Any] = type(thing)
+    if not dataclasses.is_dataclass(kind):
+        return True
+    inside = (getattr(thing, field.name) for field in dataclasses.fields(thing))
+    return trace.is_traceable(kind) and all(_can_be_traced(item) for item in inside)
+
+
+def pose(law: Characteristic, data: Recording, censoring: Censoring, weights: Array, fixed: Collection[str]) -> Problem:
+    """The problem of fitting a law to points. Raises IdentificationError where it cannot be posed."""
+    direction = direction_of(law)
+    sides = censoring.sides(data["force"])
+    goal = data[direction.quantity]
+    if direction is FORCE:
+        goal = np.where(sides > 0, censoring.least_force, np.where(sides < 0, censoring.greatest_force, goal))
+    elif direction is PRESSURE:
+        sides = -sides  # where the force is less than stated, the pressure that would hold it is more
+    leaves = tuple(declare.leaves(law))
+    _refuse_unknown(law, leaves, fixed)
+    free = tuple(i for i, leaf in enumerate(leaves) if leaf.declared.fitted and not _is_fixed(leaf, fixed))
+    measured = int(np.count_nonzero(sides == 0))
+    _refuse_too_few(law, data, len(free), measured)
+    return Problem(law, direction, data, goal, sides, weights, leaves, free)
+
+
+def _is_fixed(leaf: Leaf, fixed: Collection[str]) -> bool:
+    return leaf.path in fixed or leaf.path.partition("[")[0] in fixed
+
+
+def _refuse_unknown(law: Characteristic, leaves: Sequence[Leaf], fixed: Collection[str]) -> None:
+    known = list(dict.fromkeys(name for leaf in leaves for name in (leaf.path.partition("[")[0], leaf.path)))
+    for name in fixed:
+        if name not in known:
+            fields = list(dict.fromkeys(leaf.path.partition("[")[0] for leaf in leaves))
+            raise ParameterError(
+                f"{type(law).__name__} has no parameter '{name}' to hold fixed; there are {', '.join(fields)}."
+                f"{suggestion(name, known)}"
+            )
+
+
+def _refuse_too_few(law: Characteristic, data: Recording, free: int, measured: int) -> None:
+    name = f"{data.origin}: {type(law).__name__}"
+    if free == 0:
+        raise IdentificationError(f"{name} has no parameter left to be fitted. Hold fewer fixed.")
+    cut_off = len(data) - measured
+    if len(data) and not measured:
+        raise IdentificationError(
+            f"{name}: all {cut_off} rows are cut off at the ends of the range of force, so none was measured. Fit rows "
+            "in which the muscle pulls, or give the range with censoring=."
+        )
+    if measured < free:
+        also = f" ({cut_off} more are cut off at zero or full force and count as bounds only)" if cut_off else ""
+        raise IdentificationError(
+            f"{name} has {free} parameters to be found, but only {measured} points were measured{also}. Measure more, "
+            "choose a law with fewer parameters or a lower degree, or hold some with fixed=."
+        )

@@ -1,0 +1,132 @@
+"""Scalings of a polynomial surface in pressure and force, and how well data determine it in each."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import functools
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numpy.polynomial import chebyshev, polynomial
+
+from ..characteristic.base import Characteristic
+from ..recording import Recording
+from ..units import bar
+
+Array = npt.NDArray[np.float64]
+
+
+class LoadBox(NamedTuple):
+    """A rectangle of gauge pressure [Pa] and load [N]."""
+
+    least_pressure: float
+    greatest_pressure: float
+    least_force: float
+    greatest_force: float
+
+    @classmethod
+    def of_recording(cls, recording: Recording) -> LoadBox:
+        """The smallest box that holds every row."""
+        p, f = recording["pressure"], recording["force"]
+        return cls(float(p.min()), float(p.max()), float(f.min()), float(f.max()))
+
+    @classmethod
+    def of_law(cls, law: Characteristic) -> LoadBox:
+        """The box in which a law answers."""
+        return cls(*law.pressure_reach, *law.force_reach)
+
+    def scaled(self, pressure: Array, force: Array) -> tuple[Array, Array]:
+        """Pressure and force as numbers that run from -1 to 1 on the box."""
+        x = 2 * (pressure - self.least_pressure) / (self.greatest_pressure - self.least_pressure) - 1
+        y = 2 * (force - self.least_force) / (self.greatest_force - self.least_force) - 1
+        return x, y
+
+    def grid(self, pressures: int, forces: int) -> tuple[Array, Array]:
+        """Even points over the box, edges included, as two arrays of shape (pressures, forces)."""
+        p = np.linspace(self.least_pressure, self.greatest_pressure, pressures)
+        f = np.linspace(self.least_force, self.greatest_force, forces)
+        return np.broadcast_to(p[:, None], (pressures, forces)), np.broadcast_to(f, (pressures, forces))
+
+
+class Basis(abc.ABC):
+    """Functions of pressure and force that a surface is a sum of."""
+
+    @abc.abstractmethod
+    def columns(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
+        """Their values at N points [Pa, N], one column each, by degree in pressure and then in force."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Monomials(Basis):
+    """p^i F^j with pressure and force in multiples of stated units [Pa, N]."""
+
+    pressure_unit: float = 1.0
+    force_unit: float = 1.0
+
+    def columns(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
+        degrees = [pressure_degree, force_degree]
+        return np.asarray(polynomial.polyvander2d(pressure / self.pressure_unit, force / self.force_unit, degrees))
+
+
+@dataclasses.dataclass(frozen=True)
+class Chebyshev(Basis):
+    """T_i(x) T_j(y), with x and y running from -1 to 1 on a box: nearly orthogonal there."""
+
+    box: LoadBox
+
+    def columns(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
+        return np.asarray(chebyshev.chebvander2d(*self.box.scaled(pressure, force), [pressure_degree, force_degree]))
+
+    def in_bar_and_newton(self, coefficients: Array, pressure_degree: int, force_degree: int) -> Array:
+        """The same sum as coefficients of p^i F^j in bar and newton, in the same order."""
+        box = self.box
+        by_pressure = _monomials(box.least_pressure / bar, box.greatest_pressure / bar, pressure_degree)
+        by_force = _monomials(box.least_force, box.greatest_force, force_degree)
+        table = coefficients.reshape(pressure_degree + 1, force_degree + 1)
+        return (by_pressure @ table @ by_force.T).ravel()
+
+
+@functools.lru_cache(maxsize=64)  # a bootstrap refits one box a thousand times
+def _monomials(low: float, high: float, degree: int) -> Array:
+    """Column i holds the coefficients of T_i, scaled to low..high, by the powers of the unscaled variable."""
+    powers = np.zeros((degree + 1, degree + 1))
+    for i in range(degree + 1):
+        scaled = chebyshev.Chebyshev.basis(i, domain=[low, high]).convert(kind=polynomial.Polynomial)
+        powers[: i + 1, i] = scaled.convert(domain=[-1.0, 1.0]).coef[: i + 1]
+    powers.setflags(write=False)
+    return powers
+
+
+@dataclasses.dataclass(frozen=True)
+class Conditioning:
+    """How well data determine coefficients: the rank of the design, its size, its condition number."""
+
+    rank: int
+    coefficients: int
+    condition: float
+    """Greatest over least singular value; infinite where the rank is short."""
+
+    @classmethod
+    def of(cls, columns: Array) -> Conditioning:
+        """Of a design matrix (N, coefficients), exact beyond the 1e16 at which singular values drown in rounding.
+
+        Columns brought to length 1 have a pseudo-inverse that can be trusted; its rows take the lengths back.
+        """
+        lengths = np.linalg.norm(columns, axis=0)
+        even = columns / np.where(lengths > 0, lengths, 1.0)
+        rank, size = int(np.linalg.matrix_rank(even)), columns.shape[1]
+        if rank < size:
+            return cls(rank, size, np.inf)
+        inverse = np.linalg.pinv(even) / lengths[:, None]
+        return cls(rank, size, float(np.linalg.norm(columns, 2) * np.linalg.norm(inverse, 2)))
+
+    def __str__(self) -> str:
+        return f"rank {self.rank} of {self.coefficients}, condition {self.condition:.2g}"
+
+
+def conditioning(recording: Recording, basis: Basis, pressure_degree: int = 4, force_degree: int = 2) -> Conditioning:
+    """How well the points of a recording determine a surface's coefficients in a basis."""
+    columns = basis.columns(recording["pressure"], recording["force"], pressure_degree, force_degree)
+    return Conditioning.of(columns)

@@ -1,0 +1,161 @@
+"""From a table of a file to the model it describes, and every way in which that can go wrong.
+
+A table names its class, `model = "Braid"`, and gives its fields by name: numbers in the declared unit or text
+with a unit (`"300 mm"`), lists for tuples, tables for models inside models. A list may also be a column of a
+data file, `{ file = "data/map.csv", column = "force" }`, beside the file that names it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import types
+import typing
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from .. import units
+from ..declare import Parameter, field_or_suggestion, parameters
+from ..errors import AirmuscleError, ParameterError
+from .models import model_class
+
+
+@dataclasses.dataclass(frozen=True)
+class Place:
+    """Where in a file something stands, for messages; and the folder that its data files are relative to."""
+
+    file: str
+    table: str
+    folder: Path
+
+    def inside(self, key: str) -> Place:
+        """The place of a table or list item within this one."""
+        return dataclasses.replace(self, table=f"{self.table}.{key}" if self.table else key)
+
+    def __str__(self) -> str:
+        return f"{self.file}, [{self.table}]" if self.table else self.file
+
+
+def build(table: Mapping[str, Any], place: Place, ready: Mapping[str, Any] | None = None) -> Any:
+    """The model that a table describes. Raises ParameterError, UnitError or UnknownName, saying where.
+
+    `ready` holds fields that are models already and so do not stand in the table.
+    """
+    if not isinstance(table, Mapping):
+        raise ParameterError(f'{place}: {table!r} is not a table; write model = "..." and its parameters under it.')
+    if not isinstance(table.get("model"), str):
+        raise ParameterError(f'{place}: no model is named; write model = "Braid", say, and its parameters under it.')
+    cls = model_class(table["model"], f"{place}, model")
+    given = {key: value for key, value in table.items() if key != "model"}
+    for key in given:
+        with _said_at(place):
+            field_or_suggestion(cls, key)
+    declared = {p.name: p for p in parameters(cls)}
+    hints = typing.get_type_hints(cls)
+    _refuse_missing(cls, {**given, **(ready or {})}, hints, place)
+    values = {
+        key: _numbers(value, declared[key], hints[key], place)
+        if key in declared
+        else _part(value, hints[key], key, place)
+        for key, value in given.items()
+    }
+    with _said_at(place):
+        return cls(**values, **(ready or {}))
+
+
+@contextlib.contextmanager
+def _said_at(place: Place) -> Iterator[None]:
+    """Puts the place in front of the message of any error of ours that is raised inside."""
+    try:
+        yield
+    except AirmuscleError as error:
+        raise type(error)(f"{place}: {error}") from None
+
+
+def _refuse_missing(cls: type[Any], given: Mapping[str, Any], hints: Mapping[str, Any], place: Place) -> None:
+    for field in dataclasses.fields(cls):
+        optional = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
+        if not field.init or optional or field.name in given:
+            continue
+        facts = field.metadata
+        what = (
+            f"[{facts['unit']}] ({facts['symbol']}, {facts['meaning']})" if facts else f"({_words(hints[field.name])})"
+        )
+        raise ParameterError(f"{place}: {cls.__name__} needs '{field.name}' {what}; it is missing.")
+
+
+def _numbers(value: Any, declared: Parameter, hint: Any, place: Place) -> Any:
+    """A declared parameter: one number, or a tuple of them where the model has a tuple."""
+    where = f"{place}, {declared.name}"
+    many = typing.get_origin(hint) is tuple
+    if isinstance(value, Mapping) and many:
+        return _column(value, where, place.folder)
+    if isinstance(value, list) != many:
+        wanted = "a list of numbers" if many else "one number"
+        raise ParameterError(
+            f"{where} is {value!r}; {wanted} in {declared.unit} is wanted ({declared.symbol}, {declared.meaning})."
+        )
+    if many:
+        return tuple(_number(v, declared, f"{where}[{i}]") for i, v in enumerate(value))
+    return _number(value, declared, where)
+
+
+def _number(value: Any, declared: Parameter, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ParameterError(
+            f"{where} is {value!r}; it must be a number in {declared.unit}, or text with a unit "
+            f"({declared.symbol}, {declared.meaning})."
+        )
+    return units.quantity(value, declared.unit, where=where)
+
+
+def _column(value: Mapping[str, Any], where: str, folder: Path) -> tuple[float, ...]:
+    """A column of a data file as a tuple, in the SI unit that recordings keep it in."""
+    from ..recording import read_csv  # pandas, which most entries do not need
+
+    if set(value) != {"file", "column"} or not all(isinstance(v, str) for v in value.values()):
+        raise ParameterError(f'{where}: a column of a file is written {{ file = "data/map.csv", column = "force" }}.')
+    recording = read_csv(folder / value["file"])
+    return tuple(float(v) for v in recording[value["column"]])
+
+
+def _part(value: Any, hint: Any, key: str, place: Place) -> Any:
+    """A field that is structure: a model, a tuple of models, a whole number, a name, true or false."""
+    inner = place.inside(key)
+    if isinstance(value, Mapping):
+        found = build(value, inner)
+    elif isinstance(value, list):
+        found = tuple(_part(v, Any, f"{key}[{i}]", place) for i, v in enumerate(value))
+    elif isinstance(value, str) and not _accepts(hint, value):
+        found = build({"model": value}, inner)
+    else:
+        found = value
+    if not _accepts(hint, found):
+        what = type(found).__name__ if dataclasses.is_dataclass(found) else repr(found)
+        raise ParameterError(f"{place}: {key} is {what}; {_words(hint)} is wanted.")
+    return found
+
+
+def _accepts(hint: Any, value: Any) -> bool:
+    """Whether a value fits a field's annotation, as far as its outermost type goes."""
+    if hint is Any:
+        return True
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        return any(_accepts(option, value) for option in typing.get_args(hint))
+    cls = typing.get_origin(hint) or hint
+    if cls in (int, float) and isinstance(value, bool):
+        return False
+    return isinstance(value, (int, float) if cls is float else cls)
+
+
+def _words(hint: Any) -> str:
+    options = typing.get_args(hint) if typing.get_origin(hint) in (typing.Union, types.UnionType) else (hint,)
+    plain = {
+        int: "a whole number",
+        str: "text",
+        bool: "true or false",
+        float: "a number",
+        type(None): "nothing",
+    }
+    return " or ".join(plain.get(o) or f"a {getattr(typing.get_origin(o) or o, '__name__', o)}" for o in options)

@@ -1,0 +1,59 @@
+"""What a library file describes: a muscle or a law with its sources, its trust and its checks."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+from ..characteristic.base import Characteristic, ForceLaw
+from ..characteristic.box import Box
+from ..errors import UnknownName
+from ..geometry.base import Geometry
+from ..reference import Reference
+
+if TYPE_CHECKING:
+    from ..muscle import Damper, Muscle, Spring
+
+
+@dataclasses.dataclass(frozen=True)
+class Check:
+    """A published number that the entry must give: `quantity` at the `given` values, within a tolerance."""
+
+    quantity: str
+    given: tuple[tuple[str, float], ...]
+    equals: float
+    tolerance: float
+    source: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Entry:
+    """One library file: a muscle or a law as it was read, all numbers SI.
+
+    `trust` says how the numbers came here (printed, measured, second hand, fitted, chosen), `warning` what a user
+    must know before using it, and `box` where the entry was measured or printed, when the file says so.
+    """
+
+    name: str
+    title: str
+    trust: str
+    characteristic: Characteristic
+    geometry: Geometry | None = None
+    spring: Spring | None = None
+    damper: Damper | None = None
+    note: str = ""
+    warning: str = ""
+    box: Box | None = None
+    checks: tuple[Check, ...] = ()
+    references: tuple[Reference, ...] = ()
+
+    @property
+    def muscle(self) -> Muscle:
+        """The muscle made of the entry's parts. Raises UnknownName where parts are missing."""
+        from ..muscle import Muscle
+
+        if not isinstance(self.characteristic, ForceLaw) or self.geometry is None:
+            lack = "a [geometry]" if self.geometry is None else "a law solved for the force: see as_force_law"
+            raise UnknownName(f"{self.name} is a characteristic, not yet a muscle; it lacks {lack}.")
+        given = {part: getattr(self, part) for part in ("spring", "damper") if getattr(self, part) is not None}
+        return Muscle(self.characteristic, self.geometry, **given)

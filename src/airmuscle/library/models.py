@@ -1,0 +1,88 @@
+"""The one place where text becomes a class: what a library file or the command line may name as `model`.
+
+To add a model, add a line: its class name and the module that holds it. Modules are imported when asked for.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from ..errors import UnknownName, suggestion
+
+_MODULES: dict[str, str] = {
+    # the part of the surface with data
+    "Box": "characteristic.box",
+    # geometry
+    "Braid": "geometry.braid",
+    "Catenary": "geometry.catenary",
+    "ChebyshevGeometry": "geometry.chebyshev",
+    "CircularArc": "geometry.circular_arc",
+    "EvenSpread": "geometry.fibre_sum",
+    "GivenSum": "geometry.fibre_sum",
+    "Parabola": "geometry.parabola",
+    "PleatedTube": "geometry.pleated",
+    "StraightFibre": "geometry.straight_fibre",
+    "SumOverHalf": "geometry.fibre_sum",
+    "SumPastHalf": "geometry.fibre_sum",
+    "TabulatedGeometry": "geometry.tabulated",
+    "TrueArcParabola": "geometry.parabola",
+    # springs and dampers
+    "CubicSpring": "muscle",
+    "LinearDamper": "muscle",
+    "LinearSpring": "muscle",
+    "PressureDamper": "muscle",
+    # muscles and plants
+    "Muscle": "muscle",
+    "Plant": "plant",
+    "Ambient": "gas",
+    "Isothermal": "gas",
+    "Polytropic": "gas",
+    "ClosedChamber": "circuit",
+    "FillDischarge": "circuit",
+    "Supply": "circuit",
+    "Valve": "circuit",
+    "HangingMass": "mechanism",
+    "Held": "mechanism",
+    "Isometric": "mechanism",
+    # commands and methods
+    "Schedule": "command",
+    "Signal": "command",
+    "DormandPrince8": "method",
+    "Rodas4": "method",
+    "RungeKutta4": "method",
+    # static characteristics
+    "AlongArc": "characteristic.rubber",
+    "AlongAxis": "characteristic.rubber",
+    "BorzikovaDirect": "characteristic.borzikova",
+    "BorzikovaExponential": "characteristic.borzikova",
+    "ChouHannaford1996": "characteristic.chou_hannaford1996",
+    "CircleVirtualWork": "characteristic.circle_virtual_work",
+    "Clamped": "characteristic.clamped",
+    "ContractileSurface": "characteristic.contractile_surface",
+    "ExactMeridian": "characteristic.exact_meridian",
+    "MartensBoblan2017": "characteristic.martens_boblan2017",
+    "RubberLine": "characteristic.rubber",
+    "Saga2007": "characteristic.saga2007",
+    "PolynomialStandIn": "characteristic.as_force_law",
+    "Sarosi2012": "characteristic.sarosi2012",
+    "Tabulated": "characteristic.tabulated",
+    "TonduLopez2000": "characteristic.tondu_lopez2000",
+    "VirtualWork": "characteristic.virtual_work",
+}
+
+
+def model_names() -> tuple[str, ...]:
+    """Every class that a file may name, sorted."""
+    return tuple(sorted(_MODULES))
+
+
+def model_class(name: str, where: str) -> type[Any]:
+    """The class of this name; `where` opens the message of the UnknownName raised otherwise."""
+    if name not in _MODULES:
+        raise UnknownName(
+            f"{where}: no model '{name}'; there are {', '.join(model_names())}.{suggestion(name, _MODULES)}"
+        )
+    module = importlib.import_module(f"airmuscle.{_MODULES[name]}")
+    found: type[Any] = getattr(module, name)
+    return found

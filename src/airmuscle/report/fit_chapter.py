@@ -1,0 +1,89 @@
+"""The chapter of a report that a fit fills."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..reference import cite
+from .chapter import Chapter, Plot, Table
+from .chart import SAME_PRESSURE, Array, chart, isobars
+
+if TYPE_CHECKING:
+    from ..identify.result import Fit
+    from ..library.entry import Entry
+    from ..recording import Recording
+
+MOST_CURVES = 8
+
+
+def fit_chapter(fit: Fit, entry: Entry, recording: Recording) -> Chapter:
+    """A fit's figures of merit, parameters, isobars with the measured points, and errors, row by row."""
+    notes = "\n\n".join((*fit.notes, *recording.notes))
+    return Chapter(
+        paper="fit",
+        title=entry.title,
+        summary=f"{entry.note}\n\n{notes}",
+        tables=(_figures(fit), _parameters(fit), _correlations(fit), _rows(fit)),
+        plots=(_isobars(fit, entry), Plot("errors", "Model against measurement, and the errors.", fit.plot())),
+        references=tuple(cite(entry)),
+    )
+
+
+def _figures(fit: Fit) -> Table:
+    names, texts = zip(*fit.summary(), strict=True)
+    return Table("figures", "Figures of the fit", {"figure": list(names), "value": list(texts)})
+
+
+def _parameters(fit: Fit) -> Table:
+    return Table(
+        "parameters",
+        "Parameters",
+        {
+            "parameter": [e.name for e in fit.estimates],
+            "symbol": [e.label for e in fit.estimates],
+            "value (SI)": [e.value for e in fit.estimates],
+            "standard deviation (SI)": [e.deviation for e in fit.estimates],
+            "unit": ["" if e.unit == "1" else e.unit for e in fit.estimates],
+            "meaning": [e.meaning for e in fit.estimates],
+        },
+    )
+
+
+def _correlations(fit: Fit) -> Table:
+    columns = {name: fit.correlations[:, i] for i, name in enumerate(fit.names)}
+    return Table("correlations", "Correlations", {"parameter": list(fit.names), **columns}, shown=False)
+
+
+def _rows(fit: Fit) -> Table:
+    unit = fit.direction.unit
+    return Table(
+        "rows",
+        "Measured and modelled",
+        {
+            "pressure [Pa]": fit.recording["pressure"],
+            "contraction [1]": fit.recording["contraction"],
+            "force [N]": fit.recording["force"],
+            f"modelled {fit.direction.quantity} [{unit}]": fit.modelled,
+            f"error [{unit}]": fit.errors,
+            "cut off": (fit.sides != 0).astype(int),
+        },
+        shown=False,
+    )
+
+
+def _isobars(fit: Fit, entry: Entry) -> Plot:
+    """The isobars of the fitted law at pressures that were measured, with their points."""
+    levels = pressure_levels(fit.recording["pressure"])
+    if levels.size > MOST_CURVES:
+        levels = levels[np.unique(np.linspace(0, levels.size - 1, MOST_CURVES).astype(int))]
+    curves = isobars(fit.model, entry.box, pressures=levels)
+    return chart(fit.model, entry.title, curves, entry.box, measured=fit.recording)
+
+
+def pressure_levels(pressures: Array) -> Array:
+    """The pressures that a bench held: the medians of groups that lie closer together than a bench holds them."""
+    ordered = np.sort(pressures)
+    ends = np.flatnonzero(np.diff(ordered) > SAME_PRESSURE * ordered[-1]) + 1
+    return np.array([np.median(group) for group in np.split(ordered, ends)])

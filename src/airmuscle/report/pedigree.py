@@ -1,0 +1,27 @@
+"""What a report says about its own making, so that it can be made again."""
+
+from __future__ import annotations
+
+import functools
+import platform
+from importlib import metadata
+
+_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "casadi", "matplotlib")
+
+
+@functools.cache
+def versions() -> dict[str, str]:
+    """The versions of airmuscle, Python and the packages that compute; `not installed` where one is missing."""
+    return {
+        "airmuscle": _version("airmuscle"),
+        "Python": platform.python_version(),
+        **{package: _version(package) for package in _PACKAGES},
+        "machine": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not installed"

@@ -1,0 +1,72 @@
+"""The surfaces that the chapter on Borzikova et al. judges, and the disturbed data that it fits."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+
+import numpy as np
+
+from ..characteristic.base import ContractionLaw
+from ..characteristic.borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential, PlaneCurves
+from ..errors import AirmuscleWarning
+from ..identify.correlation_index import CorrelationIndex, correlation_index
+from ..identify.monotone_surface import monotone
+from ..identify.surface_basis import LoadBox
+from ..library.catalogue import load
+from ..recording import Recording
+
+MISPRINT = 2
+"""Place of a_02, whose exponent is misprinted, among the coefficients."""
+MENDED_A02 = -7.55e-5
+
+AS_EXPONENT = "printed matrix as exponent of (1)"
+PRINTED = "direct, as printed"
+MISPRINT_MENDED = "direct, a_02 mended alone"
+REPAIRED = "direct, repaired"
+EXPONENTIAL = "exponential (1), by us"
+MONOTONE = "exponential (1), monotone"
+
+
+def surfaces(curves: PlaneCurves = SAM_30X290) -> dict[str, ContractionLaw]:
+    """Every surface that the chapter judges, by the name that it has there."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)  # that it is misprinted is what the chapter shows
+        printed = load("borzikova-direct-printed").characteristic
+    repaired = load("borzikova-direct-repaired").characteristic
+    exponential = load("borzikova-exponential").characteristic
+    assert isinstance(printed, BorzikovaDirect)
+    assert isinstance(repaired, BorzikovaDirect)
+    assert isinstance(exponential, BorzikovaExponential)
+    saturation = curves.curves[0].saturation
+    return {
+        AS_EXPONENT: BorzikovaExponential(printed.coefficients, *LoadBox.of_law(printed), saturation=saturation),
+        PRINTED: printed,
+        MISPRINT_MENDED: with_a02(printed, MENDED_A02),
+        REPAIRED: repaired,
+        EXPONENTIAL: exponential,
+        MONOTONE: monotone(curves.sample(), saturation).model,
+    }
+
+
+def with_a02(law: BorzikovaDirect, a02: float) -> BorzikovaDirect:
+    """The surface with another coefficient of F^2."""
+    coefficients = (*law.coefficients[:MISPRINT], a02, *law.coefficients[MISPRINT + 1 :])
+    return dataclasses.replace(law, coefficients=coefficients)
+
+
+def index_on_curves(law: ContractionLaw, curves: PlaneCurves) -> CorrelationIndex:
+    """The correlation index of a surface on 15 even pressures of each plane curve."""
+    data = curves.sample()
+    return correlation_index(data["contraction"], law.contraction(data["pressure"], data["force"]))
+
+
+def rounded(recording: Recording, step: float = 0.005) -> Recording:
+    """The recording with contractions rounded to a step [1]."""
+    return recording.with_columns(contraction=np.round(recording["contraction"] / step) * step)
+
+
+def noisy(recording: Recording, seed: int, deviation: float = 0.005) -> Recording:
+    """The recording with normal noise of a standard deviation [1] on its contractions."""
+    noise = deviation * np.random.default_rng(seed).standard_normal(len(recording))
+    return recording.with_columns(contraction=recording["contraction"] + noise)

@@ -1,0 +1,109 @@
+"""The third paper: dynamics after Hill's muscle model, with valves by ISO 6358 and the gas equation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..characteristic.contractile_surface import exponents
+from ..figures import LINES, legend_outside, new_figure
+from ..identify import Fit
+from ..library import catalogue
+from ..reference import cite
+from ..report.chapter import Chapter, Claim, Equal, Plot, Table
+from . import hosovsky_fill as filling
+from . import hosovsky_release as releasing
+from .hosovsky_plant import MAPS, MATRIX, MATRIX_CATALOGUE, PAPER, Numbers, surface, surface_fit
+
+SUMMARY = """The muscle of Hosovsky et al. has a contractile element given by a polynomial of total degree five in
+contraction and pressure (21 coefficients, clamped to 0..1200 N), a parallel spring and a damper; two on/off valves
+by ISO 6358 fill and discharge it. The paper prints neither the coefficients nor mass, spring, damper and geometry.
+The surface is therefore fitted to the measured map of a DMSP-20-300, and second to Festo's tool table; valves,
+supply, schedule, released mass and solver are as printed; every other number is listed below with its source, and
+each verdict on the quick release says whether it survives the whole range of every chosen number."""
+
+
+def surface_claims(found: Fit) -> tuple[Claim, ...]:
+    """The form of the contractile surface, counted and measured."""
+    law = surface()
+    force = law.force(np.linspace(0, 1e6, 51)[:, None], np.linspace(-0.05, 0.4, 46)[None, :])
+    return (
+        Claim(PAPER, "coefficients of a polynomial of total degree five", Equal(21, 0), len(exponents(5)), "1"),
+        Claim(PAPER, "coefficients that the measured map determines (rank of the fit)", Equal(21, 0), found.rank, "1",
+              f"condition number {found.condition:.3g}, scaled; rms {found.rmse:.3g} N on the measured map"),
+        Claim(PAPER, "force compensator: greatest force of the surface", Equal(1200.0, 0.0), float(force.max()), "N"),
+        Claim(PAPER, "force compensator: least force of the surface", Equal(0.0, 0.0), float(force.min()), "N"),
+    )  # fmt: skip
+
+
+def surface_figure() -> Plot:
+    """The surface's isobars through the measured points, as the paper's Fig. 2 shows its surface."""
+    law, data = surface(), catalogue.measured(MAPS[0])
+    figure, axes = new_figure()
+    contraction = np.linspace(0.0, 0.26, 200)
+    for i, pressure in enumerate((675e3, 525e3, 375e3, 250e3, 135e3)):
+        here = np.isclose(data["pressure"], pressure)
+        axes.plot(contraction * 100, law.force(pressure, contraction), color=LINES[i], label=f"{pressure / 1e3:g} kPa")
+        axes.plot(data["contraction"][here] * 100, data["force"][here], "o", color=LINES[i])
+    axes.axhline(1200.0, color="0.4", linewidth=0.8, linestyle=":")
+    axes.set(xlabel="contraction [%]", ylabel="force [N]", xlim=(0, 27), ylim=(-30, 1700))
+    legend_outside(axes, title="gauge pressure")
+    caption = "Contractile surface (lines) fitted to a measured DMSP-20-300 (points), clamped to 0..1200 N (dotted)."
+    return Plot("hosovsky_surface", caption, figure)
+
+
+def coefficients() -> Table:
+    """The fitted coefficients in plain units, p in bar: what the paper leaves out, for this muscle."""
+    plain = {name: surface(name).plain_coefficients(1e5) for name in MAPS}
+    powers = exponents(5)
+    columns: dict[str, list[float] | list[int]] = {
+        "power of contraction": [i for i, _ in powers],
+        "power of pressure": [j for _, j in powers],
+    }
+    for name in MAPS:
+        columns[f"{name} [N/bar^j]"] = [plain[name][power] for power in powers]
+    note = "F = Sum a_ij eps^i p^j with eps as a ratio and p gauge in bar; inside the box of its data only"
+    return Table("hosovsky_coefficients", "The 21 coefficients in plain units", columns, note)
+
+
+def chapter(numbers: Numbers | None = None) -> Chapter:
+    """The chapter of the report; `numbers` are those that the paper does not print."""
+    numbers = numbers or Numbers()
+    fill = filling.run_fill(numbers)
+    table, effect_plot = filling.effects(numbers)
+    low, high = releasing.pair(numbers)
+    ranges = releasing.over_ranges(numbers)
+    return Chapter(
+        PAPER,
+        "Hosovsky et al.: muscle dynamics after Hill",
+        SUMMARY,
+        claims=(*surface_claims(surface_fit()), *filling.claims(fill), *releasing.claims(low, high, ranges)),
+        tables=(table, ranges, coefficients(), _left_boxes(fill, low, high), *_series(fill, low, high)),
+        plots=(
+            surface_figure(),
+            filling.valve_figure(MATRIX, fill.plant.ambient.temperature),
+            filling.figure_3(fill),
+            effect_plot,
+            releasing.figure_4(low, high),
+        ),
+        references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(catalogue.load(MAPS[0]))),
+        chosen=numbers.rows(),
+    )
+
+
+def _left_boxes(fill: filling.Fill, low: releasing.Release, high: releasing.Release) -> Table:
+    """When and how far the runs left the box in which the surface has data."""
+    runs = {"fill and discharge": fill.adaptive, f"release from {low.pressure / 1e3:g} kPa": low.run}
+    runs[f"release from {high.pressure / 1e3:g} kPa"] = high.run
+    left = [(name, note) for name, run in runs.items() for note in run.notes if "left the box" in note]
+    columns = {"run": [name for name, _ in left], "what": [note for _, note in left]}
+    return Table("hosovsky_boxes", "Where the runs left the data of the contractile surface", columns)
+
+
+def _series(fill: filling.Fill, low: releasing.Release, high: releasing.Release) -> tuple[Table, ...]:
+    """The runs behind Figs. 3 and 4, for the data folder."""
+    runs = {"hosovsky_fill": fill.adaptive, "hosovsky_release_low": low.run, "hosovsky_release_high": high.run}
+    names = (("time", "s"), ("pressure", "Pa"), ("contraction", "1"), ("position", "m"), ("force", "N"))
+    return tuple(
+        Table(key, key.replace("_", " "), {f"{n} [{unit}]": run[n] for n, unit in names}, shown=False)
+        for key, run in runs.items()
+    )

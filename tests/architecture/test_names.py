@@ -1,0 +1,63 @@
+"""One meaning per name: the nomenclature page is what the code declares, and no public argument is missing from it."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+import inspect
+from pathlib import Path
+
+import airmuscle
+from airmuscle.declare import parameters
+from airmuscle.library.models import model_class, model_names
+from airmuscle.recording import QUANTITIES
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def maker():
+    spec = importlib.util.spec_from_file_location("make_nomenclature", DOCS / "make_nomenclature.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_page_is_what_the_code_declares():
+    assert (DOCS / "nomenclature.md").read_text(encoding="utf-8") == maker().page(), "run docs/make_nomenclature.py"
+
+
+def public_arguments():
+    """(where, argument) of every public function and method of what the package exports, and of every model."""
+    classes = [model_class(name, "test") for name in model_names()]
+    exported = [getattr(airmuscle, name) for name in airmuscle.__all__]
+    for thing in [*exported, *classes]:
+        if inspect.isfunction(thing):
+            yield from ((thing.__name__, a) for a in inspect.signature(thing).parameters)
+        elif inspect.isclass(thing):
+            for name, member in vars(thing).items():
+                if not name.startswith("_") and inspect.isfunction(member):
+                    yield from ((f"{thing.__name__}.{name}", a) for a in inspect.signature(member).parameters)
+            if dataclasses.is_dataclass(thing):
+                yield from ((thing.__name__, f.name) for f in dataclasses.fields(thing) if f.init)
+
+
+def test_no_public_argument_is_missing_from_the_nomenclature():
+    declared = {
+        p.name
+        for name in model_names()
+        if dataclasses.is_dataclass(model_class(name, ""))
+        for p in parameters(model_class(name, ""))
+    }
+    known = declared | set(QUANTITIES) | set(maker().ARGUMENTS) | {"self", "cls"}
+    missing = sorted({f"{argument} ({where})" for where, argument in public_arguments() if argument not in known})
+    assert not missing, f"add to docs/make_nomenclature.py, or use a name that is there: {missing}"
+
+
+def test_every_declared_parameter_says_what_it_is():
+    for name in model_names():
+        cls = model_class(name, "test")
+        for p in parameters(cls) if dataclasses.is_dataclass(cls) else ():
+            assert p.unit, f"{name}.{p.name}"
+            assert p.symbol, f"{name}.{p.name}"
+            assert len(p.meaning) > 3, f"{name}.{p.name}"
+            assert p.bounds[0] < p.bounds[1], f"{name}.{p.name}"

@@ -1,0 +1,140 @@
+"""Plane curves k(p) under 45, 130 and 260 N, and the surfaces over them, as Borzikova et al. define them:
+
+k = k_max (1 - exp v) with v = Sum a_ij p^i F^j, or directly k[%] = Sum a_ij p^i F^j; p in bar, F in N.
+A surface answers searches in its box alone, says what lies outside, and goes on there by its tangent.
+"""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from airmuscle import trace
+from airmuscle.characteristic.borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential
+from airmuscle.errors import NoSolution, OutOfReach, ParameterError
+from airmuscle.library.catalogue import load
+
+# Coefficients of the exponent that the three printed curves determine, by Lagrange interpolation in F;
+# rows by power of p in bar, columns by power of F in N. Ten decimals were computed apart from this program.
+EXACT = """
+     1.6846648427e-01  -2.0969209723e-03   5.6765232032e-06
+    -2.4200192886e+00   2.9208299484e-02  -7.6323055877e-05
+     6.3570889193e-01  -1.3148179522e-02   4.1115647690e-05
+    -9.1269357045e-02   2.4281079659e-03  -8.8866673682e-06
+     2.6581395349e-03  -7.9516994633e-05   4.5438282648e-07
+"""
+EXPONENTIAL = SAM_30X290.interpolated()
+
+
+@pytest.fixture(scope="module")
+def repaired() -> BorzikovaDirect:
+    return load("borzikova-direct-repaired").characteristic
+
+
+@pytest.mark.parametrize(
+    ("force", "bar", "contraction"),
+    [
+        (45.0, 0.0, 0.40 - 0.40 * np.exp(0.0856)),
+        (45.0, 2.0, 0.40 - 0.40 * np.exp(0.1273 * 4 - 1.2602 * 2 + 0.0856)),
+        (130.0, 2.0, 0.40 - 0.40 * np.exp(0.0742 * 8 - 0.3787 * 4 + 0.0872 * 2 - 0.0082)),
+        (260.0, 2.0, 0.40 - 0.40 * np.exp(0.0127 * 16 - 0.0607 * 8 - 0.0034 * 4 + 0.0147 * 2 + 0.007)),
+    ],
+)
+def test_a_plane_curve_is_the_printed_formula(force, bar, contraction):
+    assert SAM_30X290.at(force).contraction(bar * 1e5) == pytest.approx(contraction, abs=1e-15)
+
+
+@pytest.mark.parametrize(("force", "turns"), [(45.0, [4.950]), (130.0, [0.119, 3.283]), (260.0, [0.276, 3.600])])
+def test_plane_curves_turn_where_they_do(force, turns):
+    found = SAM_30X290.at(force).turning_pressures()
+    assert [p / 1e5 for p in found] == pytest.approx(turns, abs=6e-4)
+
+
+def test_between_the_loads_there_is_no_plane_curve():
+    with pytest.raises(OutOfReach, match=r"under 200 N; there are 45, 130, 260 N\. Between them ask a surface"):
+        SAM_30X290.at(200.0)
+
+
+def test_the_surface_through_the_curves_has_the_known_coefficients():
+    assert EXPONENTIAL.coefficients == pytest.approx([float(a) for a in EXACT.split()], rel=1e-10)
+    assert load("borzikova-exponential").characteristic.coefficients == pytest.approx(
+        EXPONENTIAL.coefficients, rel=1e-12
+    )
+
+
+def test_a_sample_of_the_curves_lies_on_the_surface_through_them():
+    data = SAM_30X290.sample(36)
+    assert len(data) == 108
+    found = EXPONENTIAL.contraction(data["pressure"], data["force"])
+    assert np.abs(found - data["contraction"]).max() < 2e-15
+
+
+def test_direct_contraction_is_per_cent_over_bar_and_newton():
+    law = BorzikovaDirect((1.0, 0.0, 0.0, 0.0, 2.0, 0.5), 0.0, 3e5, 10.0, 100.0, 1, 2)
+    # 1 + 2 p F + 0.5 p F^2 at 3 bar and 10 N is 1 + 60 + 150 per cent
+    assert law.contraction(3e5, 10.0) == pytest.approx(2.11, abs=1e-14)
+
+
+def test_exponential_contraction_saturates_from_its_exponent():
+    law = BorzikovaExponential((0.1, 0.0, -0.5, 0.001), 0.0, 3e5, 10.0, 100.0, 1, 1, saturation=0.3)
+    exponent = 0.1 - 0.5 * 2 + 0.001 * 2 * 50
+    assert law.contraction(2e5, 50.0) == pytest.approx(0.3 * (1 - np.exp(exponent)), abs=1e-15)
+
+
+@pytest.mark.parametrize("force", [60.0, 130.0, 180.0])
+def test_force_and_pressure_invert_contraction(force, repaired):
+    for law in (EXPONENTIAL, repaired):
+        contraction = law.contraction(2e5, force)
+        assert law.force(2e5, contraction) == pytest.approx(force, abs=1e-9)
+        assert law.pressure(contraction, force) == pytest.approx(2e5, rel=1e-12)
+
+
+def test_slopes_follow_from_contraction():
+    force, step = 120.0, 1e-3
+    slopes = EXPONENTIAL.slopes(2e5, EXPONENTIAL.contraction(2e5, force))
+    by_force = EXPONENTIAL.contraction(2e5, force + step) - EXPONENTIAL.contraction(2e5, force - step)
+    assert slopes.by_contraction == pytest.approx(2 * step / by_force, rel=1e-6)
+
+
+def test_a_search_answers_inside_the_box_alone():
+    with pytest.raises(NoSolution, match=r"between 45 and 260 N holds a contraction of 39\.00% at 200 kPa"):
+        EXPONENTIAL.force(2e5, 0.39)
+    with pytest.raises(NoSolution, match=r"between 0 and 350 kPa gives 260 N at a contraction of 25\.00%"):
+        EXPONENTIAL.pressure(0.25, 260.0)
+
+
+def test_what_lies_outside_the_box_is_flagged():
+    pressure, force = np.array([-1.0, 0.0, 2e5, 3.5e5, 3.6e5, 2e5]), np.array([100, 45, 44, 260, 100, 261.0])
+    assert EXPONENTIAL.inside_box(pressure, force).tolist() == [False, True, False, True, False, False]
+
+
+def test_outside_the_box_the_exponent_is_its_tangent():
+    at_edge = EXPONENTIAL.polynomial(3.5e5, 150.0)
+    slope = trace.slope(EXPONENTIAL, "polynomial", 3.5e5 - 1e-6, 150.0, wrt=0)
+    assert EXPONENTIAL.polynomial(5e5, 150.0) == pytest.approx(at_edge + 1.5e5 * slope, rel=1e-9)
+    at_edge = EXPONENTIAL.polynomial(2e5, 260.0)
+    slope = trace.slope(EXPONENTIAL, "polynomial", 2e5, 260.0 - 1e-9, wrt=1)
+    assert EXPONENTIAL.polynomial(2e5, 500.0) == pytest.approx(at_edge + 240.0 * slope, rel=1e-9)
+
+
+def test_the_law_traces_to_what_it_computes():
+    pressure, force = np.linspace(-1e5, 5e5, 30), np.linspace(0.0, 400.0, 30)
+    values, by_parameters = trace.jacobian(EXPONENTIAL, "contraction", pressure, force)
+    assert values == pytest.approx(EXPONENTIAL.contraction(pressure, force), abs=1e-14)
+    assert by_parameters.shape == (30, 15 + 4 + 1)
+
+
+def test_the_misprinted_surface_loads_with_a_warning():
+    with pytest.warns(UserWarning, match="carries misprints"):
+        printed = load("borzikova-direct-printed").characteristic
+    assert printed.contraction(1e5, 260.0) < -5.0
+
+
+def test_a_wrong_number_of_coefficients_is_refused():
+    with pytest.raises(ParameterError, match=r"degree 4 in pressure and 2 in force needs 15 coefficients; 14 given"):
+        dataclasses.replace(EXPONENTIAL, coefficients=EXPONENTIAL.coefficients[:14])
+
+
+def test_a_box_without_extent_is_refused():
+    with pytest.raises(ParameterError, match="least_force 260 must lie below greatest_force 260"):
+        dataclasses.replace(EXPONENTIAL, least_force=260.0)

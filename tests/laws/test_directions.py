@@ -1,0 +1,183 @@
+"""Every library entry is one surface, whatever it is asked for.
+
+With F = f(p, eps): force, contraction and pressure answer points of the same surface; a direction that a law has in
+closed form equals the root search that stands in for it elsewhere; slopes are the derivatives of the force; an array
+gives what its elements give; a traced law gives what NumPy gives, and so does JAX.
+"""
+
+from __future__ import annotations
+
+import functools
+import warnings
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from airmuscle import trace
+from airmuscle.characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
+from airmuscle.characteristic.box import Box
+from airmuscle.errors import AirmuscleWarning, NoSolution, ParameterError
+from airmuscle.library import catalogue
+
+ARGUMENTS = {
+    "force": ("pressure", "contraction"),
+    "contraction": ("pressure", "force"),
+    "pressure": ("contraction", "force"),
+}
+SEARCHES = {ForceLaw: "force", ContractionLaw: "contraction", PressureLaw: "pressure"}
+# Away from the ends of a box and from round numbers, where tables have their kinks.
+PLACES = np.array([0.0871, 0.2913, 0.4931, 0.7127, 0.9083])
+
+
+class Points(NamedTuple):
+    """Points of a surface where the tension rises with pressure and falls with contraction."""
+
+    pressure: np.ndarray
+    contraction: np.ndarray
+    force: np.ndarray
+
+    def given(self, direction: str) -> list[np.ndarray]:
+        return [getattr(self, name) for name in ARGUMENTS[direction]]
+
+
+@functools.cache
+def entry(name: str) -> catalogue.Entry:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        return catalogue.load(name)
+
+
+def own_direction(law: Characteristic) -> str:
+    """The quantity that the law is given for."""
+    return next((direction for base, direction in SEARCHES.items() if isinstance(law, base)), "force")
+
+
+@functools.cache
+def points(name: str) -> Points:
+    law, box = entry(name).characteristic, entry(name).box
+    ranges = {
+        "pressure": box.pressure if box else law.pressure_reach,
+        "contraction": box.contraction if box else law.contraction_reach,
+        "force": (law.force_reach[0], min(law.force_reach[1], 500.0)),
+    }
+    own = own_direction(law)
+    first, second = (
+        side.reshape(-1)
+        for side in np.meshgrid(*(low + PLACES * (high - low) for low, high in (ranges[n] for n in ARGUMENTS[own])))
+    )
+    answers = np.array([answer(law, own, a, b) for a, b in zip(first, second, strict=True)])
+    known = {**dict(zip(ARGUMENTS[own], (first, second), strict=True)), own: answers}
+    found = np.array([known["pressure"], known["contraction"], known["force"]])[:, np.isfinite(answers)]
+    return Points(*found[:, [reached_from_rest(law, *point) for point in found.T]])
+
+
+def answer(law: Characteristic, direction: str, first: float, second: float) -> float:
+    try:
+        return getattr(law, direction)(first, second)
+    except NoSolution:
+        return np.nan
+
+
+def reached_from_rest(law: Characteristic, pressure: float, contraction: float, force: float) -> bool:
+    """Answered in every direction, and with the first answer where there are branches; rising in pressure, falling
+    in contraction."""
+    if not force > 0 or not np.isfinite(answer(law, "pressure", contraction, force)):
+        return False
+    first = answer(law, "contraction", pressure, force), answer(law, "force", pressure, contraction)
+    if first != pytest.approx((contraction, force), rel=1e-6):
+        return False
+    slopes = law.slopes(pressure, contraction)
+    return bool(slopes.by_pressure > 0 and slopes.by_contraction < 0)
+
+
+every_entry = pytest.mark.parametrize("name", catalogue.names())
+
+
+@every_entry
+def test_a_box_holds_points_to_test(name: str):
+    assert points(name).force.size >= 8
+
+
+@every_entry
+@pytest.mark.parametrize("direction", ARGUMENTS)
+def test_each_direction_answers_a_point_of_the_surface(name: str, direction: str):
+    law, there = entry(name).characteristic, points(name)
+    answers = there._replace(**{direction: getattr(law, direction)(*there.given(direction))})
+    own = own_direction(law)
+    np.testing.assert_allclose(getattr(law, own)(*answers.given(own)), getattr(answers, own), rtol=1e-9)
+
+
+@every_entry
+def test_a_closed_form_equals_the_root_search(name: str):
+    law, there = entry(name).characteristic, points(name)
+    base = next((base for base in SEARCHES if isinstance(law, base)), None)
+    if base is None:
+        pytest.skip("the law has no root search to compare with")
+    for direction in set(ARGUMENTS) - {SEARCHES[base]}:
+        given = there.given(direction)
+        try:
+            searched = getattr(base, direction)(law, *given)
+        except NoSolution:  # a law that refuses a part of the reach cannot be searched through it
+            continue
+        np.testing.assert_allclose(getattr(law, direction)(*given), searched, rtol=1e-9)
+
+
+@every_entry
+def test_a_force_that_no_muscle_has_is_refused(name: str):
+    law, there = entry(name).characteristic, points(name)
+    if own_direction(law) != "force":
+        pytest.skip("solved for another quantity, the law answers any force")
+    if law.force(there.pressure[0], law.contraction_reach[0]) < 1e7:  # straight fibres pull without limit at rest
+        with pytest.raises(NoSolution, match=r"no contraction between .* balances 1e\+07 N"):
+            law.contraction(there.pressure[0], 1e7)
+    with pytest.raises(NoSolution, match=r"no gauge pressure between .* gives 1e\+07 N"):
+        law.pressure(there.contraction, 1e7)
+
+
+@every_entry
+def test_slopes_are_the_derivatives_of_the_force(name: str):
+    law, there = entry(name).characteristic, points(name)
+    slopes = law.slopes(there.pressure, there.contraction)
+    for step, exact in (((1.0, 0.0), slopes.by_pressure), ((0.0, 1e-6), slopes.by_contraction)):
+        after, before = (
+            law.force(there.pressure + sign * step[0], there.contraction + sign * step[1]) for sign in (1, -1)
+        )
+        np.testing.assert_allclose(exact, (after - before) / (2 * sum(step)), rtol=1e-4)
+
+
+@every_entry
+@pytest.mark.parametrize("direction", ARGUMENTS)
+def test_an_array_gives_what_its_elements_give(name: str, direction: str):
+    law, there = entry(name).characteristic, points(name)
+    given = there.given(direction)
+    singly = [getattr(law, direction)(float(a), float(b)) for a, b in zip(*given, strict=True)]
+    assert all(isinstance(value, float) for value in singly)
+    np.testing.assert_allclose(getattr(law, direction)(*given), singly, rtol=1e-12)
+
+
+@every_entry
+def test_a_traced_law_gives_what_numpy_gives(name: str):
+    law, there = entry(name).characteristic, points(name)
+    if not law.traceable:
+        pytest.skip("the law says that it is not closed-form")
+    own = own_direction(law)
+    traced, _ = trace.jacobian(law, own, *there.given(own))
+    np.testing.assert_allclose(traced, getattr(law, own)(*there.given(own)), rtol=1e-12)
+
+
+@every_entry
+def test_jax_gives_what_numpy_gives(name: str):
+    jax: Any = pytest.importorskip("jax")
+    law, there = entry(name).characteristic, points(name)
+    if not law.traceable:
+        pytest.skip("the law says that it is not closed-form")
+    own = own_direction(law)
+    jax.config.update("jax_enable_x64", True)
+    found = jax.jit(getattr(law, own))(*map(jax.numpy.asarray, there.given(own)))
+    np.testing.assert_allclose(np.asarray(found), getattr(law, own)(*there.given(own)), rtol=1e-12)
+
+
+def test_a_box_refuses_ends_that_do_not_rise():
+    with pytest.raises(ParameterError, match="least_pressure 2 must lie below greatest_pressure 1"):
+        Box(2.0, 1.0, 0.0, 0.1)

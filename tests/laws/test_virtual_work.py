@@ -1,0 +1,102 @@
+"""The tension of an ideal muscle is what its volume gives: F = -p dV/dL.
+
+It holds to 1e-9 for Chou and Hannaford, and for Tondu and Lopez with end correction 1, on the braid they contain.
+With corrected ends, or with a wall, it does not: the tests say by how much. A law that adds a wall to the braid
+still keeps energy, dF/dp = -dV/dL; corrected ends do not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from airmuscle.characteristic.box import Box
+from airmuscle.characteristic.chou_hannaford1996 import ChouHannaford1996
+from airmuscle.characteristic.tondu_lopez2000 import TonduLopez2000
+from airmuscle.characteristic.virtual_work import VirtualWork
+from airmuscle.check import maxwell_defect, virtual_work_defect
+from airmuscle.errors import NoSolution, TraceError
+from airmuscle.geometry.braid import Braid
+from airmuscle.geometry.chebyshev import as_polynomial
+from airmuscle.geometry.tabulated import TabulatedGeometry
+from airmuscle.library import catalogue
+
+BRAID = Braid(0.01, np.radians(25.0), 0.3)
+BOX = Box(5e4, 6e5, 0.0, 0.28)
+braids = st.builds(Braid, st.floats(2e-3, 0.05), st.floats(0.2, 0.8), st.floats(0.05, 2.0))
+
+
+@given(braid=braids, pressure=st.floats(1e3, 8e5), place=st.floats(0.01, 0.95))
+def test_the_braid_gives_the_force_of_chou_and_hannaford(braid: Braid, pressure: float, place: float):
+    law = ChouHannaford1996(braid)
+    contraction = place * law.contraction_reach[1]
+    ideal = VirtualWork(braid).force(pressure, contraction)
+    assert law.force(pressure, contraction) == pytest.approx(ideal, rel=1e-9)
+
+
+def test_without_end_correction_the_force_of_tondu_and_lopez_is_the_same():
+    assert virtual_work_defect(TonduLopez2000(BRAID, 1.0), BRAID, BOX).relative < 1e-9
+    assert virtual_work_defect(ChouHannaford1996(BRAID), BRAID, BOX).relative < 1e-9
+
+
+def test_corrected_ends_leave_virtual_work_by_a_sixth_at_the_end_of_the_stroke():
+    law = TonduLopez2000(BRAID, 1.25)
+    work, maxwell = virtual_work_defect(law, BRAID, BOX), maxwell_defect(law, BRAID, BOX)
+    assert work.contraction == maxwell.contraction == 0.28
+    # F/p of both at 28 %: pi r0^2 a ((1 - 0.28)^2 - (1 - 1.25 0.28)^2), over pi r0^2 (a - b)
+    expected = 13.796730 * (0.72**2 - 0.65**2) / (13.796730 - 5.598910)
+    assert work.relative == pytest.approx(expected, rel=1e-6)
+    assert maxwell.relative == pytest.approx(expected, rel=1e-6)
+    assert work.worst == pytest.approx(249.4, abs=0.05)
+
+
+@pytest.mark.parametrize(("name", "newtons"), [("dmsp-20-300", 418.4), ("dmsp-10-250", 199.5)])
+def test_a_rubber_wall_takes_hundreds_of_newtons_and_keeps_energy(name: str, newtons: float):
+    muscle = catalogue.load(name)
+    assert virtual_work_defect(muscle.characteristic, muscle.geometry, muscle.box).worst == pytest.approx(
+        newtons, abs=0.05
+    )
+    assert maxwell_defect(muscle.characteristic, muscle.geometry, muscle.box).relative < 1e-9
+
+
+def test_a_volume_that_is_not_the_laws_shows_as_a_maxwell_defect_of_its_size():
+    thicker = replace(BRAID, radius=BRAID.radius * 1.1)
+    defect = maxwell_defect(ChouHannaford1996(BRAID), thicker, BOX)
+    assert defect.relative == pytest.approx(1 - 1 / 1.21, rel=1e-9)
+
+
+def test_a_muscle_that_pulls_nowhere_has_no_defect_to_tell():
+    with pytest.raises(NoSolution, match="pulls nowhere"):
+        maxwell_defect(ChouHannaford1996(BRAID), BRAID, Box(1e5, 2e5, 0.5, 0.6))
+
+
+def test_a_tabulated_volume_gives_its_force_but_no_second_derivative():
+    contraction = np.linspace(0.0, 0.35, 71)
+    table = TabulatedGeometry(tuple(contraction), tuple(BRAID.volume(contraction)), BRAID.resting_length)
+    inside = np.linspace(0.0125, 0.3375, 9)
+    ideal = VirtualWork(BRAID).force(4e5, inside)
+    np.testing.assert_allclose(VirtualWork(table).force(4e5, inside), ideal, atol=0.01 * ideal.max())
+    with pytest.raises(TraceError, match=r"TabulatedGeometry is not closed-form.*as_polynomial"):
+        VirtualWork(table).slopes(4e5, 0.1)
+
+
+def test_the_polynomial_of_a_geometry_states_errors_that_bound_it():
+    replaced = as_polynomial(BRAID, degree=3, reach=(0.0, 0.35))
+    assert replaced.volume_error < 1e-18  # the volume of a braid is a cubic
+    contraction = np.linspace(0.0, 0.35, 201)
+    table = TabulatedGeometry(tuple(contraction[::10]), tuple(BRAID.volume(contraction[::10])), 0.3)
+    coarse = as_polynomial(table, degree=6)
+    error = np.abs(coarse.volume(contraction) - table.volume(contraction)).max()
+    assert 0.5 * error <= coarse.volume_error <= 1.05 * error
+    slope_error = np.abs(coarse.volume_growth(contraction) - table.volume_growth(contraction)).max()
+    assert coarse.growth_error == pytest.approx(slope_error, rel=0.1)
+
+
+def test_outside_its_box_a_polynomial_geometry_goes_on_by_its_tangent():
+    replaced = as_polynomial(BRAID, degree=5, reach=(0.0, 0.3))
+    beyond = replaced.volume(0.3) + 0.1 * BRAID.volume_growth(0.3)
+    assert replaced.volume(0.4) == pytest.approx(beyond, rel=1e-9)

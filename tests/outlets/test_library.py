@@ -1,0 +1,291 @@
+"""A library file becomes a model, and a model a file that gives the same numbers.
+
+What is wrong with a file is said with file, table, key, value and what is allowed; nothing half written is left.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from pathlib import Path
+
+import pytest
+
+from airmuscle.characteristic.chou_hannaford1996 import ChouHannaford1996
+from airmuscle.characteristic.clamped import Clamped
+from airmuscle.errors import AirmuscleError, AirmuscleWarning, FileError, ParameterError, UnitError, UnknownName
+from airmuscle.geometry.braid import Braid
+from airmuscle.library import catalogue
+from airmuscle.library.models import model_class, model_names
+from airmuscle.muscle import LinearSpring, PressureDamper
+from airmuscle.reference import cite
+
+GOOD = """
+title = "A muscle of our own"
+trust = "chosen"
+[characteristic]
+model = "Clamped"
+greatest_force = "1.2 kN"
+[characteristic.inner]
+model = "TonduLopez2000"
+end_correction = 1.2
+[characteristic.inner.geometry]
+model = "Braid"
+radius = "10 mm"
+braid_angle = "25 deg"
+resting_length = "300 mm"
+[geometry]
+model = "Braid"
+radius = 0.01
+braid_angle = 0.4363
+resting_length = 0.3
+[spring]
+model = "LinearSpring"
+stiffness = "2 N/mm"
+[damper]
+model = "PressureDamper"
+damping = 50.0
+growth = "1 N s/(m bar)"
+[box]
+least_pressure = "0 bar"
+greatest_pressure = "6 bar"
+least_contraction = 0.0
+greatest_contraction = "25 %"
+[[check]]
+quantity = "force"
+pressure = "5 bar"
+contraction = "0 %"
+equals = "1.2 kN"
+tolerance = "1 N"
+source = "the clamp"
+[[reference]]
+key = "ours"
+authors = "We"
+title = "Notes"
+where = "here"
+year = 2024
+"""
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "muscle.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_file_becomes_a_muscle_in_si(tmp_path: Path):
+    entry = catalogue.load(written(tmp_path, GOOD))
+    assert entry.name == "muscle"
+    assert isinstance(entry.characteristic, Clamped)
+    assert (entry.characteristic.greatest_force, entry.characteristic.inner.geometry.radius) == (1200.0, 0.01)
+    assert entry.spring == LinearSpring(2000.0)
+    assert entry.damper == PressureDamper(50.0, 1e-5)
+    assert entry.box.pressure == (0.0, 6e5)
+    assert entry.checks[0].given == (("pressure", 5e5), ("contraction", 0.0))
+    assert {"ours", "tondu-lopez-2000"} <= {reference.key for reference in cite(entry)}
+    assert entry.muscle.tension(5e5, 0.0) == 1200.0
+    held_back = 2000.0 * 0.1 * 0.3 + (50.0 + 1e-5 * 5e5) * 0.02
+    assert entry.muscle.tension(5e5, 0.1, 0.02) == entry.characteristic.force(5e5, 0.1) - held_back
+
+
+def test_a_saved_muscle_loads_to_the_same_numbers(tmp_path: Path):
+    entry = catalogue.load(written(tmp_path, GOOD))
+    saved = catalogue.save(entry, tmp_path / "muscle.toml")
+    assert catalogue.load(saved) == entry
+    assert [path.name for path in tmp_path.iterdir()] == ["muscle.toml"]
+
+
+@pytest.mark.parametrize("name", catalogue.names())
+def test_every_library_entry_survives_saving(name: str, tmp_path: Path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        entry = catalogue.load(name)
+        assert catalogue.load(catalogue.save(entry, tmp_path / f"{name}.toml")) == entry
+
+
+def test_texts_with_quotes_and_new_lines_survive_saving(tmp_path: Path):
+    law = ChouHannaford1996(Braid(0.01, 0.4, 0.3))
+    entry = catalogue.Entry("odd", 'called "odd" \\ here', "chosen", law, law.geometry, note="two\nlines\tä\x7f")
+    assert catalogue.load(catalogue.save(entry, tmp_path / "odd.toml")) == entry
+
+
+def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path):
+    entry = catalogue.load("chou-hannaford")
+    with pytest.raises(FileError, match=r"nowhere.*cannot be written"):
+        catalogue.save(entry, tmp_path / "nowhere" / "muscle.toml")
+    (tmp_path / "taken.toml").mkdir()
+    with pytest.raises(FileError, match=r"taken\.toml: cannot be written"):
+        catalogue.save(entry, tmp_path / "taken.toml")
+    assert [path.name for path in tmp_path.iterdir()] == ["taken.toml"]
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "kind", "message"),
+    [
+        # missing
+        (
+            'radius = "10 mm"\n',
+            "",
+            ParameterError,
+            r"\[characteristic.inner.geometry\]: Braid needs 'radius' \[m\] \(r_0",
+        ),
+        ('model = "Clamped"', "", ParameterError, r"\[characteristic\]: no model is named"),
+        ('trust = "chosen"', "", ParameterError, r"muscle.toml: 'trust' is missing"),
+        (
+            "[characteristic.inner.geometry]",
+            "[x]",
+            ParameterError,
+            r"muscle.toml: 'x' is not known here; there are title",
+        ),
+        ('source = "the clamp"', "", ParameterError, r"\[check 1\]: 'source' is missing"),
+        (
+            'contraction = "0 %"\n',
+            "",
+            ParameterError,
+            r"\[check 1\]: to check the force, give pressure and contraction",
+        ),
+        ('tolerance = "1 N"', "", ParameterError, r"\[check 1\]: 'tolerance' is missing"),
+        # misspelt
+        (
+            "end_correction",
+            "end_corection",
+            ParameterError,
+            r"no parameter 'end_corection'.*Did you mean 'end_correction'\?",
+        ),
+        (
+            '"TonduLopez2000"',
+            '"TonduLopez2001"',
+            UnknownName,
+            r"\[characteristic.inner\], model: no model 'TonduLopez2001'",
+        ),
+        ("[spring]", "[sprng]", ParameterError, r"'sprng' is not known here.*Did you mean 'spring'\?"),
+        ('"300 mm"', '"300 mn"', UnitError, r"\[characteristic.inner.geometry\], resting_length: 'mn' is no unit"),
+        (
+            'quantity = "force"',
+            'quantity = "forc"',
+            ParameterError,
+            r"'forc' cannot be checked.*Did you mean 'force'\?",
+        ),
+        # mistyped
+        (
+            '"10 mm"',
+            "[0.01]",
+            ParameterError,
+            r"radius is \[0.01\]; one number in m is wanted \(r_0, radius of the braid",
+        ),
+        ('"10 mm"', "true", ParameterError, r"radius is True; it must be a number in m"),
+        ('"10 mm"', '"10"', UnitError, r"radius: '10' carries no unit; write it like '10 m'"),
+        ('"10 mm"', '"wide"', UnitError, r"radius: 'wide' is not a number with a unit"),
+        ('"10 mm"', '"10 N"', UnitError, r"radius: unit 'N' cannot become 'm'"),
+        ('"LinearSpring"', '"Braid"', ParameterError, r"\[spring\]: Braid (needs|has no parameter)"),
+        ("year = 2024", 'year = "2024"', ParameterError, r"\[reference 1\]: year is '2024'; it must be a whole number"),
+        ('title = "A muscle of our own"', "title = 7", ParameterError, r"title is 7; it must be text"),
+        # non-physical
+        (
+            '"10 mm"',
+            '"-10 mm"',
+            ParameterError,
+            r"radius of the braid at rest\) is -0.01 m; allowed are 0.0001 to 0.2 m",
+        ),
+        ('"25 deg"', '"25 rad"', ParameterError, r"theta_0.* is 25 rad; allowed are 0.05 to 1.5 rad"),
+        ('"300 mm"', "nan", ParameterError, r"L_0.* is nan; it must be finite"),
+        (
+            '"1.2 kN"',
+            '"-1 N"',
+            ParameterError,
+            r"\[characteristic\]: Clamped: least_force 0 N must lie below greatest_force",
+        ),
+        ('"6 bar"', '"-1 bar"', ParameterError, r"\[box\]: Box: least_pressure 0 must lie below greatest_pressure"),
+    ],
+)
+def test_a_bad_file_is_told_what_is_wrong(
+    tmp_path: Path, was: str, becomes: str, kind: type[AirmuscleError], message: str
+):
+    assert was in GOOD
+    with pytest.raises(kind, match=message) as raised:
+        catalogue.load(written(tmp_path, GOOD.replace(was, becomes, 1)))
+    assert "muscle.toml" in str(raised.value)
+
+
+def test_a_model_of_another_kind_is_refused(tmp_path: Path):
+    braid = 'model = "Braid"\nradius = 0.01\nbraid_angle = 0.4\nresting_length = 0.3\n'
+    text = f'title = "t"\ntrust = "chosen"\n[characteristic]\n{braid}'
+    with pytest.raises(ParameterError, match=r"\[characteristic\]: Braid is no characteristic"):
+        catalogue.load(written(tmp_path, text))
+    text = f'title = "t"\ntrust = "chosen"\n[characteristic]\nmodel = "Clamped"\n[characteristic.inner]\n{braid}'
+    with pytest.raises(ParameterError, match=r"\[characteristic\]: inner is Braid; a ForceLaw is wanted"):
+        catalogue.load(written(tmp_path, text))
+
+
+def test_a_value_where_a_table_belongs_is_refused(tmp_path: Path):
+    with pytest.raises(ParameterError, match=r"\[characteristic\]: 3 is not a table; write model = "):
+        catalogue.load(written(tmp_path, 'title = "t"\ntrust = "chosen"\ncharacteristic = 3\n'))
+    text = 'title = "t"\ntrust = "chosen"\n[characteristic]\nmodel = "ChouHannaford1996"\ngeometry = 3\n'
+    with pytest.raises(ParameterError, match=r"\[characteristic\]: geometry is 3; a Braid is wanted"):
+        catalogue.load(written(tmp_path, text))
+
+
+def test_a_file_that_is_no_toml_or_is_not_there(tmp_path: Path):
+    with pytest.raises(FileError, match=r"muscle\.toml: is not TOML: .* \(at line 2, column"):
+        catalogue.load(written(tmp_path, "title = 'x'\n[characteristic\n"))
+    with pytest.raises(FileError, match=r"nothing\.toml: there is no such file"):
+        catalogue.load(tmp_path / "nothing.toml")
+    (tmp_path / "muscle.toml").write_bytes(GOOD.replace("own", "own\xe9").encode("latin-1"))
+    with pytest.raises(FileError, match=r"is not UTF-8 text \(byte 29\)"):
+        catalogue.load(tmp_path / "muscle.toml")
+
+
+def test_a_byte_order_mark_does_no_harm(tmp_path: Path):
+    (tmp_path / "muscle.toml").write_text(GOOD, encoding="utf-8-sig")
+    assert catalogue.load(tmp_path / "muscle.toml").title == "A muscle of our own"
+
+
+def test_a_unique_beginning_of_a_name_is_enough():
+    assert catalogue.load("chou").name == "chou-hannaford"
+    with pytest.raises(UnknownName, match=r"'dmsp' is the beginning of several: dmsp-10-250, dmsp-20-300\. Write more"):
+        catalogue.load("dmsp")
+    with pytest.raises(UnknownName, match=r"no library entry 'dsmp-20-300'; there are .* Did you mean 'dmsp-20-300'\?"):
+        catalogue.load("dsmp-20-300")
+    with pytest.raises(UnknownName, match="no library entry ''"):
+        catalogue.load("")
+
+
+def test_an_entry_with_a_warning_gives_it(tmp_path: Path):
+    with pytest.warns(AirmuscleWarning, match="muscle: made up"):
+        catalogue.load(written(tmp_path, 'warning = "made up"\n' + GOOD))
+
+
+def test_an_entry_that_is_no_muscle_says_what_it_lacks():
+    with pytest.raises(UnknownName, match=r"sarosi-dmsp-10 .* lacks a \[geometry\]"):
+        _ = catalogue.load("sarosi-dmsp-10").muscle
+    table = dataclasses.replace(catalogue.load("festo-tool-dmsp-20"), geometry=Braid(0.01, 0.4, 0.2))
+    with pytest.raises(UnknownName, match="lacks a law solved for the force: see as_force_law"):
+        _ = table.muscle
+
+
+@pytest.mark.parametrize("name", catalogue.measured_names())
+def test_a_data_set_says_where_it_is_from(name: str):
+    recording = catalogue.measured(name)
+    assert len(recording) >= 60
+    assert "source: " in recording.notes[-1]
+    assert "licence: " in recording.notes[-1]
+
+
+def test_the_measured_maps_know_their_resting_length():
+    assert catalogue.measured("dmsp-20")["contraction"].max() == pytest.approx(0.26)
+    assert catalogue.measured("dmsp-10")["contraction"].max() == pytest.approx(0.208)
+
+
+def test_a_column_of_a_file_that_is_not_there(tmp_path: Path):
+    table = '{ file = "map.csv", column = "force" }'
+    text = f'title = "t"\ntrust = "chosen"\n[characteristic]\nmodel = "Tabulated"\npressures = {table}\n'
+    text += f"contractions = {table}\nforces = {table}\n"
+    with pytest.raises(FileError, match=r"map\.csv"):
+        catalogue.load(written(tmp_path, text))
+    with pytest.raises(ParameterError, match=r"pressures: a column of a file is written \{ file = "):
+        catalogue.load(written(tmp_path, text.replace("column", "colum")))
+
+
+@pytest.mark.parametrize("name", model_names())
+def test_every_model_that_a_file_may_name_is_there(name: str):
+    assert dataclasses.is_dataclass(model_class(name, "here"))

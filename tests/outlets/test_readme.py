@@ -1,0 +1,46 @@
+"""What the README shows is what runs: its Python, its commands, and the files it points to."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+
+
+def test_the_python_runs_and_is_ten_lines(tmp_path):
+    (block,) = blocks("python")
+    statements = [line for line in block.splitlines() if line and not line.startswith(("import", "from"))]
+    assert len(statements) <= 10
+    done = subprocess.run([sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "rms error" in done.stdout
+    assert "ISO 6358" in done.stdout
+
+
+def commands():
+    lines = [line.partition("#")[0].strip() for block in blocks("sh") for line in block.splitlines()]
+    return [line for line in lines if line.startswith("./run airmuscle")]
+
+
+@pytest.mark.parametrize("command", commands())
+def test_the_commands_run(command, tmp_path):
+    words = shlex.split(command)[2:]
+    words = [str(ROOT / word) if word.startswith("examples/") else word for word in words]
+    done = subprocess.run([sys.executable, "-m", "airmuscle", *words], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_files_it_points_to_are_there():
+    for target in re.findall(r"\]\(([^)]+)\)", README):
+        assert (ROOT / target).exists(), target

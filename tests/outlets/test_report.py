@@ -1,0 +1,338 @@
+"""A report is whole, honest and repeatable.
+
+It appears whole or not at all. Its page needs nothing but itself. Every verdict stands there in words, and is
+computed. The same chapters give the same bytes, and what is not finite never becomes NaN in JSON.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import datetime
+import json
+import math
+import os
+import re
+import sys
+import types
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airmuscle import figures
+from airmuscle.errors import FileError, NoSolution, UnknownName
+from airmuscle.reference import Reference
+from airmuscle.report.chapter import AtLeast, AtMost, Chapter, Claim, Equal, Plot, Table
+from airmuscle.report.html import GREATEST_VECTOR
+from airmuscle.report.staged import refuse_unwritable, staged
+from airmuscle.report.wording import number, published
+from airmuscle.report.write import as_json, write_report
+from airmuscle.reproduce import run
+
+DATE = datetime.date(2024, 5, 17)
+KEYS = {"paper", "claim", "published", "reproduced", "unit", "tolerance", "verdict", "note"}
+
+
+def a_plot(name: str, points: int = 20) -> Plot:
+    figure, axes = figures.new_figure()
+    x = np.linspace(0.0, 30.0, points)
+    axes.plot(x, 1000.0 * np.cos(x), label="300 kPa")
+    axes.set(xlabel="contraction [%]", ylabel="force [N]")
+    figures.legend_outside(axes)
+    return Plot(name, f"Caption of {name} & more", figure)
+
+
+def a_chapter(paper: str = "Saga 2007", fibres: float = 48.0) -> Chapter:
+    """A chapter whose middle claim is computed from a number that a test can perturb."""
+    return Chapter(
+        paper,
+        f"{paper}: straight fibres <in rubber>",
+        "First paragraph.\n\nSecond paragraph.",
+        claims=(
+            Claim(paper, "rings", Equal(4.0), 4, "1"),
+            Claim(paper, "force", Equal(480.0, 1.0), 10.0 * fibres, "N", note="as Fig. 7"),
+            Claim(paper, "damping", None, 0.1, "1/s"),
+            Claim(paper, "strain", AtMost(0.3), math.nan, "1"),
+            Claim(paper, "stress", AtLeast(0.3, 0.1), None, "Pa"),
+        ),
+        tables=(
+            Table(f"{paper} outline", "Outline", {"x [mm]": [0.1, math.nan], "closure": ["circle", "a,b"]}),
+            Table(f"{paper} series", "Series", {"time [s]": np.array([0.1, 1 / 3])}, shown=False),
+        ),
+        plots=(a_plot(f"{paper} isobars"),),
+        references=(Reference("s", "Saga, N.", "Muscle", "J. Robotics", 2007, "10.1000/x", note="eq. (1)"),),
+        chosen=(("modulus of the fibres", "70 GPa", "chosen"),),
+    )
+
+
+class Links(HTMLParser):
+    """Collects every address that a page asks a browser to load, or offers to follow."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.loaded: list[str] = []
+        self.followed: list[str] = []
+        self.ids: list[str] = []
+        self.tags: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        for key, value in attrs:
+            if key in ("src", "srcset", "data", "poster") or (key == "href" and tag != "a"):
+                self.loaded.append(value or "")
+            if key == "href" and tag == "a":
+                self.followed.append(value or "")
+            if key == "id":
+                self.ids.append(value or "")
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("report")
+    return write_report([a_chapter(), a_chapter("Borzikova", fibres=40.0)], folder, title="Papers", date=DATE)
+
+
+def test_the_folder_holds_page_claims_figures_and_data(report: Path):
+    found = {path.relative_to(report.parent).as_posix() for path in report.parent.rglob("*") if path.is_file()}
+    papers = ("Saga 2007", "Borzikova")
+    wanted = {f"figures/{paper} isobars.{kind}" for paper in papers for kind in ("svg", "png")}
+    wanted |= {f"data/{paper} {table}.csv" for paper in papers for table in ("outline", "series")}
+    assert found == wanted | {"report.html", "claims.json"}
+
+
+def test_claims_come_back_from_json_as_they_went_in(report: Path):
+    claims = json.loads((report.parent / "claims.json").read_text(encoding="utf-8"))
+    assert [set(claim) for claim in claims] == [KEYS] * 10
+    assert claims[1] == {
+        "paper": "Saga 2007",
+        "claim": "force",
+        "published": 480.0,
+        "reproduced": 480.0,
+        "unit": "N",
+        "tolerance": 1.0,
+        "verdict": "holds",
+        "note": "as Fig. 7",
+    }
+    assert [claim["verdict"] for claim in claims[:5]] == ["holds", "holds", *["not printed"] * 3]
+    assert claims[6]["verdict"] == "differs", "40 fibres do not give 480 N"
+
+
+def test_what_is_not_finite_is_null_in_json_and_empty_in_csv(report: Path):
+    text = (report.parent / "claims.json").read_text(encoding="utf-8")
+    assert not re.search(r"\b(NaN|Infinity)\b", text)
+    assert json.loads(text)[3]["reproduced"] is None
+    plain = as_json({"a": [math.inf, np.float32(0.5), np.int64(3), np.array([1.0, math.nan])], "b": (True, "NaN")})
+    assert json.loads(plain) == {"a": [None, 0.5, 3, [1.0, None]], "b": [True, "NaN"]}
+    with (report.parent / "data" / "Saga 2007 outline.csv").open(encoding="utf-8", newline="") as file:
+        assert list(csv.reader(file)) == [["x [mm]", "closure"], ["0.1", "circle"], ["", "a,b"]]
+
+
+def test_data_keep_every_digit(report: Path):
+    lines = (report.parent / "data" / "Saga 2007 series.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "time [s]"
+    assert [float(line) for line in lines[1:]] == [0.1, 1 / 3]
+
+
+def test_the_page_needs_nothing_but_itself(report: Path):
+    text = report.read_text(encoding="utf-8")
+    links = Links(text)
+    assert len(links.loaded) == 2
+    assert all(address.startswith("data:image/svg+xml;base64,") for address in links.loaded)
+    assert not {"script", "link", "iframe", "object"} & set(links.tags)
+    assert not re.search(r"@import|url\(", text)
+    outside = [address for address in links.followed if not address.startswith("#")]
+    assert set(outside) == {"https://doi.org/10.1000/x"}
+    assert {address[1:] for address in links.followed if address.startswith("#")} <= set(links.ids)
+
+
+def test_the_page_words_every_verdict_and_names_its_pedigree(report: Path):
+    text = re.sub(r"data:[^\"]*", "", report.read_text(encoding="utf-8"))
+    for verdict, count in (("✓ holds", 3), ("✗ differs", 1), ("– not printed", 6)):
+        assert text.count(f">{verdict}</span>") == count + 1, "and once in the overview"
+    for word in ("2024-05-17", "numpy", np.__version__, "Python", "modulus of the fibres", "70 GPa", "Saga, N."):
+        assert word in text
+    assert "straight fibres &lt;in rubber&gt;" in text
+    assert "480 ± 1" in text
+    assert "≥ 0.3 ± 0.1" in text
+    assert "Series" in text, "a table that is not shown is named with its file"
+
+
+def test_two_runs_give_the_same_bytes(tmp_path: Path):
+    first, second = (write_report([a_chapter()], tmp_path / name, date=DATE).parent for name in "ab")
+    files = sorted(path.relative_to(first) for path in first.rglob("*") if path.is_file())
+    assert len(files) == 6
+    for file in files:
+        assert (first / file).read_bytes() == (second / file).read_bytes(), file
+
+
+def test_a_dense_figure_enters_the_page_as_pixels(tmp_path: Path):
+    figure, axes = figures.new_figure()
+    scatter = np.random.default_rng(0).normal(size=(2, 12_000))
+    axes.plot(*scatter, ".")
+    chapter = Chapter("p", "t", "s", plots=(Plot("dense", "Dense", figure),))
+    page = write_report([chapter], tmp_path, date=DATE)
+    assert (tmp_path / "figures" / "dense.svg").stat().st_size > GREATEST_VECTOR
+    assert Links(page.read_text(encoding="utf-8")).loaded[0].startswith("data:image/png;base64,")
+
+
+def test_two_figures_of_one_name_are_refused(tmp_path: Path):
+    with pytest.raises(ValueError, match=r"plots need names that are file names and differ; look at Saga 2007 iso"):
+        write_report([a_chapter(), a_chapter()], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_report_without_claims_writes_none(tmp_path: Path):
+    write_report([dataclasses.replace(a_chapter(), claims=())], tmp_path, date=DATE)
+    assert not (tmp_path / "claims.json").exists()
+    assert "at a glance" not in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_other_files_in_the_folder_stay(tmp_path: Path):
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "mine.csv").write_text("1")
+    (tmp_path / "report.html").write_text("old")
+    write_report([a_chapter()], tmp_path, date=DATE)
+    assert (tmp_path / "data" / "mine.csv").read_text() == "1"
+    assert (tmp_path / "report.html").read_text(encoding="utf-8") != "old"
+
+
+# Whole or not at all
+
+
+def blocked_by_a_file(tmp_path: Path) -> Path:
+    (tmp_path / "taken").write_text("a file")
+    return tmp_path / "taken" / "deep"
+
+
+def blocked_by_permission(tmp_path: Path) -> Path:
+    (tmp_path / "locked").mkdir(mode=0o500)
+    if os.access(tmp_path / "locked", os.W_OK):
+        pytest.skip("this user may write anywhere")
+    return tmp_path / "locked" / "deep"
+
+
+def blocked_by_a_folder(tmp_path: Path) -> Path:
+    (tmp_path / "claims.json").mkdir()
+    return tmp_path
+
+
+@pytest.mark.parametrize("blocked", [blocked_by_a_file, blocked_by_permission, blocked_by_a_folder])
+def test_a_folder_that_cannot_be_written_is_named_and_left_alone(tmp_path: Path, blocked: Callable[[Path], Path]):
+    folder = blocked(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(FileError) as caught:
+        write_report([a_chapter()], folder)
+    assert str(caught.value).startswith(f"{folder}: cannot be written to: ")
+    assert str(caught.value).endswith("Name a folder that you may write to.")
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("reason", [NoSolution("no"), KeyboardInterrupt()])
+def test_work_that_breaks_off_leaves_nothing(tmp_path: Path, reason: BaseException):
+    def work() -> None:
+        with staged(tmp_path / "deep" / "out") as place:
+            (place / "half").write_text("half")
+            raise reason
+
+    with pytest.raises(type(reason)):
+        work()
+    assert list(tmp_path.rglob("*")) == []
+
+
+def test_asking_whether_a_folder_is_writable_leaves_nothing(tmp_path: Path):
+    refuse_unwritable(tmp_path / "deep" / "out")
+    assert list(tmp_path.rglob("*")) == []
+
+
+# Wording
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (1234567.0, "1.23457e+06"),
+        (3, "3"),
+        (np.float64(0.5), "0.5"),
+        (None, "–"),
+        (math.nan, "–"),
+        ("circle", "circle"),
+        (True, "True"),
+    ],
+)
+def test_numbers_read_to_six_digits(value: object, text: str):
+    assert number(value) == text
+
+
+def test_a_bound_reads_as_one():
+    assert published(Claim("p", "c", AtMost(2.0, 0.5), 1.0, "1")) == "≤ 2 ± 0.5"
+    assert published(Claim("p", "c", None, 1.0, "1")) == "–"
+
+
+# Reproducing
+
+
+def add_paper(monkeypatch: pytest.MonkeyPatch, name: str, chapter: Callable[[], Chapter]) -> None:
+    module = types.ModuleType(f"paper_{name}")
+    module.chapter = chapter  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setitem(run.PAPERS, name, module.__name__)
+
+
+@pytest.fixture
+def two_papers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "PAPERS", {})
+    add_paper(monkeypatch, "saga2007", a_chapter)
+    add_paper(monkeypatch, "borzikova", lambda: a_chapter("Borzikova"))
+
+
+def papers_in(folder: Path) -> list[str]:
+    claims = json.loads((folder / "claims.json").read_text(encoding="utf-8"))
+    return list(dict.fromkeys(claim["paper"] for claim in claims))
+
+
+@pytest.mark.usefixtures("two_papers")
+@pytest.mark.parametrize(
+    ("asked", "found"),
+    [(None, ["Saga 2007", "Borzikova"]), (["b"], ["Borzikova"]), (["b", "saga2007", "s"], ["Saga 2007", "Borzikova"])],
+)
+def test_papers_are_named_by_a_unique_beginning(tmp_path: Path, asked: list[str] | None, found: list[str]):
+    assert run.reproduce(asked, tmp_path) == tmp_path / "report.html"
+    assert papers_in(tmp_path) == found
+
+
+@pytest.mark.usefixtures("two_papers")
+def test_an_unknown_paper_is_refused_before_any_work(tmp_path: Path):
+    with pytest.raises(UnknownName, match=r"no paper 'saga2008'; there are saga2007, borzikova.*'saga2007'\?"):
+        run.reproduce(["saga2008"], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("two_papers")
+def test_an_unwritable_folder_is_refused_before_any_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    add_paper(monkeypatch, "saga2007", lambda: pytest.fail("the work began"))
+    with pytest.raises(FileError, match="taken"):
+        run.reproduce(None, blocked_by_a_file(tmp_path))
+
+
+@pytest.mark.usefixtures("two_papers")
+@pytest.mark.parametrize("reason", [NoSolution("no"), KeyboardInterrupt()])
+def test_an_interrupted_run_leaves_the_chapters_that_are_complete(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reason: BaseException
+):
+    def breaks_off() -> Chapter:
+        raise reason
+
+    add_paper(monkeypatch, "borzikova", breaks_off)
+    with pytest.raises(type(reason)):
+        run.reproduce(None, tmp_path)
+    assert papers_in(tmp_path) == ["Saga 2007"]
+    assert "(incomplete)" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_table_of_papers_names_modules_of_this_package():
+    assert list(run.PAPERS) == ["saga2007", "borzikova", "hosovsky"]
+    assert all(module.startswith("airmuscle.reproduce.") for module in run.PAPERS.values())

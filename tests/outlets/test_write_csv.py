@@ -1,0 +1,103 @@
+"""What is written is read back to the last digit, and a file appears whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from airmuscle.errors import FileError
+from airmuscle.recording import Recording, read_csv
+from airmuscle.recording.columns import QUANTITIES
+from airmuscle.recording.write_csv import write_csv
+
+
+def run(rows: int = 50) -> Recording:
+    random = np.random.default_rng(2)
+    return Recording(
+        {
+            "time": np.cumsum(random.uniform(1e-3, 1e-2, rows)),
+            "left.pressure": random.uniform(0, 6e5, rows),
+            "contraction": random.uniform(-0.05, 0.3, rows),
+            "force": random.normal(0, 1e3, rows),
+            "acceleration": random.normal(0, 1.0, rows) * 1e-300,
+            "valve, raw": random.normal(0, 1.0, rows),
+        },
+        origin="a simulation",
+        constants={"resting_length": 0.1 + 0.2, "ambient": 98_000.0, "specimen": 'DMSP-20 "ü" 1', "seed": 7},
+        notes=("The first note.", "The\nsecond."),
+    )
+
+
+def test_what_is_written_is_read_back_to_the_last_digit(tmp_path: Path):
+    written = run()
+    back = read_csv(write_csv(written, tmp_path / "run.csv"))
+    assert list(back) == list(written)
+    for name in written:
+        assert np.array_equal(back[name], written[name]), name
+    assert back.constants == written.constants
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    force=st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=5),
+    rest=st.floats(1e-3, 20.0),
+)
+def test_any_number_survives(tmp_path_factory, force: list[float], rest: float):
+    path = tmp_path_factory.getbasetemp() / "any.csv"
+    recording = Recording({"force": np.array(force)}, "any", {"resting_length": rest})
+    back = read_csv(write_csv(recording, path))
+    assert np.array_equal(back["force"], force)
+    assert back.constants["resting_length"] == rest
+
+
+def test_every_quantity_is_written_in_a_unit_that_is_read(tmp_path: Path):
+    recording = Recording({name: np.array([0.25, 0.5]) for name in QUANTITIES}, "all")
+    back = read_csv(write_csv(recording, tmp_path / "all.csv"))
+    assert all(np.array_equal(back[name], [0.25, 0.5]) for name in QUANTITIES)
+
+
+def test_the_file_shows_units_origin_constants_and_notes(tmp_path: Path):
+    lines = write_csv(run(1), tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "# a simulation"
+    assert "# resting_length [m] = 0.30000000000000004" in lines
+    assert "# Note: The second." in lines
+    assert lines[-2].startswith(
+        'time [s],left.pressure [Pa],contraction [1],force [N],acceleration [m/s^2],"valve, raw"'
+    )
+
+
+@pytest.mark.parametrize("place", ["no such folder/run.csv", "a file/run.csv"])
+def test_a_folder_that_cannot_be_written(tmp_path: Path, place: str):
+    (tmp_path / "a file").write_text("here")
+    with pytest.raises(FileError) as caught:
+        write_csv(run(), tmp_path / place)
+    assert str(tmp_path / place) in str(caught.value)
+    assert "cannot be written" in str(caught.value)
+    assert "Choose a folder" in str(caught.value)
+    assert [path.name for path in tmp_path.iterdir()] == ["a file"]
+
+
+def test_a_write_that_fails_half_way_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    path = write_csv(run(3), tmp_path / "run.csv")
+    before = path.read_bytes()
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(FileError, match="No space left on device"):
+        write_csv(run(30), path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_recording_draws_its_columns_with_units():
+    figure = run().plot("left.pressure", "contraction")
+    assert [axis.get_ylabel() for axis in figure.axes] == ["left.pressure\n[kPa]", "contraction\n[%]"]
+    assert figure.axes[-1].get_xlabel() == "time [s]"
+    assert figure.axes[0].lines[0].get_ydata() == pytest.approx(run()["left.pressure"] / 1e3)
+    assert len(run().plot().figure.axes) == 5

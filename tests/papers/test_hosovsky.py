@@ -1,0 +1,152 @@
+"""The third paper: its runs are right by two methods, its verdicts are computed, and its surface comes back."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from airmuscle.characteristic.contractile_surface import ContractileSurface
+from airmuscle.circuit import ClosedChamber
+from airmuscle.command import REST, Signal
+from airmuscle.equilibrium import equilibrium
+from airmuscle.gas import Isothermal
+from airmuscle.identify.fit import fit
+from airmuscle.mechanism import HangingMass, Isometric
+from airmuscle.method import DormandPrince8, Rodas4, RungeKutta4
+from airmuscle.muscle import LinearDamper, LinearSpring, Muscle
+from airmuscle.plant import Plant
+from airmuscle.recording import Recording
+from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_PRINTED
+from airmuscle.reproduce import hosovsky
+from airmuscle.reproduce import hosovsky_fill as filling
+from airmuscle.reproduce import hosovsky_release as releasing
+from airmuscle.reproduce.hosovsky_plant import MATRIX, Numbers, latched, plant, surface, surface_fit
+from airmuscle.simulate import simulate
+
+NUMBERS = Numbers()
+
+
+@pytest.fixture(scope="module")
+def fill():
+    return filling.run_fill(NUMBERS)
+
+
+def verdicts(claims):
+    return {claim.claim: claim.verdict for claim in claims}
+
+
+def test_the_printed_method_and_the_adaptive_one_agree(fill):
+    np.testing.assert_allclose(fill.printed_method["position"], fill.adaptive["position"], atol=1e-7, rtol=0)
+    np.testing.assert_allclose(fill.printed_method["pressure"], fill.adaptive["pressure"], atol=1.0, rtol=0)
+
+
+def test_the_muscle_fills_to_the_supply_and_empties_to_the_surroundings(fill):
+    run = fill.adaptive
+    assert run["pressure"][run["time"] == 15.0] + 101_325 == pytest.approx(650e3, abs=1.0)
+    assert run["pressure"][-1] == pytest.approx(0.0, abs=1.0)
+    shut = (run["time"] >= 15.0) & (run["time"] <= 19.0)
+    np.testing.assert_allclose(run["air_mass"][shut], run["air_mass"][shut][0], rtol=1e-12)
+
+
+def test_a_higher_critical_ratio_changes_the_verdict_on_choking(fill):
+    claim = "filling is choked until P2/P1 = b: muscle pressure at which the flow begins to fall"
+    assert verdicts(filling.claims(fill))[claim] == HOLDS
+    other = filling.run_fill(NUMBERS, dataclasses.replace(MATRIX, critical_ratio=0.5))
+    assert verdicts(filling.claims(other))[claim] == DIFFERS
+
+
+def test_another_conductance_changes_the_verdict_on_its_usual_unit(fill):
+    claim = "sonic conductance of the MATRIX valve in usual units"
+    other = filling.run_fill(NUMBERS, dataclasses.replace(MATRIX, conductance=2.6167e-8))
+    assert verdicts(filling.claims(fill))[claim] == HOLDS
+    assert verdicts(filling.claims(other))[claim] == DIFFERS
+
+
+def test_what_has_no_printed_number_is_never_said_to_hold(fill):
+    assert [c.verdict for c in filling.claims(fill) if c.reproduced is None] == [NOT_PRINTED]
+
+
+def test_exchanged_pressures_turn_the_verdicts_of_the_release():
+    low, high = releasing.pair(NUMBERS)
+    ranges = releasing.over_ranges(NUMBERS)
+    right = [c.verdict for c in releasing.claims(low, high, ranges)]
+    wrong = [c.verdict for c in releasing.claims(high, low, ranges)]
+    assert right[:2] == [HOLDS, HOLDS]
+    assert wrong[:2] == [DIFFERS, DIFFERS]
+    assert all("over the range of every chosen number" in c.note for c in releasing.claims(low, high, ranges))
+
+
+def test_the_release_starts_from_rest_with_the_latch_carrying_the_difference():
+    run = releasing.release(NUMBERS, 300e3).run
+    held = run["time"] < releasing.RELEASED_AT
+    assert (run["speed"][held] == 0).all()
+    assert (run["contraction"][held] == 0).all()
+    free = run["acceleration"][~held][0]
+    assert free == pytest.approx(surface().force(300e3, 0.0) / 30.0 - 9.80665, rel=1e-9)
+
+
+def test_the_decrement_finds_the_damping_of_a_linear_oscillator():
+    zeta, omega = 0.12, 20.0
+    t = np.linspace(0, 3, 3001)
+    decay, w = zeta * omega, omega * np.sqrt(1 - zeta**2)
+    y = 1 - np.exp(-decay * t) * (np.cos(w * t) + decay / w * np.sin(w * t))
+    v = np.exp(-decay * t) * (decay**2 / w + w) * np.sin(w * t)
+    ratio, rate = releasing.damping(t, y, v)
+    assert ratio == pytest.approx(zeta, rel=1e-3)
+    assert rate == pytest.approx(decay, rel=1e-3)
+    assert np.isnan(releasing.damping(t, t, np.ones_like(t))).all()
+
+
+def test_the_surface_follows_its_measured_map():
+    found = surface_fit()
+    assert found.rank == 21
+    assert found.rmse < 2.1
+    clamped = surface()
+    assert clamped.force(675e3, 0.0133) == 1200.0
+    assert clamped.force(35e3, 0.2) == 0.0
+
+
+def test_refitting_the_surface_from_simulated_runs_returns_what_went_in():
+    """Isometric muscles, filled slowly: the recordings are the surface, and a fit finds its coefficients again."""
+    truth = surface()
+    runs = [ramp(truth, contraction) for contraction in np.linspace(0.02, 0.24, 8)]
+    together = Recording({name: np.concatenate([run[name] for run in runs]) for name in runs[0]}, "simulated ramps")
+    blank = dataclasses.replace(truth, coefficients=(0.0,) * 21)
+    again = fit(blank, together).model
+    pressure, contraction = np.meshgrid(np.linspace(50e3, 500e3, 20), np.linspace(0.02, 0.24, 20))
+    np.testing.assert_allclose(again.force(pressure, contraction), truth.force(pressure, contraction), atol=1e-5)
+
+
+def ramp(law: ContractileSurface, contraction: float) -> Recording:
+    muscle = Muscle(law, plant(NUMBERS, latched()).muscles[0].geometry, LinearSpring(0.0), LinearDamper(300.0))
+    system = Plant(muscle, plant(NUMBERS, latched()).circuits[0], Isometric(contraction), Isothermal())
+    opening = Signal({"fill": ((0.0, 0.0), (4.0, 0.2))})
+    return simulate(system, opening, duration=20.0, start=system.state_at(pressure=40e3), output=0.2)
+
+
+@pytest.mark.parametrize(("method", "coarse", "order"), [(RungeKutta4, 4e-3, 4), (DormandPrince8, 5e-2, 8)])
+def test_a_taut_closed_muscle_without_kinks_is_solved_at_the_order_of_the_method(method, coarse, order):
+    """No clamp, no valve, no slack: what the paper's own plant cannot show, since its kinks dominate the error."""
+    ideal = Muscle.ideal(plant(NUMBERS, latched()).muscles[0].geometry)
+    system = Plant(ideal, ClosedChamber(), HangingMass(20.0), Isothermal())
+    rest = equilibrium(system, pressure=300e3)
+    start = rest | {"position": rest["position"] - 0.004}
+
+    def end(method):
+        return simulate(system, REST, duration=0.4, start=start, method=method, output=0.4)["position"][-1]
+
+    exact = end(Rodas4(1e-12))
+    assert simulate(system, REST, duration=0.4, start=start)["force"].min() > 1.0
+    errors = np.array([abs(end(method(coarse / 2**i)) - exact) for i in range(2)])
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1 + 0.1 * order)
+
+
+def test_every_chosen_number_stands_in_the_chapter_with_its_range():
+    chapter = hosovsky.chapter()
+    assert {what for what, _, _ in chapter.chosen} == {
+        getattr(NUMBERS, f.name).meaning for f in dataclasses.fields(NUMBERS)
+    }
+    assert all("range" in value for _, value, _ in chapter.chosen)
+    assert sum(c.verdict == HOLDS for c in chapter.claims) >= 10

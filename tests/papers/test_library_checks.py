@@ -1,0 +1,38 @@
+"""Every number that a library file carries as a check comes out of its model, within the tolerance it states."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+
+import pytest
+
+from airmuscle.check import verify
+from airmuscle.errors import AirmuscleWarning
+from airmuscle.library import catalogue
+
+
+def quietly_loaded(name: str) -> catalogue.Entry:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        return catalogue.load(name)
+
+
+@pytest.mark.parametrize("name", catalogue.names())
+def test_the_checks_of_an_entry_hold(name: str):
+    verdicts = verify(quietly_loaded(name))
+    assert verdicts, "the file has no [[check]]"
+    assert [str(verdict) for verdict in verdicts if not verdict.holds] == []
+
+
+@pytest.mark.parametrize("name", catalogue.names())
+def test_an_entry_says_where_it_is_from(name: str):
+    entry = quietly_loaded(name)
+    assert entry.references or entry.characteristic.references or getattr(entry.characteristic, "inner", None)
+    assert all(check.source for check in entry.checks)
+
+
+def test_a_check_fails_when_the_model_changes():
+    entry = catalogue.load("dmsp-20-300")
+    stiffer = dataclasses.replace(entry.characteristic, c0=entry.characteristic.c0 * 1.1)
+    assert not all(verdict.holds for verdict in verify(dataclasses.replace(entry, characteristic=stiffer)))
