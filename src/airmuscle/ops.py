@@ -71,7 +71,9 @@ def absolute_value(x: Value) -> Value:
 def both(a: Value, b: Value) -> Value:
     """Logical and of two conditions."""
     library = _library(a, b)
-    return bool(a and b) if library is None else library.logical_and(a, b)
+    if library is None:
+        return bool(a and b)
+    return library.logical_and(a, b) if hasattr(library, "logical_and") else library.logic_and(a, b)
 
 
 def _unary(name: str, x: Value) -> Value:

@@ -1,0 +1,178 @@
+"""From equations to machine code: every operation means the same in floats, arrays, symbols and print; what silently
+goes wrong in a trace is refused; kernels compile once per machine, and say so."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+
+import casadi
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from airmuscle import ops, trace
+from airmuscle.declare import model, parameter
+from airmuscle.errors import ParameterError, TraceError
+from airmuscle.program import StateVariable, prepared
+
+FORMULAS = {
+    "arithmetic": lambda x, y: (x + 2 * y) * (x - y) / (4 + y * y) - x,
+    "powers": lambda x, y: (2 + ops.absolute_value(x)) ** 1.7 + x**3 + y**2 + (3 + y) ** -1,
+    "roots": lambda x, y: ops.sqrt(x * x + y * y + 1),
+    "exponentials": lambda x, y: ops.exp(x / 4) * ops.log(5 + y),
+    "angles": lambda x, y: ops.sin(x) * ops.cos(y) + ops.tan(x / 4) - ops.arctan(y * x),
+    "hyperbolics": lambda x, y: ops.sinh(x / 3) - ops.cosh(y / 3) + ops.arcsinh(x),
+    "choices": lambda x, y: ops.where(x >= y, x * 3, y - 1) + ops.where(ops.both(x > 0, y > 0), 1.0, -1.0),
+    "extremes": lambda x, y: ops.maximum(x, y) * 2 - ops.minimum(x * y, 1.0) + ops.clip(x, -1.0, 1.5),
+}
+
+
+@model
+class Formula:
+    """One formula of two states and a parameter, as a system, so that it goes through the whole printer."""
+
+    formula: str
+    shift: float = parameter("1", "s", "added to the first argument", default=0.25)
+    inputs = ()
+
+    @property
+    def states(self):
+        return StateVariable("x", "1", 1.0), StateVariable("y", "1", 1.0)
+
+    def rates(self, state, inputs):
+        value = FORMULAS[self.formula](state["x"] + self.shift, state["y"])
+        return {"x": value, "y": -value}
+
+    def outputs(self, state, inputs):
+        return {"double": 2 * FORMULAS[self.formula](state["x"] + self.shift, state["y"])}
+
+
+numbers = st.floats(-3, 3, allow_subnormal=False)
+
+
+@pytest.mark.parametrize("name", FORMULAS)
+@settings(deadline=None, max_examples=60)
+@given(x=numbers, y=numbers)
+def test_an_operation_means_the_same_everywhere(name, x, y):
+    formula = FORMULAS[name]
+    with np.errstate(all="ignore"):
+        expected = formula(x + 0.25, y)
+        array = formula(np.array([x, x]) + 0.25, np.array([y, y]))
+    assert isinstance(expected, float)
+    np.testing.assert_allclose(array, expected, rtol=1e-13, atol=1e-13)
+    printed = prepared(Formula(name)).rates([x, y], [])
+    np.testing.assert_allclose(printed, [expected, -expected], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", FORMULAS)
+def test_jax_arrays_are_accepted(name):
+    jax = pytest.importorskip("jax")
+    jax.config.update("jax_enable_x64", True)
+    x, y = jax.numpy.array([0.3, -1.2]), jax.numpy.array([0.9, 0.4])
+    expected = FORMULAS[name](np.array(x), np.array(y))
+    np.testing.assert_allclose(jax.jit(FORMULAS[name])(x, y), expected, rtol=1e-12)
+
+
+def test_the_printed_jacobian_solves_the_shifted_system():
+    """factor and solve are (d I - J)^-1, and stage is that of f + g, for a full two by two Jacobian."""
+    ready = prepared(Formula("angles"))
+    x, h = np.array([0.4, -0.7]), 1e-6
+    jacobian = np.column_stack([(ready.rates(x + h * e, []) - ready.rates(x - h * e, [])) / (2 * h) for e in np.eye(2)])
+    f, values = np.empty(2), np.empty(ready.sizes.jacobian)
+    factors, g, k = np.empty(ready.sizes.factors), np.array([1.0, -2.0]), np.empty(2)
+    none = np.zeros(1)
+    ready.call("jac", x, none, ready.held, f, values)
+    np.testing.assert_allclose(values.reshape(2, 2), jacobian, rtol=1e-7)
+    ready.call("factor", values, 3.0, factors)
+    ready.call("stage", x, none, ready.held, factors, g, k)
+    np.testing.assert_allclose((3.0 * np.eye(2) - jacobian) @ k, f + g, rtol=1e-6)
+
+
+@model
+class Silent:
+    """What a law must not do: math.nan stands for math.sqrt or float() of a symbol, which make it silently."""
+
+    inputs = ()
+
+    @property
+    def states(self):
+        return (StateVariable("x", "1", 1.0),)
+
+    def rates(self, state, inputs):
+        return {"x": state["x"] * math.nan}
+
+    def outputs(self, state, inputs):
+        return {}
+
+
+@model
+class Forgetful(Silent):
+    """A system that forgets a state."""
+
+    def rates(self, state, inputs):
+        return {}
+
+
+def test_a_constant_that_is_not_finite_names_the_law():
+    with pytest.raises(TraceError, match=r"Silent traced to a constant that is not finite. Use airmuscle.ops"):
+        prepared(Silent())
+    with pytest.raises(TraceError, match=r"states are \['x'\], but rates are given for \[\]"):
+        prepared(Forgetful())
+
+
+def test_slopes_are_exact_and_equal_in_every_world():
+    x, h = 0.8, 1e-6
+
+    @model
+    class Wave:
+        height: float = parameter("1", "a", "height", default=2.0)
+
+        def value(self, x):
+            return self.height * ops.sin(x) ** 2
+
+    exact = trace.slope(Wave(), "value", x)
+    assert exact == pytest.approx((Wave().value(x + h) - Wave().value(x - h)) / (2 * h), rel=1e-8)
+    symbol = casadi.SX.sym("x")
+    inside = casadi.Function("f", [symbol], [trace.slope(Wave(), "value", symbol * 2)])
+    assert float(inside(x / 2)) == pytest.approx(exact, rel=1e-14)
+    values, by_parameter = trace.jacobian(Wave(), "value", np.array([0.1, x]))
+    np.testing.assert_allclose(by_parameter[:, 0], values / 2.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [(math.nan, "must be finite"), ("2", "must be a number"), (True, "must be a number"), (1e9, "allowed are")],
+)
+def test_a_parameter_is_checked_when_a_model_is_made(value, message):
+    @model
+    class Bounded:
+        size: float = parameter("m", "s", "a size", bounds=(0.0, 10.0))
+
+    with pytest.raises(ParameterError, match=message) as caught:
+        Bounded(value)
+    assert "Bounded.size (s, a size)" in str(caught.value)
+
+
+def test_kernels_compile_once_per_machine_and_say_so(tmp_path):
+    """Three processes in a row leave the cache folder with the same number of files; only the first says a word."""
+    code = (
+        "import airmuscle as am; from airmuscle.units import bar\n"
+        "plant = am.Plant(am.load('chou-hannaford').muscle, "
+        "am.FillDischarge(am.Supply(6 * bar), am.Valve(1e-9, 0.4), am.Valve(1e-9, 0.4)), am.Isometric(0.05))\n"
+        "am.simulate(plant, am.Schedule({'fill': ((0.0, 1.0),)}), duration=1.0)"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    files, words = [], []
+    for _ in range(3):
+        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        files.append(sum(1 for path in tmp_path.rglob("*") if path.is_file()))
+        words.append(done.stderr)
+    assert files[0] > 0
+    assert files == [files[0]] * 3
+    assert "compiling rodas4, once on this machine" in words[0]
+    assert words[1:] == ["", ""]
