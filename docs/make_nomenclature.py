@@ -76,6 +76,7 @@ ARGUMENTS = {
     "times": "instants of the recorded rows [s]",
     "most_steps": "ceiling of the number of steps",
     "tables": "tables of a file",
+    "along": "place along an outline, from its middle to its end [1]",
     "angle_squared": "square of half the angle that a circular outline spans [rad2]",
     "arc_excess": "integral of the radius beyond its resting value over the arc [m2]",
     "arc_excess_squared": "integral of its square over the arc [m3]",

@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from .errors import NoEquilibrium, NoSolution
 from .plant import Plant
-from .program import prepared
 
 PLACES = 401
 """Contractions looked at between the ends of the geometry's reach."""
@@ -58,6 +57,8 @@ class _Search:
     """The unbalanced acceleration of a one-coordinate plant, as a function of its coordinate."""
 
     def __init__(self, plant: Plant, pressure: float | tuple[float, ...]) -> None:
+        from .program.prepared import prepared  # CasADi, which describing a plant does not need
+
         if len(plant.mechanism.coordinates) > 1:
             raise NoSolution("equilibrium covers mechanisms of one coordinate; start from state_at and let it settle.")
         self.plant, self.pressure = plant, pressure

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import abc
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from .command import Segments
 from .declare import model, parameter
-from .program import Prepared
+
+if TYPE_CHECKING:
+    from .program.prepared import Prepared
 
 Array = npt.NDArray[np.float64]
 

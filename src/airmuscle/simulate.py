@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,8 +14,11 @@ from .equilibrium import equilibrium
 from .errors import ParameterError, SimulationError, suggestion
 from .method import REASONS, Course, Method, Rodas4
 from .plant import Plant
-from .program import Prepared, System, prepared
+from .program import System
 from .recording import Recording
+
+if TYPE_CHECKING:
+    from .program.prepared import Prepared
 
 Array = npt.NDArray[np.float64]
 COARSEST = 0.01
@@ -47,6 +50,8 @@ def simulate(
     """
     if not (np.isfinite(duration) and duration > 0):
         raise ParameterError(f"simulate: duration is {duration!r} s; it must be positive and finite.")
+    from .program.prepared import prepared  # CasADi, which describing a plant does not need
+
     if start is None:
         start = _rest(plant)
     method = method or Rodas4()
@@ -75,6 +80,8 @@ def advance(
 
     Raises SimulationError where the step fails, ParameterError for an unknown name.
     """
+    from .program.prepared import prepared
+
     hold = Schedule({name: ((0.0, float(value)),) for name, value in inputs.items()})
     segments = hold.segments(plant.inputs, 0.0, dt)
     course = (method or Rodas4()).run(prepared(plant), segments, 0.0, _vector(plant, state), np.empty(0))

@@ -86,6 +86,8 @@ def conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, whe
     `where` opens the message of the UnitError raised for a unit that is unknown or measures something else.
     """
     unit, where = unit.strip(), f"{where}: " if where else ""
+    if unit == target and target != "Pa":
+        return Conversion(1.0)
     found = _GAUGE_OR_ABSOLUTE.match(unit)
     if found:
         if target != "Pa":

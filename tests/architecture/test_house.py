@@ -24,9 +24,7 @@ SOURCE = ROOT / "src" / "airmuscle"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 LOCK = (ROOT / "requirements.lock").read_text(encoding="utf-8")
 FILES = sorted(SOURCE.rglob("*.py"))
-PHYSICS = re.compile(
-    r"(?<![a-z])(muscle|pressure|valve|gas|contraction|force)(s|es)?(?![a-z])", re.IGNORECASE
-)
+PHYSICS = re.compile(r"(?<![a-z])(muscle|pressure|valve|gas|contraction|force)(s|es)?(?![a-z])", re.IGNORECASE)
 # May be imported by their siblings: the base, the search, a wall's rubber, and laws made of other laws.
 SHARED_LAWS = {"base", "solve", "box", "rubber"}
 COMPOSITES = {"__init__", "scaled", "tangent", "as_force_law"}
@@ -151,17 +149,13 @@ def ruff(code: str, place: str) -> str:
 
 
 @pytest.mark.parametrize("module", ["math", "numpy"])
-@pytest.mark.parametrize(
-    "file", ["characteristic/x.py", "circuit/x.py", "mechanism/x.py", "gas.py", "muscle.py"]
-)
+@pytest.mark.parametrize("file", ["characteristic/x.py", "circuit/x.py", "mechanism/x.py", "gas.py", "muscle.py"])
 def test_a_law_that_imports_math_or_numpy_is_refused(file: str, module: str):
     for code in (f"import {module}\n\n{module}.sqrt(2.0)\n", f"from {module} import sqrt\n\nsqrt(2.0)\n"):
         assert "TID251" in ruff(code, f"src/airmuscle/{file}")
 
 
-@pytest.mark.parametrize(
-    "file", ["characteristic/tabulated.py", "characteristic/base.py", "ops.py", "report/x.py"]
-)
+@pytest.mark.parametrize("file", ["characteristic/tabulated.py", "characteristic/base.py", "ops.py", "report/x.py"])
 def test_elsewhere_math_and_numpy_are_welcome(file: str):
     assert "TID251" not in ruff("import math\n\nmath.sqrt(2.0)\n", f"src/airmuscle/{file}")
 
@@ -221,9 +215,7 @@ def test_an_unknown_command_is_one_line(checkout: Path):
 def test_another_project_or_lock_makes_the_stamp_stale(checkout: Path, changed: str):
     with (checkout / changed).open("a") as file:
         file.write("\n# changed\n")
-    assert run_of(checkout).read(str(checkout / ".venv" / "airmuscle.stamp")) != b"".join(
-        run_of(checkout).stamp()
-    )
+    assert run_of(checkout).read(str(checkout / ".venv" / "airmuscle.stamp")) != b"".join(run_of(checkout).stamp())
 
 
 @needs_posix

@@ -16,7 +16,8 @@ from airmuscle.errors import SimulationError
 from airmuscle.mechanism import HangingMass
 from airmuscle.method import DormandPrince8, Rodas4, RungeKutta4
 from airmuscle.plant import Plant
-from airmuscle.program import StateVariable, prepared
+from airmuscle.program import StateVariable
+from airmuscle.program.prepared import prepared
 from airmuscle.simulate import advance, simulate
 
 

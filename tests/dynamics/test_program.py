@@ -17,11 +17,12 @@ from hypothesis import strategies as st
 from airmuscle import ops, trace
 from airmuscle.declare import model, parameter
 from airmuscle.errors import ParameterError, TraceError
-from airmuscle.program import StateVariable, prepared
+from airmuscle.program import StateVariable
+from airmuscle.program.prepared import prepared
 
 FORMULAS = {
     "arithmetic": lambda x, y: (x + 2 * y) * (x - y) / (4 + y * y) - x,
-    "powers": lambda x, y: (2 + ops.absolute_value(x)) ** 1.7 + x**3 + y**2 + (3 + y) ** -1,
+    "powers": lambda x, y: (2 + ops.absolute_value(x)) ** 1.7 + x**3 + y**2 + (4 + y) ** -1,
     "roots": lambda x, y: ops.sqrt(x * x + y * y + 1),
     "exponentials": lambda x, y: ops.exp(x / 4) * ops.log(5 + y),
     "angles": lambda x, y: ops.sin(x) * ops.cos(y) + ops.tan(x / 4) - ops.arctan(y * x),

@@ -28,7 +28,7 @@ from airmuscle.characteristic.tondu_lopez2000 import TonduLopez2000
 from airmuscle.declare import model, parameter
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
-from airmuscle.identify import UNCENSORED, Censoring, Fit, Huber, SoftL1, fit
+from airmuscle.identify import UNCENSORED, Censoring, Fit, Huber, LeastSquares, Loss, SoftL1, fit
 from airmuscle.recording import Recording, read_csv
 
 DATA = Path(airmuscle.__file__).parent / "library" / "data"
@@ -342,7 +342,21 @@ def test_slack_points_bound_laws_in_contraction_and_pressure_too():
         assert any("20 rows at zero force or below are fitted as they stand" in note for note in unbound.notes)
 
 
-@pytest.mark.parametrize("loss", [Huber(5.0), SoftL1(5.0)])
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10_000), st.integers(1, 3), st.sampled_from([LeastSquares(), Huber(0.5)]))
+def test_no_other_coefficients_are_better(seed: int, degree: int, loss: Loss):
+    """At the least of a convex sum its gradient vanishes, however wild the data and however many rows are cut off."""
+    random = np.random.default_rng(seed)
+    columns = {name: random.uniform(0, 1, 40) for name in ("pressure", "contraction")}
+    force = np.maximum(random.normal(0, 1, 40), 0)
+    found = fit(ContractileSurface.blank(degree), Recording({**columns, "force": force}, "noise"), loss=loss)
+    errors = found.model.polynomial(columns["pressure"], columns["contraction"]) - force
+    errors = np.where(found.sides * errors < 0, 0.0, errors)
+    influence = errors * loss.rho((errors / loss.scale) ** 2)[1]
+    assert np.abs(sheet(degree, found.recording).T @ influence).max() < 1e-6
+
+
+@pytest.mark.parametrize("loss", [LeastSquares(), Huber(5.0), SoftL1(5.0)])
 def test_both_solvers_find_the_same_robust_and_censored_fit(loss):
     """A surface inside Clamped is not known to be linear and goes through the iterating solver."""
     _, recording = slack_and_taut(noise=8.0)
@@ -530,8 +544,28 @@ def test_the_measured_map_of_the_dmsp_20_determines_21_coefficients():
     assert (found.rank, found.rows_used, found.rows_censored) == (21, 126, 66)
     assert found.rmse == pytest.approx(2.07, abs=0.01)
     assert found.condition == pytest.approx(757, abs=5)
-    slack = found.model.polynomial(recording["pressure"], recording["contraction"])[recording["force"] == 0]
-    assert slack.max() < 2.0
+    bare = found.model.polynomial(recording["pressure"], recording["contraction"])[recording["force"] == 0]
+    assert bare.max() < 2.0
+
+
+def test_what_only_bounds_determine_stays_near_to_them_and_is_noted():
+    """At the shortest length that map holds no pull at all: five levels are left for the fifth power of x.
+
+    Any multiple of the quintic that vanishes at the five levels meets the points as well, if it points downward.
+    """
+    recording = read_csv(DATA / "dmsp-20-300.csv")
+    assert recording["force"][recording["length"] == 0.222].max() == 0
+    start = ContractileSurface.blank(5, greatest_force=2000.0)
+    found = fit(start, recording)
+    assert "The measured rows determine 20 of 21 parameters" in " ".join(found.notes)
+    at_shortest = found.recording["contraction"] == found.recording["contraction"].max()
+    bare = found.model.polynomial(found.recording["pressure"], found.recording["contraction"])[at_shortest]
+    assert bare.max() == pytest.approx(0.0, abs=1e-3)
+    again = fit(start, recording.rows(np.random.default_rng(1).permutation(126)))
+    assert again.values == pytest.approx(found.values, abs=1e-3)
+    taut = recording.rows(recording["force"] > 0)
+    assert "rank 20 of 21" in refused(start, taut)
+    assert "determine 20 of 21" not in " ".join(fit(ContractileSurface.blank(4, greatest_force=2e3), recording).notes)
 
 
 @pytest.mark.parametrize(("name", "rms"), [("10", 2.7), ("20", 8.4), ("40", 30.0)])

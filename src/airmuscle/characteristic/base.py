@@ -32,14 +32,19 @@ class Characteristic(abc.ABC):
     traceable: ClassVar[bool] = True
     """Whether the law is closed-form over `ops`; otherwise it enters a plant through `as_force_law`."""
 
-    pressure_reach: ClassVar[tuple[float, float]] = (0.0, 1.0e6)
-    """Gauge pressures [Pa] that a search may answer with."""
-    force_reach: ClassVar[tuple[float, float]] = (0.0, 1.0e4)
-    """Tensions [N] that a search may answer with."""
+    @property
+    def pressure_reach(self) -> tuple[float, float]:
+        """Gauge pressures [Pa] that an answer may have."""
+        return (0.0, 1.0e6)
+
+    @property
+    def force_reach(self) -> tuple[float, float]:
+        """Tensions [N] that an answer may have."""
+        return (0.0, 1.0e4)
 
     @property
     def contraction_reach(self) -> tuple[float, float]:
-        """Contractions [1] that a search may answer with; a geometric law narrows it."""
+        """Contractions [1] that an answer may have; a geometric law narrows it."""
         return (-0.05, 0.6)
 
     @abc.abstractmethod

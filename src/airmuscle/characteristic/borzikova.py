@@ -148,12 +148,12 @@ class _Surface(ContractionLaw):
                 raise ParameterError(f"{name}: least_{what} {low:g} must lie below greatest_{what} {high:g}.")
 
     @property
-    def pressure_reach(self) -> tuple[float, float]:  # type: ignore[override]
+    def pressure_reach(self) -> tuple[float, float]:
         """The box in gauge pressure [Pa]: a search finds nothing outside it."""
         return (self.least_pressure, self.greatest_pressure)
 
     @property
-    def force_reach(self) -> tuple[float, float]:  # type: ignore[override]
+    def force_reach(self) -> tuple[float, float]:
         """The box in force [N]: a search finds nothing outside it."""
         return (self.least_force, self.greatest_force)
 

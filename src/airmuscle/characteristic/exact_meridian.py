@@ -99,7 +99,7 @@ class ExactMeridian(PressureLaw):
         return within_reach(answered, self.pressure_reach, given, self._no_pressure)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        found = self._balance_of(pressure, contraction)
+        found = self.balance_under(pressure, contraction)
         given: Any = np.broadcast_arrays(pressure, contraction)
         return within_reach(found.force, (-np.inf, np.inf), given, self._no_shape)
 
@@ -121,7 +121,7 @@ class ExactMeridian(PressureLaw):
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         """By the implicit function theorem from the derivatives of the two lengths."""
-        growth = self._balance_of(pressure, contraction).growth
+        growth = self.balance_under(pressure, contraction).growth
         arc, chord = growth
         determinant = arc[0] * chord[2] - arc[2] * chord[0]
         by_pressure = -(arc[0] * chord[1] - arc[1] * chord[0]) / determinant
@@ -149,7 +149,8 @@ class ExactMeridian(PressureLaw):
             part[..., lost] = again
         return _as_given(found)
 
-    def _balance_of(self, pressure: Value, contraction: Value) -> Balance:
+    def balance_under(self, pressure: Value, contraction: Value) -> Balance:
+        """The shape that a pressure [Pa] holds at a contraction [1]; its force is NaN where there is none."""
         refuse_beyond(contraction, self.contraction_reach, "ExactMeridian")
         p, c = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(contraction, float))
         radius, area, rubber = self._circle(c)
@@ -283,8 +284,8 @@ class ExactMeridian(PressureLaw):
 
     def _no_shape(self, pressure: float, contraction: float) -> str:
         return (
-            f"ExactMeridian: no outline holds a contraction of {contraction:.2%} at {pressure / 1e3:.6g} kPa; "
-            f"it takes at least {float(self._least_pressure(self._circle(contraction)[0])) / 1e3:.6g} kPa."
+            f"ExactMeridian: no outline holds a contraction of {contraction:.2%} at {pressure / 1e3:.6g} kPa, "
+            "pulled or pushed. `pressure(contraction, force)` says what a load takes there."
         )
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from .. import ops
 from ..declare import model
 from ..ops import Value
-from .meridian import Meridian, Profile, Segment, volume_of
+from .meridian import Array, Meridian, Profile, Segment, volume_of
 from .stumpff import double_arc, stumpff, triple_arc
 
 
@@ -46,10 +44,10 @@ class Catenary(Meridian):
             w = w - 2 * (w * stumpff(3, w) - wanted) / (stumpff(2, w) - stumpff(3, w))
         return w
 
-    def profile(self, contraction: float, fibre_length: float, end_radius: float, points: int) -> Profile:
+    def profile(self, contraction: float, fibre_length: float, end_radius: float, along: Array) -> Profile:
         w = self.shape_squared(contraction)
         half = fibre_length * (1.0 - contraction) / 2
-        t = np.linspace(-1.0, 1.0, points)
+        t = along
         # cosh u - cosh(u t) as a product of sines, so that a flat arc loses no digits
         product = stumpff(1, w * (1 + t) ** 2 / 4) * stumpff(1, w * (1 - t) ** 2 / 4)
         return half * t, end_radius + half * ops.sqrt(w) * product * (1 - t * t) / 2

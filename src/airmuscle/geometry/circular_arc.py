@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar, NamedTuple
 
-import numpy as np
-
 from .. import ops
 from ..declare import model
 from ..ops import Value
 from ..reference import Reference
-from .meridian import Meridian, Profile, Segment, volume_of
+from .meridian import Array, Meridian, Profile, Segment, volume_of
 from .stumpff import double_arc, stumpff, triple_arc
 
 FERRARESI_2001 = Reference(
@@ -88,9 +86,9 @@ class CircularArc(Meridian):
             arc_excess_squared=2 * fibre_length**3 * psi * moment / by_angle,
         )
 
-    def profile(self, contraction: float, fibre_length: float, end_radius: float, points: int) -> Profile:
+    def profile(self, contraction: float, fibre_length: float, end_radius: float, along: Array) -> Profile:
         z = self.angle_squared(contraction)
-        t = np.linspace(-1.0, 1.0, points)
+        t = along
         # cos(psi t) - cos psi as a product of sines, so that a flat arc loses no digits
         product = stumpff(1, -z * (1 + t) ** 2 / 4) * stumpff(1, -z * (1 - t) ** 2 / 4)
         rise = fibre_length * ops.sqrt(z) * product * (1 - t * t) / 4

@@ -23,6 +23,10 @@ SAGA_2007 = Reference(
 )
 
 
+Array = npt.NDArray[np.float64]
+Profile = tuple[Array, Array]
+
+
 class Segment(NamedTuple):
     """One segment of the muscle at a contraction: x along the axis, r the radius, s the arc, r_0 at the ends."""
 
@@ -70,11 +74,8 @@ class Meridian(abc.ABC):
         """Everything about the segment at a contraction [1]; lengths [m]; arrays broadcast."""
 
     @abc.abstractmethod
-    def profile(self, contraction: float, fibre_length: float, end_radius: float, points: int) -> Profile:
-        """Axial positions from the middle [m] and radii there [m], each of shape (points,)."""
-
-
-Profile = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]
+    def profile(self, contraction: float, fibre_length: float, end_radius: float, along: Array) -> Profile:
+        """Positions from the middle [m] and radii there [m] at places `along` the outline, -1 to 1 from end to end."""
 
 
 def volume_of(end_radius: Value, length: Value, excess: Value, excess_squared: Value) -> Value:

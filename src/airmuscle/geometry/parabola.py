@@ -7,7 +7,7 @@ import numpy as np
 from .. import ops
 from ..declare import model
 from ..ops import Value
-from .meridian import Meridian, Profile, Segment, volume_of
+from .meridian import Array, Meridian, Profile, Segment, volume_of
 
 _NODES, _WEIGHTS = (
     (0.5 * (v + shift)).tolist() for v, shift in zip(np.polynomial.legendre.leggauss(24), (1, 0), strict=True)
@@ -59,9 +59,9 @@ def _parabola(slope: Value, slope_squared: Value, length: Value, end_radius: Val
 
 
 class _ParabolicMeridian(Meridian):
-    def profile(self, contraction: float, fibre_length: float, end_radius: float, points: int) -> Profile:
+    def profile(self, contraction: float, fibre_length: float, end_radius: float, along: Array) -> Profile:
         segment = self.segment(contraction, fibre_length, end_radius)
-        t = np.linspace(-1.0, 1.0, points)
+        t = along
         rise = segment.largest_radius - end_radius
         return segment.length / 2 * t, end_radius + rise * (1.0 - t * t)
 

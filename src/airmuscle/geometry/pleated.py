@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ..declare import model
 from ..ops import Value
 from ..reference import Reference
-from .meridian import Profile, Segment
+from .meridian import Array, Profile, Segment
 from .straight_fibre import FibreTube
 
 DAERDEN_LEFEBER_2001 = Reference(
@@ -126,13 +126,13 @@ class PleatedTube(FibreTube):
         cylinder = (length, length, radius, 0.0, 1.0, 0.0, 0.0, 0.0, np.pi * radius**2 * length)
         return np.where(np.asarray(contraction) > 0, value, cylinder[index])
 
-    def profile(self, contraction: float, points: int) -> Profile:
+    def profile(self, contraction: float, along: Array) -> Profile:
         from scipy.special import ellipeinc, ellipkinc
 
         if contraction == 0:
-            return np.linspace(-0.5, 0.5, points) * self.fibre_length, np.full(points, self.end_radius)
+            return along / 2 * self.fibre_length, np.full_like(along, self.end_radius)
         shape = self.ellipse(contraction)
-        theta = np.linspace(-1.0, 1.0, points) * shape.angle
+        theta = along * shape.angle
         radius = self.end_radius / np.cos(shape.angle)
         mu = shape.parameter
         axial = radius / np.sqrt(mu) * (2 * ellipeinc(theta, mu) - ellipkinc(theta, mu)) / 2

@@ -5,14 +5,13 @@ from __future__ import annotations
 import abc
 
 import numpy as np
-import numpy.typing as npt
 
 from ..declare import model, parameter
 from ..errors import OutOfReach, ParameterError
 from ..ops import Value
 from .base import Geometry
 from .circular_arc import CircularArc
-from .meridian import Meridian, Profile, Segment
+from .meridian import Array, Meridian, Profile, Segment
 
 
 def refuse_beyond(contraction: Value, reach: tuple[float, float], owner: str, why: str = "") -> None:
@@ -68,20 +67,19 @@ class FibreTube(Geometry):
         """Everything about one segment at a contraction [1]. Raises OutOfReach."""
 
     @abc.abstractmethod
-    def profile(self, contraction: float, points: int) -> Profile:
-        """The outline of one segment from its middle [m], each of shape (points,)."""
+    def profile(self, contraction: float, along: Array) -> Profile:
+        """Positions from the middle of a segment [m] and radii [m] at places `along` it, -1 to 1 from end to end."""
 
     def volume(self, contraction: Value) -> Value:
         return self.segments * self.segment(contraction).volume
 
-    def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    def outline(self, contraction: float, points: int = 201) -> Profile:
         self.refuse_out_of_reach(contraction)
-        at, radius = self.profile(contraction, 2 * (points // self.segments // 2) + 1)
-        chord = at[-1] - at[0]
-        middles = (np.arange(self.segments) - self.rings / 2) * chord
-        axial = (middles[:, None] + at).reshape(-1)
-        whole = np.linspace(axial[0], axial[-1], points)
-        return whole, np.interp(whole, axial, np.tile(radius, self.segments))
+        place = np.linspace(0.0, self.segments, points)
+        number = np.minimum(np.floor(place), self.rings)
+        axial, radius = self.profile(contraction, 2 * (place - number) - 1)
+        chord = self.fibre_length * (1.0 - contraction)
+        return axial + (number - self.rings / 2) * chord, radius
 
 
 @model
@@ -102,5 +100,5 @@ class StraightFibre(FibreTube):
         refuse_beyond(contraction, self.contraction_reach, "StraightFibre")
         return self.meridian.segment(contraction, self.fibre_length, self.end_radius)
 
-    def profile(self, contraction: float, points: int) -> Profile:
-        return self.meridian.profile(contraction, self.fibre_length, self.end_radius, points)
+    def profile(self, contraction: float, along: Array) -> Profile:
+        return self.meridian.profile(contraction, self.fibre_length, self.end_radius, along)

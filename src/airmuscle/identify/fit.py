@@ -69,8 +69,8 @@ def _points(recording: Recording | Sequence[Recording]) -> tuple[Recording, npt.
             )
     missing = np.isnan(np.stack(list(columns.values()))).any(axis=0) if columns else np.zeros(0, dtype=bool)
     lengths = {run.constants.get("resting_length") for run in runs} - {None}
-    constants = {"resting_length": lengths.pop()} if len(lengths) == 1 else {}
-    return Recording(columns, origin, constants), missing
+    rest = lengths.pop() if len(lengths) == 1 else None
+    return Recording(columns, origin, {} if rest is None else {"resting_length": rest}), missing
 
 
 def _weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLike | None) -> Array:
@@ -156,6 +156,11 @@ def _notes(problem: Problem, found: Statistics, loss: Loss, dropped: int) -> tup
         notes.append(
             f"{cut_off} rows are cut off at the ends of the range of force and count only where the law contradicts "
             "them; censoring=UNCENSORED fits them as they stand."
+        )
+    if found.measured_rank < found.rank:
+        notes.append(
+            f"The measured rows determine {found.measured_rank} of {found.rank} parameters; the others only have "
+            "bounds, where the rows are cut off, and stand as near to these as they can."
         )
     if at_zero:
         notes.append(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,11 @@ from .problem import Problem
 STEPS = 500
 """Iterations after which a fit gives up; none that was seen needed a fifth of them."""
 _FINE = 1e-14
+RANK_TOLERANCE = 1e-10
+"""Singular values of the scaled design below this part of the greatest count as zero (chosen): a parameter that
+ten digits of the data do not determine is not determined."""
+_SLIGHT = 1e-4
+"""Weight of a row that is cut off and not contradicted, where nothing else decides (chosen)."""
 
 
 class Solution(NamedTuple):
@@ -26,7 +31,10 @@ class Solution(NamedTuple):
 
 def solve(problem: Problem, loss: Loss) -> Solution:
     """The free parameters that make the loss least. Raises IdentificationError where the search fails."""
-    return _solve_linear(problem, loss) if _is_linear(problem) else _solve_iterating(problem, loss)
+    if not _is_linear(problem):
+        return _solve_iterating(problem, loss, problem.start)
+    found = _solve_linear(problem)
+    return found if isinstance(loss, LeastSquares) else _solve_iterating(problem, loss, found.values)
 
 
 def _is_linear(problem: Problem) -> bool:
@@ -47,66 +55,44 @@ def _design(problem: Problem) -> tuple[Array, Array]:
     return matrix, problem.modelled(problem.start) - matrix @ problem.start
 
 
-def _solve_linear(problem: Problem, loss: Loss) -> Solution:
-    """Least squares at once; again, on the rows that count and with their weights, until neither changes.
+def _solve_linear(problem: Problem) -> Solution:
+    """Least squares at once, or again on the rows that count until these are the same.
 
-    Each pass is a Newton step for squares on one side, or a reweighting for a robust loss; both sums are convex,
-    so halving a step that does not help leads to the least one.
+    Squares on one side of a bound make a convex sum, of which each pass is a Newton step. Where the measured rows
+    alone leave parameters open, a law may fall below its bounds without end; of all that are equally good, the one
+    nearest to the bounds is taken.
     """
     slopes, constant = _design(problem)
     norms = np.linalg.norm(slopes, axis=0)
     norms[norms == 0] = 1.0
-    matrix = slopes / norms
-    everyone = np.ones(len(problem.data), dtype=bool)
-    goal, weights = problem.goal - constant, problem.weights
-    found = _least_squares(matrix, goal, weights, everyone)
-    plain = isinstance(loss, LeastSquares)
-    if not (plain and not problem.sides.any()):
-        found = _improved(problem, loss, matrix, constant, found, plain=plain)
-    return Solution(found / norms, matrix @ found + constant, slopes)
+    matrix = problem.weights[:, None] * (slopes / norms)
+    goal = problem.weights * (problem.goal - constant)
+    measured = problem.sides == 0
+    determined = measured.all() or measured_rank(problem, slopes) == len(norms)
+    counting = np.ones(len(goal), dtype=bool)
+    for _ in range(50):
+        share = np.where(counting, 1.0, 0.0 if determined else _SLIGHT)
+        found = np.linalg.lstsq(share[:, None] * matrix, share * goal, rcond=1e-13)[0] / norms
+        modelled = slopes @ found + constant
+        previous, counting = counting, problem.counting(modelled)
+        if measured.all() or np.array_equal(counting, previous):
+            return Solution(found, modelled, slopes)
+    return _solve_iterating(problem, LeastSquares(), found)  # whole steps went in a circle
 
 
-def _least_squares(matrix: Array, goal: Array, weights: Array, rows: Any) -> Array:
-    return np.asarray(np.linalg.lstsq(weights[rows, None] * matrix[rows], weights[rows] * goal[rows], rcond=1e-13)[0])
+def measured_rank(problem: Problem, slopes: Array) -> int:
+    """How many parameters the rows that are not cut off determine by themselves."""
+    matrix = (problem.weights[:, None] * slopes)[problem.sides == 0]
+    norms = np.linalg.norm(matrix, axis=0)
+    return int(np.linalg.matrix_rank(matrix / np.where(norms > 0, norms, 1.0), rtol=RANK_TOLERANCE))
 
 
-def _improved(problem: Problem, loss: Loss, matrix: Array, constant: Array, found: Array, *, plain: bool) -> Array:
-    previous = None
-    for _ in range(STEPS):
-        modelled = matrix @ found + constant
-        counting = problem.counting(modelled)
-        if plain and previous is not None and np.array_equal(counting, previous):
-            return found
-        shares = np.sqrt(loss.rho((problem.errors(modelled) / loss.scale) ** 2)[1])
-        aim = _least_squares(matrix, problem.goal - constant, problem.weights * shares, counting)
-        stepped = _shortened(problem, loss, matrix, constant, found, aim)
-        whole = stepped is aim
-        if np.max(np.abs(stepped - found)) <= 1e-12 * np.max(np.abs(found), initial=1e-300):
-            return stepped
-        found, previous = stepped, counting if whole else None
-    raise _no_end(problem)
-
-
-def _shortened(problem: Problem, loss: Loss, matrix: Array, constant: Array, found: Array, aim: Array) -> Array:
-    """The step to `aim`, halved until it does not make the loss greater; no step where rounding is all there is."""
-    before = _total(problem, loss, matrix @ found + constant)
-    for halving in range(30):
-        tried = aim if halving == 0 else found + 0.5**halving * (aim - found)
-        if _total(problem, loss, matrix @ tried + constant) <= before:
-            return tried
-    return found
-
-
-def _total(problem: Problem, loss: Loss, modelled: Array) -> float:
-    return float(loss.scale**2 * np.sum(loss.rho((problem.errors(modelled) / loss.scale) ** 2)[0]))
-
-
-def _solve_iterating(problem: Problem, loss: Loss) -> Solution:
+def _solve_iterating(problem: Problem, loss: Loss, start: Array) -> Solution:
     """Bounded trust-region least squares, parameters and errors brought to the order of one."""
     from scipy.optimize import least_squares
 
     low, high = problem.bounds
-    start = np.clip(problem.start, low, high)
+    start = np.clip(start, low, high)
     scale = np.where(start != 0, np.abs(start), np.where(np.isfinite(high - low), high - low, 1.0))
     spread = float(np.ptp(problem.goal)) or float(np.max(np.abs(problem.goal))) or 1.0
     _refuse_non_finite(problem, start)

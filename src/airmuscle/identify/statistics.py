@@ -10,11 +10,7 @@ import numpy.typing as npt
 from ..errors import IdentificationError
 from .loss import Array, Loss
 from .problem import Problem
-from .solve import Solution
-
-RANK_TOLERANCE = 1e-10
-"""Singular values of the scaled design below this part of the greatest count as zero (chosen): a parameter that
-ten digits of the data do not determine is not determined."""
+from .solve import RANK_TOLERANCE, Solution, measured_rank
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -22,6 +18,8 @@ class Statistics:
     """What the design at the solution says; parameters on a bound have no deviation (NaN)."""
 
     rank: int
+    measured_rank: int
+    """Rank without the rows that are cut off."""
     condition: float
     """Greatest over least singular value of the design, its columns brought to length 1."""
     sigma: float
@@ -56,7 +54,8 @@ def statistics(problem: Problem, solution: Solution, loss: Loss) -> Statistics:
     deviations[~on_bound] = scatter * lengths / norms
     correlations[np.ix_(~on_bound, ~on_bound)] = inverse / np.outer(lengths, lengths)
     condition = float(singular[0] / singular[-1]) if singular.size else 1.0
-    return Statistics(singular.size, condition, scatter, deviations, correlations, on_bound)
+    measured = measured_rank(problem, slopes[:, ~on_bound]) if problem.sides.any() else singular.size
+    return Statistics(singular.size, measured, condition, scatter, deviations, correlations, on_bound)
 
 
 def _on_bound(problem: Problem, values: Array) -> npt.NDArray[np.bool_]:

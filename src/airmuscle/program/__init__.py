@@ -1,6 +1,8 @@
-"""From a system over `ops` to machine code: trace, differentiate, print, compile. Nothing here solves anything."""
+"""From a system over `ops` to machine code: trace, differentiate, print, compile. Nothing here solves anything.
 
-from .prepared import Prepared as Prepared
-from .prepared import prepared as prepared
+`program.prepared` holds the way in; it is not imported here, because it brings CasADi, which a description of a
+system does not need.
+"""
+
 from .system import StateVariable as StateVariable
 from .system import System as System

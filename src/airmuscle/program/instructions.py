@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import casadi
@@ -11,8 +11,9 @@ import casadi
 Operand = tuple[Any, ...]
 """("t", k) the result of instruction k, ("c", value) a constant, ("in", argument, index) an input."""
 
-SELECT = -1
-"""Our own operation: (condition, when true, when false), which CasADi spells with two masks and a sum."""
+SELECT, MAXIMUM, MINIMUM = -1, -2, -3
+"""Our own operations: (condition, when true, when false), which CasADi spells with two masks and a sum; and the
+selection of the larger or smaller of two numbers, (a, b), for which processors have one instruction."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,8 +74,20 @@ def _selects(body: list[Instruction]) -> list[Instruction]:
             line = Instruction(SELECT, line.result, (first.arguments[0], first.arguments[1], second.arguments[1]))
         elif first and second and negated(first.arguments[0]) == second.arguments[0]:
             line = Instruction(SELECT, line.result, (second.arguments[0], second.arguments[1], first.arguments[1]))
-        chosen.append(line)
+        chosen.append(_extreme(line, by_result) if line.operation == SELECT else line)
     return chosen
+
+
+def _extreme(line: Instruction, by_result: Mapping[Operand, Instruction]) -> Instruction:
+    """A SELECT of the larger or smaller of the two that its condition compares, as what it is."""
+    condition, a, b = line.arguments
+    test = by_result.get(condition)
+    if test is not None and test.operation in (casadi.OP_LE, casadi.OP_LT):
+        if test.arguments == (b, a):
+            return Instruction(MAXIMUM, line.result, (a, b))
+        if test.arguments == (a, b):
+            return Instruction(MINIMUM, line.result, (a, b))
+    return line
 
 
 def _without_unused(body: list[Instruction], outputs: tuple[tuple[int, int, Operand], ...]) -> Code:
@@ -88,7 +101,10 @@ def _without_unused(body: list[Instruction], outputs: tuple[tuple[int, int, Oper
 
 
 def hoisted(code: Code, parameter_input: int) -> tuple[Code, tuple[Instruction, ...], tuple[Operand, ...]]:
-    """Code without what depends on parameters alone; that part; and the operands it hands over, in order."""
+    """Code without what depends on parameters alone; that part; and the operands it hands over, in order.
+
+    A division by such a quantity becomes a product with its inverse, which is handed over instead.
+    """
     varies: dict[Operand, bool] = {}
 
     def depends(operand: Operand) -> bool:
@@ -99,6 +115,12 @@ def hoisted(code: Code, parameter_input: int) -> tuple[Code, tuple[Instruction, 
     once: list[Instruction] = []
     always: list[Instruction] = []
     for line in code.body:
+        if line.operation == casadi.OP_DIV and depends(line.arguments[0]) and not depends(line.arguments[1]):
+            inverse = Instruction(casadi.OP_INV, ("t", "inverse of", line.arguments[1]), line.arguments[1:])
+            if inverse.result not in varies:
+                once.append(inverse)
+                varies[inverse.result] = False
+            line = Instruction(casadi.OP_MUL, line.result, (line.arguments[0], inverse.result))
         varies[line.result] = any(depends(a) for a in line.arguments)
         (always if varies[line.result] else once).append(line)
     used = [a for line in always for a in line.arguments] + [operand for _, _, operand in code.outputs]

@@ -10,7 +10,7 @@ from typing import Any
 import casadi
 
 from ..errors import TraceError
-from .instructions import SELECT, Code, Instruction, Operand
+from .instructions import MAXIMUM, MINIMUM, SELECT, Code, Instruction, Operand
 
 FLAGS = "nsz arcp contract reassoc afn"
 """Fast arithmetic that keeps NaN and infinity: a failed step must still show (never nnan, ninf)."""
@@ -87,8 +87,11 @@ class Block:
             casadi.OP_NOT: lambda: self.choose("oeq", x[0], ZERO, ONE, ZERO),
             casadi.OP_AND: lambda: self.put(f"fmul double {x[0]}, {x[1]}"),
             casadi.OP_OR: lambda: self.choose("une", self.put(f"fadd double {x[0]}, {x[1]}"), ZERO, ONE, ZERO),
-            casadi.OP_FMIN: lambda: self.choose("ole", x[0], x[1], x[0], x[1]),
-            casadi.OP_FMAX: lambda: self.choose("oge", x[0], x[1], x[0], x[1]),
+            casadi.OP_FMIN: lambda: self.choose("olt", x[0], x[1], x[0], x[1]),
+            casadi.OP_FMAX: lambda: self.choose("ogt", x[0], x[1], x[0], x[1]),
+            # strict: of two equal numbers either is the larger, and this is what the processor's instruction does
+            MINIMUM: lambda: self.choose("olt", x[0], x[1], x[0], x[1]),
+            MAXIMUM: lambda: self.choose("ogt", x[0], x[1], x[0], x[1]),
             casadi.OP_IF_ELSE_ZERO: lambda: self.choose("une", x[0], ZERO, x[1], ZERO),
             casadi.OP_SIGN: lambda: self.choose("ogt", x[0], ZERO, ONE, self.choose("olt", x[0], ZERO, LESS, ZERO)),
             SELECT: lambda: self.choose("une", x[0], ZERO, x[1], x[2]),

@@ -36,6 +36,7 @@ class Recording:
         sizes = {name: values.shape for name, values in arrays.items()}
         if len(set(sizes.values())) > 1 or any(len(shape) != 1 for shape in sizes.values()):
             raise ColumnError(f"{self.origin}: columns must be vectors of one length; they are {sizes}.")
+        arrays = {name: values.view() for name, values in arrays.items()}
         for values in arrays.values():
             values.setflags(write=False)
         object.__setattr__(self, "columns", arrays)

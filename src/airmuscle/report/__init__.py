@@ -1,1 +1,1 @@
-"""report."""
+"""Reports: chapters of claims, tables and figures, and the files they become."""

@@ -25,7 +25,7 @@ SAME_PRESSURE = 0.005
 STEEPEST = 8.0
 """The chart reaches to this multiple of the middle force, where a law grows beyond it (chosen)."""
 POINTS, COARSE = 241, 61
-"""Points on an isobar, and those that look for its ends."""
+"""Points on an isobar, and those on one of a law that is slow, or when looking for its ends."""
 
 
 class Point(NamedTuple):
@@ -60,7 +60,7 @@ def isobars(
     if pressures is None:
         pressures = _pressures(characteristic, box, point)
     low, high = _contractions(characteristic, box, point, pressures)
-    contractions = np.linspace(low, high, POINTS)
+    contractions = np.linspace(low, high, POINTS if characteristic.traceable else COARSE)
     forces = [_forces(characteristic, float(pressure), contractions) for pressure in pressures]
     return Isobars(pressures, contractions, np.array(forces))
 

@@ -66,7 +66,7 @@ def save_table(table: Table, path: Path) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(table.columns)
-        writer.writerows([_cell(value) for value in row] for row in rows(table))
+        writer.writerows([_plain(value) for value in row] for row in rows(table))
 
 
 def as_json(content: Any) -> str:
@@ -82,11 +82,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _cell(value: Any) -> Any:
-    plain = _plain(value)
-    return "" if plain is None else repr(plain) if isinstance(plain, float) else plain
 
 
 def _refuse_clashes(chapters: Iterable[Chapter]) -> None:

@@ -29,7 +29,7 @@ def surface_claims(found: Fit) -> tuple[Claim, ...]:
     return (
         Claim(PAPER, "coefficients of a polynomial of total degree five", Equal(21, 0), len(exponents(5)), "1"),
         Claim(PAPER, "coefficients that the measured map determines (rank of the fit)", Equal(21, 0), found.rank, "1",
-              f"condition number {found.condition:.3g}, scaled; rms {found.rmse:.3g} N on the measured map"),
+              f"condition {found.condition:.3g}, scaled; rms {found.rmse:.3g} N. " + " ".join(found.notes)),
         Claim(PAPER, "force compensator: greatest force of the surface", Equal(1200.0, 0.0), float(force.max()), "N"),
         Claim(PAPER, "force compensator: least force of the surface", Equal(0.0, 0.0), float(force.min()), "N"),
     )  # fmt: skip

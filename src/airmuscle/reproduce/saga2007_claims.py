@@ -5,6 +5,8 @@ Each function takes the model, so that another fibre sum or projection factor ma
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from ..characteristic.base import Characteristic
@@ -52,7 +54,8 @@ def contraction_claim(law: Characteristic, name: str) -> Claim:
 def lifting_claim(law: Characteristic, name: str) -> Claim:
     """Claim 2: 200 N at 0.11 MPa by a contraction of 35 % or more, both at once as the introduction has it."""
     found = reached(law, PRESSURE, 200.0)
-    note = "The contraction at 0.11 MPa under 200 N. As a maximum of its own, at small contraction, 200 N is met."
+    note = "The contraction at 0.11 MPa under 200 N."
+    note += " As a maximum of its own, at small contraction, 200 N is met." if 0 < found < 0.1 else ""
     return _claim("2. About 200 N at 0.11 MPa by 35 % or more", AtLeast(35.0), 100 * found, "%", name, note)
 
 
@@ -93,7 +96,7 @@ def ring_claim(law: Saga2007, name: str, force: float) -> Claim:
     """Claim 4: rings lower the contraction at a given pressure, so that they raise the pressure for one."""
     contraction = np.linspace(0.005, 0.35, 70)
     runs = [np.asarray(pressure_along(with_rings(law, n), contraction, force)) for n in (0, 1, 2)]
-    ratio = min(float(np.min(more / fewer)) for fewer, more in zip(runs, runs[1:], strict=False))
+    ratio = min(float(np.min(more / fewer)) for fewer, more in itertools.pairwise(runs))
     where = f"{name}, {force:g} N"
     note = "Least ratio over 0.5 to 35 % of the pressure with a ring more to that without. "
     note += "Rings as equal segments in series are inferred." + (_unstable(law, force))
@@ -107,18 +110,19 @@ def _unstable(law: Saga2007, force: float) -> str:
 
 def strength_claims(law: Saga2007, name: str, force: float) -> tuple[Claim, ...]:
     """Claim 4, second half: rings raise the pressure that the muscle bears, measured by strain and by fibre tension."""
-    text, where = "4. Rings raise the pressure borne", f"{name}, {force:g} N"
+    text, where = "4. Rings raise the pressure borne: {} with two rings over none", f"{name}, {force:g} N"
     runs = [with_rings(law, n) for n in (0, 2)]
     try:
         points = [float(run.contraction(PRESSURE, force)) for run in runs]
     except NoSolution:
-        return (Claim(PAPER, f"{text} [{where}]", AtMost(1.0), None, "1", "One of them runs away at 0.11 MPa."),)
+        note = "One of the two has no stable contraction at 0.11 MPa."
+        return (Claim(PAPER, f"{text.format('strain')} [{where}]", AtMost(1.0), None, "1", note),)
     strains = [float(run.middle_strain(c)) for run, c in zip(runs, points, strict=True)]
     tensions = [float(run.end_tension(PRESSURE, c, force)) for run, c in zip(runs, points, strict=True)]
-    note = "With two rings over without, at 0.11 MPa; no strength is printed, the measure is chosen: "
-    return (
-        _claim(text, AtMost(1.0), strains[1] / strains[0], "1", where, note + "strain of the rubber in the middle."),
-        _claim(text, AtMost(1.0), tensions[1] / tensions[0], "1", where, note + "tension of one fibre."),
+    note = "At 0.11 MPa and equal load. No strength is printed; the measure is chosen."
+    return tuple(
+        _claim(text.format(measure), AtMost(1.0), pair[1] / pair[0], "1", where, note)
+        for measure, pair in (("strain of the rubber", strains), ("tension of a fibre", tensions))
     )
 
 

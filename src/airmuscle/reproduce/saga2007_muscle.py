@@ -50,7 +50,7 @@ READINGS: dict[str, Saga2007] = {
     for q in (1, 2)
     for name, line in LINES.items()
 } | {f"exact mechanics, line {name}": mechanics(line) for name, line in LINES.items()}
-"""The readings side by side: w projection, q slope; the last two have w 1, q 2, M = m/pi and the rubber along the arc."""
+"""The readings side by side, w projection, q slope; the last two have w 1, q 2, M = m/pi and rubber along the arc."""
 
 
 def exact(rubber: RubberLine, rings: int = 0) -> ExactMeridian:

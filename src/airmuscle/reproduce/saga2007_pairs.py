@@ -48,7 +48,7 @@ class Share(NamedTuple):
 
 
 @model
-class _Stored:
+class Stored:
     """The rubber's energy of one segment over contraction, to be differentiated."""
 
     tube: StraightFibre
@@ -62,7 +62,7 @@ class _Stored:
 def _energy_growth(tube: FibreTube, rubber: RubberLine, contraction: Array) -> Array:
     """dU/deps [J] of one segment; the exact outline, which has no formula, by differences."""
     if isinstance(tube, StraightFibre):
-        return np.asarray(trace.slope(_Stored(tube, rubber), "energy", contraction))
+        return np.asarray(trace.slope(Stored(tube, rubber), "energy", contraction))
 
     def energy(at: Array) -> Array:
         segment = tube.segment(at)
@@ -142,8 +142,8 @@ def _table(name: str, title: str, rows: dict[tuple[str, str], Array]) -> Table:
     for i, c in enumerate(CONTRACTIONS):
         columns[f"error at {c:.0%} [%]"] = [round(100 * float(row[i]), 2) for row in rows.values()]
     note = (
-        "Against the exact meridian of the same muscle. w = 1, M = m/pi, rubber along the arc. An empty cell or nan: past "
-        "the pole, or no exact shape (line A unloaded at 1 %). The previous model is the circle with the middle balance."
+        "Against the exact meridian of the same muscle. w = 1, M = m/pi, rubber along the arc. nan: past the pole, "
+        "or no exact shape (line A unloaded at 1 %). The previous model is the circle with the middle balance."
     )
     return Table(f"saga2007_pairs_{name}", f"Error of outline and closure: {title}", columns, note)
 

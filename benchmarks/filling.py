@@ -1,0 +1,122 @@
+"""The runs that the benchmarks time: 25 s on plants of three, six and ten states.
+
+Three states: a muscle after Hill with a surface of 21 coefficients, two MATRIX valves and a hanging mass, filled and
+discharged as in the third paper. Conductance and critical ratio of the valve, supply, gas and schedule are the paper's
+(Hosovsky et al.); surface, spring, damper and mass are chosen. Six and ten states: `joints.py`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+import numpy.typing as npt
+from joints import joint, joint_start
+
+from airmuscle import ops
+from airmuscle.characteristic.contractile_surface import ContractileSurface
+from airmuscle.circuit import FillDischarge, Supply, Valve
+from airmuscle.command import Schedule, Segments
+from airmuscle.equilibrium import equilibrium
+from airmuscle.gas import Ambient, Isothermal
+from airmuscle.geometry.braid import Braid
+from airmuscle.mechanism import HangingMass
+from airmuscle.muscle import LinearSpring, Muscle, PressureDamper
+from airmuscle.plant import Plant
+from airmuscle.program import System
+
+Array = npt.NDArray[np.float64]
+DURATION = 25.0
+SPACING = 0.01
+BRAID = Braid(0.01, 0.4363, 0.3)
+BOX = ((-1e4, 6e5), (-0.05, 0.35))
+"""Gauge pressure and contraction over which the surface is fitted. It begins below ambient, so that a muscle at rest is
+inside and the opponents are spared its tangent there."""
+FILL_DISCHARGE = Schedule({"fill": ((5.0, 1.0), (15.0, 0.0)), "discharge": ((19.0, 1.0),)})
+JOINT_PULSES = Schedule(
+    {
+        "left.fill": ((2.0, 1.0), (2.05, 0.0)),
+        "right.discharge": ((2.0, 1.0), (2.05, 0.0)),
+        "left.discharge": ((10.0, 1.0), (10.08, 0.0)),
+        "right.fill": ((10.0, 1.0), (10.08, 0.0)),
+    }
+)
+
+
+def measured_force(pressure: Array, contraction: Array) -> Array:
+    """What stands for a measured muscle: Tondu and Lopez (2000), its end correction falling with pressure; chosen.
+
+    F = pi r_0^2 p (a (1 - k(p) eps)^2 - b),   a = 3/tan^2(theta_0),   b = 1/sin^2(theta_0)
+    """
+    a, b = 3 / np.tan(BRAID.braid_angle) ** 2, 1 / np.sin(BRAID.braid_angle) ** 2
+    end_correction = 1.25 + 0.6 * np.exp(-pressure / 1.5e5)
+    return np.asarray(np.pi * BRAID.radius**2 * pressure * (a * (1 - end_correction * contraction) ** 2 - b))
+
+
+@functools.cache
+def surface() -> ContractileSurface:
+    """The polynomial of degree five nearest to `measured_force` on a grid over its box."""
+    blank = ContractileSurface.blank().with_box(*BOX)
+    p, eps = (grid.ravel() for grid in np.meshgrid(*(np.linspace(*ends, 41) for ends in BOX)))
+    columns = np.column_stack([np.asarray(c) for c in blank.basis(p, eps)])
+    found = np.linalg.lstsq(columns, measured_force(p, eps))[0]
+    return dataclasses.replace(blank, coefficients=tuple(found.tolist()))
+
+
+def hanging() -> Plant:
+    """The plant of three states."""
+    muscle = Muscle(surface(), BRAID, LinearSpring(4000.0), PressureDamper(100.0, 5e-4))
+    matrix = Valve(2.6167e-9, 0.433)
+    supply = Supply(650e3 - Ambient().pressure)
+    return Plant(muscle, FillDischarge(supply, matrix, matrix), HangingMass(5.0), Isothermal())
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Run:
+    """A system, where it starts, its command, and the factor that makes a displacement [m] of its first coordinate."""
+
+    system: System
+    start: dict[str, float]
+    command: Schedule
+    coordinate: str
+    lever: float
+
+    @property
+    def vector(self) -> Array:
+        return np.array([self.start[s.name] for s in self.system.states])
+
+    @property
+    def nominal(self) -> Array:
+        return np.array([s.nominal for s in self.system.states])
+
+    @property
+    def segments(self) -> Segments:
+        return self.command.segments(self.system.inputs, 0.0, DURATION)
+
+    @property
+    def times(self) -> Array:
+        """Every 10 ms; all instants of the schedule are among them."""
+        return np.linspace(0.0, DURATION, round(DURATION / SPACING) + 1)
+
+    def error(self, rows: Array, reference: Array) -> float:
+        """Greatest error of displacement [m] over the run; rows are (N, n)."""
+        index = [s.name for s in self.system.states].index(self.coordinate)
+        return float(self.lever * np.abs(rows[:, index] - reference[:, index]).max())
+
+
+@functools.cache
+def runs() -> dict[int, Run]:
+    """The three runs by their number of states."""
+    plant, six, ten = hanging(), joint(), joint(heat=True)
+    return {
+        3: Run(plant, dict(equilibrium(plant, pressure=0.0)), FILL_DISCHARGE, "position", 1.0),
+        6: Run(six, joint_start(six), JOINT_PULSES, "angle", six.radius),
+        10: Run(ten, joint_start(ten), JOINT_PULSES, "angle", ten.radius),
+    }
+
+
+def stretch_factor(braid: Braid) -> tuple[float, float]:
+    """k and c of V = k s (1 - (c s)^2) with s = 1 - eps, for those who write the equations out by hand."""
+    k = ops.pi * braid.radius**2 * braid.resting_length / ops.sin(braid.braid_angle) ** 2
+    return float(k), float(ops.cos(braid.braid_angle))

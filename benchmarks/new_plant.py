@@ -1,0 +1,106 @@
+"""What a plant that was never seen costs: trace, derivatives, print, compile; another parameter set; the cache."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from typing import Any
+
+from filling import hanging, runs
+from measure import Bar, Section, interleaved, of_time, show
+
+from airmuscle import trace
+from airmuscle.mechanism import HangingMass
+from airmuscle.method import DormandPrince8
+from airmuscle.plant import Plant
+from airmuscle.program import System
+from airmuscle.program.prepared import Program, prepared
+
+HEADING = ("what", "median", "least")
+TEXT = (
+    "In a process that has compiled a plant before; what is kept of earlier traces is thrown away each time. The first "
+    "plant of a process also starts CasADi and LLVM, which `Process start` below counts."
+)
+MUSCLES = 24
+WHY = (
+    "each of these muscles has a surface with its tangent, 26 states are printed as 58 000 lines, and LLVM's code "
+    "generation of such long straight lines takes two thirds of the time; its lowest level takes a tenth of that"
+)
+ONE_RUN = """
+import sys
+from filling import runs
+from airmuscle.simulate import simulate
+run = runs()[int(sys.argv[1])]
+simulate(run.system, run.command, duration=0.1, start=run.start)
+"""
+
+
+def fresh(system: System) -> Program:
+    """The program of a system as if its laws had never been traced."""
+    trace._functions.clear()
+    return Program(system)
+
+
+def with_step(system: System) -> Any:
+    """A fresh program and its printed step of ode8, 13 stages in one function."""
+    program = fresh(system)
+    return program.step(*DormandPrince8(1e-4).tableau(), prepared(system).parameters)
+
+
+def many_muscles() -> Plant:
+    """As many muscles as an arm has, each with its valves, on one mass."""
+    plant = hanging()
+    muscles = tuple(dataclasses.replace(plant.muscles[0], name=f"muscle{i}") for i in range(MUSCLES))
+    return dataclasses.replace(
+        plant, muscle=muscles, circuit=(plant.circuits[0],) * MUSCLES, mechanism=HangingMass(100.0)
+    )
+
+
+def cache_counts() -> tuple[int, ...]:
+    """Files in the kernels' cache after each of three processes, with a plant of another size each."""
+    counts = []
+    with tempfile.TemporaryDirectory() as folder:
+        for size in (3, 6, 10):
+            process(["-c", ONE_RUN, str(size)], folder)
+            counts.append(sum(path.is_file() for path in pathlib.Path(folder).rglob("*")))
+    return tuple(counts)
+
+
+def process(arguments: list[str], cache: str | None = None) -> None:
+    """Run Python in a process of its own, quietly, with this folder as the kernels' cache."""
+    here = pathlib.Path(__file__).parent
+    path = os.pathsep.join([str(here), str(here.parent / "src"), os.environ.get("PYTHONPATH", "")])
+    environment = {**os.environ, "PYTHONPATH": path} | ({"NUMBA_CACHE_DIR": cache} if cache else {})
+    subprocess.run([sys.executable, *arguments], env=environment, check=True, capture_output=True, cwd=here)
+
+
+def section(rounds: int = 5) -> Section:
+    """All of it."""
+    systems = {size: run.system for size, run in runs().items()}
+    heavier, big = dataclasses.replace(hanging(), mechanism=HangingMass(6.0)), many_muscles()
+    prepared(systems[3])
+    variants: dict[str, Callable[[], Any]] = {
+        f"new plant, {n} states": lambda s=s: fresh(s) for n, s in systems.items()
+    }
+    variants["new plant, 3 states, and its step of ode8"] = lambda: with_step(systems[3])
+    variants["another parameter set of a known plant"] = lambda: prepared(heavier)
+    times = interleaved(variants, rounds)
+    times |= interleaved({f"new plant, {MUSCLES} muscles on one mass, 26 states": lambda: fresh(big)}, 1)
+    counts = cache_counts()
+    rows = [(name, of_time(t.median), of_time(t.least)) for name, t in times.items()]
+    rows.append(("files in the cache after each of three processes", ", ".join(map(str, counts)), ""))
+    bars = (
+        Bar("new plant, 10 states", times["new plant, 10 states"].median, 0.3, "s"),
+        Bar(f"new plant, {MUSCLES} muscles", list(times.values())[-1].median, 4.0, "s", why=WHY),
+        Bar("files added to the cache by a second and third process", counts[-1] - counts[0], 0, "files"),
+    )
+    return Section("A new plant", TEXT, HEADING, tuple(rows), bars)
+
+
+if __name__ == "__main__":
+    show(section())

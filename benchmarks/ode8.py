@@ -1,0 +1,140 @@
+"""ode8 at 1e-4 s over 25 s (250 000 steps) against C of the same equations, compiled here."""
+
+from __future__ import annotations
+
+import ctypes
+import pathlib
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from filling import SPACING, Array, Run, runs, stretch_factor
+from measure import Bar, Section, interleaved, of_time, show
+from rodas4 import kernel
+
+from airmuscle.command import Segments
+from airmuscle.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, absolute
+from airmuscle.method import DormandPrince8, Rodas4
+from airmuscle.plant import Plant
+from airmuscle.program.prepared import prepared
+
+STEP = 1e-4
+SOURCE = pathlib.Path(__file__).with_name("fill_discharge.c")
+FLAGS = ("-O3", "-march=native")
+FAST = "-ffast-math"
+HEADING = ("variant", "median", "least", "times the best branch-free C", "greatest error [m]")
+TEXT = (
+    "The plant of three states, 2501 rows. Both sides compute both valves and the surface with its tangent in every "
+    "stage, without a branch; the C inlines a whole step, and the best of its compilers and flags counts. The C that "
+    "skips shut valves and the tangent stands beside it. The reference is Rodas4 at rtol 1e-11."
+)
+
+
+def stages() -> str:
+    """The stages after the first, and the weighted sum, as C macros; zeros are left out."""
+    rows, weights = DormandPrince8(STEP).tableau()
+
+    def total(row: tuple[float, ...], member: str) -> str:
+        return " + ".join(f"{a!r} * k{j}.{member}" for j, a in enumerate(row) if a)
+
+    lines = [
+        f"RATES({i}, {total(row, 'air')}, {total(row, 'position')}, {total(row, 'speed')})"
+        for i, row in enumerate(rows, 1)
+    ]
+    weighted = " + ".join(f"{a!r} * k{j}.member" for j, a in enumerate(weights) if a)
+    return f"#define EXPLICIT_STAGES {' '.join(lines)}\n#define WEIGHTED(member) {weighted}\n"
+
+
+def constants(plant: Plant) -> Array:
+    """The struct `Plant` of the C source, in its order; its valves are alike but in conductance."""
+    muscle, circuit, load, ambient = plant.muscles[0], plant.circuits[0], plant.mechanism, plant.ambient
+    law, valve = muscle.contractile, circuit.fill
+    k, c = stretch_factor(muscle.geometry)
+    scale = REFERENCE_DENSITY * np.sqrt(REFERENCE_TEMPERATURE / ambient.temperature)
+    box = (law.least_contraction, law.greatest_contraction), (law.least_pressure, law.greatest_pressure)
+    scaling = [x for low, high in box for x in (low, 2 / (high - low))]
+    return np.array(
+        [1 / load.mass, load.gravity, 1 / muscle.geometry.resting_length, k, c * c, GAS_CONSTANT * ambient.temperature]
+        + [ambient.pressure, absolute(circuit.supply.pressure, ambient)]
+        + [scale * v.conductance for v in (circuit.fill, circuit.discharge)]
+        + [valve.critical_ratio, 1 / (1 - valve.critical_ratio), float(valve.laminar_slope())]
+        + [*scaling, law.least_force, law.greatest_force]
+        + [muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth, *law.coefficients]
+    )
+
+
+def in_c(run: Run, library: ctypes.CDLL, segments: Segments | None = None) -> Callable[[], Array]:
+    """The run, or other segments of it, by a compiled C library."""
+    segments = segments or run.segments
+    plant, start, inputs = constants(run.system), run.vector, np.ascontiguousarray(segments.values)
+    steps = np.rint(np.diff([0.0, *segments.ends]) / STEP).astype(np.intc)
+    rows = np.empty((int(steps.sum()) * round(STEP * 1e6) // round(SPACING * 1e6) + 1, 3))
+    arguments = [plant.ctypes.data, start.ctypes.data, len(steps), steps.ctypes.data, inputs.ctypes.data]
+    kinds = [
+        ctypes.c_void_p,
+        ctypes.c_void_p,
+        ctypes.c_int,
+        ctypes.c_void_p,
+        ctypes.c_void_p,
+        ctypes.c_double,
+        ctypes.c_int,
+    ]
+    library.run.argtypes = [*kinds, ctypes.c_void_p]
+
+    def call(keep: Any = (plant, start, inputs, steps)) -> Array:
+        library.run(*arguments, STEP, round(SPACING / STEP), rows.ctypes.data)
+        return rows
+
+    return call
+
+
+def compilers() -> list[str]:
+    """The C compilers on the path."""
+    return [name for name in ("gcc", "clang") if shutil.which(name)]
+
+
+def compiled(folder: pathlib.Path) -> dict[str, ctypes.CDLL]:
+    """The C source by each compiler, plain and fast, without and with branches."""
+    source = folder / SOURCE.name
+    source.write_text(stages() + SOURCE.read_text(encoding="utf-8"), encoding="utf-8")
+    found = {}
+    for compiler in compilers():
+        for skip in ((), ("-DSKIP",)):
+            for fast in ((), (FAST,)):
+                name = " ".join(["C,", compiler, *FLAGS, *fast, *(["skipping"] if skip else [])])
+                target = folder / f"{len(found)}.so"
+                subprocess.run(
+                    [compiler, *FLAGS, *fast, *skip, "-shared", "-fPIC", str(source), "-o", str(target), "-lm"],
+                    check=True,
+                )
+                found[name] = ctypes.CDLL(str(target))
+    return found
+
+
+def section(rounds: int = 9) -> Section:
+    """The whole comparison."""
+    run = runs()[3]
+    ready = prepared(run.system)
+    reference = kernel(run, ready, Rodas4(1e-11))()
+    method, segments, times, state = DormandPrince8(STEP), run.segments, run.times, run.vector
+    ours = "DormandPrince8(1e-4), kernel"
+    variants: dict[str, Callable[[], Array]] = {ours: lambda: method.run(ready, segments, 0.0, state, times).rows}
+    with tempfile.TemporaryDirectory() as folder:
+        variants |= {name: in_c(run, library) for name, library in compiled(pathlib.Path(folder)).items()}
+        taken = interleaved(variants, rounds)
+        errors = {name: run.error(call(), reference) for name, call in variants.items()}
+    branch_free = [name for name in variants if name != ours and "skipping" not in name]
+    best = min(branch_free, key=lambda name: taken[name].median, default=ours)
+    rows = tuple(
+        (name, of_time(t.median), of_time(t.least), f"{t.ratio_to(taken[best]):.3g}", f"{errors[name]:.1e}")
+        for name, t in taken.items()
+    )
+    bars = (Bar(f"ode8 / {best}", taken[ours].ratio_to(taken[best]), 1.15, "x"),) if branch_free else ()
+    return Section("ode8, 250 000 steps, against C", TEXT, HEADING, rows, bars)
+
+
+if __name__ == "__main__":
+    show(section())

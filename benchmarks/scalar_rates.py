@@ -1,0 +1,220 @@
+"""The same equations written out by hand in scalar Python, as a user would for SciPy: the opponent of the kernels.
+
+Everything constant is computed beforehand and bound as a local; shut valves, the tangent outside the box and the
+root of a choked valve are skipped. Nothing of the library is called while a run goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import sin, sqrt
+from typing import Any
+
+from filling import stretch_factor
+from joints import HEAT_CAPACITY, Joint, JointWithHeat
+
+from airmuscle.circuit import Valve
+from airmuscle.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, absolute
+from airmuscle.plant import Plant
+
+Rates = Callable[[float, Any], list[float]]
+Scalar = Callable[[float, float], float]
+
+
+def valve_flow(valve: Valve, temperature: float) -> Scalar:
+    """Mass flow [kg/s] from one absolute pressure to another [Pa], fully open."""
+    scale = valve.conductance * REFERENCE_DENSITY * sqrt(REFERENCE_TEMPERATURE / temperature)
+    b, laminar = valve.critical_ratio, float(valve.laminar_slope())
+    inverse = 1.0 / (1.0 - b)
+
+    def flow(up: float, down: float) -> float:
+        if up >= down:
+            if down <= b * up:
+                return scale * up
+            beyond = (down - b * up) * inverse
+            root = up * up - beyond * beyond
+            ellipse, chord = sqrt(root) if root > 1.0 else 1.0, laminar * (up - down)
+            return scale * (ellipse if ellipse < chord else chord)
+        return -flow(down, up)
+
+    return flow
+
+
+def hill(plant: Plant) -> Callable[[Sequence[float]], Rates]:
+    """Rates of the plant of three states under given openings."""
+    muscle, load, circuit, ambient = plant.muscles[0], plant.mechanism, plant.circuits[0], plant.ambient
+    law, length = muscle.contractile, muscle.geometry.resting_length
+    k, c = stretch_factor(muscle.geometry)
+    rt, outside, source = (
+        GAS_CONSTANT * ambient.temperature,
+        ambient.pressure,
+        absolute(circuit.supply.pressure, ambient),
+    )
+    fill_flow, discharge_flow = (valve_flow(v, ambient.temperature) for v in (circuit.fill, circuit.discharge))
+    stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth
+    inverse_mass, gravity, per_length, cc = 1.0 / load.mass, load.gravity, 1.0 / length, c * c
+    low_x, scale_x = law.least_contraction, 2.0 / (law.greatest_contraction - law.least_contraction)
+    low_q, scale_q = law.least_pressure, 2.0 / (law.greatest_pressure - law.least_pressure)
+    least, greatest = law.least_force, law.greatest_force
+    (a00, a10, a20, a30, a40, a50, a01, a11, a21, a31, a41, a02, a12, a22, a32, a03, a13, a23, a04, a14, a05) = (
+        law.coefficients
+    )
+
+    def polynomial(x: float, q: float) -> float:
+        r0 = a00 + x * (a10 + x * (a20 + x * (a30 + x * (a40 + x * a50))))
+        r1 = a01 + x * (a11 + x * (a21 + x * (a31 + x * a41)))
+        r2 = a02 + x * (a12 + x * (a22 + x * a32))
+        return r0 + q * (r1 + q * (r2 + q * (a03 + x * (a13 + x * a23) + q * (a04 + x * a14 + q * a05))))
+
+    def tangent(x: float, q: float) -> float:
+        """Beyond the box: the value at its edge and the slopes there."""
+        xi, qi = min(max(x, -1.0), 1.0), min(max(q, -1.0), 1.0)
+        rows = (
+            (a00, a10, a20, a30, a40, a50),
+            (a01, a11, a21, a31, a41),
+            (a02, a12, a22, a32),
+            (a03, a13, a23),
+            (a04, a14),
+            (a05,),
+        )
+        by_x = sum(i * a * xi ** (i - 1) * qi**j for j, row in enumerate(rows) for i, a in enumerate(row) if i)
+        by_q = sum(j * a * xi**i * qi ** (j - 1) for j, row in enumerate(rows) for i, a in enumerate(row) if j)
+        return polynomial(xi, qi) + by_x * (x - xi) + by_q * (q - qi)
+
+    def under(openings: Sequence[float]) -> Rates:
+        fill, discharge = openings
+
+        def rates(t: float, y: Any) -> list[float]:
+            air, position, speed = y.tolist()
+            contraction = position * per_length
+            s = 1.0 - contraction
+            p = air * rt / (k * s * (1.0 - cc * s * s))
+            gauge = p - outside
+            x, q = (contraction - low_x) * scale_x - 1.0, (gauge - low_q) * scale_q - 1.0
+            if -1.0 <= x <= 1.0 and -1.0 <= q <= 1.0:
+                r0 = a00 + x * (a10 + x * (a20 + x * (a30 + x * (a40 + x * a50))))
+                r1 = a01 + x * (a11 + x * (a21 + x * (a31 + x * a41)))
+                r2 = a02 + x * (a12 + x * (a22 + x * a32))
+                force = r0 + q * (r1 + q * (r2 + q * (a03 + x * (a13 + x * a23) + q * (a04 + x * a14 + q * a05))))
+            else:
+                force = tangent(x, q)
+            force = least if force < least else greatest if force > greatest else force
+            tension = force - stiffness * position - (damping + growth * gauge) * speed
+            if tension < 0.0:
+                tension = 0.0
+            flow = 0.0
+            if fill:
+                flow += fill * fill_flow(source, p)
+            if discharge:
+                flow -= discharge * discharge_flow(p, outside)
+            return [flow, speed, tension * inverse_mass - gravity]
+
+        return rates
+
+    return under
+
+
+def _force(system: Joint) -> Callable[[float, float, float], float]:
+    """Tension [N] of a muscle of the joint by gauge pressure [Pa], contraction [1] and shortening speed [m/s]."""
+    muscle = system.muscle
+    length, clamp = muscle.geometry.resting_length, muscle.contractile
+    k, c = stretch_factor(muscle.geometry)
+    area, ccc, stiffness = -k / length, 3.0 * c * c, muscle.spring.stiffness * length
+    damping, least, greatest = muscle.damper.damping, clamp.least_force, clamp.greatest_force
+
+    def force(gauge: float, contraction: float, speed: float) -> float:
+        s = 1.0 - contraction
+        pull = gauge * area * (1.0 - ccc * s * s)
+        pull = least if pull < least else greatest if pull > greatest else pull
+        tension = pull - stiffness * contraction - damping * speed
+        return tension if tension > 0.0 else 0.0
+
+    return force
+
+
+def six_states(system: Joint) -> Callable[[Sequence[float]], Rates]:
+    """Rates of the joint of six states under given openings."""
+    ambient, length = system.ambient, system.muscle.geometry.resting_length
+    k, c = stretch_factor(system.muscle.geometry)
+    rt, outside, cc = GAS_CONSTANT * ambient.temperature, ambient.pressure, c * c
+    in_tube, source, radius = rt / system.tube_volume, absolute(system.supply.pressure, ambient), system.radius
+    lever, offset, inverse_inertia = radius / length, system.offset, 1.0 / system.inertia
+    friction, load, force = system.friction, system.load, _force(system)
+    valve, tube = (valve_flow(v, ambient.temperature) for v in (system.valve, system.tube))
+
+    def under(openings: Sequence[float]) -> Rates:
+        left_fill, left_discharge, right_fill, right_discharge = openings
+
+        def rates(t: float, y: Any) -> list[float]:
+            angle, speed, air_l, tube_l, air_r, tube_r = y.tolist()
+            eps_l, eps_r, v = offset + lever * angle, offset - lever * angle, radius * speed
+            sl, sr = 1.0 - eps_l, 1.0 - eps_r
+            p_l, p_r = air_l * rt / (k * sl * (1.0 - cc * sl * sl)), air_r * rt / (k * sr * (1.0 - cc * sr * sr))
+            t_l, t_r = tube_l * in_tube, tube_r * in_tube
+            through_l, through_r = tube(t_l, p_l), tube(t_r, p_r)
+            in_l = in_r = 0.0
+            if left_fill:
+                in_l += left_fill * valve(source, t_l)
+            if left_discharge:
+                in_l -= left_discharge * valve(t_l, outside)
+            if right_fill:
+                in_r += right_fill * valve(source, t_r)
+            if right_discharge:
+                in_r -= right_discharge * valve(t_r, outside)
+            pull = force(p_l - outside, eps_l, v) - force(p_r - outside, eps_r, -v)
+            turning = (radius * pull - friction * speed - load * sin(angle)) * inverse_inertia
+            return [speed, turning, through_l, in_l - through_l, through_r, in_r - through_r]
+
+        return rates
+
+    return under
+
+
+def ten_states(system: JointWithHeat) -> Callable[[Sequence[float]], Rates]:
+    """Rates of the joint of ten states, with heat and spools, under given openings."""
+    ambient, length = system.ambient, system.muscle.geometry.resting_length
+    k, c = stretch_factor(system.muscle.geometry)
+    wall, outside, cc = ambient.temperature, ambient.pressure, c * c
+    in_tube, source = GAS_CONSTANT * wall / system.tube_volume, absolute(system.supply.pressure, ambient)
+    radius, offset, inverse_inertia = system.radius, system.offset, 1.0 / system.inertia
+    lever, friction, load, force = radius / length, system.friction, system.load, _force(system)
+    valve, tube = (valve_flow(v, wall) for v in (system.valve, system.tube))
+    transfer, inverse_lag, cp = system.heat_transfer, 1.0 / system.spool_lag, HEAT_CAPACITY + GAS_CONSTANT
+    inverse_cv, ratio, per_length = 1.0 / HEAT_CAPACITY, GAS_CONSTANT / HEAT_CAPACITY, 1.0 / length
+
+    def side(
+        contraction: float, speed: float, air: float, tube_air: float, energy: float, spool: float, goal: float
+    ) -> tuple[float, float, float, float, float]:
+        s = 1.0 - contraction
+        css = cc * s * s
+        p, temperature = energy * ratio / (k * s * (1.0 - css)), energy * inverse_cv / air
+        t = tube_air * in_tube
+        incoming = 0.0
+        if spool > 0.0:
+            incoming = spool * valve(source, t)
+        elif spool < 0.0:
+            incoming = spool * valve(t, outside)
+        through = tube(t, p)
+        carried = cp * through * (wall if through >= 0.0 else temperature)
+        work = p * k * (3.0 * css - 1.0) * speed * per_length
+        heating = carried - work + transfer * (wall - temperature)
+        tension = force(p - outside, contraction, speed)
+        return tension, through, incoming - through, heating, (goal - spool) * inverse_lag
+
+    def under(openings: Sequence[float]) -> Rates:
+        goal_l, goal_r = openings[0] - openings[1], openings[2] - openings[3]
+
+        def rates(t: float, y: Any) -> list[float]:
+            angle, speed, air_l, tube_l, energy_l, spool_l, air_r, tube_r, energy_r, spool_r = y.tolist()
+            turn, v = lever * angle, radius * speed
+            pull_l, *left = side(offset + turn, v, air_l, tube_l, energy_l, spool_l, goal_l)
+            pull_r, *right = side(offset - turn, -v, air_r, tube_r, energy_r, spool_r, goal_r)
+            turning = (radius * (pull_l - pull_r) - friction * speed - load * sin(angle)) * inverse_inertia
+            return [speed, turning, *left, *right]
+
+        return rates
+
+    return under
+
+
+BY_SIZE: dict[int, Callable[[Any], Callable[[Sequence[float]], Rates]]] = {3: hill, 6: six_states, 10: ten_states}

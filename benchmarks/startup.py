@@ -1,0 +1,70 @@
+"""From the start of a process to its first result: the library and the command line, with a full and an empty cache."""
+
+from __future__ import annotations
+
+import pathlib
+import sys
+import sysconfig
+import tempfile
+from collections.abc import Callable
+
+from measure import Bar, Section, interleaved, of_time, show
+from new_plant import process
+
+HEADING = ("what", "median", "least")
+TEXT = (
+    "Whole processes, from their start to their end. Warm: the kernels lie in numba's cache. Cold: the cache folder is "
+    "empty, and a line on stderr says that kernels are being compiled. The library makes the plant of three states and "
+    "simulates its 25 s; the muscle that is solved for is one of the library's. `airmuscle` is the entry point as "
+    "installed."
+)
+SIMULATE = """
+from filling import runs
+from airmuscle.simulate import simulate
+run = runs()[3]
+simulate(run.system, run.command, duration=25.0, start=run.start)
+"""
+WHY = (
+    "the start of the run is not given, so its equilibrium is searched for, which imports scipy.optimize; numba and "
+    "LLVM start, and the plant is compiled"
+)
+SOLVE = ["solve", "chou-hannaford", "--pressure", "3 bar", "--force", "100 N"]
+
+
+def command() -> list[str]:
+    """The installed program, or its module where the package is only on the path."""
+    script = pathlib.Path(sysconfig.get_path("scripts")) / "airmuscle"
+    return [str(script)] if script.exists() else ["-m", "airmuscle"]
+
+
+def cold() -> None:
+    """A simulation with an empty cache."""
+    with tempfile.TemporaryDirectory() as folder:
+        process(["-c", SIMULATE], folder)
+
+
+def section(rounds: int = 7, cold_rounds: int = 3) -> Section:
+    """All of it."""
+    variants: dict[str, Callable[[], None]] = {
+        "python -c pass": lambda: process(["-c", "pass"]),
+        "import airmuscle, simulate 25 s, warm": lambda: process(["-c", SIMULATE]),
+        "airmuscle list": lambda: process([*command(), "list"]),
+        f"airmuscle {' '.join(SOLVE)}": lambda: process([*command(), *SOLVE]),
+    }
+    times = interleaved(variants, rounds)
+    times |= interleaved({"import airmuscle, simulate 25 s, cold": cold}, cold_rounds)
+    medians = {name: t.median for name, t in times.items()}
+    library, listing, solving, compiling = list(medians)[1:]
+    bars = (
+        Bar("first result, library, warm", medians[library], 0.7, "s", why=WHY),
+        Bar("first result, `airmuscle list`", medians[listing], 1.0, "s"),
+        Bar("first result, `airmuscle solve`", medians[solving], 1.0, "s"),
+        Bar("first result, library, cold", medians[compiling], 5.0, "s"),
+    )
+    rows = tuple((name, of_time(t.median), of_time(t.least)) for name, t in times.items())
+    return Section("Process start to first result", TEXT, HEADING, rows, bars)
+
+
+if __name__ == "__main__":
+    show(section())
+    sys.exit()

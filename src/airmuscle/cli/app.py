@@ -1,0 +1,100 @@
+"""The command `airmuscle`: its commands, and how each of them ends.
+
+Exit code 0 is well, 1 the work failed (one line on stderr says why), 2 wrong usage, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import functools
+import warnings
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from ..errors import AirmuscleError, AirmuscleWarning
+from .cite import cite
+from .fit import fit
+from .list import list_entries
+from .reproduce import reproduce
+from .show import show
+from .simulate import simulate
+from .solve import solve
+
+
+class Commands(TyperGroup):
+    """Lists the commands in the order of use, and turns errors and warnings into one line each."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return list(self.commands)
+
+    def invoke(self, ctx: Any) -> Any:
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", AirmuscleWarning)
+            warnings.showwarning = functools.partial(_show_warning, warnings.showwarning)
+            try:
+                return super().invoke(ctx)
+            except AirmuscleError as error:
+                typer.echo(f"error: {error}", err=True)
+                raise typer.Exit(1) from None
+            except KeyboardInterrupt:
+                typer.echo("interrupted", err=True)
+                raise typer.Exit(130) from None
+
+
+def _show_warning(others: Any, message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+    """One line for a warning of ours; those of others say where they come from."""
+    if issubclass(category, AirmuscleWarning):
+        typer.echo(f"warning: {message}", err=True)
+    else:
+        others(message, category, *place, **more)
+
+
+app = typer.Typer(
+    cls=Commands,
+    name="airmuscle",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+app.command("reproduce")(reproduce)
+app.command("list")(list_entries)
+app.command("show")(show)
+app.command("cite")(cite)
+app.command("solve")(solve)
+app.command("fit")(fit)
+app.command("simulate")(simulate)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib import metadata
+
+        typer.echo(f"airmuscle {metadata.version('airmuscle')}")
+        raise typer.Exit
+
+
+@app.callback()
+def airmuscle(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and leave.")
+    ] = False,
+) -> None:
+    """Models, identification and simulation of pneumatic artificial muscles.
+
+    Pressures are gauge unless their unit says absolute (bara, kPa(a), psia).
+
+    \b
+    Examples:
+      airmuscle reproduce --out report
+      airmuscle solve dmsp-20-300 --pressure "3 bar" --force "100 N" --out chart
+      airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out fit
+      airmuscle simulate scenario.toml --out run
+    """
+
+
+def main() -> None:
+    """Run the command line and leave with its exit code."""
+    app(prog_name="airmuscle")

@@ -1,0 +1,187 @@
+"""`airmuscle fit`: a muscle from a bench file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .options import Folder, Json
+from .terminal import print_json
+
+if TYPE_CHECKING:
+    from ..characteristic.base import Characteristic
+    from ..identify.result import Fit
+    from ..library.entry import Entry
+    from ..recording import Recording
+
+File = Annotated[Path, typer.Argument(metavar="FILE", help="A CSV with pressure, contraction (or length) and force.")]
+Law = Annotated[
+    str,
+    typer.Option(
+        "--characteristic",
+        metavar="NAME",
+        help="Where to start: a library entry, a muscle's TOML file, or ContractileSurface, which needs no start.",
+    ),
+]
+Units = Annotated[
+    list[str] | None,
+    typer.Option("--unit", metavar="COLUMN=UNIT", help="The unit of a column whose heading states none; repeat it."),
+]
+Fixed = Annotated[
+    list[str] | None, typer.Option("--fix", metavar="PARAMETER", help="Leave this parameter as it starts; repeat it.")
+]
+Robust = Annotated[
+    str | None, typer.Option(metavar="QUANTITY", help="Errors beyond this count less (Huber): '10 N', '0.5 %'.")
+]
+Uncensored = Annotated[
+    bool, typer.Option("--uncensored", help="Take rows at zero force as measured; else they are bounds only.")
+]
+
+
+def fit(
+    file: File,
+    characteristic: Law,
+    out: Folder = Path("fit"),
+    resting_length: Annotated[
+        str | None, typer.Option(metavar="QUANTITY", help="Length unpressurised and unloaded: '300 mm'.")
+    ] = None,
+    ambient: Annotated[
+        str | None, typer.Option(metavar="QUANTITY", help="What absolute pressures are reduced by: '98 kPa'.")
+    ] = None,
+    unit: Units = None,
+    degree: Annotated[int, typer.Option(min=1, max=9, help="Total degree of a ContractileSurface.")] = 5,
+    fix: Fixed = None,
+    robust: Robust = None,
+    uncensored: Uncensored = False,
+    json: Json = False,
+) -> None:
+    """Fit a characteristic to measured points.
+
+    \b
+    Writes DIR/muscle.toml, which every command takes as NAME, and DIR/report.html with figures and data.
+    FILE may also be a data set of the library (airmuscle list).
+
+    \b
+    Examples:
+      airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out fit
+      airmuscle fit bench.csv --characteristic dmsp-20-300 --unit pressure=bar --fix geometry.radius
+      airmuscle fit dmsp-20-300 --characteristic ContractileSurface --degree 4 --robust "10 N"
+      airmuscle solve fit/muscle.toml --pressure "3 bar" --force "100 N"
+    """
+    from ..identify import UNCENSORED
+    from ..identify import fit as identify
+    from ..report.staged import refuse_unwritable
+
+    recording = _measured(file, units=_by_column(unit), resting_length=resting_length, ambient=ambient)
+    start = _start(characteristic, recording, degree)
+    refuse_unwritable(out)
+    result = identify(
+        start.characteristic,
+        recording,
+        loss=_loss(robust, start.characteristic),
+        censoring=UNCENSORED if uncensored else None,
+        fixed=fix or (),
+    )
+    _write(result, _fitted(result, start, file), recording, out)
+    if json:
+        print_json(as_data(result))
+        return
+    typer.echo(str(result))
+    typer.echo(f"muscle: {out / 'muscle.toml'}")
+    typer.echo(f"report: {out / 'report.html'}")
+
+
+def _measured(file: Path, **options: Any) -> Recording:
+    from ..library.catalogue import measured, measured_names
+    from ..recording import read_csv
+
+    if not file.exists() and str(file) in measured_names():
+        return measured(str(file))
+    return read_csv(file, **options)
+
+
+def _by_column(texts: list[str] | None) -> dict[str, str]:
+    parts = [text.partition("=") for text in texts or ()]
+    if not all(name and sign for name, sign, _ in parts):
+        raise typer.BadParameter(f"--unit wants COLUMN=UNIT, like pressure=bar, not {', '.join(texts or ())}")
+    return {name.strip(): found.strip() for name, _, found in parts}
+
+
+def _start(name: str, recording: Recording, degree: int) -> Entry:
+    """The library entry to start from, or a bare one around a law that needs no start."""
+    from ..errors import ParameterError
+    from ..library.catalogue import load
+    from ..library.entry import Entry
+    from ..library.models import model_class, model_names
+
+    if name not in model_names():
+        return load(name)
+    cls = model_class(name, "--characteristic")
+    if not hasattr(cls, "blank"):
+        raise ParameterError(
+            f"--characteristic: {name} needs values to start from. Name a library entry made of it "
+            "(airmuscle list shows which), or write a muscle file with your own."
+        )
+    # A clamp at twice what was measured cuts off no point, and still limits extrapolation.
+    law = cls.blank(degree, greatest_force=2.0 * max(float(recording["force"].max()), 1.0))
+    return Entry(name, name, "chosen", law)
+
+
+def _loss(robust: str | None, law: Characteristic) -> Any:
+    from ..identify import Huber, LeastSquares
+    from ..identify.problem import direction_of
+    from ..units import quantity
+
+    if robust is None:
+        return LeastSquares()
+    return Huber(quantity(robust, direction_of(law).unit, where="--robust"))
+
+
+def _fitted(result: Fit, start: Entry, file: Path) -> Entry:
+    """The fitted muscle with the parts of the one it started from; its checks and trust were of other numbers."""
+    import dataclasses
+
+    summary = dict(result.summary())
+    note = f"Fitted to {file.name}: rms error {summary['rms error']}, greatest {summary['greatest error']}."
+    title = f"{type(result.model).__name__} fitted to {file.stem}"
+    return dataclasses.replace(
+        start, name="muscle", title=title, trust="fitted", note=note, warning="", characteristic=result.model,
+        box=result.box, checks=(),
+    )  # fmt: skip
+
+
+def as_data(result: Fit) -> dict[str, Any]:
+    """A fit as plain data, all numbers SI."""
+    import dataclasses
+
+    return {
+        "model": type(result.model).__name__,
+        "quantity": result.direction.quantity,
+        "unit": result.direction.unit,
+        "parameters": [dataclasses.asdict(estimate) for estimate in result.estimates],
+        "rmse": result.rmse,
+        "greatest_error": dataclasses.asdict(result.greatest_error),
+        "sigma": result.sigma,
+        "r2": result.r2,
+        "correlation_index": result.correlation_index,
+        "rank": result.rank,
+        "condition": result.condition,
+        "rows_used": result.rows_used,
+        "rows_censored": result.rows_censored,
+        "rows_dropped": result.rows_dropped,
+        "valid_for": result.ranges,
+        "notes": list(result.notes),
+    }
+
+
+def _write(result: Fit, entry: Entry, recording: Recording, out: Path) -> None:
+    from ..library.catalogue import save
+    from ..report.fit_chapter import fit_chapter
+    from ..report.staged import staged
+    from ..report.write import fill
+
+    with staged(out) as place:
+        save(entry, place / "muscle.toml")
+        fill(place, [fit_chapter(result, entry, recording)], title="Fit")

@@ -1,0 +1,67 @@
+"""`airmuscle list`: what the library holds."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from pathlib import Path
+
+from .options import Json
+from .terminal import print_json, print_table
+
+
+@dataclasses.dataclass(frozen=True)
+class Head:
+    """What a library file says of itself before anything is built from it."""
+
+    name: str
+    title: str
+    kind: str
+    trust: str
+
+
+def list_entries(json: Json = False) -> None:
+    """List the muscles, laws and data sets of the library.
+
+    A data set is a FILE that `airmuscle fit` knows by its name. Trust says how the numbers came here:
+    printed, measured, second hand, fitted or chosen.
+
+    \b
+    Examples:
+      airmuscle list
+      airmuscle list --json
+    """
+    found = heads()
+    if json:
+        print_json([dataclasses.asdict(head) for head in found])
+        return
+    print_table(("name", "title", "kind", "trust"), (dataclasses.astuple(head) for head in found))
+
+
+def heads() -> list[Head]:
+    """The heads of all library entries and data sets; nothing is built, so that listing stays quick."""
+    from ..library.catalogue import DATA, FOLDER, measured_names, names
+
+    return [
+        *(_entry_head(FOLDER / f"{name}.toml") for name in names()),
+        *(_data_head(DATA / f"{name}.csv") for name in measured_names()),
+    ]
+
+
+def _entry_head(path: Path) -> Head:
+    import tomllib
+
+    tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    muscle = all(part in tables for part in ("geometry", "spring", "damper"))
+    kind = f"{'muscle' if muscle else 'characteristic'}, {tables['characteristic']['model']}"
+    return Head(path.stem, tables["title"], kind, tables["trust"])
+
+
+def _data_head(path: Path) -> Head:
+    """Title and trust from the comments that open a data file."""
+    with path.open(encoding="utf-8") as file:
+        comments = list(itertools.takewhile(lambda line: line.startswith("#"), file))
+    text = " ".join(line.lstrip("# ").strip() for line in comments)
+    title = comments[0].lstrip("# ").strip() if comments else ""
+    trust = "second hand" if "second hand" in text else "measured" if "measured" in text else ""
+    return Head(path.stem, title, "data set", trust)

@@ -1,0 +1,130 @@
+"""`airmuscle show`: one library entry with its parameters, sources and checks."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from .options import Json, Name
+from .terminal import print_json, print_table
+
+if TYPE_CHECKING:
+    from ..library.entry import Entry
+
+PARTS = ("characteristic", "geometry", "spring", "damper", "box")
+MANY = 30
+"""Values of one list above which the table shows its ends only."""
+
+
+def show(name: Name, json: Json = False) -> None:
+    """Show an entry: parameters with symbol, value, unit, meaning and bounds, its sources and its checks.
+
+    \b
+    Examples:
+      airmuscle show dmsp-20-300
+      airmuscle show my/muscle.toml --json
+    """
+    from ..library.catalogue import load
+
+    entry = load(name)
+    if json:
+        print_json(described(entry))
+        return
+    _print(described(entry))
+
+
+def described(entry: Entry) -> dict[str, Any]:
+    """An entry as plain data, all numbers SI."""
+    from ..reference import cite
+
+    parts = {part: getattr(entry, part) for part in PARTS if getattr(entry, part) is not None}
+    return {
+        "name": entry.name,
+        "title": entry.title,
+        "trust": entry.trust,
+        "note": entry.note,
+        "warning": entry.warning,
+        "models": {part: type(thing).__name__ for part, thing in parts.items()},
+        "parameters": [row for part, thing in parts.items() for row in _parameters(part, thing)],
+        "checks": [
+            {
+                "quantity": c.quantity,
+                "given": dict(c.given),
+                "equals": c.equals,
+                "tolerance": c.tolerance,
+                "source": c.source,
+            }
+            for c in entry.checks
+        ],
+        "references": [str(reference) for reference in cite(entry)],
+    }
+
+
+def _parameters(part: str, thing: Any) -> list[dict[str, Any]]:
+    from ..declare import leaves
+
+    return [
+        {
+            "name": f"{part}.{leaf.path}",
+            "symbol": leaf.declared.symbol,
+            "value": leaf.value,
+            "unit": leaf.declared.unit,
+            "meaning": leaf.declared.meaning,
+            "bounds": [bound if math.isfinite(bound) else None for bound in leaf.declared.bounds],
+            "fitted": leaf.declared.fitted,
+        }
+        for leaf in leaves(thing)
+    ]
+
+
+def _print(entry: dict[str, Any]) -> None:
+    from ..report.wording import number
+
+    typer.echo(f"{entry['name']}: {entry['title']}")
+    typer.echo(f"trust: {entry['trust']}")
+    for key in ("note", "warning"):
+        if entry[key]:
+            typer.echo(f"{key}: {entry[key]}")
+    typer.echo("made of: " + ", ".join(f"{part} {model}" for part, model in entry["models"].items()) + "\n")
+    rows = [
+        (p["name"], p["symbol"], number(p["value"]), _unit(p["unit"]), p["meaning"], _bounds(p["bounds"]))
+        for p in _shortened(entry["parameters"])
+    ]
+    print_table(("parameter", "symbol", "value", "unit", "meaning", "bounds"), rows, right=("value",))
+    if entry["checks"]:
+        checks = [
+            (c["quantity"], _given(c["given"]), f"{number(c['equals'])} ± {number(c['tolerance'])}", c["source"])
+            for c in entry["checks"]
+        ]
+        print_table(("checked", "at (SI)", "equals (SI)", "source"), checks)
+    for reference in entry["references"]:
+        typer.echo(f"- {reference}")
+
+
+def _shortened(parameters: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The parameters without the middle of long lists."""
+    stems = [p["name"].partition("[")[0] for p in parameters]
+    kept = []
+    for i, (stem, parameter) in enumerate(zip(stems, parameters, strict=True)):
+        place = i - stems.index(stem)
+        count = stems.count(stem)
+        if count <= MANY or place in (0, 1, count - 1):
+            kept.append(parameter)
+        elif place == 2:
+            kept.append({**parameter, "name": f"... {count - 3} more", "value": "", "meaning": ""})
+    return kept
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else unit
+
+
+def _bounds(bounds: list[float | None]) -> str:
+    low, high = ("" if bound is None else f"{bound:g}" for bound in bounds)
+    return f"{low or '-inf'} to {high or 'inf'}" if low or high else ""
+
+
+def _given(given: dict[str, float]) -> str:
+    return ", ".join(f"{quantity} {value:.6g}" for quantity, value in given.items())

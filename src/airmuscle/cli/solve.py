@@ -1,0 +1,147 @@
+"""`airmuscle solve`: pressure, contraction and force of a muscle; two of them give the third."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .options import Json, Name, OptionalFolder
+from .terminal import print_json, print_table
+
+if TYPE_CHECKING:
+    from ..characteristic.base import Characteristic
+    from ..characteristic.box import Box
+    from ..library.entry import Entry
+    from ..report.chart import Point
+
+UNITS = {"pressure": "Pa", "contraction": "1", "force": "N"}
+
+Pressure = Annotated[
+    str | None, typer.Option(metavar="QUANTITY", help="Pressure with its unit: '3 bar' (gauge), '400 kPa', '4 bara'.")
+]
+Contraction = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Contraction, 0.12 or '12 %'.")]
+Force = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Tension with its unit: '100 N', '0.1 kN'.")]
+
+
+def solve(
+    name: Name,
+    pressure: Pressure = None,
+    contraction: Contraction = None,
+    force: Force = None,
+    out: OptionalFolder = None,
+    json: Json = False,
+) -> None:
+    """Give two of pressure, contraction and force of a muscle; get the third.
+
+    \b
+    Where several answers exist it is the one reached from rest.
+    With --out, DIR/isobars.png and DIR/isobars.csv: force over contraction, with the working point.
+
+    \b
+    Examples:
+      airmuscle solve dmsp-20-300 --pressure "3 bar" --force "100 N"
+      airmuscle solve dmsp-20-300 --contraction "12 %" --force "100 N" --out chart
+      airmuscle solve my/muscle.toml --pressure "400 kPa" --contraction 0.1 --json
+    """
+    from ..library.catalogue import load
+    from ..report.chart import box_of, point_text
+
+    texts = {"pressure": pressure, "contraction": contraction, "force": force}
+    missing = [quantity for quantity, text in texts.items() if text is None]
+    if len(missing) != 1:
+        raise typer.BadParameter(f"give two of --pressure, --contraction and --force; {3 - len(missing)} given")
+    entry = load(name)
+    point, box = _solved(entry.characteristic, texts), box_of(entry.characteristic, entry.box)
+    _warn(point, box)
+    if json:
+        print_json(_as_data(entry, point, box, missing[0]))
+    else:
+        typer.echo(f"{entry.name}: {entry.title}")
+        print_table(("quantity", "value", ""), _rows(entry, point, missing[0]), right=("value",))
+    if out is not None:
+        _write(entry, point, box, out)
+        typer.echo(f"chart: {out / 'isobars.png'}, data: {out / 'isobars.csv'} ({point_text(point)})", err=json)
+
+
+def _solved(characteristic: Characteristic, texts: dict[str, str | None]) -> Point:
+    from ..gas import Ambient, refuse_vacuum
+    from ..report.chart import Point
+    from ..units import quantity
+
+    given = {name: quantity(text, UNITS[name], where=f"--{name}") for name, text in texts.items() if text is not None}
+    if "pressure" in given:
+        refuse_vacuum(given["pressure"], Ambient())
+    (wanted,) = UNITS.keys() - given.keys()
+    found = getattr(characteristic, wanted)(*given.values())
+    return Point(**given, **{wanted: float(found)})
+
+
+def _warn(point: Point, box: Box | None) -> None:
+    import warnings
+
+    from ..errors import AirmuscleWarning
+
+    if point.force < 0:
+        warnings.warn("a muscle pulls and never pushes: it is slack here.", AirmuscleWarning, stacklevel=2)
+    if box is not None and not box.holds(point.pressure, point.contraction):
+        (p_low, p_high), (c_low, c_high) = box.pressure, box.contraction
+        warnings.warn(
+            "the working point lies outside the range where the muscle was measured or printed, "
+            f"{p_low / 1e3:.4g} to {p_high / 1e3:.4g} kPa and {c_low:.2%} to {c_high:.2%}: "
+            "the answer is an extrapolation.",
+            AirmuscleWarning,
+            stacklevel=2,
+        )
+
+
+def _resting_length(entry: Entry) -> float | None:
+    from ..declare import leaves
+
+    parts = (part for part in (entry.geometry, entry.characteristic) if part is not None)
+    found = (leaf.value for part in parts for leaf in leaves(part) if leaf.path.endswith("resting_length"))
+    return next(found, None)
+
+
+def _rows(entry: Entry, point: Point, wanted: str) -> list[tuple[str, str, str]]:
+    values = {
+        "pressure": f"{point.pressure / 1e3:.6g} kPa",
+        "contraction": f"{100 * point.contraction:.4g} %",
+        "force": f"{point.force:.6g} N",
+    }
+    notes = {"pressure": "gauge"}
+    length = _resting_length(entry)
+    if length:
+        notes["contraction"] = f"{1e3 * length * point.contraction:.4g} mm of {1e3 * length:.6g} mm"
+    rows = [
+        (name, value, "; ".join(filter(None, (notes.get(name, ""), "solved" if name == wanted else ""))))
+        for name, value in values.items()
+    ]
+    stiffness = float(entry.characteristic.stiffness(point.pressure, point.contraction))
+    per_length = f"{stiffness / length / 1e3:.4g} N/mm" if length else f"{stiffness / 100:.4g} N/%"
+    return [*rows, ("stiffness", per_length, "at constant pressure")]
+
+
+def _as_data(entry: Entry, point: Point, box: Box | None, wanted: str) -> dict[str, Any]:
+    return {
+        "name": entry.name,
+        "solved": wanted,
+        **point._asdict(),
+        "stiffness": float(entry.characteristic.stiffness(point.pressure, point.contraction)),
+        "resting_length": _resting_length(entry),
+        "inside_data": None if box is None else bool(box.holds(point.pressure, point.contraction)),
+        "units": {**UNITS, "pressure": "Pa gauge", "stiffness": "N per unit of contraction", "resting_length": "m"},
+    }
+
+
+def _write(entry: Entry, point: Point, box: Box | None, out: Path) -> None:
+    from ..figures import save
+    from ..report.chart import chart, isobars, table
+    from ..report.staged import staged
+    from ..report.write import save_table
+
+    with staged(out) as place:
+        curves = isobars(entry.characteristic, box, point)
+        save_table(table(curves), place / "isobars.csv")
+        save(chart(entry.characteristic, entry.title, curves, box, point).figure, place / "isobars.png")

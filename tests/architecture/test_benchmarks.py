@@ -1,0 +1,89 @@
+"""The benchmarks compare like with like: the opponents compute the same equations, and every script runs.
+
+No time is asserted here; times depend on the machine and stand in benchmarks/RESULTS.md.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import measure
+import new_plant
+import numpy as np
+import ode8
+import pytest
+import rodas4
+import run
+import startup
+import static_fit
+from filling import runs
+
+from airmuscle.command import Schedule
+from airmuscle.method import DormandPrince8, Rodas4
+from airmuscle.program.prepared import prepared
+
+
+@pytest.mark.parametrize("states", [3, 6, 10])
+def test_the_rates_written_by_hand_are_those_of_the_plant(states):
+    case = runs()[states]
+    assert len(case.system.states) == states
+    assert rodas4.refuse_other_equations(case, prepared(case.system)) < 1e-12
+
+
+def test_other_equations_are_refused():
+    case = runs()[3]
+    heavier = dataclasses.replace(case.system, mechanism=dataclasses.replace(case.system.mechanism, mass=5.001))
+    with pytest.raises(AssertionError, match="differ by"):
+        rodas4.refuse_other_equations(case, prepared(heavier))
+
+
+def test_lsoda_with_rates_by_hand_finds_the_same_course():
+    case = runs()[3]
+    ready = prepared(case.system)
+    reference = rodas4.kernel(case, ready, Rodas4(1e-11))()
+    for solve in (rodas4.lsoda, rodas4.odeint_lsoda):
+        for rates in (rodas4.by_hand(case), rodas4.by_machine(ready)):
+            found = solve(case, rates, 1e-8)
+            assert found.shape == reference.shape
+            assert case.error(found, reference) < 1e-8
+
+
+@pytest.mark.skipif(not ode8.compilers(), reason="no C compiler on the path")
+def test_the_c_computes_the_same_steps(tmp_path):
+    """Over 0.2 s, within which valves open; equal to rounding."""
+    case = runs()[3]
+    short = dataclasses.replace(case, command=Schedule({"fill": ((0.05, 1.0), (0.15, 0.0))}))
+    ready, segments = prepared(case.system), short.command.segments(case.system.inputs, 0.0, 0.2)
+    times = np.linspace(0.0, 0.2, 21)
+    expected = DormandPrince8(ode8.STEP).run(ready, segments, 0.0, short.vector, times).rows
+    for library in ode8.compiled(tmp_path).values():
+        found = ode8.in_c(short, library, segments)()[:21]
+        np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-12)
+
+
+def test_lmfit_finds_the_same_coefficients():
+    pytest.importorskip("lmfit")
+    section = static_fit.section(rounds=1)
+    assert all(bar.held for bar in section.bars)
+
+
+def test_a_section_and_its_bars_are_printed():
+    case = runs()[3]
+    times = measure.interleaved({"kernel": rodas4.kernel(case, prepared(case.system))}, rounds=2)
+    bar = measure.Bar("speed", 3.0, 4.0, "x", at_least=True, why="a reason")
+    section = measure.Section(
+        "title", "text", ("what", "time"), (("kernel", measure.of_time(times["kernel"].median)),), (bar,)
+    )
+    text = run.report([section], 1.0)
+    assert "| speed | 3 x | >= 4 x | **missed** |" in text
+    assert "Missed: speed. Why: a reason." in text
+    assert "## title" in text
+
+
+def test_a_new_plant_is_traced_and_compiled_anew():
+    system = runs()[3].system
+    assert new_plant.fresh(system).address != prepared(system).program.address
+
+
+def test_a_process_of_its_own_runs_the_program():
+    startup.process([*startup.command(), "list"])

@@ -1,0 +1,458 @@
+"""The command line does what its help says, and ends as it promises.
+
+Exit code 0 is well, 1 the work failed (one line on stderr, no traceback, nothing half written), 2 wrong usage,
+130 interrupted. What it prints and writes agrees with the library. `list` starts at once.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import subprocess
+import sys
+import tomllib
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from airmuscle.characteristic.contractile_surface import ContractileSurface
+from airmuscle.cli.app import app
+from airmuscle.cli.cite import as_bibtex
+from airmuscle.library.catalogue import load, names
+from airmuscle.recording import read_csv
+from airmuscle.reference import Reference
+from airmuscle.report.chapter import Chapter, Claim, Equal
+from airmuscle.reproduce import run
+
+MUSCLE = "dmsp-20-300"
+SCENARIO = """
+title = "Fill and discharge"
+[plant.muscle.contractile]
+model = "ChouHannaford1996"
+geometry = { model = "Braid", radius = "10 mm", braid_angle = "25 deg", resting_length = "300 mm" }
+[plant.muscle]
+geometry = { model = "Braid", radius = "10 mm", braid_angle = "25 deg", resting_length = "300 mm" }
+damper = { model = "LinearDamper", damping = 100.0 }
+[plant.circuit]
+model = "FillDischarge"
+supply = { model = "Supply", pressure = "5 bar" }
+fill = { model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }
+discharge = { model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }
+[plant.mechanism]
+model = "HangingMass"
+mass = "5 kg"
+[command]
+fill = [["0.1 s", 1], ["0.3 s", 0]]
+[run]
+duration = "0.5 s"
+start = { pressure = "1 bar" }
+"""
+
+
+def airmuscle(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def shell(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
+    """The true command, in a process of its own."""
+    command = [sys.executable, "-m", "airmuscle", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, **options)  # type: ignore[call-overload, no-any-return]
+
+
+def assert_failed(result: Result, message: str) -> None:
+    """Exit code 1 and one clear line."""
+    assert result.exit_code == 1, result.output
+    errors = [line for line in result.stderr.splitlines() if not line.startswith("warning: ")]
+    assert len(errors) == 1
+    assert re.match(f"error: .*{message}", errors[0]), errors[0]
+
+
+# Help and usage
+
+COMMANDS = ("reproduce", "list", "show", "cite", "solve", "fit", "simulate")
+
+
+def test_the_commands_stand_in_the_order_of_use():
+    listed = re.findall(r"^  (\w+)  ", airmuscle("--help").output.partition("Commands:")[2], re.MULTILINE)
+    assert listed == list(COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_help_has_examples(command: str):
+    result = airmuscle(command, "--help")
+    assert result.exit_code == 0
+    assert re.search(rf"^ +airmuscle {command}", result.output, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("sovle",),
+        ("solve",),
+        ("solve", MUSCLE, "--presure", "3 bar"),
+        ("solve", MUSCLE, "--pressure", "3 bar"),
+        ("solve", MUSCLE, "--pressure", "3 bar", "--force", "1 N", "--contraction", "0.1"),
+        ("fit", "bench.csv"),
+        ("fit", "bench.csv", "--characteristic", "ContractileSurface", "--unit", "bar"),
+        ("fit", "bench.csv", "--characteristic", "ContractileSurface", "--degree", "0"),
+        ("simulate",),
+        ("cite", MUSCLE, "--json", "--bibtex"),
+    ],
+)
+def test_wrong_usage_is_exit_code_2(arguments: tuple[str, ...]):
+    result = airmuscle(*arguments)
+    assert result.exit_code == 2
+    assert "Usage: " in result.stderr
+
+
+# list, show, cite
+
+
+def test_list_names_every_entry_with_title_kind_and_trust():
+    listed = {
+        entry["name"]: entry for entry in json.loads(airmuscle("list", "--json").output) if entry["kind"] != "data set"
+    }
+    assert tuple(listed) == names()
+    entry = load(MUSCLE)
+    assert listed[MUSCLE] == {
+        "name": MUSCLE,
+        "title": entry.title,
+        "kind": f"characteristic, {type(entry.characteristic).__name__}",
+        "trust": entry.trust,
+    }
+    table = airmuscle("list").output
+    assert all(name in table for name in names())
+
+
+def test_list_names_the_data_sets_that_fit_takes():
+    found = json.loads(airmuscle("list", "--json").output)
+    data = {entry["name"]: entry["trust"] for entry in found if entry["kind"] == "data set"}
+    assert data[MUSCLE] == "measured"
+    assert data["festo-tool-dmsp-20"] == "second hand"
+
+
+def test_show_gives_parameters_sources_and_checks():
+    shown = json.loads(airmuscle("show", MUSCLE, "--json").output)
+    parameters = {p["name"]: p for p in shown["parameters"]}
+    length = parameters["characteristic.geometry.resting_length"]
+    assert (length["value"], length["unit"], length["symbol"]) == (0.3, "m", "L_0")
+    assert shown["checks"][0]["source"]
+    assert any("Martens" in reference for reference in shown["references"])
+    text = airmuscle("show", MUSCLE).output
+    assert all(word in text for word in ("L_0", "0.3", "length between the fittings", "Martens", "trust: printed"))
+
+
+def test_show_leaves_out_the_middle_of_long_lists():
+    long = next(n for n in names() if len(json.loads(airmuscle("show", n, "--json").stdout)["parameters"]) > 60)
+    text = airmuscle("show", long).output
+    assert re.search(r"\.\.\. \d+ more", text)
+    assert len(text.splitlines()) < 60
+
+
+def test_a_unique_beginning_of_a_name_is_enough_and_others_are_refused():
+    assert airmuscle("show", "dmsp-20").output == airmuscle("show", MUSCLE).output
+    assert_failed(airmuscle("show", "dmsp"), "'dmsp' is the beginning of several: dmsp-10-250, dmsp-20-300")
+    assert_failed(airmuscle("show", "dmps-20-300"), r".*Did you mean 'dmsp-20-300'\?")
+    assert_failed(airmuscle("show", "no/such.toml"), "no/such.toml: there is no such file")
+
+
+def test_cite_prints_each_source_in_three_ways():
+    found = json.loads(airmuscle("cite", MUSCLE, "--json").output)
+    assert "martens-boblan-2017" in [source["key"] for source in found]
+    assert "doi:10.3390/act6040033" in airmuscle("cite", MUSCLE).output
+    assert airmuscle("cite", MUSCLE, "--bibtex").output.count("@misc{") == len(found)
+
+
+def test_bibtex_joins_authors_and_escapes_what_tex_would_take():
+    source = Reference("a b", "Chou, C.-P., Hannaford, B. et al.", "p & q_1 at 5 %", "J. X", 1996, "10.1/x")
+    assert as_bibtex(source) == (
+        "@misc{a-b,\n  author = {Chou, C.-P. and Hannaford, B. and others},\n"
+        "  title = {{p \\& q\\_1 at 5 \\%}},\n  howpublished = {J. X},\n  year = {1996},\n  doi = {10.1/x},\n}"
+    )
+
+
+# solve
+
+
+@pytest.mark.parametrize("wanted", ["pressure", "contraction", "force"])
+def test_any_two_give_the_third(wanted: str):
+    law = load(MUSCLE).characteristic
+    point = {"pressure": 3e5, "contraction": 0.12, "force": float(law.force(3e5, 0.12))}
+    texts = {
+        "pressure": "300 kPa",
+        "contraction": "12 %",
+        "force": f"{point['force'] / 1e3!r} kN",
+    }
+    given = [f"--{name}={text}" for name, text in texts.items() if name != wanted]
+    solved = json.loads(airmuscle("solve", MUSCLE, *given, "--json").output)
+    assert solved["solved"] == wanted
+    assert {name: solved[name] for name in point} == pytest.approx(point, rel=1e-9)
+    assert solved["inside_data"] is True
+    assert solved["stiffness"] == pytest.approx(float(law.stiffness(3e5, 0.12)), rel=1e-6)
+
+
+def test_plain_bar_is_gauge_and_bara_is_absolute():
+    gauge, absolute = (
+        json.loads(airmuscle("solve", MUSCLE, "--pressure", text, "--contraction", "0.1", "--json").output)["pressure"]
+        for text in ("3 bar", "3 bara")
+    )
+    assert (gauge, absolute) == (3e5, 3e5 - 101_325.0)
+    assert re.search(
+        r"pressure +300 kPa +gauge", airmuscle("solve", MUSCLE, "--pressure=3 bar", "--contraction=.1").output
+    )
+
+
+def test_the_chart_and_its_data_stand_in_the_folder(tmp_path: Path):
+    result = airmuscle("solve", MUSCLE, "--pressure=3 bar", "--force=100 N", "--out", tmp_path / "chart")
+    assert result.exit_code == 0
+    assert sorted(path.name for path in (tmp_path / "chart").iterdir()) == ["isobars.csv", "isobars.png"]
+    assert (tmp_path / "chart" / "isobars.png").read_bytes().startswith(b"\x89PNG")
+    with (tmp_path / "chart" / "isobars.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    law = load(MUSCLE).characteristic
+    for row in rows[::40]:
+        wanted = law.force(4e5, float(row["contraction [1]"]))
+        assert float(row["force at 400 kPa [N]"]) == pytest.approx(float(wanted), abs=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+@pytest.mark.parametrize("name", names())
+def test_every_entry_has_a_chart(tmp_path: Path, name: str):
+    entry = load(name)
+    low, high = entry.box.pressure if entry.box else entry.characteristic.pressure_reach
+    pressure = 0.5 * (low + high)
+    contraction = sum(entry.box.contraction) / 2 if entry.box else entry.characteristic.contraction(pressure, 100.0)
+    given = (f"--pressure={pressure} Pa", f"--contraction={contraction!r}")
+    result = airmuscle("solve", name, *given, "--out", tmp_path)
+    assert result.exit_code == 0, result.stderr
+    with (tmp_path / "isobars.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    forces = [float(cell) for row in rows for key, cell in row.items() if key.startswith("force") and cell]
+    assert len(rows) >= 61
+    assert len(forces) > len(rows), "more than one isobar has values"
+    assert min(forces) >= 0.0, "a muscle pulls"
+
+
+def test_a_point_outside_the_data_is_a_warning():
+    inside, outside = (
+        airmuscle("solve", MUSCLE, f"--pressure={p} kPa", "--contraction=0.1", "--json") for p in (300, 750)
+    )
+    assert inside.stderr == ""
+    assert re.match(r"warning: the working point lies outside the range .*35 to 675 kPa", outside.stderr)
+    assert json.loads(outside.stdout)["inside_data"] is False
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (("--pressure=3 kg", "--force=1 N"), "--pressure: unit 'kg' cannot become 'Pa'"),
+        (("--pressure=3", "--force=1 N"), "--pressure: '3' carries no unit; write it like '3 Pa'"),
+        (("--pressure=-2 bar", "--contraction=0.1"), "a gauge pressure of -200 kPa lies below absolute zero"),
+        (("--pressure=3 bar", "--force=9 kN"), "no contraction between .* balances 9000 N at 300 kPa"),
+    ],
+)
+def test_a_request_without_an_answer_says_why_and_writes_nothing(tmp_path: Path, given: tuple[str, ...], message: str):
+    assert_failed(airmuscle("solve", MUSCLE, *given, "--out", tmp_path / "chart"), message)
+    assert list(tmp_path.iterdir()) == []
+
+
+# fit
+
+
+def a_bench_file(path: Path) -> ContractileSurface:
+    """Writes points of a known surface of degree 2 on a grid, lengths in mm, pressures in bar, absolute."""
+    known = ContractileSurface((300.0, -250.0, 40.0, 200.0, -60.0, 10.0), 1e5, 5e5, 0.0, 0.2, 0.0, 5000.0, 2)
+    pressures, contractions = (g.ravel() for g in np.meshgrid(np.linspace(1e5, 5e5, 5), np.linspace(0.0, 0.2, 7)))
+    forces = known.force(pressures, contractions)
+    lines = [
+        f"{p / 1e5 + 1.01325!r},{300.0 * (1.0 - c)!r},{f!r}"
+        for p, c, f in zip(pressures.tolist(), contractions.tolist(), forces.tolist(), strict=True)
+    ]
+    path.write_text("\n".join(["pressure [bara],length [mm],force [N]", *lines]), encoding="utf-8")
+    return known
+
+
+def test_fit_finds_the_muscle_that_made_the_data_and_writes_it(tmp_path: Path):
+    known = a_bench_file(tmp_path / "bench.csv")
+    law = ("--characteristic", "ContractileSurface", "--degree", 2, "--resting-length", "300 mm")
+    result = airmuscle("fit", tmp_path / "bench.csv", *law, "--out", tmp_path / "fit")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines()[-1] == f"report: {tmp_path / 'fit' / 'report.html'}"
+    entry = load(tmp_path / "fit" / "muscle.toml")
+    assert entry.trust == "fitted"
+    assert entry.characteristic.coefficients == pytest.approx(known.coefficients, abs=1e-6)
+    assert entry.box is not None
+    assert entry.box.pressure == pytest.approx((1e5, 5e5))
+    written = {p.relative_to(tmp_path / "fit").as_posix() for p in (tmp_path / "fit").rglob("*") if p.is_file()}
+    assert {"report.html", "muscle.toml", "figures/isobars.svg", "figures/errors.png", "data/rows.csv"} <= written
+    solved = airmuscle("solve", tmp_path / "fit" / "muscle.toml", "--pressure=3 bar", "--contraction=0.1", "--json")
+    assert json.loads(solved.stdout)["force"] == pytest.approx(float(known.force(3e5, 0.1)))
+
+
+def test_fit_starts_from_a_library_entry_and_keeps_what_is_fixed(tmp_path: Path):
+    held = ("--fix", "c0", "--fix", "c3", "--robust", "10 N")
+    result = airmuscle("fit", MUSCLE, "--characteristic", MUSCLE, *held, "--out", tmp_path, "--json")
+    fitted = json.loads(result.stdout)
+    assert {p["name"] for p in fitted["parameters"]}.isdisjoint({"c0", "c3"})
+    assert 0.99 < fitted["r2"] <= 1.0
+    before, after = load(MUSCLE).characteristic, load(tmp_path / "muscle.toml").characteristic
+    assert (after.c0, after.c3) == (before.c0, before.c3)
+    assert after.c1 != before.c1
+
+
+@pytest.mark.parametrize(
+    ("rows", "options", "message"),
+    [
+        (36, ("--characteristic", "ChouHannaford1996"), "ChouHannaford1996 needs values to start from"),
+        (36, ("--characteristic", "ContractileSurfac"), "no library entry 'ContractileSurfac'"),
+        (20, ("--characteristic", "ContractileSurface"), ".*has 21 parameters to be found, but only 19 points"),
+        (36, ("--characteristic", "ContractileSurface", "--robust", "5 mm"), "--robust: unit 'mm' cannot become 'N'"),
+        (36, ("--characteristic", "ContractileSurface", "--resting-length", "3 N"), ".*resting_length.*'N'"),
+    ],
+)
+def test_a_fit_that_cannot_be_says_why_and_writes_nothing(
+    tmp_path: Path, rows: int, options: tuple[str, ...], message: str
+):
+    bench = tmp_path / "bench.csv"
+    a_bench_file(bench)
+    bench.write_text("\n".join(bench.read_text(encoding="utf-8").splitlines()[:rows]), encoding="utf-8")
+    length = () if "--resting-length" in options else ("--resting-length", "300 mm")
+    assert_failed(airmuscle("fit", bench, *options, *length, "--out", tmp_path / "fit"), message)
+    assert list(tmp_path.iterdir()) == [bench]
+
+
+def test_a_missing_file_is_named(tmp_path: Path):
+    result = airmuscle(
+        "fit", tmp_path / "none.csv", "--characteristic", "ContractileSurface", "--out", tmp_path / "fit"
+    )
+    assert_failed(result, r".*none\.csv")
+
+
+# simulate
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    path = tmp_path / "scenario.toml"
+    path.write_text(SCENARIO, encoding="utf-8")
+    return path
+
+
+def test_simulate_writes_a_recording_that_reads_back(scenario: Path, tmp_path: Path):
+    result = airmuscle("simulate", scenario, "--out", tmp_path / "run")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines()[-1] == f"report: {tmp_path / 'run' / 'report.html'}"
+    recording = read_csv(tmp_path / "run" / "recording.csv")
+    assert recording["time"][-1] == 0.5
+    assert recording["pressure"][0] == pytest.approx(1e5, rel=1e-9)
+    assert recording["pressure"].max() > 1.2e5, "the fill valve was open"
+    shut = recording["time"] > 0.31
+    assert np.ptp(recording["air_mass"][shut]) < 1e-12, "and then shut"
+    assert (tmp_path / "run" / "figures" / "run.svg").exists()
+
+
+def test_simulate_prints_json(scenario: Path, tmp_path: Path):
+    found = json.loads(airmuscle("simulate", scenario, "--out", tmp_path / "run", "--json").stdout)
+    assert found["title"] == "Fill and discharge"
+    assert found["range"]["time"] == {"column": "time [s]", "least": 0.0, "greatest": 0.5, "last": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('duration = "0.5 s"', "", ".*duration"),
+        ("critical_ratio", "critical_ration", ".*critical_ration"),
+        ('mass = "5 kg"', 'mass = "5 N"', ".*unit 'N' cannot become 'kg'"),
+        ("fill = [[", "fil = [[", r".*no input 'fil'.*Did you mean 'fill'\?"),
+        ('mass = "5 kg"', 'mass = "5000 kg"', ".*"),
+    ],
+)
+def test_a_bad_scenario_says_where_and_writes_nothing(scenario: Path, tmp_path: Path, old: str, new: str, message: str):
+    assert old in SCENARIO
+    scenario.write_text(SCENARIO.replace(old, new), encoding="utf-8")
+    assert_failed(airmuscle("simulate", scenario, "--out", tmp_path / "run"), message)
+    assert list(tmp_path.iterdir()) == [scenario]
+
+
+# reproduce
+
+
+@pytest.fixture
+def one_paper(monkeypatch: pytest.MonkeyPatch) -> types.ModuleType:
+    """A paper of one chapter in place of the true ones, which take seconds."""
+    module = types.ModuleType("paper_of_a_test")
+    claims = (Claim("Saga 2007", "rings", Equal(4.0), 5.0, "1"), Claim("Saga 2007", "strain", None, 0.1, "1"))
+    module.chapter = lambda: Chapter("Saga 2007", "Straight fibres", "Text.", claims)  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setattr(run, "PAPERS", {"saga2007": module.__name__})
+    return module
+
+
+@pytest.mark.usefixtures("one_paper")
+def test_reproduce_prints_the_claims_and_names_the_report_last(tmp_path: Path):
+    result = airmuscle("reproduce", "saga", "--out", tmp_path / "report")
+    assert result.exit_code == 0, "a claim that differs is a result, not a failure"
+    assert result.stdout.splitlines()[-1] == f"report: {tmp_path / 'report' / 'report.html'}"
+    assert re.search(r"Saga 2007 +rings +4 +5 +✗ differs", result.stdout)
+    assert "2 claims: 0 holds, 1 differs, 1 not printed" in result.stdout
+    assert [c["verdict"] for c in json.loads((tmp_path / "report" / "claims.json").read_text())] == [
+        "differs",
+        "not printed",
+    ]
+
+
+def test_an_interrupted_reproduction_is_polite(tmp_path: Path, one_paper: types.ModuleType):
+    def interrupted() -> Chapter:
+        raise KeyboardInterrupt
+
+    one_paper.chapter = interrupted  # type: ignore[attr-defined]
+    result = airmuscle("reproduce", "--out", tmp_path / "report")
+    assert result.exit_code == 130
+    assert result.stderr.endswith("interrupted\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.usefixtures("one_paper")
+def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path):
+    (tmp_path / "taken").write_text("a file")
+    result = airmuscle("reproduce", "--out", tmp_path / "taken")
+    assert_failed(result, ".*taken: cannot be written to: .*Name a folder that you may write to")
+    assert (tmp_path / "taken").read_text() == "a file"
+
+
+# The true command
+
+
+def test_the_true_command_ends_with_the_promised_codes():
+    well = shell("solve", MUSCLE, "--pressure", "3 bar", "--force", "100 N", "--json")
+    assert (well.returncode, well.stderr) == (0, "")
+    assert json.loads(well.stdout)["solved"] == "contraction"
+    failed = shell("show", "no-such-muscle")
+    assert (failed.returncode, failed.stdout) == (1, "")
+    assert failed.stderr.startswith("error: no library entry 'no-such-muscle'")
+    assert "Traceback" not in failed.stderr
+    wrong = shell("solve")
+    assert wrong.returncode == 2
+    assert "Usage: airmuscle solve" in wrong.stderr
+
+
+def test_list_starts_without_what_it_does_not_need():
+    code = "import sys; from airmuscle.cli.app import app; app(['list', '--json'], standalone_mode=False)"
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}; print(*sys.modules)"], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    loaded = {name.partition(".")[0] for name in done.stdout.splitlines()[-1].split()}
+    assert not loaded & {"matplotlib", "scipy", "numba", "pandas", "jinja2", "pint", "rich"}
+
+
+def test_every_example_of_the_help_is_valid_toml_where_it_names_a_file():
+    root = Path(__file__).resolve().parents[2]
+    named = re.findall(r"simulate (examples/\S+\.toml)", airmuscle("simulate", "--help").output)
+    assert named
+    for name in named:
+        assert "plant" in tomllib.loads((root / name).read_text(encoding="utf-8"))
