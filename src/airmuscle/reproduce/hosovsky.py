@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..characteristic.base import Characteristic
 from ..characteristic.contractile_surface import exponents
+from ..check import maxwell_defect
 from ..figures import LINES, legend_outside, new_figure
+from ..geometry.base import Geometry
 from ..identify import Fit
 from ..library import catalogue
 from ..reference import cite
 from ..report.chapter import Chapter, Claim, Equal, Plot, Table
 from . import hosovsky_fill as filling
 from . import hosovsky_release as releasing
-from .hosovsky_plant import MAPS, MATRIX, MATRIX_CATALOGUE, PAPER, Numbers, surface, surface_fit
+from .hosovsky_plant import MAPS, MATRIX, MATRIX_CATALOGUE, PAPER, Numbers, muscle, surface, surface_fit
 
 SUMMARY = """The muscle of Hosovsky et al. has a contractile element given by a polynomial of total degree five in
 contraction and pressure (21 coefficients, clamped to 0..1200 N), a parallel spring and a damper; two on/off valves
@@ -77,7 +80,14 @@ def chapter(numbers: Numbers | None = None) -> Chapter:
         "Hosovsky et al.: muscle dynamics after Hill",
         SUMMARY,
         claims=(*surface_claims(surface_fit()), *filling.claims(fill), *releasing.claims(low, high, ranges)),
-        tables=(table, ranges, coefficients(), _left_boxes(fill, low, high), *_series(fill, low, high)),
+        tables=(
+            table,
+            ranges,
+            coefficients(),
+            maxwell_table(numbers),
+            _left_boxes(fill, low, high),
+            *_series(fill, low, high),
+        ),
         plots=(
             surface_figure(),
             filling.valve_figure(MATRIX, fill.plant.ambient.temperature),
@@ -88,6 +98,31 @@ def chapter(numbers: Numbers | None = None) -> Chapter:
         references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(catalogue.load(MAPS[0]))),
         chosen=numbers.rows(),
     )
+
+
+def maxwell_table(numbers: Numbers) -> Table:
+    """How far muscle force and volume are from one potential, for the fitted surfaces and the measured muscles' law."""
+    shape = muscle(numbers).geometry
+    laws: dict[str, tuple[Characteristic, Geometry]]
+    laws = {f"surface fitted to {name}, before the clamp": (surface_fit(name).model, shape) for name in MAPS}
+    for name in ("dmsp-20-300", "dmsp-10-250"):
+        entry = catalogue.load(name)
+        laws[f"Martens-Boblan 2017, {name}"] = (entry.characteristic, entry.muscle.geometry)
+    boxes = [
+        surface(MAPS[0]).box,
+        surface(MAPS[1]).box,
+        *(catalogue.load(n).box for n in ("dmsp-20-300", "dmsp-10-250")),
+    ]
+    found = [maxwell_defect(law, volume, box) for (law, volume), box in zip(laws.values(), boxes, strict=True) if box]
+    columns = {
+        "muscle": list(laws),
+        "greatest |dF/dp + dV/dL| [mm2]": [d.worst * 1e6 for d in found],
+        "relative to the greatest dV/dL [%]": [d.relative * 100 for d in found],
+        "at pressure [kPa]": [d.pressure / 1e3 for d in found],
+        "at contraction [%]": [d.contraction * 100 for d in found],
+    }
+    note = "where the muscle pulls, over the box of its data; the defect times an area of pressure and length is energy"
+    return Table("hosovsky_maxwell", "Maxwell defect of fitted muscles over their box", columns, note)
 
 
 def _left_boxes(fill: filling.Fill, low: releasing.Release, high: releasing.Release) -> Table:

@@ -94,11 +94,11 @@ def start_claims(law: Saga2007, name: str) -> tuple[Claim, Claim]:
 
 def ring_claim(law: Saga2007, name: str, force: float) -> Claim:
     """Claim 4: rings lower the contraction at a given pressure, so that they raise the pressure for one."""
-    contraction = np.linspace(0.005, 0.35, 70)
+    contraction = np.geomspace(1e-7, 0.35, 200)
     runs = [np.asarray(pressure_along(with_rings(law, n), contraction, force)) for n in (0, 1, 2)]
     ratio = min(float(np.min(more / fewer)) for fewer, more in itertools.pairwise(runs))
     where = f"{name}, {force:g} N"
-    note = "Least ratio over 0.5 to 35 % of the pressure with a ring more to that without. "
+    note = "Least ratio, up to 35 %, of the pressure with a ring more to that without. "
     note += "Rings as equal segments in series are inferred." + (_unstable(law, force))
     return _claim("4. No ring contracts most", AtLeast(1.0), ratio, "1", where, note)
 
