@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,7 +33,7 @@ def simulate(
     start: Mapping[str, float] | None = None,
     start_time: float = 0.0,
     method: Method | None = None,
-    output: float | Sequence[float] | None = None,
+    output: float | npt.ArrayLike | None = None,
     complete: bool = True,
 ) -> Recording:
     """Run a plant under a command for `duration` [s], and return its states, outputs and inputs as a Recording.
@@ -90,7 +90,7 @@ def advance(
     return {s.name: float(v) for s, v in zip(plant.states, course.state, strict=True)}
 
 
-def output_times(output: float | Sequence[float] | None, start: float, duration: float, instants: Array) -> Array:
+def output_times(output: float | npt.ArrayLike | None, start: float, duration: float, instants: Array) -> Array:
     """The instants [s] at which a run is recorded, in rising order, the command's instants among them."""
     end = start + duration
     if output is None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..characteristic.base import Characteristic
@@ -114,7 +116,7 @@ def maxwell_table(numbers: Numbers) -> Table:
         *(catalogue.load(n).box for n in ("dmsp-20-300", "dmsp-10-250")),
     ]
     found = [maxwell_defect(law, volume, box) for (law, volume), box in zip(laws.values(), boxes, strict=True) if box]
-    columns = {
+    columns: dict[str, list[Any]] = {
         "muscle": list(laws),
         "greatest |dF/dp + dV/dL| [mm2]": [d.worst * 1e6 for d in found],
         "relative to the greatest dV/dL [%]": [d.relative * 100 for d in found],
