@@ -49,7 +49,7 @@ class Joint:
     @property
     def states(self) -> tuple[StateVariable, ...]:
         """Angle, speed, then what each side holds."""
-        joint = (StateVariable("angle", "rad", 0.1), StateVariable("speed", "rad/s", 0.1))
+        joint = (StateVariable("angle", "rad", 0.1), StateVariable("speed", "rad/s", 1.0))
         return joint + tuple(s for side, _ in SIDES for s in self.side_states(side))
 
     def side_states(self, side: str) -> tuple[StateVariable, ...]:

@@ -23,7 +23,7 @@ class HangingMass(Mechanism):
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        return (Coordinate("position", "speed", "m", 0.01, 0.01),)
+        return (Coordinate("position", "speed", "m", 0.01, 0.1),)
 
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return tuple(q["position"] / length for length in resting_lengths)
