@@ -126,8 +126,9 @@ def versions() -> str:
 
 def machine() -> str:
     """Processor, cores, system, and how busy it was."""
-    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
-    return f"{_processor()}, {os.cpu_count()} cores, {platform.system()}; load average {load:.1f} at the end"
+    load, cores = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan"), os.cpu_count() or 1
+    busy = "; others used it too, so that seconds are too long and only ratios hold" if load > cores / 2 + 1 else ""
+    return f"{_processor()}, {cores} cores, {platform.system()}, load average {load:.1f} at the end{busy}"
 
 
 def _processor() -> str:

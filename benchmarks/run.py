@@ -35,8 +35,9 @@ HEAD = """# Measured
 Written by `benchmarks/run.py` on {date}. {machine}. {versions}.
 
 Variants are timed in turn in one process, quick ones several times in a round. Times are medians of the rounds, beside
-them the least; ratios are medians of the ratios within a round; errors stand beside speed. Linear algebra runs on one
-thread on all sides. {seconds:.0f} s in all.
+them the least; ratios are medians of the ratios within a round; bars in seconds are held to the least, because
+neighbours can only add. Errors stand beside speed. Linear algebra runs on one thread on all sides.
+{seconds:.0f} s in all.
 """
 
 

@@ -30,6 +30,15 @@ def test_the_rates_written_by_hand_are_those_of_the_plant(states):
     assert rodas4.refuse_other_equations(case, prepared(case.system)) < 1e-12
 
 
+@pytest.mark.parametrize(("pressure", "position"), [(7e5, 0.06), (5e4, -0.02)])
+def test_so_are_they_beyond_the_box_of_the_surface(pressure, position):
+    """Where the force is also within its clamp, so that the tangent counts."""
+    case = runs()[3]
+    y = np.array(list(case.system.state_at(pressure=pressure, position=position, speed=0.1).values()))
+    found = rodas4.by_hand(case)(np.array([1.0, 0.5]))[0](0.0, y)
+    np.testing.assert_allclose(found, prepared(case.system).rates(y, [1.0, 0.5]), rtol=1e-12)
+
+
 def test_other_equations_are_refused():
     case = runs()[3]
     heavier = dataclasses.replace(case.system, mechanism=dataclasses.replace(case.system.mechanism, mass=5.001))
@@ -50,9 +59,10 @@ def test_lsoda_with_rates_by_hand_finds_the_same_course():
 
 @pytest.mark.skipif(not ode8.compilers(), reason="no C compiler on the path")
 def test_the_c_computes_the_same_steps(tmp_path):
-    """Over 0.2 s, within which valves open; equal to rounding."""
+    """Over 0.2 s from beyond the box of the surface, within which valves open; equal to rounding."""
     case = runs()[3]
-    short = dataclasses.replace(case, command=Schedule({"fill": ((0.05, 1.0), (0.15, 0.0))}))
+    start = case.system.state_at(pressure=6.5e5, position=0.05)
+    short = dataclasses.replace(case, start=start, command=Schedule({"discharge": ((0.05, 1.0), (0.15, 0.0))}))
     ready, segments = prepared(case.system), short.command.segments(case.system.inputs, 0.0, 0.2)
     times = np.linspace(0.0, 0.2, 21)
     expected = DormandPrince8(ode8.STEP).run(ready, segments, 0.0, short.vector, times).rows

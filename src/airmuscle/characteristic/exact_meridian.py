@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ NODES = 120
 """Gauss points over half the meridian."""
 
 
+@functools.cache
 def _graded_rule() -> tuple[Any, Any]:
     """Nodes and weights in v = y (2 - y): the end slope's approach to zero, 1/sqrt(1 - v), is then harmless."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
@@ -28,7 +30,6 @@ def _graded_rule() -> tuple[Any, Any]:
     return y * (2 - y), weights * (1 - y)
 
 
-_RULE = _graded_rule()
 _STEPS = 60
 _EASING = (1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05, 0.03, 0.02, 0.01, 0.005, 0.002, 0.0)
 _CLOSED = 1e-13
@@ -93,15 +94,12 @@ class ExactMeridian(PressureLaw):
         return float(self.wall_thickness * self.rubber.intercept / self.geometry.end_radius)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        found = self.balance_at(contraction, force)
-        given: Any = np.broadcast_arrays(contraction, force)
-        answered = within_reach(found.pressure, (0.0, float("inf")), given, self._drawn_in)
-        return within_reach(answered, self.pressure_reach, given, self._no_pressure)
+        found = self._shape(contraction, force).pressure
+        return within_reach(found, self.pressure_reach, (contraction, force), self._no_pressure)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        found = self.balance_under(pressure, contraction)
-        given: Any = np.broadcast_arrays(pressure, contraction)
-        return within_reach(found.force, (-np.inf, np.inf), given, self._no_shape)
+        found = self.balance_under(pressure, contraction).force
+        return within_reach(found, (-np.inf, np.inf), (pressure, contraction), self._no_shape)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         """Contraction [1] on the stable branch reached from rest, found along the radius, in which it is single."""
@@ -110,19 +108,16 @@ class ExactMeridian(PressureLaw):
         def surplus(radius: Value, p: Value, load: Value) -> Value:
             return self._balance(radius, p, load).lengths[0] / tube.fibre_length - 1.0
 
-        widest = float(tube.segment(tube.free_contraction).largest_radius)
-        reach = (tube.end_radius * (1 + 1e-9), widest)
-        given: Any = np.broadcast_arrays(pressure, force)
-        within_reach(given[0], (self.starting_pressure, float("inf")), given, self._still_straight)
+        started = (self.starting_pressure, np.inf)
+        within_reach(np.add(pressure, 0.0 * force), started, (pressure, force), self._still_straight)
+        reach = (tube.end_radius * (1 + 1e-9), float(tube.segment(tube.free_contraction).largest_radius))
         radius = first_crossing(surplus, reach, (pressure, force), lambda p, f, *_: self._no_contraction(p, f))
-        chord = self._balance(radius, pressure, force).lengths[1]
-        found = 1.0 - chord / tube.fibre_length
+        found = 1.0 - self._balance(radius, pressure, force).lengths[1] / tube.fibre_length
         return float(found) if np.ndim(radius) == 0 else found
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         """By the implicit function theorem from the derivatives of the two lengths."""
-        growth = self.balance_under(pressure, contraction).growth
-        arc, chord = growth
+        arc, chord = self.balance_under(pressure, contraction).growth
         determinant = arc[0] * chord[2] - arc[2] * chord[0]
         by_pressure = -(arc[0] * chord[1] - arc[1] * chord[0]) / determinant
         by_contraction = -self.geometry.fibre_length * arc[0] / determinant
@@ -209,7 +204,7 @@ class ExactMeridian(PressureLaw):
     def _balance(self, radius: Value, pressure: Value, force: Value) -> Balance:
         """Arc and chord of the shape with these three, and their derivatives."""
         radius, pressure, force = np.broadcast_arrays(*(np.asarray(x, float) for x in (radius, pressure, force)))
-        v, weights = (np.reshape(x, (-1,) + (1,) * radius.ndim) for x in _RULE)
+        v, weights = (np.reshape(x, (-1,) + (1,) * radius.ndim) for x in _graded_rule())
         bulge = radius - self.geometry.end_radius
         curve = self._curve(radius, pressure, force, v)
         z, axial, fibre = curve.push, curve.axial, curve.fibre
@@ -256,18 +251,24 @@ class ExactMeridian(PressureLaw):
         per_length = self.wall_thickness * self.rubber.energy(rise, rise**2, r0)
         return float(self.geometry.segments * np.sum(weights * per_length * curve.fibre * curve.per_v))
 
-    def _curve_at(self, contraction: float, force: float) -> tuple[_Curve, Any]:
-        self.pressure(contraction, force)
+    def _shape(self, contraction: Value, force: Value) -> Balance:
+        """`balance_at`, refused where there is none."""
         found = self.balance_at(contraction, force)
-        return self._curve(found.radius, found.pressure, found.force, _RULE[0]), _RULE[1]
+        within_reach(found.pressure, (0.0, np.inf), (contraction, force), self._drawn_in)
+        return found
+
+    def _curve_at(self, contraction: float, force: float) -> tuple[_Curve, Any]:
+        found = self._shape(contraction, force)
+        v, weights = _graded_rule()
+        return self._curve(found.radius, found.pressure, found.force, v), weights
 
     def profile(self, contraction: float, force: float, points: int = 201) -> Profile:
         """The outline of one segment under a tension [N]: positions from its middle and radii [m]."""
-        self.pressure(contraction, force)
-        found = self.balance_at(contraction, force)
+        found = self._shape(contraction, force)
         upper = np.linspace(0.0, 1.0, points // 2 + 1)
-        curve = self._curve(found.radius, found.pressure, found.force, upper * _RULE[0][:, None])
-        axial = upper * np.sum(_RULE[1][:, None] * curve.axial * curve.per_v, axis=0) / 2
+        v, weights = (rule[:, None] for rule in _graded_rule())
+        curve = self._curve(found.radius, found.pressure, found.force, upper * v)
+        axial = upper * np.sum(weights * curve.axial * curve.per_v, axis=0) / 2
         radius = found.radius - (found.radius - self.geometry.end_radius) * upper**2
         return np.concatenate([-axial[:0:-1], axial]), np.concatenate([radius[:0:-1], radius])
 

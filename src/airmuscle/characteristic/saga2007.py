@@ -26,6 +26,10 @@ RUBBER_TEST_STRAIN = 3.0
 """The strain at which the rubber test of Fig. 4 ends; the line is extrapolated beyond."""
 
 
+_STRAIGHT = 1e-200
+"""Stands for a zero slope in a denominator, so that straight fibres pull without bound but divide by nothing."""
+
+
 class Equilibrium(NamedTuple):
     """A contraction at which pressure and load balance."""
 
@@ -103,10 +107,10 @@ class Saga2007(PressureLaw):
         return within_reach(found, self.pressure_reach, (contraction, force), self._no_pressure)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        """Tension [N]; at zero contraction the straight fibres hold any, and it comes out infinite."""
+        """Tension [N]; without bound at zero contraction, where the straight fibres hold any."""
         self._refuse(contraction)
         shell, rubber, lever = self._terms(contraction)
-        return (pressure * shell - rubber) / lever
+        return (pressure * shell - rubber) / ops.maximum(lever, _STRAIGHT)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         def excess(contraction: Value, p: Value, load: Value) -> Value:
@@ -225,7 +229,7 @@ def _quintic_roots(law: Saga2007, pressure: float, force: float) -> list[float]:
     b = 6 * m * d * (2 * t * law.rubber.intercept - w * pressure * d) * tube.fibre_length
     # in x = l/l_0; both sides by powers of x, the highest first
     square = np.array([a2 * a2, 0.0, 2 * a2 * a0, 0.0, a0 * a0])
-    quintic = 24 * np.polymul([-1.0, 1.0], square) - np.array([0.0, 0.0, b * b, 0.0, 0.0, 0.0])
+    quintic = np.polysub(24 * np.polymul([-1.0, 1.0], square), [b * b, 0.0, 0.0, 0.0])
     found = np.roots(quintic)
     real = found.real[(abs(found.imag) < 1e-7) & (found.real > 0) & (found.real <= 1)]
     sided = [1.0 - x for x in real if b * (a2 * x * x + a0) >= 0]

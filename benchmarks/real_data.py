@@ -1,0 +1,133 @@
+"""Measured muscles of several lengths: static fits of one repeat judged on the next.
+
+    python benchmarks/real_data.py FOLDER
+
+FOLDER holds CSV files named `..._cut<cm>cm_held<cm>cm_test<n>.csv` with the columns time, pressure, force, length and
+rest_length, units in the headings. Rows above 2 N of repeat 8 are fitted, those of repeat 9 judge. Beside every
+figure stands what the two repeats differ by themselves: a fit below that has learnt one of them by heart.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from airmuscle.errors import IdentificationError
+from airmuscle.identify import fit
+from airmuscle.identify.candidates import Candidate, standard_candidates, surface
+from airmuscle.identify.compare import errors_in_force
+from airmuscle.recording import Recording
+
+NAME = re.compile(r"_cut(\d+)cm_held([\d.]+)cm_test(\d+)\.csv$")
+LEAST_FORCE = 2.0
+CEILING = 5000.0
+
+
+def read(path: Path) -> Recording:
+    """One run in SI units, its resting length a constant."""
+    table = pd.read_csv(path)
+    table.columns = [heading.split(" [")[0] for heading in table.columns]
+    table = table[table["force"] > LEAST_FORCE]
+    rest = float(table["rest_length"].iloc[0]) / 100
+    columns = {
+        "pressure": table["pressure"].to_numpy() * 1e3,
+        "contraction": 1 - table["length"].to_numpy() / 100 / rest,
+        "force": table["force"].to_numpy(),
+        "branch": table["branch"].to_numpy(),
+    }
+    match = NAME.search(path.name)
+    assert match is not None
+    return Recording(columns, path.stem, {"resting_length": rest, "specimen": f"{match[1]} cm", "repeat": match[3]})
+
+
+def repeats(folder: Path) -> tuple[list[Recording], list[Recording]]:
+    """The runs of repeat 8 and of repeat 9, in the same order."""
+    runs = [read(path) for path in sorted(folder.glob("*.csv")) if NAME.search(path.name)]
+    if not runs:
+        raise SystemExit(f"{folder}: no file is named like ..._cut10cm_held8.3cm_test8.csv")
+    return tuple([run for run in runs if run.constants["repeat"] == n] for n in ("8", "9"))  # type: ignore[return-value]
+
+
+def rms(errors: np.ndarray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.asarray(errors) ** 2)))
+
+
+def floor(first: Sequence[Recording], second: Sequence[Recording]) -> float:
+    """What the repeats differ by: the median of repeat 8 near each pressure and branch against rows of repeat 9."""
+    found = []
+    for a, b in zip(first, second, strict=True):
+        for branch in (1, 2):
+            x, y = (run.rows(run["branch"] == branch) for run in (a, b))
+            if len(x) < 5 or not len(y):
+                continue
+            near = np.abs(x["pressure"][None, :] - y["pressure"][:, None]) < 5e3
+            usable = near.sum(axis=1) >= 3
+            middles = np.array([np.median(x["force"][row]) for row in near[usable]])
+            found.append(middles - y["force"][usable])
+    return rms(np.concatenate(found))
+
+
+def of_specimen(runs: Sequence[Recording], specimen: str, *, others: bool = False) -> list[Recording]:
+    """The runs of one specimen, or of all others."""
+    return [run for run in runs if (run.constants["specimen"] == specimen) != others]
+
+
+def line(name: str, parameters: int, errors: Sequence[float], least: float) -> str:
+    """One row of the table."""
+    return f"{name:<46}{parameters:>5}" + "".join(f"{e:>9.1f}" for e in errors) + f"{least:>9.1f}"
+
+
+def judged(candidate: Candidate, train: list[Recording], test: list[Recording], specimens: list[str]) -> list[float]:
+    """Error on the next repeat, and on each specimen that was left out."""
+    law, fixed = candidate.law, candidate.fixed
+    errors = [rms(errors_in_force(fit(law, train, fixed=fixed).model, test, CEILING))]
+    for name in specimens:
+        model = fit(law, of_specimen(train, name, others=True), fixed=fixed).model
+        errors.append(rms(errors_in_force(model, of_specimen(test, name), CEILING)))
+    return errors
+
+
+def best_rank(train: list[Recording], test: list[Recording]) -> np.ndarray:
+    """A surface of 21 coefficients of one specimen, judged; four lengths leave some open: the smallest are taken."""
+    matrices = []
+    for runs in (train, test):
+        p, c = (np.concatenate([run[n] for run in runs]) for n in ("pressure", "contraction"))
+        x, q = c / 0.075 - 1, p / 3.13e5 - 1
+        matrices.append(np.column_stack([x**i * q**j for j in range(6) for i in range(6 - j)]))
+    goal, truth = (np.concatenate([run["force"] for run in runs]) for runs in (train, test))
+    norms = np.linalg.norm(matrices[0], axis=0)
+    found = np.linalg.lstsq(matrices[0] / norms, goal, rcond=1e-10)[0] / norms
+    return np.asarray(matrices[1] @ found - truth)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    train, test = repeats(parser.parse_args().folder)
+    specimens = sorted({str(run.constants["specimen"]) for run in train})
+    least = floor(train, test)
+    print(f"rms error in force [N]; fitted to repeat 8 ({sum(map(len, train))} rows), judged on repeat 9")
+    columns = "".join(f"{'no ' + name:>9}" for name in specimens)
+    print(f"{'law':<46}{'P':>5}{'next':>9}{columns}{'floor':>9}")
+    each = [best_rank(of_specimen(train, name), of_specimen(test, name)) for name in specimens]
+    print(line("a surface of 21 for each length", 63, [rms(np.concatenate(each))], least))
+    print(line("  by length", 21, [rms(e) for e in each], least))
+    candidates = [Candidate("one surface of degree 5 for all", surface(5)), *standard_candidates(train)]
+    for candidate in candidates:
+        if hasattr(candidate.law, "of_length") or candidate is candidates[0]:
+            try:
+                size = len(fit(candidate.law, train, fixed=candidate.fixed).estimates)
+                print(line(candidate.name, size, judged(candidate, train, test, specimens), least), flush=True)
+            except IdentificationError as error:
+                print(f"{candidate.name:<46} excluded: {error}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
