@@ -30,15 +30,13 @@ def equilibria(plant: Plant, *, pressure: float | tuple[float, ...]) -> tuple[Re
     """
     if not plant.mechanism.coordinates:
         return (Rest(plant.state_at(pressure=pressure), True),)
-    from scipy.optimize import brentq  # a slow import that a run with a given start need not pay
-
     search = _Search(plant, pressure)
     positions = search.positions()
     pulls = np.array([search.acceleration(x) for x in positions])
     found = []
     for i in np.flatnonzero(np.sign(pulls[:-1]) * np.sign(pulls[1:]) < 0):
-        place = brentq(search.acceleration, positions[i], positions[i + 1], xtol=1e-15, rtol=1e-14)
-        found.append(Rest(search.state(float(place)), bool(pulls[i] > 0)))
+        place = search.between(float(positions[i]), float(positions[i + 1]), float(pulls[i]))
+        found.append(Rest(search.state(place), bool(pulls[i] > 0)))
     return tuple(found)
 
 
@@ -91,6 +89,15 @@ class _Search:
         """Acceleration from rest at this coordinate."""
         state = self.state(x)
         return float(self.ready.rates([state[n] for n in self.names], list(self.inputs.values()))[self.speed])
+
+    def between(self, low: float, high: float, at_low: float) -> float:
+        """The root between two coordinates, by bisection: SciPy's search would cost the first run a slow import."""
+        while low < (middle := (low + high) / 2) < high:
+            if self.acceleration(middle) * at_low > 0:
+                low = middle
+            else:
+                high = middle
+        return low
 
     def explanation(self) -> str:
         """Why there is no rest: what each muscle pulls at both ends, and what would balance the load there."""

@@ -54,7 +54,7 @@ start = { pressure = "1 bar" }
 
 
 def airmuscle(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+    return CliRunner().invoke(app, [str(argument) for argument in arguments], env={"COLUMNS": "160"})
 
 
 def shell(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
@@ -73,7 +73,7 @@ def assert_failed(result: Result, message: str) -> None:
 
 # Help and usage
 
-COMMANDS = ("reproduce", "list", "show", "cite", "solve", "fit", "simulate")
+COMMANDS = ("reproduce", "list", "show", "cite", "solve", "inspect", "fit", "simulate")
 
 
 def test_the_commands_stand_in_the_order_of_use():

@@ -27,8 +27,8 @@ def print_table(headers: Sequence[str], rows: Iterable[Sequence[Any]], *, right:
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, header_style="bold")
-    for header in headers:
-        table.add_column(header, justify="right" if header in right else "left", overflow="fold")
+    for i, header in enumerate(headers):  # what a row is about stays in one piece, so that it can be copied
+        table.add_column(header, justify="right" if header in right else "left", overflow="fold", no_wrap=i == 0)
     for row in rows:
         table.add_row(*(cell if hasattr(cell, "plain") else _escaped(str(cell)) for cell in row))
     wide = None if sys.stdout.isatty() or "COLUMNS" in os.environ else WIDE

@@ -36,28 +36,26 @@ ONE, ZERO, LESS = _constant(1.0), _constant(0.0), _constant(-1.0)
 
 
 class Block:
-    """The lines of one LLVM function under construction; an array element is loaded once."""
+    """The lines of one LLVM function under construction; what is computed once is not computed again."""
 
     def __init__(self, scalars: Sequence[str] = ()) -> None:
         self.lines: list[str] = []
         self.scalars = frozenset(scalars)
-        self._count = 0
-        self._loaded: dict[tuple[str, int], str] = {}
+        self._known: dict[str, str] = {}
 
     def put(self, expression: str) -> str:
-        """A new value computed by `expression`; its name."""
-        self._count += 1
-        self.lines.append(f"  %v{self._count} = {expression}")
-        return f"%v{self._count}"
+        """The name of the value of `expression`, which is computed unless it is known."""
+        if expression not in self._known:
+            self._known[expression] = f"%v{len(self._known)}"
+            self.lines.append(f"  {self._known[expression]} = {expression}")
+        return self._known[expression]
 
     def load(self, array: str, index: int) -> str:
         """The value of an array element, or of a scalar argument."""
         if array in self.scalars:
             return f"%{array}"
-        if (array, index) not in self._loaded:
-            place = self.put(f"getelementptr inbounds double, ptr %{array}, i64 {index}")
-            self._loaded[array, index] = self.put(f"load double, ptr {place}, align 8")
-        return self._loaded[array, index]
+        place = self.put(f"getelementptr inbounds double, ptr %{array}, i64 {index}")
+        return self.put(f"load double, ptr {place}, align 8")
 
     def store(self, array: str, index: int, value: str) -> None:
         """Write a value into an array element."""
@@ -135,18 +133,27 @@ def _value(
 
 
 def hand_over(
-    block: Block, once: Sequence[Instruction], handed: Sequence[Operand], inputs: Sequence[str], offset: int
-) -> None:
-    """Append the parameters-only part of a function: its results go into `c` from `offset` on."""
+    block: Block, once: Sequence[Instruction], handed: Sequence[Operand], inputs: Sequence[str], places: dict[str, int]
+) -> dict[Operand, int]:
+    """Append the parameters-only part of a function, and say where in `c` its results stand.
+
+    `places` are the values that stand there already: functions that need the same value share its place.
+    """
     values = run(block, once, inputs, {})
-    for k, operand in enumerate(handed):
-        block.store("c", offset + k, _value(block, operand, inputs, {}, values))
+    held = {}
+    for operand in handed:
+        value = _value(block, operand, inputs, {}, values)
+        if value not in places:
+            places[value] = len(places)
+            block.store("c", places[value], value)
+        held[operand] = places[value]
+    return held
 
 
-def function(name: str, arguments: Sequence[str], block: Block) -> str:
+def function(name: str, arguments: Sequence[str], block: Block, attributes: str = "nounwind") -> str:
     """The LLVM text of a function that returns nothing; arrays are pointers that do not overlap."""
     signature = ", ".join(f"double %{a}" if a in block.scalars else f"ptr noalias nocapture %{a}" for a in arguments)
-    return f"define void @{name}({signature}) nounwind {{\n" + "\n".join(block.lines) + "\n  ret void\n}\n"
+    return f"define void @{name}({signature}) {attributes} {{\n" + "\n".join(block.lines) + "\n  ret void\n}\n"
 
 
 @functools.cache

@@ -16,12 +16,23 @@ def non_zeros(matrix: Any) -> Pattern:
     return tuple((i, j) for i in range(rows) for j in range(columns) if not matrix[i, j].is_zero())
 
 
-def shifted(jacobian: Pattern, size: int) -> tuple[list[list[Any]], Any, Any]:
-    """d I - J as rows of symbols, with the symbols of J's non-zeros and of d."""
-    values, shift = casadi.SX.sym("j", len(jacobian)), casadi.SX.sym("d")
+def distinct(expressions: Sequence[Any]) -> tuple[Any, tuple[int, ...]]:
+    """The expressions that differ, as one vector, and where in it each of those given stands.
+
+    A system with its sensitivities repeats one block along the diagonal: it is computed and factorised once.
+    """
+    merged = casadi.cse(casadi.vertcat(*expressions)) if expressions else casadi.SX(0, 1)
+    first: dict[int, int] = {}
+    slots = tuple(first.setdefault(merged[i].element_hash(), len(first)) for i in range(len(expressions)))
+    return casadi.vertcat(*(merged[slots.index(k)] for k in range(len(first)))), slots
+
+
+def shifted(jacobian: Pattern, slots: Sequence[int], size: int) -> tuple[list[list[Any]], Any, Any]:
+    """d I - J as rows of symbols, with the symbols of J's distinct non-zeros and of d."""
+    values, shift = casadi.SX.sym("j", max(slots, default=-1) + 1), casadi.SX.sym("d")
     matrix = [[casadi.SX(0)] * size for _ in range(size)]
-    for k, (i, j) in enumerate(jacobian):
-        matrix[i][j] = -values[k]
+    for slot, (i, j) in zip(slots, jacobian, strict=True):
+        matrix[i][j] = -values[slot]
     for i in range(size):
         matrix[i][i] = matrix[i][i] + shift
     return matrix, values, shift
@@ -48,10 +59,10 @@ def pattern_of(matrix: list[list[Any]]) -> Pattern:
     return tuple((i, j) for i, row in enumerate(matrix) for j, x in enumerate(row) if not x.is_zero())
 
 
-def solved(pattern: Pattern, factors: Any, right: Sequence[Any]) -> list[Any]:
-    """x with L U x = right, from the packed factors whose places are `pattern`."""
+def solved(pattern: Pattern, slots: Sequence[int], factors: Any, right: Sequence[Any]) -> list[Any]:
+    """x with L U x = right, from the distinct factors, which stand at the places of `pattern`."""
     size = len(right)
-    at = {place: factors[k] for k, place in enumerate(pattern)}
+    at = {place: factors[slot] for slot, place in zip(slots, pattern, strict=True)}
     x = list(right)
     for i in range(size):
         for j in range(i):

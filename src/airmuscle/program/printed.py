@@ -42,8 +42,9 @@ def traced(system: System) -> Traced:
     rates, outputs = model.rates(state, inputs), model.outputs(state, inputs)
     if set(rates) != set(names):
         raise TraceError(f"{type(system).__name__}: states are {names}, but rates are given for {list(rates)}.")
-    f = casadi.vertcat(*(rates[name] for name in names))
-    o = casadi.vertcat(*outputs.values()) if outputs else casadi.SX(0, 1)
+    # Dense, because a printed function writes non-zeros one after the other.
+    f = casadi.densify(casadi.vertcat(*(rates[name] for name in names)))
+    o = casadi.densify(casadi.vertcat(*outputs.values())) if outputs else casadi.SX(0, 1)
     trace.refuse_non_finite(casadi.vertcat(f, o), type(system).__name__)
     return Traced(x, u, w, p, f, o, tuple(outputs))
 
@@ -67,7 +68,12 @@ class Printer:
     def __init__(self) -> None:
         self.text: list[str] = []
         self._prepare = llvm.Block()
-        self.held = 0
+        self._places: dict[str, int] = {}
+
+    @property
+    def held(self) -> int:
+        """How long `c` must be."""
+        return len(self._places)
 
     def add(self, name: str, inputs: dict[str, Any], outputs: dict[str, Any], scalars: Sequence[str] = ()) -> None:
         """Print `name(inputs..., outputs...)`, with `c` in place of the parameters."""
@@ -76,9 +82,7 @@ class Printer:
         block = llvm.Block(scalars)
         if PARAMETERS in inputs:
             code, once, handed = hoisted(code, names.index(PARAMETERS))
-            llvm.hand_over(self._prepare, once, handed, names, self.held)
-            held = {operand: self.held + k for k, operand in enumerate(handed)}
-            self.held += len(handed)
+            held = llvm.hand_over(self._prepare, once, handed, names, self._places)
         else:
             code, held = Code(code.body, code.outputs), {}
         llvm.write(block, code, names, targets, held)
@@ -86,15 +90,19 @@ class Printer:
         self.text.append(llvm.function(name, arguments, block))
 
     def module(self) -> str:
-        """All functions and `prepare`, as one LLVM text."""
-        return "\n".join([llvm.function("prepare", ["p", "c"], self._prepare), *self.text])
+        """All functions and `prepare`, as one LLVM text.
+
+        `prepare` runs once for a set of parameters, so it is not worth the time that optimising it would take.
+        """
+        prepare = llvm.function("prepare", ["p", "c"], self._prepare, "nounwind noinline optnone")
+        return "\n".join([prepare, *self.text])
 
 
 def implicit_module(t: Traced) -> tuple[str, Sizes]:
     """What an implicit method needs: rhs, jac, factor, solve, stage, drift and outputs.
 
     rhs(x, u, c, f)              f = rates
-    jac(x, u, c, f, J)           rates, and the non-zeros of df/dx
+    jac(x, u, c, f, J)           rates, and the non-zeros of df/dx, equal ones once
     factor(J, d, A)              LU of d I - J
     solve(A, b, y)               y = (d I - J)^-1 b
     stage(x, u, c, A, g, k)      k = (d I - J)^-1 (f(x, u) + g)
@@ -104,25 +112,26 @@ def implicit_module(t: Traced) -> tuple[str, Sizes]:
     size = t.x.shape[0]
     jacobian = casadi.jacobian(t.f, t.x)
     places = lu.non_zeros(jacobian)
-    values = casadi.vertcat(*(jacobian[i, j] for i, j in places)) if places else casadi.SX(0, 1)
-    matrix, js, d = lu.shifted(places, size)
-    factors = lu.factorised(matrix)
-    pattern = lu.pattern_of(factors)
-    a, g, b = (casadi.SX.sym(n, k) for n, k in (("A", len(pattern)), ("g", size), ("b", size)))
-    stage = lu.solved(pattern, a, [t.f[i] + g[i] for i in range(size)])
-    solve = lu.solved(pattern, a, [b[i] for i in range(size)])
+    values, slots = lu.distinct([jacobian[i, j] for i, j in places])
+    matrix, js, d = lu.shifted(places, slots, size)
+    rows = lu.factorised(matrix)
+    pattern = lu.pattern_of(rows)
+    factors, held = lu.distinct([rows[i][j] for i, j in pattern])
+    a, g, b = (casadi.SX.sym(n, k) for n, k in (("A", factors.numel()), ("g", size), ("b", size)))
+    stage = lu.solved(pattern, held, a, [t.f[i] + g[i] for i in range(size)])
+    solve = lu.solved(pattern, held, a, [b[i] for i in range(size)])
     point = {"x": t.x, "u": t.u, PARAMETERS: t.p}
     printer = Printer()
     printer.add("rhs", point, {"f": t.f})
     printer.add("jac", point, {"f": t.f, "J": values})
-    printer.add("factor", {"J": js, "d": d}, {"A": casadi.vertcat(*(factors[i][j] for i, j in pattern))}, ["d"])
+    printer.add("factor", {"J": js, "d": d}, {"A": factors}, ["d"])
     printer.add("solve", {"A": a, "b": b}, {"y": casadi.vertcat(*solve)})
     printer.add("stage", {**point, "A": a, "g": g}, {"k": casadi.vertcat(*stage)})
     printer.add(
-        "drift", {**point, "w": t.w}, {"f": casadi.jtimes(t.f, t.u, t.w) if t.u.numel() else casadi.SX(size, 1)}
+        "drift", {**point, "w": t.w}, {"f": casadi.densify(casadi.jtimes(t.f, t.u, t.w)) if t.u.numel() else casadi.SX(size, 1)}
     )
     printer.add("outputs", point, {"o": t.o})
-    sizes = Sizes(size, t.u.shape[0], t.p.shape[0], printer.held, len(places), len(pattern), t.o.shape[0])
+    sizes = Sizes(size, t.u.shape[0], t.p.shape[0], printer.held, values.numel(), factors.numel(), t.o.shape[0])
     return printer.module(), sizes
 
 
