@@ -17,6 +17,9 @@ from .base import ForceLaw
 from .rubber import RubberLine
 from .solve import first_crossing, within_reach
 
+_STRAIGHT = 1e-200
+"""Stands for a zero angle in a denominator, so that straight fibres pull without bound but divide by nothing."""
+
 
 class _Work(NamedTuple):
     """Times psi, so that they are finite at zero contraction."""
@@ -64,10 +67,10 @@ class CircleVirtualWork(ForceLaw):
         return float(self.wall_thickness * self.rubber.intercept / self.geometry.end_radius)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        """Tension [N], negative past the largest volume; infinite at zero contraction: straight fibres hold any."""
+        """Tension [N], negative past the largest volume; without bound at rest, where straight fibres hold any."""
         self._refuse(contraction, self.geometry.contraction_reach)
         work = self._work(contraction)
-        return (pressure * work.area - work.rubber) / work.angle
+        return (pressure * work.area - work.rubber) / ops.maximum(work.angle, _STRAIGHT)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         self._refuse(contraction, self.contraction_reach)
