@@ -82,11 +82,15 @@ class IdentificationError(AirmuscleError):
 
 
 class SimulationError(AirmuscleError):
-    """A run that ended early; `.recording` is a Recording of what it computed until then, or None."""
+    """A run that ended early; `.recording` is a Recording of what it computed until then, or None.
 
-    def __init__(self, message: str, recording: Any = None) -> None:
+    `.interrupted` says that it was the user who ended it.
+    """
+
+    def __init__(self, message: str, recording: Any = None, *, interrupted: bool = False) -> None:
         super().__init__(message)
         self.recording = recording
+        self.interrupted = interrupted
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

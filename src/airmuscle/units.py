@@ -6,7 +6,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import difflib
 import functools
 import math
 import re
@@ -16,6 +18,9 @@ from .errors import UnitError
 
 AMBIENT_PRESSURE = 101_325.0
 """Standard atmosphere [Pa], what an absolute pressure is reduced by unless an ambient pressure is given."""
+
+ABSOLUTE = "Pa(a)"
+"""The declared unit of a pressure that is absolute by its meaning: of the ambient air, say."""
 
 m = N = Pa = s = kg = K = rad = J = W = 1.0
 mm, cm, km = 1e-3, 1e-2, 1e3
@@ -65,14 +70,20 @@ def _pint_text(unit: str) -> str:
     return re.sub(r"(?<=[\w)])\s+(?=[\w(])", "*", powers).replace("%", "percent").replace("°C", "degC")
 
 
+_TOWER = re.compile(r"(\*\*|\^)[\s\d()+-]*(\*\*|\^)|(\*\*|\^)\s*\(?\s*[-+]?\s*\d{2}")
+"""Powers of powers and powers of ten or more: no unit has them, and working them out may never end."""
+
+
 def _by_pint(unit: str, target: str, where: str) -> Conversion:
     import pint
 
     try:
+        if _TOWER.search(unit):
+            raise ValueError(unit)
         registry = _registry()
         zero, one = (registry.Quantity(v, _pint_text(unit)).to(_pint_text(target)).magnitude for v in (0.0, 1.0))
     except pint.DimensionalityError:
-        raise UnitError(f"{where}unit '{unit}' cannot become '{target}': it measures something else.") from None
+        raise UnitError(f"{where}unit '{unit}' cannot become {_kind(target)}: it measures something else.") from None
     except Exception:  # pint and tokenize raise many kinds on text that is no unit
         raise UnitError(
             f"{where}'{unit}' is no unit known here. Write it like 'mm', 'kPa', 'bara', 'N', '%' or 'm3/(s Pa)'."
@@ -80,11 +91,19 @@ def _by_pint(unit: str, target: str, where: str) -> Conversion:
     return Conversion(float(one - zero), float(zero))
 
 
+def _kind(target: str) -> str:
+    return "a ratio" if target in ("1", "dimensionless") else f"'{target}'"
+
+
 def conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, where: str = "") -> Conversion:
     """How values in `unit` become `target` (an SI unit; pressures become gauge).
 
     `where` opens the message of the UnitError raised for a unit that is unknown or measures something else.
     """
+    if target == ABSOLUTE:
+        if (found := _GAUGE_OR_ABSOLUTE.match(unit.strip())) and found["kind"].lower().startswith("g"):
+            raise UnitError(f"{where}: unit '{unit}' is gauge, but this pressure is absolute; write kPa(a) or bara.")
+        return dataclasses.replace(conversion(unit, "Pa", ambient=0.0, where=where), assumed_gauge=False)
     unit, where = unit.strip(), f"{where}: " if where else ""
     if unit == target and target != "Pa":
         return Conversion(1.0)
@@ -95,6 +114,8 @@ def conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, whe
         bare = _SPELLING.get(found["unit"].lower(), found["unit"].lower())
         absolute = found["kind"].lower().startswith("a")
         return Conversion(conversion(bare, "Pa").factor, -ambient if absolute else 0.0)
+    if unit in _FACTORS and {_FACTORS[unit][1], target} == {"1", "rad"}:  # pint takes an angle for a ratio
+        raise UnitError(f"{where}unit '{unit}' cannot become {_kind(target)}: it measures something else.")
     if unit in _FACTORS and _FACTORS[unit][1] == target:
         factor = _FACTORS[unit][0]
         return Conversion(factor, assumed_gauge=target == "Pa")
@@ -110,12 +131,33 @@ def quantity(value: float | str, target: str, *, ambient: float = AMBIENT_PRESSU
 
     Raises UnitError where the text holds no number, or its unit is unknown or of the wrong kind.
     """
-    if isinstance(value, float | int) and not isinstance(value, bool):
-        return float(value)
     prefix = f"{where}: " if where else ""
+    if isinstance(value, float | int) and not isinstance(value, bool):
+        with contextlib.suppress(OverflowError):
+            return float(value)
+        raise UnitError(f"{prefix}the number is too large.")
     found = _NUMBER.match(value) if isinstance(value, str) else None
-    if not found:
+    if not isinstance(value, str) or not found:
         raise UnitError(f"{prefix}{value!r} is not a number with a unit; write it like '6 bar' or '300 mm'.")
+    if re.match(r",\s*\d", found["unit"]):
+        pointed = value.replace(",", ".", 1)
+        raise UnitError(f"{prefix}'{value}' holds a comma; write the decimal sign as a point, '{pointed}'.")
     if not found["unit"] and target != "1":
         raise UnitError(f"{prefix}'{value}' carries no unit; write it like '{found['number']} {target}'.")
-    return float(conversion(found["unit"], target, ambient=ambient, where=where)(float(found["number"])))
+    number = float(found["number"])
+    if not math.isfinite(number):
+        raise UnitError(f"{prefix}'{value}' is too large for a number.")
+    try:
+        return float(conversion(found["unit"], target, ambient=ambient, where=where)(number))
+    except UnitError as reason:
+        raise UnitError(f"{reason}{_nearest(found['unit'], target)}") from None
+
+
+def _nearest(unit: str, target: str) -> str:
+    """A closing sentence: the unit of the right kind whose spelling is nearest, in whatever case."""
+    pressures = ("bara", "barg", "psia", "psig") if target in ("Pa", ABSOLUTE) else ()
+    kind = "Pa" if target == ABSOLUTE else target
+    known = (*(name for name, (_, of) in _FACTORS.items() if of == kind and name), *pressures)
+    cases = {name.lower(): name for name in known}
+    near = difflib.get_close_matches(unit.lower(), cases, n=1)
+    return f" Did you mean '{cases[near[0]]}'?" if near and unit not in _FACTORS else ""

@@ -15,7 +15,9 @@ from typer.core import TyperGroup
 from ..errors import AirmuscleError, AirmuscleWarning
 from .cite import cite
 from .fit import fit
+from .inspect import inspect
 from .list import list_entries
+from .plan import plan
 from .reproduce import reproduce
 from .show import show
 from .simulate import simulate
@@ -36,6 +38,11 @@ class Commands(TyperGroup):
                 return super().invoke(ctx)
             except AirmuscleError as error:
                 typer.echo(f"error: {error}", err=True)
+                raise typer.Exit(1) from None
+            except BrokenPipeError:
+                raise
+            except OSError as error:  # a full disk, a terminal that went away
+                typer.echo(f"error: {error.filename or 'output'}: {error.strerror or error}.", err=True)
                 raise typer.Exit(1) from None
             except KeyboardInterrupt:
                 typer.echo("interrupted", err=True)
@@ -64,7 +71,9 @@ app.command("list")(list_entries)
 app.command("show")(show)
 app.command("cite")(cite)
 app.command("solve")(solve)
+app.command("inspect")(inspect)
 app.command("fit")(fit)
+app.command("plan")(plan)
 app.command("simulate")(simulate)
 
 

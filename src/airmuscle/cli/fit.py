@@ -11,14 +11,19 @@ from .options import Folder, Json
 from .terminal import print_json
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ..characteristic.base import Characteristic
     from ..identify.result import Fit
     from ..library.entry import Entry
     from ..recording import Recording
+    from ..report.chapter import Chapter
 
-File = Annotated[Path, typer.Argument(metavar="FILE", help="A CSV with pressure, contraction (or length) and force.")]
+Files = Annotated[
+    list[Path], typer.Argument(metavar="FILES", help="CSV files with pressure, contraction (or length) and force.")
+]
 Law = Annotated[
-    str,
+    str | None,
     typer.Option(
         "--characteristic",
         metavar="NAME",
@@ -39,17 +44,25 @@ Uncensored = Annotated[
     bool, typer.Option("--uncensored", help="Take rows at zero force as measured; else they are bounds only.")
 ]
 
+Compare = Annotated[bool, typer.Option("--compare", help="Fit every law that the data determine, and rank them.")]
+LeftOut = Annotated[
+    str | None,
+    typer.Option(metavar="PART", help="What a comparison leaves out in turn: run, specimen, contraction, pressure."),
+]
+Length = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Length unpressurised and unloaded: '300 mm'.")]
+Surroundings = Annotated[
+    str | None, typer.Option(metavar="QUANTITY", help="What absolute pressures are reduced by: '98 kPa'.")
+]
+
 
 def fit(
-    file: File,
-    characteristic: Law,
+    files: Files,
+    characteristic: Law = None,
+    compare: Compare = False,
+    leave_out: LeftOut = None,
     out: Folder = Path("fit"),
-    resting_length: Annotated[
-        str | None, typer.Option(metavar="QUANTITY", help="Length unpressurised and unloaded: '300 mm'.")
-    ] = None,
-    ambient: Annotated[
-        str | None, typer.Option(metavar="QUANTITY", help="What absolute pressures are reduced by: '98 kPa'.")
-    ] = None,
+    resting_length: Length = None,
+    ambient: Surroundings = None,
     unit: Units = None,
     degree: Annotated[int, typer.Option(min=1, max=9, help="Total degree of a ContractileSurface.")] = 5,
     fix: Fixed = None,
@@ -57,34 +70,37 @@ def fit(
     uncensored: Uncensored = False,
     json: Json = False,
 ) -> None:
-    """Fit a characteristic to measured points.
+    """Fit a characteristic to measured points, or compare all.
 
     \b
     Writes DIR/muscle.toml, which every command takes as NAME, and DIR/report.html with figures and data.
-    FILE may also be a data set of the library (airmuscle list).
+    FILES may also be data sets of the library (airmuscle list).
 
     \b
     Examples:
       airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out fit
       airmuscle fit bench.csv --characteristic dmsp-20-300 --unit pressure=bar --fix geometry.radius
       airmuscle fit dmsp-20-300 --characteristic ContractileSurface --degree 4 --robust "10 N"
+      airmuscle fit run1.csv run2.csv run3.csv --compare --leave-out run
       airmuscle solve fit/muscle.toml --pressure "3 bar" --force "100 N"
     """
-    from ..identify import UNCENSORED
-    from ..identify import fit as identify
     from ..report.staged import refuse_unwritable
 
-    recording = _measured(file, units=_by_column(unit), resting_length=resting_length, ambient=ambient)
-    start = _start(characteristic, recording, degree)
+    if characteristic is None and not compare:
+        raise typer.BadParameter("name a law to fit with --characteristic, or let --compare find one")
+    units = _by_column(unit)
+    recordings = [_measured(f, units=units, resting_length=resting_length, ambient=ambient) for f in files]
+    if compare or characteristic is None:
+        from .fit_compare import compared
+
+        refuse_unwritable(out)
+        compared(files, recordings, characteristic=characteristic, fixed=tuple(fix or ()), leave_out=leave_out,
+                 degree=degree, robust=robust, uncensored=uncensored, out=out, json=json)  # fmt: skip
+        return
+    start = start_of(characteristic, recordings, degree)
     refuse_unwritable(out)
-    result = identify(
-        start.characteristic,
-        recording,
-        loss=_loss(robust, start.characteristic),
-        censoring=UNCENSORED if uncensored else None,
-        fixed=fix or (),
-    )
-    _write(result, _fitted(result, start, file), recording, out)
+    result = _identified(start, recordings, robust, uncensored, fix)
+    write(result, fitted(result, start, files), recordings, out)
     if json:
         print_json(as_data(result))
         return
@@ -93,13 +109,35 @@ def fit(
     typer.echo(f"report: {out / 'report.html'}")
 
 
+def _identified(
+    start: Entry, recordings: list[Recording], robust: str | None, uncensored: bool, fixed: list[str] | None
+) -> Fit:
+    from ..identify import UNCENSORED
+    from ..identify import fit as identify
+
+    return identify(
+        start.characteristic,
+        recordings,
+        loss=loss_of(robust, start.characteristic),
+        censoring=UNCENSORED if uncensored else None,
+        fixed=fixed or (),
+    )
+
+
 def _measured(file: Path, **options: Any) -> Recording:
-    from ..library.catalogue import measured, measured_names
+    from ..errors import ParameterError
+    from ..library.catalogue import measured
     from ..recording import read_csv
 
-    if not file.exists() and str(file) in measured_names():
-        return measured(str(file))
-    return read_csv(file, **options)
+    is_name = not file.suffix and len(file.parts) == 1
+    if not is_name or file.name in (entry.name for entry in Path().iterdir()):
+        return read_csv(file, **options)
+    given = [name for name, value in options.items() if value]
+    if given:
+        raise ParameterError(
+            f"{file}: a data set of the library brings its units and constants along; leave out {', '.join(given)}."
+        )
+    return measured(str(file))
 
 
 def _by_column(texts: list[str] | None) -> dict[str, str]:
@@ -109,7 +147,7 @@ def _by_column(texts: list[str] | None) -> dict[str, str]:
     return {name.strip(): found.strip() for name, _, found in parts}
 
 
-def _start(name: str, recording: Recording, degree: int) -> Entry:
+def start_of(name: str, recordings: list[Recording], degree: int) -> Entry:
     """The library entry to start from, or a bare one around a law that needs no start."""
     from ..errors import ParameterError
     from ..library.catalogue import load
@@ -125,11 +163,11 @@ def _start(name: str, recording: Recording, degree: int) -> Entry:
             "(airmuscle list shows which), or write a muscle file with your own."
         )
     # A clamp at twice what was measured cuts off no point, and still limits extrapolation.
-    law = cls.blank(degree, greatest_force=2.0 * max(float(recording["force"].max()), 1.0))
+    law = cls.blank(degree, greatest_force=2.0 * max(1.0, *(float(run["force"].max()) for run in recordings)))
     return Entry(name, name, "chosen", law)
 
 
-def _loss(robust: str | None, law: Characteristic) -> Any:
+def loss_of(robust: str | None, law: Characteristic) -> Any:
     from ..identify import Huber, LeastSquares
     from ..identify.problem import direction_of
     from ..units import quantity
@@ -139,13 +177,14 @@ def _loss(robust: str | None, law: Characteristic) -> Any:
     return Huber(quantity(robust, direction_of(law).unit, where="--robust"))
 
 
-def _fitted(result: Fit, start: Entry, file: Path) -> Entry:
+def fitted(result: Fit, start: Entry, files: list[Path]) -> Entry:
     """The fitted muscle with the parts of the one it started from; its checks and trust were of other numbers."""
     import dataclasses
 
     summary = dict(result.summary())
-    note = f"Fitted to {file.name}: rms error {summary['rms error']}, greatest {summary['greatest error']}."
-    title = f"{type(result.model).__name__} fitted to {file.stem}"
+    names = ", ".join(f.name for f in files)
+    note = f"Fitted to {names}: rms error {summary['rms error']}, greatest {summary['greatest error']}."
+    title = f"{type(result.model).__name__} fitted to {', '.join(f.stem for f in files)}"
     return dataclasses.replace(
         start, name="muscle", title=title, trust="fitted", note=note, warning="", characteristic=result.model,
         box=result.box, checks=(),
@@ -176,7 +215,8 @@ def as_data(result: Fit) -> dict[str, Any]:
     }
 
 
-def _write(result: Fit, entry: Entry, recording: Recording, out: Path) -> None:
+def write(result: Fit, entry: Entry, recordings: list[Recording], out: Path, chapters: Sequence[Chapter] = ()) -> None:
+    """Muscle and report in one folder, whole or not at all; `chapters` stand before the fit's own."""
     from ..library.catalogue import save
     from ..report.fit_chapter import fit_chapter
     from ..report.staged import staged
@@ -184,4 +224,5 @@ def _write(result: Fit, entry: Entry, recording: Recording, out: Path) -> None:
 
     with staged(out) as place:
         save(entry, place / "muscle.toml")
-        fill(place, [fit_chapter(result, entry, recording)], title="Fit")
+        notes = tuple(dict.fromkeys(note for run in recordings for note in run.notes))
+        fill(place, [*chapters, fit_chapter(result, entry, notes)], title="Fit")

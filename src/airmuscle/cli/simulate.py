@@ -48,6 +48,8 @@ def simulate(
         if error.recording is not None and len(error.recording):
             _write(loaded, error.recording, out)
             typer.echo(f"what was computed until then stands in {out}", err=True)
+        if error.interrupted:
+            raise KeyboardInterrupt from None
         raise
     _write(loaded, recording, out)
     if json:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -66,16 +67,48 @@ def solve(
 
 
 def _solved(characteristic: Characteristic, texts: dict[str, str | None]) -> Point:
+    from ..characteristic.base import ForceLaw
+    from ..errors import NoSolution
     from ..gas import Ambient, refuse_vacuum
-    from ..report.chart import Point
+    from ..report.chart import Point, point_text
     from ..units import quantity
 
     given = {name: quantity(text, UNITS[name], where=f"--{name}") for name, text in texts.items() if text is not None}
     if "pressure" in given:
         refuse_vacuum(given["pressure"], Ambient())
+    if "contraction" in given and isinstance(characteristic, ForceLaw):  # others refuse by themselves
+        _refuse_out_of_reach(characteristic, given["contraction"])
     (wanted,) = UNITS.keys() - given.keys()
-    found = getattr(characteristic, wanted)(*given.values())
-    return Point(**given, **{wanted: float(found)})
+    point = Point(**given, **{wanted: float(getattr(characteristic, wanted)(*given.values()))})
+    if not math.isfinite(sum(point)) or (wanted == "contraction" and not -0.5 <= point.contraction < 1.0):
+        raise NoSolution(
+            f"{type(characteristic).__name__} answers with {point_text(point)}, which no muscle can be. "
+            "The question lies far outside the range of its numbers (airmuscle show)."
+        )
+    return point
+
+
+def _refuse_out_of_reach(characteristic: Characteristic, contraction: float) -> None:
+    from ..errors import OutOfReach
+
+    low, high = characteristic.contraction_reach
+    if not low <= contraction <= high:
+        per_cent = contraction >= 1.0 and contraction / 100 <= high
+        hint = f" Is it in per cent? Write '{contraction:g} %'." if per_cent else ""
+        raise OutOfReach(
+            f"--contraction: {type(characteristic).__name__} cannot take a contraction of {100 * contraction:.6g} %; "
+            f"it reaches from {100 * low:.4g} to {100 * high:.4g} %.{hint}"
+        )
+
+
+def _stiffness(entry: Entry, point: Point) -> float | None:
+    """-dF/deps at constant pressure [N]; None where the law has no single force at this point."""
+    from ..errors import PhysicsError
+
+    try:
+        return float(entry.characteristic.stiffness(point.pressure, point.contraction))
+    except PhysicsError:
+        return None
 
 
 def _warn(point: Point, box: Box | None) -> None:
@@ -118,7 +151,9 @@ def _rows(entry: Entry, point: Point, wanted: str) -> list[tuple[str, str, str]]
         (name, value, "; ".join(filter(None, (notes.get(name, ""), "solved" if name == wanted else ""))))
         for name, value in values.items()
     ]
-    stiffness = float(entry.characteristic.stiffness(point.pressure, point.contraction))
+    stiffness = _stiffness(entry, point)
+    if stiffness is None:
+        return rows
     per_length = f"{stiffness / length / 1e3:.4g} N/mm" if length else f"{stiffness / 100:.4g} N/%"
     return [*rows, ("stiffness", per_length, "at constant pressure")]
 
@@ -128,7 +163,7 @@ def _as_data(entry: Entry, point: Point, box: Box | None, wanted: str) -> dict[s
         "name": entry.name,
         "solved": wanted,
         **point._asdict(),
-        "stiffness": float(entry.characteristic.stiffness(point.pressure, point.contraction)),
+        "stiffness": _stiffness(entry, point),
         "resting_length": _resting_length(entry),
         "inside_data": None if box is None else bool(box.holds(point.pressure, point.contraction)),
         "units": {**UNITS, "pressure": "Pa gauge", "stiffness": "N per unit of contraction", "resting_length": "m"},

@@ -12,7 +12,7 @@ from .columns import QUANTITIES
 _LETTERS = {"t": "time", "T": "temperature", "v": "speed", "V": "volume"}
 _SYNONYMS = {
     "p": "pressure", "druck": "pressure", "gauge_pressure": "pressure",
-    "f": "force", "load": "force", "tension": "force", "kraft": "force",
+    "f": "force", "load": "force", "tension": "force", "kraft": "force", "weight": "force",
     "k": "contraction", "eps": "contraction", "epsilon": "contraction", "ε": "contraction",
     "kontraktion": "contraction", "l": "length", "länge": "length", "y": "position",
     "displacement": "position", "velocity": "speed", "a": "acceleration", "zeit": "time",

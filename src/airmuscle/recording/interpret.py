@@ -7,49 +7,49 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from ..errors import ColumnError, UnitError, suggestion
-from ..units import AMBIENT_PRESSURE, Conversion, conversion, quantity
+from ..units import AMBIENT_PRESSURE, Conversion, conversion
+from .clock import seconds_from_clock
 from .columns import QUANTITIES
+from .constants import constant_of_column, stated_constants
 from .heading import SPELLINGS, Heading, known_name, read_heading
 from .plausible import refuse_implausible
 from .recording import Array, Recording
 from .table import Cells, RawTable
 
+STANDARD_GRAVITY = 9.80665
+"""What makes a load in kg a force [m/s2] (ISO 80000-3)."""
 
-def interpret(table: RawTable, *, units: Mapping[str, str], constants: Mapping[str, float | str]) -> Recording:
+
+def interpret(
+    table: RawTable, *, units: Mapping[str, str], constants: Mapping[str, float | str], ordered: bool = True
+) -> Recording:
     """The Recording that a table holds; `units` and `constants` given by the user go before the file's own.
 
+    Time that repeats or runs backwards is refused, unless `ordered` is false.
     Raises ColumnError or UnitError with file, row, value and remedy.
     """
-    constants = _constants(table, constants)
-    ambient = float(constants.get("ambient", AMBIENT_PRESSURE))
+    found = stated_constants(table, constants)
     headings = _headings(table, units)
+    for heading, cells in zip(headings, table.columns, strict=True):
+        if not heading.known and not isinstance(cells, list):
+            stated = constant_of_column(table, heading.text, heading.unit, cells)
+            found = {stated[0]: stated[1], **found} if stated else found
+    ambient = float(found.get("ambient", AMBIENT_PRESSURE))
     columns: dict[str, Array] = {}
     notes: list[str] = list(table.notes)
     for heading, cells in zip(headings, table.columns, strict=True):
         if heading.known:
-            converted, note = _in_si(table, heading, cells, ambient)
-            columns[heading.name] = converted
+            columns[heading.name], note = _in_si(table, heading, cells, ambient)
         else:
-            note = _kept(heading, cells, columns)
+            note = _kept(table, heading, cells, columns)
         notes += [note] if note and note not in notes else []
-    refuse_implausible(table, columns, constants.get("resting_length"), ambient)
-    return Recording(columns, table.origin, constants, tuple(notes))
-
-
-def _constants(table: RawTable, given: Mapping[str, float | str]) -> dict[str, Any]:
-    """The constants of the run, lengths and pressures in SI."""
-    found: dict[str, Any] = {**table.remarks, **given}
-    for name, unit in (("resting_length", "m"), ("ambient", "Pa")):
-        if name in found:
-            found[name] = quantity(found[name], unit, ambient=0.0, where=f"{table.origin}: {name}")
-            if not found[name] > 0:
-                raise ColumnError(f"{table.origin}: {name} is {found[name]:g} {unit}; it must be greater than zero.")
-    return found
+    refuse_implausible(table, columns, found.get("resting_length"), ambient, ordered=ordered)
+    written = {h.name: h.unit for h in headings if h.known and h.unit}
+    return Recording(columns, table.origin, found, tuple(notes), written)
 
 
 def _headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
@@ -95,6 +95,10 @@ def _refuse_all(table: RawTable, headings: list[Heading]) -> None:
 
 def _in_si(table: RawTable, heading: Heading, cells: Cells, ambient: float) -> tuple[Array, str]:
     """A known column in SI units, and a note where its unit left something open."""
+    if heading.name == "time" and isinstance(cells, list):
+        seconds = seconds_from_clock(cells)
+        if seconds is not None:
+            return seconds, f"The time is read from a clock and counted from its first instant, {cells[0]}."
     change = _conversion(table, heading, ambient)
     values = _numbers(table, heading, cells)
     if change.assumed_gauge:
@@ -102,6 +106,9 @@ def _in_si(table: RawTable, heading: Heading, cells: Cells, ambient: float) -> t
         return change(values), f"The {heading.name} is taken as gauge: its {said}"
     if heading.unit is None:
         return values, f"The {heading.name} has no unit and is taken as a ratio."
+    if heading.target == "N" and _is_mass(heading.unit):
+        said = f"stated in {heading.unit}; it is taken as a weight under standard gravity, {STANDARD_GRAVITY} m/s2."
+        return change(values), f"The {heading.name} is {said}"
     return change(values), ""
 
 
@@ -117,12 +124,23 @@ def _conversion(table: RawTable, heading: Heading, ambient: float) -> Conversion
             f"or give units={{'{heading.name}': ...}}; usual are {usual}."
         )
     try:
+        if target == "N" and _is_mass(heading.unit):
+            return Conversion(conversion(heading.unit, "kg").factor * STANDARD_GRAVITY)
         return conversion(heading.unit, target, ambient=ambient, where=where)
     except UnitError as reason:
         cases = {spelling.lower(): spelling for spelling in SPELLINGS[target]}
         near = difflib.get_close_matches(heading.unit.lower(), cases, n=1)
         hint = f" Did you mean '{cases[near[0]]}'?" if near else f" The {heading.name} is usually in {usual}."
         raise UnitError(f"{reason}{hint}") from None
+
+
+def _is_mass(unit: str) -> bool:
+    if unit in SPELLINGS["N"]:
+        return False
+    try:
+        return bool(conversion(unit, "kg"))
+    except UnitError:
+        return False
 
 
 def _numbers(table: RawTable, heading: Heading, cells: Cells) -> Array:
@@ -147,12 +165,15 @@ def _numbers(table: RawTable, heading: Heading, cells: Cells) -> Array:
     return values
 
 
-def _kept(heading: Heading, cells: Cells, columns: dict[str, Array]) -> str:
+def _kept(table: RawTable, heading: Heading, cells: Cells, columns: dict[str, Array]) -> str:
     """Keep an unknown column as it is where it holds numbers; the note on it, if any."""
     if isinstance(cells, list):
         if not any(cells):
             return ""
         return f"Column '{heading.text}' holds text and is left out."
+    stated = constant_of_column(table, heading.text, heading.unit, cells)
+    if stated:
+        return f"Column '{heading.text}' holds one value and states the {stated[0]}: {stated[1]:.9g} (SI)."
     columns[heading.text or "unnamed"] = cells
     near = difflib.get_close_matches(heading.text.partition(" ")[0].lower(), QUANTITIES, n=1)
     hint = f" Did you mean '{near[0]}'?" if near else ""

@@ -15,12 +15,17 @@ CONTRACTIONS = (-0.5, 1.0)
 
 
 def refuse_implausible(
-    table: RawTable, columns: Mapping[str, Array], resting_length: float | None, ambient: float
+    table: RawTable,
+    columns: Mapping[str, Array],
+    resting_length: float | None,
+    ambient: float,
+    *,
+    ordered: bool = True,
 ) -> None:
     """Raise ColumnError, with the row and the value, for the first value that no bench can have measured."""
     for name, values in columns.items():
         quantity = name.rpartition(".")[2]
-        if quantity == "time":
+        if quantity == "time" and ordered:
             _refuse_unordered(table, values)
         elif quantity == "pressure":
             _refuse_vacuum(table, values, ambient)

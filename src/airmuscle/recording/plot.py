@@ -28,7 +28,7 @@ def plot_recording(recording: Recording, names: Sequence[str] = ()) -> Any:
         max(len(chosen), 1), 1, height=0.7 + 1.15 * max(len(chosen), 1), sharex=True, squeeze=False
     )
     for i, (name, axis) in enumerate(zip(chosen, axes[:, 0], strict=False)):
-        factor, unit = _scale(name)
+        factor, unit = scale(name)
         axis.plot(across, recording[name] * factor, color=LINES[i % len(LINES)], **style)
         axis.set_ylabel(f"{name}\n[{unit}]" if unit else name)
     axes[-1, 0].set_xlabel("time [s]" if timed else "row")
@@ -37,7 +37,8 @@ def plot_recording(recording: Recording, names: Sequence[str] = ()) -> Any:
     return figure
 
 
-def _scale(name: str) -> tuple[float, str]:
+def scale(name: str) -> tuple[float, str]:
+    """The factor and the unit in which a column is shown."""
     quantity = quantity_of(name)
     if quantity is None:
         return 1.0, ""

@@ -23,13 +23,15 @@ class Recording:
     """Columns in SI units, each of shape (N,), that share their rows.
 
     `constants` hold what does not change in the run (resting_length [m], ambient [Pa], specimen);
-    `origin` is a file's name, or how it was simulated; `notes` are what the reader should know of it.
+    `origin` is a file's name, or how it was simulated; `notes` are what the reader should know of it; `units` are
+    those that a file stated, before its columns became SI.
     """
 
     columns: Mapping[str, Array]
     origin: str
     constants: Mapping[str, float | str] = dataclasses.field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         arrays = {name: np.asarray(values, dtype=float) for name, values in self.columns.items()}

@@ -1,0 +1,24 @@
+"""How far the reading of long files has come, on a terminal and there only."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+
+
+@contextlib.contextmanager
+def reading_progress() -> Iterator[Callable[[str, float], None]]:
+    """A function for `read(progress=...)` that draws a bar on stderr while the block lasts."""
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        tasks: dict[str, TaskID] = {}
+
+        def show(name: str, part: float) -> None:
+            task = tasks.get(name)
+            if task is None:
+                task = tasks[name] = bar.add_task(f"reading {name}", total=1.0)
+            bar.update(task, completed=part)
+
+        yield show

@@ -1,0 +1,146 @@
+"""What a file does not say of itself: which column is which quantity, in which unit, of which muscle.
+
+resting_length = "300 mm"
+decimal = ","
+
+[columns]
+"Channel 1" = "pressure [bara]"
+"Channel 2" = { quantity = "force", unit = "kg" }
+3 = "length [mm]"
+spare = ""
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..errors import ColumnError, FileError, ParameterError, suggestion
+from .columns import QUANTITIES
+from .constants import constant_name
+from .heading import read_heading
+from .table import RawTable
+from .text_form import TextForm
+
+CONSTANTS = ("resting_length", "ambient", "specimen", "run")
+"""Constants of a run that a mapping may state."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ColumnMapping:
+    """How to read files of one kind. Whatever is left out is what the file itself says.
+
+    `columns` gives columns, by heading or by number from 1, a heading as a file would have it, `pressure [bara]`;
+    an empty one leaves the column out. `constants` are those of the run. `delimiter` and `decimal` are of text
+    files, `sheet` of Excel, `group` of MAT, TDMS and MDF.
+    """
+
+    columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    constants: Mapping[str, float | str] = dataclasses.field(default_factory=dict)
+    delimiter: str | None = None
+    decimal: str | None = None
+    sheet: str | None = None
+    group: str | None = None
+
+    def __post_init__(self) -> None:
+        for column, heading in self.columns.items():
+            if heading and not (read_heading(heading).known or constant_name(heading)):
+                name = heading.partition("[")[0].strip()
+                raise ColumnError(
+                    f"mapping: column '{column}' is mapped to '{heading}', which is no known quantity; known are "
+                    f"{', '.join(QUANTITIES)}, resting_length.{suggestion(name, QUANTITIES)}"
+                )
+
+    @property
+    def text_form(self) -> TextForm:
+        """What of it a reader of text must know."""
+        return TextForm(self.delimiter, self.decimal, headless=any(c.isdecimal() for c in self.columns))
+
+    def with_given(self, **given: Any) -> ColumnMapping:
+        """This mapping with what is not None put in its place; columns and constants are added."""
+        stated = {name: value for name, value in given.items() if value is not None}
+        columns = {**self.columns, **{str(k): v for k, v in stated.pop("columns", {}).items()}}
+        constants = {**self.constants, **{name: stated.pop(name) for name in CONSTANTS if name in stated}}
+        return dataclasses.replace(self, columns=columns, constants=constants, **stated)
+
+
+def read_mapping(path: str | Path) -> ColumnMapping:
+    """A mapping from a TOML file. Raises FileError, ParameterError or ColumnError."""
+    path = Path(path)
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as reason:
+        raise FileError(f"{path}: cannot be read ({reason.strerror}). Check the name and the folder.") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as reason:
+        raise FileError(f"{path.name}: is no TOML file ({reason}).") from None
+    known = ("columns", *CONSTANTS, "delimiter", "decimal", "sheet", "group")
+    for key, value in content.items():
+        if key not in known:
+            raise ParameterError(
+                f"{path.name}: '{key}' is nothing a mapping states; it may state {', '.join(known)}."
+                f"{suggestion(key, known)}"
+            )
+        if key not in ("columns", *CONSTANTS) and not isinstance(value, str):
+            raise ParameterError(f"{path.name}: {key} = {value!r}; it must be a text in quotes.")
+    columns = content.pop("columns", {})
+    if not isinstance(columns, dict):
+        raise ParameterError(f"{path.name}: columns must be a table: [columns], then a line for each column.")
+    headings = {name: _heading(path, name, value) for name, value in columns.items()}
+    return ColumnMapping().with_given(columns=headings, **content)
+
+
+def _heading(path: Path, column: str, value: Any) -> str:
+    """`pressure [bara]` from that text itself or from `{quantity = "pressure", unit = "bara"}`."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, dict) and isinstance(value.get("quantity"), str) and set(value) <= {"quantity", "unit"}:
+        return f"{value['quantity']} [{value['unit']}]" if value.get("unit") else value["quantity"]
+    raise ParameterError(
+        f"{path.name}: column '{column}' is mapped to {value!r}; write 'pressure [bara]' or "
+        '{ quantity = "pressure", unit = "bara" }.'
+    )
+
+
+def mapped(table: RawTable, mapping: ColumnMapping) -> RawTable:
+    """The table with the headings that a mapping gives; a note for each column says so.
+
+    Raises ColumnError where the mapping names a column that is not there.
+    """
+    places = {_place(table, column): heading for column, heading in mapping.columns.items()}
+    headings, units = list(table.headings), list(table.units or ("",) * len(table.headings))
+    notes = list(table.notes)
+    for place, heading in places.items():
+        said = f"read as {heading}" if heading else "left out"
+        notes.append(f"Column '{table.headings[place]}' is {said}, as the mapping says.")
+        headings[place] = heading
+        units[place] = "" if _has_unit(heading) else units[place]
+    kept = [i for i in range(len(headings)) if places.get(i, "kept")]
+    return dataclasses.replace(
+        table,
+        headings=tuple(headings[i] for i in kept),
+        units=tuple(units[i] for i in kept if i < len(units)) if table.units else None,
+        columns=tuple(table.columns[i] for i in kept),
+        notes=tuple(notes),
+    )
+
+
+def _has_unit(heading: str) -> bool:
+    constant = constant_name(heading)
+    return bool(constant[1]) if constant else read_heading(heading).unit is not None
+
+
+def _place(table: RawTable, column: str) -> int:
+    """Where a column stands: by its heading, by what of it is a name, by its number."""
+    bare = [text.partition("[")[0].partition("(")[0].strip() for text in table.headings]
+    for names in (list(table.headings), bare):
+        if names.count(column) == 1:
+            return names.index(column)
+    if column.isdecimal() and 1 <= int(column) <= len(table.headings):
+        return int(column) - 1
+    raise ColumnError(
+        f"{table.origin}: the mapping names column '{column}', but there are {', '.join(table.headings)}."
+        f"{suggestion(column, table.headings)}"
+    )

@@ -1,0 +1,53 @@
+"""MDF 3 and 4, the format of ASAM: groups of channels, each group with a time of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FileError, suggestion
+from .common_rows import Channel, common_rows
+from .lab_package import lab_package, opened
+from .table import RawTable
+
+_TIME = 1
+"""The kind of a master channel that is a time, in both versions of the format."""
+
+
+def raw_mdf(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
+    """The table of all channels, or of one channel group by its name. Raises FileError or ColumnError."""
+    asammdf = lab_package("asammdf", path)
+
+    def read() -> tuple[RawTable, ...]:
+        with asammdf.MDF(path) as file:
+            names = [_group_name(g, i) for i, g in enumerate(file.groups)]
+            if group is not None and group not in names:
+                there = f"there are {', '.join(names)}.{suggestion(group, names)}"
+                raise FileError(f"{path.name}: no group '{group}'; {there}")
+            chosen = [i for i, name in enumerate(names) if group in (None, name)]
+            return (common_rows(path.name, list(_channels(file, chosen)), {}),)
+
+    return opened(path, "MDF", read)
+
+
+def _group_name(group: Any, index: int) -> str:
+    return str(getattr(group.channel_group, "acq_name", "") or f"group {index + 1}")
+
+
+def _channels(file: Any, groups: list[int]) -> Iterator[Channel]:
+    for i in groups:
+        master = file.masters_db.get(i)
+        timed = master is not None and _is_time(file.groups[i].channels[master])
+        for j, channel in enumerate(file.groups[i].channels):
+            if j == master and timed:
+                continue
+            signal = file.get(group=i, index=j)
+            time = np.asarray(signal.timestamps, dtype=float) if timed else None
+            yield Channel(channel.name, signal.samples, time, signal.unit or "")
+
+
+def _is_time(master: Any) -> bool:
+    return getattr(master, "sync_type", _TIME) == _TIME

@@ -1,0 +1,60 @@
+"""TDMS, the format of LabVIEW: a group of channels is a table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FileError, suggestion
+from .common_rows import Channel, common_rows
+from .lab_package import lab_package, opened
+from .recording import Array
+from .table import RawTable
+
+
+def raw_tdms(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
+    """A table for every group that holds channels, or for the one named. Raises FileError or ColumnError."""
+    nptdms = lab_package("nptdms", path)
+
+    def read() -> tuple[RawTable, ...]:
+        with nptdms.TdmsFile.open(path) as file:
+            filled = {g.name: g for g in file.groups() if any(len(c) for c in g.channels())}
+            chosen = _chosen(path, filled, group)
+            several = len(chosen) > 1
+            return tuple(_table(path, g, dict(file.properties), several) for g in chosen)
+
+    return opened(path, "TDMS", read)
+
+
+def _chosen(path: Path, groups: dict[str, Any], name: str | None) -> list[Any]:
+    if not groups:
+        raise FileError(f"{path.name}: the file holds no channel with values.")
+    if name is None:
+        return list(groups.values())
+    if name not in groups:
+        raise FileError(f"{path.name}: no group '{name}'; there are {', '.join(groups)}.{suggestion(name, groups)}")
+    return [groups[name]]
+
+
+def _table(path: Path, group: Any, properties: dict[str, Any], several: bool) -> RawTable:
+    stated = {**properties, **group.properties}
+    remarks = {name: value for name, value in stated.items() if isinstance(value, float | int | str)}
+    remarks = {name: value for name, value in remarks.items() if name not in ("name", "description", "title", "author")}
+    origin = f"{path.name}, group '{group.name}'" if several else path.name
+    return common_rows(origin, [_channel(c) for c in group.channels()], remarks)
+
+
+def _channel(channel: Any) -> Channel:
+    unit = str(channel.properties.get("unit_string") or channel.properties.get("NI_UnitDescription") or "")
+    return Channel(channel.name, channel[:], _time(channel), unit)
+
+
+def _time(channel: Any) -> Array | None:
+    """The times of a waveform; a step of zero is what LabVIEW writes for a channel that is none."""
+    step = float(channel.properties.get("wf_increment", 0.0))
+    if not step > 0.0:
+        return None
+    start = float(channel.properties.get("wf_start_offset", 0.0))
+    return np.asarray(start + step * np.arange(len(channel)))

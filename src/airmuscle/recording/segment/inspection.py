@@ -1,0 +1,68 @@
+"""All that can be told of a recording before anything is fitted."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..recording import Recording
+from .branches import Branch, agreement, branches
+from .findings import Finding, findings
+from .outliers import Outlier, outliers
+from .plateaus import Plateau, plateaus
+from .quasi_static import quasi_static
+from .runs import Run, runs
+from .sampling import Sampling, sampling
+from .sensor import Sensor, sensors
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Inspection:
+    """What a recording holds: its sampling, sensors, runs, branches, plateaus, suspected glitches, and findings."""
+
+    recording: Recording
+    sampling: Sampling | None
+    sensors: Mapping[str, Sensor]
+    runs: tuple[Run, ...]
+    branches: tuple[Branch, ...]
+    plateaus: tuple[Plateau, ...]
+    outliers: tuple[Outlier, ...]
+    quasi_static: float
+    """The part of the rows that is quasi-static."""
+    branch_agreement: float | None
+    """The part of the rows on which the file's own branch column says the same; None without one."""
+    findings: tuple[Finding, ...]
+
+    def plot(self) -> Any:
+        """Pressure, force and length over time with branches, plateaus, glitches and cut-offs; a Matplotlib figure."""
+        from .plot import plot_inspection
+
+        return plot_inspection(self)
+
+
+def inspect(recording: Recording, sensed: Mapping[str, Sensor] | None = None) -> Inspection:
+    """What a recording holds. `sensed` are the sensors of the rig, where several recordings show them better."""
+    known = {**sensors(recording), **{n: s for n, s in (sensed or {}).items() if n in recording.columns}}
+    timing = sampling(recording)
+    found = runs(recording, known)
+    ordered = timing is None or not (timing.repeats or timing.backward)
+    turned = branches(recording, known.get("pressure"))
+    return Inspection(
+        recording,
+        timing,
+        known,
+        found,
+        turned,
+        plateaus(recording, known) if ordered else (),
+        outliers(recording, known),
+        float(quasi_static(recording, known).mean()) if len(recording) else 0.0,
+        agreement(recording, turned) if turned else None,
+        findings(recording, timing, known, found),
+    )
+
+
+def inspect_all(recordings: Sequence[Recording]) -> tuple[Inspection, ...]:
+    """The inspections of recordings from one rig, whose sensors are estimated together."""
+    together = sensors(recordings)
+    return tuple(inspect(recording, together) for recording in recordings)

@@ -1,0 +1,67 @@
+"""Plateaus: stretches in which pressure, length and force rest, each good for one static point."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..recording import Array, Recording
+from .quasi_static import CHANGE, quasi_static
+from .sampling import row_count
+from .sensor import Sensor, sensors
+from .stretch import Stretch, level_stretches, true_stretches
+
+LEAST = 0.2
+"""The shortest plateau [s] (chosen)."""
+FEWEST = 3
+"""The fewest rows of one (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Plateau:
+    """Where a plateau is, and for each column its median and the standard deviation of that mean [SI]."""
+
+    stretch: Stretch
+    values: Mapping[str, float]
+    deviations: Mapping[str, float]
+
+
+def plateaus(
+    recording: Recording, sensed: Mapping[str, Sensor] | None = None, *, least: float = LEAST
+) -> tuple[Plateau, ...]:
+    """The plateaus of the pressure among the quasi-static rows; none without time, and none on a slow ramp.
+
+    A plateau stays within twice the change that is quasi-static, and does not run through it from end to end.
+    """
+    if "time" not in recording or "pressure" not in recording or len(recording) < FEWEST:
+        return ()
+    pressure, sensed = recording["pressure"], sensed or sensors(recording)
+    band = max(2.0 * CHANGE * float(np.ptp(pressure)), 8.0 * sensed["pressure"].deviation)
+    fewest = max(FEWEST, row_count(least, recording["time"], FEWEST))
+    return tuple(
+        _plateau(recording, stretch)
+        for calm in true_stretches(quasi_static(recording, sensed))
+        for stretch in level_stretches(pressure, band, within=calm)
+        if len(stretch) >= fewest and not _runs_through(pressure[stretch.rows], band)
+    )
+
+
+def _runs_through(pressure: Array, band: float) -> bool:
+    third = max(len(pressure) // 3, 1)
+    return bool(abs(np.median(pressure[-third:]) - np.median(pressure[:third])) > 0.4 * band)
+
+
+def _plateau(recording: Recording, stretch: Stretch) -> Plateau:
+    rows = {name: recording[name][stretch.rows] for name in recording}
+    values = {name: float(np.median(values)) for name, values in rows.items()}
+    count = np.sqrt(len(stretch))
+    return Plateau(stretch, values, {name: float(np.std(values) / count) for name, values in rows.items()})
+
+
+def plateau_points(recording: Recording, found: tuple[Plateau, ...]) -> Recording:
+    """A recording with one row for each plateau: what a static fit of a stepped test should see."""
+    columns = {name: np.array([p.values[name] for p in found]) for name in recording}
+    note = f"{len(found)} plateaus stand for {sum(len(p.stretch) for p in found)} of {len(recording)} rows."
+    return dataclasses.replace(recording, columns=columns, notes=(*recording.notes, note))

@@ -1,0 +1,51 @@
+"""Which rows show the muscle at rest or moving slowly, and which a transient.
+
+A row is quasi-static where the pressure, and the length where it is measured, change within the time `settling` by
+no more than `change` of their range, or than the noise explains. Both numbers are chosen: 0.1 s is what a muscle of
+ordinary size takes to follow its pressure, one in a hundred is what a static fit does not see.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..recording import Array, Recording
+from .sampling import row_count
+from .sensor import Sensor, sensors
+from .stretch import Mask
+
+SETTLING = 0.1
+CHANGE = 0.01
+_MOVING = ("pressure", "contraction", "length", "position")
+
+
+def quasi_static(
+    recording: Recording,
+    sensed: Mapping[str, Sensor] | None = None,
+    *,
+    settling: float = SETTLING,
+    change: float = CHANGE,
+) -> Mask:
+    """By row, whether it is quasi-static. Without time, every row is taken as a settled point."""
+    calm = np.ones(len(recording), dtype=bool)
+    if "time" not in recording or len(recording) < 3:
+        return calm
+    time = recording["time"]
+    width = row_count(settling, time, 1)
+    sensed = sensed or sensors(recording)
+    for name in recording:
+        if name.rpartition(".")[2] in _MOVING and name in sensed:
+            calm &= ~_moves(recording[name], width, change, sensed[name])
+    return calm
+
+
+def _moves(values: Array, width: int, change: float, sensor: Sensor) -> Mask:
+    """Whether a value changes too much from `width` rows before, or to as many behind: settled is both."""
+    allowed = max(change * float(np.ptp(values)), 4.0 * sensor.deviation)
+    step = np.abs(values[width:] - values[:-width]) if width < len(values) else np.empty(0)
+    moves = np.zeros(len(values), dtype=bool)
+    moves[: len(step)] |= step > allowed
+    moves[width:] |= step > allowed
+    return moves

@@ -1,0 +1,67 @@
+"""Stretches of rows in which a quantity stays within a band."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from ..recording import Array
+
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclasses.dataclass(frozen=True)
+class Stretch:
+    """Rows `start` to before `stop`, counted from 0."""
+
+    start: int
+    stop: int
+
+    def __len__(self) -> int:
+        return self.stop - self.start
+
+    @property
+    def rows(self) -> slice:
+        """The rows as a slice, to index columns and Recording.rows with."""
+        return slice(self.start, self.stop)
+
+
+def true_stretches(mask: Mask) -> list[Stretch]:
+    """The stretches in which a mask is true."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return [Stretch(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def level_stretches(values: Array, band: float, *, within: Stretch | None = None) -> Iterator[Stretch]:
+    """The longest stretches, from the front, whose values all fit into a band of this width."""
+    whole = within or Stretch(0, len(values))
+    start = whole.start
+    while start < whole.stop:
+        stop = _leaves_band(values[: whole.stop], start, band)
+        yield Stretch(start, stop)
+        start = stop
+
+
+def _leaves_band(values: Array, start: int, band: float) -> int:
+    """The first row from `start` on with which the values no longer fit; looked for in windows that double."""
+    size = 64
+    while True:
+        window = values[start : start + size]
+        outside = np.maximum.accumulate(window) - np.minimum.accumulate(window) > band
+        if outside.any():
+            return start + int(np.argmax(outside))
+        if start + size >= len(values):
+            return len(values)
+        size *= 2
+
+
+def running_median(values: Array, width: int) -> Array:
+    """The median over `width` rows around each, an odd number; the ends see the rows that there are."""
+    if width < 3 or len(values) < 3:
+        return values
+    import pandas as pd
+
+    return np.asarray(pd.Series(values).rolling(width, center=True, min_periods=1).median(), dtype=float)

@@ -1,0 +1,394 @@
+"""What a recording consists of is found from the recording itself: synthetic truth comes back.
+
+Branches follow from the pressure's history alone; a rest belongs to the branch that led to it. A sensor's resolution
+is the step of its readings, its end the reading at which they stop flickering. Glitches are listed, never removed;
+the overshoot of a step is none.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from airmuscle.errors import ColumnError
+from airmuscle.recording import Recording
+from airmuscle.recording.segment import (
+    AT_REST,
+    FREE,
+    ISOBARIC,
+    ISOMETRIC,
+    ISOTONIC,
+    branches,
+    directions,
+    inspect,
+    inspect_all,
+    outliers,
+    plateau_points,
+    plateaus,
+    quasi_static,
+    refuse_unswept,
+    runs,
+    sampling,
+    sensors,
+)
+from airmuscle.recording.segment.branches import agreement
+from airmuscle.recording.segment.sensor import noise_of, resolution_of
+
+STEP = 0.05
+RANDOM = np.random.default_rng
+
+
+def staircase(levels: list[float], rows: int = 10, overshoot: float = 0.0) -> np.ndarray:
+    """Plateaus of `rows` rows; the first row of each shoots over by a part of the step."""
+    pressure = np.repeat(np.asarray(levels, dtype=float), rows)
+    for i in range(1, len(levels)):
+        pressure[i * rows] += overshoot * (levels[i] - levels[i - 1])
+    return pressure
+
+
+def timed(pressure: np.ndarray, **columns: np.ndarray) -> Recording:
+    return Recording({"time": STEP * np.arange(len(pressure)), "pressure": pressure, **columns}, "synthetic")
+
+
+def bench(seed: int = 1, noise: float = 400.0) -> tuple[Recording, int]:
+    """A stepped isometric run up and down with noise, rounding and a cut-off; and the row at which it turns."""
+    up, down = np.linspace(0, 6e5, 25), np.linspace(5.4e5, 5e4, 20)
+    pressure = staircase([*up, *down], 10, overshoot=0.6)
+    random = RANDOM(seed)
+    force = np.maximum(1.5e-3 * pressure - 300.0 + random.normal(0, 0.8, len(pressure)), -9.0)
+    pressure = pressure + random.normal(0, noise, len(pressure))
+    rounded = {"pressure": 765.0 * np.round(pressure / 765.0), "force": 0.68 * np.round(force / 0.68)}
+    return timed(rounded["pressure"], force=rounded["force"], length=np.full(len(pressure), 0.25)), 250
+
+
+# Branches
+
+
+def test_a_stepped_ramp_with_overshoots_has_one_turn_at_the_last_row_of_the_top():
+    recording, turn = bench()
+    up, down = branches(recording)
+    assert (up.direction, up.name, up.stretch.start, up.stretch.stop) == (1, "inflating", 0, turn)
+    assert (down.direction, down.name, down.stretch.stop) == (-1, "deflating", len(recording))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    turns=st.lists(st.floats(0.2, 1.0), min_size=1, max_size=6),
+    rows=st.integers(15, 60),
+    rest=st.integers(0, 40),
+    first=st.sampled_from([1, -1]),
+    seed=st.integers(0, 99),
+)
+def test_every_turn_of_a_random_history_is_found(turns, rows, rest, first, seed):
+    corners = np.cumsum([0.0, *(first * (-1) ** i * part * 5e5 for i, part in enumerate(turns))])
+    corners += 1e5 - corners.min()
+    parts, truth = [], []
+    for i, (a, b) in enumerate(itertools.pairwise(corners)):
+        parts += [np.linspace(a, b, rows, endpoint=False), np.full(rest, b)]
+        truth += [first * (-1.0) ** i] * (rows + rest)
+    pressure = np.concatenate(parts)
+    measured = pressure + RANDOM(seed).normal(0, 200.0, len(pressure))
+    found = branches(timed(measured))
+    assert [b.direction for b in found] == [first * (-1) ** i for i in range(len(turns))]
+    slack = 0.6 * 0.05 * np.ptp(pressure) / (0.2 * 5e5 / rows) + 2  # rows that half a swing takes at the least slope
+    differing = np.count_nonzero(directions(timed(measured), found) != truth)
+    assert differing <= len(turns) * slack
+
+
+@settings(max_examples=30, deadline=None)
+@given(scale=st.floats(1e-2, 1e2), shift=st.floats(-5e4, 1e6), stretch=st.floats(0.5, 2.0))
+def test_branches_do_not_depend_on_unit_or_zero_of_the_pressure(scale: float, shift: float, stretch: float):
+    recording, _ = bench()
+    other = recording.with_columns(pressure=recording["pressure"] * scale + shift)
+    cut = [(b.direction, b.stretch) for b in branches(recording)]
+    assert [(b.direction, b.stretch) for b in branches(other)] == cut
+
+
+def test_turning_the_pressure_over_turns_the_branches_over():
+    recording, turn = bench()
+    found = branches(recording.with_columns(pressure=6e5 - recording["pressure"]))
+    assert [b.direction for b in found] == [-1, 1]
+    assert found[0].stretch.stop == turn
+
+
+def test_a_minor_loop_is_found_and_a_ripple_is_not():
+    loop = np.concatenate([np.linspace(0, 4e5, 80), np.linspace(4e5, 3e5, 30), np.linspace(3e5, 6e5, 60)])
+    assert [b.direction for b in branches(timed(loop))] == [1, -1, 1]
+    ripple = np.linspace(0, 6e5, 300) + 1.2e4 * np.sin(np.arange(300) * 0.5)
+    assert [b.direction for b in branches(timed(ripple))] == [1]
+    assert len(branches(timed(loop), swing=0.3)) == 1
+
+
+def test_a_saw_tooth_has_a_deflating_branch_of_a_row_or_two_at_each_fall():
+    tooth = np.tile(np.linspace(0, 6e5, 200), 4)
+    found = branches(timed(tooth))
+    assert [b.direction for b in found] == [1, -1, 1, -1, 1, -1, 1]
+    assert all(len(b.stretch) < 10 for b in found[1::2])
+
+
+def test_constant_pressure_and_no_pressure_have_no_branch():
+    assert (
+        branches(timed(2e5 + RANDOM(0).normal(0, 300, 200)), sensors(timed(RANDOM(0).normal(0, 300, 200)))["pressure"])
+        == ()
+    )
+    assert branches(Recording({"force": np.arange(9.0)}, "x")) == ()
+
+
+def test_a_branch_column_judges_and_decides_nothing():
+    recording, turn = bench()
+    stated = np.where(np.arange(len(recording)) < turn - 9, 1.0, 2.0)
+    judged = recording.with_columns(branch=stated)
+    assert branches(judged) == branches(recording)
+    assert agreement(judged, branches(judged)) == pytest.approx(1.0 - 9 / len(recording))
+    assert agreement(recording, branches(recording)) is None
+
+
+# Sensors
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    step=st.floats(1e-3, 1e3),
+    noise=st.floats(0.4, 3.0),
+    offset=st.floats(-1.0, 1.0),
+    twins=st.booleans(),
+    seed=st.integers(0, 99),
+)
+def test_the_step_of_readings_is_found_and_a_changing_last_digit_does_not_hide_it(step, noise, offset, twins, seed):
+    course = 60.0 * np.sin(np.linspace(0, 9, 800)) + RANDOM(seed).normal(0, noise, 800)
+    counts = np.round(course)
+    values = step * (counts + offset)
+    if twins:
+        values = values + 0.01 * step * RANDOM(seed).integers(0, 2, 800)
+    assert resolution_of(values) == pytest.approx(step, rel=0.01)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 999), size=st.integers(30, 2000))
+def test_continuous_readings_have_no_step(seed: int, size: int):
+    values = RANDOM(seed).normal(0, 1, size).cumsum()
+    found = resolution_of(values)
+    assert found < 0.02 * np.ptp(values) / np.sqrt(size), "chance leaves at most a step far below the noise"
+
+
+def test_a_few_settings_of_a_test_are_no_resolution():
+    assert resolution_of(np.repeat(np.arange(0, 7e5, 1e5), 30)) == 0.0
+    assert resolution_of(np.full(50, 3.0)) == 0.0
+
+
+@settings(max_examples=30, deadline=None)
+@given(sigma=st.floats(1e-3, 1e3), seed=st.integers(0, 99))
+def test_noise_is_told_from_the_course(sigma: float, seed: int):
+    course = 1e3 * sigma * np.sin(np.linspace(0, 6, 2000))
+    noise = RANDOM(seed).normal(0, sigma, 2000)
+    noise[::100] += 50.0 * sigma
+    assert noise_of(course + noise) == pytest.approx(sigma, rel=0.15)
+
+
+def test_resolution_and_cut_off_of_a_bench_are_found():
+    recording, _ = bench()
+    found = sensors(recording)
+    assert found["pressure"].resolution == pytest.approx(765.0, rel=1e-3)
+    assert found["force"].resolution == pytest.approx(0.68, rel=1e-3)
+    assert found["force"].least == pytest.approx(recording["force"].min())
+    assert np.isinf(found["force"].greatest)
+    assert np.isinf(found["pressure"].least)
+    assert "time" not in found
+    sides = found["force"].sides(recording["force"])
+    assert np.array_equal(sides == 1, recording["force"] < -8.7)
+    assert not (sides == -1).any()
+    assert found["force"].deviation == pytest.approx(np.hypot(found["force"].noise, 0.68 / np.sqrt(12)), rel=1e-3)
+
+
+def test_a_saturated_sensor_is_found_at_its_upper_end():
+    recording, _ = bench()
+    full = np.minimum(recording["force"], recording["force"][180])
+    found = sensors(recording.with_columns(force=full))["force"]
+    assert (found.least, found.greatest) == (full.min(), full.max())
+    assert found.noise == pytest.approx(sensors(recording)["force"].noise, rel=0.3), "cut-off rows hide no noise"
+    assert found.at_greatest == np.count_nonzero(full == full.max())
+    few, many = (np.minimum(recording["force"], recording["force"][row]) for row in (180, 80))
+    for values, serious in ((few, False), (many, True)):
+        said = [f for f in inspect(recording.with_columns(force=values)).findings if "greatest reading" in f.text]
+        assert [f.serious for f in said] == [serious]
+        assert "Such rows are bounds, not values." in said[0].text
+
+
+def test_what_rests_without_flicker_or_with_it_on_both_sides_is_not_cut_off():
+    vented = timed(np.maximum(np.concatenate([np.zeros(200), np.linspace(0, 5e5, 300)]), 0.0))
+    assert np.isinf(sensors(vented)["pressure"].least), "a sensor without noise does not show its end"
+    noisy = timed(765.0 * np.round((vented["pressure"] + RANDOM(4).normal(0, 600, 500)) / 765.0))
+    assert np.isinf(sensors(noisy)["pressure"].least)
+
+
+def test_several_runs_of_a_rig_show_an_end_that_one_hardly_reaches():
+    reaching, _ = bench(1)
+    rows = np.concatenate([np.flatnonzero(reaching["force"] <= reaching["force"].min())[:2], np.arange(150, 380)])
+    hardly = reaching.rows(np.sort(rows))
+    assert np.isinf(sensors(hardly)["force"].least)
+    seen = inspect_all([reaching, hardly])
+    assert seen[1].sensors["force"].least == pytest.approx(reaching["force"].min())
+
+
+# Plateaus and transients
+
+
+def test_the_plateaus_of_a_staircase_are_its_steps():
+    recording, _ = bench()
+    found = plateaus(recording)
+    steps = {p.stretch.start // 10 for p in found}
+    assert len(found) == len(steps) == 45
+    levels = [*np.linspace(0, 6e5, 25), *np.linspace(5.4e5, 5e4, 20)]
+    for plateau in found:
+        assert plateau.values["pressure"] == pytest.approx(levels[plateau.stretch.start // 10], abs=900.0)
+        assert plateau.stretch.stop <= 10 * (plateau.stretch.start // 10 + 1)
+    points = plateau_points(recording, found)
+    assert len(points) == 45
+    assert "45 plateaus stand for" in points.notes[-1]
+
+
+def test_a_slow_ramp_is_quasi_static_and_no_plateau_a_fast_one_is_neither():
+    slow = timed(np.linspace(0, 6e5, 600))
+    assert quasi_static(slow).all()
+    assert plateaus(slow) == ()
+    fast = timed(np.concatenate([np.zeros(50), np.linspace(0, 6e5, 20), np.full(50, 6e5)]))
+    calm = quasi_static(fast)
+    assert not calm[50:70].any()
+    assert calm[:47].all()
+    assert calm[73:].all()
+    assert [p.values["pressure"] for p in plateaus(fast)] == pytest.approx([0.0, 6e5], abs=1.0)
+
+
+def test_points_without_time_are_all_settled():
+    table = Recording({"pressure": np.array([0.0, 3e5, 1e5]), "force": np.zeros(3)}, "table")
+    assert quasi_static(table).all()
+    assert plateaus(table) == ()
+    assert outliers(table) == ()
+    assert sampling(table) is None
+
+
+# Glitches
+
+
+@settings(max_examples=60, deadline=None)
+@given(rows=st.sets(st.integers(1, 44), min_size=1, max_size=5), sign=st.sampled_from([1, -1]), seed=st.integers(0, 9))
+def test_planted_glitches_are_listed_and_stay_in_the_recording(rows: set[int], sign: int, seed: int):
+    recording, _ = bench(seed)
+    force = recording["force"].copy()
+    planted = {10 * step + 5 for step in rows if force[10 * step + 1] > -7.0}
+    for row in planted:
+        force[row] += sign * 40.0
+    spoilt = recording.with_columns(force=force)
+    found = {o.row for o in outliers(spoilt) if o.column == "force"}
+    assert planted <= found
+    assert len(found - planted) <= 1
+    assert np.array_equal(inspect(spoilt).recording["force"], force), "listed, not removed"
+    for outlier in outliers(spoilt):
+        if outlier.row in planted and outlier.column == "force":
+            assert outlier.expected == pytest.approx(recording["force"][outlier.row], abs=4.0)
+
+
+def test_a_glitch_of_two_rows_is_found_and_the_overshoot_of_a_step_is_not():
+    noise = RANDOM(3).normal(0, 300.0, 200)
+    step = np.where(np.arange(200) < 100, 1e5, 3e5) + noise
+    step[100:102] += 5e4
+    assert outliers(timed(step)) == ()
+    step[150:152] += 5e4
+    assert [o.row for o in outliers(timed(step))] == [150, 151]
+
+
+# Runs
+
+
+def test_each_kind_of_run_is_recognised():
+    sweep, noise = np.linspace(0, 1, 200), RANDOM(0).normal(0, 1, 200)
+    held = {"pressure": 3e5 + 200 * noise, "contraction": 0.1 + 1e-4 * noise, "force": 500.0 + noise}
+    swept = {"pressure": 6e5 * sweep, "contraction": 0.25 * sweep, "force": 1500 * (1 - sweep)}
+    for kind, name in ((ISOBARIC, "pressure"), (ISOMETRIC, "contraction"), (ISOTONIC, "force")):
+        recording = Recording({**swept, name: held[name]}, "run")
+        (run,) = runs(recording)
+        assert (run.kind, run.column) == (kind, name)
+        assert run.value == pytest.approx(np.median(held[name]))
+        assert set(run.swept) == set(swept) - {name}
+    assert [r.kind for r in runs(Recording(swept, "free"))] == [FREE]
+    assert [r.kind for r in runs(Recording(held, "rest"))] == [AT_REST]
+    by_length = {"pressure": swept["pressure"], "length": np.full(200, 0.3), "force": swept["force"]}
+    assert runs(Recording(by_length, "length"))[0].kind is ISOMETRIC
+
+
+def test_a_relaxation_at_held_pressure_and_length_is_named_by_its_pressure():
+    force = 500.0 + 80.0 * np.exp(-np.linspace(0, 4, 200))
+    (run,) = runs(timed(np.full(200, 3e5), length=np.full(200, 0.28), force=force))
+    assert (run.kind, run.swept) == (ISOBARIC, ("force",))
+
+
+def test_a_table_of_isobars_is_as_many_runs():
+    pressures, contractions = (
+        g.ravel() for g in np.meshgrid(np.linspace(1e5, 6e5, 6), np.linspace(0, 0.25, 11), indexing="ij")
+    )
+    table = Recording(
+        {"pressure": pressures, "contraction": contractions, "force": pressures * (0.01 - 0.03 * contractions)}, "t"
+    )
+    found = runs(table)
+    assert [run.kind for run in found] == [ISOBARIC] * 6
+    assert [run.value for run in found] == pytest.approx(np.linspace(1e5, 6e5, 6))
+    assert [(r.stretch.start, r.stretch.stop) for r in found] == [(11 * i, 11 * i + 11) for i in range(6)]
+
+
+def test_constant_pressure_given_as_an_isometric_sweep_is_refused():
+    noise = RANDOM(0).normal(0, 1, 200)
+    resting = timed(3e5 + 100 * noise, force=200 + 0.5 * noise, length=np.full(200, 0.28))
+    with pytest.raises(ColumnError, match=r"synthetic: nothing that was measured changes .*299\.\d to 300\.\d kPa"):
+        refuse_unswept(resting, runs(resting))
+    isobaric = timed(3e5 + 100 * noise, force=np.linspace(0, 900, 200), length=np.linspace(0.25, 0.3, 200))
+    refuse_unswept(isobaric, runs(isobaric))
+    said = isobaric.with_constants(run="isometric")
+    with pytest.raises(ColumnError, match="said to be isometric, but what was measured is isobaric"):
+        refuse_unswept(said, runs(said))
+    assert inspect(said).findings[0].serious
+
+
+# Time
+
+
+def test_rate_jitter_gaps_repeats_and_steps_back():
+    steps = STEP * (1 + 0.02 * RANDOM(0).normal(0, 1, 400))
+    steps[100] = 2.0
+    time = np.concatenate([[0.0], np.cumsum(steps)])
+    time[200] = time[199]
+    time[301] = time[299]
+    seen = sampling(Recording({"time": time}, "clock"))
+    assert seen.rate == pytest.approx(20.0, rel=0.01)
+    assert seen.jitter == pytest.approx(0.02, rel=0.25)
+    assert [(g.row, round(g.length, 6)) for g in seen.gaps] == [(100, 2.0)]
+    assert (seen.repeats, seen.backward) == ((200,), (301,))
+    texts = [f.text for f in inspect(timed(np.linspace(0, 6e5, 401)).with_columns(time=time)).findings]
+    assert texts[0].startswith("time repeats in 1 rows, first in row 201")
+    assert texts[1].startswith("time runs backwards in 1 rows, first in row 302")
+    assert texts[2].startswith("1 gaps in time, the longest of 2 s behind row 101")
+
+
+def test_a_record_shorter_than_its_dynamics_is_said_to_be():
+    rise = 6e5 * (1 - np.exp(-np.arange(200) * STEP / 1.0))
+    assert not any("may be shorter" in f.text for f in inspect(timed(rise)).findings)
+    short = inspect(timed(rise[:15])).findings
+    assert any("may be shorter than the dynamics" in f.text and f.serious for f in short)
+    sudden = inspect(timed(np.repeat([0.0, 6e5], 30))).findings
+    assert any("faster than 20 rows per second can show" in f.text for f in sudden)
+    slow_sweep = inspect(timed(np.linspace(0, 6e5, 900))).findings
+    assert not any("may be shorter" in f.text for f in slow_sweep)
+
+
+@settings(max_examples=60, deadline=None)
+@given(values=st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=40), with_time=st.booleans())
+def test_any_recording_can_be_inspected(values: list[float], with_time: bool):
+    columns = {"pressure": np.array(values), "force": np.array(values[::-1])}
+    if with_time:
+        columns["time"] = STEP * np.arange(len(values))
+    seen = inspect(Recording(columns, "any"))
+    assert sum(len(b.stretch) for b in seen.branches) in (0, len(values))
+    assert all(0 <= r.stretch.start < r.stretch.stop <= len(values) for r in seen.runs)

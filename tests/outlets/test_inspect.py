@@ -1,0 +1,176 @@
+"""`airmuscle inspect` shows what was understood of a file before anything is fitted, and changes nothing.
+
+What it prints is what the library says: columns with the units they were written in, sampling, runs, branches,
+plateaus, glitches, cut-offs. It looks at files that a fit would refuse, and says why.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from airmuscle.cli.app import app
+from airmuscle.recording import read
+from airmuscle.recording.segment import inspect
+
+ROWS = 400
+
+
+def airmuscle(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def seen(*arguments: object) -> list[dict]:
+    result = airmuscle("inspect", *arguments, "--json")
+    assert result.exit_code == 0, result.stderr
+    return json.loads(result.stdout)
+
+
+def bench(path: Path, *, glitch: int | None = 95, swap: bool = False) -> Path:
+    """Twenty steps up and twenty down, the force rounded to 0.5 N and cut off at -5 N, a glitch of one row."""
+    random = np.random.default_rng(5)
+    levels = [*np.linspace(0, 570, 20), *np.linspace(540, 0, 20)]
+    pressure = np.repeat(levels, 10) + random.normal(0, 0.4, ROWS)
+    force = np.maximum(0.9 * np.repeat(levels, 10) - 200.0 + random.normal(0, 0.6, ROWS), -5.0)
+    if glitch is not None:
+        force[glitch] += 60.0
+    time = 0.05 * np.arange(ROWS)
+    if swap:
+        time[[20, 21]] = time[[21, 20]]
+    rows = zip(time, pressure, np.round(2.0 * force) / 2.0, strict=True)
+    lines = [f"{t:.2f},{p:.3f},{f:.1f},270,300" for t, p, f in rows]
+    path.write_text("\n".join(["t [s],p [kPa],F [N],L [mm],rest_length [mm]", *lines]))
+    return path
+
+
+def test_json_holds_what_the_library_says(tmp_path: Path):
+    path = bench(tmp_path / "run.csv")
+    (found,) = seen(path)
+    (recording,) = read(path)
+    expected = inspect(recording)
+    assert (found["origin"], found["rows"]) == ("run.csv", ROWS)
+    assert found["constants"] == {"resting_length": 0.3}
+    columns = {column["name"]: column for column in found["columns"]}
+    assert columns["pressure"] == {
+        "name": "pressure",
+        "unit": "Pa",
+        "written_in": "kPa",
+        "least": recording["pressure"].min(),
+        "greatest": recording["pressure"].max(),
+    }
+    assert found["sampling"]["rate"] == pytest.approx(20.0)
+    force = next(sensor for sensor in found["sensors"] if sensor["name"] == "force")
+    assert (force["resolution"], force["least"], force["greatest"]) == (pytest.approx(0.5), -5.0, None)
+    assert found["runs"] == [
+        {"kind": "isometric", "first_row": 1, "last_row": ROWS, "held": "contraction",
+         "value": pytest.approx(0.1), "swept": ["pressure", "force"]}
+    ]  # fmt: skip
+    assert [(b["branch"], b["first_row"], b["last_row"]) for b in found["branches"]] == [
+        ("inflating", 1, 200),
+        ("deflating", 201, ROWS),
+    ]
+    assert len(found["plateaus"]) == len(expected.plateaus) == 40
+    assert [(o["column"], o["row"]) for o in found["suspected_glitches"]] == [("force", 96)]
+    assert found["quasi_static"] == expected.quasi_static
+    assert any("the sensor is cut off there" in finding["text"] for finding in found["findings"])
+    assert any("taken as gauge" in note for note in found["notes"])
+
+
+def test_the_text_says_it_in_words(tmp_path: Path):
+    text = airmuscle("inspect", bench(tmp_path / "run.csv")).stdout
+    for said in (
+        "run.csv: 400 rows",
+        "resting_length: 300 mm",
+        "sampling: 20 rows per second over 19.95 s, jitter 0.0%",
+        "runs: isometric at contraction 10 %, rows 1 to 400",
+        "branches: inflating, rows 1 to 200; deflating, rows 201 to 400",
+        "plateaus: 40 with",
+        "suspected glitches: 1, kept: force in row 96",
+        "note: the force stands still at its least reading, -5 N",
+    ):
+        assert said in text
+    assert "PROBLEM" not in text
+
+
+def test_a_long_list_is_cut_and_says_by_how_much(tmp_path: Path):
+    rows = [(p, c, 1e3 * p - 9 * c) for p in range(1, 14) for c in range(0, 24, 2)]
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join(["p [barg],k [%],F [N]", *(",".join(map(str, row)) for row in rows)]))
+    text = airmuscle("inspect", path).stdout
+    assert "isobaric at pressure 800 kPa" in text
+    assert "... 5 more" in text
+    assert "note: there is no time" in text
+    assert "sampling:" not in text
+
+
+def test_the_figures_stand_in_the_folder_and_are_the_same_each_time(tmp_path: Path):
+    bench(tmp_path / "a.csv")
+    bench(tmp_path / "b.csv", glitch=None)
+    for folder in ("one", "two"):
+        result = airmuscle("inspect", tmp_path / "*.csv", "--out", tmp_path / folder)
+        assert result.exit_code == 0, result.stderr
+        assert f"figures: {tmp_path / folder}" in result.stdout
+    names = sorted(path.name for path in (tmp_path / "one").iterdir())
+    assert names == ["1-a.csv.png", "2-b.csv.png"]
+    assert all((tmp_path / "one" / n).read_bytes() == (tmp_path / "two" / n).read_bytes() for n in names)
+    assert (tmp_path / "one" / names[0]).read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_figure_draws_branches_plateaus_glitches_and_the_cut_off(tmp_path: Path):
+    (recording,) = read(bench(tmp_path / "run.csv"))
+    figure = inspect(recording).plot()
+    pressure, force, contraction = figure.axes
+    labels = pressure.get_legend_handles_labels()[1]
+    assert labels == ["inflating", "deflating", "plateau", "suspected glitch"]
+    assert force.get_ylabel() == "force\n[N]"
+    assert contraction.get_ylabel() == "contraction\n[%]"
+    glitches = next(line for line in force.lines if line.get_label() == "suspected glitch")
+    assert list(glitches.get_xdata()) == [pytest.approx(0.05 * 95)]
+    assert any(list(line.get_ydata()) == [-5.0, -5.0] and line.get_linestyle() == "--" for line in force.lines)
+
+
+def test_a_file_that_a_fit_refuses_is_still_looked_at(tmp_path: Path):
+    path = bench(tmp_path / "run.csv", swap=True)
+    text = airmuscle("inspect", path).stdout
+    assert "PROBLEM: time runs backwards in 1 rows, first in row 22" in text
+    fitted = airmuscle("fit", path, "--characteristic", "ContractileSurface", "--out", tmp_path / "fit")
+    assert fitted.exit_code == 1
+    assert "goes back behind" in fitted.stderr
+
+
+def test_flags_and_mapping_say_what_the_file_does_not(tmp_path: Path):
+    path = tmp_path / "run.txt"
+    np.savetxt(path, np.column_stack([np.arange(9.0), np.linspace(2, 6, 9), np.linspace(290, 250, 9)]), delimiter="\t")
+    flags = ("--column", "1=time [s]", "--column", "2=pressure [bara]", "--column", "3=length [mm]")
+    (by_flags,) = seen(path, *flags, "--resting-length", "300 mm", "--ambient", "1 bar")
+    (tmp_path / "rig.toml").write_text(
+        'resting_length = "300 mm"\nambient = "1 bar"\n'
+        '[columns]\n1 = "time [s]"\n2 = "pressure [bara]"\n3 = "length [mm]"\n'
+    )
+    (by_file,) = seen(path, "--mapping", tmp_path / "rig.toml")
+    assert by_file == by_flags
+    pressure = next(column for column in by_file["columns"] if column["name"] == "pressure")
+    assert (pressure["least"], pressure["greatest"]) == pytest.approx((1e5, 5e5))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "expected"),
+    [
+        (("none.csv",), 1, "cannot be read"),
+        (("run.csv", "--column", "p"), 2, "--column wants NAME=TEXT"),
+        (("run.csv", "--column", "x=pressure [bar]"), 1, "the mapping names column 'x', but there are t [s]"),
+        (("run.csv", "--unit", "pressure=mm"), 1, "cannot become 'Pa'"),
+        ((), 2, "Missing argument"),
+    ],
+)
+def test_what_cannot_be_read_is_one_line(tmp_path: Path, monkeypatch, arguments, code: int, expected: str):
+    bench(tmp_path / "run.csv")
+    monkeypatch.chdir(tmp_path)
+    result = airmuscle("inspect", *arguments)
+    assert result.exit_code == code
+    assert expected in result.stderr
+    assert code == 2 or len(result.stderr.strip().splitlines()) == 1

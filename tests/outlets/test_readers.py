@@ -1,0 +1,517 @@
+"""Whatever format a laboratory keeps its runs in, the same run becomes the same Recording.
+
+A mapping says what a file does not. What cannot be read, or contradicts another file, is refused with its name.
+Very long files are thinned in bounded memory, and say so.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import tracemalloc
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airmuscle.errors import AirmuscleWarning, ColumnError, FileError, InputError, ParameterError, UnitError
+from airmuscle.recording import BlockMeans, ColumnMapping, Decimation, Recording, large_csv, read
+from airmuscle.recording.clock import seconds_from_clock
+from airmuscle.recording.mapping import read_mapping
+
+TIME = np.arange(40) * 0.05
+PRESSURE = 100.0 + 5.0 * np.arange(40.0)  # kPa
+LENGTH = 300.0 - 0.5 * np.arange(40.0)  # mm
+FORCE = 12.5 * np.sqrt(np.arange(40.0))  # N
+TABLE = np.column_stack([TIME, PRESSURE, LENGTH, FORCE])
+HEADINGS = ("time [s]", "pressure [kPa]", "length [mm]", "force [N]")
+
+
+def same(recording: Recording, extra: tuple[str, ...] = ()) -> None:
+    assert set(recording) == {"time", "pressure", "length", "force", *extra}
+    for name, values in {"time": TIME, "pressure": PRESSURE * 1e3, "length": LENGTH / 1e3, "force": FORCE}.items():
+        assert recording[name] == pytest.approx(values, rel=1e-12, abs=1e-12), name
+
+
+def only(recordings: tuple[Recording, ...]) -> Recording:
+    assert len(recordings) == 1
+    return recordings[0]
+
+
+def refusal(kind: type[InputError], source, **options) -> str:
+    with pytest.raises(kind) as caught:
+        read(source, **options)
+    return str(caught.value)
+
+
+def csv(path: Path, headings: tuple[str, ...] = HEADINGS, table: np.ndarray = TABLE) -> Path:
+    np.savetxt(path, table, delimiter=",", header=",".join(headings), comments="", fmt="%.15g")
+    return path
+
+
+# Formats
+
+
+def excel(path: Path, sheets: dict[str, list[list[object]]]) -> Path:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for name, rows in sheets.items():
+        sheet = book.create_sheet(name)
+        for row in rows:
+            sheet.append(row)
+    book.save(path)
+    return path
+
+
+def test_excel_with_units_in_the_headings(tmp_path: Path):
+    path = excel(tmp_path / "run.xlsx", {"Data": [list(HEADINGS), *TABLE.tolist()]})
+    same(only(read(path)))
+
+
+def test_excel_with_a_preamble_a_row_of_units_and_a_sheet_of_words(tmp_path: Path):
+    rows = [["Rig 3, calibrated"], ["resting_length", 310, "mm"], [], ["time", "pressure", "length", "force"],
+            ["s", "kPa", "mm", "N"], *TABLE.tolist()]  # fmt: skip
+    path = excel(tmp_path / "run.xlsx", {"Notes": [["by Ada"], ["on Monday"]], "Data": rows})
+    recording = only(read(path))
+    same(recording)
+    assert recording.constants == {"resting_length": pytest.approx(0.31)}
+    assert recording.origin == "run.xlsx"
+
+
+def test_every_sheet_with_a_table_is_a_run_and_one_can_be_chosen(tmp_path: Path):
+    rows = [list(HEADINGS), *TABLE.tolist()]
+    path = excel(tmp_path / "runs.xlsx", {"First": rows, "Second": [rows[0], *rows[3:]]})
+    first, second = read(path)
+    assert (first.origin, len(second)) == ("runs.xlsx, sheet 'First'", 38)
+    assert len(only(read(path, sheet="Second"))) == 38
+    assert "no sheet 'Secnd'; there are First, Second. Did you mean 'Second'?" in refusal(
+        FileError, path, sheet="Secnd"
+    )
+
+
+def test_excel_names_the_row_of_a_bad_cell(tmp_path: Path):
+    rows = [list(HEADINGS), *TABLE.tolist()]
+    rows[5][3] = "n/a"
+    said = refusal(ColumnError, excel(tmp_path / "run.xlsx", {"Data": rows}))
+    assert said.startswith("run.xlsx, row 6: force 'n/a' is not a number")
+    rows[5][3] = 1.0
+    rows[7] = [*rows[7], 99.0]
+    said = refusal(ColumnError, excel(tmp_path / "run.xlsx", {"Data": rows}))
+    assert "run.xlsx, row 8: '99' stands under no heading" in said
+
+
+def mat_content() -> dict[str, object]:
+    return {
+        "t": TIME,
+        "pressure_kPa": PRESSURE[:, None],
+        "length_mm": LENGTH,
+        "force_N": FORCE,
+        "rest_length_mm": 310.0,
+    }
+
+
+def save_v5(path: Path, content: dict[str, object]) -> Path:
+    import scipy.io
+
+    scipy.io.savemat(path, content)
+    return path
+
+
+def save_v73(path: Path, content: dict[str, object]) -> Path:
+    """A MATLAB 7.3 file: HDF5 with the class of each variable as an attribute."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, value in content.items():
+            file[name] = np.atleast_2d(np.asarray(value, dtype=float))
+            file[name].attrs["MATLAB_class"] = np.bytes_("double")
+    head = b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM"
+    with path.open("r+b") as file:
+        file.write(head)
+    return path
+
+
+@pytest.mark.parametrize("save", [save_v5, save_v73])
+def test_matlab_vectors(tmp_path: Path, save):
+    pytest.importorskip("pymatreader")
+    recording = only(read(save(tmp_path / "run.mat", mat_content()), units={"time": "s"}))
+    same(recording)
+    assert recording.constants["resting_length"] == pytest.approx(0.31)
+
+
+def test_matlab_structs_matrices_and_simulink(tmp_path: Path):
+    pytest.importorskip("pymatreader")
+    struct = {"run1": mat_content() | {"units": {"t": "s"}}, "run2": {"force_N": FORCE[:9]}}
+    first, second = read(save_v5(tmp_path / "two.mat", struct))
+    same(first)
+    assert (first.origin, second.origin) == ("two.mat, run1", "two.mat, run2")
+    assert len(only(read(tmp_path / "two.mat", group="run2"))) == 9
+    said = refusal(FileError, tmp_path / "two.mat", group="run3")
+    assert "no struct 'run3' with vectors; there are run1, run2" in said
+
+    named = {"data": TABLE, "colheaders": np.array(HEADINGS, dtype=object)}
+    same(only(read(save_v5(tmp_path / "import.mat", named))))
+    bare = {f"data(:,{j})": heading for j, heading in enumerate(HEADINGS, 1)}
+    same(only(read(save_v5(tmp_path / "bare.mat", {"data": TABLE}), columns=bare)))
+
+    signals = [{"values": TABLE[:, j], "label": HEADINGS[j]} for j in (1, 2, 3)]
+    simulink = {"out": {"time": TIME, "signals": np.array(signals, dtype=object)}}
+    same(only(read(save_v5(tmp_path / "sim.mat", simulink))))
+
+
+def test_matlab_without_a_vector(tmp_path: Path):
+    pytest.importorskip("pymatreader")
+    said = refusal(FileError, save_v5(tmp_path / "run.mat", {"name": "x", "n": 3.0}))
+    assert "run.mat: no vector of numbers was found among name, n" in said
+
+
+def test_tdms_waveforms(tmp_path: Path):
+    nptdms = pytest.importorskip("nptdms")
+    names = {"Pressure": ("kPa", PRESSURE), "length": ("mm", LENGTH), "F": ("N", FORCE)}
+    wave = {"wf_increment": 0.05, "wf_start_offset": 0.0}
+    channels = [
+        nptdms.ChannelObject(group, name, values, {"unit_string": unit, **wave})
+        for group in ("one", "two")
+        for name, (unit, values) in names.items()
+    ]
+    root = nptdms.RootObject({"resting_length": "310 mm", "name": "log"})
+    with nptdms.TdmsWriter(tmp_path / "run.tdms") as file:
+        file.write_segment([root, *channels])
+    one, two = read(tmp_path / "run.tdms")
+    same(one)
+    same(two)
+    assert one.origin == "run.tdms, group 'one'"
+    assert one.constants["resting_length"] == pytest.approx(0.31)
+    same(only(read(tmp_path / "run.tdms", group="two")))
+    assert "no group 'tow'; there are one, two. Did you mean 'two'?" in refusal(
+        FileError, tmp_path / "run.tdms", group="tow"
+    )
+
+
+def test_tdms_channels_without_a_common_time(tmp_path: Path):
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(tmp_path / "run.tdms") as file:
+        parts = {"p [kPa]": PRESSURE, "F [N]": FORCE[:7]}
+        file.write_segment([nptdms.ChannelObject("g", name, values) for name, values in parts.items()])
+    said = refusal(ColumnError, tmp_path / "run.tdms")
+    assert "run.tdms: the channels have different numbers of rows (p [kPa] 40, F [N] 7)" in said
+
+
+def test_tdms_channels_that_start_at_other_times_share_what_both_cover(tmp_path: Path):
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(tmp_path / "run.tdms") as file:
+        early = nptdms.ChannelObject("g", "p [kPa]", PRESSURE, {"wf_increment": 0.05, "wf_start_offset": 0.0})
+        late = nptdms.ChannelObject("g", "L [mm]", LENGTH[4:], {"wf_increment": 0.05, "wf_start_offset": 0.2})
+        file.write_segment([early, late])
+    recording = only(read(tmp_path / "run.tdms"))
+    assert recording["time"] == pytest.approx(TIME[:36])
+    assert recording["pressure"] == pytest.approx(PRESSURE[4:] * 1e3)
+    assert recording["length"] == pytest.approx(LENGTH[4:] / 1e3)
+
+
+def test_mdf_groups_with_times_of_their_own_come_to_common_rows(tmp_path: Path):
+    asammdf = pytest.importorskip("asammdf")
+    slow = slice(None, None, 3)
+    with asammdf.MDF(version="4.10") as file:
+        fast = {"pressure": ("kPa", PRESSURE), "F": ("N", FORCE)}
+        file.append(
+            [asammdf.Signal(values, TIME, name=name, unit=unit) for name, (unit, values) in fast.items()],
+            acq_name="fast",
+        )
+        valve = (np.arange(40) > 20).astype(np.uint8)
+        others = [asammdf.Signal(LENGTH[slow], TIME[slow], name="L", unit="mm"),
+                  asammdf.Signal(valve[slow], TIME[slow], name="valve")]  # fmt: skip
+        file.append(others, acq_name="slow")
+        file.save(tmp_path / "run.mf4")
+    recording = only(read(tmp_path / "run.mf4"))
+    same(recording, ("valve",))
+    held = valve[3 * (np.arange(40) // 3)]
+    assert np.array_equal(recording["valve"], held), "steps are held, not interpolated"
+    assert "Channel 'L' has a time of its own: its 14 rows are interpolated to the 40 of 'pressure'." in recording.notes
+    assert len(only(read(tmp_path / "run.mf4", group="slow"))) == 14
+    assert "no group 'fats'; there are fast, slow" in refusal(FileError, tmp_path / "run.mf4", group="fats")
+
+
+@pytest.mark.parametrize("ending", [".xlsx", ".mat", ".tdms", ".mf4"])
+def test_a_damaged_file_is_one_error_that_names_it(tmp_path: Path, ending: str):
+    path = tmp_path / f"broken{ending}"
+    path.write_bytes(b"this is no measurement at all" * 50)
+    assert f"broken{ending}: cannot be read as" in refusal(FileError, path)
+    assert "there is no such file" in refusal(FileError, tmp_path / f"none{ending}")
+
+
+@pytest.mark.parametrize(
+    ("ending", "package"), [(".xlsx", "openpyxl"), (".mat", "pymatreader"), (".tdms", "nptdms"), (".mf4", "asammdf")]
+)
+def test_a_missing_package_is_named_with_its_remedy(tmp_path: Path, monkeypatch, ending: str, package: str):
+    monkeypatch.setitem(sys.modules, package, None)
+    said = refusal(FileError, tmp_path / f"run{ending}")
+    assert said.endswith(f"needs the package {package}. Install it: pip install airmuscle[lab]")
+    assert "\n" not in said
+
+
+def test_what_is_no_known_format(tmp_path: Path):
+    (tmp_path / "run.bin").write_bytes(b"\0\1\2")
+    assert "its ending tells no format" in refusal(FileError, tmp_path / "run.bin")
+    assert "Save it as .xlsx or .csv" in refusal(FileError, tmp_path / "run.xls")
+
+
+# Several files
+
+
+def test_folders_globs_and_lists_are_read_in_order(tmp_path: Path):
+    for name in ("b.csv", "a.csv", ".hidden.csv"):
+        csv(tmp_path / name)
+    (tmp_path / "readme.md").write_text("not data")
+    assert [r.origin for r in read(tmp_path)] == ["a.csv", "b.csv"]
+    assert [r.origin for r in read(str(tmp_path / "*.csv"))] == ["a.csv", "b.csv"]
+    assert [r.origin for r in read([tmp_path / "b.csv", tmp_path / "a.csv"])] == ["b.csv", "a.csv"]
+    assert "no file is called so" in refusal(FileError, str(tmp_path / "*.txt"))
+    (tmp_path / "empty").mkdir()
+    assert "holds no file that can be read" in refusal(FileError, tmp_path / "empty")
+
+
+def test_two_files_with_the_same_numbers_under_other_units_are_refused_by_name(tmp_path: Path):
+    csv(tmp_path / "a.csv")
+    csv(tmp_path / "b.csv", ("time [s]", "pressure [bar]", "length [mm]", "force [N]"))
+    said = refusal(UnitError, tmp_path)
+    assert said.startswith("a.csv states the pressure in kPa and b.csv in bar, but both hold numbers of one size")
+    assert "units={'pressure': ...}" in said
+    csv(tmp_path / "b.csv", ("time [s]", "pressure [bar]", "length [mm]", "force [N]"), TABLE * [1, 0.01, 1, 1])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert read(tmp_path)[1]["pressure"] == pytest.approx(PRESSURE * 1e3)
+
+
+def test_gauge_in_one_file_and_unsaid_in_the_other_is_a_warning_that_names_both(tmp_path: Path):
+    csv(tmp_path / "a.csv")
+    csv(tmp_path / "b.csv", ("time [s]", "pressure [kPa(a)]", "length [mm]", "force [N]"))
+    with pytest.warns(AirmuscleWarning, match=r"a\.csv .* and b\.csv .* only one says whether its pressure is gauge"):
+        read(tmp_path)
+
+
+def test_one_unit_and_sizes_far_apart_is_a_warning(tmp_path: Path):
+    csv(tmp_path / "a.csv")
+    csv(tmp_path / "b.csv", table=TABLE * [1, 0.01, 1, 1])
+    with pytest.warns(AirmuscleWarning, match=r"pressure of b\.csv .* and a\.csv .* differs 100-fold"):
+        read(tmp_path)
+
+
+# What a file does not say
+
+
+def test_a_mapping_file_names_columns_units_and_constants(tmp_path: Path):
+    (tmp_path / "rig.toml").write_text(
+        'resting_length = "300 mm"\ndecimal = ","\ndelimiter = ";"\nambient = "100 kPa"\n[columns]\n'
+        '"Channel 1" = "time [s]"\n"Channel 2" = { quantity = "pressure", unit = "kPa(a)" }\n'
+        '"Channel 3" = "length [mm]"\n4 = "force [kg]"\nspare = ""\n'
+    )
+    body = "".join(f"{';'.join(f'{v:.17g}' for v in row)};7\n" for row in TABLE).replace(".", ",")
+    (tmp_path / "run.csv").write_text("Channel 1;Channel 2;Channel 3;Channel 4;spare\n" + body)
+    recording = only(read(tmp_path / "run.csv", mapping=tmp_path / "rig.toml"))
+    assert list(recording) == ["time", "pressure", "length", "force"]
+    assert recording["pressure"] == pytest.approx(PRESSURE * 1e3 - 100e3)
+    assert recording["force"] == pytest.approx(FORCE * 9.80665)
+    assert recording["contraction"] == pytest.approx(1.0 - LENGTH / 300.0)
+    assert recording.units["force"] == "kg"
+    said = " ".join(recording.notes)
+    assert "Column 'Channel 2' is read as pressure [kPa(a)], as the mapping says." in said
+    assert "taken as a weight under standard gravity, 9.80665 m/s2" in said
+    assert "Column 'spare' is left out" in said
+
+
+def test_a_keyword_goes_before_the_mapping(tmp_path: Path):
+    mapping = ColumnMapping(columns={"F": "force [N]"}, constants={"resting_length": "300 mm"})
+    (tmp_path / "run.csv").write_text("F,L [mm]\n1,290\n2,280\n")
+    recording = only(read(tmp_path / "run.csv", mapping=mapping, columns={"F": "force [kN]"}, resting_length=0.4))
+    assert recording["force"] == pytest.approx([1e3, 2e3])
+    assert recording.constants["resting_length"] == 0.4
+
+
+def test_a_mapping_goes_before_the_row_of_units(tmp_path: Path):
+    (tmp_path / "run.csv").write_text("p,F\nbar,N\n1,2\n3,4\n")
+    recording = only(read(tmp_path / "run.csv", columns={"p": "pressure [kPa(g)]", "F": "force"}))
+    assert recording["pressure"] == pytest.approx([1e3, 3e3])
+    assert recording["force"] == pytest.approx([2.0, 4.0])
+    assert recording.units == {"pressure": "kPa(g)", "force": "N"}
+
+
+def test_a_table_without_headings_is_mapped_by_numbers(tmp_path: Path):
+    np.savetxt(tmp_path / "run.txt", TABLE, delimiter="\t")
+    assert "map the columns by their numbers" in refusal(ColumnError, tmp_path / "run.txt")
+    same(only(read(tmp_path / "run.txt", columns=dict(enumerate(HEADINGS, 1)))))
+    np.savetxt(tmp_path / "blanks.txt", TABLE)
+    same(only(read(tmp_path / "blanks.txt", columns=dict(enumerate(HEADINGS, 1)), delimiter=" ")))
+
+
+def test_a_decimal_sign_that_was_told_settles_thousands(tmp_path: Path):
+    (tmp_path / "run.csv").write_text("force [N];length [mm]\n1.234,5;290,5\n2.000;280\n")
+    assert "say which one it is: decimal=','" in refusal(ColumnError, tmp_path / "run.csv")
+    assert only(read(tmp_path / "run.csv", decimal=","))["force"] == pytest.approx([1234.5, 2000.0])
+
+
+@pytest.mark.parametrize(
+    ("columns", "kind", "expected"),
+    [
+        ({"presure": "pressure [bar]"}, ColumnError, "the mapping names column 'presure', but there are"),
+        ({"presure": "pressure [bar]"}, ColumnError, "Did you mean 'pressure [kPa]'?"),
+        ({9: "pressure [bar]"}, ColumnError, "the mapping names column '9'"),
+        ({"pressure": "presure [bar]"}, ColumnError, "is no known quantity; known are time, pressure"),
+        ({"pressure": "presure [bar]"}, ColumnError, "Did you mean 'pressure'?"),
+        ({"pressure": "pressure [mm]"}, UnitError, "unit 'mm' cannot become 'Pa'"),
+    ],
+)
+def test_a_mapping_that_does_not_fit_says_why(tmp_path: Path, columns, kind, expected: str):
+    assert expected in refusal(kind, csv(tmp_path / "run.csv"), columns=columns)
+
+
+@pytest.mark.parametrize(
+    ("content", "kind", "expected"),
+    [
+        ("colums = 3", ParameterError, "'colums' is nothing a mapping states; it may state columns"),
+        ("[columns]\np = 3", ParameterError, "column 'p' is mapped to 3; write 'pressure [bara]'"),
+        ("columns = 3", ParameterError, "columns must be a table"),
+        ("sheet = 3", ParameterError, "sheet = 3; it must be a text in quotes"),
+        ("x = ", FileError, "rig.toml: is no TOML file"),
+        ('delimiter = ","\ndecimal = ","', ParameterError, "are both ','"),
+        ('decimal = "x"', ParameterError, "it must be '.' or ','"),
+        ('delimiter = "x"', ParameterError, "it must be a comma, semicolon, tab, blank"),
+    ],
+)
+def test_a_mapping_file_that_is_wrong(tmp_path: Path, content: str, kind, expected: str):
+    (tmp_path / "rig.toml").write_text(content)
+    with pytest.raises(kind, match=re.escape(expected)):
+        _ = read_mapping(tmp_path / "rig.toml").text_form
+    with pytest.raises(FileError, match="cannot be read"):
+        read_mapping(tmp_path / "none.toml")
+
+
+def test_a_column_of_one_value_states_the_resting_length(tmp_path: Path):
+    path = csv(tmp_path / "a.csv", (*HEADINGS, "rest_length [cm]"), np.column_stack([TABLE, np.full(40, 31.0)]))
+    recording = only(read(path))
+    same(recording)
+    assert recording.constants["resting_length"] == pytest.approx(0.31)
+    assert only(read(path, resting_length="32 cm")).constants["resting_length"] == pytest.approx(0.32)
+    csv(path, (*HEADINGS, "rest_length [cm]"), np.column_stack([TABLE, np.where(TIME < 1, 31.0, 32.0)]))
+    assert "a.csv, line 22: rest_length [cm] changes from 31 to 32" in refusal(ColumnError, path)
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        ["2024-05-17 23:59:59.5", "2024-05-18 00:00:00", "2024-05-18T00:00:01"],
+        ["17.05.2024 23:59:59,5", "18.05.2024 00:00:00", "18.05.2024 00:00:01"],
+        ["23:59:59.5", "0:00:00", "00:00:01"],
+    ],
+)
+def test_time_may_be_that_of_a_clock(tmp_path: Path, cells: list[str]):
+    assert seconds_from_clock(cells) == pytest.approx([0.0, 0.5, 1.5])
+    rows = "".join(f"{cell};{i}\n" for i, cell in enumerate(cells))
+    (tmp_path / "run.csv").write_text("time;force [N]\n" + rows)
+    recording = only(read(tmp_path / "run.csv"))
+    assert recording["time"] == pytest.approx([0.0, 0.5, 1.5])
+    assert "read from a clock" in recording.notes[0]
+
+
+def test_what_is_no_clock_is_not_taken_for_one():
+    assert seconds_from_clock(["12:00:00", "n/a"]) is None
+    assert seconds_from_clock([]) is None
+
+
+def test_time_out_of_order_is_refused_unless_it_is_only_looked_at(tmp_path: Path):
+    path = csv(tmp_path / "run.csv", table=TABLE[[0, 2, 1, 3]])
+    assert "goes back behind the row before" in refusal(ColumnError, path)
+    assert only(read(path, ordered=False))["time"] == pytest.approx(TIME[[0, 2, 1, 3]])
+
+
+# Very long files
+
+
+@pytest.fixture
+def long_file(tmp_path: Path, monkeypatch) -> Path:
+    """20 000 rows, read in pieces of 1000 as a file too large to hold."""
+    monkeypatch.setattr(large_csv, "LARGE", 10_000)
+    monkeypatch.setattr(large_csv, "_PIECE", 1000)
+    rows = "".join(f"{i};{0.5 * i:.1f}\n" for i in range(20_000)).replace(".", ",")
+    path = tmp_path / "long.csv"
+    path.write_text(f"# resting_length = 300 mm\ntime;force\ns;N\n{rows}")
+    return path
+
+
+def test_pieces_make_the_same_recording_as_the_whole(long_file: Path, monkeypatch):
+    parts = only(read(long_file))
+    monkeypatch.setattr(large_csv, "LARGE", 1_000_000_000)
+    whole = only(read(long_file))
+    assert all(np.array_equal(parts[name], whole[name]) for name in whole)
+    assert (parts.constants, parts.notes) == (whole.constants, whole.notes)
+
+
+@pytest.mark.parametrize("most", [20_000, 7_000, 3, 1])
+def test_decimation_keeps_rows_as_they_were_measured(long_file: Path, most: int):
+    recording = only(read(long_file, thinning=Decimation(most)))
+    step = -(-20_000 // most)
+    assert np.array_equal(recording["time"], np.arange(0, 20_000, step))
+    assert np.array_equal(recording["force"], 0.5 * recording["time"])
+    assert len(recording) <= most
+    assert (step == 1) == (recording.notes == ())
+    table = large_csv.large_csv(long_file, thinning=Decimation(most))
+    assert np.array_equal(table.rows, np.arange(4, 20_004, step)), "a row is named by its line"
+    assert step == 1 or recording.notes[0].startswith(f"The file has 20000 rows; one in {step} is kept as measured")
+
+
+@pytest.mark.parametrize("most", [7_000, 13, 1])
+def test_block_means_are_means(long_file: Path, most: int):
+    recording = only(read(long_file, thinning=BlockMeans(most)))
+    step = -(-20_000 // most)
+    expected = [np.mean(np.arange(20_000)[i : i + step]) for i in range(0, 20_000, step)]
+    assert recording["time"] == pytest.approx(np.array(expected), rel=1e-12)
+    assert f"each {step} are replaced by their mean" in recording.notes[0]
+    table = large_csv.large_csv(long_file, thinning=BlockMeans(most))
+    assert np.array_equal(table.rows, np.arange(4, 20_004, step)), "a row is named by the first line of its block"
+
+
+def test_a_bad_cell_in_a_long_file_is_named_with_its_line(long_file: Path):
+    text = long_file.read_text().replace("\n15000;7500,0\n", "\n15000;broken\n")
+    long_file.write_text(text)
+    assert refusal(ColumnError, long_file).startswith("long.csv, line 15004: force 'broken' is not a number")
+
+
+def test_progress_goes_from_nothing_to_all_and_an_interrupt_ends_it(long_file: Path):
+    parts: list[float] = []
+    read(long_file, progress=lambda name, part: parts.append(part))
+    assert len(parts) == 20
+    assert parts == sorted(parts)
+    assert parts[-1] == 1.0
+
+    def interrupted(name: str, part: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        read(long_file, progress=interrupted)
+
+
+def peak_memory(path: Path, rows: int) -> int:
+    with path.open("w") as file:
+        file.write("time [s],force [N]\n")
+        file.writelines(f"{i},{i % 977}.25\n" for i in range(rows))
+    tracemalloc.start()
+    recording = only(read(path, thinning=Decimation(1000)))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(recording) == 1000
+    return peak
+
+
+def test_memory_follows_the_rows_that_are_kept_not_those_of_the_file(tmp_path: Path, monkeypatch):
+    monkeypatch.setattr(large_csv, "LARGE", 10_000)
+    peaks = [peak_memory(tmp_path / "long.csv", rows) for rows in (200_000, 1_000_000)]
+    assert peaks[1] < 1.1 * peaks[0]
+
+
+def test_other_formats_are_thinned_as_well(tmp_path: Path):
+    recording = only(read(csv(tmp_path / "run.csv"), thinning=Decimation(10)))
+    assert np.array_equal(recording["force"], only(read(tmp_path / "run.csv"))["force"][::4])
+    assert "one in 4 is kept" in recording.notes[0]
+    with pytest.raises(ParameterError, match="most_rows is 0"):
+        Decimation(0)
