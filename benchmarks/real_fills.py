@@ -15,7 +15,7 @@ import numpy as np
 
 from airmuscle.circuit import Supply, Valve
 from airmuscle.command import Schedule
-from airmuscle.gas import Isothermal, Polytropic
+from airmuscle.gas import Isothermal
 from airmuscle.identify.dynamic import fit_dynamic
 from airmuscle.identify.dynamic_experiment import Experiment, StartTime, StartValue
 from airmuscle.identify.dynamic_result import DynamicFit

@@ -15,6 +15,7 @@ os.environ.setdefault(
     "OPENBLAS_NUM_THREADS", "1"
 )  # before NumPy: a second thread that waits for a core slows both sides
 
+import bootstrap
 import new_plant
 import ode8
 import rodas4
@@ -27,6 +28,7 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (rodas4.section, 25),
     (ode8.section, 15),
     (static_fit.section, 15),
+    (bootstrap.section, 5),
     (new_plant.section, 7),
     (startup.section, 7),
 )

@@ -12,11 +12,17 @@ from .chou_hannaford1996 import ChouHannaford1996 as ChouHannaford1996
 from .circle_virtual_work import CircleVirtualWork as CircleVirtualWork
 from .clamped import Clamped as Clamped
 from .contractile_surface import ContractileSurface as ContractileSurface
+from .effective_length import EffectiveLength as EffectiveLength
 from .exact_meridian import ExactMeridian as ExactMeridian
+from .hunt2017 import Hunt2017 as Hunt2017
+from .inverse_length import InverseLength as InverseLength
+from .logarithmic_length import LogarithmicLength as LogarithmicLength
 from .martens_boblan2017 import MartensBoblan2017 as MartensBoblan2017
+from .reynolds2003 import Reynolds2003 as Reynolds2003
 from .rubber import RubberLine as RubberLine
 from .saga2007 import Saga2007 as Saga2007
 from .sarosi2012 import Sarosi2012 as Sarosi2012
+from .serres2009 import Serres2009 as Serres2009
 from .tabulated import Tabulated as Tabulated
 from .tondu_lopez2000 import TonduLopez2000 as TonduLopez2000
 from .virtual_work import VirtualWork as VirtualWork

@@ -15,6 +15,9 @@ from ..ops import Value
 from ..reference import Reference
 from .solve import first_crossing
 
+NO_PRESSURE = 1e-300
+"""Stands for a pressure of zero [Pa] where a force is divided by it: no load then has an answer."""
+
 
 class Slopes(NamedTuple):
     """How the tension changes at a point of the surface."""
@@ -101,8 +104,7 @@ class ForceLaw(Characteristic):
             return load - self.force(p, contraction)
 
         def message(p: float, load: float, low: float, high: float) -> str:
-            possible = f"Between these the muscle pulls {load - high:.6g} to {load - low:.6g} N at this pressure."
-            return self._no_contraction(p, load) + possible
+            return self._no_contraction(p, load) + _pulls(load - high, load - low)
 
         return first_crossing(unbalance, self.contraction_reach, (pressure, force), message)
 
@@ -111,8 +113,7 @@ class ForceLaw(Characteristic):
             return self.force(pressure, c) - load
 
         def message(c: float, load: float, low: float, high: float) -> str:
-            possible = f"Between these the muscle pulls {low + load:.6g} to {high + load:.6g} N there."
-            return self._no_pressure(c, load) + possible
+            return self._no_pressure(c, load) + _pulls(low + load, high + load)
 
         return first_crossing(excess, self.pressure_reach, (contraction, force), message)
 
@@ -121,6 +122,19 @@ class ForceLaw(Characteristic):
             trace.slope(self, "force", pressure, contraction, wrt=0),
             trace.slope(self, "force", pressure, contraction, wrt=1),
         )
+
+    def _no_contraction_here(self, pressure: float, force: float) -> str:
+        """For a law solved in closed form, whose tension falls steadily from one end of its reach to the other."""
+        ends = (float(self.force(pressure, end)) for end in self.contraction_reach)
+        return self._no_contraction(pressure, force) + _pulls(*sorted(ends))
+
+    def _no_pressure_here(self, contraction: float, force: float) -> str:
+        ends = (float(self.force(end, contraction)) for end in self.pressure_reach)
+        return self._no_pressure(contraction, force) + _pulls(*sorted(ends))
+
+
+def _pulls(low: float, high: float) -> str:
+    return f"Between these the muscle pulls {low:.6g} to {high:.6g} N there."
 
 
 class ContractionLaw(Characteristic):

@@ -6,15 +6,27 @@ from ..declare import model, parameter
 from ..errors import ParameterError
 from ..ops import Value
 
+PRESSURES = (-101_325.0, 1e8)
+CONTRACTIONS = (-0.5, 1.0)
+"""What can be measured: no pressure below absolute zero, no contraction beyond the whole length."""
+
 
 @model
 class Box:
     """A rectangle of gauge pressure and contraction."""
 
-    least_pressure: float = parameter("Pa", "p_low", "lower end of the box in gauge pressure", fitted=False)
-    greatest_pressure: float = parameter("Pa", "p_high", "upper end of the box in gauge pressure", fitted=False)
-    least_contraction: float = parameter("1", "eps_low", "lower end of the box in contraction", fitted=False)
-    greatest_contraction: float = parameter("1", "eps_high", "upper end of the box in contraction", fitted=False)
+    least_pressure: float = parameter(
+        "Pa", "p_low", "lower end of the box in gauge pressure", bounds=PRESSURES, fitted=False
+    )
+    greatest_pressure: float = parameter(
+        "Pa", "p_high", "upper end of the box in gauge pressure", bounds=PRESSURES, fitted=False
+    )
+    least_contraction: float = parameter(
+        "1", "eps_low", "lower end of the box in contraction", bounds=CONTRACTIONS, fitted=False
+    )
+    greatest_contraction: float = parameter(
+        "1", "eps_high", "upper end of the box in contraction", bounds=CONTRACTIONS, fitted=False
+    )
 
     def check(self) -> None:
         for name in ("pressure", "contraction"):

@@ -9,7 +9,7 @@ from ..declare import model
 from ..geometry.braid import CHOU_HANNAFORD_1996, Braid
 from ..ops import Value
 from ..reference import Reference
-from .base import ForceLaw
+from .base import NO_PRESSURE, ForceLaw
 from .solve import within_reach
 
 
@@ -49,12 +49,12 @@ class ChouHannaford1996(ForceLaw):
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         found = force / self._area(contraction)
-        return within_reach(found, self.pressure_reach, (contraction, force), self._no_pressure)
+        return within_reach(found, self.pressure_reach, (contraction, force), self._no_pressure_here)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
-        ratio = force / pressure * 4 * ops.pi * self.turns**2 / self.thread**2
+        ratio = force / ops.where(pressure == 0.0, NO_PRESSURE, pressure) * 4 * ops.pi * self.turns**2 / self.thread**2
         found = 1.0 - self.thread * ops.sqrt((ratio + 1) / 3) / self.geometry.resting_length
-        return within_reach(found, self.contraction_reach, (pressure, force), self._no_contraction)
+        return within_reach(found, self.contraction_reach, (pressure, force), self._no_contraction_here)
 
     def _area(self, contraction: Value) -> Value:
         """F/p [m2]."""

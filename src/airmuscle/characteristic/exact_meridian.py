@@ -18,8 +18,7 @@ from .base import PressureLaw, Slopes
 from .rubber import RubberLine
 from .solve import first_crossing, within_reach
 
-NODES = 120
-"""Gauss points over half the meridian."""
+NODES = 120  # Gauss points over half the meridian
 
 
 @functools.cache

@@ -32,13 +32,15 @@ def first_crossing(
     first, second = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in given))
     a, b = first.reshape(-1), second.reshape(-1)
     grid = np.linspace(*reach, INTERVALS + 1)
-    values = np.asarray(function(grid[:, None], a, b)) + np.zeros((grid.size, a.size))
+    with np.errstate(over="ignore", invalid="ignore"):  # far from any answer a law may overflow
+        values = np.asarray(function(grid[:, None], a, b)) + np.zeros((grid.size, a.size))
     rises = (values[:-1] < 0) & (values[1:] >= 0)
     at_start = values[0] == 0
     unsolved = ~(rises.any(axis=0) | at_start)
     if unsolved.any():
         worst = int(np.argmax(unsolved))
-        ends = float(np.nanmin(values[:, worst])), float(np.nanmax(values[:, worst]))
+        taken = values[~np.isnan(values[:, worst]), worst]
+        ends = (float(taken.min()), float(taken.max())) if taken.size else (np.nan, np.nan)
         raise NoSolution(message(float(a[worst]), float(b[worst]), *ends))
     found = np.full(a.size, reach[0])
     index = rises.argmax(axis=0)

@@ -144,7 +144,8 @@ class _Isobars:
         return j, (pressure - self.levels[j]) / (self.levels[j + 1] - self.levels[j])
 
     def _outside(self, pressure: float, contraction: float, start: float, end: float) -> str:
-        question = f"Tabulated: {pressure / 1e3:.6g} kPa and {contraction:.2%} of contraction lie outside the table"
+        there = "" if np.isnan(contraction) else f" and {contraction:.2%} of contraction"
+        question = f"Tabulated: {pressure / 1e3:.6g} kPa{there} lie outside the table"
         if np.isnan(start):
             return f"{question}, which holds {self.levels[0] / 1e3:.6g} to {self.levels[-1] / 1e3:.6g} kPa."
         return f"{question}, which holds {start:.2%} to {end:.2%} at this pressure."

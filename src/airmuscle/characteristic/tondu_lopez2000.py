@@ -9,7 +9,7 @@ from ..declare import model, parameter
 from ..geometry.braid import Braid
 from ..ops import Value
 from ..reference import Reference
-from .base import ForceLaw
+from .base import NO_PRESSURE, ForceLaw
 from .solve import within_reach
 
 TONDU_LOPEZ_2000 = Reference(
@@ -51,12 +51,12 @@ class TonduLopez2000(ForceLaw):
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         found = force / self._area(contraction)
-        return within_reach(found, self.pressure_reach, (contraction, force), self._no_pressure)
+        return within_reach(found, self.pressure_reach, (contraction, force), self._no_pressure_here)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
-        ratio = force / (pressure * ops.pi * self.geometry.radius**2)
+        ratio = force / (ops.where(pressure == 0.0, NO_PRESSURE, pressure) * ops.pi * self.geometry.radius**2)
         found = (1.0 - ops.sqrt((ratio + self._b) / self._a)) / self.end_correction
-        return within_reach(found, self.contraction_reach, (pressure, force), self._no_contraction)
+        return within_reach(found, self.contraction_reach, (pressure, force), self._no_contraction_here)
 
     def _area(self, contraction: Value) -> Value:
         """F/p [m2]."""

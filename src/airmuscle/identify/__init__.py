@@ -1,11 +1,31 @@
-"""Parameters from measurements: `fit` and what it returns."""
+"""Parameters from measurements: `fit` and what it returns, `compare` and what stands around them."""
 
+from .band import Band as Band
+from .band import band as band
+from .bootstrap import Bootstrap as Bootstrap
+from .bootstrap import bootstrap as bootstrap
+from .candidates import Candidate as Candidate
+from .candidates import standard_candidates as standard_candidates
 from .censoring import UNCENSORED as UNCENSORED
 from .censoring import Censoring as Censoring
+from .compare import Comparison as Comparison
+from .compare import compare as compare
+from .convert import Conversion as Conversion
+from .convert import convert as convert
 from .fit import fit as fit
+from .leave_out import LeaveOut as LeaveOut
+from .leave_out import Levels as Levels
+from .leave_out import Runs as Runs
+from .leave_out import Specimens as Specimens
 from .loss import Huber as Huber
 from .loss import LeastSquares as LeastSquares
 from .loss import Loss as Loss
 from .loss import SoftL1 as SoftL1
+from .profile import Profile as Profile
+from .profile import profile as profile
+from .profile import weakly_determined as weakly_determined
 from .result import Estimate as Estimate
 from .result import Fit as Fit
+from .shape import ShapedFit as ShapedFit
+from .shape import fit_shaped as fit_shaped
+from .shape import shape_breaks as shape_breaks

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +16,7 @@ from ..recording import Recording
 from .censoring import Censoring, censoring_of
 from .correlation_index import correlation_index
 from .loss import Array, LeastSquares, Loss
-from .problem import Problem, pose
+from .problem import RESTING_LENGTH, Problem, answers, pose
 from .result import Estimate, Extreme, Fit
 from .solve import Solution, solve
 from .statistics import Statistics, statistics
@@ -47,19 +49,21 @@ def fit(
     data, dropped = _points(recording)
     weights = _weights(data, dropped, sigma)
     data, weights = data.rows(~dropped), weights[~dropped]
-    law = _with_box(characteristic, data)
+    law = _with_box(_of_length(characteristic, data), data)
     problem = pose(law, data, censoring or censoring_of(law), weights, fixed)
     solution = solve(problem, loss)
     found = statistics(problem, solution, loss)
     notes = _notes(problem, found, loss, int(np.count_nonzero(dropped)))
-    return _result(problem, solution, found, int(np.count_nonzero(dropped)), notes)
+    return _result(problem, solution, found, loss, int(np.count_nonzero(dropped)), notes)
 
 
 def _points(recording: Recording | Sequence[Recording]) -> tuple[Recording, npt.NDArray[np.bool_]]:
     """Pressure, contraction and force of one or several recordings, and the rows where one of them is missing."""
     runs = [recording] if isinstance(recording, Recording) else list(recording)
     columns = {name: np.concatenate([run[name] for run in runs]) for name in POINT} if runs else {}
-    origin = " + ".join(dict.fromkeys(run.origin for run in runs)) or "no recording"
+    origins = list(dict.fromkeys(run.origin for run in runs))
+    few = len(origins) <= 3
+    origin = " + ".join(origins if few else [*origins[:2], f"{len(origins) - 2} more"]) or "no recording"
     for name, values in columns.items():
         if np.isinf(values).any():
             row = int(np.argmax(np.isinf(values)))
@@ -68,7 +72,10 @@ def _points(recording: Recording | Sequence[Recording]) -> tuple[Recording, npt.
                 f"recording.rows(np.isfinite(recording['{name}']))."
             )
     missing = np.isnan(np.stack(list(columns.values()))).any(axis=0) if columns else np.zeros(0, dtype=bool)
-    lengths = {run.constants.get("resting_length") for run in runs} - {None}
+    lengths = {run.constants.get(RESTING_LENGTH) for run in runs} - {None}
+    if len(lengths) > 1 and all(RESTING_LENGTH in run.constants for run in runs):
+        by_row = [np.full(len(run), float(run.constants[RESTING_LENGTH])) for run in runs]
+        columns[RESTING_LENGTH] = np.concatenate(by_row)
     rest = lengths.pop() if len(lengths) == 1 else None
     return Recording(columns, origin, {} if rest is None else {"resting_length": rest}), missing
 
@@ -81,6 +88,12 @@ def _weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLi
         raise IdentificationError(f"{data.origin}: every sigma must be finite and greater than zero.")
     weights = 1.0 / deviations
     return np.asarray(weights / np.sqrt(np.mean(weights[~dropped] ** 2)))
+
+
+def _of_length(law: Any, data: Recording) -> Any:
+    """A law for muscles of any length as that of the muscle in the data, where there is one."""
+    rest = data.constants.get(RESTING_LENGTH)
+    return law.of_length(float(rest)) if rest is not None and hasattr(law, "of_length") else law
 
 
 def _with_box(law: Characteristic, data: Recording) -> Characteristic:
@@ -100,10 +113,12 @@ def _with_box(law: Characteristic, data: Recording) -> Characteristic:
     return boxed
 
 
-def _result(problem: Problem, solution: Solution, found: Statistics, dropped: int, notes: tuple[str, ...]) -> Fit:
+def _result(
+    problem: Problem, solution: Solution, found: Statistics, loss: Loss, dropped: int, notes: tuple[str, ...]
+) -> Fit:
     data, quantity = problem.data, problem.direction.quantity
     model = declare.with_parameters(problem.law, problem.leaf_values(solution.values))
-    clamped = np.asarray(getattr(model, quantity)(*problem.arguments), dtype=float)
+    clamped = answers(model, quantity, problem.direction.arguments, data)
     measured = problem.sides == 0
     errors = clamped - data[quantity]
     # a row cut off is wrong only where the law contradicts it; what it reads is not what was there
@@ -125,6 +140,8 @@ def _result(problem: Problem, solution: Solution, found: Statistics, dropped: in
         recording=data,
         direction=problem.direction,
         sides=problem.sides,
+        problem=dataclasses.replace(problem, law=model, leaves=tuple(declare.leaves(model))),
+        loss=loss,
         notes=notes,
     )
 

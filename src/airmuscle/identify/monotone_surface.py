@@ -105,11 +105,11 @@ def monotone(
     problem = SurfaceProblem.of(recording, saturation, pressure_degree, force_degree)
     constraints = slope_constraints(pressure_degree, force_degree, cells)
     targets, weights = problem.linear_targets()
-    found = _constrained(weights[:, None] * problem.columns, weights * targets, constraints, MARGIN)
+    found = constrained(weights[:, None] * problem.columns, weights * targets, constraints, MARGIN)
     for _ in range(200):
         errors = problem.modelled(found) - problem.contraction
         slopes = problem.slopes(found)
-        step = _constrained(slopes, slopes @ found - errors, constraints, MARGIN) - found
+        step = constrained(slopes, slopes @ found - errors, constraints, MARGIN) - found
         # where no part of the step helps, rounding is all that is left
         shorter = (t * step for t in 0.5 ** np.arange(20))
         step = next((s for s in shorter if _squares(problem, found + s) <= errors @ errors), 0.0 * step)
@@ -162,7 +162,7 @@ def _enclosure(degree: int, cells: int, *, slope: bool) -> Array:
     return np.vstack(blocks)
 
 
-def _constrained(matrix: Array, right: Array, rows: Array, least: float) -> Array:
+def constrained(matrix: Array, right: Array, rows: Array, least: float) -> Array:
     """The x that minimises |matrix x - right| subject to rows x >= least.
 
     With matrix = Q R and z = R x - Q^T right it is the shortest z with rows R^-1 z >= least - rows R^-1 Q^T

@@ -18,6 +18,8 @@ from ..recording.columns import QUANTITIES
 from .censoring import Censoring
 
 Array = npt.NDArray[np.float64]
+RESTING_LENGTH = "resting_length"
+"""Column of the length of muscle by row, in data of several specimens."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,6 +38,28 @@ class Direction:
 FORCE = Direction("unclamped", ("pressure", "contraction"), "force")
 CONTRACTION = Direction("contraction", ("pressure", "force"), "contraction")
 PRESSURE = Direction("pressure", ("contraction", "force"), "pressure")
+
+
+def by_specimen(law: Any, data: Recording) -> list[tuple[Any, npt.NDArray[np.intp]]]:
+    """The law of each length of muscle in the data, and its rows: one law for all where it knows of no lengths."""
+    if RESTING_LENGTH not in data.columns or not hasattr(law, "of_length"):
+        return [(law, np.arange(len(data)))]
+    lengths = data[RESTING_LENGTH]
+    return [(_of_length(law, float(length)), np.flatnonzero(lengths == length)) for length in np.unique(lengths)]
+
+
+def _of_length(law: Any, length: float) -> Any:
+    """As `law.of_length`, but unchecked: a search may pass where the law has no meaning."""
+    leaves = declare.leaves(law)
+    return declare.rebuild(law, [length if leaf.path == RESTING_LENGTH else leaf.value for leaf in leaves])
+
+
+def answers(law: Any, method: str, arguments: tuple[str, str], data: Recording) -> Array:
+    """What a law, or that of each length, gives at every row; shape (N,)."""
+    found = np.zeros(len(data))
+    for specimen, rows in by_specimen(law, data):
+        found[rows] = getattr(specimen, method)(*(data[name][rows] for name in arguments))
+    return found
 
 
 def direction_of(law: Characteristic) -> Direction:
@@ -83,7 +107,10 @@ class Problem:
         terms = getattr(self.law, "terms", ())
         field = getattr(self.law, "linear_in", None)
         texts = {f"{field}[{i}]": f"a({term})" for i, term in enumerate(terms)}
-        return tuple(texts.get(self.leaves[i].path, self.leaves[i].declared.symbol) for i in self.free)
+        symbols = [self.leaves[i].declared.symbol for i in self.free]
+        paths = [self.leaves[i].path for i in self.free]
+        names = (s if symbols.count(s) == 1 else path for s, path in zip(symbols, paths, strict=True))
+        return tuple(texts.get(path, name) for path, name in zip(paths, names, strict=True))
 
     def leaf_values(self, values: Sequence[float] | Array) -> list[float]:
         """All leaves of the law, with these values of the free ones."""
@@ -96,8 +123,7 @@ class Problem:
         """What the law gives with these parameters; shape (N,)."""
         law = declare.rebuild(self.law, self.leaf_values(values))
         with np.errstate(all="ignore"):  # what is not finite is refused, or the search steps back from it
-            found = getattr(law, self.direction.method)(*self.arguments)
-        return np.asarray(found, dtype=float) + np.zeros(len(self.data))
+            return answers(law, self.direction.method, self.direction.arguments, self.data)
 
     def errors(self, modelled: Array) -> Array:
         """Weighted errors; a row that was cut off has one only where the law contradicts it."""
@@ -112,7 +138,11 @@ class Problem:
         """The derivatives of `modelled` by the free parameters, shape (N, P): exact where the law can be traced."""
         if _can_be_traced(self.law):
             law = declare.rebuild(self.law, self.leaf_values(values))
-            return trace.jacobian(law, self.direction.method, *self.arguments)[1][:, list(self.free)]
+            found = np.empty((len(self.data), len(self.leaves)))
+            for specimen, rows in by_specimen(law, self.data):
+                arguments = (values[rows] for values in self.arguments)
+                found[rows] = trace.jacobian(specimen, self.direction.method, *arguments)[1]
+            return found[:, list(self.free)]
         return self._differences(values)
 
     def _differences(self, values: Array) -> Array:

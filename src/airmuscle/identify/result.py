@@ -14,7 +14,8 @@ from ..characteristic.box import Box
 from ..errors import ParameterError, suggestion
 from ..recording import Recording
 from .correlation_index import CorrelationIndex
-from .problem import CONTRACTION, FORCE, Array, Direction
+from .loss import Loss
+from .problem import CONTRACTION, FORCE, Array, Direction, Problem, answers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,6 +70,9 @@ class Fit:
     direction: Direction
     sides: npt.NDArray[np.float64]
     """By row: 0 measured, else cut off: the model may lie below (1) or above (-1)."""
+    problem: Problem
+    """What was posed, for refits: points, goals, weights and the free parameters."""
+    loss: Loss
     notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
@@ -93,6 +97,11 @@ class Fit:
         return np.array([estimate.deviation for estimate in self.estimates])
 
     @property
+    def covariance(self) -> Array:
+        """Of the estimates, in their order, shape (P, P); NaN for a parameter on a bound."""
+        return np.asarray(self.correlations * np.outer(self.standard_deviations, self.standard_deviations))
+
+    @property
     def rows_used(self) -> int:
         """Rows that took part, those cut off among them."""
         return len(self.recording)
@@ -110,8 +119,7 @@ class Fit:
     @property
     def modelled(self) -> Array:
         """What the fitted model gives at the rows that were used, as a user of it sees it: clamped."""
-        first, second = (self.recording[name] for name in self.direction.arguments)
-        return np.asarray(getattr(self.model, self.direction.quantity)(first, second))
+        return answers(self.model, self.direction.quantity, self.direction.arguments, self.recording)
 
     @property
     def errors(self) -> Array:

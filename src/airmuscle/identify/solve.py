@@ -31,22 +31,23 @@ class Solution(NamedTuple):
 
 def solve(problem: Problem, loss: Loss) -> Solution:
     """The free parameters that make the loss least. Raises IdentificationError where the search fails."""
-    if not _is_linear(problem):
+    if not is_linear(problem):
         return _solve_iterating(problem, loss, problem.start)
     found = _solve_linear(problem)
     return found if isinstance(loss, LeastSquares) else _solve_iterating(problem, loss, found.values)
 
 
-def _is_linear(problem: Problem) -> bool:
+def is_linear(problem: Problem) -> bool:
     """Whether the law is linear in all that is to be found, and nothing bounds it."""
-    field = getattr(problem.law, "linear_in", None)
+    named = getattr(problem.law, "linear_in", ())
+    fields = (named,) if isinstance(named, str) else named
     leaves: list[Leaf] = [problem.leaves[i] for i in problem.free]
-    return field is not None and all(
-        leaf.path.partition("[")[0] == field and leaf.declared.bounds == (-np.inf, np.inf) for leaf in leaves
+    return bool(fields) and all(
+        leaf.path.partition("[")[0] in fields and leaf.declared.bounds == (-np.inf, np.inf) for leaf in leaves
     )
 
 
-def _design(problem: Problem) -> tuple[Array, Array]:
+def design(problem: Problem) -> tuple[Array, Array]:
     """Matrix (N, P) and constant part (N,) of a law linear in its free parameters."""
     basis = getattr(problem.law, "basis", None)
     if basis is not None and len(problem.free) == len(problem.law.terms):
@@ -62,7 +63,7 @@ def _solve_linear(problem: Problem) -> Solution:
     alone leave parameters open, a law may fall below its bounds without end; of all that are equally good, the one
     nearest to the bounds is taken.
     """
-    slopes, constant = _design(problem)
+    slopes, constant = design(problem)
     norms = np.linalg.norm(slopes, axis=0)
     norms[norms == 0] = 1.0
     matrix = problem.weights[:, None] * (slopes / norms)

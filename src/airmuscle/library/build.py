@@ -7,34 +7,17 @@ data file, `{ file = "data/map.csv", column = "force" }`, beside the file that n
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import types
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .. import units
 from ..declare import Parameter, field_or_suggestion, parameters
-from ..errors import AirmuscleError, ParameterError
+from ..errors import ParameterError
 from .models import model_class
-
-
-@dataclasses.dataclass(frozen=True)
-class Place:
-    """Where in a file something stands, for messages; and the folder that its data files are relative to."""
-
-    file: str
-    table: str
-    folder: Path
-
-    def inside(self, key: str) -> Place:
-        """The place of a table or list item within this one."""
-        return dataclasses.replace(self, table=f"{self.table}.{key}" if self.table else key)
-
-    def __str__(self) -> str:
-        return f"{self.file}, [{self.table}]" if self.table else self.file
+from .place import Place, number, said_at
 
 
 def build(table: Mapping[str, Any], place: Place, ready: Mapping[str, Any] | None = None) -> Any:
@@ -49,7 +32,7 @@ def build(table: Mapping[str, Any], place: Place, ready: Mapping[str, Any] | Non
     cls = model_class(table["model"], f"{place}, model")
     given = {key: value for key, value in table.items() if key != "model"}
     for key in given:
-        with _said_at(place):
+        with said_at(place):
             field_or_suggestion(cls, key)
     declared = {p.name: p for p in parameters(cls)}
     hints = typing.get_type_hints(cls)
@@ -60,17 +43,8 @@ def build(table: Mapping[str, Any], place: Place, ready: Mapping[str, Any] | Non
         else _part(value, hints[key], key, place)
         for key, value in given.items()
     }
-    with _said_at(place):
+    with said_at(place):
         return cls(**values, **(ready or {}))
-
-
-@contextlib.contextmanager
-def _said_at(place: Place) -> Iterator[None]:
-    """Puts the place in front of the message of any error of ours that is raised inside."""
-    try:
-        yield
-    except AirmuscleError as error:
-        raise type(error)(f"{place}: {error}") from None
 
 
 def _refuse_missing(cls: type[Any], given: Mapping[str, Any], hints: Mapping[str, Any], place: Place) -> None:
@@ -102,12 +76,7 @@ def _numbers(value: Any, declared: Parameter, hint: Any, place: Place) -> Any:
 
 
 def _number(value: Any, declared: Parameter, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ParameterError(
-            f"{where} is {value!r}; it must be a number in {declared.unit}, or text with a unit "
-            f"({declared.symbol}, {declared.meaning})."
-        )
-    return units.quantity(value, declared.unit, where=where)
+    return number(value, declared.unit, where, f" ({declared.symbol}, {declared.meaning})")
 
 
 def _column(value: Mapping[str, Any], where: str, folder: Path) -> tuple[float, ...]:
@@ -116,8 +85,9 @@ def _column(value: Mapping[str, Any], where: str, folder: Path) -> tuple[float, 
 
     if set(value) != {"file", "column"} or not all(isinstance(v, str) for v in value.values()):
         raise ParameterError(f'{where}: a column of a file is written {{ file = "data/map.csv", column = "force" }}.')
-    recording = read_csv(folder / value["file"])
-    return tuple(float(v) for v in recording[value["column"]])
+    with said_at(where):
+        recording = read_csv(folder / value["file"])
+        return tuple(float(v) for v in recording[value["column"]])
 
 
 def _part(value: Any, hint: Any, key: str, place: Place) -> Any:
@@ -126,7 +96,7 @@ def _part(value: Any, hint: Any, key: str, place: Place) -> Any:
     if isinstance(value, Mapping):
         found = build(value, inner)
     elif isinstance(value, list):
-        found = tuple(_part(v, Any, f"{key}[{i}]", place) for i, v in enumerate(value))
+        found = tuple(_part(v, _item(hint), f"{key}[{i}]", place) for i, v in enumerate(value))
     elif isinstance(value, str) and not _accepts(hint, value):
         found = build({"model": value}, inner)
     else:
@@ -135,6 +105,12 @@ def _part(value: Any, hint: Any, key: str, place: Place) -> Any:
         what = type(found).__name__ if dataclasses.is_dataclass(found) else repr(found)
         raise ParameterError(f"{place}: {key} is {what}; {_words(hint)} is wanted.")
     return found
+
+
+def _item(hint: Any) -> Any:
+    """What a list under a field may hold, by the field's annotation."""
+    options = typing.get_args(hint) if typing.get_origin(hint) in (typing.Union, types.UnionType) else (hint,)
+    return next((typing.get_args(option)[0] for option in options if typing.get_origin(option) is tuple), Any)
 
 
 def _accepts(hint: Any, value: Any) -> bool:

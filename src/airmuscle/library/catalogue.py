@@ -92,3 +92,5 @@ def parsed(path: Path) -> dict[str, Any]:
         raise FileError(f"{path}: is not UTF-8 text (byte {error.start}). Save it as UTF-8.") from None
     except tomllib.TOMLDecodeError as error:
         raise FileError(f"{path}: is not TOML: {error}.") from None
+    except (ValueError, RecursionError) as error:  # a name with a null byte, brackets nested past any use
+        raise FileError(f"{path}: cannot be read ({error}).") from None

@@ -32,6 +32,13 @@ _MODULES: dict[str, str] = {
     "LinearDamper": "muscle",
     "LinearSpring": "muscle",
     "PressureDamper": "muscle",
+    # friction
+    "BoucWen": "friction.bouc_wen",
+    "Dahl": "friction.dahl",
+    "LuGre": "friction.lugre",
+    "MaxwellSlip": "friction.maxwell_slip",
+    "NoFriction": "friction.base",
+    "PrandtlIshlinskii": "friction.prandtl_ishlinskii",
     # muscles and plants
     "Muscle": "muscle",
     "Plant": "plant",
@@ -61,11 +68,17 @@ _MODULES: dict[str, str] = {
     "Clamped": "characteristic.clamped",
     "ContractileSurface": "characteristic.contractile_surface",
     "ExactMeridian": "characteristic.exact_meridian",
+    "EffectiveLength": "characteristic.effective_length",
+    "Hunt2017": "characteristic.hunt2017",
+    "InverseLength": "characteristic.inverse_length",
+    "LogarithmicLength": "characteristic.logarithmic_length",
     "MartensBoblan2017": "characteristic.martens_boblan2017",
+    "Reynolds2003": "characteristic.reynolds2003",
     "RubberLine": "characteristic.rubber",
     "Saga2007": "characteristic.saga2007",
     "PolynomialStandIn": "characteristic.as_force_law",
     "Sarosi2012": "characteristic.sarosi2012",
+    "Serres2009": "characteristic.serres2009",
     "Tabulated": "characteristic.tabulated",
     "TonduLopez2000": "characteristic.tondu_lopez2000",
     "VirtualWork": "characteristic.virtual_work",
@@ -79,6 +92,8 @@ def model_names() -> tuple[str, ...]:
 
 def model_class(name: str, where: str) -> type[Any]:
     """The class of this name; `where` opens the message of the UnknownName raised otherwise."""
+    if not isinstance(name, str):
+        raise UnknownName(f'{where} is {name!r}; it must be a name in quotes, like "Braid".')
     if name not in _MODULES:
         raise UnknownName(
             f"{where}: no model '{name}'; there are {', '.join(model_names())}.{suggestion(name, _MODULES)}"

@@ -6,14 +6,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .. import units
 from ..characteristic.base import Characteristic
+from ..characteristic.box import Box
 from ..errors import ParameterError, suggestion
 from ..geometry.base import Geometry
 from ..muscle import Damper, Spring
 from ..reference import Reference
-from .build import Place, build
+from .build import build
 from .entry import Check, Entry
+from .place import Place, checked, finite, refuse_unknown, text
 
 QUANTITIES = {"pressure": "Pa", "contraction": "1", "force": "N", "volume": "m3"}
 """What a check may give and ask for, with the unit its plain numbers are in."""
@@ -35,11 +36,15 @@ _REFERENCE_KEYS = ("key", "authors", "title", "where", "year", "doi", "note")
 def entry_from(tables: Mapping[str, Any], name: str, file: Path, folder: Path) -> Entry:
     """The entry that a parsed file describes; messages name `file`, data files are relative to `folder`."""
     place = Place(str(file), "", folder)
-    _refuse_unknown(tables, _KEYS, place)
-    texts: dict[str, Any] = {key: _text(tables, key, place, needed=key in ("title", "trust")) for key in _TEXTS}
+    refuse_unknown(tables, _KEYS, place)
+    texts: dict[str, Any] = {key: text(tables, key, place, needed=key in ("title", "trust")) for key in _TEXTS}
     if "characteristic" not in tables:
         raise ParameterError(f"{place}: the table [characteristic] is missing; it says which law and its parameters.")
-    parts = {key: _part(tables[key], kind, place.inside(key)) for key, kind in _PARTS.items() if key in tables}
+    parts = {
+        key: checked(build(tables[key], place.inside(key)), kind, place.inside(key))
+        for key, kind in _PARTS.items()
+        if key in tables
+    }
     if "geometry" not in parts:
         own = getattr(parts["characteristic"], "geometry", None)
         parts["geometry"] = own if isinstance(own, Geometry) else None
@@ -47,17 +52,15 @@ def entry_from(tables: Mapping[str, Any], name: str, file: Path, folder: Path) -
         name=name,
         **texts,
         **parts,
-        box=build({"model": "Box", **tables["box"]}, place.inside("box")) if "box" in tables else None,
+        box=_box(tables["box"], place.inside("box")) if "box" in tables else None,
         checks=tuple(_check(t, p) for t, p in _rows(tables, "check", place)),
         references=tuple(_reference(t, p) for t, p in _rows(tables, "reference", place)),
     )
 
 
-def _part(table: Any, kind: type[Any], place: Place) -> Any:
-    found = build(table, place)
-    if not isinstance(found, kind):
-        raise ParameterError(f"{place}: {type(found).__name__} is no {kind.__name__.lower()}.")
-    return found
+def _box(table: Any, place: Place) -> Any:
+    named = {"model": "Box", **table} if isinstance(table, Mapping) else table
+    return checked(build(named, place), Box, place)
 
 
 def _rows(tables: Mapping[str, Any], key: str, place: Place) -> list[tuple[Mapping[str, Any], Place]]:
@@ -67,26 +70,9 @@ def _rows(tables: Mapping[str, Any], key: str, place: Place) -> list[tuple[Mappi
     return [(row, place.inside(f"{key} {i}")) for i, row in enumerate(rows, 1)]
 
 
-def _refuse_unknown(table: Mapping[str, Any], known: tuple[str, ...], place: Place) -> None:
-    for key in table:
-        if key not in known:
-            raise ParameterError(
-                f"{place}: '{key}' is not known here; there are {', '.join(known)}.{suggestion(key, known)}"
-            )
-
-
-def _text(table: Mapping[str, Any], key: str, place: Place, *, needed: bool) -> str:
-    value = table.get(key, "")
-    if not isinstance(value, str):
-        raise ParameterError(f"{place}: {key} is {value!r}; it must be text.")
-    if needed and not value.strip():
-        raise ParameterError(f"{place}: '{key}' is missing; it must be text.")
-    return value
-
-
 def _check(table: Mapping[str, Any], place: Place) -> Check:
-    _refuse_unknown(table, _CHECK_KEYS, place)
-    quantity, source = (_text(table, key, place, needed=True) for key in _CHECK_TEXTS)
+    refuse_unknown(table, _CHECK_KEYS, place)
+    quantity, source = (text(table, key, place, needed=True) for key in _CHECK_TEXTS)
     if quantity not in QUANTITIES:
         raise ParameterError(
             f"{place}: quantity '{quantity}' cannot be checked; there are {', '.join(QUANTITIES)}."
@@ -97,24 +83,24 @@ def _check(table: Mapping[str, Any], place: Place) -> Check:
             raise ParameterError(
                 f"{place}: '{key}' is missing; it is a number in {QUANTITIES[quantity]}, or text with a unit."
             )
-    given = tuple((key, _number(table[key], key, key, place)) for key in QUANTITIES if key in table)
+    given = tuple((key, _value(table, key, key, place)) for key in QUANTITIES if key in table)
     wanted = _GIVEN[quantity]
     if tuple(key for key, _ in given) != wanted:
         raise ParameterError(f"{place}: to check the {quantity}, give {' and '.join(wanted)}, and nothing else.")
-    equals, tolerance = (_number(table[key], key, quantity, place) for key in ("equals", "tolerance"))
+    equals, tolerance = (_value(table, key, quantity, place) for key in ("equals", "tolerance"))
+    if tolerance < 0:
+        raise ParameterError(f"{place}: tolerance is {table['tolerance']!r}; it must be zero or more.")
     return Check(quantity, given, equals, tolerance, source)
 
 
-def _number(value: Any, key: str, quantity: str, place: Place) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ParameterError(f"{place}, {key} is {value!r}; it must be a number in {QUANTITIES[quantity]}.")
-    return units.quantity(value, QUANTITIES[quantity], where=f"{place}, {key}")
+def _value(table: Mapping[str, Any], key: str, quantity: str, place: Place) -> float:
+    return finite(table[key], QUANTITIES[quantity], f"{place}, {key}")
 
 
 def _reference(table: Mapping[str, Any], place: Place) -> Reference:
-    _refuse_unknown(table, _REFERENCE_KEYS, place)
-    for key in ("key", "authors", "title", "where"):
-        _text(table, key, place, needed=True)
-    if not isinstance(table.get("year", 0), int):
+    refuse_unknown(table, _REFERENCE_KEYS, place)
+    for key in ("key", "authors", "title", "where", "doi", "note"):
+        text(table, key, place, needed=key not in ("doi", "note"))
+    if not isinstance(table.get("year", 0), int) or isinstance(table.get("year"), bool):
         raise ParameterError(f"{place}: year is {table['year']!r}; it must be a whole number.")
     return Reference(**table)

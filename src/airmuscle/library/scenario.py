@@ -24,18 +24,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .. import units
-from ..command import Command
+from ..command import Command, refuse_unknown_input
 from ..equilibrium import equilibrium
-from ..errors import ParameterError, suggestion
+from ..errors import ParameterError
 from ..method import Method, Rodas4
 from ..muscle import Muscle
 from ..plant import Plant
 from ..recording import Recording
-from ..simulate import simulate
-from .build import Place, build
+from ..simulate import refuse_beyond_opening, simulate
+from .build import build
 from .catalogue import load, parsed
 from .models import model_class
+from .place import Place, checked, finite, refuse_unknown, said_at, text
 
 _TABLES = ("title", "plant", "command", "run")
 _RUN = ("duration", "start_time", "output", "start", "method")
@@ -73,37 +73,56 @@ def load_scenario(path: str | Path) -> Scenario:
     file = Path(path)
     tables = parsed(file)
     place = Place(str(file), "", file.parent)
-    _refuse_unknown(tables, _TABLES, place)
+    refuse_unknown(tables, _TABLES, place)
     for key in ("plant", "run"):
-        if not isinstance(tables.get(key), Mapping):
-            raise ParameterError(f"{place}: the table [{key}] is missing.")
+        _table(tables.get(key), key, place)
     plant = _plant(tables["plant"], place.inside("plant"))
     run, at = tables["run"], place.inside("run")
-    _refuse_unknown(run, _RUN, at)
+    refuse_unknown(run, _RUN, at)
     if "duration" not in run:
         raise ParameterError(f"{at}: 'duration' is missing; write it like duration = \"25 s\".")
-    seconds = {key: _number(run[key], "s", f"{at}, {key}") for key in ("start_time", "output") if key in run}
-    method = _object(run["method"], Method, at.inside("method")) if "method" in run else Rodas4()
+    duration, start_time = _length(run, "duration", at), finite(run.get("start_time", 0.0), "s", f"{at}, start_time")
+    command = _command(_table(tables.get("command", {}), "command", place), plant, place.inside("command"))
+    with said_at(place.inside("command")):
+        refuse_beyond_opening(plant, command.segments(plant.inputs, start_time, duration), start_time)
     return Scenario(
-        title=str(tables.get("title", file.stem)),
+        title=text(tables, "title", place, needed=False) or file.stem,
         plant=plant,
-        duration=_number(run["duration"], "s", f"{at}, duration"),
-        method=method,
-        command=_command(tables.get("command", {}), plant, place.inside("command")),
+        command=command,
+        duration=duration,
         start=_start(run.get("start", {"pressure": 0.0}), plant, at.inside("start")),
-        **seconds,
+        start_time=start_time,
+        output=_length(run, "output", at) if "output" in run else None,
+        method=_object(run["method"], Method, at.inside("method")) if "method" in run else Rodas4(),
     )
+
+
+def _table(given: Any, key: str, place: Place) -> Mapping[str, Any]:
+    if not isinstance(given, Mapping):
+        what = "is missing" if given is None else f"is {given!r}, no table; write [{key}] and its keys under it"
+        raise ParameterError(f"{place}: the table [{key}] {what}.")
+    return given
+
+
+def _length(table: Mapping[str, Any], key: str, place: Place) -> float:
+    """A length of time [s]."""
+    found = finite(table[key], "s", f"{place}, {key}")
+    if not found > 0:
+        raise ParameterError(f"{place}, {key} is {table[key]!r}; it must be greater than zero.")
+    return found
 
 
 def _plant(table: Mapping[str, Any], place: Place) -> Plant:
     muscles = table.get("muscle")
     if muscles is None:
         raise ParameterError(f"{place}: 'muscle' is missing; name a library entry, a file, or write [plant.muscle].")
-    many = isinstance(muscles, list)
-    found = [_muscle(m, place.inside("muscle")) for m in (muscles if many else [muscles])]
+    found: Any
+    if isinstance(muscles, list):
+        found = tuple(_muscle(m, place.inside(f"muscle[{i}]")) for i, m in enumerate(muscles))
+    else:
+        found = _muscle(muscles, place.inside("muscle"))
     rest = {"model": "Plant", **{key: value for key, value in table.items() if key != "muscle"}}
-    ready = {"muscle": tuple(found) if many else found[0]}
-    plant: Plant = _checked(build(rest, place, ready), Plant, place)
+    plant: Plant = checked(build(rest, place, {"muscle": found}), Plant, place)
     return plant
 
 
@@ -116,7 +135,8 @@ def _muscle(given: Any, place: Place) -> Any:
     if not isinstance(given, str):
         raise ParameterError(f"{place} is {given!r}; name a library entry or a muscle file.")
     own = place.folder / given
-    return load(own if given.endswith(".toml") else given).muscle
+    with said_at(place):
+        return load(own if given.endswith(".toml") else given).muscle
 
 
 def _parts(muscle: Muscle, replaced: Mapping[str, Any]) -> dict[str, Any]:
@@ -126,19 +146,18 @@ def _parts(muscle: Muscle, replaced: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _command(table: Mapping[str, Any], plant: Plant, place: Place) -> Command:
-    name = table.get("model", "Schedule")
-    points = {}
-    for key, rows in table.items():
-        if key == "model":
-            continue
-        if key not in plant.inputs:
-            known = ", ".join(plant.inputs) or "none"
-            raise ParameterError(
-                f"{place}: the plant has no input '{key}'; there are {known}.{suggestion(key, plant.inputs)}"
-            )
-        points[key] = tuple(_point(row, f"{place}, {key}") for row in _list(rows, f"{place}, {key}"))
-    found: Command = _checked(model_class(name, f"{place}, model")(points), Command, place)
-    return found
+    rows = {key: value for key, value in table.items() if key != "model"}
+    with said_at(place):
+        refuse_unknown_input(list(rows), plant.inputs)
+    points = {
+        key: tuple(_point(row, f"{place}, {key}") for row in _list(given, f"{place}, {key}"))
+        for key, given in rows.items()
+    }
+    kind = model_class(table.get("model", "Schedule"), f"{place}, model")
+    if not issubclass(kind, Command):
+        raise ParameterError(f"{place}: {kind.__name__} is no command.")
+    with said_at(place):
+        return kind(points)  # type: ignore[call-arg]  # every command that a file can name is made of its points
 
 
 def _list(rows: Any, where: str) -> list[Any]:
@@ -150,41 +169,22 @@ def _list(rows: Any, where: str) -> list[Any]:
 def _point(row: Any, where: str) -> tuple[float, float]:
     if not (isinstance(row, list) and len(row) == 2):
         raise ParameterError(f'{where} holds {row!r}; each is an instant and a value, ["5 s", 1].')
-    return _number(row[0], "s", where), _number(row[1], "1", where)
+    return finite(row[0], "s", where), finite(row[1], "1", where)
 
 
 def _start(given: Any, plant: Plant, place: Place) -> dict[str, float]:
     if not isinstance(given, Mapping):
         raise ParameterError(f'{place} is {given!r}; write start = {{ pressure = "0 bar" }}.')
     coordinates = {
-        name: unit for c in plant.mechanism.coordinates for name, unit in ((c.name, c.unit), (c.speed, "m/s"))
+        name: unit for c in plant.mechanism.coordinates for name, unit in ((c.name, c.unit), (c.speed, f"{c.unit}/s"))
     }
     kinds = {"pressure": "Pa", **coordinates}
-    _refuse_unknown(given, tuple(kinds), place)
-    values = {key: _number(value, kinds[key], f"{place}, {key}") for key, value in given.items()}
+    refuse_unknown(given, tuple(kinds), place)
+    values = {key: finite(value, kinds[key], f"{place}, {key}") for key, value in given.items()}
     pressure = values.pop("pressure", 0.0)
-    return plant.state_at(pressure=pressure, **values) if values else equilibrium(plant, pressure=pressure)
+    with said_at(place):
+        return plant.state_at(pressure=pressure, **values) if values else equilibrium(plant, pressure=pressure)
 
 
 def _object(given: Any, kind: type[Any], place: Place) -> Any:
-    return _checked(build({"model": given} if isinstance(given, str) else given, place), kind, place)
-
-
-def _checked(found: Any, kind: type[Any], place: Place) -> Any:
-    if not isinstance(found, kind):
-        raise ParameterError(f"{place}: {type(found).__name__} is no {kind.__name__.lower()}.")
-    return found
-
-
-def _number(value: Any, unit: str, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ParameterError(f"{where} is {value!r}; it must be a number in {unit}, or text with a unit.")
-    return units.quantity(value, unit, where=where)
-
-
-def _refuse_unknown(table: Mapping[str, Any], known: tuple[str, ...], place: Place) -> None:
-    for key in table:
-        if key not in known:
-            raise ParameterError(
-                f"{place}: '{key}' is not known here; there are {', '.join(known)}.{suggestion(key, known)}"
-            )
+    return checked(build({"model": given} if isinstance(given, str) else given, place), kind, place)

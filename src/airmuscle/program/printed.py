@@ -127,9 +127,8 @@ def implicit_module(t: Traced) -> tuple[str, Sizes]:
     printer.add("factor", {"J": js, "d": d}, {"A": factors}, ["d"])
     printer.add("solve", {"A": a, "b": b}, {"y": casadi.vertcat(*solve)})
     printer.add("stage", {**point, "A": a, "g": g}, {"k": casadi.vertcat(*stage)})
-    printer.add(
-        "drift", {**point, "w": t.w}, {"f": casadi.densify(casadi.jtimes(t.f, t.u, t.w)) if t.u.numel() else casadi.SX(size, 1)}
-    )
+    drift = casadi.densify(casadi.jtimes(t.f, t.u, t.w) if t.u.numel() else casadi.SX(size, 1))
+    printer.add("drift", {**point, "w": t.w}, {"f": drift})
     printer.add("outputs", point, {"o": t.o})
     sizes = Sizes(size, t.u.shape[0], t.p.shape[0], printer.held, values.numel(), factors.numel(), t.o.shape[0])
     return printer.module(), sizes

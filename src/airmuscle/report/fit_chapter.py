@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,18 +14,17 @@ from .chart import SAME_PRESSURE, Array, chart, isobars
 if TYPE_CHECKING:
     from ..identify.result import Fit
     from ..library.entry import Entry
-    from ..recording import Recording
 
 MOST_CURVES = 8
 
 
-def fit_chapter(fit: Fit, entry: Entry, recording: Recording) -> Chapter:
+def fit_chapter(fit: Fit, entry: Entry, notes: Sequence[str] = ()) -> Chapter:
     """A fit's figures of merit, parameters, isobars with the measured points, and errors, row by row."""
-    notes = "\n\n".join((*fit.notes, *recording.notes))
+    said = "\n\n".join((*fit.notes, *notes))
     return Chapter(
         paper="fit",
         title=entry.title,
-        summary=f"{entry.note}\n\n{notes}",
+        summary=f"{entry.note}\n\n{said}",
         tables=(_figures(fit), _parameters(fit), _correlations(fit), _rows(fit)),
         plots=(_isobars(fit, entry), Plot("errors", "Model against measurement, and the errors.", fit.plot())),
         references=tuple(cite(entry)),

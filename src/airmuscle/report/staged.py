@@ -20,7 +20,8 @@ def staged(folder: Path | str) -> Iterator[Path]:
     was not there. Files of the same name are replaced, others left alone. Raises FileError.
     """
     target = Path(folder)
-    made = _missing(target)
+    with _as_file_error(target):
+        made = _missing(target)
     try:
         with _as_file_error(target):
             target.mkdir(parents=True, exist_ok=True)
@@ -39,7 +40,8 @@ def staged(folder: Path | str) -> Iterator[Path]:
 def refuse_unwritable(folder: Path | str) -> None:
     """Raise FileError now, before long work, where `staged` could not write later; leaves nothing behind."""
     target = Path(folder)
-    made = _missing(target)
+    with _as_file_error(target):
+        made = _missing(target)
     try:
         with staged(target):
             return
@@ -74,8 +76,11 @@ def _move_up(place: Path, target: Path) -> None:
     files = sorted(path for path in place.rglob("*") if path.is_file())
     moves = [(path, target / path.relative_to(place)) for path in files]
     for _, goal in moves:
-        goal.parent.mkdir(parents=True, exist_ok=True)
         if goal.is_dir():
             raise IsADirectoryError(21, "a folder of that name is there", str(goal))
+        if goal.parent.exists() and not goal.parent.is_dir():
+            raise NotADirectoryError(20, "a file of that name is there", str(goal.parent))
+    for _, goal in moves:
+        goal.parent.mkdir(parents=True, exist_ok=True)
     for path, goal in moves:
         os.replace(path, goal)

@@ -1,0 +1,129 @@
+"""The laws that a comparison tries where none are named, each with values to start from."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..characteristic import (
+    ChouHannaford1996,
+    ContractileSurface,
+    EffectiveLength,
+    Hunt2017,
+    InverseLength,
+    LogarithmicLength,
+    MartensBoblan2017,
+    Reynolds2003,
+    Sarosi2012,
+    Serres2009,
+    TonduLopez2000,
+)
+from ..characteristic.base import Characteristic
+from ..geometry.braid import Braid
+from ..recording import Recording
+
+_WIDE = 1e6
+"""Clamp [N] of a surface inside another law: beyond any muscle."""
+_ANGLE = 0.45
+"""Angle of the braid [rad] that searches start from; those of fluidic muscles lie within 0.15 of it."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Candidate:
+    """A law to be compared: its structure and start values, and the parameters that stay as they are."""
+
+    name: str
+    law: Characteristic
+    fixed: tuple[str, ...] = ()
+
+
+@dataclasses.dataclass(frozen=True)
+class Sizes:
+    """What start values are scaled by."""
+
+    force: float
+    pressure: float
+    contraction: float
+    length: float | None
+    """Resting length [m] of the longest muscle, where all are known."""
+    lengths: int
+    """How many different ones."""
+
+    @classmethod
+    def of(cls, recordings: Sequence[Recording]) -> Sizes:
+        """Of all rows of all recordings."""
+        force, pressure, contraction = (
+            max(float(np.nanmax(run[name])) for run in recordings) for name in ("force", "pressure", "contraction")
+        )
+        given = [run.constants.get("resting_length") for run in recordings]
+        known = {float(length) for length in given if length is not None}
+        everywhere = len(given) > 0 and None not in given
+        return cls(force, pressure, contraction, max(known) if everywhere else None, len(known) if everywhere else 0)
+
+    @property
+    def radius(self) -> float:
+        """That of a braid which would pull the greatest force at the greatest pressure."""
+        area = math.pi * self.pressure * (3 / math.tan(_ANGLE) ** 2 - 1 / math.sin(_ANGLE) ** 2)
+        return min(max(math.sqrt(max(self.force, 1.0) / area), 2e-4), 0.1)
+
+
+def standard_candidates(recordings: Sequence[Recording]) -> tuple[Candidate, ...]:
+    """Every law that can be started from data alone; those that need a length, where the recordings state it."""
+    sizes = Sizes.of(recordings)
+    found = [Candidate(f"surface of degree {n}", surface(n, 2 * sizes.force)) for n in range(1, 7)]
+    found += [_sarosi(sizes), _hunt(sizes)]
+    if sizes.length is not None:
+        found += _of_a_length(sizes, sizes.length)
+    if sizes.lengths > 1 and sizes.length is not None:
+        found += _families(sizes.length)
+    return tuple(found)
+
+
+def surface(degree: int, greatest_force: float = _WIDE) -> ContractileSurface:
+    """A surface without coefficients yet, and with no clamp among the points."""
+    return ContractileSurface.blank(degree, greatest_force=max(greatest_force, 1.0))
+
+
+def _sarosi(sizes: Sizes) -> Candidate:
+    scale = sizes.force / 1500.0  # of a DMSP-20, whose measured map these values fit
+    by_pressure = scale * 6e5 / sizes.pressure
+    return Candidate(
+        "Sarosi2012",
+        Sarosi2012(1.2e-4 * by_pressure, 420 * scale, -57.0, -8.7e-3 * by_pressure, 2.7e-3 * by_pressure, -310 * scale),
+    )
+
+
+def _hunt(sizes: Sizes) -> Candidate:
+    scale = 450.0 / sizes.force  # the printed values are of a 10 mm muscle, which pulls about so much
+    greatest = min(max(sizes.contraction, 0.02), 0.5)
+    law = Hunt2017(greatest, span_by_force=0.331e-3 * scale * greatest / 0.17, by_force=1.23e3 * scale)
+    return Candidate("Hunt2017", law)
+
+
+def _of_a_length(sizes: Sizes, length: float) -> list[Candidate]:
+    braid = Braid(sizes.radius, _ANGLE, length)
+    # The modulus of a DMSP-10 in terms of L/L_0; the wall's thickness only multiplies it, so that it stays.
+    modulus = (74.085e6, -172.3e6 / length, 114.8e6 / length**2, -13.26e6 / length**3)
+    return [
+        Candidate("ChouHannaford1996", ChouHannaford1996(braid)),
+        Candidate("TonduLopez2000", TonduLopez2000(braid, 1.1)),
+        Candidate("MartensBoblan2017", MartensBoblan2017(braid, 1.8e-3, *modulus), ("wall_thickness",)),
+        Candidate("Reynolds2003", Reynolds2003(length)),
+        Candidate("Serres2009", Serres2009(length)),
+    ]
+
+
+def _families(length: float) -> list[Candidate]:
+    found = []
+    for degree in (3, 5):
+        inner = surface(degree)
+        found.append(Candidate(f"effective length, degree {degree}", EffectiveLength(inner, length, 0.005)))
+        for change in (1, 2):
+            words = f"degree {degree}, its change {change}"
+            args = (inner, surface(change), length, length)
+            found.append(Candidate(f"term in 1/L0, {words}", InverseLength(*args)))
+            found.append(Candidate(f"term in ln L0, {words}", LogarithmicLength(*args)))
+    return found

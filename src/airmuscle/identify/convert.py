@@ -1,0 +1,89 @@
+"""One model into another: `convert`, and how far the two are apart."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from ..characteristic.base import Characteristic
+from ..characteristic.box import Box
+from ..errors import IdentificationError, NoSolution
+from ..recording import Recording
+from .censoring import UNCENSORED
+from .fit import fit
+from .loss import Array
+
+_POINTS = 24
+"""Pressures and contractions that the other law is fitted to; one more of each judges it."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Conversion:
+    """The other model with the parameters that bring it nearest, and its errors in force over the box."""
+
+    model: Characteristic
+    rms: float
+    """Root mean square difference [N], at points between those of the fit."""
+    greatest: float
+    """The greatest difference [N], other less first."""
+    pressure: float
+    """Where it stands [Pa]."""
+    contraction: float
+    """Where it stands [1]."""
+
+    def __str__(self) -> str:
+        return (
+            f"{type(self.model).__name__}: rms {self.rms:.4g} N, greatest {self.greatest:.4g} N at "
+            f"{self.pressure / 1e3:.4g} kPa and {self.contraction:.2%}"
+        )
+
+
+def convert(characteristic: Characteristic, other: Characteristic, box: Box) -> Conversion:
+    """The parameters of `other` that meet `characteristic` best on a box, where it pulls, and the error that stays.
+
+    `other` gives the structure and the start values, as in `fit`. Raises IdentificationError where the box does not
+    determine it, NoSolution where the first law pulls nowhere on it.
+    """
+    given = _points(characteristic, box, _POINTS)
+    if not len(given):
+        raise NoSolution(f"{type(characteristic).__name__} pulls nowhere on the box: nothing to convert.")
+    law: Any = other
+    if hasattr(law, "greatest_force") and law.greatest_force <= float(given["force"].max()):
+        law = dataclasses.replace(law, greatest_force=2.0 * float(given["force"].max()))
+    model = fit(law, given, censoring=UNCENSORED).model
+    judged = _points(characteristic, box, _POINTS + 1)
+    difference = np.asarray(model.force(judged["pressure"], judged["contraction"])) - judged["force"]
+    if not np.isfinite(difference).all():
+        raise IdentificationError(f"{type(other).__name__} has no force somewhere on the box; choose a smaller one.")
+    at = int(np.argmax(np.abs(difference)))
+    return Conversion(
+        model, float(np.sqrt(np.mean(difference**2))), float(difference[at]), float(judged["pressure"][at]),
+        float(judged["contraction"][at]),
+    )  # fmt: skip
+
+
+def _points(law: Characteristic, box: Box, count: int) -> Recording:
+    """A grid of the box, denser towards its edges, less where the law has no force or is slack."""
+    places = (1 - np.cos(np.pi * np.arange(count) / (count - 1))) / 2
+    (p_low, p_high), (c_low, c_high) = box.pressure, box.contraction
+    pressure, contraction = np.meshgrid(p_low + (p_high - p_low) * places, c_low + (c_high - c_low) * places)
+    p, c = pressure.ravel(), contraction.ravel()
+    force = _forces(law, p, c)
+    pulls = force > 0
+    columns = {"pressure": p[pulls], "contraction": c[pulls], "force": force[pulls]}
+    return Recording(columns, type(law).__name__)
+
+
+def _forces(law: Characteristic, pressure: Array, contraction: Array) -> Array:
+    """Forces [N]; NaN where the law has none, found by halving the points."""
+    try:
+        found = np.asarray(law.force(pressure, contraction), dtype=float)
+    except NoSolution:
+        if pressure.size == 1:
+            return np.array([np.nan])
+        half = pressure.size // 2
+        parts = (_forces(law, pressure[s], contraction[s]) for s in (slice(None, half), slice(half, None)))
+        return np.concatenate(list(parts))
+    return np.asarray(found + np.zeros(pressure.size))

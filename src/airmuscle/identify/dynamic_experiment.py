@@ -1,0 +1,150 @@
+"""What a dynamic fit is asked: records with their commands and starts, and the unknowns, shared or of one record."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from .. import declare
+from ..command import Command
+from ..errors import ParameterError, suggestion
+from ..program import System
+from ..recording import Recording
+from ..recording.recording import header
+from .dynamic_start import Start
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Experiment:
+    """One record: what was measured, under which command, from which start.
+
+    `command` counts from the beginning of the run, which stands at `start_time` on the record's clock; rows before it
+    are at the start. `plant` replaces the fit's plant where a record was made with another load, say.
+    """
+
+    recording: Recording
+    command: Command
+    start: Start
+    start_time: float = 0.0
+    plant: System | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class StartTime:
+    """The instant at which a run begins on its record's clock, as an unknown."""
+
+    margin: float
+    """How far it may lie from where the experiment says [s]."""
+
+    def __str__(self) -> str:
+        return "start time"
+
+
+@dataclasses.dataclass(frozen=True)
+class StartValue:
+    """A value that the start takes as known, as an unknown: `StartValue("pressure", 2e3)`."""
+
+    name: str
+    margin: float
+    """How far it may lie from where the experiment says, in its own unit."""
+
+    def __str__(self) -> str:
+        return f"start {self.name}"
+
+
+Shared = str | tuple[str, ...]
+Own = Shared | StartTime | StartValue
+
+
+@dataclasses.dataclass(frozen=True)
+class Unknown:
+    """One number to find: leaves of the plant that share it, or a start's time or value, of one record or of all."""
+
+    name: str
+    what: tuple[str, ...] | StartTime | StartValue
+    record: int | None
+    value: float
+    low: float
+    high: float
+    unit: str
+    symbol: str
+    meaning: str
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The leaves that take this number; none for what acts on the start alone."""
+        return self.what if isinstance(self.what, tuple) else ()
+
+    @property
+    def scale(self) -> float:
+        """The size of a change that counts."""
+        if isinstance(self.what, StartTime | StartValue):
+            return self.what.margin
+        span = self.high - self.low
+        return abs(self.value) or (span if np.isfinite(span) else 1.0)
+
+    @property
+    def search(self) -> tuple[float, float]:
+        """Where starts are spread: within the bounds, and a factor of three either way."""
+        if isinstance(self.what, StartTime | StartValue):
+            return self.low, self.high
+        reach = (self.value / 3, self.value * 3) if self.value else (-self.scale, self.scale)
+        return max(self.low, min(reach)), min(self.high, max(reach))
+
+
+def unknowns(
+    plant: System,
+    experiments: Sequence[Experiment],
+    free: Sequence[Shared],
+    own: Sequence[Own],
+    bounds: Mapping[str, tuple[float, float]],
+) -> tuple[Unknown, ...]:
+    """The shared unknowns, then those of each record. Raises ParameterError for what the plant lacks."""
+    found = [_leaf(plant, what, None, bounds) for what in free]
+    for i, experiment in enumerate(experiments):
+        for what in own:
+            if isinstance(what, StartTime | StartValue):
+                found.append(_nuisance(experiment, what, i))
+            else:
+                found.append(_leaf(experiment.plant or plant, what, i, bounds))
+    names = [u.name for u in found]
+    for name in bounds:
+        if name not in {u.name.partition(" of record")[0] for u in found}:
+            raise ParameterError(f"bounds of '{name}', which is not free; free are {', '.join(names)}.")
+    if not found:
+        raise ParameterError("nothing is free: name what to find, free=('circuit.fill.conductance',).")
+    return tuple(found)
+
+
+def _leaf(plant: System, what: Shared, record: int | None, bounds: Mapping[str, tuple[float, float]]) -> Unknown:
+    paths = (what,) if isinstance(what, str) else what
+    leaves = {leaf.path: leaf for leaf in declare.leaves(plant)}
+    for path in paths:
+        if path not in leaves:
+            known = [p for p in leaves if "[" not in p]
+            raise ParameterError(
+                f"{type(plant).__name__} has no parameter '{path}'; there are {', '.join(known)}."
+                f"{suggestion(path, leaves)}"
+            )
+    leaf = leaves[paths[0]]
+    low, high = bounds.get(paths[0], leaf.declared.bounds)
+    name = paths[0] + ("" if record is None else f" of record {record + 1}")
+    if not low <= leaf.value <= high:
+        raise ParameterError(f"{name} starts at {leaf.value:g}; its bounds are {low:g} to {high:g}.")
+    d = leaf.declared
+    return Unknown(name, paths, record, leaf.value, low, high, d.unit, d.symbol, d.meaning)
+
+
+def _nuisance(experiment: Experiment, what: StartTime | StartValue, record: int) -> Unknown:
+    if isinstance(what, StartTime):
+        value, unit, symbol = experiment.start_time, "s", "t_0"
+    else:
+        if what.name not in experiment.start.known:
+            known = ", ".join(experiment.start.known)
+            raise ParameterError(f"the start does not take '{what.name}' as known; it takes {known}.")
+        value, symbol = experiment.start.known[what.name], f"{what.name}_0"
+        unit = header(what.name).partition("[")[2].rstrip("]") or "SI"
+    name = f"{what} of record {record + 1}"
+    return Unknown(name, what, record, value, value - what.margin, value + what.margin, unit, symbol, str(what))

@@ -1,0 +1,179 @@
+"""A force surface that a muscle can have: force not falling with pressure, nor rising with contraction.
+
+Both are linear in the coefficients of a surface. Written for the Bernstein coefficients of its slopes on a few
+cells, which enclose the slopes, the inequalities hold at every point of the box and not on a grid alone.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from .. import trace
+from ..characteristic.base import ForceLaw
+from ..characteristic.box import Box
+from ..characteristic.contractile_surface import ContractileSurface, exponents
+from ..errors import IdentificationError
+from ..recording import Recording
+from .fit import fit
+from .loss import Array
+from .monotone_surface import constrained
+
+_MARGIN = 1e-9
+"""Least slope on the box scaled to -1..1, in parts of the greatest force, so that rounding turns none round; chosen."""
+_LEVEL = 1e-9
+"""Slopes below this part of the greatest are rounding; chosen."""
+
+
+class ShapeRule(enum.Enum):
+    """What the force of a muscle never does."""
+
+    FALLS_WITH_PRESSURE = "force falls with pressure"
+    RISES_WITH_CONTRACTION = "force rises with contraction"
+
+
+@dataclasses.dataclass(frozen=True)
+class ShapeBreak:
+    """One connected place of a box where a law breaks a rule."""
+
+    rule: ShapeRule
+    pressure: tuple[float, float]
+    """Gauge pressures [Pa] between which it lies."""
+    contraction: tuple[float, float]
+    """Contractions [1] between which it lies."""
+    share: float
+    """Its part of the box [1]."""
+    worst: tuple[float, float]
+    """Gauge pressure [Pa] and contraction [1] where the rule is broken most."""
+    worst_slope: float
+    """The slope there [N/Pa or N]."""
+
+    def __str__(self) -> str:
+        (p0, p1), (c0, c1) = self.pressure, self.contraction
+        return (
+            f"{self.rule.value} between {p0 / 1e3:.4g} and {p1 / 1e3:.4g} kPa, {c0:.2%} and {c1:.2%} "
+            f"({self.share:.1%} of the box), most at {self.worst[0] / 1e3:.4g} kPa and {self.worst[1]:.2%}"
+        )
+
+
+def shape_breaks(law: ForceLaw, box: Box, *, points: int = 101) -> tuple[ShapeBreak, ...]:
+    """The places of a box where a muscle's force falls with pressure or rises with contraction, largest first."""
+    sides = (np.linspace(*box.pressure, points), np.linspace(*box.contraction, points))
+    pressure, contraction = np.meshgrid(*sides, indexing="ij")
+    found: list[ShapeBreak] = []
+    rules = ((ShapeRule.FALLS_WITH_PRESSURE, 0, -1.0), (ShapeRule.RISES_WITH_CONTRACTION, 1, 1.0))
+    for rule, argument, sign in rules:
+        slope = np.asarray(trace.slope(law, "force", pressure, contraction, wrt=argument))
+        against = sign * slope
+        found += _places(
+            rule, np.where(against > _LEVEL * np.abs(slope).max(), against, 0.0), sign, pressure, contraction
+        )
+    return tuple(sorted(found, key=lambda b: -b.share))
+
+
+def _places(rule: ShapeRule, against: Array, sign: float, pressure: Array, contraction: Array) -> list[ShapeBreak]:
+    from scipy import ndimage
+
+    labels, count = ndimage.label(against > 0)
+    places = []
+    for label in range(1, count + 1):
+        here = labels == label
+        at = np.unravel_index(int(np.argmax(np.where(here, against, -np.inf))), against.shape)
+        (p0, p1), (c0, c1) = ((float(v[here].min()), float(v[here].max())) for v in (pressure, contraction))
+        worst = (float(pressure[at]), float(contraction[at]))
+        share = float(here.mean())
+        places.append(ShapeBreak(rule, (p0, p1), (c0, c1), share, worst, float(sign * against[at])))
+    return places
+
+
+@dataclasses.dataclass(frozen=True)
+class ShapedFit:
+    """A surface that keeps its shape, its error, and that of the surface without conditions."""
+
+    model: ContractileSurface
+    rmse: float
+    """Root mean square error over the fitted rows [N]."""
+    unconstrained: float
+    """The same without conditions [N]: what they cost is the difference."""
+    broken: tuple[ShapeBreak, ...]
+    """Where the surface without conditions breaks a rule."""
+
+
+def fit_shaped(
+    surface: ContractileSurface,
+    recording: Recording | Sequence[Recording],
+    *,
+    free: Recording | None = None,
+    cells: tuple[int, int] = (6, 6),
+) -> ShapedFit:
+    """Fit a surface by least squares among those whose force never falls with p nor rises with eps on the box.
+
+    `free` holds points (pressure, contraction) at which the muscle hangs free: there the force is made zero. The
+    slopes are enclosed on `cells` parts of the box in pressure and contraction; more of them cost time and lose less.
+    Rows that the fit without conditions counts are counted. Raises IdentificationError where no surface can be so.
+    """
+    runs = [recording] if isinstance(recording, Recording) else list(recording)
+    if free is not None:  # as slack points they only widen the box
+        runs.append(free.with_columns(force=np.zeros(len(free))))
+    loose = fit(surface, runs)
+    law = loose.model
+    assert isinstance(law, ContractileSurface)
+    counting = loose.problem.counting(loose.problem.modelled(loose.values))
+    data = loose.recording.rows(counting)
+    matrix = np.array(law.basis(data["pressure"], data["contraction"])).T
+    goal = loose.problem.goal[counting]
+    rows = shape_constraints(law.degree, cells)
+    scale = float(np.abs(goal).max())
+    basis = _through(law, free)
+    found = basis @ constrained(matrix @ basis, goal / scale, rows @ basis, _MARGIN if free is None else 0.0)
+    model = dataclasses.replace(law, coefficients=tuple(float(a) for a in scale * found))
+    errors = matrix @ (scale * found) - goal
+    return ShapedFit(model, float(np.sqrt(np.mean(errors**2))), loose.rmse, shape_breaks(law, law.box))
+
+
+def _through(law: ContractileSurface, free: Recording | None) -> Array:
+    """A basis of the coefficients whose force at the free points is zero."""
+    size = len(law.coefficients)
+    if free is None:
+        return np.eye(size)
+    conditions = np.array(law.basis(free["pressure"], free["contraction"])).T
+    _, singular, directions = np.linalg.svd(conditions)
+    rank = int(np.count_nonzero(singular > 1e-10 * singular[0]))
+    if rank >= size:
+        raise IdentificationError(
+            f"{free.origin}: {rank} conditions at free points leave none of {size} coefficients open. Give fewer "
+            "points, or a surface of a higher degree."
+        )
+    return np.asarray(directions[rank:].T)
+
+
+def shape_constraints(degree: int, cells: tuple[int, int]) -> Array:
+    """Rows g: a surface keeps its shape on the box if all g @ coefficients >= 0; `cells` by pressure, contraction."""
+    chosen = [j * (degree + 1) + i for i, j in exponents(degree)]
+    rises = np.kron(_enclosure(degree, cells[0], slope=True), _enclosure(degree, cells[1], slope=False))
+    falls = -np.kron(_enclosure(degree, cells[0], slope=False), _enclosure(degree, cells[1], slope=True))
+    return np.vstack([rises[:, chosen], falls[:, chosen]])
+
+
+def _enclosure(degree: int, cells: int, *, slope: bool) -> Array:
+    """Bernstein coefficients, on even cells of -1..1, of 1, x, .. x^degree or their slopes, one column each."""
+    size = degree if slope else degree + 1
+    t = np.linspace(0.0, 1.0, size) if size > 1 else np.array([0.5])
+    order = np.arange(size)
+    binomials = np.array([math.comb(size - 1, int(j)) for j in order])
+    bernstein = binomials * t[:, None] ** order * (1.0 - t[:, None]) ** (size - 1 - order)
+    blocks = []
+    for low, high in itertools.pairwise(np.linspace(-1.0, 1.0, cells + 1)):
+        x = low + (high - low) * t
+        values = polynomial.polyvander(x, degree)
+        if slope:
+            powers = np.arange(1, degree + 1)
+            values = np.column_stack([np.zeros(x.size), values[:, :-1] * powers])
+        blocks.append(np.linalg.solve(bernstein, values))
+    return np.vstack(blocks)

@@ -1,0 +1,167 @@
+"""A comparison judges laws by what they say of runs, levels or specimens that they were not given.
+
+The order by cross-validated error need not be that in sample: more coefficients always meet the points better that
+they were fitted to. The simplest law is taken that is no worse than the best by more than one standard error of the
+difference. What the data do not determine is excluded, with the reason. The muscle file of the recommended law loads
+back to the same numbers.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import airmuscle as am
+from airmuscle.characteristic import Hunt2017, TonduLopez2000
+from airmuscle.cli.app import app
+from airmuscle.errors import IdentificationError
+from airmuscle.geometry.braid import Braid
+from airmuscle.identify import Candidate, Levels, Runs, Specimens, compare
+from airmuscle.identify.candidates import surface
+from airmuscle.identify.force_of import force_of
+from airmuscle.identify.leave_out import natural
+from airmuscle.recording import Recording, write_csv
+
+TRUTH = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
+START = TonduLopez2000(Braid(0.012, 0.4, 0.3), 1.0)
+
+
+def isometric(contraction: float, *, seed: int, noise: float = 3.0, law=TRUTH, rows: int = 30) -> Recording:
+    """One run at constant length: a sweep of pressure, and an error that the whole run shares."""
+    random = np.random.default_rng(seed)
+    pressure = np.linspace(0.5e5, 6e5, rows)
+    held = np.full(rows, contraction)
+    shared = noise * random.standard_normal()
+    force = law.force(pressure, held) + shared * pressure / 6e5 * 4 + noise * random.standard_normal(rows)
+    columns = {"pressure": pressure, "contraction": held, "force": force}
+    return Recording(columns, f"run {contraction:.3f}", {"resting_length": 0.3})
+
+
+def bench() -> list[Recording]:
+    return [isometric(c, seed=i) for i, c in enumerate(np.linspace(0.0, 0.2, 7))]
+
+
+CANDIDATES = (
+    Candidate("braid", START),
+    Candidate("surface of degree 2", surface(2)),
+    Candidate("surface of degree 5", surface(5)),
+    Candidate("surface of degree 6", surface(6)),
+)
+
+
+def test_the_order_in_sample_is_not_the_order_on_what_was_left_out():
+    found = compare(bench(), CANDIDATES, leave_out=Runs())
+    in_sample = min(found.contenders, key=lambda c: c.in_sample)
+    assert in_sample.candidate.name == "surface of degree 5"
+    assert found["surface of degree 5"].in_sample < 0.8 * found["braid"].in_sample
+    assert found["surface of degree 5"].cross_validated > 2 * found["braid"].cross_validated
+    assert found.recommended.candidate.name == "braid"
+    assert "3 parameters" in found.reason
+    assert [c.cross_validated for c in found.contenders] == sorted(c.cross_validated for c in found.contenders)
+
+
+def test_what_is_not_determined_is_excluded_with_its_reason():
+    found = compare(bench(), CANDIDATES, leave_out=Runs())
+    assert [e.name for e in found.excluded] == ["surface of degree 6"]
+    assert "run 0.000" in found.excluded[0].why
+    assert "levels" in found.excluded[0].why
+    assert "degree" in found.excluded[0].why
+
+
+def test_a_part_left_out_is_not_among_the_points_of_its_fit():
+    """With one run ruined, its own error is huge and that of laws fitted without it is what the truth leaves."""
+    runs = bench()
+    ruined = runs[3].with_columns(force=runs[3]["force"] + 500.0)
+    found = compare([*runs[:3], ruined, *runs[4:]], CANDIDATES[:1], leave_out=Runs())
+    errors = {part.part: part.rms for part in found.recommended.left_out}
+    clean = fit_without(runs, 3)
+    assert errors["run 0.100"] == pytest.approx(clean, rel=1e-6)
+
+
+def fit_without(runs: list[Recording], index: int) -> float:
+    model = am.fit(START, [run for i, run in enumerate(runs) if i != index]).model
+    run = runs[index]
+    error = model.force(run["pressure"], run["contraction"]) - run["force"] - 500.0
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def test_of_laws_that_are_as_good_the_simplest_is_taken():
+    exact = [isometric(c, seed=i, noise=1.0) for i, c in enumerate(np.linspace(0.0, 0.2, 9))]
+    free = Candidate("braid", START)
+    held = Candidate("braid, true ends", TonduLopez2000(START.geometry, 1.2), ("end_correction",))
+    found = compare(exact, [free, held], leave_out=Runs())
+    assert found.recommended.candidate.name == "braid, true ends"
+
+
+def test_aicc_is_hurvich_and_tsais():
+    contender = compare(bench(), CANDIDATES[:1], leave_out=Runs()).recommended
+    n, k = 210, 4
+    pulls = sum(int((run["force"] > 0).sum()) for run in bench())
+    assert pulls == n
+    expected = n * np.log(contender.in_sample**2) + 2 * k + 2 * k * (k + 1) / (n - k - 1)
+    assert contender.aicc == pytest.approx(expected, rel=1e-12)
+
+
+def test_what_is_left_out_by_itself_is_the_widest_that_there_are_three_of():
+    runs = bench()
+    assert natural(runs) == Runs()
+    assert natural([run.with_constants(specimen=run.origin) for run in runs]) == Specimens()
+    whole = Recording({n: np.concatenate([r[n] for r in runs]) for n in ("pressure", "contraction", "force")}, "whole")
+    assert natural([whole]) == Levels("contraction")
+    with pytest.raises(IdentificationError, match="more levels"):
+        natural([runs[0].rows(slice(0, 2))])
+
+
+def test_levels_are_what_was_held():
+    runs = bench()
+    labels = [array.tolist() for array in Levels("contraction").labels(runs)]
+    assert all(len(set(names)) == 1 for names in labels)
+    assert len({names[0] for names in labels}) == 7
+    with pytest.raises(IdentificationError, match="one run"):
+        compare(runs[0], CANDIDATES, leave_out=Runs())
+
+
+def test_laws_of_every_direction_are_judged_in_force():
+    law = Hunt2017(0.2)
+    pressure, force = np.meshgrid(np.linspace(2e5, 6e5, 9), np.linspace(5.0, 300.0, 9))
+    contraction = law.contraction(pressure.ravel(), force.ravel())
+    found = force_of(law, pressure.ravel(), contraction, 1000.0)
+    assert found == pytest.approx(force.ravel(), abs=0.02)
+    assert force_of(law, np.array([1e5]), np.array([0.2]), 1000.0) == 0.0
+
+
+def test_the_command_writes_a_muscle_that_loads_back(tmp_path: Path):
+    files = []
+    for i, run in enumerate(bench()):
+        files.append(tmp_path / f"run{i}.csv")
+        write_csv(run, files[-1])
+    out = tmp_path / "out"
+    options = ["--compare", "--leave-out", "run", "--resting-length", "300 mm", "--out", str(out), "--json"]
+    done = CliRunner().invoke(app, ["fit", *map(str, files), *options])
+    assert done.exit_code == 0, done.output
+    printed = json.loads(done.stdout)
+    assert printed["recommended"] == printed["ranking"][0]["law"] or "standard error" in printed["reason"]
+    entry = am.load(out / "muscle.toml")
+    fitted = {p["name"]: p["value"] for p in printed["fit"]["parameters"]}
+    from airmuscle import declare
+
+    loaded = {leaf.path: leaf.value for leaf in declare.leaves(entry.characteristic)}
+    assert {name: loaded[name] for name in fitted} == fitted
+    names = {path.stem for path in (out / "figures").glob("*.svg")}
+    assert {"isobars", "errors", "residuals", "correlations", "left-out"} <= names
+    assert "Which law to take" in (out / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_command_refuses_what_it_cannot_do(tmp_path: Path):
+    run = CliRunner()
+    done = run.invoke(app, ["fit", "dmsp-20-300", "--out", str(tmp_path / "a")])
+    assert done.exit_code == 2
+    assert "--characteristic" in done.output
+    done = run.invoke(app, ["fit", "dmsp-20-300", "--compare", "--leave-out", "rows", "--out", str(tmp_path / "a")])
+    assert done.exit_code == 2
+    assert "contraction" in done.output
+    assert not (tmp_path / "a").exists()

@@ -1,0 +1,114 @@
+"""Which runs to measure: a D-optimal design has the greatest det of the Fisher information Sum J^T J among designs of
+as many runs, so for a line y = a + b x its points stand at the ends; every run stays within the bench's limits.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from airmuscle.characteristic.box import Box
+from airmuscle.characteristic.tondu_lopez2000 import TonduLopez2000
+from airmuscle.cli.app import app
+from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.geometry.braid import Braid
+from airmuscle.identify.fit import fit
+from airmuscle.identify.plan import Bench, _exchanged, _greedy, _logarithm, plan, possible_runs
+from airmuscle.recording import Recording, read_csv
+
+BENCH = Bench(Box(50e3, 500e3, 0.0, 0.25), 400.0)
+
+
+def law():
+    return TonduLopez2000(Braid(0.01, 0.4363, 0.3), 1.25)
+
+
+def test_a_line_is_measured_at_its_ends():
+    x = np.linspace(-1.0, 1.0, 9)
+    information = np.array([np.outer(row, row) for row in np.column_stack([np.ones(9), x])])
+    chosen = _exchanged(information, _greedy(information, 4))
+    assert sorted(chosen) == [0, 0, 8, 8]
+
+
+def test_the_exchange_finds_the_best_of_all_designs():
+    rng = np.random.default_rng(4)
+    designs = rng.standard_normal((8, 3, 3))
+    information = np.einsum("rij,rik->rjk", designs, designs)
+    best = max(_logarithm(information, c) for c in itertools.combinations_with_replacement(range(8), 3))
+    assert _logarithm(information, _exchanged(information, _greedy(information, 3))) == pytest.approx(best, abs=1e-6)
+
+
+def test_every_candidate_stays_within_the_bench():
+    found = possible_runs(law(), BENCH, 12)
+    assert {run.held for run in found} == {"pressure", "contraction"}
+    for run in found:
+        assert run.pressure.min() >= 50e3 - 1e-6
+        assert run.pressure.max() <= 500e3 + 1e-6
+        assert run.contraction.min() >= -1e-12
+        assert run.contraction.max() <= 0.25 + 1e-12
+        assert run.force.max() <= 400.0
+        assert run.force.min() > 0.0
+        np.testing.assert_allclose(run.force, law().force(run.pressure, run.contraction))
+
+
+def test_the_deviations_are_those_that_a_fit_then_has():
+    """Measured as planned with readings of 2 N, the fit states what the plan promised, to 15 %."""
+    free = plan(law(), BENCH, runs=6, points=20, sigma=2.0, fixed=("geometry.radius",))
+    points = free.recording()
+    rng = np.random.default_rng(2)
+    columns = {"pressure": points["pressure"], "contraction": points["contraction"]}
+    columns["force"] = points["force"] + 2.0 * rng.standard_normal(len(points))
+    found = fit(law(), Recording(columns, "bench"), fixed=("geometry.radius",))
+    assert found.names == free.names
+    np.testing.assert_allclose(found.standard_deviations, free.deviations, rtol=0.15)
+
+
+def test_the_plan_tells_more_than_runs_spread_evenly():
+    assert plan(law(), BENCH, runs=4, fixed=("geometry.radius",)).gain > 1.1
+
+
+def test_what_the_runs_cannot_tell_is_named():
+    """Radius, angle, end correction: F is linear in r0^2, so all three are told; a single isobar at rest is not it."""
+    found = plan(law(), BENCH, runs=3)
+    assert found.undetermined == ()
+    tight = Bench(Box(50e3, 500e3, 0.0, 1e-9), 5000.0)
+    assert plan(law(), tight, runs=3).undetermined != ()
+
+
+def test_a_bench_that_can_do_nothing_is_refused():
+    with pytest.raises(IdentificationError, match="pulls nowhere between 0 and 1e-06 N"):
+        plan(law(), Bench(Box(50e3, 500e3, 0.0, 0.25), 1e-6))
+    with pytest.raises(ParameterError, match="plan needs one run or more"):
+        plan(law(), BENCH, runs=0)
+    with pytest.raises(ParameterError, match="least_pressure"):
+        Bench(Box(5e5, 5e4, 0.0, 0.25), 100.0)
+
+
+ARGUMENTS = ["plan", "tondu-lopez", "--greatest-pressure", "5 bar", "--greatest-force", "400 N", "--runs", "4"]
+
+
+def test_the_command_prints_a_table_and_writes_points_to_follow(tmp_path):
+    done = CliRunner().invoke(app, [*ARGUMENTS, "--out", str(tmp_path / "bench")])
+    assert done.exit_code == 0, done.output
+    assert "force to expect" in done.output
+    points = read_csv(tmp_path / "bench" / "plan.csv")
+    assert set(points["run"]) == {1.0, 2.0, 3.0, 4.0}
+    assert points["force"].max() <= 400.0
+    assert points["pressure"].max() <= 5e5 + 1e-6
+
+
+def test_the_command_prints_json():
+    done = CliRunner().invoke(app, [*ARGUMENTS, "--json"])
+    found = json.loads(done.output)
+    assert len(found["runs"]) == 4
+    assert found["gain"] > 1.0
+
+
+def test_a_limit_without_its_unit_is_one_line():
+    done = CliRunner().invoke(app, ["plan", "tondu-lopez", "--greatest-pressure", "5", "--greatest-force", "400 N"])
+    assert done.exit_code == 1
+    assert "carries no unit" in done.output

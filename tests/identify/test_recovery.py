@@ -1,0 +1,107 @@
+"""What made the data comes back from noisy data within the bands that the fit states, for every traceable law.
+
+Each characteristic of the library that is closed-form makes points on its own box with noise; the fit starts
+elsewhere. The force (or what the law gives) must be held by its 99.9 % bands, and parameters that the data determine
+by their standard deviations.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+from airmuscle import declare
+from airmuscle.characteristic import Box
+from airmuscle.characteristic.base import ContractionLaw, ForceLaw
+from airmuscle.characteristic.clamped import Clamped
+from airmuscle.errors import AirmuscleWarning
+from airmuscle.identify import UNCENSORED, band, fit
+from airmuscle.identify.problem import _can_be_traced, direction_of
+from airmuscle.identify.profile import weakly_determined
+from airmuscle.library import catalogue
+from airmuscle.recording import Recording
+
+HELD = {
+    "dmsp-10-250": ("wall_thickness",),  # multiplies the modulus: only their product is felt
+    "dmsp-20-300": ("wall_thickness",),
+    "saga2007": ("wall_thickness",),
+    "saga2007-circle": ("wall_thickness",),
+}
+
+
+def law_of(name: str):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        entry = catalogue.load(name)
+    return entry.characteristic, entry.box or Box(1e5, 6e5, 0.0, 0.2)
+
+
+def recoverable() -> list[str]:
+    found = []
+    for name in catalogue.names():
+        law, _ = law_of(name)
+        fitted = any(leaf.declared.fitted for leaf in declare.leaves(law))
+        if _can_be_traced(law) and fitted:
+            found.append(name)
+    return found
+
+
+def simulated(law, box: Box, seed: int) -> tuple[Recording, Recording, float]:
+    """Noisy points, the same points without noise, and the noise: 0.5 % of the range of what the law gives."""
+    random = np.random.default_rng(seed)
+    pressure = random.uniform(*box.pressure, 400)
+    direction = direction_of(law)
+    if isinstance(law, ForceLaw):
+        contraction = random.uniform(max(box.contraction[0], -0.02), box.contraction[1], 400)
+        columns = {"pressure": pressure, "contraction": contraction, "force": law.unclamped(pressure, contraction)}
+    elif isinstance(law, ContractionLaw):
+        force = random.uniform(*law.force_reach, 400)
+        columns = {"pressure": pressure, "force": force, "contraction": law.contraction(pressure, force)}
+    else:
+        contraction, force = random.uniform(*box.contraction, 400), random.uniform(0.0, 60.0, 400)
+        columns = {"contraction": contraction, "force": force, "pressure": law.pressure(contraction, force)}
+        inside = (columns["pressure"] > 0) & (columns["pressure"] < 8e5)
+        columns = {key: values[inside] for key, values in columns.items()}
+    exact = Recording(columns, "simulated")
+    truth = exact[direction.quantity]
+    noise = 0.005 * float(np.ptp(truth))
+    noisy = truth + noise * random.standard_normal(len(exact))
+    return exact.with_columns(**{direction.quantity: noisy}), exact, noise
+
+
+def disturbed(law, fixed: tuple[str, ...]):
+    """Start values 2 % away, within bounds."""
+    values = []
+    for i, leaf in enumerate(declare.leaves(law)):
+        free = leaf.declared.fitted and leaf.path.partition("[")[0] not in fixed
+        value = leaf.value * (1 + 0.02 * (-1) ** i) if free else leaf.value
+        values.append(float(np.clip(value, *leaf.declared.bounds)))
+    return declare.with_parameters(law, values)
+
+
+@pytest.mark.parametrize("name", recoverable())
+def test_a_law_is_recovered_within_its_bands(name: str):
+    law, box = law_of(name)
+    inner = law.inner if isinstance(law, Clamped) else law
+    fixed = HELD.get(name, ())
+    noisy, exact, noise = simulated(inner, box, seed=7)
+    found = fit(disturbed(inner, fixed), noisy, censoring=UNCENSORED, fixed=fixed)
+    assert found.sigma == pytest.approx(noise, rel=0.15)
+    stated = band(found, exact, level=0.999)
+    truth = exact[found.direction.quantity]
+    held = (stated.low <= truth) & (truth <= stated.high)
+    assert held.mean() > 0.97
+    assert np.sqrt(np.mean((stated.value - truth) ** 2)) < 0.5 * noise
+    true = {leaf.path: leaf.value for leaf in declare.leaves(inner)}
+    loose = weakly_determined(found)
+    for estimate in found.estimates:
+        if not estimate.on_bound and estimate.name not in loose:
+            assert abs(estimate.value - true[estimate.name]) < 4.5 * estimate.deviation, estimate.name
+
+
+def test_most_of_the_library_is_tried():
+    names = set(recoverable())
+    assert {"hunt2017-festo-10", "reynolds2003", "serres2009", "dmsp-20-300", "tondu-lopez", "saga2007-circle"} <= names
+    assert len(names) >= 10

@@ -1,0 +1,115 @@
+"""A shaped surface never loses force with pressure nor gains it with contraction, at any point of its box.
+
+The conditions hold between the points of any grid; where data keep them anyway they change nothing; where the free
+surface breaks them the place is named. A conversion of one law into another says how far the two are apart.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from airmuscle.characteristic import Box, ContractileSurface, Sarosi2012, TonduLopez2000
+from airmuscle.errors import IdentificationError, NoSolution
+from airmuscle.geometry.braid import Braid
+from airmuscle.identify import convert, fit, fit_shaped, shape_breaks
+from airmuscle.identify.candidates import surface
+from airmuscle.identify.shape import ShapeRule, shape_constraints
+from airmuscle.recording import Recording
+
+MUSCLE = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
+BOX = Box(1e5, 6e5, 0.0, 0.2)
+
+
+def points(n: int, noise: float, seed: int = 2) -> Recording:
+    random = np.random.default_rng(seed)
+    pressure, contraction = random.uniform(*BOX.pressure, n), random.uniform(*BOX.contraction, n)
+    force = MUSCLE.force(pressure, contraction) + noise * random.standard_normal(n)
+    return Recording({"pressure": pressure, "contraction": contraction, "force": force}, "bench")
+
+
+def test_few_and_noisy_points_bend_a_free_surface_and_not_a_shaped_one():
+    data = points(40, 60.0)
+    found = fit_shaped(surface(4), data)
+    assert {b.rule for b in found.broken} == set(ShapeRule)
+    assert shape_breaks(found.model, found.model.box, points=201) == ()
+    assert found.rmse > found.unconstrained
+    grid = np.meshgrid(np.linspace(*found.model.box.pressure, 60), np.linspace(*found.model.box.contraction, 60))
+
+    def distance(law):
+        return float(np.sqrt(np.mean((law.force(*grid) - MUSCLE.force(*grid)) ** 2)))
+
+    assert distance(found.model) < distance(fit(surface(4), data).model)
+
+
+def test_conditions_that_hold_anyway_change_nothing():
+    data = points(200, 0.5)
+    found = fit_shaped(surface(2), data)
+    free = fit(surface(2), data).model
+    assert found.broken == ()
+    assert found.model.coefficients == pytest.approx(free.coefficients, abs=1e-6)
+    assert found.rmse == pytest.approx(found.unconstrained, rel=1e-9)
+
+
+def test_the_conditions_are_those_of_the_slopes():
+    """Enough: where all hold, both slopes have their sign everywhere. Nearly necessary: a plain slope passes."""
+    rows = shape_constraints(3, (5, 4))
+    random = np.random.default_rng(1)
+    q, x = (v.ravel() for v in np.meshgrid(np.linspace(-1, 1, 41), np.linspace(-1, 1, 41)))
+    tried = 0
+    for _ in range(400):
+        a = random.normal(size=10) * np.array([1, 1, 0.2, 0.1, 1, 0.2, 0.1, 0.2, 0.1, 0.1])
+        a[1], a[4] = a[1] - 1.5, a[4] + 1.5
+        law = ContractileSurface(tuple(a), -1.0, 1.0, -1.0, 1.0, -1e6, 1e6, 3)
+        by_p, by_c = law.slopes(q, x)
+        if (rows @ a >= 0).all():
+            tried += 1
+            assert by_p.min() > -1e-12
+            assert by_c.max() < 1e-12
+    assert tried > 40
+    assert (rows @ np.array([0, -1.0, 0, 0, 1.0, 0, 0, 0, 0, 0]) >= -1e-12).all()
+
+
+def test_at_points_of_free_contraction_the_force_is_zero():
+    data = points(150, 5.0)
+    pressure = np.array([2e5, 4e5, 6e5])
+    free = Recording({"pressure": pressure, "contraction": np.full(3, 0.2)}, "hung free")
+    found = fit_shaped(surface(4), data, free=free)
+    assert found.model.unclamped(pressure, free["contraction"]) == pytest.approx(np.zeros(3), abs=1e-8)
+    assert shape_breaks(found.model, found.model.box) == ()
+    many = Recording({"pressure": np.linspace(1e5, 6e5, 9), "contraction": np.linspace(0.05, 0.2, 9) ** 2}, "too many")
+    with pytest.raises(IdentificationError, match="leave none"):
+        fit_shaped(surface(1), data, free=many)
+
+
+def test_the_place_of_a_break_is_named():
+    law = Sarosi2012(0.0, 0.0, -1.0, 4e-3, 1e-3, 50.0)  # gains force with contraction everywhere
+    (found,) = shape_breaks(law, BOX)
+    assert found.rule is ShapeRule.RISES_WITH_CONTRACTION
+    assert found.share == 1.0
+    assert found.worst[0] == 6e5
+    assert found.worst_slope == pytest.approx(4e-3 * 6e5)
+    assert "600 kPa" in str(found)
+
+
+def test_a_conversion_finds_the_same_law_in_another_form():
+    """F = p (A eps^2 + B eps + C) is a surface of degree three, exactly."""
+    found = convert(MUSCLE, surface(3), BOX)
+    assert found.rms < 1e-9
+    assert convert(found.model, TonduLopez2000(Braid(0.012, 0.4, 0.3), 1.0), BOX).rms < 1e-6
+
+
+def test_a_conversion_says_how_far_it_is_off():
+    found = convert(MUSCLE, surface(1), BOX)
+    grid = np.meshgrid(np.linspace(*BOX.pressure, 300), np.linspace(*BOX.contraction, 300))
+    difference = found.model.force(*grid) - MUSCLE.force(*grid)
+    assert np.abs(found.greatest) == pytest.approx(np.abs(difference).max(), rel=0.02)
+    denser = (1 - np.cos(np.pi * np.linspace(0, 1, 300))) / 2  # as the conversion judges: denser towards the edges
+    grid = np.meshgrid(1e5 + 5e5 * denser, 0.2 * denser)
+    difference = found.model.force(*grid) - MUSCLE.force(*grid)
+    assert found.rms == pytest.approx(np.sqrt(np.mean(difference**2)), rel=0.1)
+    at = (found.pressure, found.contraction)
+    assert found.model.force(*at) - MUSCLE.force(*at) == pytest.approx(found.greatest, rel=1e-9)
+    assert f"{found.greatest:.4g} N" in str(found)
+    with pytest.raises(NoSolution, match="pulls nowhere"):
+        convert(MUSCLE, surface(1), Box(1e5, 6e5, 0.5, 0.55))

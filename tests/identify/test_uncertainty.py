@@ -1,0 +1,212 @@
+"""How sure a fit is: bands hold the truth as often as they say, refits scatter as experiments do, profiles end where
+the sum of squares does.
+
+A 95 % band holds the truth in 95 % of experiments. Refits at once are those done one by one. A profile of a law linear
+in its parameter is Student's interval; one of a parameter that the data leave open has no end.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+
+from airmuscle.characteristic import ContractileSurface, Sarosi2012, TonduLopez2000
+from airmuscle.errors import IdentificationError
+from airmuscle.geometry.braid import Braid
+from airmuscle.identify import (
+    Huber,
+    Levels,
+    Runs,
+    band,
+    bootstrap,
+    fit,
+    profile,
+    weakly_determined,
+)
+from airmuscle.identify.bootstrap import _one_by_one, _parts
+from airmuscle.identify.candidates import surface
+from airmuscle.recording import Recording
+
+TRUTH = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
+"""Three parameters: radius, angle of the braid, end correction."""
+NOISE = 5.0
+EXPONENTIAL = Sarosi2012(0.0, 300.0, -60.0, -8e-3, 2.7e-3, -100.0)
+PLACES = Recording(
+    {"pressure": np.array([2e5, 4e5, 6e5, 3e5]), "contraction": np.array([0.02, 0.1, 0.18, 0.22])}, "places"
+)
+
+
+def experiment(seed: int, law=TRUTH, *, shared: float = 0.0) -> list[Recording]:
+    """Eight isometric runs with Gaussian noise, and an error that all of a run shares."""
+    random = np.random.default_rng(seed)
+    runs = []
+    for contraction in np.linspace(0.0, 0.22, 8):
+        pressure, held = np.linspace(1e5, 6e5, 8), np.full(8, contraction)
+        errors = NOISE * random.standard_normal(8) + shared * random.standard_normal()
+        force = law.unclamped(pressure, held) + errors
+        columns = {"pressure": pressure, "contraction": held, "force": np.maximum(force, 1e-3)}
+        runs.append(Recording(columns, f"run {contraction:.3f}"))
+    return runs
+
+
+PLANE = ContractileSurface((600.0, -200.0, 250.0), 1e5, 6e5, 0.0, 0.22, -1e6, 1e6, 1)
+"""Three parameters that the runs determine well."""
+
+
+@pytest.fixture(scope="module")
+def experiments():
+    return [fit(PLANE, experiment(seed, PLANE)) for seed in range(1000)]
+
+
+def share_held(fits, law, *, reading: bool = False) -> np.ndarray:
+    """In how many of the experiments the band at each place holds the truth, or a new reading."""
+    random = np.random.default_rng(5)
+    truth = law.unclamped(PLACES["pressure"], PLACES["contraction"])
+    inside = []
+    for found in fits:
+        low, high = band(found, PLACES, reading=reading)[1:]
+        seen = truth + reading * NOISE * random.standard_normal(truth.size)
+        inside.append((low <= seen) & (seen <= high))
+    return np.mean(inside, axis=0)
+
+
+def test_bands_hold_the_truth_in_95_of_100_experiments(experiments):
+    held = share_held(experiments, PLANE)
+    assert ((held >= 0.93) & (held <= 0.97)).all(), held
+
+
+def test_bands_of_readings_hold_a_new_reading_in_95_of_100_experiments(experiments):
+    held = share_held(experiments, PLANE, reading=True)
+    assert ((held >= 0.93) & (held <= 0.97)).all(), held
+    assert share_held(experiments[:200], PLANE).min() > 0.9
+
+
+def test_intervals_of_parameters_hold_the_truth_in_95_of_100_experiments(experiments):
+    factor = student.ppf(0.975, 64 - 3)
+    inside = [np.abs(found.values - PLANE.coefficients) <= factor * found.standard_deviations for found in experiments]
+    held = np.mean(inside, axis=0)
+    assert ((held >= 0.93) & (held <= 0.97)).all(), held
+
+
+@pytest.mark.slow
+def test_bands_of_a_law_that_is_not_linear_hold_it_as_often():
+    """Its three parameters nearly replace each other, so that their own intervals are a little wide (97.2 %)."""
+    held = share_held([fit(TRUTH, experiment(seed)) for seed in range(1000)], TRUTH)
+    assert ((held >= 0.93) & (held <= 0.97)).all(), held
+
+
+def test_refits_at_once_are_refits_one_by_one():
+    runs = experiment(1)
+    found = fit(surface(2, 4000), runs)
+    drawn = bootstrap(found, runs, refits=40, by=Runs(), seed=3)
+    which, count = _parts(found, runs, Runs())
+    times = np.random.default_rng(3).multinomial(count, np.full(count, 1 / count), size=40).astype(float)
+    expected = _one_by_one(found, which, times)
+    assert np.isfinite(expected).all()
+    assert drawn.values == pytest.approx(expected, rel=1e-8, abs=1e-6)
+
+
+def test_refits_by_runs_see_what_a_run_shares():
+    """Rows of one run that err together are fewer than they look: the covariance of a fit does not know."""
+    truth = ContractileSurface((300.0, -200.0, 150.0), 1e5, 6e5, 0.0, 0.22, -1e6, 1e6, 1)
+    scatter, drawn, claimed = [], [], []
+    for seed in range(60):
+        runs = experiment(seed, truth, shared=20.0)
+        found = fit(surface(1, 4000), runs)
+        scatter.append(found.values)
+        claimed.append(found.standard_deviations)
+        drawn.append(bootstrap(found, runs, refits=200, by=Runs(), seed=seed).standard_deviations)
+    actual = np.std(scatter, axis=0)[:2]
+    assert np.mean(drawn, axis=0)[:2] == pytest.approx(actual, rel=0.35)
+    assert (np.mean(claimed, axis=0)[:2] < 0.6 * actual).all()
+
+
+def test_a_law_that_is_not_linear_is_refitted_too():
+    runs = experiment(2)
+    found = fit(TRUTH, runs)
+    drawn = bootstrap(found, runs, refits=60, seed=1)
+    assert drawn.lost == 0
+    assert drawn.standard_deviations == pytest.approx(found.standard_deviations, rel=0.6)
+    low, high = drawn.intervals().T
+    assert ((low < found.values) & (found.values < high)).all()
+    assert drawn.model(0).end_correction == drawn.values[0, 2]
+
+
+def test_a_seed_gives_the_same_refits():
+    runs = experiment(1)
+    found = fit(surface(2, 4000), runs)
+    first, again, other = (bootstrap(found, runs, refits=20, by=Runs(), seed=s).values for s in (1, 1, 2))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+def test_what_cannot_be_drawn_is_refused():
+    runs = experiment(1)
+    found = fit(TRUTH, runs)
+    with pytest.raises(IdentificationError, match="64 rows and these recordings 56"):
+        bootstrap(found, runs[1:], by=Runs())
+    few = fit(surface(1, 4000), runs[:2])
+    with pytest.raises(IdentificationError, match="only 2 runs"):
+        bootstrap(few, runs[:2], by=Runs())
+    assert bootstrap(few, runs[:2], by=Levels("pressure"), refits=10).parts == 8
+
+
+def test_refits_that_their_runs_do_not_determine_are_counted():
+    runs = experiment(1)
+    found = fit(surface(5, 4000), runs)
+    drawn = bootstrap(found, runs, by=Runs(), refits=100)
+    assert drawn.lost > 10
+    assert np.isfinite(drawn.standard_deviations).all()
+
+
+def test_the_profile_of_a_linear_parameter_is_students_interval():
+    found = fit(surface(2, 4000), experiment(1))
+    name = found.names[1]
+    ends = profile(found, name)
+    half = student.ppf(0.975, found.rows_used - 6) * found[name].deviation
+    assert ends.low == pytest.approx(found[name].value - half, abs=1e-3 * half)
+    assert ends.high == pytest.approx(found[name].value + half, abs=1e-3 * half)
+
+
+def short_of_contraction(least: float, seed: int) -> Recording:
+    """Points of an exponential muscle, from some contraction on."""
+    random = np.random.default_rng(seed)
+    pressure, contraction = random.uniform(1e5, 6e5, 80), random.uniform(least, 0.2, 80)
+    force = EXPONENTIAL.force(pressure, contraction) + 10.0 * random.standard_normal(80)
+    return Recording({"pressure": pressure, "contraction": contraction, "force": force}, "bench")
+
+
+def test_a_parameter_that_the_data_leave_open_has_no_end():
+    """Where the exponential has all but decayed, a steep one cannot be told from a steeper one, or from none."""
+    found = fit(EXPONENTIAL, short_of_contraction(0.06, 5), fixed=("a1", "a4", "a5"))
+    assert set(weakly_determined(found)) == {"a2", "a3"}
+    assert profile(found, "a3").low == -np.inf
+    assert "no end" in str(profile(found, "a3"))
+
+
+def test_a_profile_is_not_symmetric_where_the_law_is_curved():
+    found = fit(EXPONENTIAL, short_of_contraction(0.05, 4), fixed=("a1", "a4", "a5"))
+    ends, estimate = profile(found, "a2"), found["a2"]
+    assert ends.low < 300.0 < ends.high
+    assert estimate.value - 2 * estimate.deviation < 0.0 < ends.low
+    assert ends.high - estimate.value > 5 * (estimate.value - ends.low)
+
+
+def test_a_well_posed_fit_flags_nothing_loose():
+    assert weakly_determined(fit(surface(2, 4000), experiment(1))) == ()
+
+
+def test_a_robust_fit_has_no_profile():
+    found = fit(TRUTH, experiment(1), loss=Huber(15.0))
+    with pytest.raises(IdentificationError, match="least squares"):
+        profile(found, "end_correction")
+
+
+def test_a_band_without_a_spare_point_or_with_a_level_of_95_is_refused():
+    runs = experiment(1)
+    with pytest.raises(IdentificationError, match=r"between 0 and 1"):
+        band(fit(TRUTH, runs), PLACES, level=95)
+    three = runs[3].rows([0, 3, 6]).with_columns(contraction=np.array([0.0, 0.1, 0.05]))
+    with pytest.raises(IdentificationError, match="as many points"):
+        band(fit(surface(1, 4000), three), PLACES)
