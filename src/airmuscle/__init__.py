@@ -16,7 +16,7 @@ from .mechanism import HangingMass, Held, Isometric, Mechanism
 from .method import DormandPrince8, Rodas4, RungeKutta4
 from .muscle import LinearDamper, LinearSpring, Muscle
 from .plant import Plant
-from .recording import Recording, read_csv, write_csv
+from .recording import Recording, read, read_csv, write_csv
 from .reference import Reference, cite
 from .simulate import advance, simulate
 
@@ -56,6 +56,7 @@ __all__ = [
     "load",
     "measured",
     "names",
+    "read",
     "read_csv",
     "save",
     "simulate",

@@ -38,7 +38,8 @@ class Command(abc.ABC):
         """The command for these inputs from `start` on, cut so that every input is linear within a segment."""
 
 
-def _refuse_unknown(given: Sequence[str], inputs: Sequence[str]) -> None:
+def refuse_unknown_input(given: Sequence[str], inputs: Sequence[str]) -> None:
+    """Raise ParameterError, with the nearest name, for a name that is no input of the plant."""
     for name in given:
         if name not in inputs:
             known = ", ".join(inputs) or "none"
@@ -57,7 +58,7 @@ class Schedule(Command):
     def __post_init__(self) -> None:
         for name, changes in self.changes.items():
             times = [time for time, _ in changes]
-            if not np.isfinite(changes).all() if changes else False:
+            if changes and not np.isfinite(changes).all():
                 raise ParameterError(f"the schedule of '{name}' holds a number that is not finite: {list(changes)}.")
             if any(b <= a for a, b in itertools.pairwise(times)):
                 raise ParameterError(
@@ -65,7 +66,7 @@ class Schedule(Command):
                 )
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
-        _refuse_unknown(list(self.changes), inputs)
+        refuse_unknown_input(list(self.changes), inputs)
         end = start + duration
         instants = {time for changes in self.changes.values() for time, _ in changes if start < time < end}
         ends = np.array([*sorted(instants), end])
@@ -94,7 +95,7 @@ class Signal(Command):
                 raise ParameterError(f"the signal of '{name}' must name its times in rising order; it has {times}.")
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
-        _refuse_unknown(list(self.points), inputs)
+        refuse_unknown_input(list(self.points), inputs)
         end = start + duration
         corners = {time for points in self.points.values() for time, _ in points if start < time < end}
         ends = np.array([*sorted(corners), end])

@@ -85,17 +85,23 @@ def _checked(owner: str, declared: Parameter, value: Any) -> Any:
     if isinstance(value, tuple | list | np.ndarray):
         return tuple(_checked(owner, declared, v) for v in value)
     low, high = declared.bounds
+    unit = "" if declared.unit == "1" else f" {declared.unit}"
     where = f"{owner}.{declared.name} ({declared.symbol}, {declared.meaning})"
     if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
-        raise ParameterError(f"{where} is {value!r}; it must be a number in {declared.unit}.")
+        raise ParameterError(f"{where} is {value!r}; it must be a number{unit and ' in' + unit}.")
     if not math.isfinite(value):
-        raise ParameterError(f"{where} is {value}; it must be finite, in {declared.unit}.")
+        raise ParameterError(f"{where} is {value}; it must be finite.")
     if not low <= value <= high:
         raise ParameterError(
-            f"{where} is {value:g} {declared.unit}; allowed are {low:g} to {high:g} {declared.unit}. "
-            "Values are SI: check the unit."
+            f"{where} is {value:g}{unit}; allowed are {low:g} to {high:g}{unit}."
+            f"{' Values are SI: check the unit.' if unit else _per_cent(float(value), high)}"
         )
     return float(value)
+
+
+def _per_cent(value: float, high: float) -> str:
+    """A question, where a ratio above its bound makes sense as per cent."""
+    return f" Is it in per cent? As a ratio it is {value / 100:g}." if 0 < value / 100 <= high <= 1 else ""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -17,11 +17,12 @@ _METERS = {
     "energy_of_flow": "energy that came in with the air",
     "damping_heat": "work that the dampers turned into heat",
 }
+_FRICTION = {"friction_work": "work done against friction: heat, and what its bristles hold"}
 
 
 @model
 class Metered:
-    """A plant with four meters [J] as further states, and its energies as further outputs.
+    """A plant with four meters [J] as further states, five where a muscle has friction, and its energies as outputs.
 
     Two books must close. Mechanical: kinetic + potential energy grow by `work_of_tension`, as long as the latch does
     no work. Air: `air_energy` grows by `energy_of_flow` less `work_of_air`.
@@ -30,9 +31,14 @@ class Metered:
     plant: Plant
 
     @property
+    def meters(self) -> dict[str, str]:
+        """Name and meaning of every meter."""
+        return _METERS | (_FRICTION if any(m.friction.states for m in self.plant.muscles) else {})
+
+    @property
     def states(self) -> tuple[StateVariable, ...]:
         """The plant's states, then the meters."""
-        return (*self.plant.states, *(StateVariable(name, "J", 1.0, meaning) for name, meaning in _METERS.items()))
+        return (*self.plant.states, *(StateVariable(name, "J", 1.0, meaning) for name, meaning in self.meters.items()))
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -43,7 +49,7 @@ class Metered:
         """The plant's rates, and the power that each meter integrates."""
         plant = self.plant
         ports = plant.ports(state)
-        rates = dict.fromkeys(_METERS, 0.0)
+        rates = dict.fromkeys(self.meters, 0.0)
         flows = plant.mass_flows(ports, inputs)
         for muscle, prefix, port, flow in zip(plant.muscles, plant.prefixes, ports, flows, strict=True):
             per_length = muscle.geometry.volume_growth(port.contraction) / muscle.geometry.resting_length
@@ -51,6 +57,8 @@ class Metered:
             rates["work_of_air"] += port.absolute_pressure * per_length * port.speed
             rates["energy_of_flow"] += self._potential(state[f"{prefix}air_mass"], port) * flow
             rates["damping_heat"] += muscle.damper.force(port.pressure, port.speed) * port.speed
+            if muscle.friction.states:
+                rates["friction_work"] += port.friction * port.speed
         return {**plant.rates(state, inputs), **rates}
 
     def _potential(self, air_mass: Value, port: Port) -> Value:

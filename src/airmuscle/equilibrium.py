@@ -106,7 +106,7 @@ class _Search:
         for x in (positions[0], positions[-1]):
             ports = self.plant.ports(self.state(float(x)))
             pulls = ", ".join(
-                f"{m.name} pulls {float(port.tension):.6g} N at {round(float(port.pressure) / 1e3, 6):.6g} kPa "
+                f"{m.name} pulls {float(port.tension) + 0.0:.6g} N at {round(float(port.pressure) / 1e3, 6):.6g} kPa "
                 f"and a contraction of {float(port.contraction):.1%}"
                 for m, port in zip(self.plant.muscles, ports, strict=True)
             )

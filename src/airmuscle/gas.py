@@ -13,7 +13,7 @@ from .declare import model, parameter
 from .errors import ParameterError
 from .ops import Value
 from .reference import Reference
-from .units import AMBIENT_PRESSURE
+from .units import ABSOLUTE, AMBIENT_PRESSURE
 
 GAS_CONSTANT = 287.05
 """Specific gas constant of dry air [J/(kg K)]."""
@@ -35,7 +35,7 @@ class Ambient:
     references: ClassVar[tuple[Reference, ...]] = (ISO8778,)
 
     pressure: float = parameter(
-        "Pa",
+        ABSOLUTE,
         "p_amb",
         "absolute pressure of the surroundings",
         bounds=(1e3, 2e5),

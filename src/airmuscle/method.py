@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from .command import Segments
 from .declare import model, parameter
+from .errors import FileError
 
 if TYPE_CHECKING:
     from .program.prepared import Prepared
@@ -59,7 +60,15 @@ class Method(abc.ABC):
         """Carry `state` (n,) from `start` through the segments; rows (N, n) at `times` (N,), which must rise."""
         from .engine.once import announce_compilation
 
-        kernel, leading, trailing, size = self._kernel(prepared)
+        try:
+            kernel, leading, trailing, size = self._kernel(prepared)
+        except RuntimeError as error:
+            if "cannot cache" not in str(error):
+                raise
+            raise FileError(
+                "there is no folder to keep compiled code in: neither the program's own nor the user's cache can be "
+                "written to. Name one that can be in the environment variable NUMBA_CACHE_DIR."
+            ) from None
         announce_compilation(kernel)
         y, rows = np.array(state, dtype=float), np.full((times.size, state.size), np.nan)
         clock, count, work = np.array([start, 0.0, start]), np.zeros(4, dtype=np.int64), np.zeros(max(size, 1))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import abc
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import ClassVar
 
 from . import ops, trace
@@ -10,9 +12,13 @@ from .characteristic.base import ForceLaw
 from .characteristic.contractile_surface import HOSOVSKY_HILL
 from .characteristic.virtual_work import VirtualWork
 from .declare import model, parameter
+from .friction.base import Friction, NoFriction
 from .geometry.base import Geometry
 from .ops import Value
 from .reference import Reference
+
+RELAXED: Mapping[str, Value] = MappingProxyType({})
+"""Bristles of a friction that are not named stand at 0."""
 
 
 class Spring(abc.ABC):
@@ -77,10 +83,11 @@ class PressureDamper(Damper):
 class Muscle:
     """Two ports, pneumatic (p, V) and mechanical (F, v), after Hill without the series element.
 
-        F = max(0, F_KE(p, eps) - F_PP(eps) - F_TL(p, v))
+        F = max(0, F_KE(p, eps) - F_PP(eps) - F_TL(p, v) - F_R)
 
-    F_KE contractile characteristic, F_PP parallel spring, F_TL damper. A muscle pulls and never pushes.
-    Reference: Hosovsky et al., equation (1).
+    F_KE contractile characteristic, F_PP parallel spring, F_TL damper, F_R friction, whose bristles hold what the
+    muscle remembers of its path. A muscle pulls and never pushes.
+    Reference: Hosovsky et al., equation (1); friction is not part of it, and off unless given.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (HOSOVSKY_HILL,)
@@ -89,6 +96,7 @@ class Muscle:
     geometry: Geometry
     spring: Spring = LinearSpring(0.0)
     damper: Damper = LinearDamper(0.0)
+    friction: Friction = NoFriction()
     name: str = "muscle"
 
     @classmethod
@@ -96,21 +104,31 @@ class Muscle:
         """A muscle whose tension follows from its volume by virtual work, so that it neither makes nor loses energy."""
         return cls(VirtualWork(geometry), geometry, name=name)
 
-    def tension(self, pressure: Value, contraction: Value, speed: Value = 0.0) -> Value:
-        """Pull on the load [N] at gauge pressure [Pa], contraction [1] and speed of contraction [m/s]."""
-        return ops.maximum(self.unslackened(pressure, contraction, speed), 0.0)
+    def tension(
+        self, pressure: Value, contraction: Value, speed: Value = 0.0, bristles: Mapping[str, Value] = RELAXED
+    ) -> Value:
+        """Pull on the load [N] at gauge pressure [Pa], contraction [1], speed of contraction [m/s] and bristles."""
+        return ops.maximum(self.unslackened(pressure, contraction, speed, bristles), 0.0)
 
-    def unslackened(self, pressure: Value, contraction: Value, speed: Value = 0.0) -> Value:
+    def unslackened(
+        self, pressure: Value, contraction: Value, speed: Value = 0.0, bristles: Mapping[str, Value] = RELAXED
+    ) -> Value:
         """The sum of the elements' forces [N]; where it is negative the muscle hangs slack."""
         return (
             self.contractile.force(pressure, contraction)
             - self.spring.force(contraction, self.geometry.resting_length)
             - self.damper.force(pressure, speed)
+            - self.friction_force(speed, bristles)
         )
+
+    def friction_force(self, speed: Value, bristles: Mapping[str, Value] = RELAXED) -> Value:
+        """Force of the friction against contraction [N]."""
+        return self.friction.force({**self.friction.relaxed(), **bristles}, speed)
 
     def stiffness(self, pressure: Value, contraction: Value) -> Value:
         """-dF/deps at constant pressure [N], exact where the muscle is taut; divide by the resting length for N/m.
 
-        With shut valves the pressure rises as the muscle is pulled, and it is stiffer.
+        With shut valves the pressure rises as the muscle is pulled, and it is stiffer. Friction is left out: its
+        bristles add theirs until they slide.
         """
         return -trace.slope(self, "unslackened", pressure, contraction, wrt=1)

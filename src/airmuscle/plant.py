@@ -16,7 +16,7 @@ from .program import StateVariable
 
 
 class Port(NamedTuple):
-    """One muscle at one moment: contraction [1], shortening speed [m/s], volume [m3], pressures [Pa], tension [N]."""
+    """One muscle at one moment: contraction [1], shortening speed [m/s], volume [m3], pressures [Pa], forces [N]."""
 
     contraction: Value
     speed: Value
@@ -24,6 +24,8 @@ class Port(NamedTuple):
     absolute_pressure: Value
     pressure: Value
     tension: Value
+    friction: Value
+    bristles: Mapping[str, Value]
 
 
 @model
@@ -31,7 +33,7 @@ class Plant:
     """Ordinary differential equations of muscles, valves and load. Air mass [kg] is the state, pressure an output.
 
     `muscle` and `circuit` are one each, or tuples of the same length. With one muscle the names are plain
-    (`air_mass`, `pressure`); with several they carry its name (`left.pressure`).
+    (`air_mass`, `pressure`, `bristle`); with several they carry its name (`left.pressure`, `left.bristle`).
     """
 
     muscle: Muscle | tuple[Muscle, ...]
@@ -71,16 +73,18 @@ class Plant:
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
-        """Air masses, then the mechanism's coordinates and their speeds."""
-        air = []
+        """Air masses, the mechanism's coordinates and their speeds, then the bristles of the muscles' friction."""
+        air, bristles = [], []
         for prefix, muscle in zip(self.prefixes, self.muscles, strict=True):
             size = self.gas.air_mass(self.ambient.pressure, muscle.geometry.volume(0.05), self.ambient)
             air.append(StateVariable(f"{prefix}air_mass", "kg", size, f"mass of the air in {muscle.name}"))
+            for b in muscle.friction.states:
+                bristles.append(StateVariable(f"{prefix}{b.name}", b.unit, b.nominal, f"{b.meaning} of {muscle.name}"))
         moving = []
         for c in self.mechanism.coordinates:
             moving.append(StateVariable(c.name, c.unit, c.nominal, f"{c.name} of the load"))
             moving.append(StateVariable(c.speed, f"{c.unit}/s", c.nominal_speed, f"{c.speed} of the load"))
-        return (*air, *moving)
+        return (*air, *moving, *bristles)
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -94,15 +98,19 @@ class Plant:
         contractions = self.mechanism.contractions(state, lengths)
         speeds = self.mechanism.contraction_speeds(state, state, lengths)
         return tuple(
-            self._port(m, state[f"{prefix}air_mass"], contraction, speed)
+            self._port(m, state[f"{prefix}air_mass"], contraction, speed, _bristles(m, prefix, state))
             for m, prefix, contraction, speed in zip(self.muscles, self.prefixes, contractions, speeds, strict=True)
         )
 
-    def _port(self, muscle: Muscle, air_mass: Value, contraction: Value, speed: Value) -> Port:
+    def _port(
+        self, muscle: Muscle, air_mass: Value, contraction: Value, speed: Value, bristles: Mapping[str, Value]
+    ) -> Port:
         volume = muscle.geometry.volume(contraction)
         inside = self.gas.pressure(air_mass, volume, self.ambient)
         pressure = gauge(inside, self.ambient)
-        return Port(contraction, speed, volume, inside, pressure, muscle.tension(pressure, contraction, speed))
+        tension = muscle.tension(pressure, contraction, speed, bristles)
+        friction = muscle.friction_force(speed, bristles)
+        return Port(contraction, speed, volume, inside, pressure, tension, friction, bristles)
 
     def mass_flows(self, ports: tuple[Port, ...], inputs: Mapping[str, Value]) -> tuple[Value, ...]:
         """Mass flow [kg/s] into every muscle."""
@@ -120,18 +128,24 @@ class Plant:
         for c in self.mechanism.coordinates:
             rates[c.name] = state[c.speed]
             rates[c.speed] = pulls[c.name]
+        for muscle, prefix, port in zip(self.muscles, self.prefixes, ports, strict=True):
+            bending = muscle.friction.rates(port.bristles, port.speed)
+            rates |= {f"{prefix}{name}": rate for name, rate in bending.items()}
         return rates
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
-        """Gauge pressure, contraction, tension, volume and mass flow of every muscle; accelerations."""
+        """Gauge pressure, contraction, tension, friction, volume and mass flow of every muscle; accelerations."""
         ports = self.ports(state)
         found: dict[str, Value] = {}
-        for prefix, port, flow in zip(self.prefixes, ports, self.mass_flows(ports, inputs), strict=True):
+        flows = self.mass_flows(ports, inputs)
+        for muscle, prefix, port, flow in zip(self.muscles, self.prefixes, ports, flows, strict=True):
             found[f"{prefix}pressure"] = port.pressure
             found[f"{prefix}contraction"] = port.contraction
             found[f"{prefix}force"] = port.tension
             found[f"{prefix}volume"] = port.volume
             found[f"{prefix}mass_flow"] = flow
+            if muscle.friction.states:
+                found[f"{prefix}friction"] = port.friction
         pulls = self.mechanism.acceleration(state, state, [port.tension for port in ports], inputs)
         for c in self.mechanism.coordinates:
             found["acceleration" if len(pulls) == 1 else f"{c.name}.acceleration"] = pulls[c.name]
@@ -140,10 +154,11 @@ class Plant:
     def state_at(self, *, pressure: float | tuple[float, ...], **coordinates: float) -> dict[str, float]:
         """A state by what is known of it: gauge pressure [Pa] of the muscle (or of each), coordinates, speeds.
 
-        What is not named is 0. Raises ParameterError for a pressure below absolute zero or an unknown name.
+        What is not named is 0, bristles too. Raises ParameterError for a pressure below absolute zero or an unknown
+        name.
         """
         pressures = pressure if isinstance(pressure, tuple) else (pressure,) * len(self.muscles)
-        moving = {name: 0.0 for c in self.mechanism.coordinates for name in (c.name, c.speed)}
+        moving = {s.name: 0.0 for s in self.states[len(self.muscles) :]}
         for name in coordinates:
             if name not in moving:
                 raise ParameterError(f"Plant: no coordinate '{name}'; there are {', '.join(moving) or 'none'}.")
@@ -157,3 +172,8 @@ class Plant:
             volume = muscle.geometry.volume(contraction)
             air[f"{prefix}air_mass"] = float(self.gas.air_mass(absolute(p, self.ambient), volume, self.ambient))
         return {**air, **moving}
+
+
+def _bristles(muscle: Muscle, prefix: str, state: Mapping[str, Value]) -> dict[str, Value]:
+    """A muscle's bristles by their own names, taken from the plant's state."""
+    return {b.name: state[f"{prefix}{b.name}"] for b in muscle.friction.states}

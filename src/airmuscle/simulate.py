@@ -12,7 +12,7 @@ import numpy.typing as npt
 from .command import Command, Schedule, Segments
 from .equilibrium import equilibrium
 from .errors import ParameterError, SimulationError, suggestion
-from .method import REASONS, Course, Method, Rodas4
+from .method import INTERRUPTED, REASONS, Course, Method, Rodas4
 from .plant import Plant
 from .program import System
 from .recording import Recording
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 COARSEST = 0.01
 """Output is at least this fine [s] unless asked otherwise."""
+MOST_ROWS = 10_000_000
+"""Rows of a recording that fit a usual memory."""
 
 
 def simulate(
@@ -50,6 +52,8 @@ def simulate(
     """
     if not (np.isfinite(duration) and duration > 0):
         raise ParameterError(f"simulate: duration is {duration!r} s; it must be positive and finite.")
+    if not start_time + duration > start_time:
+        raise ParameterError(f"simulate: start_time is {start_time!r} s; {duration!r} s after it no time has passed.")
     from .program.prepared import prepared  # CasADi, which describing a plant does not need
 
     if start is None:
@@ -57,6 +61,7 @@ def simulate(
     method = method or Rodas4()
     ready = prepared(plant)
     segments = command.segments(plant.inputs, start_time, duration)
+    refuse_beyond_opening(plant, segments, start_time)
     times = output_times(output, start_time, duration, segments.ends)
     state = _vector(plant, start)
     course = method.run(ready, segments, start_time, state, times)
@@ -65,7 +70,7 @@ def simulate(
         problem = _problem(plant, course, start_time + duration)
         recording = dataclasses.replace(recording, notes=(*recording.notes, problem))
         if complete:
-            raise SimulationError(problem, recording)
+            raise SimulationError(problem, recording, interrupted=course.status == INTERRUPTED)
     return recording
 
 
@@ -96,8 +101,13 @@ def output_times(output: float | npt.ArrayLike | None, start: float, duration: f
     if output is None:
         output = min(duration / 1000, COARSEST)
     if isinstance(output, float | int):
-        if not output > 0:
-            raise ParameterError(f"simulate: an output spacing of {output!r} s is not positive.")
+        if not 0 < output < np.inf:
+            raise ParameterError(f"simulate: an output spacing of {output!r} s is not positive and finite.")
+        if duration / output > MOST_ROWS:
+            raise ParameterError(
+                f"simulate: an output spacing of {output!r} s makes {duration / output:.3g} rows of a run of "
+                f"{duration:g} s; {MOST_ROWS} are allowed. The result does not depend on it: choose a wider one."
+            )
         grid = start + output * np.arange(int(np.floor(duration / output * (1 + 1e-12))) + 1)
     else:
         grid = np.sort(np.asarray(output, dtype=float))
@@ -105,6 +115,21 @@ def output_times(output: float | npt.ArrayLike | None, start: float, duration: f
             raise ParameterError(f"simulate: output instants must lie within {start:g} to {end:g} s.")
     apart = np.min(np.abs(grid[:, None] - instants[None, :]), axis=1) > 1e-9 * duration if grid.size else grid > 0
     return np.unique(np.concatenate([grid[apart], instants]))
+
+
+def refuse_beyond_opening(plant: System, segments: Segments, start: float) -> None:
+    """Raise ParameterError where a Plant is commanded beyond shut and open; the inputs of other systems are theirs."""
+    if not isinstance(plant, Plant):
+        return
+    lengths = np.diff(segments.ends, prepend=start)[:, None]
+    for values in (segments.values, segments.values + segments.slopes * lengths):
+        beyond = (values < -1e-9) | (values > 1 + 1e-9)
+        if beyond.any():
+            row, column = np.argwhere(beyond)[0]
+            raise ParameterError(
+                f"the input '{plant.inputs[column]}' is {values[row, column]:g} before {segments.ends[row]:g} s; "
+                "allowed are 0 (shut, or free) to 1 (open, or held)."
+            )
 
 
 def _rest(plant: System) -> Mapping[str, float]:
@@ -151,8 +176,16 @@ def _recorded(
         constants = {"ambient": plant.ambient.pressure}
         if len(plant.muscles) == 1:
             constants["resting_length"] = plant.muscles[0].geometry.resting_length
-        notes += [f"gas: {plant.gas}", "friction: off", *outside_box(plant, columns)]
+        notes += [f"gas: {plant.gas}", friction_in_words(plant), *outside_box(plant, columns)]
     return Recording(columns, "simulation", constants, tuple(notes))
+
+
+def friction_in_words(plant: Plant) -> str:
+    """What friction a plant's muscles have; the default is none, which a reader should know."""
+    if not any(m.friction.states for m in plant.muscles):
+        return "friction: off"
+    words = [f"{m.name} {m.friction if m.friction.states else 'none'}" for m in plant.muscles]
+    return f"friction: {', '.join(words) if len(words) > 1 else plant.muscles[0].friction}"
 
 
 def outside_box(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
@@ -180,7 +213,7 @@ def outside_box(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
 def _problem(plant: System, course: Course, end: float) -> str:
     state = ", ".join(f"{s.name} {v:.6g} {s.unit}" for s, v in zip(plant.states, course.state, strict=True))
     remedy = {
-        4: "Raise the tolerance, or look for a valve that chatters.",
+        4: "Raise the tolerance, lengthen a fixed step, or look for a valve that chatters.",
         5: "Nothing is lost; what was computed is in the recording.",
     }.get(course.status, "Look at the last state: a parameter may be far from physical, or a fixed step too long.")
     return (

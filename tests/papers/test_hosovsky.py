@@ -14,7 +14,7 @@ from airmuscle.equilibrium import equilibrium
 from airmuscle.gas import Isothermal
 from airmuscle.identify.fit import fit
 from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.method import DormandPrince8, Rodas4, RungeKutta4
+from airmuscle.method import DormandPrince8, RungeKutta4
 from airmuscle.muscle import LinearDamper, LinearSpring, Muscle
 from airmuscle.plant import Plant
 from airmuscle.recording import Recording

@@ -175,7 +175,7 @@ def readings() -> Plot:
 def pairs() -> Plot:
     """The error of 12 pairs of assumed outline and closure, without rubber and with it."""
     figure, panels = new_figure(1, 2, width=7.2, height=4.2, sharey=True)
-    contraction = np.linspace(0.005, 0.4, 80)
+    contraction = np.linspace(0.005, 0.4, 60)
     found = (ideal_errors(contraction), errors(RUBBER["A"], 100.0, contraction))
     closures = ("end balance", "middle balance", "virtual work")
     titles = ("tension per pressure, no rubber", "pressure, line A, 100 N")

@@ -69,7 +69,7 @@ def reached(law: Characteristic, pressure: float, force: float) -> float:
     Zero where the tube stays straight, the end of the law's reach where the muscle runs away.
     """
     low, high = law.contraction_reach
-    grid = np.linspace(max(low, 1e-3), high * (1 - 1e-6), 400)
+    grid = np.linspace(max(low, 1e-3), high * (1 - 1e-6), 150)
     needed = pressure_along(law, grid, force)
     enough = np.flatnonzero(needed <= pressure)
     if not enough.size:

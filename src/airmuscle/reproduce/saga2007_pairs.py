@@ -6,6 +6,7 @@ Ferraresi et al. 2001, is the circle with the balance at the middle.
 
 from __future__ import annotations
 
+import functools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,6 +65,9 @@ def _energy_growth(tube: FibreTube, rubber: RubberLine, contraction: Array) -> A
     if isinstance(tube, StraightFibre):
         return np.asarray(trace.slope(Stored(tube, rubber), "energy", contraction))
 
+    if not (rubber.slope or rubber.intercept):
+        return np.zeros_like(contraction)
+
     def energy(at: Array) -> Array:
         segment = tube.segment(at)
         return np.asarray(WALL * rubber.energy(segment.arc_excess, segment.arc_excess_squared, tube.end_radius))
@@ -98,24 +102,27 @@ def pressure(share: Share, force: float) -> Array:
         return np.where(share.area > 0, (force + share.rubber) / share.area, np.nan)
 
 
+@functools.lru_cache(maxsize=16)
+def _shares(rubber: RubberLine, contraction: tuple[float, ...]) -> dict[tuple[str, str], Share]:
+    """All 15 pairs (outline, closure), kept for the loads that ask for them."""
+    at = np.array(contraction)
+    return {
+        (outline, closure): share
+        for outline, tube in OUTLINES.items()
+        for closure, share in closures(tube, rubber, at).items()
+    }
+
+
 def pressures(rubber: RubberLine, force: float, contraction: Array) -> dict[tuple[str, str], Array]:
     """The pressure [Pa] of each of the 15 pairs (outline, closure)."""
-    return {
-        (outline, closure): pressure(share, force)
-        for outline, tube in OUTLINES.items()
-        for closure, share in closures(tube, rubber, contraction).items()
-    }
+    return {pair: pressure(share, force) for pair, share in _shares(rubber, tuple(contraction)).items()}
 
 
 def ideal_errors(contraction: Array) -> dict[tuple[str, str], Array]:
     """Error of F/p of each pair against the exact meridian, both without rubber [1]."""
-    none = RubberLine(0.0, 0.0)
     truth = np.asarray(PleatedTube(LENGTH, DIAMETER).area(contraction))
-    return {
-        (outline, closure): share.area / truth - 1
-        for outline, tube in OUTLINES.items()
-        for closure, share in closures(tube, none, contraction).items()
-    }
+    found = _shares(RubberLine(0.0, 0.0), tuple(contraction))
+    return {pair: share.area / truth - 1 for pair, share in found.items()}
 
 
 def errors(rubber: RubberLine, force: float, contraction: Array) -> dict[tuple[str, str], Array]:

@@ -1,0 +1,82 @@
+"""The Bouc-Wen hysteresis, in its normalised form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from .. import ops
+from ..declare import model, parameter
+from ..ops import Value
+from ..reference import Reference
+from .base import Bristle, Friction
+from .path import autonomous
+
+BOUC1967 = Reference(
+    key="Bouc1967",
+    authors="Bouc, R.",
+    title="Forced vibration of mechanical systems with hysteresis",
+    where="Proceedings of the Fourth Conference on Nonlinear Oscillation, Prague, 315",
+    year=1967,
+)
+WEN1976 = Reference(
+    key="Wen1976",
+    authors="Wen, Y.-K.",
+    title="Method for random vibration of hysteretic systems",
+    where="Journal of the Engineering Mechanics Division, ASCE, 102(2), 249-263",
+    year=1976,
+    note="the exponent n",
+)
+ISMAIL2009 = Reference(
+    key="Ismail2009",
+    authors="Ismail, M., Ikhouane, F., Rodellar, J.",
+    title="The hysteresis Bouc-Wen model, a survey",
+    where="Archives of Computational Methods in Engineering 16, 161-188",
+    year=2009,
+    doi="10.1007/s11831-009-9031-8",
+    note="normalised form, and the bounds sigma >= 1/2, n >= 1 within which it cannot create energy",
+)
+LEAST = 1e-12
+"""Below this |w| counts as this, so that a power of it has a derivative at 0 (chosen)."""
+
+
+@model
+class BoucWen(Friction):
+    """dz/dt = v - sigma |v| |w|^(n-1) w + (sigma - 1) v |w|^n,  w = k z/F_C,  F = F_C w = k z.
+
+    z deflection [m], w the same as a share of its limit, k stiffness from rest, F_C the force it tends to, n sharpness
+    of the transition, sigma shape of unloading. The usual A, beta, gamma overdetermine the loop; this is the
+    normalised form, rho = k/F_C. The elastic part of Bouc and Wen is the muscle's parallel spring. n = sigma = 1 is
+    Dahl's law; n to infinity is a single slipping element. Rate independent; inner loops drift as Dahl's do.
+    Reference: Bouc (1967), Wen (1976); normalised form Ismail, Ikhouane and Rodellar (2009).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (BOUC1967, WEN1976, ISMAIL2009)
+
+    stiffness: float = parameter("N/m", "k", "stiffness from rest", bounds=(1e-3, 1e9))
+    coulomb_force: float = parameter("N", "F_C", "friction force in sliding", bounds=(1e-6, 1e5))
+    sharpness: float = parameter("1", "n", "sharpness of the transition to sliding", bounds=(1.0, 20.0), default=1.0)
+    unloading: float = parameter("1", "sigma", "shape of unloading", bounds=(0.5, 20.0), default=0.5)
+
+    @property
+    def states(self) -> tuple[Bristle, ...]:
+        return (Bristle("bristle", "m", self.travel, "deflection of the bristle"),)
+
+    @property
+    def travel(self) -> float:
+        return self.coulomb_force / self.stiffness
+
+    def _bending(self, share: Value, speed: Value) -> Value:
+        size = ops.maximum(ops.absolute_value(share), LEAST) ** (self.sharpness - 1.0)
+        opposed = self.unloading * ops.absolute_value(speed) * share
+        along = (self.unloading - 1.0) * speed * ops.absolute_value(share)
+        return speed + size * (along - opposed)
+
+    def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
+        return {"bristle": self._bending(bristles["bristle"] * self.stiffness / self.coulomb_force, speed)}
+
+    def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
+        return self.stiffness * bristles["bristle"]
+
+    def replay(self, displacement: Any, time: Any = None) -> Any:
+        return self.coulomb_force * autonomous(self._bending, displacement, self.travel)

@@ -1,0 +1,55 @@
+"""Dahl's friction: one bristle that yields gradually."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from .. import ops
+from ..declare import model, parameter
+from ..ops import Value
+from ..reference import Reference
+from .base import Bristle, Friction
+from .path import deflection
+
+DAHL1968 = Reference(
+    key="Dahl1968",
+    authors="Dahl, P. R.",
+    title="A solid friction model",
+    where="The Aerospace Corporation, El Segundo, report TOR-0158(3107-18)-1",
+    year=1968,
+    note="dF/dx = sigma_0 (1 - (F/F_C) sgn v)^i; here with the exponent i = 1",
+)
+
+
+@model
+class Dahl(Friction):
+    """dz/dt = v - sigma_0 |v| z/F_C,  F = sigma_0 z.
+
+    z deflection of the bristle [m], v speed, sigma_0 its stiffness, F_C the force that it tends to in sliding. From
+    rest, F = F_C (1 - exp(-sigma_0 x/F_C)). Rate independent; small inner loops do not close, they drift.
+    Reference: Dahl (1968), with the exponent 1.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (DAHL1968,)
+
+    stiffness: float = parameter("N/m", "sigma_0", "stiffness of the bristle", bounds=(1e-3, 1e9))
+    coulomb_force: float = parameter("N", "F_C", "friction force in sliding", bounds=(1e-6, 1e5))
+
+    @property
+    def states(self) -> tuple[Bristle, ...]:
+        return (Bristle("bristle", "m", self.travel, "deflection of the bristle"),)
+
+    @property
+    def travel(self) -> float:
+        return self.coulomb_force / self.stiffness
+
+    def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
+        bent = self.stiffness * bristles["bristle"] / self.coulomb_force
+        return {"bristle": speed - ops.absolute_value(speed) * bent}
+
+    def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
+        return self.stiffness * bristles["bristle"]
+
+    def replay(self, displacement: Any, time: Any = None) -> Any:
+        return self.stiffness * deflection(displacement, self.travel)

@@ -1,0 +1,78 @@
+"""The LuGre friction: a bristle whose sliding force falls with speed, and viscous friction beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from .. import ops
+from ..declare import model, parameter
+from ..ops import Value
+from ..reference import Reference
+from .base import Bristle, Friction
+from .path import deflection, speeds
+
+CANUDAS_DE_WIT1995 = Reference(
+    key="CanudasDeWit1995",
+    authors="Canudas de Wit, C., Olsson, H., Astrom, K. J., Lischinsky, P.",
+    title="A new model for control of systems with friction",
+    where="IEEE Transactions on Automatic Control 40(3), 419-425",
+    year=1995,
+    doi="10.1109/9.376053",
+    note="equations of the bristle and of the force; g(v) in the form with exp(-(v/v_S)^2)",
+)
+
+
+@model
+class LuGre(Friction):
+    """dz/dt = v - sigma_0 |v| z/g(v),  F = sigma_0 z + sigma_1 dz/dt + sigma_2 v.
+
+    g(v) = F_C + (F_S - F_C) exp(-(v/v_S)^2).
+
+    z mean deflection of the bristles [m], v speed, g(v) force of steady sliding (Stribeck's curve), F_C Coulomb's
+    force, F_S the force at break-away, v_S Stribeck's speed, sigma_1 and sigma_2 damping of the bristles and of the
+    sliding. Steady sliding gives F = g(v) sgn v + sigma_2 v. From speed to force it is passive if
+    sigma_2 > sigma_1 (F_S - F_C)/F_C. In the limit of slow motion it is Dahl's law with F_S.
+    Reference: Canudas de Wit et al. (1995).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (CANUDAS_DE_WIT1995,)
+    rate_independent: ClassVar[bool] = False
+
+    stiffness: float = parameter("N/m", "sigma_0", "stiffness of the bristles", bounds=(1e-3, 1e9))
+    coulomb_force: float = parameter("N", "F_C", "friction force in fast sliding", bounds=(1e-6, 1e5))
+    stribeck_force: float = parameter(
+        "N", "F_S - F_C", "how much more the slowest sliding takes", bounds=(0.0, 1e5), default=0.0
+    )
+    stribeck_speed: float = parameter(
+        "m/s", "v_S", "speed over which the sliding force falls", bounds=(1e-6, 100.0), default=0.01
+    )
+    bristle_damping: float = parameter("N s/m", "sigma_1", "damping of the bristles", bounds=(0.0, 1e6), default=0.0)
+    damping: float = parameter("N s/m", "sigma_2", "viscous damping in sliding", bounds=(0.0, 1e6), default=0.0)
+
+    @property
+    def states(self) -> tuple[Bristle, ...]:
+        return (Bristle("bristle", "m", self.travel, "mean deflection of the bristles"),)
+
+    @property
+    def travel(self) -> float:
+        return (self.coulomb_force + self.stribeck_force) / self.stiffness
+
+    def sliding_force(self, speed: Value) -> Value:
+        """g(v), the size of the bristles' force in steady sliding [N]."""
+        return self.coulomb_force + self.stribeck_force * ops.exp(-((speed / self.stribeck_speed) ** 2))
+
+    def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
+        bent = self.stiffness * bristles["bristle"] / self.sliding_force(speed)
+        return {"bristle": speed - ops.absolute_value(speed) * bent}
+
+    def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
+        bending = self.rates(bristles, speed)["bristle"]
+        return self.stiffness * bristles["bristle"] + self.bristle_damping * bending + self.damping * speed
+
+    def replay(self, displacement: Any, time: Any = None) -> Any:
+        if time is None:
+            return self.stiffness * deflection(displacement, self.travel)
+        speed = speeds(displacement, time)
+        bend = deflection(displacement, self.sliding_force(speed) / self.stiffness)
+        return self.force({"bristle": bend}, speed)

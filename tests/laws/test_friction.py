@@ -1,0 +1,277 @@
+"""Friction: force with memory, against the motion, that never drives.
+
+Each law's rates and its replay along a path are one law; Dahl and Bouc-Wen meet their closed forms, LuGre its
+Stribeck curve; stops meet their definition, and with it Masing's rules, closed inner loops and wiping out. Whatever
+the path, the work done against friction from rest is never negative. All but LuGre are independent of the rate.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import casadi
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from airmuscle.declare import leaves
+from airmuscle.errors import ParameterError
+from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
+from airmuscle.friction.path import stops
+
+STIFFNESSES, LIMITS = (4e4, 2e4, 1e4), (1e-4, 4e-4, 1e-3)
+SLIP = MaxwellSlip(STIFFNESSES, LIMITS)
+LOPSIDED = PrandtlIshlinskii(STIFFNESSES, LIMITS, (5.0, 12.0, -8.0), (0.8, -0.5, -0.6))
+DAHL, BOUC_WEN = Dahl(5e4, 20.0), BoucWen(5e4, 20.0, 1.7, 0.8)
+LUGRE = LuGre(5e4, 15.0, 5.0, 0.01, 50.0, 20.0)
+RATE_INDEPENDENT = [DAHL, BOUC_WEN, SLIP, LOPSIDED]
+ALL = [*RATE_INDEPENDENT, LUGRE]
+EXACT_STOPS = [SLIP, LOPSIDED]
+turns = st.lists(st.floats(-3e-3, 3e-3), min_size=1, max_size=8)
+
+
+def name(law):
+    return type(law).__name__
+
+
+def path_through(ends, rows=40):
+    """A path from 0 through turning points, straight between them."""
+    legs = [np.linspace(a, b, rows, endpoint=False) for a, b in itertools.pairwise((0.0, *ends))]
+    return np.concatenate([*legs, [ends[-1]]])
+
+
+def integrated(law, ends, speed=1e-3):
+    """Force and bristles at the end of a path run at a constant speed, by the rates of the law."""
+    values, names = np.zeros(len(law.states)), [s.name for s in law.states]
+    v = 0.0
+    for a, b in itertools.pairwise((0.0, *ends)):
+        if a == b:
+            continue
+        v = speed * np.sign(b - a)
+
+        def rates(_, z, v=v):
+            return list(law.rates(dict(zip(names, z, strict=True)), v).values())
+
+        solved = solve_ivp(rates, (0.0, abs(b - a) / speed), values, method="LSODA", rtol=1e-9, atol=1e-13)
+        values = solved.y[:, -1]
+    bristles = dict(zip(names, values, strict=True))
+    return law.force(bristles, v), bristles
+
+
+def yielded(law, ends):
+    """Bristles at the end of a path, by the rates of the law, in steps within the transition of its least limit."""
+    names, longest = [s.name for s in law.states], 0.5 * law.transition * min(law.limits)
+    z = np.zeros(len(names))
+    for a, b in itertools.pairwise((0.0, *ends)):
+        count = int(np.ceil(abs(b - a) / longest))
+        v = np.sign(b - a)
+
+        def rates(z, v=v):
+            return np.array(list(law.rates(dict(zip(names, z.tolist(), strict=True)), float(v)).values()))
+
+        for _ in range(count):
+            h = abs(b - a) / count
+            z = z + h * rates(z + 0.5 * h * rates(z))
+    return z
+
+
+@pytest.mark.parametrize("law", [DAHL, BOUC_WEN, replace(BOUC_WEN, sharpness=6.0, unloading=3.0)], ids=repr)
+def test_the_replay_is_the_integral_of_the_rates(law):
+    ends = (1e-3, -2e-4, 3e-4, 2e-4, 9e-4, -3e-3)
+    for count in range(1, len(ends) + 1):
+        assert law.replay(path_through(ends[:count]))[-1] == pytest.approx(integrated(law, ends[:count])[0], abs=2e-5)
+
+
+def test_the_replay_of_lugre_in_time_is_the_integral_of_its_rates():
+    ends = (1e-3, -2e-4, 3e-4)
+    path = path_through(ends)
+    time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(path)))]) / 5e-3
+    assert LUGRE.replay(path, time)[-1] == pytest.approx(integrated(LUGRE, ends, 5e-3)[0], rel=1e-6)
+    slow = LUGRE.replay(path, time * 1e6)
+    np.testing.assert_allclose(slow, LUGRE.replay(path), atol=1e-3)
+
+
+@pytest.mark.parametrize("transition", [0.3, 0.05])
+@pytest.mark.parametrize("law", EXACT_STOPS, ids=name)
+@settings(max_examples=8, deadline=None)
+@given(ends=st.lists(st.floats(-2e-3, 2e-3), min_size=2, max_size=5))
+def test_a_yielding_stop_stays_within_its_transition_of_the_exact_one(law, transition, ends):
+    """|delta - exact| <= eta Delta: the plant's form tends to the exact one with eta."""
+    bends = yielded(replace(law, transition=transition), ends)
+    exact = stops(np.array([0.0, *ends]), law.limits)[-1]
+    assert (np.abs(bends - exact) <= transition * np.array(law.limits) + 1e-9).all()
+
+
+def test_dahl_meets_its_closed_form():
+    x = np.linspace(0.0, 2e-3, 50)
+    np.testing.assert_allclose(DAHL.replay(x), 20.0 * (1.0 - np.exp(-5e4 * x / 20.0)), rtol=1e-12)
+
+
+def test_bouc_wen_meets_its_closed_forms():
+    """n = 2, sigma = 1/2 is a tangens hyperbolicus from rest; n = sigma = 1 is Dahl's law; sharp n is one stop."""
+    x = np.linspace(0.0, 2e-3, 50)
+    np.testing.assert_allclose(BoucWen(5e4, 20.0, 2.0, 0.5).replay(x), 20.0 * np.tanh(5e4 * x / 20.0), atol=1e-6)
+    ends = (1e-3, -2e-4, 3e-4, -1e-3)
+    path = path_through(ends)
+    np.testing.assert_allclose(BoucWen(5e4, 20.0, 1.0, 1.0).replay(path), DAHL.replay(path), atol=1e-6)
+    stop = MaxwellSlip((5e4,), (4e-4,))
+    assert np.abs(BoucWen(5e4, 20.0, 20.0, 0.5).replay(path) - stop.replay(path)).max() < 0.05 * 20.0
+    assert np.abs(BoucWen(5e4, 20.0, 2.0, 0.5).replay(path) - stop.replay(path)).max() > 0.05 * 20.0
+
+
+@pytest.mark.parametrize("bend", [-3e-4, -1e-4, 0.0, 2e-4, 3.9e-4])
+@pytest.mark.parametrize("speed", [-0.02, 0.02])
+def test_a_stop_that_yields_from_rest_is_bouc_wen_with_n_1_and_sigma_a_half(bend, speed):
+    smooth, one = BoucWen(5e4, 20.0, 1.0, 0.5), MaxwellSlip((5e4,), (4e-4,), 1.0)
+    (expected,) = smooth.rates({"bristle": bend}, speed).values()
+    assert one.rates({"bristle1": bend}, speed)["bristle1"] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("speed", [-0.1, -0.005, 0.002, 0.01, 0.3])
+def test_lugre_slides_along_stribecks_curve(speed):
+    law = LUGRE
+    steady = np.sign(speed) * (15.0 + 5.0 * np.exp(-((speed / 0.01) ** 2))) + 20.0 * speed
+    force, bristles = integrated(law, (np.sign(speed) * 0.05,), abs(speed))
+    assert force == pytest.approx(steady, rel=1e-6)
+    assert law.rates(bristles, speed)["bristle"] == pytest.approx(0.0, abs=1e-6 * abs(speed))
+
+
+@pytest.mark.parametrize("law", ALL, ids=name)
+@settings(max_examples=60, deadline=None)
+@given(ends=turns)
+def test_friction_never_drives(law, ends):
+    """The work done against it from rest is never negative; on a closed path all of it but the bristles' is heat."""
+    path = path_through((*ends, 0.0), 400)
+    time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(path)))]) / 0.02
+    force = law.replay(path, time)
+    work = np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(path))
+    assert work.min(initial=0.0) >= -1e-4 * 40.0 * 1e-3
+
+
+@pytest.mark.parametrize("law", ALL, ids=name)
+def test_a_loop_run_again_and_again_closes_and_costs_work(law):
+    ends = (2e-3, -2e-3) * 6
+    path = path_through(ends, 400)
+    force = law.replay(path)
+    before, last = force[-1601:-800], force[-801:]
+    np.testing.assert_allclose(last, before, atol=1e-6)
+    assert np.sum(0.5 * (last[1:] + last[:-1]) * np.diff(path[-801:])) > 0.03
+
+
+@pytest.mark.parametrize("law", RATE_INDEPENDENT, ids=name)
+@settings(max_examples=30, deadline=None)
+@given(bend=st.floats(-1.0, 1.0), speed=st.floats(-1.0, 1.0), factor=st.floats(0.01, 100.0))
+def test_the_rates_grow_with_speed_so_that_the_path_alone_counts(law, bend, speed, factor):
+    bristles = {s.name: bend * s.nominal for s in law.states}
+    slow, fast = law.rates(bristles, speed), law.rates(bristles, factor * speed)
+    assert list(fast.values()) == pytest.approx([factor * r for r in slow.values()], abs=1e-13 * factor)
+    assert law.force(bristles, speed) == law.force(bristles, 0.0)
+
+
+def test_lugre_depends_on_the_rate_and_says_so():
+    assert not LUGRE.rate_independent
+    assert abs(integrated(LUGRE, (0.01,), 0.1)[0] - integrated(LUGRE, (0.01,), 0.001)[0]) > 1.0
+
+
+@pytest.mark.parametrize("law", RATE_INDEPENDENT, ids=name)
+def test_rows_between_two_turning_points_change_nothing(law):
+    ends = (1e-3, -2e-4, 3e-4, -1e-3)
+    assert law.replay(path_through(ends, 300))[-1] == pytest.approx(law.replay(np.array([0.0, *ends]))[-1], abs=1e-6)
+
+
+@settings(max_examples=100, deadline=None)
+@given(ends=turns)
+def test_a_stop_is_what_defines_it(ends):
+    """|z| <= r and (dx - dz)(z - phi) >= 0 for every |phi| <= r; with the play operator beside it, x = E + P."""
+    path = np.array([0.0, *ends])
+    bends = stops(path, LIMITS)
+    play = np.zeros(3)
+    for i, (x, bend) in enumerate(zip(path, bends, strict=True)):
+        assert (np.abs(bend) <= LIMITS).all()
+        play = np.maximum(x - LIMITS, np.minimum(x + LIMITS, play))
+        np.testing.assert_allclose(bend + play, x, atol=1e-15)
+        if i:
+            slid = (x - path[i - 1]) - (bend - bends[i - 1])
+            for phi in (np.array(LIMITS), -np.array(LIMITS)):
+                assert (slid * (bend - phi) >= -1e-18).all()
+
+
+def test_masing_unloading_is_the_first_loading_drawn_twice_as_large():
+    first = SLIP.replay(np.linspace(0.0, 1.5e-3, 301))
+    path = path_through((1.5e-3, -1.5e-3), 600)
+    unloading = SLIP.replay(path)[600:]
+    np.testing.assert_allclose(unloading[0] - unloading, 2.0 * np.interp(np.linspace(0, 1.5e-3, 601),
+                               np.linspace(0, 1.5e-3, 301), first), atol=1e-9)  # fmt: skip
+
+
+@pytest.mark.parametrize("law", EXACT_STOPS, ids=name)
+def test_an_inner_loop_closes_and_is_forgotten(law):
+    """Back at the point where it began the force is what it was, and goes on as if there had been no inner loop."""
+    outer, inner = (1.5e-3, -1e-3, 4e-4), (0.0, 2e-4, 1e-4, 4e-4)
+    assert law.replay(np.array([0.0, *outer, *inner]))[-1] == law.replay(np.array([0.0, *outer]))[-1]
+    going_on = (9e-4, -1.4e-3)
+    with_it, without = (law.replay(np.array([0.0, *outer, *x, *going_on])) for x in (inner, ()))
+    np.testing.assert_allclose(with_it[-2:], without[-2:], atol=1e-12)
+
+
+def test_a_single_bristle_does_not_close_inner_loops():
+    outer, inner = (1.5e-3, -1e-3, -8e-4), (-9e-4, -8e-4)
+    for law in (DAHL, BOUC_WEN):
+        ends = law.replay(np.array([0.0, *outer, *inner]))[-1], law.replay(np.array([0.0, *outer]))[-1]
+        assert abs(ends[0] - ends[1]) > 0.1
+
+
+@settings(max_examples=60, deadline=None)
+@given(ends=st.lists(st.floats(-3e-3, 3e-3), min_size=1, max_size=6), reach=st.floats(3e-3, 6e-3))
+def test_a_greater_extremum_wipes_out_what_was_before(ends, reach):
+    for law in EXACT_STOPS:
+        after = law.replay(np.array([0.0, *ends, reach, 1e-3]))[-1]
+        assert after == pytest.approx(law.replay(np.array([0.0, reach, 1e-3]))[-1], abs=1e-9)
+
+
+def test_without_dead_zones_prandtl_ishlinskii_is_maxwell_slip_and_with_them_lopsided():
+    path = path_through((1.5e-3, -1.5e-3, 1.5e-3))
+    plain = PrandtlIshlinskii(STIFFNESSES, LIMITS)
+    np.testing.assert_allclose(plain.replay(path), SLIP.replay(path), rtol=1e-12)
+    assert plain.replay(path).max() == pytest.approx(-plain.replay(path).min())
+    u = 4.0 + 8.0 + 10.0
+    assert LOPSIDED.replay(path).max() == pytest.approx(u + 0.8 * (u - 5.0) - 0.5 * (u - 12.0))
+    assert LOPSIDED.replay(path).min() == pytest.approx(-u + 0.6 * (u - 8.0))
+
+
+@pytest.mark.parametrize("law", ALL, ids=name)
+def test_a_traced_law_gives_the_numbers_of_the_plain_one(law):
+    symbols = {s.name: casadi.SX.sym(s.name) for s in law.states}
+    v = casadi.SX.sym("v")
+    outputs = [*law.rates(symbols, v).values(), law.force(symbols, v)]
+    function = casadi.Function("law", [*symbols.values(), v], outputs)
+    for share, speed in itertools.product((-1.0, -0.97, 0.0, 0.4, 1.0), (-0.2, 0.0, 0.1)):
+        bristles = {s.name: share * s.nominal for s in law.states}
+        expected = [*law.rates(bristles, speed).values(), law.force(bristles, speed)]
+        assert [float(x) for x in function(*bristles.values(), speed)] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("law", ALL, ids=name)
+def test_the_rates_are_continuous_in_the_speed_and_vanish_at_rest(law):
+    bristles = {s.name: 0.98 * s.nominal for s in law.states}
+    for speed in (-1e-12, 0.0, 1e-12):
+        assert list(law.rates(bristles, speed).values()) == pytest.approx([0.0] * len(bristles), abs=1e-11)
+
+
+def test_no_friction_is_no_force_and_no_state():
+    assert NoFriction().states == ()
+    assert not list(leaves(NoFriction()))
+    assert NoFriction().replay(np.ones(3)).tolist() == [0.0, 0.0, 0.0]
+
+
+def test_elements_that_do_not_pair_and_dead_zones_that_would_drive_are_refused():
+    with pytest.raises(ParameterError, match="MaxwellSlip: 2 stiffnesses and 1 limits; give one of each"):
+        MaxwellSlip((1.0, 2.0), (1e-3,))
+    with pytest.raises(ParameterError, match="PrandtlIshlinskii: 1 thresholds and 0 weights"):
+        PrandtlIshlinskii((1.0,), (1e-3,), (5.0,))
+    with pytest.raises(ParameterError, match=r"weight -0.9 at 12 N the force would fall.*must exceed -1"):
+        PrandtlIshlinskii((1.0,), (1e-3,), (5.0, 12.0), (-0.2, -0.9))
+    PrandtlIshlinskii((1.0,), (1e-3,), (5.0, -12.0), (-0.2, -0.9))

@@ -1,0 +1,273 @@
+"""A scenario file becomes the plant, the command and the run it describes, in every form that docs/scenario.md names.
+
+What is wrong with it is said with file, table, key, value and what is allowed.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airmuscle.command import Schedule, Signal
+from airmuscle.errors import (
+    AirmuscleError,
+    FileError,
+    NoEquilibrium,
+    ParameterError,
+    PhysicsError,
+    UnitError,
+    UnknownName,
+)
+from airmuscle.gas import Isothermal, Polytropic
+from airmuscle.library.catalogue import load, save
+from airmuscle.library.scenario import load_scenario
+from airmuscle.mechanism import HangingMass, Held, Isometric
+from airmuscle.method import DormandPrince8, Rodas4, RungeKutta4
+from airmuscle.muscle import LinearDamper
+
+PAGE = (Path(__file__).parents[2] / "docs" / "scenario.md").read_text(encoding="utf-8")
+WHOLE, PAIR = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
+
+MUSCLE = 'muscle = "chou-hannaford"'
+MASS = 'model = "HangingMass"\nmass = "5 kg"'
+FILL = 'fill = [["0.1 s", 1], ["0.2 s", 0]]'
+DURATION = 'duration = "0.3 s"'
+GOOD = f"""
+title = "A small one"
+[plant]
+{MUSCLE}
+[plant.circuit]
+model = "FillDischarge"
+supply = {{ model = "Supply", pressure = "5 bar" }}
+fill = {{ model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }}
+discharge = {{ model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }}
+[plant.mechanism]
+{MASS}
+[command]
+{FILL}
+[run]
+{DURATION}
+start = {{ pressure = "1 bar" }}
+"""
+
+
+def written(folder: Path, *changes: tuple[str, str], text: str = GOOD) -> Path:
+    """The scenario with some of its text replaced, as a file."""
+    for was, becomes in changes:
+        assert was in text
+        text = text.replace(was, becomes, 1)
+    path = folder / "scenario.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+# Every form of docs/scenario.md
+
+
+def test_the_page_runs(tmp_path: Path):
+    scenario = load_scenario(written(tmp_path, text=WHOLE))
+    library = load("dmsp-20-300")
+    assert scenario.title == "Fill and discharge"
+    assert scenario.plant.muscle.contractile == library.characteristic
+    assert scenario.plant.muscle.damper == LinearDamper(200.0)
+    assert scenario.plant.gas == Isothermal()
+    assert scenario.plant.circuit.supply.pressure == 650e3 - 101_325.0
+    assert scenario.command == Schedule({"fill": ((5.0, 1.0), (15.0, 0.0)), "discharge": ((19.0, 1.0),)})
+    assert (scenario.duration, scenario.output, scenario.method) == (25.0, 0.01, Rodas4(rtol=1e-8))
+    run = scenario.simulate()
+    assert run["pressure"].max() == pytest.approx(650e3 - 101_325.0, rel=1e-3), "filled up to the supply"
+    assert run["pressure"][-1] == pytest.approx(0.0, abs=100.0), "and discharged"
+
+
+def test_the_pair_of_the_page_runs(tmp_path: Path):
+    run = load_scenario(written(tmp_path, text=PAIR)).simulate()
+    assert np.ptp(run["left.air_mass"]) == 0.0
+    assert run["right.pressure"][-1] > run["left.pressure"][-1] + 1e5
+    assert np.array_equal(run["left.contraction"], run["right.contraction"])
+
+
+def test_what_is_optional_has_the_defaults_of_the_page(tmp_path: Path):
+    path = written(tmp_path, ('title = "A small one"\n', ""), ('start = { pressure = "1 bar" }\n', ""), (FILL, ""))
+    path = written(tmp_path, (MUSCLE, 'muscle = "dmsp-20"'), text=path.read_text(encoding="utf-8"))
+    path = written(tmp_path, ("[command]\n", ""), text=path.read_text(encoding="utf-8"))
+    scenario = load_scenario(path)
+    assert (scenario.title, scenario.output, scenario.method) == ("scenario", None, Rodas4())
+    assert scenario.plant.gas == Polytropic()
+    assert scenario.command == Schedule({})
+    assert scenario.plant.ports(scenario.start)[0].pressure == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "part", "expected"),
+    [
+        (MASS, 'model = "Isometric"\ncontraction = "10 %"', "mechanism", Isometric(0.1)),
+        (MASS, 'model = "Held"\ninner = { model = "HangingMass", mass = 5 }', "mechanism", Held(HangingMass(5.0))),
+        (MUSCLE, f'{MUSCLE}\ngas = "Polytropic"', "gas", Polytropic()),
+        (MUSCLE, f'{MUSCLE}\ngas = {{ model = "Polytropic", exponent = 1.4 }}', "gas", Polytropic(1.4)),
+    ],
+)
+def test_components_are_tables_or_names(tmp_path: Path, was: str, becomes: str, part: str, expected: object):
+    assert getattr(load_scenario(written(tmp_path, (was, becomes))).plant, part) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "method"),
+    [
+        ('"Rodas4"', Rodas4()),
+        ('{ model = "DormandPrince8", step = "0.1 ms" }', DormandPrince8(1e-4)),
+        ('{ model = "RungeKutta4", step = 1e-4 }', RungeKutta4(1e-4)),
+    ],
+)
+def test_every_method_of_the_page(tmp_path: Path, text: str, method: object):
+    scenario = load_scenario(written(tmp_path, (DURATION, f"{DURATION}\nmethod = {text}")))
+    assert scenario.method == method
+    assert scenario.simulate()["time"][-1] == 0.3
+
+
+def test_a_muscle_may_be_a_file_beside_the_scenario(tmp_path: Path):
+    save(load("chou-hannaford"), tmp_path / "mine.toml")
+    by_name = load_scenario(written(tmp_path)).plant.muscle
+    assert load_scenario(written(tmp_path, (MUSCLE, 'muscle = "mine.toml"'))).plant.muscle == by_name
+    replaced = 'muscle = { library = "mine.toml", damper = { model = "LinearDamper", damping = 7 }, name = "mine" }'
+    muscle = load_scenario(written(tmp_path, (MUSCLE, replaced))).plant.muscle
+    assert (muscle.damper, muscle.name, muscle.geometry) == (LinearDamper(7.0), "mine", by_name.geometry)
+
+
+def test_a_signal_is_linear_between_its_points(tmp_path: Path):
+    scenario = load_scenario(written(tmp_path, (FILL, f'model = "Signal"\n{FILL}'), (DURATION, 'duration = "200 ms"')))
+    assert scenario.command == Signal({"fill": ((0.1, 1.0), (0.2, 0.0))})
+    run = scenario.simulate()
+    assert run["fill"][run["time"] == 0.15] == pytest.approx(0.5)
+
+
+def test_the_start_is_rest_at_a_pressure_or_a_state(tmp_path: Path):
+    at_rest = load_scenario(written(tmp_path))
+    assert at_rest.plant.ports(at_rest.start)[0].tension == pytest.approx(5 * 9.80665)
+    given = ('start = { pressure = "1 bar" }', 'start = { pressure = "2 bar", position = "10 mm", speed = "5 cm/s" }')
+    state = load_scenario(written(tmp_path, given)).start
+    assert (state["position"], state["speed"]) == (0.01, 0.05)
+    assert at_rest.plant.ports(state)[0].pressure == pytest.approx(2e5)
+
+
+def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
+    for text in ("98 kPa(a)", "0.98 bara", "98 kPa"):
+        ambient = f'ambient = {{ model = "Ambient", pressure = "{text}" }}'
+        assert load_scenario(written(tmp_path, (MUSCLE, f"{MUSCLE}\n{ambient}"))).plant.ambient.pressure == 98_000.0
+
+
+# What is wrong is said
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "kind", "message"),
+    [
+        # tables and keys
+        ("[command]", "[commands]", ParameterError, r"toml: 'commands' is not known here; .*Did you mean 'command'\?"),
+        ("[run]\n", "[command.fill2]\n", ParameterError, r"toml: the table \[run\] is missing"),
+        ('title = "A small one"', "title = 3", ParameterError, r"toml: title is 3; it must be text"),
+        (DURATION, "", ParameterError, r"\[run\]: 'duration' is missing; write it like duration = \"25 s\""),
+        (DURATION, "duratoin = 3", ParameterError, r"\[run\]: 'duratoin' is not known .*Did you mean 'duration'\?"),
+        # the plant
+        (MUSCLE, "", ParameterError, r"\[plant\]: 'muscle' is missing; name a library entry, a file, or write"),
+        (MUSCLE, "muscle = 3", ParameterError, r"\[plant.muscle\] is 3; name a library entry or a muscle file"),
+        (MUSCLE, "muscle = [3]", ParameterError, r"\[plant.muscle\[0\]\] is 3; name a library entry"),
+        (MUSCLE, 'muscle = "chou-hanaford"', UnknownName, r"\[plant.muscle\]: no library .*mean 'chou-hannaford'\?"),
+        (MUSCLE, 'muscle = "dmsp"', UnknownName, r"\[plant.muscle\]: 'dmsp' is the beginning of several: dmsp-10-250"),
+        (MUSCLE, 'muscle = "mine.toml"', FileError, r"\[plant.muscle\]: .*mine\.toml: there is no such file"),
+        (MUSCLE, 'muscle = "sarosi-dmsp-10"', UnknownName, r"\[plant.muscle\]: sarosi-dmsp-10 .* lacks a \[geometry\]"),
+        (MUSCLE, 'muscle = { library = "x" }', UnknownName, r"\[plant.muscle.library\]: no library entry 'x'"),
+        (MUSCLE, "muscle = {}", ParameterError, r"\[plant.muscle\]: Muscle needs 'contractile'"),
+        (MUSCLE, f"{MUSCLE}\ngaz = 1", ParameterError, r"\[plant\]: Plant has no parameter 'gaz'.*mean 'gas'\?"),
+        (MUSCLE, f'{MUSCLE}\ngas = "Rodas4"', ParameterError, r"\[plant\]: gas is Rodas4; a Gas is wanted"),
+        (MUSCLE, f'{MUSCLE}\ngas = "Isotherm"', UnknownName, r"\[plant.gas\], model: .*Did you mean 'Isothermal'\?"),
+        ("3e-9, critical_ratio = 0.3", "3e-9", ParameterError, r"\[plant.circuit.fill\]: Valve needs 'critical_ratio'"),
+        ("= 0.3", "= 30", ParameterError, r"is 30; allowed are 0 to 0.95. Is it in per cent\? As a ratio it is 0.3"),
+        ('"5 bar"', '"-2 bar"', ParameterError, r"\[plant.circuit.supply\]: .* is -200000 Pa; allowed are -100000 to"),
+        ('"5 bar"', '"5,5 bar"', UnitError, r"supply\], pressure: '5,5 bar' holds a comma; .* as a point, '5.5 bar'"),
+        ('"5 kg"', '"5 N"', UnitError, r"\[plant.mechanism\], mass: unit 'N' cannot become 'kg'"),
+        # the command
+        (FILL, 'fil = [["0 s", 1]]', ParameterError, r"\[command\]: .* no input 'fil'; .*Did you mean 'fill'\?"),
+        (FILL, "fill = 1", ParameterError, r"\[command\], fill is 1; write instants and values, \[\[\"5 s\", 1\]"),
+        (FILL, "fill = [1]", ParameterError, r"\[command\], fill holds 1; each is an instant and a value"),
+        (FILL, 'fill = [["1 bar", 1]]', UnitError, r"\[command\], fill: unit 'bar' cannot become 's'"),
+        (FILL, 'fill = [["0.1", 1]]', UnitError, r"\[command\], fill: '0.1' carries no unit; write it like '0.1 s'"),
+        (FILL, "fill = [[0.1, true]]", ParameterError, r"\[command\], fill is True; it must be a number"),
+        (FILL, "fill = [[0.1, nan]]", ParameterError, r"\[command\], fill is nan; it must be finite"),
+        (
+            FILL,
+            "fill = [[0.2, 1], [0.1, 0]]",
+            ParameterError,
+            r"\[command\]: .*'fill' must name its instants in rising",
+        ),
+        (FILL, "fill = [[0.1, 7]]", ParameterError, r"\[command\]: the input 'fill' is 7 before 0.3 s; allowed are 0"),
+        (FILL, "fill = [[0, -0.5]]", ParameterError, r"\[command\]: the input 'fill' is -0.5 before"),
+        (FILL, 'model = "Signal"\nfill = [[0, 0], [0.3, 2]]', ParameterError, r"the input 'fill' is 2 before 0.3 s"),
+        (
+            FILL,
+            'model = "Signal"\nfill = []',
+            ParameterError,
+            r"\[command\]: the signal of 'fill' must be finite points",
+        ),
+        (FILL, 'model = "Shedule"', UnknownName, r"\[command\], model: no model 'Shedule'.*Did you mean 'Schedule'\?"),
+        (FILL, 'model = "Braid"', ParameterError, r"\[command\]: Braid is no command"),
+        (FILL, "model = 3", UnknownName, r"\[command\], model is 3; it must be a name in quotes"),
+        # the run
+        (DURATION, "duration = 0", ParameterError, r"\[run\], duration is 0; it must be greater than zero"),
+        (DURATION, 'duration = "-1 s"', ParameterError, r"\[run\], duration is '-1 s'; it must be greater than zero"),
+        (DURATION, "duration = inf", ParameterError, r"\[run\], duration is inf; it must be finite"),
+        (DURATION, "duration = [1]", ParameterError, r"\[run\], duration is \[1\]; it must be a number in s, or text"),
+        (DURATION, 'duration = "1 m"', UnitError, r"\[run\], duration: unit 'm' cannot become 's'"),
+        (DURATION, f"{DURATION}\noutput = 0", ParameterError, r"\[run\], output is 0; it must be greater than zero"),
+        (DURATION, f"{DURATION}\nstart_time = nan", ParameterError, r"\[run\], start_time is nan; it must be finite"),
+        (DURATION, f'{DURATION}\nmethod = "Rodas"', UnknownName, r"\[run.method\], .*Did you mean 'Rodas4'\?"),
+        (DURATION, f'{DURATION}\nmethod = "Isothermal"', ParameterError, r"\[run.method\]: Isothermal is no method"),
+        (DURATION, f"{DURATION}\nmethod = 3", ParameterError, r"\[run.method\]: 3 is not a table; write model ="),
+        (
+            '{ pressure = "1 bar" }',
+            "3",
+            ParameterError,
+            r"\[run.start\] is 3; write start = \{ pressure = \"0 bar\" \}",
+        ),
+        ("{ pressure =", "{ presure =", ParameterError, r"\[run.start\]: 'presure' .*Did you mean 'pressure'\?"),
+        ('"1 bar"', '"-2 bar"', ParameterError, r"\[run.start\]: .*-200 kPa lies below absolute zero"),
+        ('"1 bar"', "inf", ParameterError, r"\[run.start\], pressure is inf; it must be finite"),
+        (
+            'pressure = "1 bar"',
+            'position = "1 m"',
+            PhysicsError,
+            r"\[run.start\]: Braid cannot take .* it reaches from",
+        ),
+    ],
+)
+def test_a_bad_scenario_is_told_what_is_wrong(
+    tmp_path: Path, was: str, becomes: str, kind: type[AirmuscleError], message: str
+):
+    path = written(tmp_path, (was, becomes))
+    with pytest.raises(kind, match=message) as raised:
+        load_scenario(path)
+    assert "scenario.toml" in str(raised.value)
+
+
+def test_a_plant_that_cannot_rest_names_muscle_and_forces(tmp_path: Path):
+    heavy = written(tmp_path, ('"5 kg"', '"500 kg"'), (MUSCLE, 'muscle = { library = "chou-hannaford", name = "arm" }'))
+    with pytest.raises(NoEquilibrium, match=r"scenario\.toml, \[run\.start\]: HangingMass finds no rest") as raised:
+        load_scenario(heavy)
+    assert re.search(r"arm pulls \d+(\.\d+)? N at 100 kPa and a contraction of", str(raised.value))
+    assert re.search(r"needs a pull of 4903\.\d+ N\. Change the load, the pressure or the parallel", str(raised.value))
+
+
+def test_a_command_that_is_no_table(tmp_path: Path):
+    path = written(tmp_path, (f"[command]\n{FILL}", ""), ('title = "A small one"', "command = [1]"))
+    with pytest.raises(
+        ParameterError, match=r"scenario\.toml: the table \[command\] is \[1\], no table; write \[command\]"
+    ):
+        load_scenario(path)
+
+
+def test_too_many_rows_are_refused_before_they_fill_the_memory(tmp_path: Path):
+    scenario = load_scenario(written(tmp_path, (DURATION, f'{DURATION}\noutput = "1e-12 s"')))
+    with pytest.raises(ParameterError, match=r"output spacing of 1e-12 s makes 3e\+11 rows .* 10000000 are allowed"):
+        scenario.simulate()
