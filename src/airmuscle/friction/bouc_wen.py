@@ -13,14 +13,14 @@ from .base import Bristle, Friction
 from .path import autonomous
 
 BOUC1967 = Reference(
-    key="Bouc1967",
+    key="bouc-1967",
     authors="Bouc, R.",
     title="Forced vibration of mechanical systems with hysteresis",
     where="Proceedings of the Fourth Conference on Nonlinear Oscillation, Prague, 315",
     year=1967,
 )
 WEN1976 = Reference(
-    key="Wen1976",
+    key="wen-1976",
     authors="Wen, Y.-K.",
     title="Method for random vibration of hysteretic systems",
     where="Journal of the Engineering Mechanics Division, ASCE, 102(2), 249-263",
@@ -28,7 +28,7 @@ WEN1976 = Reference(
     note="the exponent n",
 )
 ISMAIL2009 = Reference(
-    key="Ismail2009",
+    key="ismail-2009",
     authors="Ismail, M., Ikhouane, F., Rodellar, J.",
     title="The hysteresis Bouc-Wen model, a survey",
     where="Archives of Computational Methods in Engineering 16, 161-188",

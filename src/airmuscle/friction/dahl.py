@@ -13,7 +13,7 @@ from .base import Bristle, Friction
 from .path import deflection
 
 DAHL1968 = Reference(
-    key="Dahl1968",
+    key="dahl-1968",
     authors="Dahl, P. R.",
     title="A solid friction model",
     where="The Aerospace Corporation, El Segundo, report TOR-0158(3107-18)-1",

@@ -13,7 +13,7 @@ from .base import Bristle, Friction
 from .path import deflection, speeds
 
 CANUDAS_DE_WIT1995 = Reference(
-    key="CanudasDeWit1995",
+    key="canudas-de-wit-1995",
     authors="Canudas de Wit, C., Olsson, H., Astrom, K. J., Lischinsky, P.",
     title="A new model for control of systems with friction",
     where="IEEE Transactions on Automatic Control 40(3), 419-425",

@@ -14,7 +14,7 @@ from .base import Bristle, Friction
 from .path import stops
 
 IWAN1966 = Reference(
-    key="Iwan1966",
+    key="iwan-1966",
     authors="Iwan, W. D.",
     title="A distributed-element model for hysteresis and its steady-state dynamic response",
     where="Journal of Applied Mechanics 33(4), 893-900",
@@ -23,7 +23,7 @@ IWAN1966 = Reference(
     note="springs with Coulomb sliders, in parallel",
 )
 GOLDFARB_CELANOVIC1997 = Reference(
-    key="GoldfarbCelanovic1997",
+    key="goldfarb-celanovic-1997",
     authors="Goldfarb, M., Celanovic, N.",
     title="Modeling piezoelectric stack actuators for control of micromanipulation",
     where="IEEE Control Systems Magazine 17(3), 69-79",
@@ -32,7 +32,7 @@ GOLDFARB_CELANOVIC1997 = Reference(
     note="the same elements for the hysteresis of an actuator",
 )
 VO_MINH2011 = Reference(
-    key="VoMinh2011",
+    key="vo-minh-2011",
     authors="Vo-Minh, T., Tjahjowidodo, T., Ramon, H., Van Brussel, H.",
     title="A new approach to modeling hysteresis in a pneumatic artificial muscle using the Maxwell-slip model",
     where="IEEE/ASME Transactions on Mechatronics 16(1), 177-186",

@@ -15,7 +15,7 @@ from .maxwell_slip import refuse_uneven, yielding
 from .path import stops
 
 KUHNEN2003 = Reference(
-    key="Kuhnen2003",
+    key="kuhnen-2003",
     authors="Kuhnen, K.",
     title="Modeling, identification and compensation of complex hysteretic nonlinearities: a modified "
     "Prandtl-Ishlinskii approach",
@@ -25,7 +25,7 @@ KUHNEN2003 = Reference(
     note="superposition of dead-zone operators behind a Prandtl-Ishlinskii operator; there made of play operators",
 )
 AL_JANAIDEH2011 = Reference(
-    key="AlJanaideh2011",
+    key="al-janaideh-2011",
     authors="Al Janaideh, M., Rakheja, S., Su, C.-Y.",
     title="An analytical generalized Prandtl-Ishlinskii model inversion for hysteresis compensation in "
     "micropositioning control",

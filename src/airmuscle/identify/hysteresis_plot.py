@@ -1,0 +1,65 @@
+"""Figures of loops: a friction law with its inner loops, and a fit beside its data."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..figures import DASHES, LINES, legend_below, new_figure
+from ..friction import Friction
+from .loss import Array
+
+if TYPE_CHECKING:
+    from .hysteresis_result import HysteresisFit
+
+TURNS = (2.0, -2.0, -0.6, -1.1, -0.6, 0.5, -0.3, 0.5, 2.0)
+"""Turning points of the path of `plot_loops`, as multiples of the law's travel (chosen)."""
+INNER = ((3, 5), (6, 8))
+"""Which of the ways between them are inner loops."""
+ROWS = 200
+"""Rows of each way."""
+
+
+def winding(travel: float) -> Array:
+    """A path [m] from rest around an outer loop, with two inner loops on its way up."""
+    legs = [np.linspace(a, b, ROWS, endpoint=False) for a, b in itertools.pairwise((0.0, *TURNS))]
+    return travel * np.concatenate([*legs, [TURNS[-1]]])
+
+
+def plot_loops(friction: Friction) -> Any:
+    """Force over displacement of a friction law: from rest, around the outer loop, through two inner ones."""
+    path = winding(friction.travel or 1e-3)
+    force = friction.replay(path)
+    parts = [("outer loop", ROWS, len(path)), ("from rest", 0, ROWS + 1)]
+    parts += [("inner loops" if i == 0 else "", a * ROWS, b * ROWS + 1) for i, (a, b) in enumerate(INNER)]
+    outer = force.copy()
+    for a, b in INNER:
+        outer[a * ROWS + 1 : b * ROWS] = np.nan
+    figure, axes = new_figure(width=5.6, height=3.9)
+    for (name, first, last), style in zip(parts, (0, 1, 2, 2), strict=True):
+        rows, label = slice(first, last), name or None
+        shown = force if style else outer
+        axes.plot(path[rows] * 1e3, shown[rows], color=LINES[style], linestyle=DASHES[style], label=label)
+    axes.set(xlabel="displacement [mm]", ylabel="friction [N]", title=type(friction).__name__)
+    legend_below(figure, axes, 3)
+    return figure
+
+
+def plot_hysteresis(fit: HysteresisFit) -> Any:
+    """What the static curve leaves of the force over the path, with the fitted friction; and the errors."""
+    run = fit.course
+    left = run.goal - run.columns @ fit.coefficients
+    figure, (upper, lower) = new_figure(2, 1, width=6.0, height=5.6, sharex=True)
+    path = run.path * 1e3
+    force = -fit.friction.replay(run.path, run.time)
+    upper.plot(path[run.rows], left[run.rows], "o", color=LINES[0], alpha=0.5, label="measured, less static curve")
+    upper.plot(path, force, color=LINES[1], label=f"{type(fit.friction).__name__}, along the whole path")
+    upper.set_ylabel("force [N]")
+    lower.plot(path[run.rows], (left - force)[run.rows], "o", color=LINES[0], alpha=0.5)
+    lower.axhline(0.0, color=LINES[1])
+    lower.set(xlabel="displacement [mm]", ylabel="measured less modelled [N]")
+    upper.set_title(f"{run.origin}: rms {fit.plain_rmse:.3g} N without, {fit.rmse:.3g} N with friction")
+    legend_below(figure, upper, 2)
+    return figure

@@ -1,0 +1,155 @@
+"""A fitted friction: how much of a loop it explains, and whether the data justify it."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..declare import leaves
+from ..friction import Friction
+from . import branches
+from .evidence import aicc, effective_rows, f_test
+from .loss import Array
+
+RARE = 0.01
+"""Probability below which an F test counts (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Course:
+    """One run as the fit sees it: the path, the force that the static columns and the friction shall explain."""
+
+    origin: str
+    path: Array
+    time: Array | None
+    goal: Array
+    columns: Array
+    rows: npt.NDArray[np.bool_]
+    """Where errors count."""
+
+    def coefficients(self, friction: Friction | None) -> Array:
+        """Of the static columns, best beside this friction, or without any."""
+        goal = self.goal if friction is None else self.goal + friction.replay(self.path, self.time)
+        return np.asarray(np.linalg.lstsq(self.columns[self.rows], goal[self.rows], rcond=None)[0])
+
+    def errors(self, friction: Friction | None, coefficients: Array) -> Array:
+        """Measured less modelled force [N], every row."""
+        missing = self.goal - self.columns @ coefficients
+        return missing if friction is None else missing + friction.replay(self.path, self.time)
+
+    def remainder(self, friction: Friction | None) -> Array:
+        """Errors of the chosen rows, with the best static coefficients."""
+        return self.errors(friction, self.coefficients(friction))[self.rows]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class HysteresisFit:
+    """A friction law fitted to a loop, against the same static curve without friction; forces in N.
+
+    `gap` is the rms distance of the deflating from the inflating branch, `gap_left` what the friction leaves of it.
+    `repeat_rmse` and `plain_repeat_rmse` are errors on a second run, with this friction and without any, where the
+    static coefficients are found anew (the level of runs may shift); `repeatability` is the scatter of one run about
+    the mean of the two, the floor below which a fit follows chance. All three are NaN without a second run.
+    """
+
+    friction: Friction
+    coefficients: Array
+    rmse: float
+    plain_rmse: float
+    gap: float
+    gap_left: float
+    effective_rows: float
+    aicc_gain: float
+    chance: float
+    """Probability that idle parameters would do as well (F test)."""
+    repeat_rmse: float
+    plain_repeat_rmse: float
+    repeatability: float
+    course: Course
+
+    @property
+    def unsettled(self) -> tuple[str, ...]:
+        """Parameters that the search drove to the end of what is allowed: the data do not determine them."""
+        free = [leaf for leaf in leaves(self.friction) if leaf.declared.fitted and leaf.declared.bounds[0] > 0]
+        return tuple(
+            leaf.path
+            for leaf in free
+            if not 1.01 * leaf.declared.bounds[0] < leaf.value < 0.99 * leaf.declared.bounds[1]
+        )
+
+    @property
+    def justified(self) -> bool:
+        """Whether AICc, the F test and, where there is one, the second run agree that there is friction."""
+        carries_over = not self.repeat_rmse >= self.plain_repeat_rmse
+        return self.aicc_gain > 0 and self.chance < RARE and carries_over
+
+    @property
+    def verdict(self) -> str:
+        """Whether the data justify this friction, in words with the numbers."""
+        name = type(self.friction).__name__
+        text = (
+            f"{name} lowers the rms error from {self.plain_rmse:.3g} to {self.rmse:.3g} N and the gap between the "
+            f"branches from {self.gap:.3g} to {self.gap_left:.3g} N. AICc "
+            f"{'falls' if self.aicc_gain > 0 else 'rises'} by {abs(self.aicc_gain):.3g} over {self.effective_rows:.0f} "
+            f"independent rows; idle parameters would do as well with a probability of {self.chance:.2g}."
+        )
+        if np.isfinite(self.repeat_rmse):
+            text += (
+                f" On the second run the error goes from {self.plain_repeat_rmse:.3g} to {self.repeat_rmse:.3g} N; the "
+                f"runs themselves scatter by {self.repeatability:.3g} N."
+            )
+        if self.rmse < self.repeatability:
+            text += " The fit lies below that floor: part of it follows chance."
+        if self.unsettled:
+            text += f" Not determined: {', '.join(self.unsettled)}."
+        return f"{text} The data {'justify' if self.justified else 'do not justify'} this friction."
+
+    def plot(self) -> Any:
+        """The loop and what the friction explains of it; a Matplotlib figure."""
+        from .hysteresis_plot import plot_hysteresis
+
+        return plot_hysteresis(self)
+
+    def __str__(self) -> str:
+        lines = [
+            f"{leaf.path:<16}{leaf.declared.symbol:<9}{leaf.value:<12.6g}{leaf.declared.unit}"
+            for leaf in leaves(self.friction)
+        ]
+        return "\n".join([f"{type(self.friction).__name__} fitted to {self.course.origin}", *lines, self.verdict])
+
+
+def judged(friction: Friction, free: int, run: Course, repeat: Course | None) -> HysteresisFit:
+    """A fitted friction, beside the static curve alone."""
+    with_it, without = run.coefficients(friction), run.coefficients(None)
+    errors, plain = run.errors(friction, with_it)[run.rows], run.errors(None, without)[run.rows]
+    square, plain_square = float(np.mean(errors**2)), float(np.mean(plain**2))
+    rows, base = effective_rows(errors), run.columns.shape[1]
+    path = run.path[run.rows]
+    again = plain_again = floor = float("nan")
+    if repeat is not None:
+        again = _rms(repeat.remainder(friction))
+        plain_again = _rms(repeat.remainder(None))
+        other = repeat.errors(None, without)[repeat.rows]
+        floor = _rms(branches.repeat_difference(path, plain, repeat.path[repeat.rows], other)) / np.sqrt(2)
+    return HysteresisFit(
+        friction=friction,
+        coefficients=with_it,
+        rmse=float(np.sqrt(square)),
+        plain_rmse=float(np.sqrt(plain_square)),
+        gap=_rms(branches.gap(path, plain)),
+        gap_left=_rms(branches.gap(path, errors)),
+        effective_rows=rows,
+        aicc_gain=aicc(plain_square, rows, base) - aicc(square, rows, base + free),
+        chance=f_test(plain_square, square, rows, base + free, free),
+        repeat_rmse=again,
+        plain_repeat_rmse=plain_again,
+        repeatability=floor,
+        course=run,
+    )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
