@@ -16,11 +16,7 @@ import numpy as np
 from airmuscle.circuit import Supply, Valve
 from airmuscle.command import Schedule
 from airmuscle.gas import Isothermal
-from airmuscle.identify.dynamic import fit_dynamic
-from airmuscle.identify.dynamic_experiment import Experiment, StartTime, StartValue
-from airmuscle.identify.dynamic_result import DynamicFit
-from airmuscle.identify.dynamic_start import Start
-from airmuscle.identify.free_fill import FreeFill
+from airmuscle.identify.dynamic import DynamicFit, Experiment, FreeFill, Start, StartTime, StartValue, fit_dynamic
 from airmuscle.recording import Recording, read_csv
 
 SENSOR = 500.0

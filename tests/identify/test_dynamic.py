@@ -17,11 +17,7 @@ from airmuscle.command import Schedule
 from airmuscle.equilibrium import equilibrium
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.gas import Polytropic
-from airmuscle.identify.dynamic import fit_dynamic
-from airmuscle.identify.dynamic_experiment import Experiment, StartTime, StartValue
-from airmuscle.identify.dynamic_start import Start
-from airmuscle.identify.free_fill import FreeFill
-from airmuscle.identify.identifiable import identifiable
+from airmuscle.identify.dynamic import Experiment, FreeFill, Start, StartTime, StartValue, fit_dynamic, identifiable
 from airmuscle.mechanism import HangingMass, Isometric
 from airmuscle.plant import Plant
 from airmuscle.simulate import simulate

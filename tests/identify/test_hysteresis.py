@@ -15,11 +15,11 @@ from airmuscle.characteristic.virtual_work import VirtualWork
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, PrandtlIshlinskii
 from airmuscle.geometry.braid import Braid
-from airmuscle.identify.branches import gap, repeat_difference
-from airmuscle.identify.creep import Creep, fit_creep
-from airmuscle.identify.evidence import aicc, effective_rows, f_test
 from airmuscle.identify.hysteresis import Given, OnContraction, OnPressure, PolynomialCurve, candidates, fit_hysteresis
-from airmuscle.identify.hysteresis_plot import plot_loops, winding
+from airmuscle.identify.hysteresis.branches import gap, repeat_difference
+from airmuscle.identify.hysteresis.creep import Creep, fit_creep
+from airmuscle.identify.hysteresis.evidence import aicc, effective_rows, f_test
+from airmuscle.identify.hysteresis.plot import plot_loops, winding
 from airmuscle.recording import Recording
 
 LENGTH = 0.2

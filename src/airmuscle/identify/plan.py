@@ -19,7 +19,7 @@ from ..characteristic.box import Box
 from ..errors import IdentificationError, ParameterError
 from ..recording import Recording
 from .censoring import UNCENSORED
-from .identifiable import EXACT, Undetermined, identifiable
+from .dynamic.identifiable import EXACT, Undetermined, identifiable
 from .problem import pose
 
 Array = npt.NDArray[np.float64]

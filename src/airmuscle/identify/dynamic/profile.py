@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import numpy.typing as npt
 
-from .dynamic_result import DynamicFit
+from .result import DynamicFit
 
 Array = npt.NDArray[np.float64]
 NORMAL_95 = 1.96

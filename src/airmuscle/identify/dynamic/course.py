@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .. import declare
-from ..errors import IdentificationError, ParameterError, suggestion
-from ..method import Method
-from ..program import System
-from ..sensitive import Sensitive, sensitivity
-from .dynamic_experiment import Experiment, StartTime, StartValue, Unknown
-from .dynamic_start import conditions, solved
+from ... import declare
+from ...errors import IdentificationError, ParameterError, suggestion
+from ...method import Method
+from ...program import System
+from ...sensitive import Sensitive, sensitivity
+from .experiment import Experiment, StartTime, StartValue, Unknown
+from .start import conditions, solved
 
 Array = npt.NDArray[np.float64]
 
@@ -27,7 +27,7 @@ class Course:
         self, plant: System, experiment: Experiment, number: int, unknowns: Sequence[Unknown],
         observed: Mapping[str, float], method: Method,
     ) -> None:  # fmt: skip
-        from ..program.prepared import prepared  # CasADi, which describing a fit does not need
+        from ...program.prepared import prepared  # CasADi, which describing a fit does not need
 
         self.plant, self.experiment, self.method = experiment.plant or plant, experiment, method
         self.unknowns = unknowns
@@ -97,7 +97,7 @@ class Course:
         return outputs[:, self._value], slopes
 
     def _outputs(self, values: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-        from ..engine.evaluate import evaluate
+        from ...engine.evaluate import evaluate
 
         state, slopes = self.start(values)
         clock = self.times - self.start_time(values)

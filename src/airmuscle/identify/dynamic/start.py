@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .. import declare, trace
-from ..equilibrium import equilibrium
-from ..errors import IdentificationError, ParameterError, suggestion
-from ..plant import Plant
-from ..program import System
+from ... import declare, trace
+from ...equilibrium import equilibrium
+from ...errors import IdentificationError, ParameterError, suggestion
+from ...plant import Plant
+from ...program import System
 
 Array = npt.NDArray[np.float64]
 ITERATIONS = 50

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from .loss import Array
+from ..loss import Array
 
 PLACES = 24
 """Places along the path at which branches are compared (chosen)."""

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from .. import declare
-from ..errors import ParameterError, suggestion
-from ..program import System
-from ..recording import Recording
-from .dynamic_experiment import Unknown
+from ... import declare
+from ...errors import ParameterError, suggestion
+from ...program import System
+from ...recording import Recording
+from ..result import Estimate
+from .experiment import Unknown
 from .identifiable import Identifiability
-from .result import Estimate
 
 if TYPE_CHECKING:
-    from .dynamic import Problem
-    from .dynamic_profile import Profile
+    from .fit import Problem
+    from .profile import Profile
 
 Array = npt.NDArray[np.float64]
 
@@ -83,7 +83,7 @@ class DynamicFit:
 
     def profile(self, name: str, points: int = 9) -> Profile:
         """How the sum of squares grows as one estimate is held at other values and all others are found anew."""
-        from .dynamic_profile import profile
+        from .profile import profile
 
         return profile(self, name, points)
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ..declare import model, parameter
-from ..errors import IdentificationError, ParameterError
-from ..recording import Recording
+from ...declare import model, parameter
+from ...errors import IdentificationError, ParameterError
+from ...recording import Recording
+from ..loss import Array
 from .evidence import effective_rows, f_test
-from .hysteresis_result import RARE
-from .loss import Array
+from .result import RARE
 
 TRIED = 40
 """Time constants tried, spread evenly in their logarithm over what the record can tell (chosen)."""

@@ -8,14 +8,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import AirmuscleError, IdentificationError, ParameterError
-from ..method import Method, Rodas4
-from ..program import System
-from .dynamic_course import Course, observations, stacked
-from .dynamic_experiment import Experiment, Own, Shared, Unknown, unknowns
-from .dynamic_result import DynamicFit
+from ...errors import AirmuscleError, IdentificationError, ParameterError
+from ...method import Method, Rodas4
+from ...program import System
+from ..result import Estimate
+from .course import Course, observations, stacked
+from .experiment import Experiment, Own, Shared, Unknown, unknowns
 from .identifiable import Identifiability, identifiable
-from .result import Estimate
+from .result import DynamicFit
 
 Array = npt.NDArray[np.float64]
 CORRELATED = 0.3

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .. import declare
-from ..characteristic.base import Characteristic
-from ..declare import Leaf, model, parameter
-from ..errors import IdentificationError
-from ..friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, PrandtlIshlinskii
-from ..recording import Recording
-from .hysteresis_result import Course, HysteresisFit, judged
-from .loss import Array
+from ... import declare
+from ...characteristic.base import Characteristic
+from ...declare import Leaf, model, parameter
+from ...errors import IdentificationError
+from ...friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, PrandtlIshlinskii
+from ...recording import Recording
+from ..loss import Array
+from .result import Course, HysteresisFit, judged
 
 Mask = npt.NDArray[np.bool_]
 

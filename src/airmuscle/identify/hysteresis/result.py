@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..declare import leaves
-from ..friction import Friction
+from ...declare import leaves
+from ...friction import Friction
+from ..loss import Array
 from . import branches
 from .evidence import aicc, effective_rows, f_test
-from .loss import Array
 
 RARE = 0.01
 """Probability below which an F test counts (chosen)."""
@@ -109,7 +109,7 @@ class HysteresisFit:
 
     def plot(self) -> Any:
         """The loop and what the friction explains of it; a Matplotlib figure."""
-        from .hysteresis_plot import plot_hysteresis
+        from .plot import plot_hysteresis
 
         return plot_hysteresis(self)
 

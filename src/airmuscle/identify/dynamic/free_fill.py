@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from .. import ops
-from ..circuit import Supply, Valve
-from ..declare import model, parameter
-from ..gas import Ambient, Gas, Polytropic, absolute, gauge
-from ..ops import Value
-from ..program import StateVariable
+from ... import ops
+from ...circuit import Supply, Valve
+from ...declare import model, parameter
+from ...gas import Ambient, Gas, Polytropic, absolute, gauge
+from ...ops import Value
+from ...program import StateVariable
 
 
 @model

@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from .. import declare
-from ..command import Command
-from ..errors import ParameterError, suggestion
-from ..program import System
-from ..recording import Recording
-from ..recording.recording import header
-from .dynamic_start import Start
+from ... import declare
+from ...command import Command
+from ...errors import ParameterError, suggestion
+from ...program import System
+from ...recording import Recording
+from ...recording.recording import header
+from .start import Start
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..figures import DASHES, LINES, legend_below, new_figure
-from ..friction import Friction
-from .loss import Array
+from ...figures import DASHES, LINES, legend_below, new_figure
+from ...friction import Friction
+from ..loss import Array
 
 if TYPE_CHECKING:
-    from .hysteresis_result import HysteresisFit
+    from .result import HysteresisFit
 
 TURNS = (2.0, -2.0, -0.6, -1.1, -0.6, 0.5, -0.3, 0.5, 2.0)
 """Turning points of the path of `plot_loops`, as multiples of the law's travel (chosen)."""

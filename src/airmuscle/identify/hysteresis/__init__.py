@@ -1,0 +1,11 @@
+"""Friction and creep from loops, with a verdict whether the data justify them."""
+
+from .creep import Creep as Creep
+from .creep import fit_creep as fit_creep
+from .fit import Given as Given
+from .fit import OnContraction as OnContraction
+from .fit import OnPressure as OnPressure
+from .fit import PolynomialCurve as PolynomialCurve
+from .fit import candidates as candidates
+from .fit import fit_hysteresis as fit_hysteresis
+from .result import HysteresisFit as HysteresisFit
