@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .options import Folder, Json
+from .options import Folder, Json, Map
 from .terminal import print_json
 
 if TYPE_CHECKING:
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from ..report.chapter import Chapter
 
 Files = Annotated[
-    list[Path], typer.Argument(metavar="FILES", help="CSV files with pressure, contraction (or length) and force.")
+    list[Path],
+    typer.Argument(metavar="FILES", help="CSV, Excel, MAT, TDMS or MDF: pressure, contraction or length, force."),
 ]
 Law = Annotated[
     str | None,
@@ -64,6 +65,7 @@ def fit(
     resting_length: Length = None,
     ambient: Surroundings = None,
     unit: Units = None,
+    mapping: Map = None,
     degree: Annotated[int, typer.Option(min=1, max=9, help="Total degree of a ContractileSurface.")] = 5,
     fix: Fixed = None,
     robust: Robust = None,
@@ -81,7 +83,7 @@ def fit(
       airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out fit
       airmuscle fit bench.csv --characteristic dmsp-20-300 --unit pressure=bar --fix geometry.radius
       airmuscle fit dmsp-20-300 --characteristic ContractileSurface --degree 4 --robust "10 N"
-      airmuscle fit run1.csv run2.csv run3.csv --compare --leave-out run
+      airmuscle fit runs/*.xlsx --mapping rig.toml --compare --leave-out run
       airmuscle solve fit/muscle.toml --pressure "3 bar" --force "100 N"
     """
     from ..report.staged import refuse_unwritable
@@ -89,7 +91,7 @@ def fit(
     if characteristic is None and not compare:
         raise typer.BadParameter("name a law to fit with --characteristic, or let --compare find one")
     units = _by_column(unit)
-    recordings = [_measured(f, units=units, resting_length=resting_length, ambient=ambient) for f in files]
+    recordings = _measured(files, units=units, mapping=mapping, resting_length=resting_length, ambient=ambient)
     if compare or characteristic is None:
         from .fit_compare import compared
 
@@ -124,20 +126,21 @@ def _identified(
     )
 
 
-def _measured(file: Path, **options: Any) -> Recording:
+def _measured(files: list[Path], **options: Any) -> list[Recording]:
+    """The runs in files, read together so that contradictions show, then the data sets of the library."""
     from ..errors import ParameterError
     from ..library.catalogue import measured
-    from ..recording import read_csv
+    from ..recording import read
 
-    is_name = not file.suffix and len(file.parts) == 1
-    if not is_name or file.name in (entry.name for entry in Path().iterdir()):
-        return read_csv(file, **options)
+    here = {entry.name for entry in Path().iterdir()}
+    names = [f for f in files if not f.suffix and len(f.parts) == 1 and f.name not in here]
+    own = [f for f in files if f not in names]
     given = [name for name, value in options.items() if value]
-    if given:
+    if names and given:
         raise ParameterError(
-            f"{file}: a data set of the library brings its units and constants along; leave out {', '.join(given)}."
+            f"{names[0]}: a data set of the library brings its units and constants along; leave out {', '.join(given)}."
         )
-    return measured(str(file))
+    return [*(read(own, **options) if own else ()), *(measured(str(name)) for name in names)]
 
 
 def _by_column(texts: list[str] | None) -> dict[str, str]:

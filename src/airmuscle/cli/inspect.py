@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .options import Json, OptionalFolder
+from .options import Json, Map, OptionalFolder
 from .terminal import print_json, print_table
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 Files = Annotated[
     list[str], typer.Argument(metavar="FILE...", help="Files, globs or folders: CSV, Excel, MAT, TDMS, MDF.")
 ]
-Map = Annotated[Path | None, typer.Option("--mapping", metavar="FILE", help="TOML that says what the files do not.")]
 Columns = Annotated[
     list[str] | None,
     typer.Option("--column", metavar="COLUMN=HEADING", help="'Channel 1=pressure [bara]', '3=length [mm]'; repeat it."),

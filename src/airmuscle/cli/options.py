@@ -17,3 +17,5 @@ Folder = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for t
 OptionalFolder = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="Folder for chart and data; none are written without it.")
 ]
+Map = Annotated[Path | None, typer.Option("--mapping", metavar="FILE", help="TOML that says what the files do not.")]
+"""A mapping of columns, for files whose headings leave names or units open."""
