@@ -46,6 +46,20 @@ def refuse_unknown_input(given: Sequence[str], inputs: Sequence[str]) -> None:
             raise ParameterError(f"the plant has no input '{name}'; there are {known}.{suggestion(name, inputs)}")
 
 
+def _pairs(kind: str, name: str, given: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    try:
+        return [(0.0 + time, 0.0 + value) for time, value in given]
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"the {kind} of '{name}' is {given!r}; write pairs of time [s] and value, ((5, 1), (15, 0))."
+        ) from None
+
+
+def _refuse_disorder(kind: str, word: str, name: str, times: Sequence[float]) -> None:
+    if any(b <= a for a, b in itertools.pairwise(times)):
+        raise ParameterError(f"the {kind} of '{name}' must name its {word} in rising order; it has {times}.")
+
+
 @dataclasses.dataclass(frozen=True)
 class Schedule(Command):
     """Piecewise constant inputs, each a sequence of (instant [s], value from then on); before the first it is 0.
@@ -56,14 +70,11 @@ class Schedule(Command):
     changes: Mapping[str, Sequence[tuple[float, float]]]
 
     def __post_init__(self) -> None:
-        for name, changes in self.changes.items():
-            times = [time for time, _ in changes]
+        for name, given in self.changes.items():
+            changes = _pairs("schedule", name, given)
             if changes and not np.isfinite(changes).all():
-                raise ParameterError(f"the schedule of '{name}' holds a number that is not finite: {list(changes)}.")
-            if any(b <= a for a, b in itertools.pairwise(times)):
-                raise ParameterError(
-                    f"the schedule of '{name}' must name its instants in rising order; it has {times}."
-                )
+                raise ParameterError(f"the schedule of '{name}' holds a number that is not finite: {changes}.")
+            _refuse_disorder("schedule", "instants", name, [time for time, _ in changes])
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
         refuse_unknown_input(list(self.changes), inputs)
@@ -85,14 +96,11 @@ class Signal(Command):
     points: Mapping[str, Sequence[tuple[float, float]]]
 
     def __post_init__(self) -> None:
-        for name, points in self.points.items():
-            times = [time for time, _ in points]
+        for name, given in self.points.items():
+            points = _pairs("signal", name, given)
             if not points or not np.isfinite(points).all():
-                raise ParameterError(
-                    f"the signal of '{name}' must be finite points (time, value); it is {list(points)}."
-                )
-            if any(b <= a for a, b in itertools.pairwise(times)):
-                raise ParameterError(f"the signal of '{name}' must name its times in rising order; it has {times}.")
+                raise ParameterError(f"the signal of '{name}' must be finite points (time, value); it is {points}.")
+            _refuse_disorder("signal", "times", name, [time for time, _ in points])
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
         refuse_unknown_input(list(self.points), inputs)

@@ -74,8 +74,14 @@ def parameters(thing: Any) -> tuple[Parameter, ...]:
 
 
 def _validate(thing: Any) -> None:
+    lists = {f.name for f in dataclasses.fields(thing) if "tuple" in str(f.type)}
     for declared in parameters(thing):
         value = getattr(thing, declared.name)
+        if declared.name not in lists and isinstance(value, tuple | list | np.ndarray):
+            raise ParameterError(
+                f"{type(thing).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is {value!r}; "
+                "it must be one number."
+            )
         object.__setattr__(thing, declared.name, _checked(type(thing).__name__, declared, value))
     if hasattr(thing, "check"):
         thing.check()
@@ -101,7 +107,7 @@ def _checked(owner: str, declared: Parameter, value: Any) -> Any:
 
 def _per_cent(value: float, high: float) -> str:
     """A question, where a ratio above its bound makes sense as per cent."""
-    return f" Is it in per cent? As a ratio it is {value / 100:g}." if 0 < value / 100 <= high <= 1 else ""
+    return f" Is it in per cent? As a ratio it is {value / 100:g}." if 0 < value / 100 <= high <= 1 < value else ""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -83,12 +83,15 @@ def advance(
 ) -> dict[str, float]:
     """The state after `dt` [s] with the inputs held: the seam that controllers and exports call.
 
-    Raises SimulationError where the step fails, ParameterError for an unknown name.
+    Raises SimulationError where the step fails, ParameterError for an unknown name or an opening beyond 0 to 1.
     """
     from .program.prepared import prepared
 
+    if not 0 < dt < np.inf:
+        raise ParameterError(f"advance: dt is {dt!r} s; it must be positive and finite.")
     hold = Schedule({name: ((0.0, float(value)),) for name, value in inputs.items()})
     segments = hold.segments(plant.inputs, 0.0, dt)
+    refuse_beyond_opening(plant, segments, 0.0)
     course = (method or Rodas4()).run(prepared(plant), segments, 0.0, _vector(plant, state), np.empty(0))
     if course.status != 0:
         raise SimulationError(_problem(plant, course, dt))

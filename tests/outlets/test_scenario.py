@@ -84,7 +84,7 @@ def test_the_page_runs(tmp_path: Path):
 
 def test_the_pair_of_the_page_runs(tmp_path: Path):
     run = load_scenario(written(tmp_path, text=PAIR)).simulate()
-    assert np.ptp(run["left.air_mass"]) == 0.0
+    assert np.ptp(run["left.air_mass"]) < 1e-18, "its chamber is closed"
     assert run["right.pressure"][-1] > run["left.pressure"][-1] + 1e5
     assert np.array_equal(run["left.contraction"], run["right.contraction"])
 

@@ -49,9 +49,10 @@ def first_crossing(
         here = chosen & ~at_start
         if here.any():
             bracket = (grid[index[here]], grid[index[here] + 1])
-            root = elementwise.find_root(
-                searched, bracket, args=(a[here], b[here]), tolerances=_TOLERANCES, maxiter=200
-            )
+            with np.errstate(over="ignore", invalid="ignore"):
+                root = elementwise.find_root(
+                    searched, bracket, args=(a[here], b[here]), tolerances=_TOLERANCES, maxiter=200
+                )
             found[here] = root.x
     return float(found[0]) if first.ndim == 0 else found.reshape(first.shape)
 
