@@ -22,6 +22,7 @@ from typer.testing import CliRunner, Result
 from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.cli.app import app
 from airmuscle.cli.cite import as_bibtex
+from airmuscle.errors import UnknownName
 from airmuscle.library.catalogue import load, names
 from airmuscle.recording import read_csv
 from airmuscle.reference import Reference
@@ -121,11 +122,21 @@ def test_list_names_every_entry_with_title_kind_and_trust():
     assert listed[MUSCLE] == {
         "name": MUSCLE,
         "title": entry.title,
-        "kind": f"characteristic, {type(entry.characteristic).__name__}",
+        "kind": f"muscle, {type(entry.characteristic).__name__}",
         "trust": entry.trust,
     }
     table = airmuscle("list").output
     assert all(name in table for name in names())
+
+
+@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+def test_list_calls_a_muscle_what_can_be_simulated():
+    for entry in json.loads(airmuscle("list", "--json").output):
+        if entry["kind"].startswith("muscle"):
+            assert load(entry["name"]).muscle.geometry.resting_length > 0
+        elif entry["kind"] != "data set":
+            with pytest.raises(UnknownName, match="is a characteristic, not yet a muscle"):
+                _ = load(entry["name"]).muscle
 
 
 def test_list_names_the_data_sets_that_fit_takes():

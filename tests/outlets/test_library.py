@@ -6,6 +6,7 @@ What is wrong with a file is said with file, table, key, value and what is allow
 from __future__ import annotations
 
 import dataclasses
+import re
 import warnings
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from airmuscle.errors import AirmuscleError, AirmuscleWarning, FileError, Parame
 from airmuscle.geometry.braid import Braid
 from airmuscle.library import catalogue
 from airmuscle.library.models import model_class, model_names
-from airmuscle.muscle import LinearSpring, PressureDamper
+from airmuscle.muscle import LinearDamper, LinearSpring, PressureDamper
 from airmuscle.reference import cite
 
 GOOD = """
@@ -86,6 +87,17 @@ def test_a_file_becomes_a_muscle_in_si(tmp_path: Path):
     assert entry.muscle.tension(5e5, 0.0) == 1200.0
     held_back = 2000.0 * 0.1 * 0.3 + (50.0 + 1e-5 * 5e5) * 0.02
     assert entry.muscle.tension(5e5, 0.1, 0.02) == entry.characteristic.force(5e5, 0.1) - held_back
+
+
+def test_the_page_on_muscle_files_holds_the_muscle_that_it_names(tmp_path: Path):
+    page = (Path(__file__).parents[2] / "docs" / "muscle-file.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+    entry = catalogue.load(written(tmp_path, text))
+    assert entry.muscle.damper == LinearDamper(200.0)
+    assert entry.characteristic.force(375e3, 0.11) == pytest.approx(
+        catalogue.load("dmsp-20-300").characteristic.force(375e3, 0.11), rel=1e-4
+    )
+    assert entry.checks[0].tolerance == 38.9
 
 
 def test_a_saved_muscle_loads_to_the_same_numbers(tmp_path: Path):

@@ -5,12 +5,14 @@ What is wrong with it is said with file, table, key, value and what is allowed.
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from airmuscle.circuit import ClosedChamber
 from airmuscle.command import Schedule, Signal
 from airmuscle.errors import (
     AirmuscleError,
@@ -22,14 +24,16 @@ from airmuscle.errors import (
     UnknownName,
 )
 from airmuscle.gas import Isothermal, Polytropic
+from airmuscle.geometry import Braid
 from airmuscle.library.catalogue import load, save
+from airmuscle.library.entry import Entry
 from airmuscle.library.scenario import load_scenario
 from airmuscle.mechanism import HangingMass, Held, Isometric
 from airmuscle.method import DormandPrince8, Rodas4, RungeKutta4
 from airmuscle.muscle import LinearDamper
 
 PAGE = (Path(__file__).parents[2] / "docs" / "scenario.md").read_text(encoding="utf-8")
-WHOLE, PAIR = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
+WHOLE, FITTED, PAIR = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
 
 MUSCLE = 'muscle = "chou-hannaford"'
 MASS = 'model = "HangingMass"\nmass = "5 kg"'
@@ -89,6 +93,17 @@ def test_the_pair_of_the_page_runs(tmp_path: Path):
     assert np.array_equal(run["left.contraction"], run["right.contraction"])
 
 
+def test_a_list_holds_tables_or_names_of_its_kind(tmp_path: Path):
+    i, j = PAIR.index("[[plant.circuit]]"), PAIR.index("[plant.mechanism]")
+    names = PAIR[:i] + PAIR[j:].replace('"right.fill" = [["0.1 s", 1]]', "")
+    listed = ("[[plant.muscle]]", 'circuit = ["ClosedChamber", "ClosedChamber"]\n[[plant.muscle]]')
+    text = f"[plant]\n{names}"
+    assert load_scenario(written(tmp_path, listed, text=text)).plant.circuits == (ClosedChamber(), ClosedChamber())
+    wrong = (listed[0], listed[1].replace('"ClosedChamber"]', "3]"))
+    with pytest.raises(ParameterError, match=r"\[plant\]: circuit\[1\] is 3; a Circuit is wanted"):
+        load_scenario(written(tmp_path, wrong, text=text))
+
+
 def test_what_is_optional_has_the_defaults_of_the_page(tmp_path: Path):
     path = written(tmp_path, ('title = "A small one"\n', ""), ('start = { pressure = "1 bar" }\n', ""), (FILL, ""))
     path = written(tmp_path, (MUSCLE, 'muscle = "dmsp-20"'), text=path.read_text(encoding="utf-8"))
@@ -136,6 +151,16 @@ def test_a_muscle_may_be_a_file_beside_the_scenario(tmp_path: Path):
     assert (muscle.damper, muscle.name, muscle.geometry) == (LinearDamper(7.0), "mine", by_name.geometry)
 
 
+def test_a_fitted_surface_becomes_a_muscle_by_the_geometry_of_the_page(tmp_path: Path):
+    surface = load("dmsp-20-300").characteristic
+    (tmp_path / "fit").mkdir()
+    save(Entry("muscle", "fitted", "fitted", surface), tmp_path / "fit" / "muscle.toml")
+    path = written(tmp_path, (f"[plant]\n{MUSCLE}", FITTED))
+    muscle = load_scenario(path).plant.muscle
+    assert muscle.contractile == surface
+    assert muscle.geometry == Braid(0.01, math.radians(24.4), 0.3)
+
+
 def test_a_signal_is_linear_between_its_points(tmp_path: Path):
     scenario = load_scenario(written(tmp_path, (FILL, f'model = "Signal"\n{FILL}'), (DURATION, 'duration = "200 ms"')))
     assert scenario.command == Signal({"fill": ((0.1, 1.0), (0.2, 0.0))})
@@ -161,6 +186,7 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
 # What is wrong is said
 
 
+@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
 @pytest.mark.parametrize(
     ("was", "becomes", "kind", "message"),
     [
@@ -179,6 +205,18 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
         (MUSCLE, 'muscle = "mine.toml"', FileError, r"\[plant.muscle\]: .*mine\.toml: there is no such file"),
         (MUSCLE, 'muscle = "sarosi-dmsp-10"', UnknownName, r"\[plant.muscle\]: sarosi-dmsp-10 .* lacks a \[geometry\]"),
         (MUSCLE, 'muscle = { library = "x" }', UnknownName, r"\[plant.muscle.library\]: no library entry 'x'"),
+        (
+            MUSCLE,
+            'muscle = { library = "saga2007" }',
+            ParameterError,
+            r"\[plant.muscle\]: saga2007 is Saga2007, which is not solved for",
+        ),
+        (
+            MUSCLE,
+            'muscle = { library = "sarosi-dmsp-10" }',
+            ParameterError,
+            r"\[plant.muscle\]: Muscle needs 'geometry'",
+        ),
         (MUSCLE, "muscle = {}", ParameterError, r"\[plant.muscle\]: Muscle needs 'contractile'"),
         (MUSCLE, f"{MUSCLE}\ngaz = 1", ParameterError, r"\[plant\]: Plant has no parameter 'gaz'.*mean 'gas'\?"),
         (MUSCLE, f'{MUSCLE}\ngas = "Rodas4"', ParameterError, r"\[plant\]: gas is Rodas4; a Gas is wanted"),

@@ -66,15 +66,15 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
-app.command("reproduce")(reproduce)
+app.command("reproduce", short_help="Reproduce the papers, and judge each of their claims.")(reproduce)
 app.command("list")(list_entries)
-app.command("show")(show)
+app.command("show", short_help="Show parameters, sources and checks of an entry.")(show)
 app.command("cite")(cite)
-app.command("solve")(solve)
-app.command("inspect")(inspect)
+app.command("solve", short_help="From two of pressure, contraction and force get the third.")(solve)
+app.command("inspect", short_help="Show what was understood of bench files.")(inspect)
 app.command("fit")(fit)
-app.command("plan")(plan)
-app.command("simulate")(simulate)
+app.command("plan", short_help="Say which runs tell most about a muscle on your bench.")(plan)
+app.command("simulate", short_help="Simulate a plant that a scenario file describes.")(simulate)
 
 
 def _print_version(wanted: bool) -> None:

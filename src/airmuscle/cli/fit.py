@@ -81,7 +81,7 @@ def fit(
     \b
     Examples:
       airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out fit
-      airmuscle fit bench.csv --characteristic dmsp-20-300 --unit pressure=bar --fix geometry.radius
+      airmuscle fit bench.csv --characteristic dmsp-20-300 --unit pressure=bar --fix wall_thickness
       airmuscle fit dmsp-20-300 --characteristic ContractileSurface --degree 4 --robust "10 N"
       airmuscle fit runs/*.xlsx --mapping rig.toml --compare --leave-out run
       airmuscle solve fit/muscle.toml --pressure "3 bar" --force "100 N"

@@ -23,6 +23,7 @@ class Head:
 def list_entries(json: Json = False) -> None:
     """List the muscles, laws and data sets of the library.
 
+    A muscle can be simulated; a characteristic lacks a geometry for that, or is not solved for the force.
     A data set is a FILE that `airmuscle fit` knows by its name. Trust says how the numbers came here:
     printed, measured, second hand, fitted or chosen.
 
@@ -51,10 +52,15 @@ def heads() -> list[Head]:
 def _entry_head(path: Path) -> Head:
     import tomllib
 
+    from ..characteristic.base import ForceLaw
+    from ..library.models import model_class
+
     tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    muscle = all(part in tables for part in ("geometry", "spring", "damper"))
-    kind = f"{'muscle' if muscle else 'characteristic'}, {tables['characteristic']['model']}"
-    return Head(path.stem, tables["title"], kind, tables["trust"])
+    law = tables["characteristic"]
+    muscle = issubclass(model_class(law["model"], str(path)), ForceLaw) and ("geometry" in tables or "geometry" in law)
+    return Head(
+        path.stem, tables["title"], f"{'muscle' if muscle else 'characteristic'}, {law['model']}", tables["trust"]
+    )
 
 
 def _data_head(path: Path) -> Head:

@@ -23,7 +23,7 @@ COLOURS = {"holds": "green", "differs": "bold red", "not printed": "dim"}
 def reproduce(
     papers: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[PAPER]...", help="saga2007, borzikova, hosovsky, or a beginning of one; all if none."),
+        typer.Argument(metavar="PAPER", help="saga2007, borzikova, hosovsky, or a beginning of one; all if none."),
     ] = None,
     out: Folder = Path("report"),
 ) -> None:

@@ -47,7 +47,12 @@ def described(entry: Entry) -> dict[str, Any]:
         "note": entry.note,
         "warning": entry.warning,
         "models": {part: type(thing).__name__ for part, thing in parts.items()},
-        "parameters": [row for part, thing in parts.items() for row in _parameters(part, thing)],
+        "parameters": [
+            row
+            for part, thing in parts.items()
+            if part != "geometry" or thing != getattr(entry.characteristic, "geometry", None)
+            for row in _parameters(part, thing)
+        ],
         "checks": [
             {
                 "quantity": c.quantity,
@@ -98,7 +103,9 @@ def _print(entry: dict[str, Any]) -> None:
             (c["quantity"], _given(c["given"]), f"{number(c['equals'])} ± {number(c['tolerance'])}", c["source"])
             for c in entry["checks"]
         ]
+        typer.echo()
         print_table(("checked", "at (SI)", "equals (SI)", "source"), checks)
+    typer.echo()
     for reference in entry["references"]:
         typer.echo(f"- {reference}")
 

@@ -115,26 +115,30 @@ def rodas4(
                 for i in range(n):
                     g[i] = f0[i] + h * D1 * ft[i]
                 invoke(solve, (at_a, at_g, at_1))
-                for i in range(m):
-                    u[i] = values[segment, i] + (t + N2 * h - start) * w[i]
+                if moving:
+                    for i in range(m):
+                        u[i] = values[segment, i] + (t + N2 * h - start) * w[i]
                 for i in range(n):
                     x[i] = y[i] + A21 * k1[i]
                     g[i] = r * (C21 * k1[i]) + h * D2 * ft[i]
                 invoke(stage, (at_x, at_u, at_c, at_a, at_g, at_2))
-                for i in range(m):
-                    u[i] = values[segment, i] + (t + N3 * h - start) * w[i]
+                if moving:
+                    for i in range(m):
+                        u[i] = values[segment, i] + (t + N3 * h - start) * w[i]
                 for i in range(n):
                     x[i] = y[i] + A31 * k1[i] + A32 * k2[i]
                     g[i] = r * (C31 * k1[i] + C32 * k2[i]) + h * D3 * ft[i]
                 invoke(stage, (at_x, at_u, at_c, at_a, at_g, at_3))
-                for i in range(m):
-                    u[i] = values[segment, i] + (t + N4 * h - start) * w[i]
+                if moving:
+                    for i in range(m):
+                        u[i] = values[segment, i] + (t + N4 * h - start) * w[i]
                 for i in range(n):
                     x[i] = y[i] + A41 * k1[i] + A42 * k2[i] + A43 * k3[i]
                     g[i] = r * (C41 * k1[i] + C42 * k2[i] + C43 * k3[i]) + h * D4 * ft[i]
                 invoke(stage, (at_x, at_u, at_c, at_a, at_g, at_4))
-                for i in range(m):
-                    u[i] = values[segment, i] + (t + h - start) * w[i]
+                if moving:
+                    for i in range(m):
+                        u[i] = values[segment, i] + (t + h - start) * w[i]
                 for i in range(n):
                     x[i] = y[i] + A51 * k1[i] + A52 * k2[i] + A53 * k3[i] + A54 * k4[i]
                     g[i] = r * (C51 * k1[i] + C52 * k2[i] + C53 * k3[i] + C54 * k4[i])
@@ -163,13 +167,15 @@ def rodas4(
             if status != DONE:
                 break
             reached = end if last else t + h
+            if row < times.shape[0] and times[row] <= reached:
+                for i in range(n):  # x and g are free by now: the two polynomials of the dense output
+                    x[i] = H21 * k1[i] + H22 * k2[i] + H23 * k3[i] + H24 * k4[i] + H25 * k5[i]
+                    g[i] = H31 * k1[i] + H32 * k2[i] + H33 * k3[i] + H34 * k4[i] + H35 * k5[i]
             while row < times.shape[0] and times[row] <= reached:
                 q = (times[row] - t) / h
                 p = 1.0 - q
                 for i in range(n):
-                    b = H21 * k1[i] + H22 * k2[i] + H23 * k3[i] + H24 * k4[i] + H25 * k5[i]
-                    a = H31 * k1[i] + H32 * k2[i] + H33 * k3[i] + H34 * k4[i] + H35 * k5[i]
-                    rows[row, i] = y[i] * p + q * (yn[i] + p * (b + q * a))
+                    rows[row, i] = y[i] * p + q * (yn[i] + p * (x[i] + q * g[i]))
                 row += 1
             for i in range(n):
                 y[i] = yn[i]

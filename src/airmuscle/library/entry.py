@@ -53,7 +53,11 @@ class Entry:
         from ..muscle import Muscle
 
         if not isinstance(self.characteristic, ForceLaw) or self.geometry is None:
-            lack = "a [geometry]" if self.geometry is None else "a law solved for the force: see as_force_law"
+            lack = (
+                "a [geometry], which its file or [plant.muscle] can give"
+                if self.geometry is None
+                else "a law solved for the force: see as_force_law"
+            )
             raise UnknownName(f"{self.name} is a characteristic, not yet a muscle; it lacks {lack}.")
         given = {part: getattr(self, part) for part in ("spring", "damper") if getattr(self, part) is not None}
         return Muscle(self.characteristic, self.geometry, **given)

@@ -22,18 +22,20 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
+from ..characteristic.base import ForceLaw
 from ..command import Command, refuse_unknown_input
 from ..equilibrium import equilibrium
 from ..errors import ParameterError
 from ..method import Method, Rodas4
-from ..muscle import Muscle
 from ..plant import Plant
 from ..recording import Recording
 from ..simulate import refuse_beyond_opening, simulate
 from .build import build
 from .catalogue import load, parsed
+from .entry import Entry
 from .models import model_class
 from .place import Place, checked, finite, refuse_unknown, said_at, text
 
@@ -130,19 +132,29 @@ def _muscle(given: Any, place: Place) -> Any:
     if isinstance(given, Mapping):
         rest = {"model": "Muscle", **given}
         base = rest.pop("library", None)
-        ready = {} if base is None else _parts(_muscle(base, place.inside("library")), rest)
-        return build(rest, place, ready)
+        return build(rest, place, {} if base is None else _parts(_entry(base, place.inside("library")), rest, place))
+    entry = _entry(given, place)
+    with said_at(place):
+        return entry.muscle
+
+
+def _entry(given: Any, place: Place) -> Entry:
     if not isinstance(given, str):
         raise ParameterError(f"{place} is {given!r}; name a library entry or a muscle file.")
-    own = place.folder / given
     with said_at(place):
-        return load(own if given.endswith(".toml") else given).muscle
+        return load(place.folder / given if given.endswith(".toml") else given)
 
 
-def _parts(muscle: Muscle, replaced: Mapping[str, Any]) -> dict[str, Any]:
-    """The parts of a muscle that a table leaves as they are; it is plainly named unless the table says otherwise."""
-    names = [f.name for f in dataclasses.fields(Muscle) if f.name not in ("name", *replaced)]
-    return {name: getattr(muscle, name) for name in names}
+def _parts(entry: Entry, replaced: Mapping[str, Any], place: Place) -> dict[str, Any]:
+    """The parts of an entry that a table leaves as they are; what it lacks, such as a geometry, the table may give."""
+    parts = {"contractile": entry.characteristic, **{n: getattr(entry, n) for n in ("geometry", "spring", "damper")}}
+    left = {name: part for name, part in parts.items() if part is not None and name not in replaced}
+    if not isinstance(left.get("contractile"), ForceLaw | NoneType):
+        raise ParameterError(
+            f"{place}: {entry.name} is {type(entry.characteristic).__name__}, which is not solved for the force; "
+            "a plant needs a ForceLaw. In Python, as_force_law(law, box) makes one."
+        )
+    return left
 
 
 def _command(table: Mapping[str, Any], plant: Plant, place: Place) -> Command:

@@ -1,0 +1,54 @@
+"""Units at the border: the table of common ones is pint's, gauge and absolute differ by the surroundings."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from airmuscle import units
+from airmuscle.errors import UnitError
+
+COMMON = {name: entry for name, entry in units._FACTORS.items() if name not in ("", "-", "min")}
+
+
+@pytest.mark.parametrize("unit", COMMON)
+def test_a_common_unit_is_what_pint_says(unit):
+    factor, target = COMMON[unit]
+    by_pint = units._by_pint("dimensionless" if unit == "1" else unit, "dimensionless" if target == "1" else target, "")
+    assert by_pint.factor == pytest.approx(factor, rel=1e-12)
+    assert by_pint.offset == 0.0
+
+
+def test_the_factors_of_the_notebook_are_those_of_the_text():
+    assert units.quantity("6 bar", "Pa") == 6 * units.bar
+    assert units.quantity("300 mm", "m") == pytest.approx(300 * units.mm)
+    assert units.quantity("25 deg", "rad") == 25 * units.degree
+
+
+@given(st.floats(-1e5, 1e7), st.floats(9e4, 1.1e5))
+def test_absolute_pressure_is_gauge_plus_the_surroundings(gauge, ambient):
+    absolute = units.conversion("kPa(a)", "Pa", ambient=ambient)
+    assert absolute((gauge + ambient) / 1e3) == pytest.approx(gauge, abs=1e-8 * 1e7)
+    assert units.conversion("barg", "Pa", ambient=ambient)(gauge / 1e5) == pytest.approx(gauge)
+
+
+@pytest.mark.parametrize("text", ["7 bara", "7 bar abs", "7 bar(a)", "7 bar absolute", "700 kPa(a)", "700 kPa a"])
+def test_every_spelling_of_absolute_is_understood(text):
+    assert units.quantity(text, "Pa") == pytest.approx(7e5 - 101_325)
+
+
+@pytest.mark.parametrize("text", ["7 barg", "7 bar(g)", "7 bar gauge", "7 bar", "700 kPag"])
+def test_every_spelling_of_gauge_is_understood(text):
+    assert units.quantity(text, "Pa") == pytest.approx(7e5)
+
+
+def test_a_bare_pressure_is_taken_as_gauge_and_says_so():
+    assert units.conversion("bar", "Pa").assumed_gauge
+    assert not units.conversion("barg", "Pa").assumed_gauge
+
+
+@pytest.mark.parametrize(("text", "target"), [("3 N", "m"), ("3 bara", "N"), ("3 zorkmid", "m"), ("3", "m"), ("", "m")])
+def test_what_is_no_such_quantity_is_refused(text, target):
+    with pytest.raises(UnitError):
+        units.quantity(text, target)

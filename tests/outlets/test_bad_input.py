@@ -1,0 +1,435 @@
+"""Bad input ends in one clear line: where, what, what is allowed, what to do; exit code 1, nothing half written.
+
+Each case goes through the command line as a user would, and its message is read.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from airmuscle import advance, load, measured, method, read_csv, simulate
+from airmuscle.circuit import FillDischarge, Supply, Valve
+from airmuscle.cli.app import app
+from airmuscle.command import Schedule, Signal
+from airmuscle.declare import model, parameter
+from airmuscle.equilibrium import equilibrium
+from airmuscle.errors import FileError, NoSolution, ParameterError, UnitError
+from airmuscle.library.catalogue import names, parsed
+from airmuscle.mechanism import HangingMass
+from airmuscle.method import RungeKutta4
+from airmuscle.plant import Plant
+from airmuscle.report.staged import refuse_unwritable, staged
+from airmuscle.units import ABSOLUTE, conversion, quantity
+
+MUSCLE = "dmsp-20-300"
+HEAD = "pressure [bar],length [mm],force [N]"
+SURFACE = ("--characteristic", "ContractileSurface", "--degree", "2", "--resting-length", "300 mm")
+
+
+def refused(folder: Path, *arguments: object) -> str:
+    """The one line on stderr of a command that fails in a folder where nothing may appear."""
+    before = sorted(folder.rglob("*"))
+    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert result.exit_code == 1, result.output
+    assert isinstance(result.exception, SystemExit), "no traceback"
+    lines = [line for line in result.stderr.splitlines() if not line.startswith("warning: ")]
+    assert len(lines) == 1, lines
+    assert lines[0].startswith("error: ")
+    assert sorted(folder.rglob("*")) == before, "nothing half written"
+    return lines[0].removeprefix("error: ")
+
+
+# Bench files
+
+
+def rows(*columns: int, count: int = 35) -> list[list[float]]:
+    """Pressures of 1.5 to 5.5 bar, lengths from 300 mm down and the force of a plane over them."""
+    found = [[1.5 + i % 5, 300.5 - 10 * (i // 5)] for i in range(count)]
+    table = [[p, length, 100 * p + 3 * length - 850] for p, length in found]
+    return [[row[c] for c in columns or (0, 1, 2)] for row in table]
+
+
+def bench(head: str = HEAD, table: list[list[float]] | None = None, **replaced: object) -> str:
+    """A bench file; `row_7="a,b,c"` replaces the seventh row."""
+    lines = [",".join(map(str, row)) for row in (rows() if table is None else table)]
+    for key, line in replaced.items():
+        lines[int(key.removeprefix("row_")) - 1] = str(line)
+    return "\n".join([head, *lines]) + "\n"
+
+
+CSV = {
+    "without units": (bench("pressure,length,force"), r"'pressure': no unit is stated. Head it 'pressure \[kPa\]'"),
+    "decimal comma": (bench(row_1="1,5,300,5,201,5"), r"line 2: 6 cells .* decimal comma, separate the columns by ';'"),
+    "text": (bench(row_7="n/a,290,100"), r"line 8: pressure 'n/a' is not a number. Correct the cell or delete"),
+    "NaN": (bench(row_7="nan,290,100"), r"line 8: pressure is nan, .* Delete the line, or fill the gap"),
+    "infinity": (bench(row_7="1e400,290,100"), r"line 8: pressure is inf, which no sensor measures"),
+    "empty cell": (bench(row_7=",290,100"), r"line 8: pressure has an empty cell"),
+    "no rows": (HEAD, r"there are headings \(pressure \[bar\], .*\) but no rows of numbers"),
+    "nothing": ("", r"the file is empty"),
+    "ragged": (bench(row_35="1,2"), r"line 36: 2 cells stand under 3 headings"),
+    "time backwards": (
+        bench(f"time [s],{HEAD}", [[9 - i, *row] for i, row in enumerate(rows())]),
+        r"line 3: time 8 s goes back behind the row before \(9 s\). Time must increase: sort the rows",
+    ),
+    "unknown column": (bench(HEAD.replace("press", "pres")), r"no column 'pressure'; .* Did you mean 'presure \[bar"),
+    "unknown unit": (bench(HEAD.replace("bar", "brr")), r"'pressure \[brr\]': 'brr' is no unit.*mean 'bar'\?"),
+    "wrong kind": (bench(HEAD.replace("bar", "mm")), r"'pressure \[mm\]': unit 'mm' cannot become 'Pa'"),
+    "vacuum": (bench(row_3="-3,290,100"), r"line 4: a gauge pressure of -300 kPa lies at or below absolute zero"),
+    "metres": (bench(HEAD.replace("mm", "m")), r"line 2: with a resting length of 0.3 m .* implausible: -1000.67"),
+    "per cent": (
+        bench("pressure [bar],contraction,force [N]", [[p, (301 - x) / 3, f] for p, x, f in rows()]),
+        r"line 7: contraction 3.5 lies outside -0.5 to 1. Is it in per cent\? Then head it 'contraction \[%\]'",
+    ),
+    "no force": (bench("pressure [bar],length [mm]", rows(0, 1)), r"no column 'force'; there are pressure, length"),
+    "twice": (bench(f"force [N],{HEAD}", rows(2, 0, 1, 2)), r"columns 'force \[N\]' and 'force \[N\]' both hold the"),
+    "few points": (bench(table=rows()[:3] + rows()[5:7]), r"6 parameters to be found, but only 5 points"),
+    "one pressure": (bench(table=[[3, *r] for r in rows(1, 2)]), r"pressure is 300000 Pa in every row.*several levels"),
+    "two pressures": (
+        bench(table=[[1 if p < 3 else 4, *rest] for p, *rest in rows()]),
+        r"cannot tell apart a\(1\), a\(q\^2\) .*\(rank 5 of 6 parameters\).*2 of pressure, 7 of contraction. Measure at more",
+    ),
+    "slack": (bench(table=[[p, length, 0] for p, length, _ in rows()]), r"all 35 rows are cut off .*Fit rows in which"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "message"), CSV.values(), ids=CSV.keys())
+def test_a_bench_file_that_cannot_be_fitted(tmp_path: Path, text: str, message: str):
+    file = tmp_path / "bench.csv"
+    file.write_text(text, encoding="utf-8")
+    said = refused(tmp_path, "fit", file, *SURFACE, "--out", tmp_path / "fit")
+    assert re.search(rf"bench\.csv.*{message}", said), said
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        bench().encode("utf-8-sig"),
+        f"# Prüfstand\n{bench()}".encode("latin-1"),
+        bench().replace(",", ";").replace(".", ",").encode(),
+        bench().replace("\n", "\r\n").encode(),
+    ],
+    ids=["byte order mark", "Latin-1", "decimal comma between semicolons", "lines of Windows"],
+)
+def test_what_other_programs_write_is_read(tmp_path: Path, content: bytes):
+    (tmp_path / "bench.csv").write_bytes(content)
+    arguments = ["fit", str(tmp_path / "bench.csv"), *SURFACE, "--out", str(tmp_path / "fit"), "--json"]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["rmse"] < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (("--resting-length", "-300 mm"), "resting_length is -0.3 m; it must be greater than zero"),
+        (("--resting-length", "300 N"), "resting_length: unit 'N' cannot become 'm'"),
+        (("--resting-length", "300"), "resting_length: '300' carries no unit"),
+        (("--unit", "presure=bar"), "a unit is given for 'presure', but .* Did you mean 'pressure'"),
+        (("--fix", "coefficient"), "no parameter 'coefficient' to hold fixed; .* Did you mean 'coefficients'"),
+        (("--robust", "-1 N"), "is -1.0; it must be greater than zero"),
+    ],
+)
+def test_a_bad_option_of_fit(tmp_path: Path, option: tuple[str, str], message: str):
+    (tmp_path / "bench.csv").write_text(bench(), encoding="utf-8")
+    said = refused(tmp_path, "fit", tmp_path / "bench.csv", *SURFACE, *option, "--out", tmp_path / "fit")
+    assert re.search(message, said), said
+
+
+def test_a_data_set_is_known_by_a_unique_beginning_and_brings_its_units(tmp_path: Path):
+    surface = ("--characteristic", "ContractileSurface", "--degree", "2")
+    result = CliRunner().invoke(app, ["fit", "dmsp-20", *surface, "--out", str(tmp_path / "fit"), "--json"])
+    assert json.loads(result.stdout)["rows_used"] == len(measured(MUSCLE))
+    said = refused(tmp_path, "fit", MUSCLE, *surface, "--unit", "pressure=psi", "--out", tmp_path / "other")
+    assert said == f"{MUSCLE}: a data set of the library brings its units and constants along; leave out units."
+    said = refused(tmp_path, "fit", "dmps-20-300", *surface, "--out", tmp_path / "other")
+    assert re.fullmatch(rf"no data set 'dmps-20-300'; there are .* Did you mean '{MUSCLE}'\?", said)
+
+
+# Requests without an answer
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (("--pressure=3 bar", "--contraction=90 %"), r"--contraction: .* 90 %; it reaches from -4.9\d+ to 40 %"),
+        (("--pressure=3 bar", "--contraction=-50 %"), r"--contraction: .* cannot take a contraction of -50 %"),
+        (("--pressure=3 bar", "--contraction=12"), r"cannot take .* 1200 %.* Is it in per cent\? Write '12 %'"),
+        (("--pressure=3 bar", "--contraction=12 mm"), "--contraction: unit 'mm' cannot become a ratio"),
+        (("--pressure=3 bar", "--contraction=12 deg"), "--contraction: unit 'deg' cannot become a ratio"),
+        (("--pressure=3,5 bar", "--force=1 N"), "'3,5 bar' holds a comma; .* as a point, '3.5 bar'"),
+        (("--pressure=3 Bar", "--force=1 N"), r"--pressure: 'Bar' is no unit known here.* Did you mean 'bar'\?"),
+        (("--pressure=1e400 bar", "--force=1 N"), "--pressure: '1e400 bar' is too large for a number"),
+        (("--pressure=nan bar", "--force=1 N"), "--pressure: 'nan bar' is not a number with a unit; write it like"),
+        (("--pressure=0 bara", "--force=1 N"), "a gauge pressure of -101.325 kPa lies below absolute zero"),
+        (("--pressure=3 bar", "--force=-10 N"), "no contraction between .* balances -10 N .* the muscle pulls 0 to"),
+        (("--pressure=9**9**9**9", "--force=1 N"), "--pressure: .* is no unit known here"),
+    ],
+)  # fmt: skip
+def test_a_request_that_no_muscle_can_meet(tmp_path: Path, given: tuple[str, ...], message: str):
+    said = refused(tmp_path, "solve", MUSCLE, *given, "--out", tmp_path / "chart")
+    assert re.search(message, said), said
+
+
+@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+@pytest.mark.parametrize("name", names())
+def test_every_entry_answers_or_refuses_in_one_line(name: str):
+    """Loads, pressures and contractions far beyond any muscle: a number that JSON can hold, or one line."""
+    beyond = (
+        ("--pressure=3 bar", "--force=1e6 N"),
+        ("--pressure=0 bar", "--force=100 N"),
+        ("--force=1e9 N", "--contraction=0.1"),
+    )
+    for given in (*beyond, ("--pressure=3 bar", "--contraction=0.95"), ("--pressure=9 MPa", "--force=100 N")):
+        result = CliRunner().invoke(app, ["solve", name, *given, "--json"])
+        assert isinstance(result.exception, SystemExit | None), given
+        others = [line for line in result.stderr.splitlines() if not line.startswith("warning: ")]
+        assert len(others) == result.exit_code, others
+        if result.exit_code == 0:
+            solved = json.loads(result.stdout)
+            assert -0.5 <= solved["contraction"] < 1.0
+            assert all(isinstance(solved[quantity], float) for quantity in ("pressure", "contraction", "force"))
+
+
+@pytest.mark.parametrize("name", ["chou-hannaford", "tondu-lopez"])
+def test_without_pressure_a_closed_form_bears_no_load(name: str):
+    law = load(name).characteristic
+    for pressure in (0.0, np.array([0.0, 3e5])):
+        with pytest.raises(NoSolution, match=r"balances 100 N at 0 kPa. Between these the muscle pulls 0 to 0 N there"):
+            law.contraction(pressure, 100.0)
+
+
+def test_an_answer_that_no_muscle_can_be_is_refused(tmp_path: Path):
+    said = refused(tmp_path, "solve", "borzikova-direct-repaired", "--pressure=9 MPa", "--force=100 N")
+    assert re.search(r"answers with 9000 kPa, 328\.\d+%, 100 N, which no muscle can be.*outside the range of its", said)
+
+
+# Units
+
+
+@pytest.mark.parametrize("unit", ["9**9**9**9", "m**99999999", "m^9^9^9", "10**99999999 m", "(9)**(9)**(9)"])
+def test_a_unit_that_would_never_be_worked_out_is_refused_at_once(unit: str):
+    start = time.perf_counter()
+    with pytest.raises(UnitError, match="is no unit known here"):
+        conversion(unit, "Pa")
+    assert time.perf_counter() - start < 2.0
+
+
+def test_powers_that_units_have_are_taken():
+    assert quantity("2 kg m^2 s^-2", "J") == quantity("2 kg*m**2/s**2", "J") == 2.0
+
+
+def test_the_pressure_of_the_surroundings_takes_no_gauge_unit():
+    assert quantity("1 bara", ABSOLUTE) == quantity("100 kPa(a)", ABSOLUTE) == quantity("1 bar", ABSOLUTE) == 1e5
+    with pytest.raises(UnitError, match=r"here: unit 'barg' is gauge, but this pressure is absolute; write kPa\(a\)"):
+        quantity("1 barg", ABSOLUTE, where="here")
+
+
+def test_a_whole_number_beyond_all_floats():
+    with pytest.raises(UnitError, match="here: the number is too large"):
+        quantity(10**400, "Pa", where="here")
+
+
+# Python
+
+
+@model
+class Tube:
+    """A model for these tests."""
+
+    radius: float = parameter("m", "r", "radius", bounds=(0.001, 0.1))
+    share: float = parameter("1", "s", "share of the length", bounds=(0.0, 0.9), default=0.5)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"radius": "1"}, r"Tube.radius \(r, radius\) is '1'; it must be a number in m"),
+        ({"radius": np.nan}, r"is nan; it must be finite"),
+        ({"radius": 20.0}, r"is 20 m; allowed are 0.001 to 0.1 m. Values are SI: check the unit"),
+        ({"radius": np.array([0.01])}, r"is array\(\[0.01\]\); it must be one number"),
+        ({"radius": 0.01, "share": 30}, r"is 30; allowed are 0 to 0.9. Is it in per cent\? As a ratio it is 0.3"),
+        ({"radius": 0.01, "share": -1}, r"is -1; allowed are 0 to 0.9.$"),
+        ({"radius": 0.01, "share": True}, r"is True; it must be a number.$"),
+    ],
+)
+def test_a_parameter_that_cannot_be(given: dict[str, object], message: str):
+    with pytest.raises(ParameterError, match=message):
+        Tube(**given)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("kind", [Schedule, Signal])
+@pytest.mark.parametrize("given", [1, (1, 2), ((1, 2, 3),), (("5 s", 1),)])
+def test_a_command_that_is_no_pairs(kind: type, given: object):
+    with pytest.raises(ParameterError, match=r"of 'fill' is .*; write pairs of time \[s\] and value, \(\(5, 1\)"):
+        kind({"fill": given})
+
+
+@pytest.fixture
+def plant() -> Plant:
+    valve = Valve(3e-9, 0.3)
+    return Plant(load(MUSCLE).muscle, FillDischarge(Supply(5e5), valve, valve), HangingMass(5.0))
+
+
+def test_a_run_that_cannot_be(plant: Plant):
+    wrong = {"duration": -1.0}, {"duration": np.inf}, {"start_time": np.nan}, {"start_time": 1e300}, {"output": np.inf}
+    for given in wrong:
+        (name,) = given
+        with pytest.raises(ParameterError, match=f"simulate: .*{name}"):
+            simulate(plant, Schedule({}), **{"duration": 1.0, **given})
+    for opening in (7.0, -0.5):
+        with pytest.raises(ParameterError, match=rf"the input 'fill' is {opening:g} before 1 s; allowed are 0 \(shut"):
+            simulate(plant, Schedule({"fill": ((0, opening),)}), duration=1.0)
+        with pytest.raises(ParameterError, match=rf"the input 'fill' is {opening:g}"):
+            advance(plant, equilibrium(plant, pressure=0.0), {"fill": opening}, 0.1)
+
+
+@pytest.mark.parametrize("dt", [0.0, -1.0, np.nan, np.inf])
+def test_a_step_of_no_length(plant: Plant, dt: float):
+    with pytest.raises(ParameterError, match=r"advance: dt is .* s; it must be positive and finite"):
+        advance(plant, equilibrium(plant, pressure=0.0), {}, dt)
+
+
+# Muscle files
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"\x00", r"is not TOML: Invalid statement \(at line 1, column 1\)"),
+        (b"\xff\xfe", r"is not UTF-8 text \(byte 0\). Save it as UTF-8"),
+        (b"title = 'a'\ntitle = 'b'\n", r"is not TOML: Cannot overwrite a value \(at line 2"),
+        (b"x = " + b"[" * 5000 + b"]" * 5000, r"cannot be read \(maximum recursion depth"),
+        (b"x = 1" + b"0" * 5000, r"cannot be read \(Exceeds the limit"),
+    ],
+)
+def test_a_file_that_is_no_toml(tmp_path: Path, content: bytes, message: str):
+    (tmp_path / "muscle.toml").write_bytes(content)
+    said = refused(tmp_path, "show", tmp_path / "muscle.toml")
+    assert re.search(rf"muscle\.toml: {message}", said), said
+
+
+@pytest.mark.parametrize("name", ["a\0.toml", f"{'a' * 5000}.toml"])
+def test_a_name_that_no_file_can_have(name: str):
+    with pytest.raises(FileError, match="cannot be read"):
+        parsed(Path(name))
+
+
+BOX = "least_pressure = 0\ngreatest_pressure = 6e5\nleast_contraction = 0\ngreatest_contraction = 0.25\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("box = 3", r"\[box\]: 3 is not a table"),
+        (f"[box]\n{BOX.replace('0.25', '25')}", r"\[box\]: Box.greatest_contraction .* is 25; allowed are -0.5 to 1"),
+        (f"[box]\n{BOX.replace('least_pressure = 0', 'least_pressure = -3e5', 1)}", r"\[box\]: .* is -300000 Pa"),
+        (f'[box]\nmodel = "Braid"\n{BOX}', r"\[box\]: Braid has no parameter 'least_pressure'"),
+        ('[[check]]\nquantity = "volume"\ncontraction = nan\nequals = 1\ntolerance = 1\nsource = "s"', r"contraction is nan"),
+        ('[[check]]\nquantity = "volume"\ncontraction = 0\nequals = 1\ntolerance = -1\nsource = "s"', r"tolerance is -1"),
+        ('[[reference]]\nkey = "k"\nauthors = "a"\ntitle = "t"\nwhere = "w"\ndoi = 3', r"\[reference 1\]: doi is 3"),
+    ],
+)  # fmt: skip
+def test_a_muscle_file_with_a_bad_table(tmp_path: Path, text: str, message: str):
+    law = '[characteristic]\nmodel = "ChouHannaford1996"\n[characteristic.geometry]\nmodel = "Braid"\n'
+    head = f'title = "t"\ntrust = "chosen"\n{text if text.startswith("box") else ""}\n'
+    braid = "radius = 0.01\nbraid_angle = 0.4\nresting_length = 0.3\n"
+    file = tmp_path / "muscle.toml"
+    file.write_text(head + law + braid + ("" if text.startswith("box") else text), encoding="utf-8")
+    said = refused(tmp_path, "show", file)
+    assert re.search(rf"muscle\.toml.*{message}", said), said
+
+
+# Folders
+
+
+@pytest.mark.parametrize("name", ["taken", "taken/below", "a" * 300])
+def test_a_folder_that_cannot_be_made(tmp_path: Path, name: str):
+    (tmp_path / "taken").write_text("a file", encoding="utf-8")
+    with pytest.raises(FileError, match=r"cannot be written to: .*Name a folder that you may write to"):
+        refuse_unwritable(tmp_path / name)
+    assert [path.name for path in tmp_path.iterdir()] == ["taken"]
+
+
+def write_a_run(folder: Path) -> None:
+    with staged(folder) as place:
+        for name in ("data/rows.csv", "figures/run.png", "report.html"):
+            (place / name).parent.mkdir(exist_ok=True)
+            (place / name).write_text("new", encoding="utf-8")
+
+
+@pytest.mark.parametrize(("blocked", "is_folder"), [("report.html", True), ("figures", False)])
+def test_a_name_that_is_taken_leaves_the_folder_as_it_was(tmp_path: Path, blocked: str, is_folder: bool):
+    target = tmp_path / "run"
+    target.mkdir()
+    (target / blocked).mkdir() if is_folder else (target / blocked).write_text("a file", encoding="utf-8")
+    kind = "folder" if is_folder else "file"
+    with pytest.raises(FileError, match=rf"a {kind} of that name is there \(.*{blocked}\)"):
+        write_a_run(target)
+    assert [path.name for path in target.rglob("*")] == [blocked]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
+@pytest.mark.parametrize("option", [(), ("--json",)])
+def test_a_full_disk_is_one_line(option: tuple[str, ...]):
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "airmuscle", "list", *option]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+    assert done.returncode == 1
+    assert done.stderr == "error: output: No space left on device.\n"
+
+
+class Interrupted:
+    """A kernel that the user stops while it carries its third packet of steps."""
+
+    signatures = ("compiled",)
+
+    def __init__(self, kernel: Callable[..., int]) -> None:
+        self.kernel, self.packets = kernel, 0
+
+    def __call__(self, *arguments: object) -> int:
+        self.packets += 1
+        if self.packets > 2:
+            raise KeyboardInterrupt
+        return self.kernel(*arguments)
+
+
+def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "run.toml").write_text(
+        f'[plant]\nmuscle = "{MUSCLE}"\ncircuit = "ClosedChamber"\n'
+        'mechanism = { model = "HangingMass", mass = "5 kg" }\n'
+        '[run]\nduration = "1 s"\nmethod = { model = "RungeKutta4", step = "1 ms" }\n',
+        encoding="utf-8",
+    )
+    true_kernel = RungeKutta4._kernel
+
+    def kernel(self: RungeKutta4, prepared: Any) -> tuple[Any, ...]:
+        first, *others = true_kernel(self, prepared)
+        return (Interrupted(first), *others)
+
+    monkeypatch.setattr(RungeKutta4, "_kernel", kernel)
+    monkeypatch.setattr(method, "BUDGET", 100)
+    result = CliRunner().invoke(app, ["simulate", str(tmp_path / "run.toml"), "--out", str(tmp_path / "run")])
+    assert result.exit_code == 130
+    assert result.stderr == f"what was computed until then stands in {tmp_path / 'run'}\ninterrupted\n"
+    kept = read_csv(tmp_path / "run" / "recording.csv")
+    assert kept["time"][-1] == pytest.approx(0.2, abs=0.0011)
+
+
+def test_without_a_place_for_compiled_code_the_remedy_is_named(plant: Plant, monkeypatch: pytest.MonkeyPatch):
+    def kernel(self: RungeKutta4, prepared: Any) -> tuple[Any, ...]:
+        raise RuntimeError("cannot cache function 'rodas4': no locator available for file 'rodas4.py'")
+
+    monkeypatch.setattr(RungeKutta4, "_kernel", kernel)
+    with pytest.raises(FileError, match=r"no folder to keep compiled code in.* environment variable NUMBA_CACHE_DIR"):
+        simulate(plant, Schedule({}), duration=1.0, method=RungeKutta4(1e-3))
