@@ -48,6 +48,8 @@ INLINE double surface(const Plant *p, double x, double q) {
   double f = r0 + qi * (r1 + qi * (r2 + qi * (r3 + qi * (r4 + qi * a[20]))));
   double by_x = d0 + qi * (d1 + qi * (d2 + qi * (d3 + qi * a[19])));
   double by_q = r1 + qi * (2 * r2 + qi * (3 * r3 + qi * (4 * r4 + qi * 5 * a[20])));
+  by_x = by_x < 0 ? by_x : 0;
+  by_q = by_q > 0 ? by_q : 0;
   return f + by_x * (x - xi) + by_q * (q - qi);
 }
 

@@ -79,7 +79,7 @@ def hill(plant: Plant) -> Callable[[Sequence[float]], Rates]:
         )
         by_x = sum(i * a * xi ** (i - 1) * qi**j for j, row in enumerate(rows) for i, a in enumerate(row) if i)
         by_q = sum(j * a * xi**i * qi ** (j - 1) for j, row in enumerate(rows) for i, a in enumerate(row) if j)
-        return polynomial(xi, qi) + by_x * (x - xi) + by_q * (q - qi)
+        return polynomial(xi, qi) + min(by_x, 0.0) * (x - xi) + max(by_q, 0.0) * (q - qi)
 
     def under(openings: Sequence[float]) -> Rates:
         fill, discharge = openings

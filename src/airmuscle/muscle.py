@@ -9,6 +9,7 @@ from typing import ClassVar
 
 from . import ops, trace
 from .characteristic.base import ForceLaw
+from .characteristic.box import Box
 from .characteristic.contractile_surface import HOSOVSKY_HILL
 from .characteristic.virtual_work import VirtualWork
 from .declare import model, parameter
@@ -98,6 +99,8 @@ class Muscle:
     damper: Damper = LinearDamper(0.0)
     friction: Friction = NoFriction()
     name: str = "muscle"
+    box: Box | None = None
+    """Where its numbers were measured, if that is known: a run says when and how far it left it."""
 
     @classmethod
     def ideal(cls, geometry: Geometry, name: str = "muscle") -> Muscle:

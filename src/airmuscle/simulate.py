@@ -195,7 +195,7 @@ def outside_box(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
     """When and how far a run left the box in which a muscle's characteristic has data."""
     found = []
     for prefix, muscle in zip(plant.prefixes, plant.muscles, strict=True):
-        box = getattr(muscle.contractile, "box", None)
+        box = muscle.box or getattr(muscle.contractile, "box", None)
         if box is None:
             continue
         for name, scale, unit in (("pressure", 1e3, "kPa"), ("contraction", 0.01, "%")):
@@ -208,7 +208,7 @@ def outside_box(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
                 found.append(
                     f"{muscle.name} left the box of its characteristic in {name} ({low / scale:.4g} to "
                     f"{high / scale:.4g} {unit}) in {share:.0%} of the rows, by at most {beyond[worst] / scale:.4g} "
-                    f"{unit} at {columns['time'][worst]:.4g} s; there it goes on by its tangent"
+                    f"{unit} at {columns['time'][worst]:.4g} s; nothing was measured there"
                 )
     return found
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -15,8 +16,10 @@ from airmuscle.energy import Metered
 from airmuscle.equilibrium import equilibria, equilibrium
 from airmuscle.errors import NoEquilibrium, ParameterError
 from airmuscle.gas import Ambient, Isothermal, Polytropic
+from airmuscle.library.catalogue import load
 from airmuscle.mechanism import HangingMass, Held, Isometric
 from airmuscle.method import DormandPrince8, Rodas4
+from airmuscle.muscle import LinearDamper
 from airmuscle.plant import Plant
 from airmuscle.simulate import simulate
 
@@ -131,3 +134,21 @@ def test_an_unknown_coordinate_or_input_is_refused_with_what_there_is():
         plant.state_at(pressure=0.0, angle=1.0)
     with pytest.raises(ParameterError, match=r"no input 'fil'; there are fill, discharge\. Did you mean 'fill'\?"):
         simulate(plant, Schedule({"fil": ((0.0, 1.0),)}), duration=1.0, start=plant.state_at(pressure=0.0))
+
+
+def test_a_run_says_when_and_how_far_it_left_what_was_measured():
+    """A fitted surface carries its box, a library muscle that of its file; inside it nothing is said."""
+    muscle = load("dmsp-20-300").muscle
+    assert muscle.box is not None
+    damped = replace(muscle, damper=LinearDamper(300.0))
+    plant = Plant(damped, CIRCUIT, HangingMass(10.0))
+    start = equilibrium(plant, pressure=0.0)
+    run = simulate(plant, Schedule({"fill": ((0.5, 1.0),)}), duration=4.0, start=start)
+    (pressure, contraction) = [note for note in run.notes if "left the box" in note]
+    assert re.search(
+        r"left the box of its characteristic in pressure \(35 to 675 kPa\) in \d+% of the rows, by at most 35 kPa",
+        pressure,
+    )
+    assert re.search(r"in contraction \(1\.333 to 26 %\).*nothing was measured there", contraction)
+    inside = simulate(plant, Schedule({}), duration=1.0, start=equilibrium(plant, pressure=4e5))
+    assert not [note for note in inside.notes if "left the box" in note]

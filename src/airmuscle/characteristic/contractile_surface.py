@@ -35,7 +35,8 @@ class ContractileSurface(ForceLaw):
 
     eps contraction [1], p gauge pressure [Pa], a_ij scaled coefficients [N], n = 5 gives the 21 of the paper.
     Scaling is what keeps the fit well conditioned. Outside the box, where there was no data, the surface goes on
-    by its tangent. Reference: Hosovsky et al., F_KE = f(k, P) under their equation (1).
+    by its tangent, but there it neither rises with contraction nor falls with pressure, which no muscle does.
+    Reference: Hosovsky et al., F_KE = f(k, P) under their equation (1).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (HOSOVSKY_HILL,)
@@ -113,7 +114,7 @@ class ContractileSurface(ForceLaw):
         x, q = self._scaled(pressure, contraction)
         inner_q, inner_x = ops.clip(q, -1.0, 1.0), ops.clip(x, -1.0, 1.0)
         value, by_x, by_q = self._horner(inner_x, inner_q)
-        return value + by_x * (x - inner_x) + by_q * (q - inner_q)
+        return value + ops.minimum(by_x, 0.0) * (x - inner_x) + ops.maximum(by_q, 0.0) * (q - inner_q)
 
     def _scaled(self, pressure: Value, contraction: Value) -> tuple[Value, Value]:
         """Contraction and pressure as x and q, from -1 to 1 on the box."""

@@ -60,4 +60,4 @@ class Entry:
             )
             raise UnknownName(f"{self.name} is a characteristic, not yet a muscle; it lacks {lack}.")
         given = {part: getattr(self, part) for part in ("spring", "damper") if getattr(self, part) is not None}
-        return Muscle(self.characteristic, self.geometry, **given)
+        return Muscle(self.characteristic, self.geometry, box=self.box, **given)
