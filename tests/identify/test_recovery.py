@@ -24,9 +24,7 @@ from airmuscle.library import catalogue
 from airmuscle.recording import Recording
 
 HELD = {
-    "dmsp-10-250": ("wall_thickness",),  # multiplies the modulus: only their product is felt
-    "dmsp-20-300": ("wall_thickness",),
-    "saga2007": ("wall_thickness",),
+    "saga2007": ("wall_thickness",),  # multiplies the modulus: only their product is felt
     "saga2007-circle": ("wall_thickness",),
 }
 

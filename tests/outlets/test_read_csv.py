@@ -333,3 +333,12 @@ def test_a_long_file_is_read_in_a_moment(bench):
     for i, name in enumerate(("time", "force", "position")):
         assert np.array_equal(fast[name], values[:, i])
         assert np.array_equal(careful[name], values[:, i])
+
+
+def test_a_stated_unit_goes_before_the_files_own_and_says_so(tmp_path):
+    path = tmp_path / "bench.csv"
+    path.write_text("pressure [bar],force [N]\n30,1\n60,2\n", encoding="utf-8")
+    recording = read_csv(path, units={"pressure": "psig"})
+    assert recording["pressure"][0] == pytest.approx(30 * 6894.757293168361)
+    assert "pressure is taken in psig, as stated, although the file says bar" in recording.notes
+    assert not any("although" in note for note in read_csv(path, units={"pressure": "bar"}).notes)

@@ -40,7 +40,9 @@ class MartensBoblan2017(ForceLaw):
     references: ClassVar[tuple[Reference, ...]] = (MARTENS_BOBLAN_2017,)
 
     geometry: Braid
-    wall_thickness: float = parameter("m", "H_0", "thickness of the rubber wall at rest", bounds=(1e-4, 1e-2))
+    wall_thickness: float = parameter(
+        "m", "H_0", "thickness of the wall at rest; only its product with E is felt", bounds=(1e-4, 1e-2), fitted=False
+    )
     c0: float = parameter("Pa", "c_0", "modulus of the wall, constant term")
     c1: float = parameter("Pa/m", "c_1", "modulus of the wall, by length")
     c2: float = parameter("Pa/m^2", "c_2", "modulus of the wall, by length squared")

@@ -40,7 +40,7 @@ def interpret(
             found = {stated[0]: stated[1], **found} if stated else found
     ambient = float(found.get("ambient", AMBIENT_PRESSURE))
     columns: dict[str, Array] = {}
-    notes: list[str] = list(table.notes)
+    notes: list[str] = [*table.notes, *_overruled(table, headings)]
     for heading, cells in zip(headings, table.columns, strict=True):
         if heading.known:
             columns[heading.name], note = _in_si(table, heading, cells, ambient)
@@ -71,6 +71,17 @@ def _headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
     if not any(heading.known for heading in found):
         _refuse_all(table, found)
     return found
+
+
+def _overruled(table: RawTable, headings: list[Heading]) -> list[str]:
+    """A word on every column whose own unit gave way to the one that the user stated."""
+    row = [*(table.units or ()), *[""] * len(headings)]
+    own = [below or read_heading(h.text).unit for h, below in zip(headings, row, strict=False)]
+    return [
+        f"{h.name} is taken in {h.unit}, as stated, although the file says {unit}"
+        for h, unit in zip(headings, own, strict=True)
+        if unit and h.unit and unit != h.unit
+    ]
 
 
 def _refuse_twins(table: RawTable, headings: list[Heading]) -> None:
