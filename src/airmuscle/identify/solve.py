@@ -106,6 +106,8 @@ def _solve_iterating(problem: Problem, loss: Loss, start: Array) -> Solution:
         counting = problem.counting(problem.modelled(values))
         return np.asarray(problem.slopes(values) * (counting * problem.weights / spread)[:, None] * scale)
 
+    if np.abs(errors(start / scale)).max() < 1e-14:  # it meets every row already: there is no slope to follow
+        return Solution(start, problem.modelled(start), problem.slopes(start))
     result = least_squares(
         errors,
         start / scale,
