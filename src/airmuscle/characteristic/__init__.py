@@ -15,8 +15,8 @@ from .contractile_surface import ContractileSurface as ContractileSurface
 from .effective_length import EffectiveLength as EffectiveLength
 from .exact_meridian import ExactMeridian as ExactMeridian
 from .hunt2017 import Hunt2017 as Hunt2017
-from .inverse_length import InverseLength as InverseLength
-from .logarithmic_length import LogarithmicLength as LogarithmicLength
+from .length_family import InverseLength as InverseLength
+from .length_family import LogarithmicLength as LogarithmicLength
 from .martens_boblan2017 import MartensBoblan2017 as MartensBoblan2017
 from .reynolds2003 import Reynolds2003 as Reynolds2003
 from .rubber import RubberLine as RubberLine
