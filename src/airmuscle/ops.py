@@ -54,8 +54,8 @@ def maximum(a: Value, b: Value) -> Value:
 
 
 def minimum(a: Value, b: Value) -> Value:
-    """The smaller; traced as a comparison, whose derivative at equality is that of `a`."""
-    return np.minimum(a, b) if _library(a, b) is np else where(a <= b, a, b)
+    """The smaller; traced as a comparison, whose derivative at equality is that of `b`, the one not the larger."""
+    return np.minimum(a, b) if _library(a, b) is np else where(a >= b, b, a)
 
 
 def clip(x: Value, low: Value, high: Value) -> Value:

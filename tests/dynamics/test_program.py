@@ -144,6 +144,14 @@ def test_slopes_are_exact_and_equal_in_every_world():
     np.testing.assert_allclose(by_parameter[:, 0], values / 2.0)
 
 
+def test_where_two_numbers_are_equal_one_is_the_larger_and_the_other_the_smaller():
+    """Otherwise their slopes vanish together, and with them the Jacobian of a flow at equal pressures."""
+    x, y = casadi.SX.sym("x"), casadi.SX.sym("y")
+    both = casadi.vertcat(ops.maximum(x, y) + ops.minimum(x, y), ops.maximum(x, y) - ops.minimum(x, y))
+    slopes = casadi.Function("slopes", [x, y], [casadi.jacobian(both, casadi.vertcat(x, y))])
+    np.testing.assert_array_equal(np.array(slopes(2.0, 2.0)), [[1.0, 1.0], [1.0, -1.0]])
+
+
 @pytest.mark.parametrize(
     ("value", "message"),
     [(math.nan, "must be finite"), ("2", "must be a number"), (True, "must be a number"), (1e9, "allowed are")],
