@@ -30,10 +30,13 @@ QUANTITIES: dict[str, Quantity] = {
     "discharge": Quantity("1", "u_dis", "opening of the discharge valve, 0 shut to 1 open"),
     "held": Quantity("1", "u_held", "1 while the load is latched, 0 released"),
     "branch": Quantity("1", "b", "branch as a file states it, 1 inflating, 2 deflating; it only judges what is found"),
+    "friction": Quantity("N", "F_f", "friction of the muscle, against its motion"),
+    "bristle": Quantity("m", "z", "deflection of a friction element"),
+    "stop": Quantity("m", "z_s", "deflection of a stop operator"),
     "temperature": Quantity("K", "T", "absolute temperature of the air"),
 }
 
 
 def quantity_of(column: str) -> Quantity | None:
-    """The quantity behind a column name; `left.pressure` is a pressure."""
-    return QUANTITIES.get(column.rpartition(".")[2])
+    """The quantity behind a column name; `left.pressure` is a pressure, `bristle2` a bristle."""
+    return QUANTITIES.get(column.rpartition(".")[2].rstrip("0123456789"))
