@@ -77,7 +77,7 @@ def test_plants_of_every_size_agree_with_scipy(size):
     rows = np.isin(run["time"], times)
     for i, state in enumerate(plant.states):
         size_of = max(np.abs(expected[:, i]).max(), state.nominal)
-        np.testing.assert_allclose(run[state.name][rows], expected[:, i], atol=2e-7 * size_of, rtol=0)
+        np.testing.assert_allclose(run[state.name][rows], expected[:, i], atol=2e-8 * size_of, rtol=0)
 
 
 @pytest.mark.parametrize("size", CASES)

@@ -336,3 +336,11 @@ def test_an_interrupted_run_leaves_the_chapters_that_are_complete(
 def test_the_table_of_papers_names_modules_of_this_package():
     assert list(run.PAPERS) == ["saga2007", "borzikova", "hosovsky"]
     assert all(module.startswith("airmuscle.reproduce.") for module in run.PAPERS.values())
+
+
+def test_a_chosen_bound_is_never_given_out_as_published():
+    claim = Claim("paper", "low pressure", AtMost(0.04, chosen=True), 0.03, "MPa")
+    assert claim.verdict == "holds"
+    assert claim.as_dict()["published"] is None
+    assert claim.as_dict()["tolerance"] == 0.04
+    assert published(claim) == "≤ 0.04 (chosen)"

@@ -291,8 +291,7 @@ class ExactMeridian(PressureLaw):
 
 def _error(balance: Balance, wanted: Any) -> Any:
     """The larger miss of the two lengths, as a part of the fibre's length; infinite where there is no shape."""
-    miss = np.abs(balance.lengths - wanted).max(axis=0) / wanted[0]
-    return np.where(np.isfinite(miss), miss, np.inf)
+    return np.nan_to_num(np.abs(balance.lengths - wanted).max(axis=0) / wanted[0], nan=np.inf, posinf=np.inf)
 
 
 def _as_given(balance: Balance) -> Balance:

@@ -21,6 +21,7 @@ from ..characteristic.base import ContractionLaw
 from ..errors import IdentificationError
 from ..recording import Recording
 from .exponential_surface import SurfaceFit, SurfaceProblem
+from .places import places
 from .surface_basis import Array, LoadBox
 
 MARGIN = 1e-9
@@ -70,22 +71,11 @@ def monotonicity_breaks(
     found: list[MonotonicityBreak] = []
     for rule, argument, sign in ((Rule.RISES_WITH_FORCE, 1, 1.0), (Rule.FALLS_WITH_PRESSURE, 0, -1.0)):
         slope = trace.slope(law, "contraction", pressure, force, wrt=argument)
-        found += _places(rule, slope, sign, pressure, force)
+        found += [
+            MonotonicityBreak(rule, p.first, p.second, p.share, p.worst, sign * p.height)
+            for p in places(sign * slope, pressure, force)
+        ]
     return tuple(sorted(found, key=lambda b: -b.share))
-
-
-def _places(rule: Rule, slope: Array, sign: float, pressure: Array, force: Array) -> list[MonotonicityBreak]:
-    from scipy import ndimage
-
-    labels, count = ndimage.label(sign * slope > 0)
-    places = []
-    for label in range(1, count + 1):
-        here = labels == label
-        at = np.unravel_index(int(np.argmax(np.where(here, sign * slope, -np.inf))), slope.shape)
-        ranges = [(float(v[here].min()), float(v[here].max())) for v in (pressure, force)]
-        worst = (float(pressure[at]), float(force[at]))
-        places.append(MonotonicityBreak(rule, ranges[0], ranges[1], float(here.mean()), worst, float(slope[at])))
-    return places
 
 
 def monotone(

@@ -24,6 +24,7 @@ from ..recording import Recording
 from .fit import fit
 from .loss import Array
 from .monotone_surface import constrained
+from .places import places
 
 _MARGIN = 1e-9
 """Least slope on the box scaled to -1..1, in parts of the greatest force, so that rounding turns none round; chosen."""
@@ -71,25 +72,12 @@ def shape_breaks(law: ForceLaw, box: Box, *, points: int = 101) -> tuple[ShapeBr
     for rule, argument, sign in rules:
         slope = np.asarray(trace.slope(law, "force", pressure, contraction, wrt=argument))
         against = sign * slope
-        found += _places(
-            rule, np.where(against > _LEVEL * np.abs(slope).max(), against, 0.0), sign, pressure, contraction
-        )
+        felt = np.where(against > _LEVEL * np.abs(slope).max(), against, 0.0)
+        found += [
+            ShapeBreak(rule, p.first, p.second, p.share, p.worst, sign * p.height)
+            for p in places(felt, pressure, contraction)
+        ]
     return tuple(sorted(found, key=lambda b: -b.share))
-
-
-def _places(rule: ShapeRule, against: Array, sign: float, pressure: Array, contraction: Array) -> list[ShapeBreak]:
-    from scipy import ndimage
-
-    labels, count = ndimage.label(against > 0)
-    places = []
-    for label in range(1, count + 1):
-        here = labels == label
-        at = np.unravel_index(int(np.argmax(np.where(here, against, -np.inf))), against.shape)
-        (p0, p1), (c0, c1) = ((float(v[here].min()), float(v[here].max())) for v in (pressure, contraction))
-        worst = (float(pressure[at]), float(contraction[at]))
-        share = float(here.mean())
-        places.append(ShapeBreak(rule, (p0, p1), (c0, c1), share, worst, float(sign * against[at])))
-    return places
 
 
 @dataclasses.dataclass(frozen=True)

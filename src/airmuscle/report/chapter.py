@@ -18,10 +18,15 @@ HOLDS, DIFFERS, NOT_PRINTED = "holds", "differs", "not printed"
 
 @dataclasses.dataclass(frozen=True)
 class Printed(abc.ABC):
-    """What a paper prints for a claim, and how a reproduced number is held against it."""
+    """What a paper prints for a claim, and how a reproduced number is held against it.
+
+    Where a paper says only "low" or "comparable", the bound is `chosen`: then no number counts as published, and the
+    bound stands as the tolerance.
+    """
 
     value: float
     tolerance: float = 0.0
+    chosen: bool = False
 
     @abc.abstractmethod
     def agrees(self, reproduced: float) -> bool:
@@ -72,13 +77,14 @@ class Claim:
 
     def as_dict(self) -> dict[str, Any]:
         """The claim as `claims.json` holds it."""
+        held = self.printed
         return {
             "paper": self.paper,
             "claim": self.claim,
-            "published": None if self.printed is None else self.printed.value,
+            "published": None if held is None or held.chosen else held.value,
             "reproduced": self.reproduced,
             "unit": self.unit,
-            "tolerance": None if self.printed is None else self.printed.tolerance,
+            "tolerance": None if held is None else held.value if held.chosen else held.tolerance,
             "verdict": self.verdict,
             "note": self.note,
         }

@@ -34,7 +34,8 @@ def published(claim: Claim) -> str:
         return MISSING
     relation = _RELATIONS.get(type(claim.printed), "")
     tolerance = f" ± {number(claim.printed.tolerance)}" if claim.printed.tolerance else ""
-    return f"{relation}{number(claim.printed.value)}{tolerance}"
+    chosen = " (chosen)" if claim.printed.chosen else ""
+    return f"{relation}{number(claim.printed.value)}{tolerance}{chosen}"
 
 
 def tally(claims: tuple[Claim, ...]) -> dict[str, int]:

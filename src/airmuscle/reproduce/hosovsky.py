@@ -12,6 +12,7 @@ from ..check import maxwell_defect
 from ..figures import LINES, legend_outside, new_figure
 from ..geometry.base import Geometry
 from ..identify import Fit
+from ..identify.solve import measured_rank
 from ..library import catalogue
 from ..reference import cite
 from ..report.chapter import Chapter, Claim, Equal, Plot, Table
@@ -30,10 +31,11 @@ each verdict on the quick release says whether it survives the whole range of ev
 def surface_claims(found: Fit) -> tuple[Claim, ...]:
     """The form of the contractile surface, counted and measured."""
     law = surface()
+    measured = measured_rank(found.problem, found.problem.slopes(found.values))
     force = law.force(np.linspace(0, 1e6, 51)[:, None], np.linspace(-0.05, 0.4, 46)[None, :])
     return (
         Claim(PAPER, "coefficients of a polynomial of total degree five", Equal(21, 0), len(exponents(5)), "1"),
-        Claim(PAPER, "coefficients that the measured map determines (rank of the fit)", Equal(21, 0), found.rank, "1",
+        Claim(PAPER, "coefficients that the rows of the map that pull determine", Equal(21, 0), measured, "1",
               f"condition {found.condition:.3g}, scaled; rms {found.rmse:.3g} N. " + " ".join(found.notes)),
         Claim(PAPER, "force compensator: greatest force of the surface", Equal(1200.0, 0.0), float(force.max()), "N"),
         Claim(PAPER, "force compensator: least force of the surface", Equal(0.0, 0.0), float(force.min()), "N"),

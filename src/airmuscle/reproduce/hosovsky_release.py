@@ -111,7 +111,7 @@ def claims(low: Release, high: Release, ranges: Table) -> tuple[Claim, ...]:
     """The paper's statements on Fig. 4; each note says whether it holds over all chosen ranges."""
     values = compared(low, high)
     columns = list(ranges.columns.values())[1:]
-    alike, more = AtMost(COMPARABLE), AtLeast(0.0)
+    alike, more = AtMost(COMPARABLE, chosen=True), AtLeast(0.0)
     statements = (
         ("a higher initial pressure gives a higher first acceleration: difference", "acceleration", more, "m/s2"),
         ("a higher initial pressure gives a larger greatest contraction: difference", "contraction", more, "%"),
