@@ -32,7 +32,7 @@ from ..errors import ParameterError
 from ..method import Method, Rodas4
 from ..plant import Plant
 from ..recording import Recording
-from ..simulate import refuse_beyond_opening, simulate
+from ..simulate import refuse_beyond_range, simulate
 from .build import build
 from .catalogue import load, parsed
 from .entry import Entry
@@ -86,7 +86,7 @@ def load_scenario(path: str | Path) -> Scenario:
     duration, start_time = _length(run, "duration", at), finite(run.get("start_time", 0.0), "s", f"{at}, start_time")
     command = _command(_table(tables.get("command", {}), "command", place), plant, place.inside("command"))
     with said_at(place.inside("command")):
-        refuse_beyond_opening(plant, command.segments(plant.inputs, start_time, duration), start_time)
+        refuse_beyond_range(plant, command.segments(plant.inputs, start_time, duration), start_time)
     return Scenario(
         title=text(tables, "title", place, needed=False) or file.stem,
         plant=plant,
