@@ -27,6 +27,7 @@ _MODULES: dict[str, str] = {
     "SumPastHalf": "geometry.fibre_sum",
     "TabulatedGeometry": "geometry.tabulated",
     "TrueArcParabola": "geometry.parabola",
+    "Vessel": "geometry.vessel",
     # elements of a muscle
     "CreepElements": "muscle.creep",
     "CubicSpring": "muscle.spring",
