@@ -13,8 +13,8 @@ C [m3/(s Pa)] is the figure that the laws use. Every pair of functions here is i
     diameter        of a round hole, S = c_d pi d^2/4 with its discharge coefficient c_d
 
 All but the effective area need b, which a sheet with Kv or the nominal flow alone does not print: 0.3 is usual, and
-what was taken must be said. Kv measured with water, or Cv with air at a drop of 0.1 bar, says nothing of choke: of SMC's
-valves the Cv printed beside C and b is 4 to 30 % above this rule. Where C and b are printed, use them.
+what was taken must be said. Kv measured with water, or Cv with air at a drop of 0.1 bar, says nothing of choke: of
+SMC's valves the Cv printed beside C and b is 4 to 31 % above this rule. Where C and b are printed, use them.
 Kv and Cv are plain numbers in the units of their definitions; everything else is SI.
 """
 
@@ -23,7 +23,6 @@ from __future__ import annotations
 from .. import ops
 from ..errors import ParameterError
 from ..gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Ambient
-from ..ops import Value
 from .valve import Valve
 
 NOMINAL_UPSTREAM, NOMINAL_DOWNSTREAM = 7e5, 6e5
@@ -31,11 +30,11 @@ NOMINAL_UPSTREAM, NOMINAL_DOWNSTREAM = 7e5, 6e5
 KV_PER_CV = 0.865
 """Kv [m3/h at 1 bar] of a valve with Cv 1 [US gallons a minute at 1 psi]."""
 _HEAT_RATIO = 1.4
-_NOZZLE = _HEAT_RATIO**0.5 * (2.0 / (_HEAT_RATIO + 1.0)) ** ((_HEAT_RATIO + 1.0) / (2.0 * (_HEAT_RATIO - 1.0)))
+_NOZZLE: float = _HEAT_RATIO**0.5 * (2.0 / (_HEAT_RATIO + 1.0)) ** ((_HEAT_RATIO + 1.0) / (2.0 * (_HEAT_RATIO - 1.0)))
 """qm sqrt(R T)/(S p1) of choked air without loss [1], 0.6847."""
-_SPEED = ops.sqrt(GAS_CONSTANT * REFERENCE_TEMPERATURE)
+_SPEED: float = ops.sqrt(GAS_CONSTANT * REFERENCE_TEMPERATURE)
 """sqrt(R T0) [m/s]."""
-_KV_AREA = 1.0 / 3600.0 / ops.sqrt(2.0 * 1e5 / 1000.0)
+_KV_AREA: float = 1.0 / 3600.0 / ops.sqrt(2.0 * 1e5 / 1000.0)
 """Area [m2] of Kv = 1: 1 m3/h of water, 1000 kg/m3, at 1 bar."""
 
 
@@ -45,7 +44,7 @@ def nominal_flow(conductance: float, critical_ratio: float) -> float:
 
 
 def conductance_from_nominal_flow(flow: float, critical_ratio: float) -> float:
-    """C [m3/(s Pa)] from the volume flow [m3/s] at the reference atmosphere, 6 to 5 bar gauge. Raises ParameterError."""
+    """C [m3/(s Pa)] from the volume flow [m3/s] at the reference atmosphere, 6 to 5 bar gauge; ParameterError."""
     return conductance_from_flow(flow, critical_ratio, NOMINAL_UPSTREAM, NOMINAL_DOWNSTREAM)
 
 
@@ -137,8 +136,8 @@ def _unit_flow(critical_ratio: float, upstream: float, downstream: float) -> flo
     return float(law.mass_flow(upstream, downstream, 1.0, REFERENCE_TEMPERATURE) / (REFERENCE_DENSITY * 1e-8))
 
 
-def _near_equal(critical_ratio: float) -> Value:
-    return ops.sqrt(1.0 - _ratio(critical_ratio))
+def _near_equal(critical_ratio: float) -> float:
+    return float(ops.sqrt(1.0 - _ratio(critical_ratio)))
 
 
 def _ratio(critical_ratio: float) -> float:
@@ -146,12 +145,11 @@ def _ratio(critical_ratio: float) -> float:
 
 
 def _positive(what: str, value: float) -> None:
-    if not 0.0 < value < float("inf"):
-        raise ParameterError(f"{what} is {value:g}; it must be a finite number above zero, in SI units.")
+    if isinstance(value, bool) or not isinstance(value, float | int) or not 0.0 < value < float("inf"):
+        raise ParameterError(f"{what} is {value!r}; it must be a finite number above zero.")
 
 
 def _coefficient(value: float) -> None:
-    if not 0.0 < value <= 1.0:
-        raise ParameterError(
-            f"discharge coefficient is {value:g}; it is a ratio above 0, 1 at most (0.6 a sharp edge)."
-        )
+    _positive("discharge coefficient", value)
+    if value > 1.0:
+        raise ParameterError(f"discharge coefficient is {value:g}; it is at most 1 (about 0.6 for a sharp edge).")
