@@ -6,6 +6,7 @@ A valve of the catalogue stands in a scenario as `{ library = "matrix-821" }`.
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -110,6 +111,17 @@ def test_a_file_of_the_user_is_read_in_si(tmp_path: Path):
     assert entry.flow(**dict(check.given)) == pytest.approx(check.equals, rel=1e-9)
     assert dict(check.given) == {"upstream": 7e5, "downstream": 1e5}
     assert find(tmp_path / "valve.toml") == find(str(tmp_path / "valve.toml")) == entry
+
+
+def test_the_page_on_valves_is_true(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    page = (Path(__file__).parents[2] / "docs" / "valves.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    exec(compile(code, "valves.md", "exec"), {})
+    assert capsys.readouterr().out.count("Valve(") == 2
+    _, own = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+    entry = load_valve(written(tmp_path, own))
+    (check,) = entry.checks
+    assert abs(entry.flow(**dict(check.given)) - check.equals) <= check.tolerance
 
 
 def test_a_limit_of_use_is_a_warning():
