@@ -16,7 +16,7 @@ import pytest
 from scipy.integrate import quad
 
 from airmuscle.characteristic.chou_hannaford1996 import ChouHannaford1996
-from airmuscle.circuit import FillDischarge, Supply, Valve
+from airmuscle.circuit import CheckValve, FillDischarge, IndexedValve, Orifice, Supply, Valve
 from airmuscle.command import Schedule
 from airmuscle.gas import GAS_CONSTANT, REFERENCE_DENSITY, Ambient, Isothermal
 from airmuscle.geometry.braid import Braid
@@ -33,9 +33,8 @@ VOLUME = BRAID.volume(0.0)
 TAU = VOLUME / (GAS_CONSTANT * T0 * CONDUCTANCE * REFERENCE_DENSITY)
 
 
-def filled(b: float, start: float, duration: float):
+def filled(valve: Orifice, start: float, duration: float):
     """Time [s] and absolute pressure [Pa] of a muscle held at zero contraction, whose volume is a vessel's."""
-    valve = Valve(CONDUCTANCE, b)
     circuit = FillDischarge(Supply(SOURCE - AMBIENT.pressure), valve, valve)
     plant = Plant(Muscle(ChouHannaford1996(BRAID), BRAID), circuit, Isometric(0.0), gas=Isothermal(), ambient=AMBIENT)
     run = simulate(
@@ -59,12 +58,26 @@ def closed_form(b: float, start: float, time):
 @pytest.mark.parametrize(("b", "start"), [(0.0, 1e5), (0.0, 4e5), (0.3, 1e5), (0.433, 1e5), (0.5, 6e5)])
 def test_the_vessel_fills_as_the_closed_form_says(b: float, start: float):
     full = TAU * (max(b - start / SOURCE, 0.0) + (1 - b) * np.pi / 2)
-    time, pressure = filled(b, start, full)
+    time, pressure = filled(Valve(CONDUCTANCE, b), start, full)
     expected = closed_form(b, start, time)
     below = expected < 0.9985 * SOURCE
     below &= np.maximum.accumulate(expected) <= expected
     assert below.sum() > 100
     assert pressure[below] == pytest.approx(expected[below], rel=1e-6)
+
+
+def test_the_general_law_fills_it_alike():
+    plain, general = (filled(law, 1e5, 2.0)[1] for law in (Valve(CONDUCTANCE, 0.3), IndexedValve(CONDUCTANCE, 0.3)))
+    assert general == pytest.approx(plain, rel=1e-6)
+
+
+def test_through_a_cracking_check_valve_it_stops_short_of_the_supply_and_does_not_empty():
+    check = CheckValve(IndexedValve(CONDUCTANCE, 0.3, 0.55, 30e3))
+    _, filling = filled(check, 1e5, 60.0)
+    assert filling[-1] == pytest.approx(SOURCE - 30e3, rel=1e-4)
+    assert filling.max() <= SOURCE - 30e3 + 1.0
+    _, holding = filled(check, 9e5, 5.0)
+    assert holding == pytest.approx(9e5, rel=1e-12)
 
 
 @pytest.mark.parametrize("b", [0.0, 0.3, 0.433])

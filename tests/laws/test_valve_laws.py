@@ -123,6 +123,20 @@ def test_below_its_cracking_pressure_it_is_shut_and_above_it_opens():
     assert 0.0 < flow(valve, 320e3, 299.9e3) < flow(valve, 320e3, 299e3)
 
 
+def test_where_cracking_takes_up_all_of_the_subsonic_range_it_opens_over_the_laminar_one():
+    """b = 0.6 and dp_c = 3 bar at 4 bar: 1 - b - dp_c/p1 < 0, where the printed formula has no meaning."""
+    valve, p1 = IndexedValve(1e-8, 0.6, 0.5, 3e5), 4e5
+    choked = 1e-8 * REFERENCE_DENSITY * p1
+    shares = [flow(valve, p1, p1 - 3e5 - part * 0.001 * p1) / choked for part in (0.0, 0.25, 0.5, 1.0, 50.0)]
+    assert shares == pytest.approx([0.0, 0.25, 0.5, 1.0, 1.0])
+
+
+@given(indexed, st.floats(0.0, 2.0))
+def test_the_power_itself_has_a_finite_slope_even_where_another_branch_rules(valve, way):
+    """Derivatives of both branches are worked out before one is chosen: infinity times zero would be NaN in JAX."""
+    assert np.isfinite(trace.slope(valve, "_fraction", way, wrt=0))
+
+
 def kinks(law: Orifice, p1: float) -> list[float]:
     """Downstream pressures [Pa] at which a branch of the law changes, forward and reverse."""
     inner = getattr(law, "orifice", law)
