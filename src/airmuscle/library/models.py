@@ -67,6 +67,8 @@ _MODULES: dict[str, str] = {
     "ProportionalValve": "circuit",
     "RegulatedSupply": "circuit",
     "Shared": "circuit",
+    "CheckValve": "circuit",
+    "IndexedValve": "circuit",
     "Supply": "circuit",
     "Tank": "circuit",
     "ThreePosition": "circuit",
