@@ -10,9 +10,9 @@ from ..gas import Air, Ambient, Flow, Gas, Isothermal, gauge
 from ..ops import Value
 from ..variables import Input, StateVariable, outside, renamed, within
 from .circuit import Circuit, Response
+from .orifice import Orifice
 from .supply import Source
 from .through import through
-from .valve import Valve
 
 
 @model
@@ -23,7 +23,7 @@ class Tube:
     exact for the flow law of a tube with friction, q^2 = C^2 (p_1^2 - p_2^2), that is for a critical ratio of 0.
     """
 
-    orifice: Valve
+    orifice: Orifice
     volume: float = parameter("m3", "V_t", "volume of the tube", bounds=(1e-9, 1e-2))
     pieces: int = 1
     gas: Gas = Isothermal()

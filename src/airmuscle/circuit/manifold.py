@@ -12,9 +12,9 @@ from ..ops import Value
 from ..variables import Input, StateVariable, outside, renamed, within
 from .circuit import Circuit, Response
 from .fill_discharge import surroundings
+from .orifice import Orifice
 from .supply import Shared, Source
 from .through import through
-from .valve import Valve
 
 
 @model
@@ -22,7 +22,7 @@ class Leaking(Circuit):
     """A circuit whose muscles also lose air to the surroundings through a leak each."""
 
     circuit: Circuit
-    leak: Valve
+    leak: Orifice
 
     @property
     def supply(self) -> Source:  # type: ignore[override]  # the circuit's own

@@ -10,8 +10,8 @@ from ..errors import ParameterError
 from ..gas import Air, Ambient, Flow, Gas, Isothermal, absolute
 from ..ops import Value
 from ..variables import StateVariable, outside, renamed, within
+from .orifice import Orifice
 from .through import opened, through
-from .valve import Valve
 
 
 class Source(abc.ABC):
@@ -61,7 +61,7 @@ class Tank(Source):
     """
 
     supply: Source
-    feed: Valve
+    feed: Orifice
     volume: float = parameter("m3", "V_T", "volume of the tank", bounds=(1e-6, 1e2))
     gas: Gas = Isothermal()
 
@@ -94,7 +94,7 @@ class RegulatedSupply(Source):
     """
 
     supply: Source
-    valve: Valve
+    valve: Orifice
     pressure: float = parameter("Pa", "p_set", "gauge pressure that it is set to", bounds=(0.0, 2e6))
     band: float = parameter("Pa", "B", "droop from no flow to full flow", bounds=(100.0, 1e6), default=2e4)
     volume: float = parameter("m3", "V_r", "volume of its outlet", bounds=(1e-7, 1.0), default=5e-5)

@@ -68,6 +68,8 @@ _MODULES: dict[str, str] = {
     "ProportionalValve": "circuit",
     "RegulatedSupply": "circuit",
     "Shared": "circuit",
+    "CheckValve": "circuit",
+    "IndexedValve": "circuit",
     "Supply": "circuit",
     "Tank": "circuit",
     "ThreePosition": "circuit",
