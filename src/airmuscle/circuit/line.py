@@ -65,7 +65,10 @@ class Tube:
 
 @model
 class Line(Circuit):
-    """A tube between a circuit's valves and each of its muscles; `tube.pressure` (`tube1.pressure`, ...) is that in its pieces."""
+    """A tube between a circuit's valves and each of its muscles.
+
+    `tube.pressure` is that in the tube; with several pieces `tube1.pressure`, ... from the valve on.
+    """
 
     circuit: Circuit
     tube: Tube
