@@ -25,9 +25,20 @@ class Segments:
 
     def inputs_at(self, times: Array, start: float) -> Array:
         """The inputs (N, m) at times (N,); at an instant those that begin there."""
-        starts = np.concatenate([[start], self.ends[:-1]])
+        starts = self.starts(start)
         index = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, self.ends.size - 1)
         return np.asarray(self.values[index] + (times - starts[index])[:, None] * self.slopes[index])
+
+    def starts(self, start: float) -> Array:
+        """Where each segment begins (S,)."""
+        return np.concatenate([[start], self.ends[:-1]])
+
+    def cut_at(self, starts: Array, start: float) -> Segments:
+        """The same course with segments that begin at other instants (R,), in rising order, the first not before
+        `start`; within them it must have no instant of its own."""
+        index = np.searchsorted(self.starts(start), starts, side="right") - 1
+        ends = np.append(starts[1:], self.ends[-1])
+        return Segments(ends, self.inputs_at(starts, start), self.slopes[index])
 
 
 class Command(abc.ABC):
@@ -80,13 +91,12 @@ class Schedule(Command):
         refuse_unknown_input(list(self.changes), inputs)
         end = start + duration
         instants = {time for changes in self.changes.values() for time, _ in changes if start < time < end}
-        ends = np.array([*sorted(instants), end])
-        starts = np.concatenate([[start], ends[:-1]])
-        values = np.zeros((ends.size, len(inputs)))
+        starts = np.array([start, *sorted(instants)])
+        values = np.zeros((starts.size, len(inputs)))
         for i, name in enumerate(inputs):
-            for time, value in self.changes.get(name, ()):
-                values[starts >= time, i] = value
-        return Segments(ends, values, np.zeros_like(values))
+            times, levels = np.array([(-np.inf, 0.0), *self.changes.get(name, ())], dtype=float).T
+            values[:, i] = levels[np.searchsorted(times, starts, side="right") - 1]
+        return Segments(np.append(starts[1:], end), values, np.zeros_like(values))
 
 
 @dataclasses.dataclass(frozen=True)
