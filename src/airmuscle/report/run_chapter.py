@@ -60,7 +60,8 @@ def _shown(scenario: Scenario, recording: Recording) -> list[str]:
 def _inputs(scenario: Scenario, recording: Recording) -> Plot:
     """Every input as the plant had it, with its jumps, and behind it what a driver was told."""
     command, inputs = scenario.command, scenario.plant.inputs
-    start, end = scenario.start_time, max(float(recording["time"][-1]), np.nextafter(scenario.start_time, np.inf))
+    start, reached = scenario.start_time, float(recording["time"][-1])
+    end = reached if reached > start else start + scenario.duration
     had = command.segments(inputs, start, end - start)
     shortened = had.ends.size > MOST_PIECES
     if shortened:
