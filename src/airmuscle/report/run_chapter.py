@@ -65,7 +65,7 @@ def _inputs(scenario: Scenario, recording: Recording) -> Plot:
     had = command.segments(inputs, start, end - start)
     shortened = had.ends.size > MOST_PIECES
     if shortened:
-        had = command.segments(inputs, start, float(had.ends[MOST_PIECES]) - start)
+        had = command.segments(inputs, start, float(had.ends[MOST_PIECES - 1]) - start)
     told = command.inner.segments(inputs, start, float(had.ends[-1]) - start) if isinstance(command, Driven) else None
     figure, axes = new_figure(
         len(inputs), 1, height=0.9 + 0.9 * len(inputs), sharex=True, sharey=True, squeeze=False
