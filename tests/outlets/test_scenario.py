@@ -202,6 +202,12 @@ def test_a_recorded_command_may_be_held_and_rows_may_stand_beside_it(tmp_path: P
         assert command == kind({"fill": fill, "discharge": ((0.1, 1.0),)})
 
 
+def test_columns_called_like_inputs_are_taken_unasked(tmp_path: Path):
+    (tmp_path / "bench.csv").write_text("time [s],discharge [1],fill [1]\n0,1,0\n1,0.5,0.2\n", encoding="utf-8")
+    command = load_scenario(written(tmp_path, (FILL, 'file = "bench.csv"'))).command
+    assert command == Signal({"fill": ((0, 0), (1, 0.2)), "discharge": ((0, 1), (1, 0.5))})
+
+
 def test_the_file_of_a_run_holds_the_columns_that_are_asked_for(tmp_path: Path):
     path = written(tmp_path, ("[run]", '[output]\ncolumns = ["force", "fill"]\n[run]'))
     scenario = load_scenario(path)

@@ -27,7 +27,7 @@ MOST_CHANGES = 6
 def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
     """The chapter of a run, whole or as far as it came."""
     notes = "\n\n".join(_sentence(note) for note in recording.notes)
-    plots = [Plot("run", f"{scenario.title}, simulated.", recording.plot(*_shown(scenario, recording)))]
+    plots = [Plot("run", f"{scenario.title}, simulated.", recording.plot(*_shown(recording)))]
     if scenario.plant.inputs:
         plots.append(_inputs(scenario, recording))
     return Chapter(
@@ -52,9 +52,8 @@ def _length(scenario: Scenario, recording: Recording) -> str:
     return f"A run of {scenario.duration:g} s."
 
 
-def _shown(scenario: Scenario, recording: Recording) -> list[str]:
-    own = [name for name in recording if name not in scenario.plant.inputs]
-    return [name for kind in SHOWN for name in own if name.rpartition(".")[2] == kind]
+def _shown(recording: Recording) -> list[str]:
+    return [name for kind in SHOWN for name in recording if name.rpartition(".")[2] == kind]
 
 
 def _inputs(scenario: Scenario, recording: Recording) -> Plot:
