@@ -61,7 +61,7 @@ def simulate(
     method = method or Rodas4()
     ready = prepared(plant)
     segments = command.segments(plant.inputs, start_time, duration)
-    refuse_beyond_opening(plant, segments, start_time)
+    refuse_beyond_range(plant, segments, start_time)
     times = output_times(output, start_time, duration, segments.ends)
     state = _vector(plant, start)
     course = method.run(ready, segments, start_time, state, times)
@@ -83,7 +83,7 @@ def advance(
 ) -> dict[str, float]:
     """The state after `dt` [s] with the inputs held: the seam that controllers and exports call.
 
-    Raises SimulationError where the step fails, ParameterError for an unknown name or an opening beyond 0 to 1.
+    Raises SimulationError where the step fails, ParameterError for an unknown name or an input beyond its range.
     """
     from .program.prepared import prepared
 
@@ -91,7 +91,7 @@ def advance(
         raise ParameterError(f"advance: dt is {dt!r} s; it must be positive and finite.")
     hold = Schedule({name: ((0.0, float(value)),) for name, value in inputs.items()})
     segments = hold.segments(plant.inputs, 0.0, dt)
-    refuse_beyond_opening(plant, segments, 0.0)
+    refuse_beyond_range(plant, segments, 0.0)
     course = (method or Rodas4()).run(prepared(plant), segments, 0.0, _vector(plant, state), np.empty(0))
     if course.status != 0:
         raise SimulationError(_problem(plant, course, dt))
@@ -122,18 +122,22 @@ def output_times(output: float | npt.ArrayLike | None, start: float, duration: f
     return np.unique(np.concatenate([grid[apart], instants]))
 
 
-def refuse_beyond_opening(plant: System, segments: Segments, start: float) -> None:
-    """Raise ParameterError where a Plant is commanded beyond shut and open; the inputs of other systems are theirs."""
+def refuse_beyond_range(plant: System, segments: Segments, start: float) -> None:
+    """Raise ParameterError where a Plant is commanded beyond what its inputs allow; other systems' are theirs."""
     if not isinstance(plant, Plant):
         return
     lengths = np.diff(segments.ends, prepend=start)[:, None]
+    least, greatest = (np.array([getattr(i, end) for i in plant.commands]) for end in ("least", "greatest"))
+    slack = 1e-9 * (greatest - least)
     for values in (segments.values, segments.values + segments.slopes * lengths):
-        beyond = (values < -1e-9) | (values > 1 + 1e-9)
+        beyond = (values < least - slack) | (values > greatest + slack)
         if beyond.any():
             row, column = np.argwhere(beyond)[0]
+            given = plant.commands[column]
+            unit = "" if given.unit == "1" else f" {given.unit}"
             raise ParameterError(
-                f"the input '{plant.inputs[column]}' is {values[row, column]:g} before {segments.ends[row]:g} s; "
-                "allowed are 0 (shut, or free) to 1 (open, or held)."
+                f"the input '{given.name}' is {values[row, column]:g}{unit} before {segments.ends[row]:g} s; allowed "
+                f"are {given.least:g} to {given.greatest:g}{unit} ({given.meaning})."
             )
 
 

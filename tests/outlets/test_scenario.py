@@ -30,9 +30,11 @@ from airmuscle.geometry import Braid
 from airmuscle.library.catalogue import load, save
 from airmuscle.library.entry import Entry
 from airmuscle.library.scenario import load_scenario
+from airmuscle.library.valve_catalogue import load_valve
 from airmuscle.mechanism import HangingMass, Held, Isometric
 from airmuscle.method import DormandPrince8, Rodas4, RungeKutta4
 from airmuscle.muscle import LinearDamper
+from airmuscle.report.run_chapter import _inputs
 
 PAGE = (Path(__file__).parents[2] / "docs" / "scenario.md").read_text(encoding="utf-8")
 WHOLE, FITTED, PAIR, DRIVEN, LINE = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
@@ -202,6 +204,32 @@ def test_a_recorded_command_may_be_held_and_rows_may_stand_beside_it(tmp_path: P
         assert command == kind({"fill": fill, "discharge": ((0.1, 1.0),)})
 
 
+@pytest.mark.filterwarnings("ignore:smc-sx91: Made for 0.2 MPa at most")
+def test_a_driver_may_have_the_delays_of_a_valve_of_the_catalogue(tmp_path: Path):
+    response = load_valve("smc-sx91").response
+    command = load_scenario(
+        written(tmp_path, (FILL, f'{FILL}\ndrivers = {{ fill = {{ library = "smc-sx91" }} }}'))
+    ).command
+    assert command.drivers == {"fill": OnOff(response.opening_delay, response.closing_delay)}
+
+
+def test_an_input_is_read_in_its_own_unit(tmp_path: Path):
+    valve = '{ model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }'
+    regulator = f"""model = "ProportionalRegulator"
+supply = {{ model = "Supply", pressure = "6 bar" }}
+fill = {valve}
+discharge = {valve}
+lag = {{ model = "Follower", frequency = "20 Hz", damping_ratio = 0.7 }}
+"""
+    i, j = GOOD.index('model = "FillDischarge"'), GOOD.index("[plant.mechanism]")
+    text = GOOD[:i] + regulator + GOOD[j:].replace(FILL, 'setpoint = [["0.1 s", "2 bar"], ["0.2 s", 1e5]]')
+    scenario = load_scenario(written(tmp_path, text=text))
+    assert scenario.command == Schedule({"setpoint": ((0.1, 2e5), (0.2, 1e5))})
+    assert "setpoint\n[Pa]" in [axis.get_ylabel() for axis in _inputs(scenario, scenario.simulate()).figure.axes]
+    with pytest.raises(UnitError, match=r"\[command\], setpoint: unit 'mm' cannot become 'Pa'"):
+        load_scenario(written(tmp_path, ('"2 bar"', '"2 mm"'), text=text))
+
+
 def test_columns_called_like_inputs_are_taken_unasked(tmp_path: Path):
     (tmp_path / "bench.csv").write_text("time [s],discharge [1],fill [1]\n0,1,0\n1,0.5,0.2\n", encoding="utf-8")
     command = load_scenario(written(tmp_path, (FILL, 'file = "bench.csv"'))).command
@@ -363,6 +391,18 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             'fill = [[0, 2]]\ndrivers = { fill = "OnOff" }',
             ParameterError,
             r"\[command\]: the driver of 'fill' is told 2 before",
+        ),
+        (
+            FILL,
+            'drivers = { fill = { library = "ckd-m4ga1-r" } }',
+            ParameterError,
+            r"\[command.drivers.fill\]: ckd-m4ga1-r: no response is published; write model = ",
+        ),
+        (
+            FILL,
+            'drivers = { fill = { library = "matrix-821", path = "valve" } }',
+            ParameterError,
+            r"\[command.drivers.fill\]: 'path' is not known here",
         ),
         # what is written
         (

@@ -16,19 +16,22 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..command import Command, Periodic, Schedule, Signal, refuse_unknown_input
-from ..driver import Driven, Driver
+from ..driver import Driven, Driver, OnOff
 from ..errors import ColumnError, ParameterError
+from ..variables import Input
 from .build import build
 from .models import model_class
-from .place import Place, checked, finite, said_at, text
+from .place import Place, checked, finite, refuse_unknown, said_at, text
 
 KEYS = ("model", "period", "file", "columns", "drivers")
 """Keys of the table that are no inputs."""
 Points = tuple[tuple[float, float], ...]
 
 
-def command_from(table: Mapping[str, Any], inputs: Sequence[str], place: Place) -> Command:
+def command_from(table: Mapping[str, Any], commands: Sequence[Input], place: Place) -> Command:
     """The command that the table describes. Raises ParameterError, UnitError, UnknownName, FileError or ColumnError."""
+    units = {given.name: given.unit for given in commands}
+    inputs = tuple(units)
     rows = {key: value for key, value in table.items() if key not in KEYS}
     with said_at(place):
         refuse_unknown_input(list(rows), inputs)
@@ -36,7 +39,7 @@ def command_from(table: Mapping[str, Any], inputs: Sequence[str], place: Place) 
     for key, given in rows.items():
         if key in points:
             raise ParameterError(f"{place}: '{key}' stands in the file and here too; take it out of one of them.")
-        points[key] = tuple(_point(row, f"{place}, {key}") for row in _list(given, f"{place}, {key}"))
+        points[key] = tuple(_point(row, units[key], f"{place}, {key}") for row in _list(given, f"{place}, {key}"))
     with said_at(place):
         command: Command = _kind(table, place)(points)
     if "period" in table:
@@ -60,10 +63,10 @@ def _list(rows: Any, where: str) -> list[Any]:
     return rows
 
 
-def _point(row: Any, where: str) -> tuple[float, float]:
+def _point(row: Any, unit: str, where: str) -> tuple[float, float]:
     if not (isinstance(row, list) and len(row) == 2):
         raise ParameterError(f'{where} holds {row!r}; each is an instant and a value, ["5 s", 1].')
-    return finite(row[0], "s", where), finite(row[1], "1", where)
+    return finite(row[0], "s", where), finite(row[1], unit, where)
 
 
 def _recorded(table: Mapping[str, Any], inputs: Sequence[str], place: Place) -> dict[str, Points]:
@@ -107,5 +110,21 @@ def _chain(given: Any, place: Place) -> Driver | tuple[Driver, ...]:
 
 
 def _driver(given: Any, place: Place) -> Driver:
+    if isinstance(given, Mapping) and "library" in given and "model" not in given:
+        refuse_unknown(given, ("library",), place)
+        return _of_catalogue(text(given, "library", place, needed=True), place)
     found: Driver = checked(build({"model": given} if isinstance(given, str) else given, place), Driver, place)
     return found
+
+
+def _of_catalogue(name: str, place: Place) -> OnOff:
+    """The delays of a valve of the catalogue, or of a file beside the scenario; its motion is part of them."""
+    from .valve_catalogue import load_valve
+
+    with said_at(place):
+        valve = load_valve(place.folder / name if name.endswith(".toml") else name)
+        if valve.response is None:
+            raise ParameterError(
+                f'{valve.name}: no response is published; write model = "OnOff" and its opening_delay.'
+            )
+    return OnOff(valve.response.opening_delay, valve.response.closing_delay)

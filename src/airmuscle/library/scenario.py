@@ -35,7 +35,7 @@ from ..method import Method, Rodas4
 from ..muscle import Muscle
 from ..plant import Plant
 from ..recording import Recording
-from ..simulate import refuse_beyond_opening, simulate
+from ..simulate import refuse_beyond_range, simulate
 from .build import build
 from .catalogue import load, parsed
 from .command_table import command_from
@@ -96,9 +96,9 @@ def load_scenario(path: str | Path) -> Scenario:
         raise ParameterError(f"{at}: 'duration' is missing; write it like duration = \"25 s\".")
     duration, start_time = _length(run, "duration", at), finite(run.get("start_time", 0.0), "s", f"{at}, start_time")
     table = _table(tables.get("command", {}), "command", place)
-    command = command_from(table, plant.inputs, place.inside("command"))
+    command = command_from(table, plant.commands, place.inside("command"))
     with said_at(place.inside("command")):
-        refuse_beyond_opening(plant, command.segments(plant.inputs, start_time, duration), start_time)
+        refuse_beyond_range(plant, command.segments(plant.inputs, start_time, duration), start_time)
     start = _start(run.get("start", {"pressure": 0.0}), plant, at.inside("start"))
     return Scenario(
         title=text(tables, "title", place, needed=False) or file.stem,

@@ -15,6 +15,7 @@ import typing
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..circuit.orifice import Orifice
 from ..declare import Parameter, parameters
 from ..driver import Driver
 from ..method import Method
@@ -23,6 +24,7 @@ from ..plant import Plant
 from ..reference import Reference
 from . import command_table, read, scenario
 from .models import model_class, model_names
+from .valve_catalogue import PATHS
 
 Schema = dict[str, Any]
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
@@ -109,6 +111,8 @@ class _Models:
             members = [n for n in model_names() if issubclass(model_class(n, "schema"), cls)]
             alone = [n for n in members if not _required(model_class(n, "schema"))]
             tables = [self._reference(n) for n in members]
+            if cls is Orifice:
+                tables.append(_table({"library": _TEXT, "path": {"enum": list(PATHS)}}, ("library",)))
             self.found[name] = {"anyOf": [*([{"enum": alone}] if alone else []), *tables]}
         return {"$ref": f"#/$defs/{name}"}
 
@@ -173,10 +177,11 @@ def _plant(known: _Models) -> Schema:
 
 
 def _command(known: _Models) -> Schema:
-    point = {"type": "array", "prefixItems": [_quantity("s"), _quantity("1")], "minItems": 2, "maxItems": 2}
+    point = {"type": "array", "prefixItems": [_quantity("s"), _quantity("")], "minItems": 2, "maxItems": 2}
     rows = {"description": "instants [s] and values", "type": "array", "items": point}
     driver = known.kind(Driver)
-    chain = {"anyOf": [driver, {"type": "array", "items": driver}]}
+    each = {"anyOf": [driver, _table({"library": _TEXT}, ("library",))]}
+    chain = {"anyOf": [*each["anyOf"], {"type": "array", "items": each}]}
     keys = {
         "model": {"enum": ["Schedule", "Signal"]},
         "period": _quantity("s"),

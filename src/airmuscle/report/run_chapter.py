@@ -59,6 +59,7 @@ def _shown(recording: Recording) -> list[str]:
 def _inputs(scenario: Scenario, recording: Recording) -> Plot:
     """Every input as the plant had it, with its jumps, and behind it what a driver was told."""
     command, inputs = scenario.command, scenario.plant.inputs
+    units = {given.name: "" if given.unit == "1" else f"\n[{given.unit}]" for given in scenario.plant.commands}
     start, reached = scenario.start_time, float(recording["time"][-1])
     end = reached if reached > start else start + scenario.duration
     had = command.segments(inputs, start, end - start)
@@ -67,13 +68,13 @@ def _inputs(scenario: Scenario, recording: Recording) -> Plot:
         had = command.segments(inputs, start, float(had.ends[MOST_PIECES - 1]) - start)
     told = command.inner.segments(inputs, start, float(had.ends[-1]) - start) if isinstance(command, Driven) else None
     figure, axes = new_figure(
-        len(inputs), 1, height=0.9 + 0.9 * len(inputs), sharex=True, sharey=True, squeeze=False
-    )  # one height for all: openings are compared
+        len(inputs), 1, height=0.9 + 0.9 * len(inputs), sharex=True, sharey=len(set(units.values())) == 1, squeeze=False
+    )  # one height for all of one unit: openings are compared
     for i, (name, axis) in enumerate(zip(inputs, axes[:, 0], strict=True)):
         if told is not None:
             axis.plot(*_corners(told, start, i), color=BLACK, linestyle="--", linewidth=0.9, label="command")
         axis.plot(*_corners(had, start, i), color=BLUE, label="what the plant had")
-        axis.set_ylabel(name)
+        axis.set_ylabel(f"{name}{units[name]}")
     axes[-1, 0].set_xlabel("time [s]")
     figure.align_ylabels()
     if told is not None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from ... import ops
 from ...circuit import Supply, Valve
 from ...declare import model, parameter
-from ...gas import Ambient, Gas, Polytropic, absolute, gauge
+from ...gas import Ambient, Polytropic, Process, absolute, gauge
 from ...ops import Value
 from ...program import StateVariable
 
@@ -33,7 +33,7 @@ class FreeFill:
     middle: float = parameter("Pa", "p_h", "gauge pressure in the middle of the growth", bounds=(0.0, 1e6))
     breadth: float = parameter("Pa", "p_w", "breadth in pressure of the growth", bounds=(1e3, 1e6))
     lag: float = parameter("s", "tau", "time by which the wall lags", bounds=(1e-4, 10.0))
-    gas: Gas = Polytropic()
+    gas: Process = Polytropic()
     ambient: Ambient = Ambient()
 
     @property
