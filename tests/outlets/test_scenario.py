@@ -204,7 +204,7 @@ def test_a_recorded_command_may_be_held_and_rows_may_stand_beside_it(tmp_path: P
         assert command == kind({"fill": fill, "discharge": ((0.1, 1.0),)})
 
 
-@pytest.mark.filterwarnings("ignore:smc-sx91: Made for 0.2 MPa at most")
+@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
 def test_a_driver_may_have_the_delays_of_a_valve_of_the_catalogue(tmp_path: Path):
     response = load_valve("smc-sx91").response
     command = load_scenario(
