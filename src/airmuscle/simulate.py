@@ -116,7 +116,9 @@ def output_times(output: float | npt.ArrayLike | None, start: float, duration: f
         grid = np.sort(np.asarray(output, dtype=float))
         if grid.size and not (grid[0] >= start and grid[-1] <= end):
             raise ParameterError(f"simulate: output instants must lie within {start:g} to {end:g} s.")
-    apart = np.min(np.abs(grid[:, None] - instants[None, :]), axis=1) > 1e-9 * duration if grid.size else grid > 0
+    behind = np.searchsorted(instants, grid)  # two neighbours of each: a table of all pairs would not fit the memory
+    before, after = instants[np.maximum(behind - 1, 0)], instants[np.minimum(behind, instants.size - 1)]
+    apart = np.minimum(np.abs(grid - before), np.abs(grid - after)) > 1e-9 * duration
     return np.unique(np.concatenate([grid[apart], instants]))
 
 

@@ -82,6 +82,8 @@ _MODULES: dict[str, str] = {
     # commands and methods
     "Schedule": "command",
     "Signal": "command",
+    "OnOff": "driver",
+    "PWM": "driver",
     "DormandPrince8": "method",
     "Rodas4": "method",
     "RungeKutta4": "method",
