@@ -1,0 +1,191 @@
+"""Exponential, logarithm and power in lanes, and every other function of the C library lane by lane.
+
+A call of the C library would take the lanes one after the other; these three are written in operations that take all
+of them at once, without a branch. Greatest error seen against exact values, in units of the last place: exp 0.9, log
+0.6, pow 0.9 (tests/dynamics/test_lanes.py measures them); over the whole range, with 0, infinity and NaN as in IEEE
+754. In single precision they are computed in double and rounded once.
+
+References: range reduction and the exact product by the parts of ln 2 after Tang, P. T. P., ACM TOMS 15(2), 1989;
+sum and product with their rounding error after Dekker, T. J., Numerische Mathematik 18, 1971.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from .llvm import Block, function_of_values
+from .numbers import Number
+
+LN2_HIGH, LN2_LOW = 0.693147180559890330187, 5.497923018708371e-14
+"""ln 2 in two parts; the first ends in zeros, so that its product with an exponent is exact."""
+ROUNDER = 1.5 * 2.0**52
+"""Added to a whole number of moderate size, this leaves the number in the last bits of the sum."""
+LEAST_NORMAL = 2.0**-1022
+
+
+class _Exact(Block):
+    """Arithmetic in double lanes that is done as written: nothing reordered, no NaN or zero assumed away."""
+
+    def __init__(self, lanes: int) -> None:
+        super().__init__((), Number(64, lanes))
+
+    def add(self, a: str, b: str) -> str:
+        return self.put(f"fadd {self.number.text} {a}, {b}")
+
+    def subtract(self, a: str, b: str) -> str:
+        return self.put(f"fsub {self.number.text} {a}, {b}")
+
+    def times(self, a: str, b: str) -> str:
+        return self.put(f"fmul {self.number.text} {a}, {b}")
+
+    def over(self, a: str, b: str) -> str:
+        return self.put(f"fdiv {self.number.text} {a}, {b}")
+
+    def fused(self, a: str, b: str, c: str) -> str:
+        """a b + c, rounded once."""
+        return self.intrinsic("fma", (a, b, c), "")
+
+    def negative(self, a: str) -> str:
+        return self.put(f"fneg {self.number.text} {a}")
+
+    def rounded(self, a: str) -> str:
+        return self.intrinsic("rint", (a,), "")
+
+    def size_of(self, a: str) -> str:
+        return self.intrinsic("fabs", (a,), "")
+
+    def polynomial(self, x: str, coefficients: Sequence[float]) -> str:
+        """c0 + x (c1 + x (c2 + ...))."""
+        total = self.constant(coefficients[-1])
+        for c in reversed(coefficients[:-1]):
+            total = self.fused(total, x, self.constant(c))
+        return total
+
+    def bits(self, a: str) -> str:
+        return self.put(f"bitcast {self.number.text} {a} to {self.number.whole}")
+
+    def from_bits(self, a: str) -> str:
+        return self.put(f"bitcast {self.number.whole} {a} to {self.number.text}")
+
+    def on_bits(self, operation: str, a: str, b: float | str) -> str:
+        """A whole-number operation with a constant, which is given as the double of the same bits, or with a value."""
+        other = self.bits(self.constant(b)) if isinstance(b, float) else b
+        return self.put(f"{operation} {self.number.whole} {a}, {other}")
+
+    def shifted(self, operation: str, a: str) -> str:
+        """Shift by the 52 bits of a mantissa."""
+        return self.on_bits(operation, a, 52 * 5e-324)
+
+    def power_of_two(self, n: str) -> str:
+        """2**n for a whole number n from -1022 to 1023."""
+        low = self.shifted("shl", self.bits(self.add(n, self.constant(ROUNDER))))
+        return self.from_bits(self.on_bits("add", low, 1.0))
+
+    def sum_of(self, large: str, small: str) -> tuple[str, str]:
+        """large + small and its rounding error."""
+        total = self.add(large, small)
+        return total, self.subtract(small, self.subtract(total, large))
+
+    def exponential(self, x: str, low: str | None = None) -> str:
+        """e**(x + low), low being less than a rounding of x: 2**n e**r with |r| <= ln 2 / 2, by Taylor's sum."""
+        x = self.choose("ogt", x, self.constant(720.0), self.constant(720.0), x)
+        x = self.choose("olt", x, self.constant(-760.0), self.constant(-760.0), x)
+        n = self.rounded(self.times(x, self.constant(1 / math.log(2))))
+        back = self.negative(n)
+        r = self.fused(back, self.constant(LN2_HIGH), x)
+        r, lost = self.sum_of(r, self.times(back, self.constant(LN2_LOW)))
+        lost = lost if low is None else self.add(lost, low)
+        tail = self.polynomial(r, [1 / math.factorial(i) for i in range(2, 14)])
+        value = self.add(self.constant(1.0), self.add(r, self.fused(self.times(r, r), tail, lost)))
+        half = self.rounded(self.times(n, self.constant(0.5)))
+        return self.times(
+            self.times(value, self.power_of_two(half)), self.power_of_two(self.subtract(n, half))
+        )
+
+    def logarithm(self, x: str) -> tuple[str, str]:
+        """ln x in two parts: x = 2**n m with m from sqrt(1/2) to sqrt(2), ln m = 2 artanh((m - 1)/(m + 1))."""
+        scaled = self.times(x, self.constant(2.0**54))
+        bits = self.bits(self.choose("olt", x, self.constant(LEAST_NORMAL), scaled, x))
+        offset = self.choose("olt", x, self.constant(LEAST_NORMAL), self.constant(-54.0), self.constant(0.0))
+        exponent = self.shifted("ashr", self.on_bits("sub", bits, math.sqrt(0.5)))
+        m = self.from_bits(self.on_bits("sub", bits, self.shifted("shl", exponent)))
+        n = self.subtract(self.from_bits(self.on_bits("add", exponent, ROUNDER)), self.constant(ROUNDER))
+        n = self.add(n, offset)
+        one = self.constant(1.0)
+        above, below = self.subtract(m, one), self.add(m, one)
+        lost = self.subtract(m, self.subtract(below, one))
+        s = self.over(above, below)
+        left = self.fused(self.negative(s), below, above)
+        left = self.over(self.fused(self.negative(s), lost, left), below)
+        z = self.times(s, s)
+        tail = self.times(self.times(s, z), self.polynomial(z, [2 / (2 * i + 3) for i in range(10)]))
+        high, error = self.sum_of(self.times(n, self.constant(LN2_HIGH)), self.add(s, s))
+        low = self.add(self.fused(n, self.constant(LN2_LOW), self.add(left, left)), self.add(error, tail))
+        return self._at_the_ends(x, *self.sum_of(high, low))
+
+    def _at_the_ends(self, x: str, high: str, low: str) -> tuple[str, str]:
+        """The logarithm of 0, of infinity and of what has none."""
+        zero, infinity = self.constant(0.0), self.constant(math.inf)
+        high = self.choose("olt", x, infinity, high, x)
+        high = self.choose("oeq", x, zero, self.constant(-math.inf), high)
+        high = self.choose("olt", x, zero, self.constant(math.nan), high)
+        return high, self.choose("olt", self.size_of(high), infinity, low, zero)
+
+    def power_by_logarithm(self, x: str, y: str) -> str:
+        """x**y = e**(y ln|x|), with the sign and the exceptions of IEEE 754."""
+        zero, one, infinity = self.constant(0.0), self.constant(1.0), self.constant(math.inf)
+        size = self.size_of(x)
+        high, low = self.logarithm(size)
+        product = self.times(y, high)
+        lost = self.fused(y, low, self.fused(y, high, self.negative(product)))
+        lost = self.choose("olt", self.size_of(product), self.constant(1e3), lost, zero)
+        value = self.exponential(product, lost)
+        value = self.choose("oeq", size, one, self.choose("ord", y, y, one, y), value)
+        half = self.times(y, self.constant(0.5))
+        whole = self.choose("oeq", self.rounded(y), y, one, zero)
+        even = self.choose("oeq", self.rounded(half), half, one, zero)
+        signed = self.intrinsic("copysign", (value, x), "")
+        value = self.choose("ogt", whole, even, signed, value)
+        undefined = self.choose("oeq", whole, one, value, self.constant(math.nan))
+        value = self.choose("olt", x, zero, self.choose("olt", size, infinity, undefined, value), value)
+        value = self.choose("oeq", y, zero, one, value)
+        return self.choose("oeq", x, one, one, value)
+
+
+def definition(name: str, count: int, number: Number) -> str:
+    """The LLVM text of a function of the C library, of one or two arguments, in lanes."""
+    block, arguments = _Exact(number.lanes), [f"%{a}" for a in "xy"[:count]]
+    wide = [_converted(block, "fpext", number, block.number, a) for a in arguments]
+    if name == "exp":
+        value = block.exponential(wide[0])
+    elif name == "log":
+        value = block.add(*block.logarithm(wide[0]))
+    elif name == "pow":
+        value = block.power_by_logarithm(wide[0], wide[1])
+    else:
+        value = _lane_by_lane(block, name, wide)
+    value = _converted(block, "fptrunc", block.number, number, value)
+    return function_of_values(f"lanes.{name}", arguments, block, number, value)
+
+
+def _converted(block: Block, conversion: str, given: Number, wanted: Number, value: str) -> str:
+    return value if given == wanted else block.put(f"{conversion} {given.text} {value} to {wanted.text}")
+
+
+def _lane_by_lane(block: Block, name: str, arguments: Sequence[str]) -> str:
+    number, found = block.number, "poison"
+    for i in range(number.lanes):
+        given = [block.put(f"extractelement {number.text} {a}, i32 {i}") for a in arguments]
+        value = block.put(f"call double @{name}({', '.join(f'double {a}' for a in given)})")
+        found = block.put(f"insertelement {number.text} {found}, double {value}, i32 {i}")
+    return found
+
+
+def declarations(number: Number) -> str:
+    """LLVM's own functions that the printer and this file call, on these numbers and on doubles."""
+    text = ""
+    for kind in {number, Number(64, number.lanes)}:
+        for name, count in (("sqrt", 1), ("fabs", 1), ("rint", 1), ("copysign", 2), ("fma", 3)):
+            text += f"declare {kind.text} @{kind.intrinsic(name)}({', '.join([kind.text] * count)})\n"
+    return text
