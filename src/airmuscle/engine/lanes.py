@@ -78,7 +78,7 @@ def lanes(
             for lane in range(width):
                 full = -1.0 if ended[lane] else total[lane] - 1.0 - done[lane]
                 before = np.floor((instant - start[lane]) / length + 1e-9) - done[lane]
-                common = min(common, min(full, before))
+                common = min(common, full, before)
             if common > 0.0:
                 for lane in range(width):
                     h[0, lane] = length

@@ -99,9 +99,7 @@ class _Exact(Block):
         tail = self.polynomial(r, [1 / math.factorial(i) for i in range(2, 14)])
         value = self.add(self.constant(1.0), self.add(r, self.fused(self.times(r, r), tail, lost)))
         half = self.rounded(self.times(n, self.constant(0.5)))
-        return self.times(
-            self.times(value, self.power_of_two(half)), self.power_of_two(self.subtract(n, half))
-        )
+        return self.times(self.times(value, self.power_of_two(half)), self.power_of_two(self.subtract(n, half)))
 
     def logarithm(self, x: str) -> tuple[str, str]:
         """ln x in two parts: x = 2**n m with m from sqrt(1/2) to sqrt(2), ln m = 2 artanh((m - 1)/(m + 1))."""

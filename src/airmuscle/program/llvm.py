@@ -24,8 +24,9 @@ _CALLS = {
     casadi.OP_EXPM1: "expm1",
 }  # fmt: skip
 _COMPARISONS = {casadi.OP_LE: "ole", casadi.OP_LT: "olt", casadi.OP_EQ: "oeq", casadi.OP_NE: "une"}
-_DECLARATIONS = "".join(f"declare double @{name}(double)\n" for name in sorted(_CALLS.values())) + (
-    "declare double @pow(double, double)\ndeclare double @llvm.sqrt.f64(double)\ndeclare double @llvm.fabs.f64(double)\n"
+_OF_ONE = (*sorted(_CALLS.values()), *(DOUBLE.intrinsic(name) for name in _INTRINSICS.values()))
+_DECLARATIONS = "".join(f"declare double @{name}(double)\n" for name in _OF_ONE) + (
+    "declare double @pow(double, double)\n"
 )
 
 

@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from .. import declare
 from . import llvm
-from .printed import Sizes, Traced, explicit_module, implicit_module, traced
+from .numbers import Number
+from .printed import Sizes, Traced, explicit_module, implicit_module, lanes_module, traced
 from .system import System
 
 _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "drift", "outputs")
@@ -42,12 +43,24 @@ class Program:
         engine, held = self._steps[a, b]
         return int(engine.get_function_address("step")), _handed(engine, parameters, held)
 
+    def lanes(
+        self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...], number: Number
+    ) -> tuple[tuple[int, int, int], int]:
+        """The addresses of `prepare`, the explicit step and `outputs` in lanes, and how long `c` must be."""
+        if (a, b, number) not in self._steps:
+            text, held = lanes_module(self.traced, a, b, number)
+            self._steps[a, b, number] = llvm.compiled(text), held
+        engine, held = self._steps[a, b, number]
+        prepare, step, outputs = (int(engine.get_function_address(n)) for n in ("prepare", "step", "outputs"))
+        return (prepare, step, outputs), held
+
+
+_PREPARE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+
 
 def _handed(engine: Any, parameters: npt.NDArray[np.float64], size: int) -> npt.NDArray[np.float64]:
-    pointer = ctypes.c_void_p
     handed = np.zeros(max(size, 1))
-    prepare = ctypes.CFUNCTYPE(None, pointer, pointer)(engine.get_function_address("prepare"))
-    prepare(parameters.ctypes.data, handed.ctypes.data)
+    _PREPARE(engine.get_function_address("prepare"))(parameters.ctypes.data, handed.ctypes.data)
     return handed
 
 
