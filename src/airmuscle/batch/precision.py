@@ -7,9 +7,9 @@ import dataclasses
 
 from ..program.numbers import Number
 
-WIDTH = 16
-"""Plants side by side, measured: two of the widest registers of double precision, one of single. With 8 a step waits
-for itself, with 32 it does not fit the registers."""
+BITS = 1024
+"""Size of a row of plants side by side: two of the widest registers, which are computed in turn (measured). With one a
+step waits for itself; four are no faster."""
 
 
 class Precision(abc.ABC):
@@ -32,7 +32,7 @@ class Double(Precision):
 
     @property
     def number(self) -> Number:
-        return Number(64, WIDTH)
+        return Number(64, BITS // 64)
 
     @property
     def note(self) -> str:
@@ -45,7 +45,7 @@ class Single(Precision):
 
     @property
     def number(self) -> Number:
-        return Number(32, WIDTH)
+        return Number(32, BITS // 32)
 
     @property
     def note(self) -> str:

@@ -69,8 +69,11 @@ def simulate_batch(
     different = variations_of(plant, variations, _count(start, command))
     count = len(different.values)
     segments = _segments(plant, command, count, start_time, duration)
-    instants = segments[0].ends if isinstance(command, Command) else np.array([start_time + duration])
+    end = np.array([start_time + duration])
+    instants = segments[0].ends if isinstance(command, Command) else end
     times = output_times(output, start_time, duration, instants)
+    if keep is not None and len(keep) == 0:
+        times = end
     starts, reasons = _starts(different, start, count)
     task, store = _task(
         different, method, starts, segments, start_time, duration, times, reasons, keep, into, precision

@@ -28,8 +28,8 @@ class InMemory:
         if size > MOST_BYTES:
             raise ParameterError(
                 f"simulate_batch: {len(names)} columns of {count} plants at {rows} instants take {size / 1e9:.3g} GB "
-                f"of memory; {MOST_BYTES / 1e9:g} GB are allowed. Choose columns (keep=...), write to disk (into=...), or "
-                "ask for fewer instants (output=...)."
+                f"of memory; {MOST_BYTES / 1e9:g} GB are allowed. Choose columns (keep=...), write to disk (into=...), "
+                "or ask for fewer instants (output=...)."
             )
         self.columns: dict[str, npt.NDArray[Any]] = {name: np.empty((count, rows), kind) for name in names}
 

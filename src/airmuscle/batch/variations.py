@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -56,19 +57,22 @@ class Variations:
 
     def refuse_inconsistent(self) -> None:
         """Raise ParameterError, naming the row, where parameters of a model do not go together."""
-        for whole in _checking(self._as_columns()):
+        for part in _checking(self._as_columns()):
+            of_row = _rows_of(part)
+            if of_row is None:
+                continue
             try:
-                whole.check()
+                part.check()
             except (TypeError, ValueError, AirmuscleError):  # it looks at numbers, or refuses one of them: row by row
-                break
-        else:
-            return
-        for row in range(len(self.values)):
-            try:
-                for part in _checking(self.one(row)):
-                    part.check()
-            except ParameterError as error:
-                raise ParameterError(f"variations, row {row}: {error}") from None
+                for row in range(len(self.values)):
+                    _refuse_row(row, of_row(row))
+
+
+def _refuse_row(row: int, part: Any) -> None:
+    try:
+        part.check()
+    except ParameterError as error:
+        raise ParameterError(f"variations, row {row}: {error}") from None
 
 
 def _checking(thing: Any) -> Iterator[Any]:
@@ -81,6 +85,30 @@ def _checking(thing: Any) -> Iterator[Any]:
             yield thing
         for field in dataclasses.fields(thing):
             yield from _checking(getattr(thing, field.name))
+
+
+def _rows_of(thing: Any) -> Callable[[int], Any] | None:
+    """What gives a model with the numbers of one row in place of its columns (N,); None where it has no column."""
+    if isinstance(thing, np.ndarray):
+        numbers = thing.tolist()
+        return lambda row: numbers[row]
+    if isinstance(thing, tuple):
+        items = [_rows_of(item) for item in thing]
+        if not any(items):
+            return None
+        return lambda row: tuple(item if of is None else of(row) for item, of in zip(thing, items, strict=True))
+    if not dataclasses.is_dataclass(thing):
+        return None
+    inside = {field.name: _rows_of(getattr(thing, field.name)) for field in dataclasses.fields(thing)}
+    changed = [(name, of_row) for name, of_row in inside.items() if of_row is not None]
+
+    def with_numbers(row: int) -> Any:
+        new = copy.copy(thing)
+        for name, of_row in changed:
+            object.__setattr__(new, name, of_row(row))
+        return new
+
+    return with_numbers if changed else None
 
 
 def variations_of(system: System, given: Mapping[str, npt.ArrayLike], count: int | None) -> Variations:

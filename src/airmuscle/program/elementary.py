@@ -12,7 +12,7 @@ sum and product with their rounding error after Dekker, T. J., Numerische Mathem
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from .llvm import Block, function_of_values
 from .numbers import Number
@@ -164,7 +164,7 @@ def definition(name: str, count: int, number: Number) -> str:
     else:
         value = _lane_by_lane(block, name, wide)
     value = _converted(block, "fptrunc", block.number, number, value)
-    return function_of_values(f"lanes.{name}", arguments, block, number, value)
+    return function_of_values(number.function(name), arguments, block, number, value)
 
 
 def _converted(block: Block, conversion: str, given: Number, wanted: Number, value: str) -> str:
@@ -180,10 +180,10 @@ def _lane_by_lane(block: Block, name: str, arguments: Sequence[str]) -> str:
     return found
 
 
-def declarations(number: Number) -> str:
-    """LLVM's own functions that the printer and this file call, on these numbers and on doubles."""
+def declarations(numbers: Collection[Number]) -> str:
+    """LLVM's own functions that the printer and this file call, on these numbers and on as many doubles."""
     text = ""
-    for kind in {number, Number(64, number.lanes)}:
+    for kind in sorted({*numbers, *(Number(64, number.lanes) for number in numbers)}, key=lambda k: (k.bits, k.lanes)):
         for name, count in (("sqrt", 1), ("fabs", 1), ("rint", 1), ("copysign", 2), ("fma", 3)):
             text += f"declare {kind.text} @{kind.intrinsic(name)}({', '.join([kind.text] * count)})\n"
     return text

@@ -88,7 +88,7 @@ class Block:
         if number == DOUBLE:
             return self.put(f"call {FLAGS} double @{function}({arguments})")
         self.needed[function] = len(x)
-        return self.put(f"call {number.text} @lanes.{function}({arguments})")
+        return self.put(f"call {number.text} @{number.function(function)}({arguments})")
 
     def intrinsic(self, name: str, x: Sequence[str], flags: str = FLAGS) -> str:
         """A function that LLVM has."""
@@ -153,30 +153,35 @@ def write(
     """Append code to a block: `inputs` and `stores` name the arrays; `held` says which operands stand in `c`."""
     values = run(block, code.body, inputs, held)
     for output, index, operand in code.outputs:
-        block.store(stores[output], index, _value(block, operand, inputs, held, values))
+        block.store(stores[output], index, value_of(block, operand, inputs, held, values))
 
 
 def run(
-    block: Block, body: Sequence[Instruction], inputs: Sequence[str], held: Mapping[Operand, int]
+    block: Block,
+    body: Sequence[Instruction],
+    inputs: Sequence[str],
+    held: Mapping[Operand, int],
+    given: Mapping[Operand, str] | None = None,
 ) -> dict[Operand, str]:
-    """Append instructions to a block; the names of their results."""
-    values: dict[Operand, str] = {}
+    """Append instructions to a block; the names of their results, and of the operands `given` beforehand."""
+    values: dict[Operand, str] = dict(given or {})
     for line in body:
-        arguments = [_value(block, a, inputs, held, values) for a in line.arguments]
+        arguments = [value_of(block, a, inputs, held, values) for a in line.arguments]
         values[line.result] = block.operate(line.operation, arguments)
     return values
 
 
-def _value(
+def value_of(
     block: Block, operand: Operand, inputs: Sequence[str], held: Mapping[Operand, int], values: Mapping[Operand, str]
 ) -> str:
+    """The name of an operand's value, which is loaded if it stands in an array."""
+    if operand in values:
+        return values[operand]
     if operand in held:
         return block.load("c", held[operand])
     if operand[0] == "c":
         return block.constant(float(operand[1]))
-    if operand[0] == "in":
-        return block.load(inputs[operand[1]], operand[2])
-    return values[operand]
+    return block.load(inputs[operand[1]], operand[2])
 
 
 def hand_over(
@@ -189,7 +194,7 @@ def hand_over(
     values = run(block, once, inputs, {})
     held = {}
     for operand in handed:
-        value = _value(block, operand, inputs, {}, values)
+        value = value_of(block, operand, inputs, {}, values)
         if value not in places:
             places[value] = len(places)
             block.store("c", places[value], value)

@@ -47,6 +47,10 @@ class Number:
         """LLVM's own function of this name on such values: llvm.sqrt.f64, llvm.sqrt.v32f64."""
         return f"llvm.{name}.{f'v{self.lanes}' if self.lanes > 1 else ''}f{self.bits}"
 
+    def function(self, name: str) -> str:
+        """What stands for a function of the C library on such values; `elementary` prints it."""
+        return f"{name}.v{self.lanes}f{self.bits}"
+
     def literal(self, value: float) -> str:
         """One of the numbers as LLVM text; a shorter one is rounded first, as LLVM wants it exact."""
         if self.bits == 32:

@@ -13,7 +13,8 @@ import numpy.typing as npt
 from .. import declare
 from . import llvm
 from .numbers import Number
-from .printed import Sizes, Traced, explicit_module, implicit_module, lanes_module, traced
+from .printed import Sizes, Traced, explicit_module, implicit_module, traced
+from .printed_lanes import lanes_module
 from .system import System
 
 _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "drift", "outputs")

@@ -10,8 +10,8 @@ import casadi
 
 from .. import trace
 from ..errors import TraceError
-from . import elementary, llvm, lu
-from .instructions import Code, hoisted, instructions
+from . import llvm, lu
+from .instructions import Code, Operand, hoisted, instructions
 from .numbers import DOUBLE, Number
 from .system import System
 
@@ -66,14 +66,14 @@ class Sizes:
 class Printer:
     """Collects functions; what each needs of the parameters alone is gathered into one `prepare(p, c)`.
 
-    In lanes every element of every array, parameters too, is a `number` of one plant a lane.
+    Every element of every array is a `number`; in lanes one of each plant.
     """
 
     def __init__(self, number: Number = DOUBLE) -> None:
         self.text: list[str] = []
+        self.needed: dict[str, int] = {}
         self._number = number
         self._prepare = llvm.Block((), number)
-        self._needed: dict[str, int] = {}
         self._places: dict[str, int] = {}
 
     @property
@@ -83,18 +83,21 @@ class Printer:
 
     def add(self, name: str, inputs: dict[str, Any], outputs: dict[str, Any], scalars: Sequence[str] = ()) -> None:
         """Print `name(inputs..., outputs...)`, with `c` in place of the parameters."""
-        code = instructions(list(inputs.values()), list(outputs.values()))
+        code, held = self.without_parameters(inputs, outputs)
         names, targets = list(inputs), dict(enumerate(outputs))
         block = llvm.Block(scalars, self._number)
-        if PARAMETERS in inputs:
-            code, once, handed = hoisted(code, names.index(PARAMETERS))
-            held = llvm.hand_over(self._prepare, once, handed, names, self._places)
-        else:
-            code, held = Code(code.body, code.outputs), {}
         llvm.write(block, code, names, targets, held)
         arguments = ["c" if n == PARAMETERS else n for n in names] + list(outputs)
         self.text.append(llvm.function(name, arguments, block))
-        self._needed |= block.needed
+        self.needed |= {**block.needed, **self._prepare.needed}
+
+    def without_parameters(self, inputs: dict[str, Any], outputs: dict[str, Any]) -> tuple[Code, dict[Operand, int]]:
+        """The code of outputs without what depends on parameters alone, and where in `c` that stands."""
+        code, names = instructions(list(inputs.values()), list(outputs.values())), list(inputs)
+        if PARAMETERS not in inputs:
+            return code, {}
+        code, once, handed = hoisted(code, names.index(PARAMETERS))
+        return code, llvm.hand_over(self._prepare, once, handed, names, self._places)
 
     def module(self) -> str:
         """All functions and `prepare`, as one LLVM text.
@@ -102,11 +105,7 @@ class Printer:
         `prepare` runs once for a set of parameters, so it is not worth the time that optimising it would take.
         """
         prepare = llvm.function("prepare", ["p", "c"], self._prepare, "nounwind noinline optnone")
-        if self._number == DOUBLE:
-            return "\n".join([prepare, *self.text])
-        needed = {**self._needed, **self._prepare.needed}
-        parts = [elementary.definition(name, count, self._number) for name, count in needed.items()]
-        return "\n".join([elementary.declarations(self._number), *parts, prepare, *self.text])
+        return "\n".join([prepare, *self.text])
 
 
 def implicit_module(t: Traced) -> tuple[str, Sizes]:
@@ -150,27 +149,13 @@ def explicit_module(t: Traced, a: Sequence[Sequence[float]], b: Sequence[float])
 
     `a` are the rows of the tableau below its first, `b` its weights; nodes are the row sums. Inputs move at w.
     """
-    printer = Printer()
-    h = casadi.SX.sym("h")
-    inputs = {"x": t.x, "u": t.u, PARAMETERS: t.p, "w": t.w, "h": h}
-    printer.add("step", inputs, {"y": _explicit_step(t, h, a, b)}, ["h"])
-    return printer.module(), printer.held
-
-
-def lanes_module(t: Traced, a: Sequence[Sequence[float]], b: Sequence[float], number: Number) -> tuple[str, int]:
-    """The same step, and outputs(x, u, c, o), for one plant a lane; h is an array too, as each plant has its own."""
-    printer = Printer(number)
-    h = casadi.SX.sym("h")
-    point = {"x": t.x, "u": t.u, PARAMETERS: t.p}
-    printer.add("step", {**point, "w": t.w, "h": h}, {"y": _explicit_step(t, h, a, b)})
-    printer.add("outputs", point, {"o": t.o})
-    return printer.module(), printer.held
-
-
-def _explicit_step(t: Traced, h: Any, a: Sequence[Sequence[float]], b: Sequence[float]) -> Any:
     rates = casadi.Function("rates", [t.x, t.u, t.p], [t.f])
+    h = casadi.SX.sym("h")
     slopes: list[Any] = []
     for row in ([], *a):
         increment = sum((weight * k for weight, k in zip(row, slopes, strict=True) if weight), casadi.SX(0))
         slopes.append(rates(t.x + h * increment if row else t.x, t.u + sum(row) * h * t.w, t.p))
-    return t.x + h * sum((weight * k for weight, k in zip(b, slopes, strict=True) if weight), casadi.SX(0))
+    step = t.x + h * sum((weight * k for weight, k in zip(b, slopes, strict=True) if weight), casadi.SX(0))
+    printer = Printer()
+    printer.add("step", {"x": t.x, "u": t.u, PARAMETERS: t.p, "w": t.w, "h": h}, {"y": step}, ["h"])
+    return printer.module(), printer.held
