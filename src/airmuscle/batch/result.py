@@ -30,6 +30,7 @@ class Batch:
     columns  by name (N, T), those that were kept; NaN where a plant did not get there
     final    by state (N,), where each plant ended: at the end of the run, or where it failed
     status   (N,) 0 where a plant got to the end; `reason(i)` says in words why not
+    reached  (N,) how many rows each plant got to
     notes    what is true of all of them: the method, the precision
     """
 
@@ -38,6 +39,7 @@ class Batch:
     columns: Mapping[str, npt.NDArray[Any]]
     final: Mapping[str, Array]
     status: npt.NDArray[np.int64]
+    reached: npt.NDArray[np.int64]
     reasons: Mapping[int, str]
     notes: tuple[str, ...] = ()
 
@@ -74,9 +76,9 @@ class Batch:
         if not -len(self) <= index < len(self):
             raise ColumnError(f"batch: there is no plant {index}; there are 0 to {len(self) - 1}.")
         index, system = index % len(self), self.plant(index)
-        kept = {name: np.asarray(values[index], dtype=float) for name, values in self.columns.items()}
-        reached = np.all([np.isfinite(v) for v in kept.values()], axis=0) if kept else np.ones(self.time.size, bool)
-        columns = {"time": self.time[reached], **{name: values[reached] for name, values in kept.items()}}
+        rows = slice(int(self.reached[index]))
+        kept = {name: np.asarray(values[index, rows], dtype=float) for name, values in self.columns.items()}
+        columns = {"time": self.time[rows], **kept}
         constants: dict[str, float | str] = {}
         notes = [f"plant {index} of a batch", *self.notes]
         if isinstance(system, Plant):

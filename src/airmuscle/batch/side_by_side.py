@@ -104,7 +104,7 @@ def _run(task: Task, table: Table, room: Block, plants: npt.NDArray[np.intp], st
     for j, column in enumerate(task.columns.values()):
         column[plants] = room.rows[j, : plants.size]
     task.final[plants] = room.final[: plants.size]
-    task.status[plants] = room.status[: plants.size]
+    task.status[plants], task.reached[plants] = room.status[: plants.size], task.times.size
     for index in plants[room.status[: plants.size] != 0]:
         _explain(task, int(index), room.kind)
 

@@ -176,8 +176,13 @@ def _found(task: Task, store: InMemory, precision: Precision) -> Batch:
     system = task.ready.system
     final = {s.name: task.final[:, i].copy() for i, s in enumerate(system.states)}
     notes = tuple(note for note in (f"simulated by {task.method}, in a batch", precision.note) if note)
-    small = {"time": task.times, "status": task.status, **{f"final {name}": v for name, v in final.items()}}
+    small = {
+        "time": task.times,
+        "status": task.status,
+        "reached": task.reached,
+        **{f"final {name}": v for name, v in final.items()},
+    }
     told = {"notes": notes, "reasons": task.reasons, "varied": list(task.variations.paths)}
     columns = store.finished(small, told)
     task.columns.clear()
-    return Batch(task.variations, task.times, columns, final, task.status, task.reasons, notes)
+    return Batch(task.variations, task.times, columns, final, task.status, task.reached, task.reasons, notes)

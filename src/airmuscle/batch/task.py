@@ -20,7 +20,8 @@ Array = npt.NDArray[np.float64]
 class Task:
     """N plants to be run: starts (N, n), the segments of each, and the rows and columns that are kept.
 
-    Found are `columns` (N, T) by name, `final` (N, n), `status` (N,), and in words the `reasons` of those that failed.
+    Found are `columns` (N, T) by name, `final` (N, n), `status` (N,), how many rows were `reached` (N,), and in words
+    the `reasons` of those that failed.
     """
 
     ready: Prepared
@@ -34,6 +35,7 @@ class Task:
     columns: dict[str, npt.NDArray[Any]]
     final: Array
     status: npt.NDArray[np.int64]
+    reached: npt.NDArray[np.int64]
     reasons: dict[int, str]
     nominal: Array
 
@@ -74,7 +76,7 @@ class Task:
             part, j = places[place]
             column[index, :reached] = table[part][:, j]
             column[index, reached:] = np.nan
-        self.final[index], self.status[index] = course.state, course.status
+        self.final[index], self.status[index], self.reached[index] = course.state, course.status, reached
         if course.status:
             self.reasons[index] = self._in_words(course)
 
@@ -88,7 +90,7 @@ class Task:
 
     def without(self, index: int, status: int, reason: str | None = None) -> None:
         """Put in place that a plant was not run."""
-        self.status[index], self.final[index] = status, np.nan
+        self.status[index], self.final[index], self.reached[index] = status, np.nan, 0
         for column in self.columns.values():
             column[index] = np.nan
         if reason is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
+import threading
 from collections.abc import Sequence
 from typing import Any
 
@@ -29,6 +30,7 @@ class Program:
         self._engine = llvm.compiled(text)
         self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
         self._steps: dict[Any, tuple[Any, int]] = {}
+        self._compiling = threading.Lock()  # of two threads that ask for a step, one makes it: an engine must not go
 
     def held(self, parameters: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """What the functions need of a set of parameters, computed once."""
@@ -38,9 +40,10 @@ class Program:
         self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...], parameters: npt.NDArray[np.float64]
     ) -> tuple[int, npt.NDArray[np.float64]]:
         """The address of an explicit step of this tableau, and what it needs of the parameters."""
-        if (a, b) not in self._steps:
-            text, held = explicit_module(self.traced, a, b)
-            self._steps[a, b] = llvm.compiled(text), held
+        with self._compiling:
+            if (a, b) not in self._steps:
+                text, held = explicit_module(self.traced, a, b)
+                self._steps[a, b] = llvm.compiled(text), held
         engine, held = self._steps[a, b]
         return int(engine.get_function_address("step")), _handed(engine, parameters, held)
 
@@ -48,9 +51,10 @@ class Program:
         self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...], number: Number
     ) -> tuple[tuple[int, int, int], int]:
         """The addresses of `prepare`, the explicit step and `outputs` in lanes, and how long `c` must be."""
-        if (a, b, number) not in self._steps:
-            text, held = lanes_module(self.traced, a, b, number)
-            self._steps[a, b, number] = llvm.compiled(text), held
+        with self._compiling:
+            if (a, b, number) not in self._steps:
+                text, held = lanes_module(self.traced, a, b, number)
+                self._steps[a, b, number] = llvm.compiled(text), held
         engine, held = self._steps[a, b, number]
         prepare, step, outputs = (int(engine.get_function_address(n)) for n in ("prepare", "step", "outputs"))
         return (prepare, step, outputs), held
