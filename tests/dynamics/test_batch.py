@@ -414,7 +414,7 @@ def test_the_recording_of_one_is_that_of_simulate():
     assert found.recording(-1).notes[0] == "plant 1 of a batch"
     with pytest.raises(ColumnError, match="there is no plant 2; there are 0 to 1"):
         found.recording(2)
-    with pytest.raises(ColumnError, match="no column 'presure'; kept are .* Did you mean 'pressure'"):
+    with pytest.raises(ColumnError, match=r"no column 'presure'; kept are .* Did you mean 'pressure'"):
         found["presure"]
 
 

@@ -58,12 +58,7 @@ def simulate_batch(
     Raises ParameterError where a path, value, start, command or column cannot be; the row is named. An interrupted
     batch (Ctrl-C) is returned with what was done, the rest having the status of a run that was interrupted.
     """
-    if not (np.isfinite(duration) and duration > 0 and start_time + duration > start_time):
-        raise ParameterError(
-            f"simulate_batch: duration is {duration!r} s from {start_time!r} s on; it must be positive and finite."
-        )
-    if cores is not None and (not isinstance(cores, int) or cores < 1):
-        raise ParameterError(f"simulate_batch: cores is {cores!r}; it must be a whole number from 1 on.")
+    _refuse_nonsense(duration, start_time, cores)
     method = method or Rodas4()
     refuse_single(precision, method)
     different = variations_of(plant, variations, _count(start, command))
@@ -84,6 +79,15 @@ def simulate_batch(
     except BaseException:
         store.abandoned()
         raise
+
+
+def _refuse_nonsense(duration: float, start_time: float, cores: int | None) -> None:
+    if not (np.isfinite(duration) and duration > 0 and start_time + duration > start_time):
+        raise ParameterError(
+            f"simulate_batch: duration is {duration!r} s from {start_time!r} s on; it must be positive and finite."
+        )
+    if cores is not None and (not isinstance(cores, int) or cores < 1):
+        raise ParameterError(f"simulate_batch: cores is {cores!r}; it must be a whole number from 1 on.")
 
 
 def _count(start: Mapping[str, npt.ArrayLike] | None, command: Command | Sequence[Command]) -> int | None:
@@ -135,8 +139,9 @@ def _task(
     count, n = starts.shape
     ready = prepared(different.system)
     nominal = np.empty((count, n)) if isinstance(method, Explicit) else different.nominal()
-    final, status = np.full((count, n), np.nan), np.full(count, NOT_RUN, dtype=np.int64)
-    task = Task(ready, different, method, starts, segments, begin, duration, times, {}, final, status, reasons, nominal)
+    final, status, reached = np.full((count, n), np.nan), np.full(count, NOT_RUN), np.zeros(count, dtype=np.int64)
+    given = (ready, different, method, starts, segments, begin, duration, times)
+    task = Task(*given, {}, final, status, reached, reasons, nominal)
     names = task.names if keep is None else _kept(keep, task.names)
     kind = np.float64 if precision.number.bits == 64 else np.float32
     store = InMemory(names, count, times.size, kind) if into is None else OnDisk(into, names, count, times.size, kind)
