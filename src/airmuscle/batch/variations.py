@@ -52,7 +52,7 @@ class Variations:
         """The system with a column (N,) in place of every leaf that differs."""
         leaves: list[Any] = declare.flatten(self.system).tolist()
         for place, column in zip(self.places, self.values.T, strict=True):
-            leaves[place] = column
+            leaves[place] = column.view(_Column)
         return declare.rebuild(self.system, leaves)
 
     def refuse_inconsistent(self) -> None:
@@ -63,9 +63,19 @@ class Variations:
                 continue
             try:
                 part.check()
-            except (TypeError, ValueError, AirmuscleError):  # it looks at numbers, or refuses one of them: row by row
+            except (TypeError, ValueError, AirmuscleError):  # rows differ, or one of them is refused: row by row
                 for row in range(len(self.values)):
                     _refuse_row(row, of_row(row))
+
+
+class _Column(np.ndarray):
+    """A column that is asked `if`: it answers where all rows agree, so that one answer serves for all of them."""
+
+    def __bool__(self) -> bool:
+        answers = np.asarray(self, dtype=bool)
+        if answers.any() and not answers.all():
+            raise ValueError("the rows differ")
+        return bool(answers.any())
 
 
 def _refuse_row(row: int, part: Any) -> None:

@@ -74,8 +74,26 @@ def _selects(body: list[Instruction]) -> list[Instruction]:
             line = Instruction(SELECT, line.result, (first.arguments[0], first.arguments[1], second.arguments[1]))
         elif first and second and negated(first.arguments[0]) == second.arguments[0]:
             line = Instruction(SELECT, line.result, (second.arguments[0], second.arguments[1], first.arguments[1]))
+        elif line.operation == casadi.OP_IF_ELSE_ZERO:
+            line = _extreme_of_zero(line, by_result)
         chosen.append(_extreme(line, by_result) if line.operation == SELECT else line)
     return chosen
+
+
+def _extreme_of_zero(line: Instruction, by_result: Mapping[Operand, Instruction]) -> Instruction:
+    """A mask of a number that hides what is below zero, or above it, as the larger or smaller of the two.
+
+    NaN is hidden or shown as by the mask: where the comparison fails, the second of the two is chosen.
+    """
+    (condition, a), zero = line.arguments, ("c", 0.0)
+    test = by_result.get(condition)
+    opposite = test is not None and test.operation == casadi.OP_NOT
+    if test is not None and opposite:
+        test = by_result.get(test.arguments[0])
+    if test is None or test.operation not in (casadi.OP_LE, casadi.OP_LT) or {a, zero} != set(test.arguments):
+        return line
+    larger = (test.arguments == (zero, a)) != opposite
+    return Instruction(MAXIMUM if larger else MINIMUM, line.result, (zero, a) if opposite else (a, zero))
 
 
 def _extreme(line: Instruction, by_result: Mapping[Operand, Instruction]) -> Instruction:
