@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import itertools
 import pathlib
 import subprocess
 import sys
@@ -13,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from batch_numpy import rk4
-from filling import Array, hanging, runs, stretch_factor
+from filling import Array, hanging, runs
 from measure import Bar, Section, Times, interleaved, of_time, show
 from ode8 import compilers
 
@@ -37,8 +38,8 @@ SWITCHED = (0.5, 2.0, 3.0, 4.0)
 GROWTH = (1, 100, 1000, 10_000, 100_000)
 HEADING = ("variant", "plants", "cores", "median", "least", "million plant-steps a second")
 TEXT = (
-    "The plant of three states with its 44 parameters drawn anew for every plant, within 5 % (chosen), RK4 at 1e-3 s over "
-    "5 s, the end of each kept. The C computes the same equations in blocks of 8, 16 or 32 lanes, everything that "
+    "The plant of three states with its 44 parameters drawn anew for every plant, within 5 % (chosen), RK4 at 1e-3 s "
+    "over 5 s, the end of each kept. The C computes the same equations in blocks of 8, 16 or 32 lanes, everything that "
     "depends on parameters alone computed before; `simulate_batch` is timed whole, with the check of every parameter. "
     f"Of NumPy {SHORT:g} s are run and counted as 5 s."
 )
@@ -90,7 +91,8 @@ def compiled(folder: pathlib.Path) -> dict[str, tuple[ctypes.CDLL, int]]:
                 target = folder / f"batch{len(found)}.so"
                 code = target.with_suffix(".o")
                 subprocess.run(
-                    [compiler, *FLAGS, *wide, f"-DLANES={lanes}", "-fPIC", "-c", str(SOURCE), "-o", str(code)], check=True
+                    [compiler, *FLAGS, *wide, f"-DLANES={lanes}", "-fPIC", "-c", str(SOURCE), "-o", str(code)],
+                    check=True,
                 )
                 subprocess.run([compiler, "-shared", str(code), "-o", str(target)], check=True)
                 found[name] = ctypes.CDLL(str(target)), lanes
@@ -113,7 +115,7 @@ def in_c(library: ctypes.CDLL, lanes: int, parameters: Array, start: Array, seco
             addresses = (given.ctypes.data, at.ctypes.data, state.ctypes.data)
             library.batch(*addresses, size, first, last, round(seconds / STEP), STEP)
 
-        threads = [threading.Thread(target=part, args=(int(a), int(b))) for a, b in zip(blocks, blocks[1:], strict=False)]
+        threads = [threading.Thread(target=part, args=(int(a), int(b))) for a, b in itertools.pairwise(blocks)]
         for thread in threads:
             thread.start()
         for thread in threads:
@@ -130,7 +132,12 @@ def in_numpy(table: Array, start: Array, seconds: float) -> Array:
 
 
 def in_lanes(
-    plant: Plant, parameters: dict[str, Array], start: Array, seconds: float, cores: int, precision: Precision = Double()
+    plant: Plant,
+    parameters: dict[str, Array],
+    start: Array,
+    seconds: float,
+    cores: int,
+    precision: Precision = Double(),
 ) -> Array:
     """The batch by `simulate_batch`; ends (3, N)."""
     named = dict(zip((s.name for s in plant.states), start.tolist(), strict=True))
@@ -173,7 +180,7 @@ def growth() -> list[tuple[str, ...]]:
     for count in GROWTH:
         parameters, seconds = varied(plant, count), DURATION if count < 100_000 else DURATION / 5
         for cores in sorted({1, min(2, cores_here())}):
-            times = interleaved({"": lambda n=cores: in_lanes(plant, parameters, start, seconds, n)}, 2)[""]
+            times = interleaved({"": lambda p=parameters, t=seconds, n=cores: in_lanes(plant, p, start, t, n)}, 2)[""]
             rows.append(_row("simulate_batch, growth", count, cores, times, seconds))
     return rows
 

@@ -7,7 +7,7 @@ from filling import Array
 
 
 def rk4(p: Array, start: Array, switched: tuple[float, float, float, float], step: float, count: int) -> Array:
-    """The states (3, N) after `count` steps; `p` (46, N) as in batch.c, valves switched at the same instants for all."""
+    """The states (3, N) after `count` steps; `p` (46, N) as in batch.c, the same instants for all."""
     state = start
     for i in range(count):
         now = (i + 0.5) * step

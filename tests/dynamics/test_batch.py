@@ -7,6 +7,7 @@ import _thread
 import dataclasses
 import json
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -377,13 +378,14 @@ def test_an_error_on_the_way_leaves_nothing_behind(tmp_path, monkeypatch):
 @pytest.mark.parametrize("where", ["memory", "disk"])
 def test_an_interruption_keeps_what_is_done(tmp_path, monkeypatch, method, where):
     """The user stops as soon as the first plants are done; the rest says so, and what is there is right."""
-    wait = threads.Queue._take
+    take, once = threads.Queue._take, threading.Lock()
 
     def interrupting(self):
-        if self.done >= (1 if isinstance(method, Explicit) else 20) and not self.stop[0]:
+        if self.done >= (1 if isinstance(method, Explicit) else 20) and once.acquire(blocking=False):
             _thread.interrupt_main()
-            threading.Event().wait(0.3)
-        return wait(self)
+            while not self.stop[0]:
+                time.sleep(0.01)
+        return take(self)
 
     count, start = 64, plain().state_at(pressure=1e5)
     given = {"duration": 0.05, "start": start, "method": method, "keep": ("pressure",), "cores": 1, "output": 0.01}

@@ -8,8 +8,7 @@ import dataclasses
 from ..program.numbers import Number
 
 BITS = 1024
-"""Size of a row of plants side by side: two of the widest registers, which are computed in turn (measured). With one a
-step waits for itself; four are no faster."""
+"""Size of a row of plants side by side: two of the widest registers, which take turns."""
 
 
 class Precision(abc.ABC):
