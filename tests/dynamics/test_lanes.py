@@ -1,5 +1,5 @@
 """The lane printer is the scalar printer with another type: every operation in lanes means what it means in NumPy, also
-at zero, infinity and NaN; exp, log and pow, which have forms of their own, err by a unit of the last place at most."""
+at zero, infinity and NaN; exp, log, pow, sin and cos, which have forms of their own, err by a unit of the last place at most."""
 
 from __future__ import annotations
 
@@ -182,6 +182,22 @@ def test_pow_errs_by_about_a_unit_over_its_whole_range():
     with np.errstate(all="ignore"):
         exact = np.power(x.astype(np.longdouble), y.astype(np.longdouble))
     assert units_of_last_place(found, exact).max() < 1.1
+
+
+@extended
+@pytest.mark.parametrize(("symbolic", "exact"), [(casadi.sin, np.sin), (casadi.cos, np.cos)], ids=["sin", "cos"])
+def test_sin_and_cos_err_by_less_than_a_unit(symbolic, exact):
+    """Also next to multiples of a quarter turn; what is large, infinite or NaN is left to the C library."""
+    quarters = np.arange(-600.0, 600.0) * np.pi / 2
+    x = np.concatenate(
+        [np.linspace(-10, 10, 40001), quarters, np.nextafter(quarters, 1e9), np.linspace(-9e5, 9e5, 40001)]
+    )
+    found = run(NUMBERS["16 doubles"], lambda x: [symbolic(x)], x)[:, 0]
+    reduced = exact(x.astype(np.longdouble))
+    assert units_of_last_place(found, reduced).max() < 0.85
+    x = np.array([0.0, -0.0, 1e-300, 1e7, -1e22, 1e300, np.inf, np.nan, 0.5])
+    with np.errstate(all="ignore"):
+        np.testing.assert_allclose(run(NUMBERS["16 doubles"], lambda x: [symbolic(x)], x)[:, 0], exact(x), rtol=2e-16)
 
 
 def test_pow_has_the_exceptions_of_ieee_754():
