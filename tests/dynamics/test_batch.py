@@ -286,6 +286,45 @@ def test_parameters_that_do_not_go_together_name_the_row():
         simulate_batch(law, varied, PULSE, duration=0.1, method=FAST)
 
 
+@model
+class Growing:
+    """x' = r x between two bounds that must not cross."""
+
+    rate: float = parameter("1/s", "r", "rate", default=1.0)
+    low: float = parameter("1", "a", "lower bound", default=0.0)
+    high: float = parameter("1", "b", "upper bound", default=1.0)
+    inputs = ()
+
+    def check(self):
+        if self.low > self.high:
+            raise ParameterError(f"Growing: {self.low} is above {self.high}.")
+
+    @property
+    def states(self):
+        return (StateVariable("x", "1", 1.0),)
+
+    def rates(self, state, inputs):
+        return {"x": self.rate * state["x"]}
+
+    def outputs(self, state, inputs):
+        return {}
+
+
+def test_a_check_whose_answer_differs_from_row_to_row_is_asked_row_by_row():
+    given = {"duration": 0.1, "start": {"x": 1.0}, "method": FAST}
+    with pytest.raises(ParameterError, match=r"variations, row 1: Growing: 2.0 is above 1.0"):
+        simulate_batch(Growing(), {"low": [0.0, 2.0, 0.0]}, REST, **given)
+    assert not simulate_batch(Growing(), {"low": [0.0, 2.0], "high": [1.0, 3.0]}, REST, **given).failed.size
+
+
+def test_a_number_too_large_for_single_precision_is_reported():
+    start = {"x": [1.0, 3e38]}
+    found = simulate_batch(Growing(), {}, REST, duration=1.0, start=start, method=FAST, precision=Single())
+    assert list(found.failed) == [1]
+    assert found.reason(1) == "the run is not finite in single precision, though not in double"
+    assert np.isnan(found["x"][1]).all()
+
+
 def refused(message, error=ParameterError, **arguments):
     given = {"variations": {"mechanism.mass": [9.0, 10.0]}, "command": PULSE, "duration": 0.1, "method": FAST,
              "start": plain().state_at(pressure=0.0)}  # fmt: skip

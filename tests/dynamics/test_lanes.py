@@ -64,6 +64,10 @@ OPERATIONS = {
         lambda x, y: [casadi.if_else(x > y, x, y), casadi.if_else(x > 0, y, 0), casadi.if_else(x < y, x * 3, y - 1)],
         lambda x, y: [np.where(x > y, x, y), np.where(x > 0, y, 0), np.where(x < y, x * 3, y - 1)],
     ),
+    "masks of what is below or above zero": (
+        lambda x, y: [casadi.if_else(x >= 0, x, 0), casadi.if_else(x >= 0, 0, x), casadi.if_else(x <= 0, 0, x)],
+        lambda x, y: [np.where(x >= 0, x, 0), np.where(x >= 0, 0, x), np.where(x <= 0, 0, x)],
+    ),
     "extremes": (
         lambda x, y: [casadi.fmin(x, y), casadi.fmax(x, y), casadi.sign(x)],
         lambda x, y: [np.where(x < y, x, y), np.where(x > y, x, y), np.where(x > 0, 1, np.where(x < 0, -1, 0))],

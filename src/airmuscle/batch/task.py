@@ -74,7 +74,8 @@ class Task:
         places = [(i, j) for i, part in enumerate(table) for j in range(part.shape[1])]
         for place, column in zip(chosen, self.columns.values(), strict=True):
             part, j = places[place]
-            column[index, :reached] = table[part][:, j]
+            with np.errstate(over="ignore"):  # a column of single precision, which then says so
+                column[index, :reached] = table[part][:, j]
             column[index, reached:] = np.nan
         self.final[index], self.status[index], self.reached[index] = course.state, course.status, reached
         if course.status:
