@@ -13,7 +13,7 @@ from .terminal import print_json, print_table
 if TYPE_CHECKING:
     from ..library.entry import Entry
 
-PARTS = ("characteristic", "geometry", "spring", "damper", "box")
+PARTS = ("characteristic", "geometry", "spring", "damper", "friction", "box")
 MANY = 30
 """Values of one list above which the table shows its ends only."""
 

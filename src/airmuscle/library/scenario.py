@@ -35,7 +35,7 @@ from ..recording import Recording
 from ..simulate import refuse_beyond_opening, simulate
 from .build import build
 from .catalogue import load, parsed
-from .entry import Entry
+from .entry import OPTIONAL, Entry
 from .models import model_class
 from .place import Place, checked, finite, refuse_unknown, said_at, text
 
@@ -147,7 +147,7 @@ def _entry(given: Any, place: Place) -> Entry:
 
 def _parts(entry: Entry, replaced: Mapping[str, Any], place: Place) -> dict[str, Any]:
     """The parts of an entry that a table leaves as they are; what it lacks, such as a geometry, the table may give."""
-    parts = {"contractile": entry.characteristic, **{n: getattr(entry, n) for n in ("geometry", "spring", "damper")}}
+    parts = {"contractile": entry.characteristic, **{n: getattr(entry, n) for n in ("geometry", *OPTIONAL)}}
     left = {name: part for name, part in parts.items() if part is not None and name not in replaced}
     if not isinstance(left.get("contractile"), ForceLaw | NoneType):
         raise ParameterError(
@@ -200,3 +200,7 @@ def _start(given: Any, plant: Plant, place: Place) -> dict[str, float]:
 
 def _object(given: Any, kind: type[Any], place: Place) -> Any:
     return checked(build({"model": given} if isinstance(given, str) else given, place), kind, place)
+
+
+plant_from, muscle_from, command_from = _plant, _muscle, _command
+"""The grammar of a plant, a muscle and a command, for other files that hold them."""
