@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .bench_files import Files, Length, Surroundings, Units, measured
 from .options import Folder, Json, Map
 from .terminal import print_json
 
@@ -19,10 +20,6 @@ if TYPE_CHECKING:
     from ..recording import Recording
     from ..report.chapter import Chapter
 
-Files = Annotated[
-    list[Path],
-    typer.Argument(metavar="FILES", help="CSV, Excel, MAT, TDMS or MDF: pressure, contraction or length, force."),
-]
 Law = Annotated[
     str | None,
     typer.Option(
@@ -30,10 +27,6 @@ Law = Annotated[
         metavar="NAME",
         help="Where to start: a library entry, a muscle's TOML file, or ContractileSurface, which needs no start.",
     ),
-]
-Units = Annotated[
-    list[str] | None,
-    typer.Option("--unit", metavar="COLUMN=UNIT", help="The unit of a column whose heading states none; repeat it."),
 ]
 Fixed = Annotated[
     list[str] | None, typer.Option("--fix", metavar="PARAMETER", help="Leave this parameter as it starts; repeat it.")
@@ -49,10 +42,6 @@ Compare = Annotated[bool, typer.Option("--compare", help="Fit every law that the
 LeftOut = Annotated[
     str | None,
     typer.Option(metavar="PART", help="What a comparison leaves out in turn: run, specimen, contraction, pressure."),
-]
-Length = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Length unpressurised and unloaded: '300 mm'.")]
-Surroundings = Annotated[
-    str | None, typer.Option(metavar="QUANTITY", help="What absolute pressures are reduced by: '98 kPa'.")
 ]
 
 
@@ -90,8 +79,7 @@ def fit(
 
     if characteristic is None and not compare:
         raise typer.BadParameter("name a law to fit with --characteristic, or let --compare find one")
-    units = _by_column(unit)
-    recordings = _measured(files, units=units, mapping=mapping, resting_length=resting_length, ambient=ambient)
+    recordings = measured(files, unit, mapping=mapping, resting_length=resting_length, ambient=ambient)
     if compare or characteristic is None:
         from .fit_compare import compared
 
@@ -124,30 +112,6 @@ def _identified(
         censoring=UNCENSORED if uncensored else None,
         fixed=fixed or (),
     )
-
-
-def _measured(files: list[Path], **options: Any) -> list[Recording]:
-    """The runs in files, read together so that contradictions show, then the data sets of the library."""
-    from ..errors import ParameterError
-    from ..library.catalogue import measured
-    from ..recording import read
-
-    here = {entry.name for entry in Path().iterdir()}
-    names = [f for f in files if not f.suffix and len(f.parts) == 1 and f.name not in here]
-    own = [f for f in files if f not in names]
-    given = [name for name, value in options.items() if value]
-    if names and given:
-        raise ParameterError(
-            f"{names[0]}: a data set of the library brings its units and constants along; leave out {', '.join(given)}."
-        )
-    return [*(read(own, **options) if own else ()), *(measured(str(name)) for name in names)]
-
-
-def _by_column(texts: list[str] | None) -> dict[str, str]:
-    parts = [text.partition("=") for text in texts or ()]
-    if not all(name and sign for name, sign, _ in parts):
-        raise typer.BadParameter(f"--unit wants COLUMN=UNIT, like pressure=bar, not {', '.join(texts or ())}")
-    return {name.strip(): found.strip() for name, _, found in parts}
 
 
 def start_of(name: str, recordings: list[Recording], degree: int) -> Entry:

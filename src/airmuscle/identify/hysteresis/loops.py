@@ -12,8 +12,18 @@ from ...errors import IdentificationError
 from ...recording import Recording
 from ...recording.segment import ISOBARIC, ISOMETRIC, Run, Sensor, quasi_static, runs, sensors, ways_along
 from ...recording.segment.runs import BAND, STROKE
-from .fit import Given, Mask, OnContraction, OnPressure, PolynomialCurve, Slide, StaticCurve, candidates, course
-from .fit import fit_hysteresis
+from .fit import (
+    Given,
+    Mask,
+    OnContraction,
+    OnPressure,
+    PolynomialCurve,
+    Slide,
+    StaticCurve,
+    candidates,
+    course,
+    fit_hysteresis,
+)
 from .result import HysteresisFit
 
 
@@ -98,8 +108,7 @@ def _loop(
             "no curve in one of them stands for the muscle without friction. Give its characteristic."
         )
     chosen = _counting(recording, sensed, all_rows)
-    time = recording["time"] if "time" in recording else None
-    _refuse_one_way(recording, ways_along(slide.path(recording), time), chosen)
+    _refuse_one_way(recording, ways_along(slide.path(recording), recording.columns.get("time")), chosen)
     return Loop(recording, longest, slide, static, chosen)
 
 

@@ -50,7 +50,7 @@ def branches(recording: Recording, sensor: Sensor | None = None, *, swing: float
     """
     if "pressure" not in recording or len(recording) < 3:
         return ()
-    calm = _without_spikes(recording["pressure"], recording["time"] if "time" in recording else None)
+    calm = _without_spikes(recording["pressure"], recording.columns.get("time"))
     found = _ways(calm, max(swing * float(np.ptp(calm)), 10.0 * (sensor.deviation if sensor else 0.0)))
     return tuple(_branch(calm, stretch, direction) for stretch, direction in found)
 
