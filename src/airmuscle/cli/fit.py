@@ -9,6 +9,7 @@ import typer
 
 from .bench_files import Files, Length, Surroundings, Units, measured
 from .options import Folder, Json, Map
+from .remedies import in_options
 from .terminal import print_json
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def fit(
     if json:
         print_json(as_data(result))
         return
-    typer.echo(str(result))
+    typer.echo(in_options(str(result)))
     typer.echo(f"muscle: {out / 'muscle.toml'}")
     typer.echo(f"report: {out / 'report.html'}")
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from .remedies import in_options
 from .terminal import print_json
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def compared(
     if json:
         print_json(_as_data(found))
         return
-    typer.echo(str(found))
+    typer.echo(in_options(str(found)))
     typer.echo(f"muscle: {out / 'muscle.toml'}")
     typer.echo(f"report: {out / 'report.html'}")
 
