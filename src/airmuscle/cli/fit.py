@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .bench_files import Files, Length, Surroundings, Units, measured
+from .fit_start import start_of
 from .options import Folder, Json, Map
 from .remedies import in_options
 from .terminal import print_json
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from ..library.entry import Entry
     from ..recording import Recording
     from ..report.chapter import Chapter
+    from .fit_start import Start
 
 Law = Annotated[
     str | None,
@@ -42,7 +44,30 @@ Uncensored = Annotated[
 Compare = Annotated[bool, typer.Option("--compare", help="Fit every law that the data determine, and rank them.")]
 LeftOut = Annotated[
     str | None,
-    typer.Option(metavar="PART", help="What a comparison leaves out in turn: run, specimen, contraction, pressure."),
+    typer.Option(
+        metavar="PART",
+        help="What a comparison leaves out in turn, and a bootstrap draws: run, specimen, contraction, pressure.",
+    ),
+]
+Refits = Annotated[
+    int | None, typer.Option(min=20, max=100_000, metavar="N", help="Refit N times to parts of the data drawn anew.")
+]
+Profiled = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="PARAMETER",
+        help="Profile likelihood of this parameter; 'weak' takes all that are nearly not determined. Repeat it.",
+    ),
+]
+Shape = Annotated[
+    bool,
+    typer.Option("--shape", help="A ContractileSurface that neither falls with pressure nor rises with contraction."),
+]
+Free = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="PRESSURE=CONTRACTION", help="With --shape: where the muscle hangs free, '3 bar=18 %'. Repeat it."
+    ),
 ]
 
 
@@ -51,6 +76,10 @@ def fit(
     characteristic: Law = None,
     compare: Compare = False,
     leave_out: LeftOut = None,
+    bootstrap: Refits = None,
+    profile: Profiled = None,
+    shape: Shape = False,
+    free: Free = None,
     out: Folder = Path("fit"),
     resting_length: Length = None,
     ambient: Surroundings = None,
@@ -73,66 +102,58 @@ def fit(
       airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out fit
       airmuscle fit bench.csv --characteristic dmsp-20-300 --unit pressure=bar --fix wall_thickness
       airmuscle fit dmsp-20-300 --characteristic ContractileSurface --degree 4 --robust "10 N"
+      airmuscle fit runs/*.csv --characteristic dmsp-20-300 --bootstrap 1000 --profile weak
+      airmuscle fit bench.csv --characteristic ContractileSurface --shape --free "3 bar=18 %"
       airmuscle fit runs/*.xlsx --mapping rig.toml --compare --leave-out run
       airmuscle solve fit/muscle.toml --pressure "3 bar" --force "100 N"
     """
     from ..report.staged import refuse_unwritable
+    from .fit_more import More
 
     if characteristic is None and not compare:
         raise typer.BadParameter("name a law to fit with --characteristic, or let --compare find one")
+    more = More.of(bootstrap, profile, leave_out, shape, free, compare)
     recordings = measured(files, unit, mapping=mapping, resting_length=resting_length, ambient=ambient)
     if compare or characteristic is None:
         from .fit_compare import compared
 
         refuse_unwritable(out)
-        compared(files, recordings, characteristic=characteristic, fixed=tuple(fix or ()), leave_out=leave_out,
-                 degree=degree, robust=robust, uncensored=uncensored, out=out, json=json)  # fmt: skip
+        compared(files, recordings, more, characteristic=characteristic, fixed=tuple(fix or ()), degree=degree,
+                 robust=robust, uncensored=uncensored, out=out, json=json)  # fmt: skip
         return
     start = start_of(characteristic, recordings, degree)
     refuse_unwritable(out)
     result = _identified(start, recordings, robust, uncensored, fix)
-    write(result, fitted(result, start, files), recordings, out)
+    found = more.find(result, recordings)
+    entry = fitted(result, start.entry, files)
+    write(result, found.shaped_entry(entry), recordings, out, found.chapters())
     if json:
-        print_json(as_data(result))
+        print_json(as_data(result) | found.as_data())
         return
-    typer.echo(in_options(str(result)))
+    echo([str(result), *found.lines()], out)
+
+
+def echo(lines: Sequence[str], out: Path) -> None:
+    """What was found, and where it stands."""
+    for line in lines:
+        typer.echo(in_options(line))
     typer.echo(f"muscle: {out / 'muscle.toml'}")
     typer.echo(f"report: {out / 'report.html'}")
 
 
 def _identified(
-    start: Entry, recordings: list[Recording], robust: str | None, uncensored: bool, fixed: list[str] | None
+    start: Start, recordings: list[Recording], robust: str | None, uncensored: bool, fixed: list[str] | None
 ) -> Fit:
     from ..identify import UNCENSORED
     from ..identify import fit as identify
 
     return identify(
-        start.characteristic,
+        start.entry.characteristic,
         recordings,
-        loss=loss_of(robust, start.characteristic),
+        loss=loss_of(robust, start.entry.characteristic),
         censoring=UNCENSORED if uncensored else None,
-        fixed=fixed or (),
+        fixed=(*(fixed or ()), *start.fixed),
     )
-
-
-def start_of(name: str, recordings: list[Recording], degree: int) -> Entry:
-    """The library entry to start from, or a bare one around a law that needs no start."""
-    from ..errors import ParameterError
-    from ..library.catalogue import load
-    from ..library.entry import Entry
-    from ..library.models import model_class, model_names
-
-    if name not in model_names():
-        return load(name)
-    cls = model_class(name, "--characteristic")
-    if not hasattr(cls, "blank"):
-        raise ParameterError(
-            f"--characteristic: {name} needs values to start from. Name a library entry made of it "
-            "(airmuscle list shows which), or write a muscle file with your own."
-        )
-    # A clamp at twice what was measured cuts off no point, and still limits extrapolation.
-    law = cls.blank(degree, greatest_force=2.0 * max(1.0, *(float(run["force"].max()) for run in recordings)))
-    return Entry(name, name, "chosen", law)
 
 
 def loss_of(robust: str | None, law: Characteristic) -> Any:

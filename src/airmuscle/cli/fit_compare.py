@@ -7,23 +7,22 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from .remedies import in_options
 from .terminal import print_json
 
 if TYPE_CHECKING:
     from ..identify.candidates import Candidate
     from ..identify.compare import Comparison
-    from ..identify.leave_out import LeaveOut
     from ..recording import Recording
+    from .fit_more import More
 
 
 def compared(
     files: list[Path],
     recordings: list[Recording],
+    more: More,
     *,
     characteristic: str | None,
     fixed: tuple[str, ...],
-    leave_out: str | None,
     degree: int,
     robust: str | None,
     uncensored: bool,
@@ -33,22 +32,21 @@ def compared(
     """Compare, print the ranking, and write the recommended muscle with its report."""
     from ..identify.compare import compare
     from ..report.compare_chapter import compare_chapter
-    from .fit import fitted, write
+    from .fit import echo, fitted, write
 
     if uncensored or robust is not None:
         raise typer.BadParameter("--compare judges by squared errors of the rows that pull: no --robust, --uncensored")
     candidates = _candidates(recordings, characteristic, degree, fixed)
     said = None if json else lambda name: typer.echo(f"  {name}", err=True)
-    found = compare(recordings, candidates, leave_out=_part(leave_out), progress=said)
+    found = compare(recordings, candidates, leave_out=more.by, progress=said)
     chosen = found.recommended
+    sure = more.find(chosen.fit, recordings)
     entry = fitted(chosen.fit, _bare(chosen.candidate), files)
-    write(chosen.fit, entry, recordings, out, [compare_chapter(found)])
+    write(chosen.fit, entry, recordings, out, [compare_chapter(found), *sure.chapters()])
     if json:
-        print_json(_as_data(found))
+        print_json(_as_data(found) | sure.as_data())
         return
-    typer.echo(in_options(str(found)))
-    typer.echo(f"muscle: {out / 'muscle.toml'}")
-    typer.echo(f"report: {out / 'report.html'}")
+    echo([str(found), *sure.lines()], out)
 
 
 def _candidates(
@@ -56,27 +54,14 @@ def _candidates(
 ) -> list[Candidate]:
     """All that start from data alone, and the one named beside them."""
     from ..identify.candidates import Candidate, standard_candidates
-    from .fit import start_of
+    from .fit_start import start_of
 
     found = list(standard_candidates(recordings))
     if characteristic is not None:
-        law = start_of(characteristic, recordings, degree).characteristic
-        found.append(Candidate(f"{characteristic} (named)", law, fixed))
+        start = start_of(characteristic, recordings, degree)
+        law = start.entry.characteristic
+        found.append(Candidate(f"{characteristic} (named)", law, (*fixed, *start.fixed)))
     return found
-
-
-def _part(word: str | None) -> LeaveOut | None:
-    from ..identify.leave_out import Levels, Runs, Specimens
-
-    parts: dict[str, LeaveOut] = {
-        "run": Runs(),
-        "specimen": Specimens(),
-        "contraction": Levels("contraction"),
-        "pressure": Levels("pressure"),
-    }
-    if word is not None and word not in parts:
-        raise typer.BadParameter(f"--leave-out is '{word}'; it may be {', '.join(parts)}")
-    return None if word is None else parts[word]
 
 
 def _bare(candidate: Candidate) -> Any:
