@@ -206,6 +206,8 @@ def as_data(result: Fit) -> dict[str, Any]:
 
 def write(result: Fit, entry: Entry, recordings: list[Recording], out: Path, chapters: Sequence[Chapter] = ()) -> None:
     """Muscle and report in one folder, whole or not at all; `chapters` stand before the fit's own."""
+    import dataclasses
+
     from ..library.catalogue import save
     from ..report.fit_chapter import fit_chapter
     from ..report.staged import staged
@@ -214,4 +216,5 @@ def write(result: Fit, entry: Entry, recordings: list[Recording], out: Path, cha
     with staged(out) as place:
         save(entry, place / "muscle.toml")
         notes = tuple(dict.fromkeys(note for run in recordings for note in run.notes))
-        fill(place, [*chapters, fit_chapter(result, entry, notes)], title="Fit")
+        worded = dataclasses.replace(result, notes=tuple(in_options(note) for note in result.notes))
+        fill(place, [*chapters, fit_chapter(worded, entry, notes)], title="Fit")

@@ -50,7 +50,8 @@ def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
             law, reading = (band(fit, points, level=LEVEL, reading=r) for r in (False, True))
         except IdentificationError:
             return None
-        x, colour = across * points[roles.along], figures.LINES[i % len(figures.LINES)]
+        colour = figures.LINES[i % len(figures.LINES)]
+        x = across * np.where(law.value < 0 if answer == "force" else False, np.nan, points[roles.along])
         scale, word = _DRAWN[roles.held]
         style = {"color": colour, "linestyle": figures.DASHES[i % 5]}
         left.plot(x, factor * law.value, label=f"{scale * level:.4g} {word}", **style)
@@ -67,8 +68,8 @@ def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
 
 _CAPTION = (
     "95 % bands at levels that were measured, dark for the law, faint for one more reading; on the right half their "
-    "width, thick for the law, thin for a reading. They take errors as independent, which those of one slow ramp "
-    "are not."
+    "width, thick for the law, thin for a reading, as far as the muscle pulls. They take errors as independent, which "
+    "those of one slow ramp are not."
 )
 
 

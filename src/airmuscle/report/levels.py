@@ -16,7 +16,7 @@ def levels_of(values: Array, most: int) -> Array:
     ends = np.flatnonzero(np.diff(ordered) > SAME_PRESSURE * np.abs(ordered).max()) + 1
     levels = np.array([np.median(group) for group in np.split(ordered, ends)])
     if levels.size == 1 and np.ptp(ordered) > 2 * SAME_PRESSURE * np.abs(ordered).max():  # a ramp has no levels
-        return np.quantile(ordered, np.linspace(0.1, 0.9, most))
+        return np.asarray(np.quantile(ordered, np.linspace(0.1, 0.9, most)))
     if levels.size <= most:
         return levels
     return levels[np.unique(np.linspace(0, levels.size - 1, most).astype(int))]

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 MOST_ROWS = 40
 NORMAL = 1.96
+MOST_LOST = 0.1
+"""Share of refits without an answer from which on the rest are a selection (chosen)."""
 REACH = 12.0
 """Standard deviations to which the figure reaches; an interval beyond it ends in an arrow."""
 
@@ -65,6 +67,8 @@ class Uncertainty:
 
 def _drawn(drawn: Bootstrap) -> str:
     lost = f"; {drawn.lost} of them did not determine the parameters" if drawn.lost else ""
+    if drawn.lost > MOST_LOST * len(drawn.values):
+        lost += ", too many to trust the rest: give more runs, or a law with fewer parameters"
     return f"bootstrap: {len(drawn.values)} refits to {drawn.parts} parts drawn anew, seed {drawn.seed}{lost}"
 
 
@@ -126,8 +130,8 @@ def _figure(found: Uncertainty) -> Any:
         if estimate.name in by_name:
             pair = (np.array(by_name[estimate.name]) - estimate.value) / estimate.deviation
             ways.append((tuple(pair), RED, "profile", -0.25))
-        for pair, colour, label, shift in ways:
-            _interval(axes, pair, row + shift, colour, label)
+        for ends_of_it, colour, label, shift in ways:
+            _interval(axes, ends_of_it, row + shift, colour, label)
     axes.axvline(0.0, color=BLACK, linewidth=0.6)
     axes.set_yticks(range(len(shown)), [found.fit.estimates[i].label for i in shown])
     axes.invert_yaxis()
