@@ -74,7 +74,7 @@ def assert_failed(result: Result, message: str) -> None:
 
 # Help and usage
 
-COMMANDS = ("reproduce", "list", "show", "cite", "solve", "inspect", "fit", "hysteresis", "plan", "simulate")
+COMMANDS = ("reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "plan", "simulate")
 
 
 def test_the_commands_stand_in_the_order_of_use():

@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 
 from ..errors import AirmuscleError, AirmuscleWarning
 from .cite import cite
+from .convert import convert
 from .fit import fit
 from .hysteresis import hysteresis
 from .inspect import inspect
@@ -75,6 +76,7 @@ app.command("cite")(cite)
 app.command("solve", short_help="From two of pressure, contraction and force get the third.")(solve)
 app.command("inspect", short_help="Show what was understood of bench files.")(inspect)
 app.command("fit")(fit)
+app.command("convert", short_help="Bring one model as near to another as it comes.")(convert)
 app.command("hysteresis", short_help="Fit friction to loops, and say whether the data justify it.")(hysteresis)
 app.command("plan", short_help="Say which runs tell most about a muscle on your bench.")(plan)
 app.command("simulate", short_help="Simulate a plant that a scenario file describes.")(simulate)

@@ -19,4 +19,4 @@ def levels_of(values: Array, most: int) -> Array:
         return np.asarray(np.quantile(ordered, np.linspace(0.1, 0.9, most)))
     if levels.size <= most:
         return levels
-    return levels[np.unique(np.linspace(0, levels.size - 1, most).astype(int))]
+    return np.asarray(levels[np.unique(np.linspace(0, levels.size - 1, most).astype(int))])
