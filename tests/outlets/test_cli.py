@@ -74,7 +74,20 @@ def assert_failed(result: Result, message: str) -> None:
 
 # Help and usage
 
-COMMANDS = ("reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "plan", "simulate")
+COMMANDS = (
+    "reproduce",
+    "list",
+    "show",
+    "cite",
+    "solve",
+    "inspect",
+    "fit",
+    "convert",
+    "hysteresis",
+    "fit-dynamic",
+    "plan",
+    "simulate",
+)
 
 
 def test_the_commands_stand_in_the_order_of_use():

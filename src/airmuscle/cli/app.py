@@ -16,6 +16,7 @@ from ..errors import AirmuscleError, AirmuscleWarning
 from .cite import cite
 from .convert import convert
 from .fit import fit
+from .fit_dynamic import fit_dynamic
 from .hysteresis import hysteresis
 from .inspect import inspect
 from .list import list_entries
@@ -78,6 +79,7 @@ app.command("inspect", short_help="Show what was understood of bench files.")(in
 app.command("fit")(fit)
 app.command("convert", short_help="Bring one model as near to another as it comes.")(convert)
 app.command("hysteresis", short_help="Fit friction to loops, and say whether the data justify it.")(hysteresis)
+app.command("fit-dynamic", short_help="Find a plant's numbers from records of its motion.")(fit_dynamic)
 app.command("plan", short_help="Say which runs tell most about a muscle on your bench.")(plan)
 app.command("simulate", short_help="Simulate a plant that a scenario file describes.")(simulate)
 

@@ -41,6 +41,7 @@ _MODULES: dict[str, str] = {
     "PrandtlIshlinskii": "friction.prandtl_ishlinskii",
     # muscles and plants
     "Muscle": "muscle",
+    "FreeFill": "identify.dynamic.free_fill",
     "Plant": "plant",
     "Ambient": "gas",
     "Isothermal": "gas",

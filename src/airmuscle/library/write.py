@@ -36,6 +36,14 @@ def part_lines(name: str, thing: Any) -> list[str]:
     return list(_table(name, _described(thing)))
 
 
+def scenario_toml(title: str, plant: Any, command: Mapping[str, Any], run: Mapping[str, Any], note: str = "") -> str:
+    """The text of a scenario that `load_scenario` reads back: a plant with all its numbers, a command as written."""
+    lines = [f"# {line}" for line in note.splitlines()]
+    lines += [f"title = {_value(title)}", *_table("plant", _described(plant))]
+    lines += [*_table("command", command), *_table("run", run)]
+    return "\n".join(lines) + "\n"
+
+
 def save(entry: Entry, path: str | Path) -> Path:
     """Write an entry to a file that `load` reads back, whole or not at all. Raises FileError."""
     path = Path(path)
