@@ -47,6 +47,8 @@ ARGUMENTS = {
     "fill": "valve from the supply",
     "discharge": "valve to the surroundings",
     "inner": "what a wrapper wraps",
+    "valve": "what lets air through",
+    "line": "what lies between valve and muscle",
     "upstream": "absolute pressure before a valve [Pa]",
     "downstream": "absolute pressure behind a valve [Pa]",
     "opening": "0 shut to 1 open",

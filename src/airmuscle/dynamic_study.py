@@ -86,7 +86,7 @@ class DynamicStudy:
     def written(self, found: DynamicFit, record: int = 0) -> tuple[str, str]:
         """Name and text of a file with what was found: a record's scenario, or the [plant] of one that has none."""
         plant, origin = found.plant(record), self.experiments[record].recording.origin
-        note = f"{self.title}: numbers found from {origin} and {len(self.experiments) - 1} further records."
+        note = f"{self.title}: numbers found from {', '.join(e.recording.origin for e in self.experiments)}."
         if not isinstance(plant, Plant):
             return "plant", "\n".join([f"# {note}", *part_lines("plant", plant)]) + "\n"
         course = found.problem.courses[record]

@@ -91,7 +91,7 @@ COMMANDS = (
 
 
 def test_the_commands_stand_in_the_order_of_use():
-    listed = re.findall(r"^  (\w+)  ", airmuscle("--help").output.partition("Commands:")[2], re.MULTILINE)
+    listed = re.findall(r"^  ([\w-]+)  ", airmuscle("--help").output.partition("Commands:")[2], re.MULTILINE)
     assert listed == list(COMMANDS)
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ..library.entry import Entry
     from ..recording import Recording
     from ..report.chapter import Chapter
+    from .fit_more import Asked
     from .fit_start import Start
 
 Law = Annotated[
@@ -41,6 +42,9 @@ Uncensored = Annotated[
     bool, typer.Option("--uncensored", help="Take rows at zero force as measured; else they are bounds only.")
 ]
 
+EqualWeights = Annotated[
+    bool, typer.Option("--equal-weights", help="All rows count alike, whatever the sensors of several rigs resolve.")
+]
 Compare = Annotated[bool, typer.Option("--compare", help="Fit every law that the data determine, and rank them.")]
 LeftOut = Annotated[
     str | None,
@@ -89,6 +93,7 @@ def fit(
     fix: Fixed = None,
     robust: Robust = None,
     uncensored: Uncensored = False,
+    equal_weights: EqualWeights = False,
     json: Json = False,
 ) -> None:
     """Fit a characteristic to measured points, or compare all.
@@ -107,30 +112,35 @@ def fit(
       airmuscle fit runs/*.xlsx --mapping rig.toml --compare --leave-out run
       airmuscle solve fit/muscle.toml --pressure "3 bar" --force "100 N"
     """
-    from ..report.staged import refuse_unwritable
-    from .fit_more import More
+    from .fit_more import Asked, More
 
     if characteristic is None and not compare:
         raise typer.BadParameter("name a law to fit with --characteristic, or let --compare find one")
     more = More.of(bootstrap, profile, leave_out, shape, free, compare)
+    asked = Asked(more, tuple(fix or ()), degree, robust, uncensored, equal_weights, out, json)
     recordings = measured(files, unit, mapping=mapping, resting_length=resting_length, ambient=ambient)
-    if compare or characteristic is None:
-        from .fit_compare import compared
-
-        refuse_unwritable(out)
-        compared(files, recordings, more, characteristic=characteristic, fixed=tuple(fix or ()), degree=degree,
-                 robust=robust, uncensored=uncensored, out=out, json=json)  # fmt: skip
+    if characteristic is not None and not compare:
+        _one(files, recordings, characteristic, asked)
         return
-    start = start_of(characteristic, recordings, degree)
-    refuse_unwritable(out)
-    result = _identified(start, recordings, robust, uncensored, fix)
-    found = more.find(result, recordings)
+    from .fit_compare import compared
+
+    compared(files, recordings, characteristic, asked)
+
+
+def _one(files: list[Path], recordings: list[Recording], characteristic: str, asked: Asked) -> None:
+    """Fit the law that was named."""
+    from ..report.staged import refuse_unwritable
+
+    start = start_of(characteristic, recordings, asked.degree)
+    refuse_unwritable(asked.out)
+    result = _identified(start, recordings, asked)
+    found = asked.more.find(result, recordings)
     entry = fitted(result, start.entry, files)
-    write(result, found.shaped_entry(entry), recordings, out, found.chapters())
-    if json:
+    write(result, found.shaped_entry(entry), recordings, asked.out, found.chapters())
+    if asked.json:
         print_json(as_data(result) | found.as_data())
         return
-    echo([str(result), *found.lines()], out)
+    echo([str(result), *found.lines()], asked.out)
 
 
 def echo(lines: Sequence[str], out: Path) -> None:
@@ -141,18 +151,17 @@ def echo(lines: Sequence[str], out: Path) -> None:
     typer.echo(f"report: {out / 'report.html'}")
 
 
-def _identified(
-    start: Start, recordings: list[Recording], robust: str | None, uncensored: bool, fixed: list[str] | None
-) -> Fit:
+def _identified(start: Start, recordings: list[Recording], asked: Asked) -> Fit:
     from ..identify import UNCENSORED
     from ..identify import fit as identify
 
     return identify(
         start.entry.characteristic,
         recordings,
-        loss=loss_of(robust, start.entry.characteristic),
-        censoring=UNCENSORED if uncensored else None,
-        fixed=(*(fixed or ()), *start.fixed),
+        loss=loss_of(asked.robust, start.entry.characteristic),
+        censoring=UNCENSORED if asked.uncensored else None,
+        sigma=1.0 if asked.equal_weights else None,
+        fixed=(*asked.fixed, *start.fixed),
     )
 
 

@@ -13,54 +13,44 @@ if TYPE_CHECKING:
     from ..identify.candidates import Candidate
     from ..identify.compare import Comparison
     from ..recording import Recording
-    from .fit_more import More
+    from .fit_more import Asked
 
 
-def compared(
-    files: list[Path],
-    recordings: list[Recording],
-    more: More,
-    *,
-    characteristic: str | None,
-    fixed: tuple[str, ...],
-    degree: int,
-    robust: str | None,
-    uncensored: bool,
-    out: Path,
-    json: bool,
-) -> None:
+def compared(files: list[Path], recordings: list[Recording], characteristic: str | None, asked: Asked) -> None:
     """Compare, print the ranking, and write the recommended muscle with its report."""
     from ..identify.compare import compare
     from ..report.compare_chapter import compare_chapter
+    from ..report.staged import refuse_unwritable
     from .fit import echo, fitted, write
 
-    if uncensored or robust is not None:
-        raise typer.BadParameter("--compare judges by squared errors of the rows that pull: no --robust, --uncensored")
-    candidates = _candidates(recordings, characteristic, degree, fixed)
-    said = None if json else lambda name: typer.echo(f"  {name}", err=True)
-    found = compare(recordings, candidates, leave_out=more.by, progress=said)
+    if asked.uncensored or asked.robust is not None or asked.equal_weights:
+        raise typer.BadParameter(
+            "--compare judges by squared errors of the rows that pull: no --robust, --uncensored, --equal-weights"
+        )
+    refuse_unwritable(asked.out)
+    candidates = _candidates(recordings, characteristic, asked)
+    said = None if asked.json else lambda name: typer.echo(f"  {name}", err=True)
+    found = compare(recordings, candidates, leave_out=asked.more.by, progress=said)
     chosen = found.recommended
-    sure = more.find(chosen.fit, recordings)
+    sure = asked.more.find(chosen.fit, recordings)
     entry = fitted(chosen.fit, _bare(chosen.candidate), files)
-    write(chosen.fit, entry, recordings, out, [compare_chapter(found), *sure.chapters()])
-    if json:
+    write(chosen.fit, entry, recordings, asked.out, [compare_chapter(found), *sure.chapters()])
+    if asked.json:
         print_json(_as_data(found) | sure.as_data())
         return
-    echo([str(found), *sure.lines()], out)
+    echo([str(found), *sure.lines()], asked.out)
 
 
-def _candidates(
-    recordings: list[Recording], characteristic: str | None, degree: int, fixed: tuple[str, ...]
-) -> list[Candidate]:
+def _candidates(recordings: list[Recording], characteristic: str | None, asked: Asked) -> list[Candidate]:
     """All that start from data alone, and the one named beside them."""
     from ..identify.candidates import Candidate, standard_candidates
     from .fit_start import start_of
 
     found = list(standard_candidates(recordings))
     if characteristic is not None:
-        start = start_of(characteristic, recordings, degree)
+        start = start_of(characteristic, recordings, asked.degree)
         law = start.entry.characteristic
-        found.append(Candidate(f"{characteristic} (named)", law, (*fixed, *start.fixed)))
+        found.append(Candidate(f"{characteristic} (named)", law, (*asked.fixed, *start.fixed)))
     return found
 
 

@@ -21,21 +21,25 @@ WEAK = "weak"
 """For --profile: all that take part in what the records do not determine."""
 
 
+Study = Annotated[
+    Path, typer.Argument(metavar="STUDY.toml", help="A file with [plant], [observed], [fit] and [[record]].")
+]
+Profiled = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="PARAMETER",
+        help="How the error grows as this one is held at other values; 'weak': all not determined. Repeat it.",
+    ),
+]
+Points = Annotated[int, typer.Option(min=2, max=50, help="Values of a profile to either side.")]
+Starts = Annotated[int | None, typer.Option(min=1, max=10_000, help="Starts of the search, before the file's.")]
+
+
 def fit_dynamic(
-    study: Annotated[
-        Path, typer.Argument(metavar="STUDY.toml", help="A file with [plant], [observed], [fit] and [[record]].")
-    ],
-    profile: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="PARAMETER",
-            help="How the error grows as this one is held at other values; 'weak': all not determined. Repeat it.",
-        ),
-    ] = None,
-    points: Annotated[int, typer.Option(min=2, max=50, help="Values of a profile to either side.")] = 5,
-    starts: Annotated[
-        int | None, typer.Option(min=1, max=10_000, help="Starts of the search, before the file's.")
-    ] = None,
+    study: Study,
+    profile: Profiled = None,
+    points: Points = 5,
+    starts: Starts = None,
     out: Folder = Path("dynamic"),
     json: Json = False,
 ) -> None:

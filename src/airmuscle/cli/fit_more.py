@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -20,6 +21,20 @@ if TYPE_CHECKING:
 
 WEAK = "weak"
 """For --profile: all parameters whose standard deviation should not be trusted."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Asked:
+    """How to fit, and where the answers go."""
+
+    more: More
+    fixed: tuple[str, ...]
+    degree: int
+    robust: str | None
+    uncensored: bool
+    equal_weights: bool
+    out: Path
+    json: bool
 
 
 @dataclasses.dataclass(frozen=True)

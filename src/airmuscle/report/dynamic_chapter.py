@@ -34,7 +34,7 @@ def _estimates(fit: DynamicFit, title: str, remarks: Sequence[str]) -> Chapter:
     said = [
         f"Residuals of {fit.scatter:.3g} standard deviations of the sensors; {known.rank} of {known.singular.size} "
         f"unknowns off their bounds are determined; {fit.reached} of {fit.costs.size} starts came to this optimum.",
-        *(f"{note[:1].upper()}{note[1:]}." for note in fit.notes),
+        *(f"{note[:1].upper()}{note[1:].rstrip('.')}." for note in fit.notes),
         *remarks,
     ]
     rms = {
@@ -77,7 +77,7 @@ def _open(fit: DynamicFit) -> list[Table]:
     found = fit.identifiability.undetermined
     if not found:
         return []
-    columns = {
+    columns: dict[str, Any] = {
         "these move together": [", ".join(f"{name} {share:+.2g}" for name, share in each.shares) for each in found],
         "standard deviation, of their size": [each.deviation for each in found],
         "what would tell them apart": [each.experiment for each in found],
@@ -93,7 +93,7 @@ def _correlations(fit: DynamicFit) -> Table:
 
 def _profiles(profiles: Sequence[Profile]) -> Chapter:
     ends = [profile.interval for profile in profiles]
-    columns = {
+    columns: dict[str, Any] = {
         "parameter": [p.name for p in profiles],
         "2.5 % (SI)": [low if np.isfinite(low) else "open" for low, _ in ends],
         "97.5 % (SI)": [high if np.isfinite(high) else "open" for _, high in ends],
