@@ -248,3 +248,12 @@ def test_a_record_whose_time_repeats_is_refused(folder, tmp_path):
     (folder / "run3.csv").write_text("\n".join([*lines[:30], lines[29], *lines[30:]]) + "\n", encoding="utf-8")
     result = airmuscle("fit-dynamic", variant(folder, file=('"run1.csv"', '"run3.csv"')), "--out", tmp_path / "out")
     assert "repeats the time of the row before" in result.stderr
+
+
+def test_the_page_on_dynamic_identification_holds_a_study_that_loads(folder):
+    page = (Path(__file__).parents[2] / "docs" / "dynamic-identification.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+    (folder / "page.toml").write_text(text, encoding="utf-8")
+    study = load_study(folder / "page.toml")
+    assert [e.plant.mechanism.mass for e in study.experiments] == [10.0, 12.0]
+    assert study.free[0] == ("circuit.fill.conductance", "circuit.discharge.conductance")

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ..recording import Recording
 
 Files = Annotated[
@@ -42,7 +44,19 @@ def measured(files: list[Path], unit: list[str] | None, **options: Any) -> list[
         )
     with reading_progress() as progress:
         runs = read(own, progress=progress, **options) if own else ()
+    _refuse_misstated(runs)
     return [*runs, *(data_set(str(name)) for name in names)]
+
+
+def _refuse_misstated(recordings: Sequence[Recording]) -> None:
+    """Refuse a run that is not what its file says, or a lone one in which nothing changes."""
+    from ..recording.segment import AT_REST, refuse_unswept, runs, sensors
+
+    together = sensors(recordings) if recordings else {}
+    for recording in recordings:
+        found = runs(recording, {name: s for name, s in together.items() if name in recording.columns})
+        if len(recordings) == 1 or all(run.kind is not AT_REST for run in found):
+            refuse_unswept(recording, found)
 
 
 def pairs(option: str, texts: list[str] | None) -> dict[str, str]:

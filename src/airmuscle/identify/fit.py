@@ -13,7 +13,7 @@ from .. import declare
 from ..characteristic.base import Characteristic
 from ..errors import IdentificationError
 from ..recording import Recording
-from .censoring import Censoring, censoring_of
+from .censoring import Censoring, censoring_of, within_sensor
 from .correlation_index import correlation_index
 from .loss import Array, LeastSquares, Loss
 from .problem import RESTING_LENGTH, Problem, answers, direction_of, pose
@@ -40,8 +40,9 @@ def fit(
 
     `characteristic` gives the structure and the start values; its parameters that are declared as not fitted, and
     those named in `fixed`, stay. Errors are taken in the direction that the law gives (force, contraction or
-    pressure), within the declared bounds. Rows at zero or full force are cut off and count only where the law
-    contradicts them; `censoring` states another range, `UNCENSORED` takes every row as it stands.
+    pressure), within the declared bounds. Rows at zero or full force, or where the force sensor shows that it is cut
+    off, count only where the law contradicts them; `censoring` states another range, `UNCENSORED` takes every row as
+    it stands.
     `sigma` are the standard deviations of the rows, of which only the ratios matter; without it recordings from
     several rigs weigh by what their sensors resolve, and `sigma=1.0` weighs all alike. `loss` is LeastSquares(),
     Huber(scale) or SoftL1(scale), the scale in the unit of the fitted quantity.
@@ -53,7 +54,8 @@ def fit(
     weights = _weights(data, dropped, sigma if by_rig is None else _by_row(by_rig, recording))
     data, weights = data.rows(~dropped), weights[~dropped]
     law = _with_box(_of_length(characteristic, data), data)
-    problem = pose(law, data, censoring or censoring_of(law), weights, fixed)
+    runs = [recording] if isinstance(recording, Recording) else list(recording)
+    problem = pose(law, data, censoring or within_sensor(censoring_of(law), law, runs), weights, fixed)
     solution = solve(problem, loss)
     found = statistics(problem, solution, loss)
     notes = (*_notes(problem, found, loss, int(np.count_nonzero(dropped))), *_of_rigs(by_rig, problem))
