@@ -257,3 +257,17 @@ def test_the_page_on_dynamic_identification_holds_a_study_that_loads(folder):
     study = load_study(folder / "page.toml")
     assert [e.plant.mechanism.mass for e in study.experiments] == [10.0, 12.0]
     assert study.free[0] == ("circuit.fill.conductance", "circuit.discharge.conductance")
+
+
+def test_a_start_that_was_found_begins_the_written_scenario(folder, tmp_path):
+    path = variant(
+        folder, start=('start = { pressure = "0.6 bar" }', 'start = { pressure = "0.62 bar" }'),
+        nuisance=('start_time = "50 ms"', 'start_time = "50 ms"\nstart = { pressure = "5 kPa" }'),
+        one=(RECORD.format("run2.csv").replace("0.6 bar", "0.62 bar"), ""), quick=("starts = 2", "starts = 1"),
+    )  # fmt: skip
+    result = airmuscle("fit-dynamic", path, "--out", tmp_path / "out", "--json")
+    found = {e["name"]: e for e in json.loads(result.stdout)["parameters"]}["start pressure of record 1"]
+    assert found["value"] == pytest.approx(6e4, abs=4 * found["deviation"])
+    assert found["deviation"] < 300.0
+    text = (tmp_path / "out" / "scenario.toml").read_text(encoding="utf-8")
+    assert float(re.search(r"\[run\.start\]\npressure = (\S+)", text)[1]) == found["value"]
