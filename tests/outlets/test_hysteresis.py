@@ -157,8 +157,8 @@ def test_a_hold_begins_where_the_length_has_arrived(two):
 
 def test_rows_on_the_way_to_a_hold_are_none_of_it():
     """The length creeps up by 0.01 % a row, less than what counts as held, and then stands for 40 rows."""
-    contraction = np.concatenate([np.linspace(0.0897, 0.1, 100, endpoint=False), np.full(40, 0.1)])
-    rows = {"time": 0.5 * np.arange(140), "pressure": np.full(140, 3e5), "contraction": contraction}
-    force = np.linspace(100.0, 300.0, 140)
+    contraction = np.concatenate([np.linspace(0.0897, 0.1, 103, endpoint=False), np.full(40, 0.1)])
+    rows = {"time": 0.5 * np.arange(143), "pressure": np.full(143, 3e5), "contraction": contraction}
+    force = np.linspace(100.0, 300.0, 143)
     found = max(holds(Recording({**rows, "force": force}, "hold")), key=lambda hold: len(hold.stretch))
-    assert (found.stretch.start, found.stretch.stop) == (100, 140)
+    assert (found.stretch.start, found.stretch.stop) == (103, 143)
