@@ -1,7 +1,6 @@
 """A dynamic fit written down as a file: the plant, the records, and what shall be found.
 
 [plant]                                     as in a scenario, with the numbers that the search starts from;
-                                            or model = "FreeFill" with its parameters
 [command]                                   as in a scenario; of every record that states none of its own
 fill = [["0.1 s", 1], ["1 s", 0]]
 [observed]                                  what was measured, each with its sensor's standard deviation
@@ -16,7 +15,7 @@ start = { pressure = "3 kPa" }              optional: so are values that a start
 starts = 8                                  optional, and seed: how many starts the search has
 method = { model = "Rodas4", rtol = 1e-8 }  optional
 [fit.bounds]                                optional, by the first path; those declared otherwise
-"gas.exponent" = [1.0, 1.4]
+"gas.exponent" = [1.01, 1.4]
 [[record]]
 file = "fill1.csv"                          beside this file
 start = { pressure = "0 bar" }              optional: rest at this pressure, or a state with position = "10 mm";
@@ -39,18 +38,19 @@ import numpy as np
 
 from . import declare
 from .errors import ParameterError
-from .identify.dynamic import DynamicFit, Experiment, FreeFill, Start, StartTime, StartValue, fit_dynamic
+from .identify.dynamic import DynamicFit, Experiment, Start, StartTime, StartValue, fit_dynamic
 from .identify.dynamic.experiment import Own, Shared
 from .library.build import build
 from .library.catalogue import parsed
+from .library.command_table import command_from
 from .library.place import Place, checked, finite, refuse_unknown, said_at, text
-from .library.scenario import command_from, plant_from
-from .library.write import part_lines, scenario_toml
+from .library.scenario import plant_from
+from .library.write import scenario_toml
 from .method import Method
 from .plant import Plant
-from .program import System
 from .recording import Recording, read
 from .recording.columns import quantity_of
+from .simulate import refuse_beyond_range
 
 _TABLES = ("title", "plant", "command", "observed", "fit", "record")
 _FIT = ("free", "own", "start_time", "start", "starts", "seed", "method", "bounds")
@@ -64,7 +64,7 @@ class DynamicStudy:
     """Records, their plant, and what is to be found; all numbers SI."""
 
     title: str
-    plant: System
+    plant: Plant
     experiments: tuple[Experiment, ...]
     commands: tuple[Mapping[str, Any], ...]
     """The command of every record as its file states it, to be written again."""
@@ -83,24 +83,23 @@ class DynamicStudy:
             starts=self.starts, seed=self.seed, method=self.method,
         )  # fmt: skip
 
-    def written(self, found: DynamicFit, record: int = 0) -> tuple[str, str]:
-        """Name and text of a file with what was found: a record's scenario, or the [plant] of one that has none."""
+    def scenario(self, found: DynamicFit, record: int = 0) -> str:
+        """The text of a scenario: a record's plant with what was found, its command, its start and its length."""
         plant, origin = found.plant(record), self.experiments[record].recording.origin
         note = f"{self.title}: numbers found from {', '.join(e.recording.origin for e in self.experiments)}."
-        if not isinstance(plant, Plant):
-            return "plant", "\n".join([f"# {note}", *part_lines("plant", plant)]) + "\n"
+        assert isinstance(plant, Plant)
         course = found.problem.courses[record]
         known = dict(course.experiment.start.known)
         for k in course.mine:
             what = course.unknowns[k].what
             if isinstance(what, StartValue):
                 known[what.name] = float(found.values[k])
-        moving = {name for c in plant.mechanism.coordinates for name in (c.name, c.speed)}
-        still = bool(course.experiment.start.still)
-        start = {name: value for name, value in known.items() if name == "pressure" or (name in moving and not still)}
+        coordinates = plant.mechanism.coordinates
+        held = {name for c in coordinates for name in (c.name, c.speed) if c.name in known}
+        start = {name: value for name, value in known.items() if name == "pressure" or name in held}
         duration = float(course.times[-1]) - course.start_time(found.values)
         run = {"duration": duration, "start": start}
-        return "scenario", scenario_toml(f"{self.title}, {origin}", plant, self.commands[record], run, note)
+        return scenario_toml(f"{self.title}, {origin}", plant, self.commands[record], run, note)
 
 
 def load_study(path: str | Path) -> DynamicStudy:
@@ -109,7 +108,7 @@ def load_study(path: str | Path) -> DynamicStudy:
     tables = parsed(file)
     place = Place(str(file), "", file.parent)
     refuse_unknown(tables, _TABLES, place)
-    plant = _system(_table(tables, "plant", place), place.inside("plant"))
+    plant = plant_from(_table(tables, "plant", place), place.inside("plant"))
     observed = _observed(_table(tables, "observed", place), plant, place.inside("observed"))
     records = tables.get("record")
     if not isinstance(records, list) or not records:
@@ -166,20 +165,12 @@ def _method(table: Mapping[str, Any], place: Place) -> Method | None:
     return found
 
 
-def _system(table: Mapping[str, Any], place: Place) -> System:
-    """A plant as scenarios have it, or a model that is a system by itself."""
-    if table.get("model", "Plant") == "Plant":
-        return plant_from(table, place)
-    found: System = checked(build(table, place), FreeFill, place)
-    return found
-
-
-def _unit(name: str, plant: System) -> str:
+def _unit(name: str, plant: Plant) -> str:
     quantity = quantity_of(name)
     return quantity.unit if quantity else next((s.unit for s in plant.states if s.name == name), "1")
 
 
-def _observed(table: Mapping[str, Any], plant: System, place: Place) -> dict[str, tuple[float, str]]:
+def _observed(table: Mapping[str, Any], plant: Plant, place: Place) -> dict[str, tuple[float, str]]:
     """Standard deviation and column of every output that was measured."""
     found = {}
     for name, given in table.items():
@@ -202,7 +193,7 @@ def _shared(given: Any, where: str) -> Shared:
     raise ParameterError(f"{where} holds {given!r}; each is a path in quotes, or a list of paths that share a value.")
 
 
-def _own(table: Mapping[str, Any], plant: System, place: Place) -> tuple[Own, ...]:
+def _own(table: Mapping[str, Any], plant: Plant, place: Place) -> tuple[Own, ...]:
     found: list[Own] = [_shared(item, f"{place}, own") for item in _list(table, "own", place)]
     if "start_time" in table:
         found.append(StartTime(_positive(table["start_time"], "s", f"{place}, start_time")))
@@ -218,14 +209,17 @@ def _positive(given: Any, unit: str, where: str) -> float:
     return found
 
 
-def _bounds(table: Mapping[str, Any], plant: System, place: Place) -> dict[str, tuple[float, float]]:
-    units = {leaf.path: leaf.declared.unit for leaf in declare.leaves(plant)}
+def _bounds(table: Mapping[str, Any], plant: Plant, place: Place) -> dict[str, tuple[float, float]]:
+    declared = {leaf.path: leaf.declared for leaf in declare.leaves(plant)}
     found = {}
     for path, given in table.items():
-        refuse_unknown({path: given}, tuple(units), place)
+        refuse_unknown({path: given}, tuple(declared), place)
         if not isinstance(given, list) or len(given) != 2:
-            raise ParameterError(f"{place}, {path} is {given!r}; write the least and the greatest value, [1.0, 1.4].")
-        low, high = (finite(end, units[path], f"{place}, {path}") for end in given)
+            raise ParameterError(f"{place}, {path} is {given!r}; write the least and the greatest value, [1.01, 1.4].")
+        low, high = (finite(end, declared[path].unit, f"{place}, {path}") for end in given)
+        least, greatest = declared[path].bounds
+        if low < least or high > greatest:
+            raise ParameterError(f"{place}, {path} is {given!r}; allowed are {least:g} to {greatest:g}.")
         if not low < high:
             raise ParameterError(f"{place}, {path} is {given!r}; the least value must lie below the greatest.")
         found[path] = low, high
@@ -239,7 +233,7 @@ class _Record:
     row: Any
     place: Place
     tables: Mapping[str, Any]
-    shared: System
+    shared: Plant
 
     def experiment(self, observed: Mapping[str, tuple[float, str]]) -> tuple[Experiment, Mapping[str, Any]]:
         """The record as an experiment, and its command as written."""
@@ -247,18 +241,21 @@ class _Record:
             raise ParameterError(f"{self.place} is {self.row!r}; write [[record]] and its keys under it.")
         refuse_unknown(self.row, _RECORD, self.place)
         plant = self.plant()
-        command = self.row.get("command", self.tables.get("command", {}))
-        recording = self.recording(observed)
+        table = dict(_table({**self.tables, **self.row}, "command", self.place, needed=False))
+        if "file" in table:  # so that it can be written elsewhere
+            table["file"] = str((self.place.folder / str(table["file"])).resolve())
+        recording, at = self.recording(observed), self.place.inside("command")
         start_time = finite(self.row.get("start_time", 0.0), "s", f"{self.place}, start_time")
-        return Experiment(
-            recording, command_from(command, plant, self.place.inside("command")),  # type: ignore[arg-type]
-            self.start(plant, recording), start_time, plant,
-        ), command  # fmt: skip
+        command = command_from(table, plant.commands, at)
+        with said_at(at):
+            length = max(float(recording["time"][-1]) - start_time, 1e-9)
+            refuse_beyond_range(plant, command.segments(plant.inputs, 0.0, length), 0.0)
+        return Experiment(recording, command, self.start(plant, recording), start_time, plant), table
 
-    def plant(self) -> System:
+    def plant(self) -> Plant:
         """The shared plant, with the parts that this record states put in their place."""
         other = _table(self.row, "plant", self.place, needed=False)
-        return _system({**self.tables["plant"], **other}, self.place.inside("plant")) if other else self.shared
+        return plant_from({**self.tables["plant"], **other}, self.place.inside("plant")) if other else self.shared
 
     def recording(self, observed: Mapping[str, tuple[float, str]]) -> Recording:
         """The part of the file that is used, with the observed columns under the names of the outputs."""
@@ -284,7 +281,7 @@ class _Record:
             )
         return recording.rows(rows)
 
-    def start(self, plant: System, recording: Recording) -> Start:
+    def start(self, plant: Plant, recording: Recording) -> Start:
         """Rest at a pressure, or the state that is stated."""
         at = self.place.inside("start")
         given = dict(_table(self.row, "start", self.place, needed=False))
@@ -293,8 +290,4 @@ class _Record:
         usual = float(np.median(recording[sensed[0]][:FIRST_ROWS])) if sensed else 0.0
         pressure = values.pop("pressure", usual)
         with said_at(at):
-            if isinstance(plant, FreeFill):
-                refuse_unknown(values, ("pressure",), at)
-                return Start({"line.pressure": pressure, "pressure": pressure}, plant.guess(pressure), ("volume",))
-            assert isinstance(plant, Plant)
             return Start.held(plant, pressure, **values) if values else Start.at_rest(plant, pressure)

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from airmuscle.cli.app import app
 from airmuscle.declare import leaves
 from airmuscle.dynamic_study import load_study
-from airmuscle.identify.dynamic import FreeFill, StartTime, StartValue
+from airmuscle.identify.dynamic import StartTime, StartValue
 from airmuscle.library.scenario import load_scenario
 from airmuscle.mechanism import HangingMass
 from airmuscle.recording import Recording, read_csv
@@ -54,7 +54,7 @@ own = ["circuit.supply.pressure"]
 start_time = "50 ms"
 starts = 2
 [fit.bounds]
-"gas.exponent" = [1.0, 1.4]
+"gas.exponent" = [1.01, 1.4]
 """
 RECORD = '[[record]]\nfile = "{}"\nstart_time = "0.2 s"\nstart = {{ pressure = "0.6 bar" }}\n'
 
@@ -126,7 +126,7 @@ def test_what_cannot_be_told_apart_is_printed_with_its_experiment(folder, tmp_pa
         folder, held=('"HangingMass"\nmass = "10 kg"', '"Isometric"\ncontraction = 0.05'),
         free=(f'free = [{VALVES}, "gas.exponent", "muscle.damper.damping"]',
               f'free = [{VALVES}, "muscle.geometry.resting_length"]'),
-        bounds=('[fit.bounds]\n"gas.exponent" = [1.0, 1.4]\n', ""),
+        bounds=('[fit.bounds]\n"gas.exponent" = [1.01, 1.4]\n', ""),
         observed=('position = { deviation = "50 um", column = "height" }\n', ""),
         one=(RECORD.format("run2.csv"), ""),
     )  # fmt: skip
@@ -149,7 +149,7 @@ def test_a_study_says_what_it_was_told(folder):
     study = load_study(path)
     first, second = study.experiments
     assert study.own == ("circuit.supply.pressure", StartTime(0.05), StartValue("pressure", 2e3))
-    assert (study.seed, study.starts, study.bounds) == (3, 2, {"gas.exponent": (1.0, 1.4)})
+    assert (study.seed, study.starts, study.bounds) == (3, 2, {"gas.exponent": (1.01, 1.4)})
     assert study.method.rtol == 1e-7
     assert study.observed == pytest.approx({"pressure": 500.0, "position": 5e-5})
     assert (first.plant.mechanism, second.plant.mechanism) == (HangingMass(10.0), HangingMass(12.0))
@@ -159,41 +159,64 @@ def test_a_study_says_what_it_was_told(folder):
     assert second.command.segments(("fill", "discharge"), 0.0, 1.0).values.tolist() == [[1.0, 0.0]]
 
 
-FREE_FILL = """
+UNLOADED = """
 [plant]
-model = "FreeFill"
+[plant.muscle.contractile]
+model = "VirtualWork"
+geometry = { model = "Vessel", enclosed_volume = "100 mL" }
+[plant.muscle]
+geometry = { model = "Vessel", enclosed_volume = "100 mL" }
+wall = { model = "SwellingWall", growth_volume = 1e-4, middle = "150 kPa", breadth = "50 kPa", lag = "0.2 s" }
+[plant.circuit]
+model = "Line"
+[plant.circuit.circuit]
+model = "FillDischarge"
 supply = { model = "Supply", pressure = "6 bar" }
-valve = { model = "Valve", conductance = 5e-10, critical_ratio = 0.4 }
-line = { model = "Valve", conductance = 1.3e-9, critical_ratio = 0.3 }
-line_volume = 2e-5
-rest_volume = "100 mL"
-growth_volume = 1e-4
-middle = "150 kPa"
-breadth = "50 kPa"
-lag = "0.2 s"
+fill = { model = "Valve", conductance = 5e-10, critical_ratio = 0.4 }
+discharge = { model = "Valve", conductance = 0.0, critical_ratio = 0.3 }
+[plant.circuit.tube]
+model = "Tube"
+volume = 2e-5
+orifice = { model = "Valve", conductance = 1.3e-9, critical_ratio = 0.3 }
+[plant.mechanism]
+model = "Isometric"
+contraction = 0.0
 [command]
 fill = [[0, 1]]
 [observed]
-"line.pressure" = { deviation = "500 Pa", column = "pressure" }
+"tube.pressure" = { deviation = "500 Pa", column = "pressure" }
 [fit]
-free = ["valve.conductance"]
+free = ["circuit.circuit.fill.conductance"]
 [[record]]
 file = "run1.csv"
 """
 
 
-def test_an_unloaded_muscle_behind_a_line_is_a_plant_too(folder, tmp_path):
-    (folder / "fill.toml").write_text(FREE_FILL, encoding="utf-8")
+def test_an_unloaded_muscle_behind_a_tube_is_fitted_and_written_too(folder, tmp_path):
+    (folder / "fill.toml").write_text(UNLOADED, encoding="utf-8")
     study = load_study(folder / "fill.toml")
-    assert isinstance(study.plant, FreeFill)
-    assert study.plant.rest_volume == pytest.approx(1e-4)
-    assert study.experiments[0].start.still == ("volume",)
-    result = airmuscle("fit-dynamic", folder / "fill.toml", "--out", tmp_path / "out")
-    assert "plant: " in result.stdout
-    text = re.sub(r"(?s)\[plant\].*?\[command\]", "[command]", FREE_FILL, count=1)
-    (folder / "fill.toml").write_text((tmp_path / "out" / "plant.toml").read_text() + text, encoding="utf-8")
-    found = float(re.search(r"valve\.conductance +\S+ +(\S+)", result.stdout)[1])
-    assert load_study(folder / "fill.toml").plant.valve.conductance == pytest.approx(found, rel=1e-5)
+    (experiment,) = study.experiments
+    assert experiment.start.known["pressure"] == pytest.approx(np.median(experiment.recording["pressure"][:3]))
+    result = airmuscle("fit-dynamic", folder / "fill.toml", "--out", tmp_path / "out", "--json")
+    assert result.exit_code == 0, result.stderr
+    (found,) = json.loads(result.stdout)["parameters"]
+    plant = load_scenario(tmp_path / "out" / "scenario.toml").plant
+    assert plant.circuit.circuit.fill.conductance == found["value"]
+    assert plant.muscle.wall == study.plant.muscle.wall
+
+
+def test_a_command_may_stand_in_a_file_and_is_found_from_the_written_scenario(folder, tmp_path):
+    (folder / "valve.csv").write_text(
+        "time [s],fill [1],discharge [1]\n0,0,0\n0.1,0,0\n0.11,1,0\n1,1,0\n1.01,0,0\n1.3,0,0\n1.31,0,1\n",
+        encoding="utf-8",
+    )
+    path = variant(folder, file=('fill = [["0.1 s", 1], ["1 s", 0]]\ndischarge = [["1.3 s", 1]]', 'file = "valve.csv"'),
+                   once=(RECORD.format("run2.csv"), ""), few=("starts = 2", "starts = 1"))  # fmt: skip
+    result = airmuscle("fit-dynamic", path, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.stderr
+    command = load_scenario(tmp_path / "out" / "scenario.toml").command
+    found = command.segments(("fill", "discharge"), 0.0, 2.0).inputs_at(np.array([0.05, 0.5, 1.5]), 0.0)
+    assert found[:, 0].tolist() == [0.0, 1.0, 0.0]
 
 
 REFUSED = {
@@ -201,10 +224,11 @@ REFUSED = {
     "a file that is not there": ('"run1.csv"', '"run3.csv"', "run3.csv"),
     "an unknown path": ('"gas.exponent", "m', '"gas.exponen", "m', "no parameter 'gas.exponen'"),
     "an unknown path in bounds": ('"gas.exponent" =', '"gas.exponen" =', "Did you mean 'gas.exponent'"),
-    "bounds upside down": ("[1.0, 1.4]", "[1.4, 1.0]", "the least value must lie below the greatest"),
-    "one bound": ("[1.0, 1.4]", "1.4", "write the least and the greatest value"),
-    "bounds of another kind": ("[1.0, 1.4]", '["1 m", 1.4]', "unit 'm' cannot become"),
-    "a start beyond its bounds": ("[1.0, 1.4]", "[1.2, 1.4]", "gas.exponent starts at 1.1; its bounds are 1.2 to 1.4"),
+    "bounds upside down": ("[1.01, 1.4]", "[1.4, 1.01]", "the least value must lie below the greatest"),
+    "bounds beyond what can be": ("[1.01, 1.4]", "[1.0, 1.4]", "allowed are 1.001 to 1.667"),
+    "one bound": ("[1.01, 1.4]", "1.4", "write the least and the greatest value"),
+    "bounds of another kind": ("[1.01, 1.4]", '["1 m", 1.4]', "unit 'm' cannot become"),
+    "a start beyond its bounds": ("[1.01, 1.4]", "[1.2, 1.4]", "gas.exponent starts at 1.1; its bounds are 1.2 to 1.4"),
     "a deviation of zero": ('"500 Pa"', '"0 Pa"', "a sensor's standard deviation is above zero"),
     "a deviation of another kind": ('"500 Pa"', '"500 mm"', "[observed], pressure: unit 'mm' cannot become 'Pa'"),
     "a column that is not there": ('"height"', '"heigth"', "no column 'heigth'; there are time, pressure, height"),

@@ -14,6 +14,7 @@ import pytest
 
 from airmuscle.characteristic.chou_hannaford1996 import ChouHannaford1996
 from airmuscle.characteristic.clamped import Clamped
+from airmuscle.contact import HuntCrossley
 from airmuscle.errors import AirmuscleError, AirmuscleWarning, FileError, ParameterError, UnitError, UnknownName
 from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
 from airmuscle.geometry.braid import Braid
@@ -21,7 +22,7 @@ from airmuscle.library import catalogue
 from airmuscle.library.models import model_class, model_names
 from airmuscle.library.place import Place
 from airmuscle.library.scenario import muscle_from
-from airmuscle.muscle import LinearDamper, LinearSpring, PressureDamper
+from airmuscle.muscle import CreepElements, EndStop, LinearDamper, LinearSpring, PressureDamper, SwellingWall
 from airmuscle.reference import cite
 
 GOOD = """
@@ -132,6 +133,18 @@ def test_a_plant_takes_over_the_friction_of_its_muscle_file_unless_it_states_ano
     place = Place("scenario.toml", "plant.muscle", tmp_path)
     assert muscle_from(table, place).friction == FRICTION[0]
     assert muscle_from({**table, "friction": {"model": "NoFriction"}}, place).friction == NoFriction()
+
+
+def test_a_muscle_file_carries_wall_stop_and_creep(tmp_path: Path):
+    parts = {
+        "wall": SwellingWall(1e-5, 1.5e5, 5e4, 0.2),
+        "stop": EndStop(0.25, HuntCrossley(1e7)),
+        "creep": CreepElements((500.0,), (8.0,)),
+    }
+    entry = dataclasses.replace(catalogue.load("dmsp-20-300"), **parts)
+    again = catalogue.load(catalogue.save(entry, tmp_path / "muscle.toml"))
+    assert again == dataclasses.replace(entry, name="muscle")
+    assert {name: getattr(again.muscle, name) for name in parts} == parts
 
 
 def test_a_friction_of_another_kind_is_refused(tmp_path: Path):

@@ -23,6 +23,7 @@ from .list import list_entries
 from .plan import plan
 from .remedies import in_options
 from .reproduce import reproduce
+from .schema import schema
 from .show import show
 from .simulate import simulate
 from .solve import solve
@@ -82,6 +83,7 @@ app.command("hysteresis", short_help="Fit friction to loops, and say whether the
 app.command("fit-dynamic", short_help="Find a plant's numbers from records of its motion.")(fit_dynamic)
 app.command("plan", short_help="Say which runs tell most about a muscle on your bench.")(plan)
 app.command("simulate", short_help="Simulate a plant that a scenario file describes.")(simulate)
+app.command("schema", short_help="Print what editors need to check scenario and muscle files.")(schema)
 
 
 def _print_version(wanted: bool) -> None:

@@ -112,9 +112,8 @@ def _write(
     with staged(out) as place:
         for i in range(len(study.experiments)):
             suffix = f"-{i + 1}" if len(study.experiments) > 1 else ""
-            name, content = study.written(found, i)
-            names.append(f"{name}{suffix}.toml")
-            (place / names[-1]).write_text(content, encoding="utf-8")
+            names.append(f"scenario{suffix}.toml")
+            (place / names[-1]).write_text(study.scenario(found, i), encoding="utf-8")
         fill(place, dynamic_chapters(found, study.title, profiles, remarks), title="Dynamic fit")
     return [out / name for name in names]
 

@@ -13,9 +13,9 @@ from ..reference import Reference
 
 if TYPE_CHECKING:
     from ..friction.base import Friction
-    from ..muscle import Damper, Muscle, Spring
+    from ..muscle import CreepElements, Damper, Muscle, Series, Spring, Stop, Wall
 
-OPTIONAL = ("spring", "damper", "friction")
+OPTIONAL = ("spring", "damper", "friction", "wall", "series", "stop", "creep")
 """Parts that a muscle may do without, as fields of an entry and tables of its file."""
 
 
@@ -46,6 +46,10 @@ class Entry:
     spring: Spring | None = None
     damper: Damper | None = None
     friction: Friction | None = None
+    wall: Wall | None = None
+    series: Series | None = None
+    stop: Stop | None = None
+    creep: CreepElements | None = None
     note: str = ""
     warning: str = ""
     box: Box | None = None

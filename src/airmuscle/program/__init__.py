@@ -4,5 +4,5 @@
 system does not need.
 """
 
-from .system import StateVariable as StateVariable
+from ..variables import StateVariable as StateVariable
 from .system import System as System
