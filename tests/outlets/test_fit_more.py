@@ -192,3 +192,14 @@ def test_levels_are_those_held_and_a_ramp_has_quantiles():
     assert levels_of(held, 5) == pytest.approx([1e5, 2e5, 4e5])
     assert levels_of(np.repeat(np.linspace(1e5, 6e5, 11), 5), 3).size == 3
     assert levels_of(np.linspace(0.0, 1e5, 1001), 3) == pytest.approx([1e4, 5e4, 9e4])
+
+
+def test_exclusions_of_a_comparison_name_options_everywhere(tmp_path):
+    bench(tmp_path / "bench.csv", noise=1.0, count=60)
+    asked = ("--compare", "--leave-out", "pressure", "--profile", "weak")
+    result = airmuscle("fit", tmp_path / "bench.csv", *asked, "--out", tmp_path / "fit")
+    assert result.exit_code == 0, result.stderr
+    page = (tmp_path / "fit" / "report.html").read_text("utf-8")
+    assert "--fix" in result.stdout
+    assert "fixed=" not in result.stdout + page
+    assert "profile: " in result.stdout

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from .remedies import in_options
 from .terminal import print_json
 
 if TYPE_CHECKING:
@@ -30,7 +32,7 @@ def compared(files: list[Path], recordings: list[Recording], characteristic: str
     refuse_unwritable(asked.out)
     candidates = _candidates(recordings, characteristic, asked)
     said = None if asked.json else lambda name: typer.echo(f"  {name}", err=True)
-    found = compare(recordings, candidates, leave_out=asked.more.by, progress=said)
+    found = _worded(compare(recordings, candidates, leave_out=asked.more.by, progress=said))
     chosen = found.recommended
     sure = asked.more.find(chosen.fit, recordings)
     entry = fitted(chosen.fit, _bare(chosen.candidate), files)
@@ -39,6 +41,12 @@ def compared(files: list[Path], recordings: list[Recording], characteristic: str
         print_json(_as_data(found) | sure.as_data())
         return
     echo([str(found), *sure.lines()], asked.out)
+
+
+def _worded(found: Comparison) -> Comparison:
+    """The reasons of exclusions with the remedies of the command line."""
+    excluded = tuple(dataclasses.replace(each, why=in_options(each.why)) for each in found.excluded)
+    return dataclasses.replace(found, excluded=excluded)
 
 
 def _candidates(recordings: list[Recording], characteristic: str | None, asked: Asked) -> list[Candidate]:
