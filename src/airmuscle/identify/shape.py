@@ -25,6 +25,7 @@ from .fit import fit
 from .loss import Array
 from .monotone_surface import constrained
 from .places import places
+from .result import Fit
 
 _MARGIN = 1e-9
 """Least slope on the box scaled to -1..1, in parts of the greatest force, so that rounding turns none round; chosen."""
@@ -78,6 +79,14 @@ def shape_breaks(law: ForceLaw, box: Box, *, points: int = 101) -> tuple[ShapeBr
             for p in places(felt, pressure, contraction)
         ]
     return tuple(sorted(found, key=lambda b: -b.share))
+
+
+def broken_by(fit: Fit, *, points: int = 101) -> tuple[ShapeBreak, ...]:
+    """The places in the data's box where a fitted law breaks a rule; none for laws that are no closed-form force."""
+    law = fit.model
+    if not isinstance(law, ForceLaw) or not law.traceable or not all(low < high for low, high in fit.ranges.values()):
+        return ()
+    return shape_breaks(law, fit.box, points=points)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -204,3 +204,7 @@ def _columns(table: Mapping[str, Any], plant: Plant, start: Mapping[str, float],
 
 def _object(given: Any, kind: type[Any], place: Place) -> Any:
     return checked(build({"model": given} if isinstance(given, str) else given, place), kind, place)
+
+
+plant_from, muscle_from = _plant, _muscle
+"""The grammar of a plant and of a muscle, for other files that hold them."""
