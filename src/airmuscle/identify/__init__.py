@@ -13,6 +13,7 @@ from .compare import compare as compare
 from .convert import Conversion as Conversion
 from .convert import convert as convert
 from .fit import fit as fit
+from .leave_out import Blocks as Blocks
 from .leave_out import LeaveOut as LeaveOut
 from .leave_out import Levels as Levels
 from .leave_out import Runs as Runs

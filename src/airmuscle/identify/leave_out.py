@@ -25,6 +25,8 @@ class LeaveOut(abc.ABC):
     """How the rows of recordings fall into parts, each of which is left out in turn."""
 
     word: str
+    purpose: str
+    """What a law is good for that does well on parts like these."""
 
     @abc.abstractmethod
     def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
@@ -36,6 +38,7 @@ class Runs(LeaveOut):
     """Each recording is a part."""
 
     word: str = "run"
+    purpose: str = "another run of the kind that was measured"
 
     def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
         names = [run.origin for run in recordings]
@@ -48,6 +51,7 @@ class Specimens(LeaveOut):
     """Each muscle is a part, told by the constant `specimen`, or else by its resting length."""
 
     word: str = "specimen"
+    purpose: str = "a muscle of the type that was not measured, of another length where lengths differ"
 
     def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
         return [np.full(len(run), self._name(run)) for run in recordings]
@@ -66,6 +70,7 @@ class Levels(LeaveOut):
     quantity: str
     gap: float = 0.02
     word: str = "level"
+    purpose: str = "levels between those measured, and one step beyond"
 
     def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
         values = np.concatenate([run[self.quantity] for run in recordings])
@@ -80,6 +85,29 @@ class Levels(LeaveOut):
         edges = (middles[1:] + middles[:-1]) / 2
         names = np.array([f"{self.quantity} {middle:.4g}" for middle in middles])
         return [names[np.searchsorted(edges, run[self.quantity])] for run in recordings]
+
+
+@dataclasses.dataclass(frozen=True)
+class Blocks(LeaveOut):
+    """Stretches of a quantity within every run, so that each run and each muscle has a say in every fit.
+
+    A run's range is cut into `2 count` stretches; every `count`-th belongs to one part, the next run's one stretch
+    further. Rows within a stretch repeat each other, stretches do not: Roberts et al., Ecography 40:913 (2017).
+    """
+
+    quantity: str = "pressure"
+    count: int = 5
+    word: str = "block"
+    purpose: str = "the muscles that were measured, within their range"
+
+    def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
+        names = np.array([f"block {k + 1}" for k in range(self.count)])
+        return [names[(i + self._stretch(run[self.quantity])) % self.count] for i, run in enumerate(recordings)]
+
+    def _stretch(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.intp]:
+        low, high = (float(end(values)) for end in (np.nanmin, np.nanmax))
+        shares = (np.nan_to_num(values, nan=low) - low) / (high - low if high > low else 1.0)
+        return np.minimum((2 * self.count * shares).astype(np.intp), 2 * self.count - 1)
 
 
 def parts(recordings: Sequence[Recording], leave_out: LeaveOut) -> tuple[list[Labels], list[str]]:
