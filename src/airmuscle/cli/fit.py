@@ -48,7 +48,7 @@ Uncensored = Annotated[
 Compare = Annotated[bool, typer.Option("--compare", help="Fit every law that the data determine, and rank them.")]
 LeftOut = Annotated[
     str | None,
-    typer.Option(metavar="PART", help="What a comparison leaves out in turn: run, specimen, contraction, pressure."),
+    typer.Option(metavar="PART", help="What a comparison leaves out: run, specimen, contraction, pressure, block."),
 ]
 Length = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Length unpressurised and unloaded: '300 mm'.")]
 Surroundings = Annotated[

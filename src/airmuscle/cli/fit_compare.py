@@ -65,13 +65,14 @@ def _candidates(
 
 
 def _part(word: str | None) -> LeaveOut | None:
-    from ..identify.leave_out import Levels, Runs, Specimens
+    from ..identify.leave_out import Blocks, Levels, Runs, Specimens
 
     parts: dict[str, LeaveOut] = {
         "run": Runs(),
         "specimen": Specimens(),
         "contraction": Levels("contraction"),
         "pressure": Levels("pressure"),
+        "block": Blocks(),
     }
     if word is not None and word not in parts:
         raise typer.BadParameter(f"--leave-out is '{word}'; it may be {', '.join(parts)}")
@@ -92,6 +93,7 @@ def _as_data(found: Comparison) -> dict[str, Any]:
         "recommended": found.recommended.candidate.name,
         "reason": found.reason,
         "left_out": found.leave_out.word,
+        "purpose": found.purpose,
         "ranking": [
             {
                 "law": c.candidate.name,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +15,13 @@ from .problem import Problem
 STEPS = 500
 """Iterations after which a fit gives up; none that was seen needed a fifth of them."""
 _FINE = 1e-14
+_NARROWING = 4.0
+"""Part by which the scale of a robust loss goes down from search to search (chosen)."""
 RANK_TOLERANCE = 1e-10
 """Singular values of the scaled design below this part of the greatest count as zero (chosen): a parameter that
 ten digits of the data do not determine is not determined."""
+_PASSES = 200
+"""Most Newton steps of a linear fit with rows that are cut off; it ends by itself, and none that was seen took 30."""
 _SLIGHT = 1e-4
 """Weight of a row that is cut off and not contradicted, where nothing else decides (chosen)."""
 
@@ -34,7 +39,33 @@ def solve(problem: Problem, loss: Loss) -> Solution:
     if not is_linear(problem):
         return _solve_iterating(problem, loss, problem.start)
     found = _solve_linear(problem)
-    return found if isinstance(loss, LeastSquares) else _solve_iterating(problem, loss, found.values)
+    if isinstance(loss, LeastSquares):
+        return found
+    robust = _solve_narrowing(problem, loss, found)
+    if _measured_alone_determine(problem, robust.slopes):
+        return robust
+    # The search stops as soon as no bound is contradicted, and no row speaks any more for what bounds alone determine.
+    return _solve_linear(_reweighted(problem, loss, robust))
+
+
+def _solve_narrowing(problem: Problem, loss: Loss, start: Solution) -> Solution:
+    """From the scale of the errors down to the one wanted: searches under a loss far narrower do not settle."""
+    values = start.values
+    scale = float(np.sqrt(np.mean(problem.errors(start.modelled) ** 2)))
+    while scale > _NARROWING * loss.scale:
+        values = _solve_iterating(problem, loss.with_scale(scale), values).values
+        scale /= _NARROWING
+    return _solve_iterating(problem, loss, values)
+
+
+def _reweighted(problem: Problem, loss: Loss, solution: Solution) -> Problem:
+    """The problem of which a robust solution is the least-squares one: every square weighted by rho' there."""
+    slope = loss.rho((problem.errors(solution.modelled) / loss.scale) ** 2)[1]
+    return dataclasses.replace(problem, weights=problem.weights * np.sqrt(slope))
+
+
+def _measured_alone_determine(problem: Problem, slopes: Array) -> bool:
+    return bool((problem.sides == 0).all()) or measured_rank(problem, slopes) == slopes.shape[1]
 
 
 def is_linear(problem: Problem) -> bool:
@@ -59,26 +90,35 @@ def design(problem: Problem) -> tuple[Array, Array]:
 def _solve_linear(problem: Problem) -> Solution:
     """Least squares at once, or again on the rows that count until these are the same.
 
-    Squares on one side of a bound make a convex sum, of which each pass is a Newton step. Where the measured rows
-    alone leave parameters open, a law may fall below its bounds without end; of all that are equally good, the one
-    nearest to the bounds is taken.
+    Squares on one side of a bound make a convex sum, of which each pass is a Newton step, halved where the whole of it
+    goes too far. Where the measured rows alone leave parameters open, a law may fall below its bounds without end; of
+    all that are equally good, the one nearest to the bounds is taken.
     """
     slopes, constant = design(problem)
     norms = np.linalg.norm(slopes, axis=0)
     norms[norms == 0] = 1.0
     matrix = problem.weights[:, None] * (slopes / norms)
     goal = problem.weights * (problem.goal - constant)
-    measured = problem.sides == 0
-    determined = measured.all() or measured_rank(problem, slopes) == len(norms)
-    counting = np.ones(len(goal), dtype=bool)
-    for _ in range(50):
-        share = np.where(counting, 1.0, 0.0 if determined else _SLIGHT)
-        found = np.linalg.lstsq(share[:, None] * matrix, share * goal, rcond=1e-13)[0] / norms
-        modelled = slopes @ found + constant
-        previous, counting = counting, problem.counting(modelled)
-        if measured.all() or np.array_equal(counting, previous):
-            return Solution(found, modelled, slopes)
-    return _solve_iterating(problem, LeastSquares(), found)  # whole steps went in a circle
+    uncounted = 0.0 if _measured_alone_determine(problem, slopes) else _SLIGHT
+
+    def shares(scaled: Array) -> Array:
+        return np.where(problem.counting(slopes @ (scaled / norms) + constant), 1.0, uncounted)
+
+    def squares(scaled: Array) -> float:
+        return float(np.sum((shares(scaled) * (matrix @ scaled - goal)) ** 2))
+
+    share, found = np.ones(len(goal)), np.zeros(len(norms))
+    for passes in range(_PASSES):
+        step = np.linalg.lstsq(share[:, None] * matrix, share * goal, rcond=1e-13)[0] - found
+        if passes:
+            least = squares(found)
+            step = next((t * step for t in 0.5 ** np.arange(30) if squares(found + t * step) <= least), 0.0 * step)
+        found, previous = found + step, share
+        share = shares(found)
+        if np.array_equal(share, previous):
+            break
+    values = found / norms
+    return Solution(values, slopes @ values + constant, slopes)
 
 
 def measured_rank(problem: Problem, slopes: Array) -> int:
