@@ -85,11 +85,15 @@ def line(name: str, parameters: int, errors: Sequence[float], least: float) -> s
 
 
 def judged(candidate: Candidate, train: list[Recording], test: list[Recording], specimens: list[str]) -> list[float]:
-    """Error on the next repeat, and on each specimen that was left out."""
+    """Error on the next repeat, and on each specimen that was left out; NaN where the others do not determine it."""
     law, fixed = candidate.law, candidate.fixed
     errors = [rms(errors_in_force(fit(law, train, fixed=fixed).model, test, CEILING))]
     for name in specimens:
-        model = fit(law, of_specimen(train, name, others=True), fixed=fixed).model
+        try:
+            model = fit(law, of_specimen(train, name, others=True), fixed=fixed).model
+        except IdentificationError:  # two lengths do not determine it
+            errors.append(np.nan)
+            continue
         errors.append(rms(errors_in_force(model, of_specimen(test, name), CEILING)))
     return errors
 
