@@ -27,6 +27,6 @@ from .profile import profile as profile
 from .profile import weakly_determined as weakly_determined
 from .result import Estimate as Estimate
 from .result import Fit as Fit
-from .shape import ShapedFit as ShapedFit
-from .shape import fit_shaped as fit_shaped
-from .shape import shape_breaks as shape_breaks
+from .surface.shape import ShapedFit as ShapedFit
+from .surface.shape import fit_shaped as fit_shaped
+from .surface.shape import shape_breaks as shape_breaks

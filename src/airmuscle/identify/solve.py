@@ -136,7 +136,7 @@ def _is_least(result: Any) -> bool:
     along = np.linalg.lstsq((result.jac / norms).T, result.grad / norms, rcond=_SAME)[0]
     squares, size = float(along @ along), norms.size
     spare = max(result.fun.size - size, 1)
-    return squares / size <= _OFFSET**2 * (2 * result.cost - squares) / spare
+    return bool(squares / size <= _OFFSET**2 * (2 * result.cost - squares) / spare)
 
 
 def _refuse_non_finite(problem: Problem, start: Array) -> None:
