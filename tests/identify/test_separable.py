@@ -97,13 +97,13 @@ def lengths(inner: ContractileSurface, dead_length: float, noise: float = 0.0) -
     return runs
 
 
-@pytest.mark.parametrize("start", [-0.02, 0.0, 0.005, 0.05])
-def test_the_ends_of_a_family_of_degree_five_are_found_from_any_start(start: float):
+@pytest.mark.parametrize("start", [(0.005, 0.0), (0.078, 0.0), (0.005, 0.02), (-0.1, 0.05)])
+def test_the_ends_of_a_family_of_degree_five_are_found_from_any_start(start: tuple[float, float]):
     random = np.random.default_rng(4)
     coefficients = random.normal(0, 20, 21)
     coefficients[:2], coefficients[6] = (300.0, -250.0), 200.0
     inner = ContractileSurface(tuple(coefficients), 3e5, 6e5, -0.06, 0.18, -1e6, 1e6, 5)
-    found = fit(EffectiveLength(surface(5), 0.4, start), lengths(inner, 0.02))
+    found = fit(EffectiveLength(surface(5), 0.4, *start), lengths(inner, 0.02))
     assert found["dead_length"].value == pytest.approx(0.02, abs=1e-5)
     assert found["end_shift"].value == pytest.approx(1e-3, abs=1e-5)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -18,10 +17,6 @@ class Loss(abc.ABC):
     """The sum of scale^2 rho((error/scale)^2) over the points is what a fit makes least."""
 
     scale: float
-
-    def with_scale(self, scale: float) -> Self:
-        """The same loss on another scale."""
-        return dataclasses.replace(self, scale=scale)  # type: ignore[type-var]  # its leaves are dataclasses
 
     @abc.abstractmethod
     def rho(self, z: Array) -> Array:

@@ -21,8 +21,6 @@ _OFFSET = 1e-3
 """Relative offset at which parameters count as found, that of Bates and Watts."""
 _SAME = 1e-8
 """Singular values below this part of the greatest tell of parameters that replace each other (chosen)."""
-_NARROWING = 4.0
-"""Part by which the scale of a robust loss goes down from search to search (chosen)."""
 
 
 class Solution(NamedTuple):
@@ -40,21 +38,11 @@ def solve(problem: Problem, loss: Loss) -> Solution:
     found = _solve_linear(problem)
     if isinstance(loss, LeastSquares):
         return found
-    robust = _solve_narrowing(problem, loss, found)
+    robust = _solve_iterating(problem, loss, found.values)
     if measured_alone_determine(problem, robust.slopes):
         return robust
     # The search stops as soon as no bound is contradicted, and no row speaks any more for what bounds alone determine.
     return _solve_linear(_reweighted(problem, loss, robust))
-
-
-def _solve_narrowing(problem: Problem, loss: Loss, start: Solution) -> Solution:
-    """From the scale of the errors down to the one wanted: searches under a loss far narrower do not settle."""
-    values = start.values
-    scale = float(np.sqrt(np.mean(problem.errors(start.modelled) ** 2)))
-    while scale > _NARROWING * loss.scale:
-        values = _solve_iterating(problem, loss.with_scale(scale), values).values
-        scale /= _NARROWING
-    return _solve_iterating(problem, loss, values)
 
 
 def _reweighted(problem: Problem, loss: Loss, solution: Solution) -> Problem:
