@@ -50,7 +50,7 @@ LeftOut = Annotated[
     str | None,
     typer.Option(
         metavar="PART",
-        help="What a comparison leaves out in turn, and a bootstrap draws: run, specimen, contraction, pressure.",
+        help="What a comparison leaves out and a bootstrap draws: run, specimen, contraction, pressure, block.",
     ),
 ]
 Refits = Annotated[

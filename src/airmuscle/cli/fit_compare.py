@@ -76,6 +76,7 @@ def _as_data(found: Comparison) -> dict[str, Any]:
         "recommended": found.recommended.candidate.name,
         "reason": found.reason,
         "left_out": found.leave_out.word,
+        "purpose": found.purpose,
         "ranking": [
             {
                 "law": c.candidate.name,

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from ..identify.leave_out import LeaveOut
     from ..identify.result import Fit
-    from ..identify.shape import ShapedFit
+    from ..identify.surface.shape import ShapedFit
     from ..library.entry import Entry
     from ..recording import Recording
     from ..report.chapter import Chapter
@@ -97,7 +97,7 @@ class Found:
 
     def lines(self) -> list[str]:
         """The same for a terminal."""
-        from ..identify.shape import broken_by
+        from ..identify.surface.shape import broken_by
 
         said = self.sure.lines()
         if self.none_weak:
@@ -109,7 +109,7 @@ class Found:
 
     def as_data(self) -> dict[str, Any]:
         """The same as plain data, SI."""
-        from ..identify.shape import broken_by
+        from ..identify.surface.shape import broken_by
 
         broken = broken_by(self.sure.fit) if self.shaped is None else self.shaped.broken
         found = {**self.sure.as_data(), "shape_breaks": [_broken(each) for each in broken]}
@@ -127,13 +127,14 @@ class Found:
 
 def part_of(word: str | None) -> LeaveOut | None:
     """What --leave-out names."""
-    from ..identify.leave_out import Levels, Runs, Specimens
+    from ..identify.leave_out import Blocks, Levels, Runs, Specimens
 
     parts: dict[str, LeaveOut] = {
         "run": Runs(),
         "specimen": Specimens(),
         "contraction": Levels("contraction"),
         "pressure": Levels("pressure"),
+        "block": Blocks(),
     }
     if word is not None and word not in parts:
         raise typer.BadParameter(f"--leave-out is '{word}'; it may be {', '.join(parts)}")

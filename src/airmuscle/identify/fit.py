@@ -59,6 +59,7 @@ def fit(
     solution = solve(problem, loss)
     found = statistics(problem, solution, loss)
     notes = (*_notes(problem, found, loss, int(np.count_nonzero(dropped))), *_of_rigs(by_rig, problem))
+    notes += _narrow(problem, solution, loss)
     return _result(problem, solution, found, loss, int(np.count_nonzero(dropped)), notes)
 
 
@@ -218,6 +219,19 @@ def _notes(problem: Problem, found: Statistics, loss: Loss, dropped: int) -> tup
     if not isinstance(loss, LeastSquares):
         notes.append(f"Robust: {loss}, in {problem.direction.unit}.")
     return tuple(notes)
+
+
+def _narrow(problem: Problem, solution: Solution, loss: Loss) -> tuple[str, ...]:
+    """A robust loss so narrow that nearly every row is an outlier to it."""
+    measured = problem.sides == 0
+    errors = np.abs(problem.errors(solution.modelled))[measured]
+    inside = int(np.count_nonzero(errors <= loss.scale))
+    if isinstance(loss, LeastSquares) or inside >= errors.size / 2:
+        return ()
+    return (
+        f"Only {inside} of {errors.size} rows lie within the scale of {loss}: the standard deviations come out too "
+        "small. A scale of about three times the noise gives ones to be trusted.",
+    )
 
 
 def _other_lengths(problem: Problem) -> list[str]:

@@ -83,7 +83,7 @@ def _isobars(fit: Fit, entry: Entry) -> Plot:
 
 def _shape(fit: Fit) -> list[Table]:
     """Where the fitted law breaks what every muscle keeps, if it does anywhere."""
-    from ..identify.shape import broken_by
+    from ..identify.surface.shape import broken_by
 
     found = broken_by(fit)
     return [breaks_table(found, "shape", "Where the law behaves as no muscle does")] if found else []

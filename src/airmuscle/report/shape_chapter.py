@@ -13,7 +13,8 @@ from .levels import levels_of
 
 if TYPE_CHECKING:
     from ..identify.result import Fit
-    from ..identify.shape import ShapeBreak, ShapedFit
+    from ..identify.surface.breaks import Break
+    from ..identify.surface.shape import ShapedFit
 
 CURVES = 5
 POINTS = 161
@@ -38,17 +39,17 @@ def shape_chapter(shaped: ShapedFit, loose: Fit, free: int) -> Chapter:
     )
 
 
-def breaks_table(found: Sequence[ShapeBreak], name: str, title: str) -> Table:
+def breaks_table(found: Sequence[Break], name: str, title: str) -> Table:
     """The places where a law breaks a rule, largest first."""
     return Table(
         name,
         title,
         {
-            "rule": [each.rule.value for each in found],
+            "rule": [each.rule.words for each in found],
             "from [kPa]": [each.pressure[0] / 1e3 for each in found],
             "to [kPa]": [each.pressure[1] / 1e3 for each in found],
-            "from [%]": [100 * each.contraction[0] for each in found],
-            "to [%]": [100 * each.contraction[1] for each in found],
+            "from [%]": [100 * each.across[0] for each in found],
+            "to [%]": [100 * each.across[1] for each in found],
             "share of the box [%]": [100 * each.share for each in found],
             "worst at [kPa]": [each.worst[0] / 1e3 for each in found],
             "worst at [%]": [100 * each.worst[1] for each in found],
