@@ -10,9 +10,9 @@ from ..gas import STILL, Air, Ambient
 from ..ops import Value
 from ..variables import Input
 from .circuit import Circuit, Response
+from .orifice import Orifice
 from .supply import Source, Supply
 from .through import through
-from .valve import Valve
 
 
 def surroundings(ambient: Ambient) -> Air:
@@ -25,8 +25,8 @@ class FillDischarge(Circuit):
     """Two on/off valves: one from the supply, one to the surroundings."""
 
     supply: Source
-    fill: Valve
-    discharge: Valve
+    fill: Orifice
+    discharge: Orifice
 
     @property
     def inputs(self) -> tuple[Input, ...]:
@@ -46,8 +46,8 @@ class ThreePosition(Circuit):
     """A 3/3 valve with closed centre: one input, 1 fills, 0 shuts, -1 discharges."""
 
     supply: Source
-    fill: Valve
-    discharge: Valve
+    fill: Orifice
+    discharge: Orifice
 
     @property
     def inputs(self) -> tuple[Input, ...]:

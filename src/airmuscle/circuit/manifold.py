@@ -10,11 +10,11 @@ from ..errors import ParameterError
 from ..gas import Air, Ambient
 from ..ops import Value
 from ..variables import Input, StateVariable, outside, renamed, within
-from .circuit import Circuit, Response
+from .circuit import SUPPLY, Circuit, Response
 from .fill_discharge import surroundings
+from .orifice import Orifice
 from .supply import Shared, Source
 from .through import through
-from .valve import Valve
 
 
 @model
@@ -22,7 +22,7 @@ class Leaking(Circuit):
     """A circuit whose muscles also lose air to the surroundings through a leak each."""
 
     circuit: Circuit
-    leak: Valve
+    leak: Orifice
 
     @property
     def supply(self) -> Source:  # type: ignore[override]  # the circuit's own
@@ -63,6 +63,12 @@ class Manifold(Circuit):
     def check(self) -> None:
         if len(self.names) != len(self.branches) or len(set(self.names)) != len(self.names) or not self.names:
             raise ParameterError(f"Manifold: {len(self.branches)} branches need as many different names: {self.names}.")
+        for name in self.names:
+            if not name or "." in name or f"{name}." == SUPPLY:
+                raise ParameterError(
+                    f"Manifold: a branch cannot be named {name!r}; give a word without a dot, and not 'supply', which "
+                    "names the manifold's own."
+                )
         for name, branch in self._parts():
             if not isinstance(branch.supply, Shared):
                 raise ParameterError(

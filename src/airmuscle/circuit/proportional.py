@@ -12,9 +12,9 @@ from ..ops import Value
 from ..variables import Input, StateVariable
 from .circuit import Circuit, Response
 from .fill_discharge import surroundings
+from .orifice import Orifice
 from .supply import Source
 from .through import opened, through
-from .valve import Valve
 
 
 @model
@@ -41,15 +41,15 @@ class ProportionalValve(Circuit):
     """
 
     supply: Source
-    fill: Valve
-    discharge: Valve
+    fill: Orifice
+    discharge: Orifice
     spool: Follower
     overlap: float = parameter("1", "o", "overlap, share of the stroke", bounds=(-0.5, 0.9), default=0.0)
     muscles: int = 1
     """How many muscles it feeds, one or two."""
 
     def check(self) -> None:
-        if self.muscles not in (1, 2):
+        if isinstance(self.muscles, bool) or self.muscles not in (1, 2):
             raise ParameterError(f"ProportionalValve: it feeds one muscle or two, not {self.muscles!r}.")
 
     @property
@@ -97,8 +97,8 @@ class ProportionalRegulator(Circuit):
     """
 
     supply: Source
-    fill: Valve
-    discharge: Valve
+    fill: Orifice
+    discharge: Orifice
     lag: Follower
     band: float = parameter("Pa", "B", "error at which it is fully open", bounds=(100.0, 1e6), default=2e4)
     greatest: float = parameter("Pa", "u_max", "greatest set point", bounds=(1e3, 5e6), fitted=False, default=1e6)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from .. import ops
 from ..gas import HEAT_AT_CONSTANT_PRESSURE, Air, Flow
 from ..ops import Value
-from .valve import Valve
+from .orifice import Orifice
 
 
-def through(orifice: Valve, first: Air, second: Air, opening: Value = 1.0) -> Flow:
+def through(orifice: Orifice, first: Air, second: Air, opening: Value = 1.0) -> Flow:
     """The flow from the first place to the second; it has the temperature of the place that it comes from."""
     temperature = first.temperature
     if second.temperature is not first.temperature:  # a choice between two equal temperatures would cost time
