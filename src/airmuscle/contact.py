@@ -25,7 +25,7 @@ class HuntCrossley:
     """F = K delta^(3/2) (1 + c delta'), never pulling.
 
     delta depth of the contact [m], K stiffness, c damping: the force begins and ends at zero without a jump, and a
-    slow impact at a speed v ends with (1 - 2/3 c v) of it (c v = 0.1: 0.940 exactly, 0.933 by this rule).
+    slow impact at a speed v ends with (1 - 2/3 c v) of it (for c v = 0.1 that is 0.933, and exactly 0.938).
     Reference: Hunt and Crossley (1975); the exponent is that of Hertz.
     """
 
