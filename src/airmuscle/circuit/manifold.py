@@ -69,7 +69,7 @@ class Manifold(Circuit):
                     f"Manifold: a branch cannot be named {name!r}; give a word without a dot, and not 'supply', which "
                     "names the manifold's own."
                 )
-        for name, branch in self._parts():
+        for name, branch in zip(self.names, self.branches, strict=True):
             if not isinstance(branch.supply, Shared):
                 raise ParameterError(
                     f"Manifold: branch '{name}' has a supply of its own; give it Shared(), as the manifold feeds it."
