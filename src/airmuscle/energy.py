@@ -32,8 +32,9 @@ class Metered:
     Four books must close. Mechanical: kinetic + potential energy grow by `work_of_tension`, which counts the push of an
     end stop, as long as the latch and what the mechanism loses by itself do no work. Muscle: `work_of_contractile` is
     `work_of_tension` + `damping_heat` + `element_work` + `friction_work` (where there is friction), as long as no
-    muscle hangs slack: a slack one passes nothing on. Air: `air_energy`, of the air in the muscles, grows by `energy_of_flow`
-    + `heat_to_air` less `work_of_air`. Mass: `air_total`, of all air, grows by `air_supplied` less `air_exhausted`.
+    muscle hangs slack: a slack one passes nothing on. Air: `air_energy`, of the air in the muscles, grows by
+    `energy_of_flow` + `heat_to_air` less `work_of_air`. Mass: `air_total`, of all air, grows by `air_supplied` less
+    `air_exhausted`.
     """
 
     plant: Plant

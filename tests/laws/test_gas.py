@@ -129,8 +129,8 @@ def test_pressure_rises_by_the_first_law(p, T, inflow, growth, heat_transfer):
 
 
 def test_the_specific_heats_are_those_of_dry_air():
-    assert HEAT_AT_CONSTANT_PRESSURE == pytest.approx(1005, abs=1.0)
-    assert HEAT_AT_CONSTANT_PRESSURE - HEAT_AT_CONSTANT_VOLUME == pytest.approx(GAS_CONSTANT)
+    assert pytest.approx(1005, abs=1.0) == HEAT_AT_CONSTANT_PRESSURE
+    assert pytest.approx(GAS_CONSTANT) == HEAT_AT_CONSTANT_PRESSURE - HEAT_AT_CONSTANT_VOLUME
 
 
 @pytest.mark.parametrize("gas", PROCESSES, ids=repr)
