@@ -22,7 +22,6 @@ ARGUMENTS = {
     "branches": "circuits on one supply",
     "tube": "volume and resistance between a valve and a muscle",
     "pieces": "number of pieces that a tube is cut into",
-    "orifice": "what lets air pass by its sonic conductance",
     "leak": "orifice that is never shut",
     "valve": "orifice that is opened and shut",
     "spool": "how the spool of a valve follows its command",
@@ -64,6 +63,14 @@ ARGUMENTS = {
     "complete": "whether a run that ends early is an error",
     "thing": "any noun of airmuscle",
     "muscle": "one muscle, or a tuple of them",
+    "orifice": "restriction that air flows through",
+    "valves": "valves that are combined into one",
+    "kv": "flow coefficient Kv [m3/h of water at 1 bar]",
+    "cv": "flow coefficient Cv [US gallons a minute of water at 1 psi]",
+    "area": "effective area of a valve [m2]",
+    "diameter": "of a round hole [m]",
+    "discharge_coefficient": "share of a hole's area that a flow takes up [1]",
+    "volume_flow": "volume flow at the reference atmosphere [m3/s]",
     "circuit": "what feeds a muscle, or a tuple of them",
     "mechanism": "what the muscles pull at",
     "gas": "how the air takes up pressure",
@@ -166,6 +173,10 @@ ARGUMENTS = {
     "strain": "hoop strain [1]",
     "surface": "polynomial surface",
     "units": "units of columns whose headers carry none",
+    "functions": "functions of time by input",
+    "drivers": "what stands between the command and the opening of an input",
+    "signal": "course of one input in time",
+    "memory": "what a driver still has under way",
 }
 """Arguments of public functions that are neither a declared parameter nor a measurable quantity."""
 

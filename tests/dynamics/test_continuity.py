@@ -35,6 +35,7 @@ from airmuscle.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.geometry.catenary import Catenary
 from airmuscle.geometry.chebyshev import as_polynomial
 from airmuscle.geometry.parabola import Parabola, TrueArcParabola
+from airmuscle.geometry.vessel import Vessel
 from airmuscle.library import catalogue
 from airmuscle.library.models import model_class, model_names
 from airmuscle.mechanism import HangingMass, Held, Isometric
@@ -104,6 +105,7 @@ EXAMPLES = {
         type(m).__name__: of(SURFACE, geometry.StraightFibre(0.2, 0.02, meridian=m))
         for m in (Catenary(), Parabola(), TrueArcParabola())
     },
+    "vessel": of(SURFACE, Vessel(2e-4), wall=LaggingWall(2e-11, 0.05)),
     "polynomial volume": of(SURFACE, as_polynomial(BRAID, 8, (-0.05, 0.3))),
     # elements of a muscle
     "hardening spring, lopsided damper": of(
@@ -151,7 +153,8 @@ EXAMPLES = {
 }  # fmt: skip
 
 NOT_IN_A_PLANT = {
-    "commands and methods": ("Schedule", "Signal", "Rodas4", "DormandPrince8", "RungeKutta4"),
+    "commands, what drives valves by them, and methods": (
+        "Schedule", "Signal", "OnOff", "PWM", "Rodas4", "DormandPrince8", "RungeKutta4"),
     "laws solved for pressure or contraction, where as_force_law stands in, and their readings": (
         "BorzikovaDirect", "BorzikovaExponential", "Hunt2017", "Saga2007", "AlongArc", "AlongAxis",
         "EvenSpread", "GivenSum", "SumOverHalf", "SumPastHalf",

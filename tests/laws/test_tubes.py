@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 
 from airmuscle.circuit import DistributedTube, FillDischarge, Line, Supply, Tube, TubeOrifice, Valve
 from airmuscle.command import Schedule
-from airmuscle.gas import GAS_CONSTANT, STILL, Air, Ambient, EnergyBalance, Isothermal, Polytropic
+from airmuscle.gas import GAS_CONSTANT, HEAT_AT_CONSTANT_PRESSURE, STILL, Air, Ambient, EnergyBalance, Isothermal, Polytropic
 from airmuscle.mechanism import Isometric
 from airmuscle.method import Rodas4
 from airmuscle.plant import Plant
@@ -91,6 +91,17 @@ def test_the_formula_for_a_tubes_conductance_agrees_with_darcys_law(length, diam
     found = orifice.mass_flow(6e5, 5.5e5, 1.0, WARM)
     assert found == pytest.approx(steady(6e5, 5.5e5, length, diameter), rel=0.15)
     assert 0.0 < orifice.critical_ratio < 0.61
+
+
+@pytest.mark.parametrize("mass_flow", [2e-4, -2e-4])
+def test_the_air_that_flows_on_is_as_warm_as_where_it_comes_from(mass_flow):
+    tube = DistributedTube(1.0, 3e-3, 2, EnergyBalance(0.0))
+    state = at_rest(tube, 3e5) | {"tube2.flow": mass_flow}
+    state["tube2.internal_energy"] *= 1.1
+    airs, muscle = tube.airs(state, AMBIENT), Air(3e5, 350.0)
+    _, onward = tube.rates(state, airs, STILL, muscle, AMBIENT)
+    origin = airs[1] if mass_flow > 0 else muscle
+    assert onward.enthalpy == pytest.approx(HEAT_AT_CONSTANT_PRESSURE * origin.temperature * mass_flow)
 
 
 def test_a_tube_of_a_size_has_its_volume_and_its_flow():

@@ -3,6 +3,8 @@
 from .check_valve import CheckValve as CheckValve
 from .circuit import Circuit as Circuit
 from .circuit import Response as Response
+from .combination import in_parallel as in_parallel
+from .combination import in_series as in_series
 from .conduit import Conduit as Conduit
 from .distributed_tube import DistributedTube as DistributedTube
 from .fill_discharge import ClosedChamber as ClosedChamber

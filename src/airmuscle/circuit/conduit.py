@@ -16,6 +16,12 @@ class Conduit(abc.ABC):
     """A tube of one model or another. States are mappings by the names of `states`."""
 
     references: ClassVar[tuple[Reference, ...]] = ()
+    pieces: int
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the names of each piece's states begin with, from the valve to the muscle."""
+        return ("tube.",) if self.pieces == 1 else tuple(f"tube{i}." for i in range(1, self.pieces + 1))
 
     @abc.abstractmethod
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
@@ -34,8 +40,3 @@ class Conduit(abc.ABC):
         self, state: Mapping[str, Value], airs: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
     ) -> tuple[dict[str, Value], Flow]:
         """Rates of its states while `flow` comes in from the valve, and the flow into the muscle."""
-
-
-def piece_names(pieces: int) -> tuple[str, ...]:
-    """What the names of each piece's states begin with, from the valve to the muscle."""
-    return ("tube.",) if pieces == 1 else tuple(f"tube{i}." for i in range(1, pieces + 1))

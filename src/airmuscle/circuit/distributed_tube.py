@@ -11,7 +11,7 @@ from ..gas import GAS_CONSTANT, HEAT_AT_CONSTANT_PRESSURE, Air, Ambient, Flow, G
 from ..ops import Value
 from ..reference import Reference
 from ..variables import StateVariable, outside, renamed, within
-from .conduit import Conduit, piece_names
+from .conduit import Conduit
 from .tube import refuse_pieces
 
 BLASIUS1913 = Reference(
@@ -70,21 +70,21 @@ class DistributedTube(Conduit):
             *self.gas.states(self.piece_volume, ambient),
             StateVariable("flow", "kg/s", brisk, "mass flow to the next piece"),
         )
-        return tuple(state for name in piece_names(self.pieces) for state in renamed(name, of_piece))
+        return tuple(state for name in self.names for state in renamed(name, of_piece))
 
     def settled(self, air: Air, ambient: Ambient) -> dict[str, Value]:
         content = {**self.gas.content(air.pressure, self.piece_volume, ambient), "flow": 0.0}
-        return {name: value for prefix in piece_names(self.pieces) for name, value in outside(prefix, content).items()}
+        return {name: value for prefix in self.names for name, value in outside(prefix, content).items()}
 
     def airs(self, state: Mapping[str, Value], ambient: Ambient) -> tuple[Air, ...]:
-        held = (within(name, state) for name in piece_names(self.pieces))
+        held = (within(name, state) for name in self.names)
         return tuple(self.gas.air(content, self.piece_volume, ambient) for content in held)
 
     def rates(
         self, state: Mapping[str, Value], airs: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
     ) -> tuple[dict[str, Value], Flow]:
         rates: dict[str, Value] = {}
-        for name, air, after in zip(piece_names(self.pieces), airs, (*airs[1:], muscle), strict=True):
+        for name, air, after in zip(self.names, airs, (*airs[1:], muscle), strict=True):
             mass = state[f"{name}flow"]
             onward = _carried(mass, air, after)
             rates |= outside(name, self.gas.rates(within(name, state), air, flow - onward, 0.0, ambient))

@@ -12,7 +12,7 @@ from ..gas import Air, Ambient, Flow, Gas, Isothermal
 from ..ops import Value
 from ..reference import Reference
 from ..variables import StateVariable, outside, renamed, within
-from .conduit import Conduit, piece_names
+from .conduit import Conduit
 from .orifice import Orifice
 from .through import through
 from .valve import Valve
@@ -83,21 +83,21 @@ class Tube(Conduit):
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         of_piece = self.gas.states(self.volume / self.pieces, ambient)
-        return tuple(state for name in piece_names(self.pieces) for state in renamed(name, of_piece))
+        return tuple(state for name in self.names for state in renamed(name, of_piece))
 
     def settled(self, air: Air, ambient: Ambient) -> dict[str, Value]:
         content = self.gas.content(air.pressure, self.volume / self.pieces, ambient)
-        return {name: value for prefix in piece_names(self.pieces) for name, value in outside(prefix, content).items()}
+        return {name: value for prefix in self.names for name, value in outside(prefix, content).items()}
 
     def airs(self, state: Mapping[str, Value], ambient: Ambient) -> tuple[Air, ...]:
-        held = (within(name, state) for name in piece_names(self.pieces))
+        held = (within(name, state) for name in self.names)
         return tuple(self.gas.air(content, self.volume / self.pieces, ambient) for content in held)
 
     def rates(
         self, state: Mapping[str, Value], airs: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
     ) -> tuple[dict[str, Value], Flow]:
         rates: dict[str, Value] = {}
-        for name, air, after in zip(piece_names(self.pieces), airs, (*airs[1:], muscle), strict=True):
+        for name, air, after in zip(self.names, airs, (*airs[1:], muscle), strict=True):
             onward = through(self.orifice, air, after, self.pieces**0.5)
             rates |= outside(name, self.gas.rates(within(name, state), air, flow - onward, 0.0, ambient))
             flow = onward

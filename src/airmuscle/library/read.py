@@ -53,8 +53,8 @@ def entry_from(tables: Mapping[str, Any], name: str, file: Path, folder: Path) -
         **texts,
         **parts,
         box=_box(tables["box"], place.inside("box")) if "box" in tables else None,
-        checks=tuple(_check(t, p) for t, p in _rows(tables, "check", place)),
-        references=tuple(_reference(t, p) for t, p in _rows(tables, "reference", place)),
+        checks=tuple(_check(t, p) for t, p in rows_of(tables, "check", place)),
+        references=references_from(tables, place),
     )
 
 
@@ -63,7 +63,8 @@ def _box(table: Any, place: Place) -> Any:
     return checked(build(named, place), Box, place)
 
 
-def _rows(tables: Mapping[str, Any], key: str, place: Place) -> list[tuple[Mapping[str, Any], Place]]:
+def rows_of(tables: Mapping[str, Any], key: str, place: Place) -> list[tuple[Mapping[str, Any], Place]]:
+    """The tables written as [[key]], each with its place."""
     rows = tables.get(key, [])
     if not isinstance(rows, list) or not all(isinstance(row, Mapping) for row in rows):
         raise ParameterError(f"{place}: '{key}' must be written as [[{key}]], once for each.")
@@ -95,6 +96,11 @@ def _check(table: Mapping[str, Any], place: Place) -> Check:
 
 def _value(table: Mapping[str, Any], key: str, quantity: str, place: Place) -> float:
     return finite(table[key], QUANTITIES[quantity], f"{place}, {key}")
+
+
+def references_from(tables: Mapping[str, Any], place: Place) -> tuple[Reference, ...]:
+    """The sources that a file names."""
+    return tuple(_reference(t, p) for t, p in rows_of(tables, "reference", place))
 
 
 def _reference(table: Mapping[str, Any], place: Place) -> Reference:
