@@ -16,7 +16,16 @@ from scipy.optimize import brentq
 
 from airmuscle.circuit import DistributedTube, FillDischarge, Line, Supply, Tube, TubeOrifice, Valve
 from airmuscle.command import Schedule
-from airmuscle.gas import GAS_CONSTANT, HEAT_AT_CONSTANT_PRESSURE, STILL, Air, Ambient, EnergyBalance, Isothermal, Polytropic
+from airmuscle.gas import (
+    GAS_CONSTANT,
+    HEAT_AT_CONSTANT_PRESSURE,
+    STILL,
+    Air,
+    Ambient,
+    EnergyBalance,
+    Isothermal,
+    Polytropic,
+)
 from airmuscle.mechanism import Isometric
 from airmuscle.method import Rodas4
 from airmuscle.plant import Plant
