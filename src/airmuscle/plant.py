@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from .circuit import Circuit, Response
+from .circuit.supply import refuse_shared
 from .declare import model
 from .errors import ParameterError, TraceError
 from .gas import Air, Ambient, Flow, Gas, Polytropic, absolute, gauge, refuse_vacuum
@@ -59,6 +60,8 @@ class Plant:
         for field, part, kind in parts:
             if not isinstance(part, kind):
                 raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {part!r}.")
+        for circuit in self.circuits:
+            refuse_shared(f"Plant: its {type(circuit).__name__}", circuit.supply)
         names = [m.name for m in self.muscles]
         ports = sum(c.ports for c in self.circuits)
         if ports != len(names):
