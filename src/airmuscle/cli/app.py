@@ -22,6 +22,7 @@ from .reproduce import reproduce
 from .show import show
 from .simulate import simulate
 from .solve import solve
+from .sweep import sweep
 
 
 class Commands(TyperGroup):
@@ -75,6 +76,7 @@ app.command("inspect", short_help="Show what was understood of bench files.")(in
 app.command("fit")(fit)
 app.command("plan", short_help="Say which runs tell most about a muscle on your bench.")(plan)
 app.command("simulate", short_help="Simulate a plant that a scenario file describes.")(simulate)
+app.command("sweep", short_help="Run a scenario many times, with numbers that vary.")(sweep)
 
 
 def _print_version(wanted: bool) -> None:

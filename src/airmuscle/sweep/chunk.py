@@ -1,7 +1,7 @@
 """A chunk: some runs of a study, what came of them, and the file that keeps it.
 
-The name of the file is the fingerprint of all that its contents depend on. So a chunk that is there need not be computed
-again, whatever became of the study in between; one whose inputs have changed is not found, and so computed anew.
+The name of the file is the fingerprint of all that its contents depend on. So a chunk that is there need not be
+computed again, whatever became of the study in between; one whose inputs changed is not found, and computed anew.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _loaded: dict[tuple[str, str], Study] = {}
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Chunk:
-    """Outcomes of n runs: `numbers` (n, k), `courses` by name (n, T), and why a run failed (n,), empty where it did not."""
+    """Outcomes of n runs: `numbers` (n, k), `courses` by name (n, T), and why a run failed (n,), empty if not."""
 
     numbers: Array
     courses: Mapping[str, Array]

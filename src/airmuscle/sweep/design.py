@@ -22,7 +22,7 @@ Array = npt.NDArray[np.float64]
 MOST_RUNS = 10_000_000
 """Runs of one study whose table fits a usual memory."""
 HALF_CELL = 2.0**-31
-"""Half the distance of Sobol points of 30 bits; no share is nearer to 0 or 1, where a normal value would be infinite."""
+"""Half the distance of Sobol points of 30 bits; no share is nearer to 0 or 1, where normal values are infinite."""
 
 
 class Design(abc.ABC):
@@ -97,7 +97,10 @@ class MonteCarlo(Sampled):
 
 
 class LatinHypercube(Sampled):
-    """Each variable takes each of `count` equal parts of its range once. McKay, Beckman, Conover, Technometrics 1979."""
+    """Each variable takes each of `count` equal parts of its range once.
+
+    McKay, Beckman, Conover, Technometrics 21 (1979) 239-245.
+    """
 
     def _shares(self, variations: Sequence[Variation]) -> Array:
         from scipy.stats import qmc

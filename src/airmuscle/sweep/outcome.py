@@ -39,7 +39,7 @@ class Outcome(abc.ABC):
     def __post_init__(self) -> None:
         if not self.begin < self.end:
             raise ParameterError(
-                f"{type(self).__name__}: it begins at {self.begin:g} s and ends at {self.end:g} s; the end must be later."
+                f"{type(self).__name__}: from {self.begin:g} to {self.end:g} s; its end must be later than its begin."
             )
 
     def window(self, time: Array, values: Array) -> Window:
@@ -57,6 +57,10 @@ class Outcome(abc.ABC):
         """Instants [s] that must be among the rows of a run."""
         return np.array([t for t in (self.begin, self.end) if math.isfinite(t)])
 
+    @abc.abstractmethod
+    def unit(self, of_column: str) -> str:
+        """The outcome's unit, from the column's."""
+
 
 class Scalar(Outcome):
     """An outcome that is one number; NaN where the run does not have it."""
@@ -71,7 +75,6 @@ class Scalar(Outcome):
         """The outcome of a window that has one row at least."""
 
     def unit(self, of_column: str) -> str:
-        """The outcome's unit, from the column's."""
         return of_column
 
 
@@ -199,7 +202,10 @@ class Course(Outcome):
     @property
     def instants(self) -> Array:
         steps = math.floor((self.end - self.begin) / self.every * (1 + 1e-12))
-        return self.begin + self.every * np.arange(steps + 1)
+        return np.asarray(self.begin + self.every * np.arange(steps + 1), dtype=float)
+
+    def unit(self, of_column: str) -> str:
+        return of_column
 
     def rows(self, time: Array, values: Array) -> Array:
         """The column at the instants, from a run whose rows hold them."""

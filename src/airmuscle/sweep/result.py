@@ -49,7 +49,7 @@ class StudyResult:
         outcomes = {f"{name} [{study.units[name]}]": self[name] for name in study.scalars}
         status = ["failed" if reason else "done" for reason in self.reasons]
         runs: list[Any] = list(range(len(study)))
-        columns = {"run": runs, **inputs, **outcomes, "status": status, "reason": list(self.reasons)}
+        columns: dict[str, Any] = {"run": runs, **inputs, **outcomes, "status": status, "reason": list(self.reasons)}
         return Table("results", "All runs", columns, shown=False)
 
     def statistics(self) -> Table:

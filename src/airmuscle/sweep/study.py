@@ -1,20 +1,20 @@
 """A study written down as a file: a scenario, what varies in it, how it is sampled, and what is kept.
 
-    title = "Spread of two valves"                     optional
-    scenario = "fill_discharge.toml"                   a scenario file beside this one; or the tables [scenario.plant],
-                                                       [scenario.command] and [scenario.run] of one
-    chunk = 32                                         optional: runs that are written together
-    [vary]                                             numbers by their paths, see varied.py
-    "mechanism.mass" = ["5 kg", "10 kg"]               levels; also { model = "Range", low = , high = , count = }
-    "circuit.fill.conductance" = { model = "Normal", mean = "...", deviation = "..." }       see variation.py
-    [follow]                                           optional: numbers that take the value of one that varies
-    "circuit.discharge.conductance" = "circuit.fill.conductance"
-    [design]
-    model = "LatinHypercube"                           see design.py
-    count = 256
-    seed = 1
-    [outcome]                                          see outcome.py
-    contraction = { model = "Final", column = "contraction" }
+title = "Spread of two valves"                     optional
+scenario = "fill_discharge.toml"                   a scenario file beside this one; or the tables [scenario.plant],
+                                                   [scenario.command] and [scenario.run] of one
+chunk = 32                                         optional: runs that are written together
+[vary]                                             numbers by their paths, see varied.py
+"mechanism.mass" = ["5 kg", "10 kg"]               levels; also { model = "Range", low = , high = , count = }
+"circuit.fill.conductance" = { model = "Normal", mean = "...", deviation = "..." }       see variation.py
+[follow]                                           optional: numbers that take the value of one that varies
+"circuit.discharge.conductance" = "circuit.fill.conductance"
+[design]
+model = "LatinHypercube"                           see design.py
+count = 256
+seed = 1
+[outcome]                                          see outcome.py
+contraction = { model = "Final", column = "contraction" }
 """
 
 from __future__ import annotations
@@ -81,9 +81,7 @@ class Study:
     def units(self) -> dict[str, str]:
         """The units of the outcomes."""
         known = columns_of(self.source.scenario)
-        return {name: o.unit(known[o.column]) for name, o in self.scalars.items()} | {
-            name: known[o.column] for name, o in self.courses.items()
-        }
+        return {name: outcome.unit(known[outcome.column]) for name, outcome in self.outcomes.items()}
 
     def rows(self, chunk: int) -> range:
         """The runs of one chunk."""
@@ -111,7 +109,7 @@ def columns_of(scenario: Scenario) -> dict[str, str]:
     """The units of all columns that a run has."""
     plant: Plant = scenario.plant
     zeros = dict.fromkeys(plant.inputs, 0.0)
-    units = {"time": "s"} | {name: "" for name in plant.outputs(scenario.start, zeros)}
+    units = {"time": "s"} | dict.fromkeys(plant.outputs(scenario.start, zeros), "")
     units |= {name: known.unit for name in units if (known := quantity_of(name))}
     return units | {s.name: s.unit for s in plant.states} | {i.name: i.unit for i in plant.commands}
 

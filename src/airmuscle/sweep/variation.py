@@ -47,7 +47,8 @@ class Levels(Variation):
 
     def at(self, shares: Array) -> Array:
         index = np.floor(shares * len(self.values)).astype(int)
-        return np.array(self.values)[np.minimum(index, len(self.values) - 1)]
+        values: Array = np.array(self.values)[np.minimum(index, len(self.values) - 1)]
+        return values
 
     @property
     def ends(self) -> tuple[float, float]:
