@@ -173,6 +173,10 @@ ARGUMENTS = {
     "strain": "hoop strain [1]",
     "surface": "polynomial surface",
     "units": "units of columns whose headers carry none",
+    "functions": "functions of time by input",
+    "drivers": "what stands between the command and the opening of an input",
+    "signal": "course of one input in time",
+    "memory": "what a driver still has under way",
 }
 """Arguments of public functions that are neither a declared parameter nor a measurable quantity."""
 

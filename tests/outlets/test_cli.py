@@ -75,7 +75,7 @@ def assert_failed(result: Result, message: str) -> None:
 
 # Help and usage
 
-COMMANDS = ("reproduce", "list", "show", "cite", "solve", "inspect", "fit", "plan", "simulate")
+COMMANDS = ("reproduce", "list", "show", "cite", "solve", "inspect", "fit", "plan", "simulate", "schema")
 
 
 def test_the_commands_stand_in_the_order_of_use():
@@ -364,6 +364,57 @@ def test_simulate_writes_a_recording_that_reads_back(scenario: Path, tmp_path: P
     shut = recording["time"] > 0.31
     assert np.ptp(recording["air_mass"][shut]) < 1e-12, "and then shut"
     assert (tmp_path / "run" / "figures" / "run.svg").exists()
+
+
+def test_a_run_that_fails_keeps_what_it_has_and_says_why(scenario: Path, tmp_path: Path):
+    """A valve of half a metre fills the muscle in a millisecond and throws the load to where no law was measured."""
+    example = (Path(__file__).resolve().parents[2] / "examples" / "fill_discharge.toml").read_text(encoding="utf-8")
+    torn = example.replace("2.6167e-9", "9e-6").replace('gas = "Isothermal"', "")
+    scenario.write_text(torn, encoding="utf-8")
+    result = airmuscle("simulate", scenario, "--out", tmp_path / "run")
+    assert result.exit_code == 1
+    kept, error = result.stderr.splitlines()[-2:]
+    assert kept == f"what was computed until then stands in {tmp_path / 'run'}"
+    found = re.fullmatch(
+        r"error: the run ended at (\S+) of 25 s because .* steps, at air_mass .* kg, .*\. \S+ .*\.", error
+    )
+    assert found, error
+    lines = (tmp_path / "run" / "recording.csv").read_text(encoding="utf-8").splitlines()
+    rows = np.array([[float(cell) for cell in line.split(",")] for line in lines if line[0].isdigit()])
+    assert 5.0 < rows[-1, 0] <= float(found[1])
+    assert np.isfinite(rows).all()
+    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    assert "A run of 25 s that ended early, at " in page
+    assert f"<p>{error.removeprefix('error: ').capitalize()[:30]}" in page, "the last note says why"
+
+
+def test_the_report_of_a_run_shows_inputs_parameters_sources_and_notes(scenario: Path, tmp_path: Path):
+    named = re.sub(
+        r"\[plant.muscle.contractile\](.|\n)*?damper", '[plant.muscle]\nlibrary = "dmsp-20"\ndamper', SCENARIO
+    )
+    driver = '[command.drivers]\nfill = [{ model = "PWM", frequency = "50 Hz" }, { model = "OnOff", opening_delay = "1 ms" }]'
+    named = named.replace('pressure = "1 bar" }', 'pressure = "0 bar" }')
+    scenario.write_text(f"{named}\n{driver}\n[output]\ncolumns = ['force']", encoding="utf-8")
+    result = airmuscle("simulate", scenario, "--out", tmp_path / "run")
+    assert result.exit_code == 0, result.output
+    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    for text in (
+        "A run of 0.5 s. The recording is recording.csv.",
+        "left the box of its characteristic in pressure",
+        "Inputs of the plant; dashed, what the drivers were told.",
+        "fill 1 from 0.1 s, 0 from 0.3 s; driven: fill by PWM(frequency=50.0, smallest_pulse=0.0), OnOff(opening_delay=",
+        "<td>muscle.contractile.wall_thickness</td>",
+        "Rodas4(rtol=1e-06)",
+        "Martens",
+    ):
+        assert text in page, text
+    assert list(read_csv(tmp_path / "run" / "recording.csv")) == ["time", "force"]
+    assert {p.name for p in (tmp_path / "run" / "figures").iterdir()} == {
+        "run.svg",
+        "run.png",
+        "inputs.svg",
+        "inputs.png",
+    }
 
 
 def test_simulate_prints_json(scenario: Path, tmp_path: Path):

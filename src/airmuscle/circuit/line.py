@@ -65,7 +65,10 @@ class Tube:
 
 @model
 class Line(Circuit):
-    """A tube between a circuit's valves and each of its muscles; `tube.pressure` is that at the valve."""
+    """A tube between a circuit's valves and each of its muscles.
+
+    `tube.pressure` is that in the tube; with several pieces `tube1.pressure`, ... from the valve on.
+    """
 
     circuit: Circuit
     tube: Tube
@@ -108,6 +111,7 @@ class Line(Circuit):
         for name, content, pieces, flow, air in zip(self.names, held, along, done.flows, airs, strict=True):
             of_tube, onward = self.tube.rates(content, pieces, flow, air, ambient)
             rates |= outside(name, of_tube)
-            outputs[f"{name}tube.pressure"] = gauge(pieces[0].pressure, ambient)
+            for piece, inside in zip(self.tube.names, pieces, strict=True):
+                outputs[f"{name}{piece}pressure"] = gauge(inside.pressure, ambient)
             flows.append(onward)
         return Response(tuple(flows), done.drawn, done.exhausted, rates, outputs)

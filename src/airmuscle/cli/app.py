@@ -19,6 +19,7 @@ from .inspect import inspect
 from .list import list_entries
 from .plan import plan
 from .reproduce import reproduce
+from .schema import schema
 from .show import show
 from .simulate import simulate
 from .solve import solve
@@ -77,6 +78,7 @@ app.command("fit")(fit)
 app.command("plan", short_help="Say which runs tell most about a muscle on your bench.")(plan)
 app.command("simulate", short_help="Simulate a plant that a scenario file describes.")(simulate)
 app.command("sweep", short_help="Run a scenario many times, with numbers that vary.")(sweep)
+app.command("schema", short_help="Print what editors need to check scenario and muscle files.")(schema)
 
 
 def _print_version(wanted: bool) -> None:

@@ -27,6 +27,7 @@ _MODULES: dict[str, str] = {
     "SumPastHalf": "geometry.fibre_sum",
     "TabulatedGeometry": "geometry.tabulated",
     "TrueArcParabola": "geometry.parabola",
+    "Vessel": "geometry.vessel",
     # elements of a muscle
     "CreepElements": "muscle.creep",
     "CubicSpring": "muscle.spring",
@@ -81,6 +82,8 @@ _MODULES: dict[str, str] = {
     # commands and methods
     "Schedule": "command",
     "Signal": "command",
+    "OnOff": "driver",
+    "PWM": "driver",
     "DormandPrince8": "method",
     "Rodas4": "method",
     "RungeKutta4": "method",

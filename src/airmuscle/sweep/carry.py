@@ -46,10 +46,7 @@ def reason(error: Exception) -> str:
 
 
 def _rows(scenario: Scenario, instants: Array) -> Array:
-    """The scenario's own rows and the instants that lie within the run, none closer to another than rounding."""
+    """The scenario's own rows, and the instants that lie within the run."""
     end = scenario.start_time + scenario.duration
-    own = output_times(scenario.output, scenario.start_time, scenario.duration, np.array([end]))
-    further = instants[(instants >= scenario.start_time) & (instants <= end)]
-    behind = np.searchsorted(own, further)
-    gaps = [np.abs(further - own[np.clip(behind + shift, 0, own.size - 1)]) for shift in (-1, 0)]
-    return np.union1d(own, further[np.minimum(*gaps) > 1e-9 * scenario.duration])
+    within = instants[(instants >= scenario.start_time) & (instants < end)]
+    return output_times(scenario.output, scenario.start_time, scenario.duration, np.append(within, end))

@@ -19,6 +19,8 @@ ACROSS = 3
 """Panels beside each other."""
 MOST_POINTS = 2000
 """Points of a scatter figure; of more runs every so many is drawn."""
+LONG = 28
+"""Letters that fit under a panel."""
 _SHOWN = {
     "Pa": (1e-3, "kPa"), "Pa(a)": (1e-3, "kPa(a)"), "m": (1e3, "mm"), "m3": (1e6, "cm³"), "rad": (180 / math.pi, "deg"),
     "m3/(s Pa)": (1e8, "dm³/(s bar)"), "kg/s": (1e3, "g/s"), "1": (1.0, ""),
@@ -41,11 +43,12 @@ def scale(unit: str) -> tuple[float, str]:
 
 
 def label(name: str, unit: str) -> str:
-    """What stands at an axis: the name, on several lines where it is a long path, and the unit."""
+    """What stands at an axis: the name and the unit, on two lines where they are long together."""
     shown = scale(unit)[1]
-    parts = name.split(".")
-    words = name if len(name) <= 24 else f"{'.'.join(parts[:-1])}\n.{parts[-1]}"
-    return f"{words} [{shown}]" if shown else words
+    if len(name) > LONG:
+        name = f"{name.rpartition('.')[0]}\n.{name.rpartition('.')[2]}"
+    between = "\n" if len(name) + len(shown) > LONG and "\n" not in name else " "
+    return f"{name}{between}[{shown}]" if shown else name
 
 
 def _panels(count: int, height: float = 2.3, **options: Any) -> tuple[Any, Iterator[Any]]:
@@ -93,6 +96,7 @@ def _scatter(result: StudyResult, name: str) -> Plot:
         across, _ = scale(number.unit)
         axis.plot(study.values[drawn, i] * across, result[name][drawn] * factor, **style)
         axis.set_xlabel(label(number.path, number.unit))
+        axis.locator_params(axis="x", nbins=5)
         if i % ACROSS == 0:
             axis.set_ylabel(label(name, study.units[name]))
     few = f" Of {there.size} runs {drawn.size} are drawn." if drawn.size < there.size else ""
@@ -116,7 +120,7 @@ def _bars(result: StudyResult, indices: dict[str, Indices]) -> Plot:
             axis.barh(places + shift, np.nan_to_num(values), xerr=errors, color=colour, label=words, **bar)
         axis.set_yticks(places, inputs)
         axis.invert_yaxis()
-        axis.set_title(name if np.isfinite(found.total).any() else f"{name}: does not vary", loc="left")
+        axis.set_title(name if np.isfinite(found.total).any() else f"{name}: does not vary")
         axis.axvline(0.0, color=BLACK, linewidth=0.8)
         axis.grid(False, axis="y")
     axes[-1, 0].set_xlabel("part of the variance")

@@ -46,7 +46,7 @@ class Source:
         """Everything that can vary, by path."""
         plant = self.scenario.plant
         found = [Number(leaf.path, leaf.declared.unit, leaf.declared.bounds, i) for i, leaf in enumerate(leaves(plant))]
-        for keys, unit in (*_of_command(self.tables.get("command", {})), *_of_run(self.tables["run"], plant)):
+        for keys, unit in (*_of_command(self.tables.get("command", {}), plant), *_of_run(self.tables["run"], plant)):
             found.append(Number(_spelt(keys), unit, (-math.inf, math.inf), keys))
         return {number.path: number for number in found}
 
@@ -72,14 +72,15 @@ class Source:
         return scenario_from(tables, place, with_parameters(scenario.plant, leaf_values))
 
 
-def _of_command(table: Mapping[str, Any]) -> Iterator[tuple[Keys, str]]:
+def _of_command(table: Mapping[str, Any], plant: Plant) -> Iterator[tuple[Keys, str]]:
+    units = {given.name: given.unit for given in plant.commands}
     for name, given in table.items():
         if name == "period":
             yield ("command", name), "s"
         elif isinstance(given, list):
             for i, _ in enumerate(given):
                 yield ("command", name, i, 0), "s"
-                yield ("command", name, i, 1), "1"
+                yield ("command", name, i, 1), units[name]
         elif isinstance(given, Mapping):
             yield from _of_models(given, ("command", name))
 

@@ -17,12 +17,14 @@ from ...program import System
 
 Array = npt.NDArray[np.float64]
 ITERATIONS = 50
+NUDGE = 100.0
+"""A little more gauge pressure [Pa], by which states that settle with it are found."""
 _conditions: dict[Any, Any] = {}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Start:
-    """Conditions that fix a state: `known` values of states or outputs, and states that stand `still`.
+    """Conditions that fix a state: `known` values of states or outputs, states that stand `still`, `equal` outputs.
 
     Together they must be as many as the states; `guess` is where the search for the state begins. Inputs count as zero.
     """
@@ -30,41 +32,72 @@ class Start:
     known: Mapping[str, float]
     guess: Mapping[str, float]
     still: tuple[str, ...] = ()
+    equal: tuple[tuple[str, str], ...] = ()
 
     @classmethod
     def at_rest(cls, plant: Plant, pressure: float) -> Start:
-        """A plant of one muscle in equilibrium at a gauge pressure [Pa]."""
+        """A plant of one muscle in equilibrium at a gauge pressure [Pa], its walls and tubes settled."""
         speeds = [c.speed for c in plant.mechanism.coordinates]
-        known = {"pressure": pressure} | dict.fromkeys(speeds, 0.0)
-        return cls(known, equilibrium(plant, pressure=pressure), tuple(speeds))
+        places = [c.name for c in plant.mechanism.coordinates]
+        state = equilibrium(plant, pressure=pressure)
+        known, still, equal = _settled(plant, state, pressure, (*speeds, *places))
+        known |= dict.fromkeys(speeds, 0.0)
+        return cls({"pressure": pressure, **known}, state, (*still, *speeds), equal)
 
     @classmethod
     def held(cls, plant: Plant, pressure: float, **coordinates: float) -> Start:
-        """A plant of one muscle at a gauge pressure [Pa], its coordinates known, at rest unless speeds are given."""
+        """A plant of one muscle at a gauge pressure [Pa], its coordinates known, at rest unless speeds are given.
+
+        Walls and tubes are settled at this pressure, and go with it where it is an unknown.
+        """
         state = plant.state_at(pressure=pressure, **coordinates)
-        moving = {name: value for name, value in state.items() if name != "air_mass"}
-        return cls({"pressure": pressure} | moving, state)
+        known, still, equal = _settled(plant, state, pressure)
+        return cls({"pressure": pressure, **known}, state, still, equal)
 
     def refuse_unfit(self, system: System, values: Mapping[str, Any]) -> None:
         """Raise ParameterError for a name that the system lacks, or too few or many conditions."""
         names = [s.name for s in system.states]
-        for name in (*self.known, *self.still):
+        for name in (*self.known, *self.still, *(n for pair in self.equal for n in pair)):
             if name not in (names if name in self.still else values):
                 raise ParameterError(
                     f"the start names '{name}'; the system has {', '.join(values)}.{suggestion(name, values)}"
                 )
-        if len(self.known) + len(self.still) != len(names) or set(self.guess) != set(names):
+        if len(self.known) + len(self.still) + len(self.equal) != len(names) or set(self.guess) != set(names):
             raise ParameterError(
                 f"the start must give as many conditions as there are states ({', '.join(names)}), and a guess "
                 f"of each; known are {', '.join(self.known) or 'none'}, still {', '.join(self.still) or 'none'}."
             )
 
 
+def _settled(
+    plant: Plant, state: Mapping[str, float], pressure: float, left: Sequence[str] = ()
+) -> tuple[dict[str, float], tuple[str, ...], tuple[tuple[str, str], ...]]:
+    """How the states besides the air mass are fixed: those that a little more pressure leaves alone are known.
+
+    Of the others a tube has the pressure of the muscle, and the rest stands still.
+    """
+    moving = {c.name: state[c.name] for c in plant.mechanism.coordinates}
+    moving |= {c.speed: state[c.speed] for c in plant.mechanism.coordinates}
+    other = plant.state_at(pressure=pressure + NUDGE, **moving)
+    shown = plant.outputs(state, dict.fromkeys(plant.inputs, 0.0))
+    known, still, equal = {}, [], []
+    for name, value in state.items():
+        if name == "air_mass" or name in left:
+            continue
+        if other[name] == value:
+            known[name] = value
+        elif (of_tube := f"{name.removesuffix('air_mass')}pressure") in shown:
+            equal.append((of_tube, "pressure"))
+        else:
+            still.append(name)
+    return known, tuple(still), tuple(equal)
+
+
 def conditions(system: System, start: Start) -> Any:
     """The CasADi function (state, leaves) -> (values known, rates to vanish, their slopes by state, by leaf)."""
     import casadi
 
-    key = (declare.structure(system), tuple(start.known), start.still)
+    key = (declare.structure(system), tuple(start.known), start.still, start.equal)
     if key not in _conditions:
         model, p = trace.symbolic(system)
         x = casadi.SX.sym("x", len(system.states))
@@ -73,7 +106,11 @@ def conditions(system: System, start: Start) -> Any:
         values = {**model.outputs(state, shut), **state}
         start.refuse_unfit(system, values)
         rates = model.rates(state, shut)
-        g = casadi.vertcat(*(casadi.SX(values[n]) for n in start.known), *(casadi.SX(rates[n]) for n in start.still))
+        g = casadi.vertcat(
+            *(casadi.SX(values[n]) for n in start.known),
+            *(casadi.SX(rates[n]) for n in start.still),
+            *(casadi.SX(values[a] - values[b]) for a, b in start.equal),
+        )
         outputs = casadi.cse([g, casadi.jacobian(g, x), casadi.jacobian(g, p)])
         _conditions[key] = casadi.Function("start", [x, p], outputs)
     return _conditions[key]
@@ -87,7 +124,7 @@ def solved(
     `function` is that of `conditions`, made once for a structure.
     Raises IdentificationError where no state meets the conditions.
     """
-    target, size = np.concatenate([known, np.zeros(len(start.still))]), np.asarray(sizes)
+    target, size = np.concatenate([known, np.zeros(len(start.still) + len(start.equal))]), np.asarray(sizes)
     x, best = guess.copy(), np.inf
     for _ in range(ITERATIONS):
         g, by_state, by_leaf = (np.asarray(part) for part in function(x, leaves))
@@ -101,7 +138,8 @@ def solved(
             return x, inverse[:, : known.size], -inverse @ by_leaf
     raise IdentificationError(
         f"no state meets the start "
-        f"{dict(zip(start.known, known.tolist(), strict=True))} with {', '.join(start.still) or 'nothing'} at rest; "
+        f"{dict(zip(start.known, known.tolist(), strict=True))} with {', '.join(start.still) or 'nothing'} at rest and "
+        f"{', '.join(f'{a} = {b}' for a, b in start.equal) or 'nothing'} equal; "
         f"the last step of the search was {best:.2g} of the nominal size."
     )
 
