@@ -59,8 +59,10 @@ def _computed(study: Study, missing: Sequence[int], executor: Executor | None) -
     if executor is None:
         yield from ((index, run_chunk(path, mark, index)) for index in missing)
         return
-    tasks: dict[Future[Chunk], int] = {executor.submit(run_chunk, path, mark, index): index for index in missing}
+    tasks: dict[Future[Chunk], int] = {}
     try:
+        for index in missing:
+            tasks[executor.submit(run_chunk, path, mark, index)] = index
         for task in as_completed(tasks):
             yield tasks.pop(task), task.result()  # forgotten at once: a long study would hold all it has computed
     except BrokenExecutor:
