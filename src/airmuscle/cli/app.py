@@ -27,6 +27,7 @@ from .schema import schema
 from .show import show
 from .simulate import simulate
 from .solve import solve
+from .sweep import sweep
 
 
 class Commands(TyperGroup):
@@ -83,6 +84,7 @@ app.command("hysteresis", short_help="Fit friction to loops, and say whether the
 app.command("fit-dynamic", short_help="Find a plant's numbers from records of its motion.")(fit_dynamic)
 app.command("plan", short_help="Say which runs tell most about a muscle on your bench.")(plan)
 app.command("simulate", short_help="Simulate a plant that a scenario file describes.")(simulate)
+app.command("sweep", short_help="Run a scenario many times, with numbers that vary.")(sweep)
 app.command("schema", short_help="Print what editors need to check scenario and muscle files.")(schema)
 
 
