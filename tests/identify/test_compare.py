@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 import airmuscle as am
 from airmuscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.cli.app import app
+from airmuscle.cli.fit_compare import _part
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify import Blocks, Candidate, Levels, Runs, Specimens, compare
@@ -174,6 +175,13 @@ def test_what_is_left_out_decides_what_the_law_is_for():
     assert "muscles and contractions that were measured" in within.reason
     assert beyond.purpose in str(beyond).splitlines()[0]
     assert "a muscle of the type that was not measured" in beyond.reason
+
+
+@pytest.mark.parametrize(
+    ("word", "how"), [("run", Runs()), ("specimen", Specimens()), ("block", Blocks()), ("pressure", Levels("pressure"))]
+)
+def test_the_command_knows_each_way_by_a_word(word: str, how):
+    assert _part(word) == how
 
 
 def test_each_way_of_leaving_out_has_a_purpose_of_its_own():
