@@ -5,12 +5,15 @@ The file is written with SI numbers here; the words of an error and units as tex
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from plants import EXAMPLES
 
 from airmuscle.errors import ParameterError
 from airmuscle.library import write
+from airmuscle.library.models import model_class, model_names
 from airmuscle.library.scenario import load_scenario
 
 
@@ -84,3 +87,11 @@ def test_what_is_wrong_with_a_component_is_said_with_its_place(right, wrong, mes
     file.write_text(TUBE.replace(right, wrong), encoding="utf-8")
     with pytest.raises(ParameterError, match=message):
         load_scenario(file)
+
+
+def test_the_page_of_components_names_each_with_a_line():
+    page = (Path(__file__).parents[2] / "docs" / "components.md").read_text(encoding="utf-8")
+    parts = ("circuit", "gas", "contact", "muscle")
+    owned = [n for n in model_names() if model_class(n, "").__module__.split(".")[1] in parts and n != "Muscle"]
+    assert len(owned) > 30
+    assert [n for n in owned if f"`{n}`" not in page] == []
