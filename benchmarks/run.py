@@ -15,6 +15,7 @@ os.environ.setdefault(
     "OPENBLAS_NUM_THREADS", "1"
 )  # before NumPy: a second thread that waits for a core slows both sides
 
+import batch
 import bootstrap
 import new_plant
 import ode8
@@ -27,6 +28,7 @@ RESULTS = pathlib.Path(__file__).with_name("RESULTS.md")
 SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (rodas4.section, 25),
     (ode8.section, 15),
+    (batch.section, 7),
     (static_fit.section, 15),
     (bootstrap.section, 5),
     (new_plant.section, 7),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
+import threading
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,7 +13,9 @@ import numpy.typing as npt
 
 from .. import declare
 from . import llvm
+from .numbers import Number
 from .printed import Sizes, Traced, explicit_module, implicit_module, traced
+from .printed_lanes import lanes_module
 from .system import System
 
 _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "drift", "outputs")
@@ -27,6 +30,7 @@ class Program:
         self._engine = llvm.compiled(text)
         self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
         self._steps: dict[Any, tuple[Any, int]] = {}
+        self._compiling = threading.Lock()  # of two threads that ask for a step, one makes it: an engine must not go
 
     def held(self, parameters: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """What the functions need of a set of parameters, computed once."""
@@ -36,18 +40,32 @@ class Program:
         self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...], parameters: npt.NDArray[np.float64]
     ) -> tuple[int, npt.NDArray[np.float64]]:
         """The address of an explicit step of this tableau, and what it needs of the parameters."""
-        if (a, b) not in self._steps:
-            text, held = explicit_module(self.traced, a, b)
-            self._steps[a, b] = llvm.compiled(text), held
+        with self._compiling:
+            if (a, b) not in self._steps:
+                text, held = explicit_module(self.traced, a, b)
+                self._steps[a, b] = llvm.compiled(text), held
         engine, held = self._steps[a, b]
         return int(engine.get_function_address("step")), _handed(engine, parameters, held)
 
+    def lanes(
+        self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...], number: Number
+    ) -> tuple[tuple[int, int, int], int]:
+        """The addresses of `prepare`, the explicit step and `outputs` in lanes, and how long `c` must be."""
+        with self._compiling:
+            if (a, b, number) not in self._steps:
+                text, held = lanes_module(self.traced, a, b, number)
+                self._steps[a, b, number] = llvm.compiled(text), held
+        engine, held = self._steps[a, b, number]
+        prepare, step, outputs = (int(engine.get_function_address(n)) for n in ("prepare", "step", "outputs"))
+        return (prepare, step, outputs), held
+
+
+_PREPARE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+
 
 def _handed(engine: Any, parameters: npt.NDArray[np.float64], size: int) -> npt.NDArray[np.float64]:
-    pointer = ctypes.c_void_p
     handed = np.zeros(max(size, 1))
-    prepare = ctypes.CFUNCTYPE(None, pointer, pointer)(engine.get_function_address("prepare"))
-    prepare(parameters.ctypes.data, handed.ctypes.data)
+    _PREPARE(engine.get_function_address("prepare"))(parameters.ctypes.data, handed.ctypes.data)
     return handed
 
 

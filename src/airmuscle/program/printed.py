@@ -11,7 +11,8 @@ import casadi
 from .. import trace
 from ..errors import TraceError
 from . import llvm, lu
-from .instructions import Code, hoisted, instructions
+from .instructions import Code, Operand, hoisted, instructions
+from .numbers import DOUBLE, Number
 from .system import System
 
 PARAMETERS = "p"
@@ -63,11 +64,16 @@ class Sizes:
 
 
 class Printer:
-    """Collects functions; what each needs of the parameters alone is gathered into one `prepare(p, c)`."""
+    """Collects functions; what each needs of the parameters alone is gathered into one `prepare(p, c)`.
 
-    def __init__(self) -> None:
+    Every element of every array is a `number`; in lanes one of each plant.
+    """
+
+    def __init__(self, number: Number = DOUBLE) -> None:
         self.text: list[str] = []
-        self._prepare = llvm.Block()
+        self.needed: dict[str, int] = {}
+        self._number = number
+        self._prepare = llvm.Block((), number)
         self._places: dict[str, int] = {}
 
     @property
@@ -77,17 +83,21 @@ class Printer:
 
     def add(self, name: str, inputs: dict[str, Any], outputs: dict[str, Any], scalars: Sequence[str] = ()) -> None:
         """Print `name(inputs..., outputs...)`, with `c` in place of the parameters."""
-        code = instructions(list(inputs.values()), list(outputs.values()))
+        code, held = self.without_parameters(inputs, outputs)
         names, targets = list(inputs), dict(enumerate(outputs))
-        block = llvm.Block(scalars)
-        if PARAMETERS in inputs:
-            code, once, handed = hoisted(code, names.index(PARAMETERS))
-            held = llvm.hand_over(self._prepare, once, handed, names, self._places)
-        else:
-            code, held = Code(code.body, code.outputs), {}
+        block = llvm.Block(scalars, self._number)
         llvm.write(block, code, names, targets, held)
         arguments = ["c" if n == PARAMETERS else n for n in names] + list(outputs)
         self.text.append(llvm.function(name, arguments, block))
+        self.needed |= {**block.needed, **self._prepare.needed}
+
+    def without_parameters(self, inputs: dict[str, Any], outputs: dict[str, Any]) -> tuple[Code, dict[Operand, int]]:
+        """The code of outputs without what depends on parameters alone, and where in `c` that stands."""
+        code, names = instructions(list(inputs.values()), list(outputs.values())), list(inputs)
+        if PARAMETERS not in inputs:
+            return code, {}
+        code, once, handed = hoisted(code, names.index(PARAMETERS))
+        return code, llvm.hand_over(self._prepare, once, handed, names, self._places)
 
     def module(self) -> str:
         """All functions and `prepare`, as one LLVM text.

@@ -12,7 +12,7 @@ from ..check import maxwell_defect
 from ..figures import LINES, legend_outside, new_figure
 from ..geometry.base import Geometry
 from ..identify import Fit
-from ..identify.solve import measured_rank
+from ..identify.one_sided import measured_rank
 from ..library import catalogue
 from ..reference import cite
 from ..report.chapter import Chapter, Claim, Equal, Plot, Table
