@@ -34,6 +34,8 @@ ARGUMENTS = {
     "stop": "what ends a muscle's way",
     "contact": "law of a contact",
     "depth": "depth of a contact [m]",
+    "density": "of the air [kg/m3]",
+    "beside": "coefficient of damping beside a damper [N s/m]",
     "stretch": "stretch of a series spring [m]",
     "inner_contraction": "contraction of the contractile part [1], behind a series spring",
     "inner_speed": "speed of shortening of the contractile part [m/s]",

@@ -223,9 +223,12 @@ class Plant:
 
         Coordinates and speeds that are not named are 0; walls, tubes, tanks and series springs are settled at this
         pressure, bristles relaxed. Names with a dot are passed as `**{"left.bristle": 1e-4}`. Raises ParameterError
-        for a pressure below absolute zero or an unknown name.
+        for a pressure below absolute zero, another number of pressures than muscles, an unknown name, or a wall that
+        takes all volume away.
         """
         pressures = pressure if isinstance(pressure, tuple) else (pressure,) * len(self.muscles)
+        if len(pressures) != len(self.muscles):
+            raise ParameterError(f"Plant: {len(pressures)} pressures are given for {len(self.muscles)} muscles.")
         air = {f"{p}{s.name}" for p, m in zip(self.prefixes, self.muscles, strict=True)
                for s in self.gas.states(m.geometry.volume(0.05), self.ambient)}  # fmt: skip
         order = [s.name for s in self.states]
@@ -241,6 +244,10 @@ class Plant:
             muscle.geometry.refuse_out_of_reach(eps)
             own = {**muscle.settled(p, eps), **within(prefix, values)}
             volume = muscle.volume(muscle.inner_contraction(eps, own), own)
+            if not volume > 0.0:
+                raise ParameterError(
+                    f"Plant: {muscle.name} encloses {volume:g} m3 at {p:g} Pa; its wall gives too much."
+                )
             content = self.gas.content(absolute(p, self.ambient), volume, self.ambient)
             airs.append(self.gas.air(content, volume, self.ambient))
             state = {**outside(prefix, {**content, **own}), **state}

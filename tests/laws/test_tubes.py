@@ -1,11 +1,15 @@
 """A tube delays and weakens what it passes; cut into pieces with inertia it tends to the closed forms.
 
-Steady isothermal flow: p1^2 - p2^2 = 256 mu R T L q g/(pi D^4), g = 1 laminar, (Re/1187)^(3/4) beyond (Blasius).
+Steady isothermal flow: p1^2 - p2^2 = 256 mu R T L q g/(pi D^4) + zeta R T (q/A)^2, g = 1 laminar, (Re/1187)^(3/4)
+beyond (Blasius), zeta of the ends.
 Small vibrations: q_L/p_0 = 1/(Z sinh(gamma L)), gamma = sqrt((r + i w l) i w c), with r, l, c friction, inertance and
 compliance for each metre. A front arrives after L over the speed of sound.
 """
 
 from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,13 +41,14 @@ MU = 1.82e-5
 GASES = [Isothermal(), Polytropic(1.2), EnergyBalance(0.0)]
 
 
-def steady(p1, p2, length, diameter):
+def steady(p1, p2, length, diameter, end_loss=1.5):
     """The flow of the closed form, by root search."""
-    reynolds = 4 / (np.pi * diameter * MU)
+    reynolds, area = 4 / (np.pi * diameter * MU), np.pi / 4 * diameter**2
 
     def excess(q):
         g = max(reynolds * q / (64 / 0.3164) ** (4 / 3), 1.0) ** 0.75
-        return 256 * MU * GAS_CONSTANT * WARM * length * q * g / (np.pi * diameter**4) - (p1**2 - p2**2)
+        friction = 256 * MU * length * q * g / (np.pi * diameter**4)
+        return GAS_CONSTANT * WARM * (friction + end_loss * (q / area) ** 2) - (p1**2 - p2**2)
 
     return brentq(excess, 0.0, 1.0, xtol=1e-18, rtol=1e-12)
 
@@ -65,21 +70,21 @@ def at_rest(tube, pressure, tilt=0.0):
 
 @pytest.mark.parametrize("pieces", [1, 3, 17])
 @pytest.mark.parametrize(("p1", "p2"), [(3.01e5, 3e5), (6e5, 5e5), (2e5, 1.9e5)])
-@pytest.mark.parametrize(("length", "diameter"), [(2.0, 4e-3), (10.0, 2e-3), (0.5, 1e-3)])
-def test_a_steady_flow_obeys_darcys_law_however_few_the_pieces(p1, p2, length, diameter, pieces):
-    tube = DistributedTube(length, diameter, pieces)
-    q = steady(p1, p2, length, diameter)
-    squares = p1**2 + (p2**2 - p1**2) * np.arange(pieces) / pieces
-    names = ["tube."] if pieces == 1 else [f"tube{i}." for i in range(1, pieces + 1)]
+@pytest.mark.parametrize(("length", "diameter", "end_loss"), [(2.0, 4e-3, 1.5), (10.0, 2e-3, 0.0), (0.5, 1e-3, 3.0)])
+def test_a_steady_flow_obeys_darcys_law_however_few_the_pieces(p1, p2, length, diameter, end_loss, pieces):
+    tube = DistributedTube(length, diameter, pieces, end_loss=end_loss)
+    q, area = steady(p1, p2, length, diameter, end_loss), np.pi / 4 * diameter**2
+    ends = GAS_CONSTANT * WARM * end_loss * (q / area) ** 2
+    squares = p1**2 - (p1**2 - p2**2 - ends) * np.arange(pieces) / pieces
     state = {}
-    for name, p in zip(names, np.sqrt(squares), strict=True):
+    for name, p in zip(tube.names, np.sqrt(squares), strict=True):
         state |= {f"{name}air_mass": p * tube.piece_volume / (GAS_CONSTANT * WARM), f"{name}flow": q}
     rates, onward = tube.rates(state, tube.airs(state, AMBIENT), STILL, Air(p2, WARM), AMBIENT)
-    driving = tube.area * pieces / length * (p1 - p2) / pieces
+    driving = tube.area * (p1 - p2) / length
     assert onward.mass == q
-    for name in names:
+    for name in tube.names:
         assert rates[f"{name}flow"] == pytest.approx(0.0, abs=1e-9 * driving)
-    for name in names[1:]:
+    for name in tube.names[1:]:
         assert rates[f"{name}air_mass"] == pytest.approx(0.0, abs=1e-15)
 
 
@@ -98,7 +103,7 @@ def test_the_formula_for_a_tubes_conductance_agrees_with_darcys_law(length, diam
     """From 6 to 5.5 bar absolute. This holds the formula's units fast: others would be off by powers of ten."""
     orifice = TubeOrifice(length, diameter)
     found = orifice.mass_flow(6e5, 5.5e5, 1.0, WARM)
-    assert found == pytest.approx(steady(6e5, 5.5e5, length, diameter), rel=0.15)
+    assert found == pytest.approx(steady(6e5, 5.5e5, length, diameter), rel=0.06)
     assert 0.0 < orifice.critical_ratio < 0.61
 
 
@@ -227,3 +232,16 @@ def test_a_lumped_tube_knows_no_delay_and_both_agree_once_the_waves_are_gone():
     assert lumped["mass_flow"][early] > 1e3 * abs(distributed["mass_flow"][early])
     apart = np.abs(lumped["pressure"] - distributed["pressure"])
     assert apart.max() < 0.01 * 5.5e5
+
+
+@pytest.mark.parametrize(
+    ("length", "conductance", "per_cent"), [(1.0, 2.6167e-9, 0.3), (8.0, 2.6167e-9, 1.2), (0.25, 1e-8, 0.7)]
+)
+def test_the_page_states_the_error_of_lumped_tubes(length, conductance, per_cent):
+    script = Path(__file__).parents[2] / "docs" / "make_tubes_figure.py"
+    spec = importlib.util.spec_from_file_location("make_tubes_figure", script)
+    drawing = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(drawing)
+    assert 100 * drawing.error(length, 1, conductance) == pytest.approx(per_cent, abs=0.07)
+    page = script.with_name("components.md").read_text(encoding="utf-8")
+    assert f"{per_cent} %" in page

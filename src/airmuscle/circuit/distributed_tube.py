@@ -34,11 +34,13 @@ class DistributedTube(Conduit):
 
     q_0 the valve's flow, q_n that into the muscle, p_(n+1) its pressure; dx = L/n, A = pi D^2/4, Re = |q| D/(A mu),
     rho the mean density of both sides. f is Hagen-Poiseuille's friction, and from Re = 1187 on, where they meet, that
-    of Blasius for smooth tubes (up to about 1e5). A step of pressure arrives after L/c, c the speed of sound of the
-    gas (`Gas.sound_speed`), and fades as exp(-f L/(2 c)). A steady isothermal flow obeys q^2 ~ p_1^2 - p_2^2 exactly,
-    however few the pieces; a front is smeared over about n^(1/3) of them. Left out: the momentum that the flow carries
-    along (right for flows well below the speed of sound: no choking here, the valve does that), losses at the ends,
-    friction that depends on frequency, and the kinetic energy in the gas's balance.
+    of Blasius for smooth tubes (up to about 1e5). The last piece also loses zeta dynamic heads, zeta |q| q/(2 rho A)
+    of force, for both ends: 0.5 where air enters a sharp edge and 1 where it leaves. A step of pressure arrives after
+    L/c, c the speed of sound of the gas (`Gas.sound_speed`), and fades as exp(-f L/(2 c)). A steady isothermal flow
+    obeys p_1^2 - p_2^2 = R T (2 f rho L q/A + zeta q^2/A^2) exactly, however few the pieces; a front is smeared over
+    about n^(1/3) of them. Left out: the momentum that the flow carries along (right below a third of the speed of
+    sound; nothing chokes here, the valve does that), friction that depends on frequency, and the kinetic energy in the
+    gas's balance.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (BLASIUS1913,)
@@ -50,6 +52,8 @@ class DistributedTube(Conduit):
     viscosity: float = parameter(
         "Pa s", "mu", "dynamic viscosity of the air", bounds=(1e-6, 1e-4), fitted=False, default=1.82e-5
     )
+
+    end_loss: float = parameter("1", "zeta", "loss at both ends, in dynamic heads", bounds=(0.0, 10.0), default=1.5)
 
     def check(self) -> None:
         refuse_pieces("DistributedTube", self.pieces)
@@ -88,9 +92,11 @@ class DistributedTube(Conduit):
             mass = state[f"{name}flow"]
             onward = _carried(mass, air, after)
             rates |= outside(name, self.gas.rates(within(name, state), air, flow - onward, 0.0, ambient))
-            rates[f"{name}flow"] = self.area * self.pieces / self.length * (air.pressure - after.pressure) - (
-                self.friction(mass, (_density(air) + _density(after)) / 2.0) * mass
-            )
+            density = (_density(air) + _density(after)) / 2.0
+            force = self.area * (air.pressure - after.pressure)
+            if after is muscle:
+                force = force - self.end_loss * ops.absolute_value(mass) * mass / (2.0 * density * self.area)
+            rates[f"{name}flow"] = force * self.pieces / self.length - self.friction(mass, density) * mass
             flow = onward
         return rates, flow
 

@@ -121,10 +121,9 @@ class Muscle:
         def excess(inner: float) -> float:
             return float(self.static(pressure, inner) - series.force((inner - contraction) * length))
 
-        here = excess(contraction)
+        here, (least, most) = excess(contraction), self.geometry.contraction_reach
         low, high = contraction, contraction + max(here, 0.0) / (series.stiffness * length)
-        if here < 0.0:
-            low = min(max(self.geometry.contraction_reach[0], contraction - 1.0), contraction)
+        low, high = (min(least, contraction), contraction) if here < 0.0 else (low, min(high, max(most, contraction)))
         while low < (middle := (low + high) / 2) < high:
             low, high = (middle, high) if excess(middle) >= 0 else (low, middle)
         return low

@@ -68,7 +68,7 @@ class LaggingWall(_Lagging):
     tau V_w'^2/c, is heat.
     """
 
-    compliance: float = parameter("m3/Pa", "c", "volume that the wall adds for each pascal", bounds=(0.0, 1e-6))
+    compliance: float = parameter("m3/Pa", "c", "volume that the wall adds for each pascal", bounds=(0.0, 1e-8))
     lag: float = parameter("s", "tau", "time by which the wall lags", bounds=(1e-4, 100.0))
 
     def settled_volume(self, pressure: Value) -> Value:

@@ -170,15 +170,22 @@ def table(found: tuple[Effect, ...]) -> Table:
                                      "exchanged": [e.exchanged.what for e in found]}  # fmt: skip
     for column, unit, size in (("pressure", "kPa", 1e3), ("contraction", "% of length", 0.01)):
         for word, phase in phases:
-            columns[f"{column}, {word}: greatest change [{unit}]"] = [e.greatest(column, phase) / size for e in found]
+            columns[f"{column}, {word}: greatest change [{unit}]"] = [
+                _shown(e.greatest(column, phase) / size) for e in found
+            ]
     for i, (word, _) in enumerate(phases):
-        columns[f"{word} later at 90 % [ms]"] = [round(e.delays[i] * 1e3, 3) + 0.0 for e in found]
-    columns["pressure, filling to discharging [1]"] = [ratio(e) for e in found]
+        columns[f"{word} later at 90 % [ms]"] = [_shown(round(e.delays[i] * 1e3, 3)) for e in found]
+    columns["pressure, filling to discharging [1]"] = [_shown(ratio(e)) for e in found]
     note = (
         "each exchanged alone in the plant as printed, all numbers chosen; the last ratio is above 1 where filling "
         "suffers more, as the paper sees it"
     )
     return Table("hosovsky_effects", "What each suspected cause of the deviations in Fig. 3 changes", columns, note)
+
+
+def _shown(value: float) -> float:
+    """Three digits: more would say more than chosen numbers can."""
+    return float(f"{value + 0.0:.3g}")
 
 
 def ratio(effect: Effect) -> float:
