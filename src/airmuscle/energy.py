@@ -16,6 +16,7 @@ _METERS = (
     StateVariable("energy_of_flow", "J", 1.0, "energy that came into the muscles with the air"),
     StateVariable("heat_to_air", "J", 1.0, "heat that the walls gave to the air in the muscles"),
     StateVariable("damping_heat", "J", 1.0, "work that the dampers turned into heat"),
+    StateVariable("mechanism_loss", "J", 1.0, "work that the mechanism lost to its dampers, stops and drives"),
     StateVariable("air_supplied", "kg", 1e-3, "air that came from outside the plant"),
     StateVariable("air_exhausted", "kg", 1e-3, "air that went to the surroundings"),
 )
@@ -26,8 +27,8 @@ _FRICTION = StateVariable("friction_work", "J", 1.0, "work done against friction
 class Metered:
     """A plant with meters as further states, and its energies and its air as outputs.
 
-    Three books must close. Mechanical: kinetic + potential energy grow by `work_of_tension`, as long as the latch and
-    what the mechanism loses by itself do no work. Air: `air_energy` grows by `energy_of_flow` + `heat_to_air` less
+    Three books must close. Mechanical: kinetic + potential energy grow by `work_of_tension` less `mechanism_loss`, as
+    long as a latch moves only from rest. Air: `air_energy` grows by `energy_of_flow` + `heat_to_air` less
     `work_of_air`. Mass: `air_total` grows by `air_supplied` less `air_exhausted`.
     """
 
@@ -68,6 +69,8 @@ class Metered:
             powers["damping_heat"] += damping * port.inner_speed
             if muscle.friction.states:
                 powers["friction_work"] += port.friction * port.inner_speed
+        pulls = plant.mechanism.pulls(state, [port.tension for port in ports], plant.resting_lengths)
+        powers["mechanism_loss"] += plant.mechanism.lost_power(state, state, pulls, inputs)
         for response in responses:
             powers["air_supplied"] += response.drawn.mass
             powers["air_exhausted"] += response.exhausted.mass
