@@ -65,8 +65,8 @@ class Plant:
             raise ParameterError(f"Plant: its circuits feed {ports} muscles; {len(names)} are given.")
         taken = self.mechanism.muscles
         if taken not in (None, len(names)):
-            kind = type(self.mechanism).__name__
-            raise ParameterError(f"Plant: {kind} takes {taken} muscles; {len(names)} are given.")
+            owner = type(self.mechanism).__name__
+            raise ParameterError(f"Plant: {owner} takes {taken} muscles; {len(names)} are given.")
         if isinstance(self.circuit, tuple) and any(c.ports != 1 for c in self.circuit):
             raise ParameterError("Plant: a circuit that feeds several muscles stands alone, not in a tuple.")
         if len(set(names)) < len(names):
