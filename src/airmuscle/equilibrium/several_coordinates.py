@@ -13,6 +13,8 @@ Array = npt.NDArray[np.float64]
 STARTS = 60
 """Places from which the search begins, spread evenly over what the muscles can take."""
 ITERATIONS = 40
+BALANCED = 1e-8
+"""Imbalance that counts as none, as a share of the greatest at the starts."""
 APART = 1e-6
 """Rests closer than this share of a coordinate's nominal size are one."""
 
@@ -20,9 +22,11 @@ APART = 1e-6
 def places_of_several(static: Static) -> list[Array]:
     """Every place of balance that a start leads to, sorted by its coordinates."""
     sizes = np.array([c.nominal for c in static.coordinates])
+    begun = [(x, static.accelerations(static.place(x))) for x in starts(static)]
+    balance = BALANCED * max((np.abs(f).max() for _, f in begun), default=0.0)
     found: list[Array] = []
-    for start in starts(static):
-        place = _newton(static, start, sizes)
+    for x, f in begun:
+        place = _newton(static, x, f, sizes, balance)
         if place is not None and all(np.abs((place - other) / sizes).max() > APART for other in found):
             found.append(place)
     return sorted(found, key=tuple)
@@ -57,31 +61,27 @@ def _place_of(static: Static, target: Array) -> Array:
     return np.asarray(x)
 
 
-def _newton(static: Static, x: Array, sizes: Array) -> Array | None:
+def _newton(static: Static, x: Array, f: Array, sizes: Array, balance: float) -> Array | None:
     """The place of balance that Newton's method finds from x, with steps halved until the imbalance falls."""
-    f = static.accelerations(static.place(x))
     for _ in range(ITERATIONS):
         step = _step(static, x, f, sizes)
         if not np.isfinite(step).all():
             return None
-        share = 1.0
-        while share > 1e-6:
+        if np.abs(step / sizes).max() < 1e-13:
+            return x if np.abs(f).max() <= balance else None
+        for share in 0.5 ** np.arange(12):
             ahead = x + share * step
-            if static.within_reach(static.place(ahead)):
-                after = static.accelerations(static.place(ahead))
-                if np.abs(after).max() < np.abs(f).max() or np.abs(share * step / sizes).max() < 1e-9:
-                    break
-            share *= 0.5
+            after = static.accelerations(static.place(ahead)) if static.within_reach(static.place(ahead)) else None
+            if after is not None and np.abs(after).max() < np.abs(f).max():
+                break
         else:
-            return None
+            return x if np.abs(f).max() <= balance else None
         x, f = ahead, after
-        if np.abs(share * step / sizes).max() < 1e-9:
-            return x
     return None
 
 
 def _step(static: Static, x: Array, f: Array, sizes: Array) -> Array:
-    width = 1e-6
+    width = 1e-5
     slopes = np.empty((f.size, x.size))
     for k, nudge in enumerate(np.diag(width * sizes)):
         ahead, back = (x + sign * nudge for sign in (1.0, -1.0))

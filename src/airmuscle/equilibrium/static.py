@@ -42,6 +42,7 @@ class Static:
         self.speeds = [self.names.index(c.speed) for c in self.coordinates]
         self.ready = prepared(plant)
         self.lengths = [float(length) for length in plant.resting_lengths]
+        self._before = (0.0,) * len(self.air)  # pressures of the place before: the next are near
         self.reach = [_reach(m) for m in plant.muscles]
 
     def place(self, x: Sequence[float] | Array) -> dict[str, float]:
@@ -68,8 +69,9 @@ class Static:
         """Gauge pressure [Pa] of every muscle there."""
         if not self.shut:
             return self.air
-        given = zip(self.plant.muscles, self.air, self.contractions(q), strict=True)
-        return tuple(pressure_of(self.plant, muscle, mass, contraction) for muscle, mass, contraction in given)
+        given = zip(self.plant.muscles, self.air, self.contractions(q), self._before, strict=True)
+        self._before = tuple(pressure_of(self.plant, m, mass, eps, guess) for m, mass, eps, guess in given)
+        return self._before
 
     def accelerations(self, q: Mapping[str, float]) -> Array:
         """Acceleration of every coordinate from rest there: 0 where it rests, nan where no pressure holds the air."""
@@ -117,10 +119,10 @@ def _reach(muscle: Muscle) -> tuple[float, float]:
     return low + margin, high - margin
 
 
-def pressure_of(plant: Plant, muscle: Muscle, air_mass: float, contraction: float) -> float:
+def pressure_of(plant: Plant, muscle: Muscle, air_mass: float, contraction: float, guess: float = 0.0) -> float:
     """Gauge pressure [Pa] of a mass of air [kg] shut in a muscle at rest; wall and series spring settled.
 
-    Raises NoEquilibrium, naming the muscle, where no pressure up to 1000 bar belongs to it.
+    `guess` is where the search begins [Pa]. Raises NoEquilibrium, naming the muscle, where no pressure up to 1000 bar belongs to it.
     """
 
     def excess(x: float) -> float:
@@ -131,14 +133,14 @@ def pressure_of(plant: Plant, muscle: Muscle, air_mass: float, contraction: floa
         held = float(plant.gas.content(math.exp(x), volume, plant.ambient)["air_mass"])
         return math.log(held / air_mass) if held > 0 else -math.inf
 
-    a = math.log(absolute(0.0, plant.ambient))
+    a = math.log(absolute(guess, plant.ambient))
     at_a = excess(a)
     b = a - at_a
     for _ in range(20):  # the secant is exact for a rigid wall and a gas that keeps to one process
         at_b = excess(b) if math.isfinite(b) and b < math.log(GREATEST) else math.nan
         if not math.isfinite(at_b):
             break
-        if abs(at_b) < 1e-14 or at_b == at_a:
+        if abs(at_b) < 1e-13 or at_b == at_a:
             return float(gauge(math.exp(b), plant.ambient))
         a, b, at_a = b, b - at_b * (b - a) / (at_b - at_a), at_b
     low, high = 0.0, math.log(GREATEST)
