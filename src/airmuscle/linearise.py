@@ -116,8 +116,8 @@ class Linearised:
 def linearise(plant: System, state: Mapping[str, float], inputs: Mapping[str, float] | None = None) -> Linearised:
     """A system near a state and inputs (0 unless given), by exact derivatives of the equations that are simulated.
 
-    At a kink - a valve just shut, a muscle just slack, a stop just touched - the derivative is that of one side, so
-    choose inputs and state away from it. The state need not be a rest; `rates` says whether it is. Raises
+    At a kink - a valve just shut, a muscle just slack, a stop just touched - derivatives are those of one side, and
+    where two kinks meet, as in the middle of a valve without overlap, of one side of each: choose a state away from it. The state need not be a rest; `rates` says whether it is. Raises
     ParameterError for an unknown or missing name, or an input beyond its range.
     """
     from .program.derivatives import derivatives

@@ -63,7 +63,7 @@ def stiffness(plant: Plant, state: Mapping[str, float]) -> Stiffness:
 def _of_muscle(plant: Plant, muscle: Muscle, port: Port) -> TwoStiffnesses:
     by_pressure, by_contraction = _slopes(muscle, port)
     squeezed = _pressure_growth(plant, muscle, port)
-    inside = (-by_contraction, -by_contraction - by_pressure * squeezed)
+    inside = (0.0 - by_contraction, 0.0 - by_contraction - by_pressure * squeezed)
     if not isinstance(muscle.series, SeriesSpring):
         return TwoStiffnesses(*inside)
     stretched = float(port.inner_contraction) > float(port.contraction)

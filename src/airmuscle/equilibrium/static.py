@@ -122,7 +122,8 @@ def _reach(muscle: Muscle) -> tuple[float, float]:
 def pressure_of(plant: Plant, muscle: Muscle, air_mass: float, contraction: float, guess: float = 0.0) -> float:
     """Gauge pressure [Pa] of a mass of air [kg] shut in a muscle at rest; wall and series spring settled.
 
-    `guess` is where the search begins [Pa]. Raises NoEquilibrium, naming the muscle, where no pressure up to 1000 bar belongs to it.
+    `guess` is where the search begins [Pa]. Raises NoEquilibrium, naming the muscle, where no pressure up to 1000 bar
+    belongs to it.
     """
 
     def excess(x: float) -> float:
