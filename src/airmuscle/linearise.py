@@ -117,8 +117,9 @@ def linearise(plant: System, state: Mapping[str, float], inputs: Mapping[str, fl
     """A system near a state and inputs (0 unless given), by exact derivatives of the equations that are simulated.
 
     At a kink - a valve just shut, a muscle just slack, a stop just touched - derivatives are those of one side, and
-    where two kinks meet, as in the middle of a valve without overlap, of one side of each: choose a state away from it. The state need not be a rest; `rates` says whether it is. Raises
-    ParameterError for an unknown or missing name, or an input beyond its range.
+    where two kinks meet, as in the middle of a valve without overlap, of one side of each: choose a state away from
+    it. The state need not be a rest; `rates` says whether it is. Raises ParameterError for an unknown or missing name,
+    or an input beyond its range.
     """
     from .program.derivatives import derivatives
     from .program.prepared import prepared

@@ -30,7 +30,7 @@ BRAID = Braid(0.01, 0.4363, 0.2)
 MUSCLE = Muscle(VirtualWork(BRAID), BRAID, LinearSpring(3000.0))
 """Without a damper, so that a pull however quick shows the stiffness alone."""
 EXPONENTS = [(Isothermal(), 1.0), (Polytropic(1.2), 1.2), (EnergyBalance(0.0), HEAT_RATIO)]
-by_gas = pytest.mark.parametrize(("gas", "exponent"), EXPONENTS, ids=lambda x: str(x))
+by_gas = pytest.mark.parametrize(("gas", "exponent"), EXPONENTS, ids=str)
 
 
 def pulled(gas, pressure=3e5, contraction=0.12):
