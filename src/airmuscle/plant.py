@@ -227,6 +227,10 @@ class Plant:
         for a pressure below absolute zero or an unknown name.
         """
         pressures = pressure if isinstance(pressure, tuple) else (pressure,) * len(self.muscles)
+        if len(pressures) != len(self.muscles):
+            raise ParameterError(
+                f"Plant: {len(pressures)} pressures for {len(self.muscles)} muscles; give one or each."
+            )
         air = {f"{p}{s.name}" for p, m in zip(self.prefixes, self.muscles, strict=True)
                for s in self.gas.states(m.geometry.volume(0.05), self.ambient)}  # fmt: skip
         order = [s.name for s in self.states]

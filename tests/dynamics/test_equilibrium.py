@@ -263,6 +263,11 @@ def test_bad_input_is_refused(given_air, message):
         equilibrium(joint_plant(), **given_air)
 
 
+def test_a_state_at_three_pressures_of_two_muscles_is_refused():
+    with pytest.raises(ParameterError, match="3 pressures for 2 muscles; give one or each"):
+        joint_plant().state_at(pressure=(1e5, 1e5, 1e5))
+
+
 def test_an_input_beyond_its_range_is_refused():
     valve = ProportionalValve(Supply(6e5), VALVE, VALVE, Follower(80.0), muscles=2)
     with pytest.raises(ParameterError, match=r"the input 'command' is 2; allowed are -1 to 1"):

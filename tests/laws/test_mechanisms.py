@@ -190,6 +190,20 @@ def test_stops_act_beyond_the_ends_alone_and_push_back(angle, speed):
     assert still == pytest.approx(0.05 * 1e7 * np.sign(depth) * abs(depth) ** 1.5, abs=1e-9)
 
 
+@given(st.floats(-3.0, 3.0))
+def test_a_stop_begins_without_a_jump(speed):
+    """Where the contact begins, on either side of it, and where it opens again because the body leaves fast."""
+    stops, still = StoppedJoint(JOINT, -0.3, 0.4, 0.05, CONTACT), {"angle": 0.0}
+    for end in (-0.3, 0.4):
+        inside, outside = (
+            stops.acceleration({"angle": end * (1 + h)}, {"speed": speed}, still, {})["angle"] for h in (-1e-9, 1e-9)
+        )
+        assert outside == pytest.approx(inside, abs=1e-4)
+    leaving = -1 / (0.4 * 0.05)
+    push = [stops.push({"angle": 0.45}, {"speed": leaving + h}) for h in (-1e-9, 0.0, 1e-9)]
+    assert push == pytest.approx([0.0, 0.0, 0.0], abs=1e-4)
+
+
 # What cannot be
 
 
