@@ -73,8 +73,10 @@ PLANTS = {
 }
 
 
-@pytest.mark.parametrize("gas", GASES, ids=repr)
-@pytest.mark.parametrize("name", PLANTS)
+ALL = [(name, gas) for name in PLANTS for gas in GASES if name != "compliant" or gas == GASES[-1]]
+
+
+@pytest.mark.parametrize(("name", "gas"), ALL, ids=str)
 def test_at_an_equilibrium_nothing_moves(name, gas):
     plant = replace(PLANTS[name], gas=gas)
     for rest in equilibria(plant, pressure=3e5):
@@ -96,7 +98,7 @@ def test_the_air_that_a_pressure_puts_in_gives_the_same_rest(name, gas):
 
 
 def test_so_it_does_where_wall_and_series_spring_give():
-    plant = PLANTS["compliant"]
+    plant = Plant(COMPLIANT, CIRCUIT, Isometric(0.1))
     state = equilibrium(plant, pressure=2.5e5)
     assert equilibrium(plant, air_mass=state["air_mass"]) == pytest.approx(state, rel=1e-7, abs=1e-9)
 

@@ -213,7 +213,7 @@ def test_with_heat_it_is_too_but_that_air_that_leaves_a_muscle_flows_at_its_own_
         state = random_state(system, rng)
         state |= {f"{side}.spool": rng.uniform(-1.0, 1.0) for side in ("left", "right")}
         expected = system.rates(state, dict.fromkeys(system.inputs, 0.0))
-        places = {f"{side}.position": state[f"{side}.spool"] for side in ("left", "right")}
+        places = {name: state[f"{side}.spool"] for name, side in zip(plant.inputs, ("left", "right"), strict=True)}
         found = plant.rates(of_plant(state), places)
         assert found["speed"] == pytest.approx(expected["speed"], rel=1e-11)
         for side in ("left", "right"):

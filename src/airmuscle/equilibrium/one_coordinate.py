@@ -11,7 +11,7 @@ from ..errors import NoEquilibrium, OutOfReach
 from .static import Static
 
 Array = npt.NDArray[np.float64]
-PLACES = 201
+PLACES = 101
 """Places looked at between the ends of the reach."""
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
@@ -34,21 +34,33 @@ def places(static: Static) -> list[float]:
     found = [float(v) for v in x[zero[1:-1] & ~(zero[:-2] & zero[2:])]]  # of a stretch in balance its two ends
     for i in range(x.size - 1):
         if f[i] * f[i + 1] < 0:
-            found.append(between(acceleration, float(x[i]), float(x[i + 1]), float(f[i])))
+            found.append(between(acceleration, float(x[i]), float(x[i + 1])))
     for i in range(1, x.size - 1):
         if _nears_zero(f[i - 1 : i + 2]):
             found += _pair(acceleration, x[i - 1 : i + 2], float(np.sign(f[i])))
     return sorted(found)
 
 
-def between(function: Callable[[float], float], low: float, high: float, at_low: float) -> float:
-    """The root between two places, by bisection: SciPy's search would cost the first run a slow import."""
-    while low < (middle := (low + high) / 2) < high:
-        if function(middle) * at_low > 0:
-            low = middle
+def between(function: Callable[[float], float], low: float, high: float) -> float:
+    """The root between two places of different sign: false position, the end that stays halved (Illinois).
+
+    SciPy's search would cost the first run a slow import.
+    """
+    at_low, at_high = function(low), function(high)
+    close, last = 1e-15 * (high - low), low
+    for _ in range(200):
+        middle = low + (high - low) * at_low / (at_low - at_high)
+        if not low < middle < high:
+            middle = 0.5 * (low + high)
+        at = function(middle)
+        if at == 0 or abs(middle - last) <= close or not low < middle < high:
+            return middle
+        if at * at_low > 0:
+            low, at_low, at_high = middle, at, at_high * (0.5 if last <= low else 1.0)
         else:
-            high = middle
-    return low
+            high, at_high, at_low = middle, at, at_low * (0.5 if last >= high else 1.0)
+        last = middle
+    return last
 
 
 def _nears_zero(f: Array) -> bool:
@@ -65,10 +77,7 @@ def _pair(function: Callable[[float], float], x: Array, sign: float) -> list[flo
     for _ in range(50):
         if min(values) < 0:
             turn = inner[int(values[1] < values[0])]
-            return [
-                between(function, float(x[0]), turn, sign),
-                between(function, turn, float(x[2]), -sign),
-            ]
+            return [between(function, float(x[0]), turn), between(function, turn, float(x[2]))]
         if values[0] < values[1]:
             high, inner[1], values[1] = inner[1], inner[0], values[0]
             inner[0] = high - GOLDEN * (high - low)

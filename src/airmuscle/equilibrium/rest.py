@@ -34,7 +34,7 @@ def equilibria(
 
     Walls, series springs, tubes and tanks are settled, friction and creep relaxed. `stable` is judged by the
     eigenvalues of the motion at this constant pressure, or with this air shut in; friction is left out.
-    With one coordinate the whole reach of the muscles is searched, and a pair of rests that lies closer than 1/200 of
+    With one coordinate the whole reach of the muscles is searched, and a pair of rests that lies closer than 1/100 of
     it is found where the force has its extreme between them. With several, Newton's method starts from many places;
     it may miss a rest that none of them leads to. Raises ParameterError for what cannot be given, OutOfReach where a
     muscle cannot take a contraction that its mechanism holds it at.
