@@ -164,8 +164,7 @@ def units_of(plant: System, outputs: Sequence[str]) -> dict[str, str]:
     units |= dict.fromkeys(plant.inputs, "")
     if isinstance(plant, Plant):
         units |= {i.name: i.unit for i in plant.commands}
-        for c in plant.mechanism.coordinates:
-            units |= {n: f"{c.unit}/s^2" for n in ("acceleration", f"{c.name}.acceleration") if n in outputs}
+        units |= {c.acceleration: f"{c.unit}/s^2" for c in plant.mechanism.coordinates}
     return units | {s.name: s.unit for s in plant.states}
 
 

@@ -216,7 +216,7 @@ class Plant:
             found |= outside(prefix, response.outputs)
         accelerations = self._accelerations(state, ports, inputs)
         for c in self.mechanism.coordinates:
-            found["acceleration" if len(accelerations) == 1 else f"{c.name}.acceleration"] = accelerations[c.name]
+            found[c.acceleration] = accelerations[c.name]
         return found
 
     def state_at(self, *, pressure: float | tuple[float, ...], **values: float) -> dict[str, float]:

@@ -12,11 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joints import chosen_muscle
 
+from airmuscle import ops
 from airmuscle.circuit import ClosedChamber, FillDischarge, Follower, ProportionalValve, Supply, Valve
 from airmuscle.command import REST, Schedule
 from airmuscle.contact import HuntCrossley
 from airmuscle.declare import model, parameter
 from airmuscle.equilibrium import equilibria, equilibrium
+from airmuscle.equilibrium.one_coordinate import grid
+from airmuscle.equilibrium.static import Static
 from airmuscle.errors import NoEquilibrium, OutOfReach, ParameterError
 from airmuscle.friction import Dahl
 from airmuscle.gas import EnergyBalance, Isothermal, Polytropic
@@ -145,7 +148,7 @@ def test_muscles_in_series_carry_the_same_load_over_the_sum_of_their_ways():
     weak = equilibrium(Plant(LEFT, ClosedChamber(), HangingMass(10.0)), pressure=2e5)["position"]
     chain = joint_plant(InSeries(HangingMass(10.0), (0.5,), gravity=0.0))
     found = equilibrium(chain, pressure=(3e5, 2e5))
-    assert found["node1"] == pytest.approx(single, rel=1e-9)
+    assert found["node1.position"] == pytest.approx(single, rel=1e-9)
     assert found["position"] == pytest.approx(single + weak, rel=1e-9)
 
 
@@ -190,6 +193,29 @@ def test_no_pair_is_made_up_where_the_force_only_comes_near_zero():
     assert equilibria(Plant(chosen_muscle(), ClosedChamber(), Above(0.02, 1e-4)), pressure=1e5) == ()
 
 
+def test_a_rest_that_is_one_of_the_places_looked_at_is_found_once():
+    class Towards(Bumpy):
+        def acceleration(self, q, v, pulls, inputs):
+            return {"position": self.middle - q["position"]}
+
+    plant = Plant(chosen_muscle(), ClosedChamber(), Towards(0.0, 0.0))
+    place = float(grid(Static(plant, 1e5, None))[37])
+    found = equilibria(replace(plant, mechanism=Towards(place, 0.0)), pressure=1e5)
+    assert [r.state["position"] for r in found] == [place]
+
+
+def test_of_a_stretch_in_balance_the_ends_are_given():
+    class Flat(Bumpy):
+        def acceleration(self, q, v, pulls, inputs):
+            x = q["position"] - self.middle
+            return {"position": ops.maximum(-self.half - x, 0.0) - ops.maximum(x - self.half, 0.0)}
+
+    plant = Plant(chosen_muscle(), ClosedChamber(), Flat(0.02, 0.015))
+    found = [r.state["position"] for r in equilibria(plant, pressure=1e5)]
+    assert found == pytest.approx([0.005, 0.035], abs=np.diff(grid(Static(plant, 1e5, None)))[0])
+    assert equilibrium(plant, pressure=1e5)["position"] == found[0]
+
+
 STANDING = replace(JOINT, weight_torque=-25.0)
 """A weight above the joint: its torque lies between what the muscles hold at constant pressure and with shut valves."""
 
@@ -225,7 +251,9 @@ def test_between_stops_a_joint_that_falls_has_three_rests():
 def test_the_failure_names_the_muscles_and_what_they_pull():
     with pytest.raises(NoEquilibrium, match=r"left pulls [\d.]+ N at 200 kPa .*right pulls .* at 200 kPa.*rad/s2"):
         equilibrium(joint_plant(replace(JOINT, weight_torque=-60.0)), pressure=2e5)
-    with pytest.raises(NoEquilibrium, match=r"InSeries finds no rest: left pulls .*node1 at .* m/s2, position at"):
+    with pytest.raises(
+        NoEquilibrium, match=r"InSeries finds no rest: left pulls .*node1.position at .* m/s2, position at"
+    ):
         equilibrium(joint_plant(InSeries(HangingMass(900.0), (0.5,))), pressure=2e5)
 
 

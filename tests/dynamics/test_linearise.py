@@ -57,7 +57,7 @@ CASES = {
 def moving(plant, pressure=3e5):
     """A state away from rest and from kinks."""
     state = equilibrium(plant, pressure=pressure)
-    push = {"speed": 0.02, "spool": 0.1, "regulated": 8e3, "tube.air_mass": 1e-6, "bristle": 1e-6}
+    push = {"speed": 0.02, "angular_speed": 0.2, "spool": 0.1, "regulated": 8e3, "tube.air_mass": 1e-6, "bristle": 1e-6}
     return {n: v + push.get(n, 0.0) for n, v in state.items()}
 
 
@@ -122,7 +122,11 @@ def test_names_and_units_come_along():
     assert found.outputs[: len(found.states)] == found.states
     assert (found.inputs, found.given) == (("command",), {"command": 0.2})
     assert {found.units[n] for n in ("left.pressure", "right.pressure")} == {"Pa"}
-    assert (found.units["angle"], found.units["speed"], found.units["acceleration"]) == ("rad", "rad/s", "rad/s^2")
+    assert (found.units["angle"], found.units["angular_speed"], found.units["angular_acceleration"]) == (
+        "rad",
+        "rad/s",
+        "rad/s^2",
+    )
     assert set(found.units) >= {*found.states, *found.inputs, *found.outputs}
     assert repr(found).startswith("Linearised(6 states, inputs command, 17 outputs; poles ")
 

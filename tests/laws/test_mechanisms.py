@@ -54,7 +54,7 @@ MECHANISMS: dict[str, tuple[Mechanism, int]] = {
     "series in a frame": (InSeries(Isometric(0.05), (0.3,)), 2),
     "joint": (JOINT, 2),
     "stopped": (Stopped(SpringLoad(3.0, 2000.0), -0.01, 0.02, CONTACT), 1),
-    "stopped chain": (Stopped(InSeries(HangingMass(5.0), (0.3,)), -0.01, 0.02, CONTACT, "node1"), 2),
+    "stopped chain": (Stopped(InSeries(HangingMass(5.0), (0.3,)), -0.01, 0.02, CONTACT, "node1.position"), 2),
     "stopped joint": (StoppedJoint(JOINT, -0.3, 0.4, 0.05, CONTACT), 2),
     "held": (Held(JOINT), 2),
 }
@@ -137,7 +137,9 @@ def test_a_lever_at_a_small_angle_is_a_weight_at_the_ratio_of_its_arms():
     lever = Lever((0.1,), 5.0, 0.2)
     pulls = lever.pulls({"angle": 0.0}, [98.0665], [0.3])
     assert pulls["angle"] == pytest.approx(9.80665)
-    assert lever.acceleration({"angle": 0.0}, {"speed": 0.0}, pulls, {})["angle"] == pytest.approx(0.0, abs=1e-12)
+    assert lever.acceleration({"angle": 0.0}, {"angular_speed": 0.0}, pulls, {})["angle"] == pytest.approx(
+        0.0, abs=1e-12
+    )
     (contraction,) = lever.contractions({"angle": 0.5 * np.pi}, [0.3])
     assert contraction == pytest.approx(1 - np.hypot(0.1, 0.2) / 0.3)
 
@@ -161,7 +163,7 @@ def test_a_pulley_of_ratio_one_without_inertia_is_a_hanging_mass():
 
 def test_a_chain_of_muscles_shortens_by_the_sum_of_its_parts():
     chain = InSeries(HangingMass(5.0), (0.3, 0.2))
-    q = {"node1": 0.01, "node2": 0.015, "position": 0.05}
+    q = {"node1.position": 0.01, "node2.position": 0.015, "position": 0.05}
     contractions = chain.contractions(q, LENGTHS)
     assert sum(n * e for n, e in zip(LENGTHS, contractions, strict=True)) == pytest.approx(0.05)
     assert contractions == pytest.approx((0.01 / 0.2, 0.005 / 0.25, 0.035 / 0.3))
@@ -171,7 +173,7 @@ def test_the_first_muscle_turns_the_joint_forward_and_the_second_back():
     forward, back = JOINT.contractions({"angle": 0.1}, [0.2, 0.25])
     assert forward == pytest.approx(0.12 + 0.003 / 0.2)
     assert back == pytest.approx(0.12 - 0.003 / 0.25)
-    still = {"speed": 0.0}
+    still = {"angular_speed": 0.0}
     for tensions, sign in (((100.0, 20.0), 1), ((20.0, 100.0), -1), ((50.0, 50.0), 0)):
         pulls = JOINT.pulls({"angle": 0.0}, tensions, [0.2, 0.25])
         assert np.sign(JOINT.acceleration({"angle": 0.0}, still, pulls, {})["angle"]) == sign
@@ -180,12 +182,12 @@ def test_the_first_muscle_turns_the_joint_forward_and_the_second_back():
 @given(st.floats(-0.4, 0.6), st.floats(-3.0, 3.0))
 def test_stops_act_beyond_the_ends_alone_and_push_back(angle, speed):
     stops = StoppedJoint(JOINT, -0.3, 0.4, 0.05, CONTACT)
-    push = stops.push({"angle": angle}, {"speed": speed})
+    push = stops.push({"angle": angle}, {"angular_speed": speed})
     if -0.3 <= angle <= 0.4:
         assert push == 0.0
     else:
         assert push * angle <= 0.0
-    still = stops.push({"angle": angle}, {"speed": 0.0})
+    still = stops.push({"angle": angle}, {"angular_speed": 0.0})
     depth = 0.05 * (max(-0.3 - angle, 0.0) - max(angle - 0.4, 0.0))
     assert still == pytest.approx(0.05 * 1e7 * np.sign(depth) * abs(depth) ** 1.5, abs=1e-9)
 
@@ -196,11 +198,12 @@ def test_a_stop_begins_without_a_jump(speed):
     stops, still = StoppedJoint(JOINT, -0.3, 0.4, 0.05, CONTACT), {"angle": 0.0}
     for end in (-0.3, 0.4):
         inside, outside = (
-            stops.acceleration({"angle": end * (1 + h)}, {"speed": speed}, still, {})["angle"] for h in (-1e-9, 1e-9)
+            stops.acceleration({"angle": end * (1 + h)}, {"angular_speed": speed}, still, {})["angle"]
+            for h in (-1e-9, 1e-9)
         )
         assert outside == pytest.approx(inside, abs=1e-4)
     leaving = -1 / (0.4 * 0.05)
-    push = [stops.push({"angle": 0.45}, {"speed": leaving + h}) for h in (-1e-9, 0.0, 1e-9)]
+    push = [stops.push({"angle": 0.45}, {"angular_speed": leaving + h}) for h in (-1e-9, 0.0, 1e-9)]
     assert push == pytest.approx([0.0, 0.0, 0.0], abs=1e-4)
 
 
@@ -217,7 +220,7 @@ def test_a_stop_begins_without_a_jump(speed):
         (lambda: InSeries(HangingMass(1.0), ()), "give the mass of each node"),
         (lambda: InSeries(JOINT, (0.1,)), "AntagonisticJoint takes 2"),
         (lambda: Stopped(JOINT, 0.0, 0.1, CONTACT), "AntagonisticJoint has 0 coordinates in m"),
-        (lambda: Stopped(InSeries(HangingMass(1.0), (0.1,)), 0.0, 0.1, CONTACT), "node1 or position"),
+        (lambda: Stopped(InSeries(HangingMass(1.0), (0.1,)), 0.0, 0.1, CONTACT), "node1.position or position"),
         (lambda: Stopped(HangingMass(1.0), 0.0, 0.1, CONTACT, "angle"), "no coordinate 'angle' in m"),
         (lambda: Stopped(HangingMass(1.0), 0.1, 0.1, CONTACT), "must lie below"),
         (lambda: SpringLoad(float("nan"), 1.0), "must be finite"),

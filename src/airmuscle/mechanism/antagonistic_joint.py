@@ -35,7 +35,7 @@ class AntagonisticJoint(Mechanism):
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        return (Coordinate("angle", "speed", "rad", 0.1, 1.0, -ops.pi, ops.pi),)
+        return (Coordinate("angle", "angular_speed", "rad", 0.1, 1.0, -ops.pi, ops.pi),)
 
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         way, (first, second) = self.radius * q["angle"], resting_lengths
@@ -49,16 +49,16 @@ class AntagonisticJoint(Mechanism):
     def acceleration(
         self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
-        held = self.weight_torque * ops.sin(q["angle"]) + self.damping * v["speed"]
+        held = self.weight_torque * ops.sin(q["angle"]) + self.damping * v["angular_speed"]
         return {"angle": (pulls["angle"] - held) / self.inertia}
 
     def lost_power(
         self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
-        return self.damping * v["speed"] ** 2
+        return self.damping * v["angular_speed"] ** 2
 
     def potential_energy(self, q: Mapping[str, Value]) -> Value:
         return self.weight_torque * (1.0 - ops.cos(q["angle"]))
 
     def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
-        return 0.5 * self.inertia * v["speed"] ** 2
+        return 0.5 * self.inertia * v["angular_speed"] ** 2

@@ -28,6 +28,12 @@ class Coordinate:
     least: float = -INFINITY
     greatest: float = INFINITY
 
+    @property
+    def acceleration(self) -> str:
+        """The name of its acceleration: that of its speed with the one word for the other."""
+        found = self.speed.replace("speed", "acceleration")
+        return found if found != self.speed else f"{self.name}.acceleration"
+
 
 class Mechanism(abc.ABC):
     """What muscles pull at. Coordinates q and speeds v are mappings by the names of `coordinates`."""

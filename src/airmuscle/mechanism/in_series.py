@@ -46,7 +46,7 @@ class InSeries(Wrapper):
     def nodes(self) -> tuple[Coordinate, ...]:
         """The coordinates of the nodes."""
         count = range(1, len(self.node_masses) + 1)
-        return tuple(Coordinate(f"node{i}", f"node{i}_speed", "m", 0.01, 0.1) for i in count)
+        return tuple(Coordinate(f"node{i}.position", f"node{i}.speed", "m", 0.01, 0.1) for i in count)
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:

@@ -50,7 +50,7 @@ class Lever(Mechanism):
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        return (Coordinate("angle", "speed", "rad", 0.05, 1.0, -0.5 * ops.pi, 0.5 * ops.pi),)
+        return (Coordinate("angle", "angular_speed", "rad", 0.05, 1.0, -0.5 * ops.pi, 0.5 * ops.pi),)
 
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         aside, up = ops.cos(q["angle"]) - 1.0, ops.sin(q["angle"])
@@ -68,15 +68,15 @@ class Lever(Mechanism):
         self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
         weight = self.mass * self.gravity * self.load_arm * ops.cos(q["angle"])
-        return {"angle": (pulls["angle"] - weight - self.damping * v["speed"]) / self._total_inertia()}
+        return {"angle": (pulls["angle"] - weight - self.damping * v["angular_speed"]) / self._total_inertia()}
 
     def lost_power(
         self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
-        return self.damping * v["speed"] ** 2
+        return self.damping * v["angular_speed"] ** 2
 
     def potential_energy(self, q: Mapping[str, Value]) -> Value:
         return self.mass * self.gravity * self.load_arm * ops.sin(q["angle"])
 
     def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
-        return 0.5 * self._total_inertia() * v["speed"] ** 2
+        return 0.5 * self._total_inertia() * v["angular_speed"] ** 2
