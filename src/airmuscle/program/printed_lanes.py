@@ -96,7 +96,7 @@ class _Step:
         if not node:
             return u
         way = self._combined("fmul", self.block.constant(node), self._load("h", 0))
-        return u
+        return self._combined("fadd", u, self._combined("fmul", way, self._load("w", i)))
 
     def _combined(self, operation: str, a: str, b: str) -> str:
         return self.block.put(f"{operation} {FLAGS} {self.number.text} {a}, {b}")
