@@ -245,6 +245,12 @@ def test_between_stops_a_joint_that_falls_has_three_rests():
     assert found[0].state["angle"] == pytest.approx(-found[2].state["angle"], abs=1e-9)
 
 
+def test_of_two_stable_rests_the_one_nearer_to_full_length_is_taken():
+    stopped = StoppedJoint(replace(JOINT, weight_torque=-60.0), -0.4, 0.2, 0.05, HuntCrossley(1e8))
+    assert [r.stable for r in equilibria(joint_plant(stopped), pressure=2e5)] == [True, False, True]
+    assert equilibrium(joint_plant(stopped), pressure=2e5)["angle"] == pytest.approx(0.2, abs=0.01)
+
+
 # What is said where there is none
 
 
