@@ -39,6 +39,7 @@ ARGUMENTS = {
     "stretch": "stretch of a series spring [m]",
     "inner_contraction": "contraction of the contractile part [1], behind a series spring",
     "inner_speed": "speed of shortening of the contractile part [m/s]",
+    "coordinate": "name of a coordinate of a mechanism",
     "pulls": "generalised forces on the coordinates of a mechanism [N, N m]",
     "values": "values by name",
     "friction": "force with memory",

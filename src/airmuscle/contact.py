@@ -42,6 +42,10 @@ class HuntCrossley:
         """Force [N] at a depth [m] that does not change; times c it is the coefficient of the damping [N s/m]."""
         return self.stiffness * depth * _root(depth)
 
+    def energy(self, depth: Value) -> Value:
+        """Energy [J] that it holds elastically at a depth [m]: (2/5) K delta^(5/2)."""
+        return 0.4 * self.stiffness * depth**2 * _root(depth)
+
 
 def _root(depth: Value) -> Value:
     """Square root whose slope stays finite at zero, where the depth before it makes the product vanish."""

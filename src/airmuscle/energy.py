@@ -19,6 +19,7 @@ _METERS = (
     StateVariable("damping_heat", "J", 1.0, "work that the dampers turned into heat"),
     StateVariable("work_of_contractile", "J", 1.0, "work of the contractile elements"),
     StateVariable("element_work", "J", 1.0, "work done against springs, creep and end stops: heat, and what they hold"),
+    StateVariable("mechanism_loss", "J", 1.0, "work that the mechanism lost to its dampers, stops and drives"),
     StateVariable("air_supplied", "kg", 1e-3, "air that came from outside the plant"),
     StateVariable("air_exhausted", "kg", 1e-3, "air that went to the surroundings"),
 )
@@ -30,7 +31,7 @@ class Metered:
     """A plant with meters as further states, and its energies and its air as outputs.
 
     Four books must close. Mechanical: kinetic + potential energy grow by `work_of_tension`, which counts the push of an
-    end stop, as long as the latch and what the mechanism loses by itself do no work. Muscle: `work_of_contractile` is
+    end stop, less `mechanism_loss`, as long as a latch moves only from rest. Muscle: `work_of_contractile` is
     `work_of_tension` + `damping_heat` + `element_work` + `friction_work` (where there is friction), as long as no
     muscle hangs slack: a slack one passes nothing on. Air: `air_energy`, of the air in the muscles, grows by
     `energy_of_flow` + `heat_to_air` less `work_of_air`. Mass: `air_total`, of all air, grows by `air_supplied` less
@@ -72,6 +73,8 @@ class Metered:
             powers["heat_to_air"] += plant.gas.warmed(port.air, plant.ambient)
             for name, power in _muscle_powers(muscle, port).items():
                 powers[name] += power
+        pulls = plant.mechanism.pulls(state, [port.tension for port in ports], plant.resting_lengths)
+        powers["mechanism_loss"] += plant.mechanism.lost_power(state, state, pulls, inputs)
         for response in responses:
             powers["air_supplied"] += response.drawn.mass
             powers["air_exhausted"] += response.exhausted.mass

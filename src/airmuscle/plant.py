@@ -66,6 +66,10 @@ class Plant:
         ports = sum(c.ports for c in self.circuits)
         if ports != len(names):
             raise ParameterError(f"Plant: its circuits feed {ports} muscles; {len(names)} are given.")
+        taken = self.mechanism.muscles
+        if taken not in (None, len(names)):
+            owner = type(self.mechanism).__name__
+            raise ParameterError(f"Plant: {owner} takes {taken} muscles; {len(names)} are given.")
         if isinstance(self.circuit, tuple) and any(c.ports != 1 for c in self.circuit):
             raise ParameterError("Plant: a circuit that feeds several muscles stands alone, not in a tuple.")
         if len(set(names)) < len(names):
@@ -215,7 +219,7 @@ class Plant:
             found |= outside(prefix, response.outputs)
         accelerations = self._accelerations(state, ports, inputs)
         for c in self.mechanism.coordinates:
-            found["acceleration" if len(accelerations) == 1 else f"{c.name}.acceleration"] = accelerations[c.name]
+            found[c.acceleration] = accelerations[c.name]
         return found
 
     def state_at(self, *, pressure: float | tuple[float, ...], **values: float) -> dict[str, float]:

@@ -11,6 +11,7 @@ import contextlib
 import csv
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -29,7 +30,11 @@ from airmuscle.report.write import save_table
 from airmuscle.simulate import simulate
 from airmuscle.sweep import chunk, dask_cluster, fingerprint, load_study, processes, run_study
 from airmuscle.sweep.chapter import study_chapter, write_study
+from airmuscle.sweep.design import DESIGNS
+from airmuscle.sweep.outcome import OUTCOMES
+from airmuscle.sweep.variation import DISTRIBUTIONS, Range
 
+ROOT = Path(__file__).parents[2]
 MUSCLE = """
 title = "A braid"
 trust = "example"
@@ -273,13 +278,17 @@ def test_a_worker_that_reads_another_study_refuses(folder: Path):
 
 
 def test_a_worker_that_dies_is_an_error_that_says_how_to_go_on(folder: Path):
-    study = load_study(folder / "study.toml")
+    study = load_study(edited(folder, "count = 22", "count = 2000"))
     with processes(2) as executor:
-        executor.submit(int).result()
-        for process in executor._processes.values():
-            process.kill()
+
+        def killing(done: int, of: int) -> None:
+            if done:
+                for process in executor._processes.values():
+                    process.kill()
+
         with pytest.raises(SimulationError, match="a worker died"):
-            run_study(study, folder / "out", executor)
+            run_study(study, folder / "out", executor, killing)
+    assert 1 <= len(list((folder / "out" / "chunks").glob("*.npz"))) < 500
 
 
 # Runs that fail
@@ -368,10 +377,29 @@ def test_a_scenario_may_stand_in_the_study(folder: Path):
     assert np.array_equal(run(folder, "inside").numbers, beside.numbers)
 
 
-def test_the_example_is_a_study():
-    study = load_study(Path(__file__).parents[2] / "examples" / "valve_study.toml")
+def test_the_example_runs(tmp_path: Path):
+    for name in ("valve_study.toml", "fill_discharge.toml"):
+        shutil.copy(ROOT / "examples" / name, tmp_path)
+    study = load_study(tmp_path / "valve_study.toml")
     assert len(study) == 384
-    assert study.source.scenario.plant == load_scenario(study.path.with_name("fill_discharge.toml")).plant
+    assert study.source.scenario.plant == load_scenario(ROOT / "examples" / "fill_discharge.toml").plant
+    (tmp_path / "valve_study.toml").rename(tmp_path / "study.toml")
+    edited(tmp_path, "count = 64", "count = 2")
+    result = run(tmp_path)
+    assert result.failed.size == 0
+    assert np.isfinite(result.numbers).all()
+
+
+def test_the_study_of_the_page_can_be_read(tmp_path: Path):
+    page = (ROOT / "docs" / "sweep.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+    shutil.copy(ROOT / "examples" / "fill_discharge.toml", tmp_path)
+    (tmp_path / "study.toml").write_text(blocks[0], encoding="utf-8")
+    study = load_study(tmp_path / "study.toml")
+    shown = set(re.findall(r"`(\w+)`", page))
+    kinds = {cls.__name__ for cls in (*DESIGNS, *DISTRIBUTIONS, *OUTCOMES, Range)}
+    assert kinds <= shown, f"the page lacks {kinds - shown}"
+    assert len(study) == 256
 
 
 # Outputs

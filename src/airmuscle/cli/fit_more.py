@@ -169,4 +169,4 @@ def _shaped(fit: Fit, recordings: Sequence[Recording], free: tuple[tuple[float, 
 
 
 def _broken(each: Any) -> dict[str, Any]:
-    return {**dataclasses.asdict(each), "rule": each.rule.value}
+    return {**dataclasses.asdict(each), "rule": each.rule.words}
