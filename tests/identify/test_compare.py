@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 import airmuscle as am
 from airmuscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.cli.app import app
-from airmuscle.cli.fit_compare import _part
+from airmuscle.cli.fit_more import part_of
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify import Blocks, Candidate, Levels, Runs, Specimens, compare
@@ -181,7 +181,7 @@ def test_what_is_left_out_decides_what_the_law_is_for():
     ("word", "how"), [("run", Runs()), ("specimen", Specimens()), ("block", Blocks()), ("pressure", Levels("pressure"))]
 )
 def test_the_command_knows_each_way_by_a_word(word: str, how):
-    assert _part(word) == how
+    assert part_of(word) == how
 
 
 def test_each_way_of_leaving_out_has_a_purpose_of_its_own():

@@ -204,7 +204,7 @@ class Muscle:
 
         That of the contractile part with spring and end stop: a series spring makes the muscle softer.
 
-        With shut valves the pressure rises as the muscle is pulled, and it is stiffer: `airmuscle.stiffness`. Friction is
+        With shut valves the pressure rises as the muscle is pulled, and it is stiffer: module `stiffness`. Friction is
         left out: its bristles add theirs until they slide.
         """
         return -trace.slope(self, "static", pressure, contraction, wrt=1)
