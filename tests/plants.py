@@ -27,7 +27,21 @@ from airmuscle.geometry.chebyshev import as_polynomial
 from airmuscle.geometry.parabola import Parabola, TrueArcParabola
 from airmuscle.geometry.vessel import Vessel
 from airmuscle.library import catalogue
-from airmuscle.mechanism import HangingMass, Held, Isometric
+from airmuscle.mechanism import (
+    AntagonisticJoint,
+    HangingMass,
+    Held,
+    InSeries,
+    Isometric,
+    Isotonic,
+    Lever,
+    Mounted,
+    Prescribed,
+    Pulley,
+    SpringLoad,
+    Stopped,
+    StoppedJoint,
+)
 from airmuscle.muscle import (
     CreepElements,
     CubicSpring,
@@ -68,6 +82,12 @@ def fed(by, count=1, gas=EnergyBalance(0.5)):
     """A circuit that feeds muscles which hang side by side, with heat."""
     muscles = tuple(replace(chosen_muscle(), name=f"m{i}") for i in range(count))
     return Plant(muscles if count > 1 else muscles[0], by, HangingMass(10.0 * count), gas)
+
+
+def pulled(mechanism, count=1):
+    """A mechanism that one muscle or several pull at, each with two valves."""
+    muscles = tuple(replace(chosen_muscle(), name=f"m{i}") for i in range(count))
+    return Plant(muscles, (TWO_VALVES,) * count, mechanism, Isothermal())
 
 
 def listed(name):
@@ -134,4 +154,14 @@ EXAMPLES = {
         ),
         2,
     ),
+    # mechanisms
+    "mass on a spring": pulled(SpringLoad(5.0, 2000.0, 20.0, 50.0)),
+    "constant force": pulled(Isotonic(100.0, 2.0, 5.0)),
+    "prescribed": pulled(Prescribed()),
+    "lever": pulled(Lever((0.03,), 3.0, 0.2)),
+    "pulley with stops": pulled(Stopped(Pulley(0.02, 5.0), -0.005, 0.02, HuntCrossley(1e9))),
+    "joint with stops": pulled(
+        StoppedJoint(Mounted(AntagonisticJoint(0.03, 0.05, 0.2), (0.08, 0.08)), -0.2, 0.2, 0.05, HuntCrossley(1e9)), 2
+    ),
+    "muscles in series": pulled(InSeries(HangingMass(5.0), (0.5,), 1.0), 2),
 }  # fmt: skip

@@ -65,6 +65,8 @@ def ranges(plant, rng):
     for s in plant.states:
         if s.name.endswith(("air_mass", "internal_energy")):
             ends = 0.1 * start[s.name], 4.0 * start[s.name] + s.nominal
+        elif s.name.startswith("node"):  # so little that the muscles beside it stay within their reach
+            ends = (-0.005, 0.009) if "position" in s.name else (-0.4, 0.4)
         elif s.name in ("position", "inner_contraction"):
             size = 0.2 if s.name == "position" else 1.0
             ends = max(least + 1e-3, -0.05) * size, min(most, 0.35) * size
@@ -73,7 +75,7 @@ def ranges(plant, rng):
         low.append(ends[0])
         high.append(ends[1])
     for i in plant.commands:
-        low.append(i.least)
+        low.append(max(i.least, -7e5))
         high.append(min(i.greatest, 7e5))
     low, high = np.array(low), np.array(high)
     at = rng.uniform(low, high)

@@ -18,7 +18,8 @@ from airmuscle.library.scenario import load_scenario
 
 
 def text_of(plant):
-    start = 'start = { pressure = "2 bar", position = "5 mm" }' if plant.mechanism.coordinates else ""
+    places = "".join(f', "{c.name}" = "0.005 {c.unit}"' for c in plant.mechanism.coordinates)
+    start = f'start = {{ pressure = "2 bar"{places} }}' if places else ""
     tables = "\n".join(write._table("plant", write._described(plant)))
     return f'{tables}\n[run]\nduration = "20 ms"\noutput = "5 ms"\n{start}\n'
 
