@@ -77,7 +77,7 @@ def assert_failed(result: Result, message: str) -> None:
 
 COMMANDS = (
     "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "plan",
-    "simulate", "schema",
+    "simulate", "sweep", "schema",
 )  # fmt: skip
 
 
