@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from ..declare import model, parameter
 from ..ops import Value
-from .base import Coordinate, Mechanism
+from .translation import Translation
 
 
 @model
-class Isotonic(Mechanism):
+class Isotonic(Translation):
     """m y'' = F - F_c - d y', with y from where the muscle has its resting length.
 
     F_c constant force, m mass that moves along and does not weigh, d damping. The smaller the mass, the nearer the
@@ -20,18 +20,6 @@ class Isotonic(Mechanism):
     force: float = parameter("N", "F_c", "constant force against the muscles", bounds=(0.0, 1e6))
     mass: float = parameter("kg", "m", "mass that moves along", bounds=(1e-4, 1e5))
     damping: float = parameter("N s/m", "d", "damping coefficient of the load", bounds=(0.0, 1e6), default=0.0)
-
-    @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        return (Coordinate("position", "speed", "m", 0.01, 0.1),)
-
-    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
-        return tuple(q["position"] / length for length in resting_lengths)
-
-    def pulls(
-        self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
-    ) -> dict[str, Value]:
-        return {"position": sum(tensions, 0.0)}
 
     def acceleration(
         self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
@@ -45,6 +33,3 @@ class Isotonic(Mechanism):
 
     def potential_energy(self, q: Mapping[str, Value]) -> Value:
         return self.force * q["position"]
-
-    def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
-        return 0.5 * self.mass * v["speed"] ** 2

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from ..declare import model, parameter
 from ..ops import Value
-from .base import Coordinate, Mechanism
+from .translation import Translation
 
 
 @model
-class SpringLoad(Mechanism):
+class SpringLoad(Translation):
     """m y'' = F - F_0 - k y - d y', with y from where the muscle has its resting length.
 
     m mass, k stiffness, d damping, F_0 force of the spring at y = 0; a weight m g may be a part of it. All muscles
@@ -21,18 +21,6 @@ class SpringLoad(Mechanism):
     stiffness: float = parameter("N/m", "k", "stiffness of the spring", bounds=(0.0, 1e8))
     damping: float = parameter("N s/m", "d", "damping coefficient of the load", bounds=(0.0, 1e6), default=0.0)
     preload: float = parameter("N", "F_0", "force of the spring at position 0", bounds=(-1e6, 1e6), default=0.0)
-
-    @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        return (Coordinate("position", "speed", "m", 0.01, 0.1),)
-
-    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
-        return tuple(q["position"] / length for length in resting_lengths)
-
-    def pulls(
-        self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
-    ) -> dict[str, Value]:
-        return {"position": sum(tensions, 0.0)}
 
     def acceleration(
         self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
@@ -47,6 +35,3 @@ class SpringLoad(Mechanism):
 
     def potential_energy(self, q: Mapping[str, Value]) -> Value:
         return (self.preload + 0.5 * self.stiffness * q["position"]) * q["position"]
-
-    def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
-        return 0.5 * self.mass * v["speed"] ** 2
