@@ -2,7 +2,8 @@
 
 Three states: a muscle after Hill with a surface of 21 coefficients, two MATRIX valves and a hanging mass, filled and
 discharged as in the third paper. Conductance and critical ratio of the valve, supply, gas and schedule are the paper's
-(Hosovsky et al.); surface, spring, damper and mass are chosen. Eight states: six such muscles side by side. Six and ten: `joints.py`.
+(Hosovsky et al.); surface, spring, damper and mass are chosen. Eight states: six such muscles side by
+side. Six and ten: `joints.py`.
 """
 
 from __future__ import annotations
