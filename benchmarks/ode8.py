@@ -29,9 +29,9 @@ FLAGS = ("-O3", "-march=native")
 FAST = "-ffast-math"
 HEADING = ("muscles", "variant", "median", "least", "times the best branch-free C", "greatest error [m]")
 TEXT = (
-    "One, two and six muscles on one mass, 2501 rows. Both sides compute both valves and the surface with its tangent in "
-    "every stage, without a branch; the C inlines a whole step, and the best of its compilers and flags counts. The C that "
-    "skips shut valves and the tangent stands beside it. The reference is Rodas4 at rtol 1e-11."
+    "One, two and six muscles on one mass, 2501 rows. Both sides compute both valves and the surface with its tangent "
+    "in every stage, without a branch; the C inlines a whole step, and the best of its compilers and flags counts. The "
+    "C that skips shut valves and the tangent stands beside it. The reference is Rodas4 at rtol 1e-11."
 )
 
 
@@ -101,16 +101,16 @@ def compiled(folder: pathlib.Path, muscles: int = 1) -> dict[str, ctypes.CDLL]:
             for fast in ((), (FAST,)):
                 name = " ".join(["C,", compiler, *FLAGS, *fast, *(["skipping"] if skip else [])])
                 target = folder / f"{muscles}-{len(found)}.so"
-                _build([compiler, *FLAGS, *fast, *skip, f"-DMUSCLES={muscles}"], [compiler, *FLAGS], source, target)
+                build([compiler, *FLAGS, *fast, *skip, f"-DMUSCLES={muscles}"], source, target)
                 found[name] = ctypes.CDLL(str(target))
     return found
 
 
-def _build(compile_by: list[str], link_by: list[str], source: pathlib.Path, target: pathlib.Path) -> None:
+def build(flags: list[str], source: pathlib.Path, target: pathlib.Path, linked: tuple[str, ...] = ("-lm",)) -> None:
     """Linked without -ffast-math: gcc would add code that flushes subnormals to zero in the whole process."""
-    code = target.with_suffix(".o")
-    subprocess.run([*compile_by, "-fPIC", "-c", str(source), "-o", str(code)], check=True)
-    subprocess.run([*link_by, "-shared", str(code), "-o", str(target), "-lm"], check=True)
+    code, (compiler, *rest) = target.with_suffix(".o"), flags
+    subprocess.run([compiler, *rest, "-fPIC", "-c", str(source), "-o", str(code)], check=True)
+    subprocess.run([compiler, *FLAGS, "-shared", str(code), "-o", str(target), *linked], check=True)
 
 
 def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tuple[Bar, ...]]:

@@ -7,6 +7,7 @@ starts anew, or is told to expect a jump, at each instant of the schedule.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -20,7 +21,7 @@ from airmuscle.program.prepared import Prepared
 
 Solver = Callable[[float], Callable[[], Array]]
 MOST_STEPS = 1_000_000
-PADDED = (512, 2048)
+PADDED, NEWTON = (512, 2048), 1e-2
 
 
 def pieces(run: Run) -> Iterator[tuple[Array, Array]]:
@@ -126,8 +127,10 @@ def diffrax_kvaerno5(run: Run, ready: Prepared) -> Solver:
     """diffrax' Kvaerno5 on the library's laws with JAX arrays, jitted, forward only.
 
     A solve for each segment: with `jump_ts` the step of a long rest meets the opening of a valve, and the solver is
-    left with states that are infinite. Times are padded to two lengths, so that no more is compiled.
+    left with states that are infinite. Times are padded to two lengths, so that no more is compiled. Newton's
+    iterations to a hundredth instead of to rtol, and XLA on one thread, each make it two to five times quicker.
     """
+    os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")
     import diffrax
     import jax
     from jax import numpy as jnp
@@ -139,12 +142,14 @@ def diffrax_kvaerno5(run: Run, ready: Prepared) -> Solver:
         found = system.rates(dict(zip(names, y, strict=True)), dict(zip(system.inputs, u, strict=True)))
         return jnp.stack([jnp.asarray(found[name], dtype=float) for name in names])
 
+    method = diffrax.Kvaerno5(root_finder=diffrax.VeryChord(rtol=NEWTON, atol=NEWTON * nominal))
+
     @jax.jit
     def segment(y: Any, u: Any, times: Any, rtol: Any) -> Any:
         return diffrax.diffeqsolve(
-            diffrax.ODETerm(rates), diffrax.Kvaerno5(), times[0], times[-1], 1e-5, y, args=u,
-            stepsize_controller=diffrax.PIDController(rtol=rtol, atol=rtol * nominal), max_steps=None,
-            saveat=diffrax.SaveAt(ts=times), adjoint=diffrax.ForwardMode(),
+            diffrax.ODETerm(rates), method, times[0], times[-1], 1e-5, y, args=u,
+            stepsize_controller=diffrax.PIDController(rtol=rtol, atol=rtol * nominal), max_steps=MOST_STEPS,
+            saveat=diffrax.SaveAt(ts=times), adjoint=diffrax.ForwardMode(), throw=False,
         ).ys  # fmt: skip
 
     def padded(times: Array) -> Any:

@@ -161,8 +161,15 @@ def _ratio(what: str, measured: float) -> Bar:
 
 def loosest(run: Run, solve: Callable[[float], Array], reference: Array) -> float:
     """The loosest rtol of the series at which, and at the next tighter one, the error is what was wanted."""
-    kept = [run.error(solve(rtol), reference) <= WANTED for rtol in SERIES]
-    return next((r for r, here, then in zip(SERIES, kept, kept[1:], strict=False) if here and then), SERIES[-1])
+    kept: float | None = None
+    for rtol in SERIES:
+        if not run.error(solve(rtol), reference) <= WANTED:
+            kept = None
+        elif kept:
+            return kept
+        else:
+            kept = rtol
+    return SERIES[-1]
 
 
 def at_equal_precision(
