@@ -36,8 +36,8 @@ TEXT = (
     "`Line` with `Tube`, `Isothermal` or `EnergyBalance`, with a mechanism and for ten states a valve with a lagging "
     "spool that are made here. Both have the same rates to rounding, which is checked; their steps differ a little, "
     "because a plant takes other nominal sizes. The ratio is that of one derivative, the least of its times on both "
-    "sides: some 50 ns are doubled by a neighbour on the same core. `ProportionalValve` has a spool of second order, so "
-    "that two such valves make twelve states; no system is written out for it. Rodas4 at rtol 1e-6."
+    "sides: a neighbour on the same core doubles some 50 ns. `ProportionalValve` has a spool of second order, so that "
+    "two such valves make twelve states; no system is written out for it. Rodas4 at rtol 1e-6."
 )
 WHY = "the components compute something that the equations written out need not"
 

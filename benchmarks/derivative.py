@@ -22,7 +22,8 @@ HEADING = ("what", "median", "least", "a muscle")
 CALLS = 10_000
 TEXT = (
     f"{MUSCLES} muscles on one mass, 26 states: for each the flow through two valves, volume, pressure, "
-    f"characteristic, spring and damper; half open. {CALLS} calls in a compiled loop, each at a state that depends on the call before."
+    f"characteristic, spring and damper; half open. {CALLS} calls in a compiled loop, each at a state that depends on "
+    "the call before."
 )
 WHY = "each surface has its tangent beyond the box and its clamp computed in every evaluation, without a branch"
 

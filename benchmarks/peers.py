@@ -30,9 +30,9 @@ TEXT = (
     "2501 rows, 10 ms apart. Each has the loosest rtol of a series at which, and at the next tighter one, the error is "
     f"at most {WANTED:g} m, with atol rtol times each state's nominal size; each begins anew at every instant of the "
     "schedule. What can be done beforehand (solvers made, functions compiled) is not timed. Eight states are six "
-    "muscles on one mass, six and ten two muscles on a joint. scikit-sundae calls Python for every evaluation, whether "
-    "the rates are compiled or not; CasADi has the expressions that our machine code is printed from, constants folded, "
-    "and an exact Jacobian; diffrax has the library's laws with JAX arrays; python-control is SciPy's LSODA with an "
+    "muscles on one mass, six and ten two muscles on a joint. scikit-sundae calls Python for every evaluation, also of "
+    "compiled rates; CasADi has the expressions that our machine code is printed from, constants folded, and an exact "
+    "Jacobian; diffrax has the library's laws with JAX arrays; python-control is SciPy's LSODA with an "
     "interpolation of its inputs at every evaluation. The reference is Rodas4 at rtol 1e-11."
 )
 
@@ -61,8 +61,8 @@ class Peer:
 
 
 COMPILED = (
-    "with compiled rates CVODE is left with its own steps and the call of Python around each evaluation; Rodas4 has more "
-    "states to factor and to solve for, six times a step, as the plant grows"
+    "with compiled rates CVODE is left with its own steps and the call of Python around each evaluation; Rodas4 has "
+    "more states to factor and to solve for, six times a step, as the plant grows"
 )
 PEERS = (
     Peer("scikit-sundae CVODE, rates by hand", "sksundae", "scikit-sundae", sundae_by_hand, 45.0),
