@@ -1,22 +1,28 @@
-/* The plant of three states of filling.py, written for speed: everything inlined, no branch, the whole step one function.
-   EXPLICIT_STAGES is defined by the benchmark from the tableau: S(i, argument, ...) for each stage and WEIGHTED(k).
+/* The hanging plants of filling.py, written for speed: everything inlined, no branch, the whole step one function.
+   MUSCLES is how many pull at the mass; a state is the air in each, then position and speed. The benchmark defines
+   EXPLICIT_STAGES from the tableau, a RATES(i, terms) for each stage after the first, and WEIGHTED, the sum of slopes.
    SKIP leaves out shut valves and the tangent beyond the box, which costs branches but less work. */
 #include <math.h>
 
+#ifndef MUSCLES
+#define MUSCLES 1
+#endif
+enum { STATES = MUSCLES + 2, POSITION = MUSCLES, SPEED = MUSCLES + 1 };
+
 typedef struct {
-  double inverse_mass, gravity, inverse_length, inverse_volume, cc, rt, ambient, supply;
+  double inverse_length, inverse_volume, cc, rt, ambient, supply;
   double fill, discharge, critical, inverse_subsonic, laminar;
   double low_x, scale_x, low_q, scale_q, least, greatest, stiffness, damping, growth;
   double a[21];
-} Plant;
+} Muscle;
 
-typedef struct { double air, position, speed; } State;
+typedef struct { double inverse_mass, gravity; Muscle muscles[MUSCLES]; } Plant;
 
 #define INLINE static inline __attribute__((always_inline))
 INLINE double larger(double a, double b) { return a > b ? a : b; }
 INLINE double smaller(double a, double b) { return a < b ? a : b; }
 
-INLINE double flow(const Plant *p, double up, double down) {
+INLINE double flow(const Muscle *p, double up, double down) {
   double high = larger(up, down), low = smaller(up, down);
   double beyond = larger(low - p->critical * high, 0.0) * p->inverse_subsonic;
   double ellipse = sqrt(larger(high * high - beyond * beyond, 1.0));
@@ -32,7 +38,7 @@ INLINE double value(const double *a, double x, double q) {
   return r0 + q * (r1 + q * (r2 + q * (r3 + q * (r4 + q * a[20]))));
 }
 
-INLINE double surface(const Plant *p, double x, double q) {
+INLINE double surface(const Muscle *p, double x, double q) {
   const double *a = p->a;
 #ifdef SKIP
   if (x >= -1.0 && x <= 1.0 && q >= -1.0 && q <= 1.0) return value(a, x, q);
@@ -53,40 +59,59 @@ INLINE double surface(const Plant *p, double x, double q) {
   return f + by_x * (x - xi) + by_q * (q - qi);
 }
 
-INLINE State rates(const Plant *p, double air, double position, double speed, double fill, double discharge) {
+/* Tension of one muscle; the mass flow into it goes to `air_rate`. */
+INLINE double muscle(const Muscle *p, double air, double position, double speed, double fill, double discharge,
+                     double *air_rate) {
   double contraction = position * p->inverse_length, s = 1.0 - contraction;
   double pressure = air * p->rt / (p->inverse_volume * s * (1.0 - p->cc * s * s)), gauge = pressure - p->ambient;
   double x = (contraction - p->low_x) * p->scale_x - 1.0, q = (gauge - p->low_q) * p->scale_q - 1.0;
   double force = smaller(larger(surface(p, x, q), p->least), p->greatest);
-  double tension = larger(force - p->stiffness * position - (p->damping + p->growth * gauge) * speed, 0.0);
 #ifdef SKIP
-  double air_rate = 0.0;
-  if (fill != 0.0) air_rate += fill * p->fill * flow(p, p->supply, pressure);
-  if (discharge != 0.0) air_rate -= discharge * p->discharge * flow(p, pressure, p->ambient);
+  double into = 0.0;
+  if (fill != 0.0) into += fill * p->fill * flow(p, p->supply, pressure);
+  if (discharge != 0.0) into -= discharge * p->discharge * flow(p, pressure, p->ambient);
+  *air_rate = into;
 #else
-  double air_rate = fill * p->fill * flow(p, p->supply, pressure) - discharge * p->discharge * flow(p, pressure, p->ambient);
+  *air_rate = fill * p->fill * flow(p, p->supply, pressure) - discharge * p->discharge * flow(p, pressure, p->ambient);
 #endif
-  return (State){air_rate, speed, tension * p->inverse_mass - p->gravity};
+  return larger(force - p->stiffness * position - (p->damping + p->growth * gauge) * speed, 0.0);
 }
 
-#define RATES(i, A, P, V) State k##i = rates(p, y.air + h * (A), y.position + h * (P), y.speed + h * (V), fill, discharge);
+/* k = rates at y under the openings u: fill and discharge of every muscle. */
+INLINE void rates(const Plant *p, const double *y, const double *u, double *k) {
+  double total = 0.0;
+  for (int i = 0; i < MUSCLES; i++)
+    total += muscle(&p->muscles[i], y[i], y[POSITION], y[SPEED], u[2 * i], u[2 * i + 1], &k[i]);
+  k[POSITION] = y[SPEED];
+  k[SPEED] = total * p->inverse_mass - p->gravity;
+}
 
-INLINE State step(const Plant *p, State y, double fill, double discharge, double h) {
-  State k0 = rates(p, y.air, y.position, y.speed, fill, discharge);
+#ifdef EXPLICIT_STAGES
+#define RATES(i, TERMS) \
+  double k##i[STATES]; \
+  for (int j = 0; j < STATES; j++) x[j] = y[j] + h * (TERMS); \
+  rates(p, x, u, k##i);
+
+INLINE void step(const Plant *p, double *y, const double *u, double h) {
+  double x[STATES], k0[STATES];
+  rates(p, y, u, k0);
   EXPLICIT_STAGES
-  return (State){y.air + h * (WEIGHTED(air)), y.position + h * (WEIGHTED(position)), y.speed + h * (WEIGHTED(speed))};
+  for (int j = 0; j < STATES; j++) y[j] += h * (WEIGHTED);
 }
 
 /* Rows every `every` steps; `steps` of each segment are a multiple of it. */
 void run(const Plant *plant, const double *start, int segments, const int *steps, const double *inputs, double h, int every,
          double *rows) {
   Plant local = *plant;
-  State y = {start[0], start[1], start[2]};
-  long row = 0;
-  rows[row++] = y.air; rows[row++] = y.position; rows[row++] = y.speed;
-  for (int s = 0; s < segments; s++)
+  double y[STATES];
+  for (int j = 0; j < STATES; j++) *rows++ = y[j] = start[j];
+  for (int s = 0; s < segments; s++) {
+    double u[2 * MUSCLES];
+    for (int j = 0; j < 2 * MUSCLES; j++) u[j] = inputs[2 * MUSCLES * s + j];
     for (int done = 0; done < steps[s]; done += every) {
-      for (int i = 0; i < every; i++) y = step(&local, y, inputs[2 * s], inputs[2 * s + 1], h);
-      rows[row++] = y.air; rows[row++] = y.position; rows[row++] = y.speed;
+      for (int i = 0; i < every; i++) step(&local, y, u, h);
+      for (int j = 0; j < STATES; j++) *rows++ = y[j];
     }
+  }
 }
+#endif

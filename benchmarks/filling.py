@@ -1,8 +1,9 @@
-"""The runs that the benchmarks time: 25 s on plants of three, six and ten states.
+"""The runs that the benchmarks time: 25 s on plants of three, six, eight and ten states.
 
 Three states: a muscle after Hill with a surface of 21 coefficients, two MATRIX valves and a hanging mass, filled and
 discharged as in the third paper. Conductance and critical ratio of the valve, supply, gas and schedule are the paper's
-(Hosovsky et al.); surface, spring, damper and mass are chosen. Six and ten states: `joints.py`.
+(Hosovsky et al.); surface, spring, damper and mass are chosen. Eight states: six such muscles side by
+side. Six and ten: `joints.py`.
 """
 
 from __future__ import annotations
@@ -64,12 +65,29 @@ def surface() -> ContractileSurface:
     return dataclasses.replace(blank, coefficients=tuple(found.tolist()))
 
 
-def hanging() -> Plant:
-    """The plant of three states."""
-    muscle = Muscle(surface(), BRAID, LinearSpring(4000.0), PressureDamper(100.0, 5e-4))
-    matrix = Valve(2.6167e-9, 0.433)
-    supply = Supply(650e3 - Ambient().pressure)
-    return Plant(muscle, FillDischarge(supply, matrix, matrix), HangingMass(5.0), Isothermal())
+def hanging(muscles: int = 1) -> Plant:
+    """Muscles side by side on one mass, each with its own valves and a stiffness of its own: states one each, and two.
+
+    With one, the plant of three states.
+    """
+    matrix, supply = Valve(2.6167e-9, 0.433), Supply(650e3 - Ambient().pressure)
+    each = [
+        Muscle(surface(), BRAID, LinearSpring(4000.0 + 50.0 * i), PressureDamper(100.0, 5e-4), name=f"muscle{i}")
+        for i in range(muscles)
+    ]
+    circuits = (FillDischarge(supply, matrix, matrix),) * muscles
+    if muscles == 1:
+        return Plant(each[0], circuits[0], HangingMass(5.0), Isothermal())
+    return Plant(tuple(each), circuits, HangingMass(5.0 * muscles), Isothermal())
+
+
+def filled_in_turn(plant: Plant) -> Schedule:
+    """The schedule of the third paper for the first muscle, and for each further one a fifth of a second later."""
+    changes = {}
+    for i, prefix in enumerate(plant.prefixes):
+        for name, instants in FILL_DISCHARGE.changes.items():
+            changes[f"{prefix}{name}"] = tuple((time + 0.2 * i, value) for time, value in instants)
+    return Schedule(changes)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -106,12 +124,20 @@ class Run:
 
 
 @functools.cache
+def lifts(muscles: int) -> Run:
+    """The run of so many muscles on one mass."""
+    plant = hanging(muscles)
+    return Run(plant, dict(equilibrium(plant, pressure=0.0)), filled_in_turn(plant), "position", 1.0)
+
+
+@functools.cache
 def runs() -> dict[int, Run]:
-    """The three runs by their number of states."""
-    plant, six, ten = hanging(), joint(), joint(heat=True)
+    """Four runs by their number of states: one muscle, two muscles on a joint, twice, and six muscles on one mass."""
+    six, ten = joint(), joint(heat=True)
     return {
-        3: Run(plant, dict(equilibrium(plant, pressure=0.0)), FILL_DISCHARGE, "position", 1.0),
+        3: lifts(1),
         6: Run(six, joint_start(six), JOINT_PULSES, "angle", six.radius),
+        8: lifts(6),
         10: Run(ten, joint_start(ten), JOINT_PULSES, "angle", ten.radius),
     }
 

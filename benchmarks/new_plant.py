@@ -71,12 +71,15 @@ def cache_counts() -> tuple[int, ...]:
     return tuple(counts)
 
 
-def process(arguments: list[str], cache: str | None = None) -> None:
-    """Run Python in a process of its own, quietly, with this folder as the kernels' cache."""
+def process(arguments: list[str], cache: str | None = None) -> str:
+    """What Python prints in a process of its own, with this folder as the kernels' cache."""
     here = pathlib.Path(__file__).parent
     path = os.pathsep.join([str(here), str(here.parent / "src"), os.environ.get("PYTHONPATH", "")])
     environment = {**os.environ, "PYTHONPATH": path} | ({"NUMBA_CACHE_DIR": cache} if cache else {})
-    subprocess.run([sys.executable, *arguments], env=environment, check=True, capture_output=True, cwd=here)
+    done = subprocess.run(
+        [sys.executable, *arguments], env=environment, check=True, capture_output=True, cwd=here, text=True
+    )
+    return done.stdout
 
 
 def section(rounds: int = 5) -> Section:

@@ -11,13 +11,15 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from filling import SPACING, Array, Run, runs, stretch_factor
-from measure import Bar, Section, interleaved, of_time, show
+from filling import SPACING, Array, Run, lifts, stretch_factor
+from measure import Bar, Section, Times, interleaved, of_time, show
 from rodas4 import kernel
 
+from airmuscle.circuit import FillDischarge
 from airmuscle.command import Segments
-from airmuscle.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, absolute
+from airmuscle.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Ambient, absolute
 from airmuscle.method import DormandPrince8, Rodas4
+from airmuscle.muscle import Muscle
 from airmuscle.plant import Plant
 from airmuscle.program.prepared import prepared
 
@@ -25,11 +27,11 @@ STEP = 1e-4
 SOURCE = pathlib.Path(__file__).with_name("fill_discharge.c")
 FLAGS = ("-O3", "-march=native")
 FAST = "-ffast-math"
-HEADING = ("variant", "median", "least", "times the best branch-free C", "greatest error [m]")
+HEADING = ("muscles", "variant", "median", "least", "times the best branch-free C", "greatest error [m]")
 TEXT = (
-    "The plant of three states, 2501 rows. Both sides compute both valves and the surface with its tangent in every "
-    "stage, without a branch; the C inlines a whole step, and the best of its compilers and flags counts. The C that "
-    "skips shut valves and the tangent stands beside it. The reference is Rodas4 at rtol 1e-11."
+    "One, two and six muscles on one mass, 2501 rows. Both sides compute both valves and the surface with its tangent "
+    "in every stage, without a branch; the C inlines a whole step, and the best of its compilers and flags counts. The "
+    "C that skips shut valves and the tangent stands beside it. The reference is Rodas4 at rtol 1e-11."
 )
 
 
@@ -37,33 +39,34 @@ def stages() -> str:
     """The stages after the first, and the weighted sum, as C macros; zeros are left out."""
     rows, weights = DormandPrince8(STEP).tableau()
 
-    def total(row: tuple[float, ...], member: str) -> str:
-        return " + ".join(f"{a!r} * k{j}.{member}" for j, a in enumerate(row) if a)
+    def total(row: tuple[float, ...]) -> str:
+        return " + ".join(f"{a!r} * k{i}[j]" for i, a in enumerate(row) if a)
 
-    lines = [
-        f"RATES({i}, {total(row, 'air')}, {total(row, 'position')}, {total(row, 'speed')})"
-        for i, row in enumerate(rows, 1)
-    ]
-    weighted = " + ".join(f"{a!r} * k{j}.member" for j, a in enumerate(weights) if a)
-    return f"#define EXPLICIT_STAGES {' '.join(lines)}\n#define WEIGHTED(member) {weighted}\n"
+    lines = [f"RATES({i}, {total(row)})" for i, row in enumerate(rows, 1)]
+    return f"#define EXPLICIT_STAGES {' '.join(lines)}\n#define WEIGHTED {total(weights)}\n"
 
 
 def constants(plant: Plant) -> Array:
-    """The struct `Plant` of the C source, in its order; its valves are alike but in conductance."""
-    muscle, circuit, load, ambient = plant.muscles[0], plant.circuits[0], plant.mechanism, plant.ambient
+    """The struct `Plant` of the C source, in its order; the valves of a muscle are alike but in conductance."""
+    load = plant.mechanism
+    muscles = [_constants(*pair, plant.ambient) for pair in zip(plant.muscles, plant.circuits, strict=True)]
+    return np.array([1 / load.mass, load.gravity, *(x for one in muscles for x in one)])
+
+
+def _constants(muscle: Muscle, circuit: FillDischarge, ambient: Ambient) -> list[float]:
     law, valve = muscle.contractile, circuit.fill
     k, c = stretch_factor(muscle.geometry)
     scale = REFERENCE_DENSITY * np.sqrt(REFERENCE_TEMPERATURE / ambient.temperature)
     box = (law.least_contraction, law.greatest_contraction), (law.least_pressure, law.greatest_pressure)
     scaling = [x for low, high in box for x in (low, 2 / (high - low))]
-    return np.array(
-        [1 / load.mass, load.gravity, 1 / muscle.geometry.resting_length, k, c * c, GAS_CONSTANT * ambient.temperature]
-        + [ambient.pressure, absolute(circuit.supply.pressure, ambient)]
-        + [scale * v.conductance for v in (circuit.fill, circuit.discharge)]
-        + [valve.critical_ratio, 1 / (1 - valve.critical_ratio), float(valve.laminar_slope())]
-        + [*scaling, law.least_force, law.greatest_force]
-        + [muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth, *law.coefficients]
-    )
+    return [
+        *(1 / muscle.geometry.resting_length, k, c * c, GAS_CONSTANT * ambient.temperature),
+        *(ambient.pressure, absolute(circuit.supply.pressure, ambient)),
+        *(scale * v.conductance for v in (circuit.fill, circuit.discharge)),
+        *(valve.critical_ratio, 1 / (1 - valve.critical_ratio), float(valve.laminar_slope())),
+        *(*scaling, law.least_force, law.greatest_force),
+        *(muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth, *law.coefficients),
+    ]
 
 
 def in_c(run: Run, library: ctypes.CDLL, segments: Segments | None = None) -> Callable[[], Array]:
@@ -71,18 +74,10 @@ def in_c(run: Run, library: ctypes.CDLL, segments: Segments | None = None) -> Ca
     segments = segments or run.segments
     plant, start, inputs = constants(run.system), run.vector, np.ascontiguousarray(segments.values)
     steps = np.rint(np.diff([0.0, *segments.ends]) / STEP).astype(np.intc)
-    rows = np.empty((int(steps.sum()) * round(STEP * 1e6) // round(SPACING * 1e6) + 1, 3))
+    rows = np.empty((int(steps.sum()) * round(STEP * 1e6) // round(SPACING * 1e6) + 1, start.size))
     arguments = [plant.ctypes.data, start.ctypes.data, len(steps), steps.ctypes.data, inputs.ctypes.data]
-    kinds = [
-        ctypes.c_void_p,
-        ctypes.c_void_p,
-        ctypes.c_int,
-        ctypes.c_void_p,
-        ctypes.c_void_p,
-        ctypes.c_double,
-        ctypes.c_int,
-    ]
-    library.run.argtypes = [*kinds, ctypes.c_void_p]
+    at = ctypes.c_void_p
+    library.run.argtypes = [at, at, ctypes.c_int, at, at, ctypes.c_double, ctypes.c_int, at]
 
     def call(keep: Any = (plant, start, inputs, steps)) -> Array:
         library.run(*arguments, STEP, round(SPACING / STEP), rows.ctypes.data)
@@ -96,7 +91,7 @@ def compilers() -> list[str]:
     return [name for name in ("gcc", "clang") if shutil.which(name)]
 
 
-def compiled(folder: pathlib.Path) -> dict[str, ctypes.CDLL]:
+def compiled(folder: pathlib.Path, muscles: int = 1) -> dict[str, ctypes.CDLL]:
     """The C source by each compiler, plain and fast, without and with branches."""
     source = folder / SOURCE.name
     source.write_text(stages() + SOURCE.read_text(encoding="utf-8"), encoding="utf-8")
@@ -105,38 +100,50 @@ def compiled(folder: pathlib.Path) -> dict[str, ctypes.CDLL]:
         for skip in ((), ("-DSKIP",)):
             for fast in ((), (FAST,)):
                 name = " ".join(["C,", compiler, *FLAGS, *fast, *(["skipping"] if skip else [])])
-                target = folder / f"{len(found)}.so"
-                _build([compiler, *FLAGS, *fast, *skip], [compiler, *FLAGS], source, target)
+                target = folder / f"{muscles}-{len(found)}.so"
+                build([compiler, *FLAGS, *fast, *skip, f"-DMUSCLES={muscles}"], source, target)
                 found[name] = ctypes.CDLL(str(target))
     return found
 
 
-def _build(compile_by: list[str], link_by: list[str], source: pathlib.Path, target: pathlib.Path) -> None:
+def build(flags: list[str], source: pathlib.Path, target: pathlib.Path, linked: tuple[str, ...] = ("-lm",)) -> None:
     """Linked without -ffast-math: gcc would add code that flushes subnormals to zero in the whole process."""
-    code = target.with_suffix(".o")
-    subprocess.run([*compile_by, "-fPIC", "-c", str(source), "-o", str(code)], check=True)
-    subprocess.run([*link_by, "-shared", str(code), "-o", str(target), "-lm"], check=True)
+    code, (compiler, *rest) = target.with_suffix(".o"), flags
+    subprocess.run([compiler, *rest, "-fPIC", "-c", str(source), "-o", str(code)], check=True)
+    subprocess.run([compiler, *FLAGS, "-shared", str(code), "-o", str(target), *linked], check=True)
 
 
-def section(rounds: int = 9) -> Section:
-    """The whole comparison."""
-    run = runs()[3]
+def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tuple[Bar, ...]]:
+    """Rows and the bar of so many muscles in one plant."""
+    run = lifts(muscles)
     ready = prepared(run.system)
     reference = kernel(run, ready, Rodas4(1e-11))()
     method, segments, times, state = DormandPrince8(STEP), run.segments, run.times, run.vector
     ours = "DormandPrince8(1e-4), kernel"
     variants: dict[str, Callable[[], Array]] = {ours: lambda: method.run(ready, segments, 0.0, state, times).rows}
     with tempfile.TemporaryDirectory() as folder:
-        variants |= {name: in_c(run, library) for name, library in compiled(pathlib.Path(folder)).items()}
+        libraries = compiled(pathlib.Path(folder), muscles)
+        variants |= {name: in_c(run, library) for name, library in libraries.items()}
         taken = interleaved(variants, rounds)
         errors = {name: run.error(call(), reference) for name, call in variants.items()}
     branch_free = [name for name in variants if name != ours and "skipping" not in name]
     best = min(branch_free, key=lambda name: taken[name].median, default=ours)
     rows = tuple(
-        (name, of_time(t.median), of_time(t.least), f"{t.ratio_to(taken[best]):.3g}", f"{errors[name]:.1e}")
+        (str(muscles), name, of_time(t.median), of_time(t.least), _times(t, taken[best]), f"{errors[name]:.1e}")
         for name, t in taken.items()
     )
-    bars = (Bar(f"ode8 / {best}", taken[ours].ratio_to(taken[best]), 1.15, "x"),) if branch_free else ()
+    title = f"ode8, muscles: {muscles}: / {best}"
+    return rows, (Bar(title, taken[ours].ratio_to(taken[best]), 1.15, "x"),) if branch_free else ()
+
+
+def _times(time: Times, other: Times) -> str:
+    return f"{time.ratio_to(other):.3g}"
+
+
+def section(rounds: int = 9) -> Section:
+    """The whole comparison."""
+    parts = [measure(muscles, max(2, rounds // muscles)) for muscles in (1, 2, 6)]
+    rows, bars = (tuple(x for part in column for x in part) for column in zip(*parts, strict=True))
     return Section("ode8, 250 000 steps, against C", TEXT, HEADING, rows, bars)
 
 

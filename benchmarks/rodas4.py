@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numba
 import numpy as np
 from filling import DURATION, SPACING, Array, Run, runs
 from measure import Bar, Section, Times, interleaved, of_time, show
-from scalar_rates import BY_SIZE
+from scalar_rates import Rates, hill, six_states, ten_states
+from several_rates import several
 
 from airmuscle.engine.address import invoke, pointer
 from airmuscle.method import Rodas4
@@ -17,6 +18,12 @@ from airmuscle.program.prepared import Prepared, prepared
 from airmuscle.simulate import simulate
 
 RTOL = 1e-6
+BY_HAND: dict[int, Callable[[Any], Callable[[Sequence[float]], Rates]]] = {
+    3: hill,
+    6: six_states,
+    8: several,
+    10: ten_states,
+}
 HEADING = ("states", "variant", "median", "least", "times Rodas4", "greatest error [m]")
 TEXT = (
     "2501 rows, 10 ms apart; rtol 1e-6, and atol 1e-6 of each state's nominal size, unless the row says otherwise. The "
@@ -47,7 +54,7 @@ def compiled_rates(t: Any, y: Any, u: Any, c: Any, function: Any) -> Any:
 
 def by_hand(run: Run) -> Callable[[Array], Any]:
     """Openings -> the rates written by hand."""
-    under = BY_SIZE[len(run.system.states)](run.system)
+    under = BY_HAND[len(run.system.states)](run.system)
     return lambda openings: (under(openings.tolist()), ())
 
 
@@ -154,8 +161,15 @@ def _ratio(what: str, measured: float) -> Bar:
 
 def loosest(run: Run, solve: Callable[[float], Array], reference: Array) -> float:
     """The loosest rtol of the series at which, and at the next tighter one, the error is what was wanted."""
-    kept = [run.error(solve(rtol), reference) <= WANTED for rtol in SERIES]
-    return next((r for r, here, then in zip(SERIES, kept, kept[1:], strict=False) if here and then), SERIES[-1])
+    kept: float | None = None
+    for rtol in SERIES:
+        if not run.error(solve(rtol), reference) <= WANTED:
+            kept = None
+        elif kept:
+            return kept
+        else:
+            kept = rtol
+    return SERIES[-1]
 
 
 def at_equal_precision(

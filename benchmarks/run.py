@@ -1,4 +1,4 @@
-"""Run all benchmarks and write RESULTS.md beside this file; about three minutes.
+"""Run all benchmarks and write RESULTS.md beside this file; about five minutes.
 
 ./run python benchmarks/run.py [--rounds-factor 1.0] [--print-only]
 """
@@ -17,8 +17,14 @@ os.environ.setdefault(
 
 import batch
 import bootstrap
+import components
+import derivative
+import growth
+import memory
+import mujoco_peer
 import new_plant
 import ode8
+import peers
 import rodas4
 import startup
 import static_fit
@@ -27,8 +33,14 @@ from measure import Bar, Section, machine, show, table, today, versions
 RESULTS = pathlib.Path(__file__).with_name("RESULTS.md")
 SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (rodas4.section, 25),
+    (peers.section, 9),
     (ode8.section, 15),
     (batch.section, 7),
+    (mujoco_peer.section, 5),
+    (derivative.section, 25),
+    (components.section, 25),
+    (growth.section, 7),
+    (memory.section, 1),
     (static_fit.section, 15),
     (bootstrap.section, 5),
     (new_plant.section, 7),

@@ -13,6 +13,7 @@ from typing import Any
 from filling import stretch_factor
 from joints import HEAT_CAPACITY, Joint, JointWithHeat
 
+from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.circuit import Valve
 from airmuscle.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, absolute
 from airmuscle.plant import Plant
@@ -40,6 +41,31 @@ def valve_flow(valve: Valve, temperature: float) -> Scalar:
     return flow
 
 
+def beyond_box(law: ContractileSurface) -> Scalar:
+    """The surface beyond its box, in its scaled arguments: the value at the edge and the slopes there."""
+    (a00, a10, a20, a30, a40, a50, a01, a11, a21, a31, a41, a02, a12, a22, a32, a03, a13, a23, a04, a14, a05) = (
+        law.coefficients
+    )
+    rows = (
+        (a00, a10, a20, a30, a40, a50),
+        (a01, a11, a21, a31, a41),
+        (a02, a12, a22, a32),
+        (a03, a13, a23),
+        (a04, a14),
+        (a05,),
+    )
+
+    def tangent(x: float, q: float) -> float:
+        xi, qi = min(max(x, -1.0), 1.0), min(max(q, -1.0), 1.0)
+        terms = [(i, j, a) for j, row in enumerate(rows) for i, a in enumerate(row)]
+        at_edge = sum(a * xi**i * qi**j for i, j, a in terms)
+        by_x = sum(i * a * xi ** (i - 1) * qi**j for i, j, a in terms if i)
+        by_q = sum(j * a * xi**i * qi ** (j - 1) for i, j, a in terms if j)
+        return at_edge + min(by_x, 0.0) * (x - xi) + max(by_q, 0.0) * (q - qi)
+
+    return tangent
+
+
 def hill(plant: Plant) -> Callable[[Sequence[float]], Rates]:
     """Rates of the plant of three states under given openings."""
     muscle, load, circuit, ambient = plant.muscles[0], plant.mechanism, plant.circuits[0], plant.ambient
@@ -55,31 +81,10 @@ def hill(plant: Plant) -> Callable[[Sequence[float]], Rates]:
     inverse_mass, gravity, per_length, cc = 1.0 / load.mass, load.gravity, 1.0 / length, c * c
     low_x, scale_x = law.least_contraction, 2.0 / (law.greatest_contraction - law.least_contraction)
     low_q, scale_q = law.least_pressure, 2.0 / (law.greatest_pressure - law.least_pressure)
-    least, greatest = law.least_force, law.greatest_force
+    least, greatest, tangent = law.least_force, law.greatest_force, beyond_box(law)
     (a00, a10, a20, a30, a40, a50, a01, a11, a21, a31, a41, a02, a12, a22, a32, a03, a13, a23, a04, a14, a05) = (
         law.coefficients
     )
-
-    def polynomial(x: float, q: float) -> float:
-        r0 = a00 + x * (a10 + x * (a20 + x * (a30 + x * (a40 + x * a50))))
-        r1 = a01 + x * (a11 + x * (a21 + x * (a31 + x * a41)))
-        r2 = a02 + x * (a12 + x * (a22 + x * a32))
-        return r0 + q * (r1 + q * (r2 + q * (a03 + x * (a13 + x * a23) + q * (a04 + x * a14 + q * a05))))
-
-    def tangent(x: float, q: float) -> float:
-        """Beyond the box: the value at its edge and the slopes there."""
-        xi, qi = min(max(x, -1.0), 1.0), min(max(q, -1.0), 1.0)
-        rows = (
-            (a00, a10, a20, a30, a40, a50),
-            (a01, a11, a21, a31, a41),
-            (a02, a12, a22, a32),
-            (a03, a13, a23),
-            (a04, a14),
-            (a05,),
-        )
-        by_x = sum(i * a * xi ** (i - 1) * qi**j for j, row in enumerate(rows) for i, a in enumerate(row) if i)
-        by_q = sum(j * a * xi**i * qi ** (j - 1) for j, row in enumerate(rows) for i, a in enumerate(row) if j)
-        return polynomial(xi, qi) + min(by_x, 0.0) * (x - xi) + max(by_q, 0.0) * (q - qi)
 
     def under(openings: Sequence[float]) -> Rates:
         fill, discharge = openings
@@ -215,6 +220,3 @@ def ten_states(system: JointWithHeat) -> Callable[[Sequence[float]], Rates]:
         return rates
 
     return under
-
-
-BY_SIZE: dict[int, Callable[[Any], Callable[[Sequence[float]], Rates]]] = {3: hill, 6: six_states, 10: ten_states}

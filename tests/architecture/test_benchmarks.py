@@ -25,7 +25,7 @@ from airmuscle.method import DormandPrince8, Rodas4
 from airmuscle.program.prepared import prepared
 
 
-@pytest.mark.parametrize("states", [3, 6, 10])
+@pytest.mark.parametrize("states", [3, 6, 8, 10])
 def test_the_rates_written_by_hand_are_those_of_the_plant(states):
     case = runs()[states]
     assert len(case.system.states) == states

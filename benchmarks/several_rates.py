@@ -1,0 +1,80 @@
+"""Several muscles on one mass, written out by hand in scalar Python: what `scalar_rates.hill` is for one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from filling import stretch_factor
+from scalar_rates import Rates, beyond_box, valve_flow
+
+from airmuscle.circuit import FillDischarge
+from airmuscle.gas import GAS_CONSTANT, Ambient, absolute
+from airmuscle.muscle import Muscle
+from airmuscle.plant import Plant
+
+OneMuscle = Callable[[float, float, float, float, float], tuple[float, float]]
+
+
+def one_muscle(muscle: Muscle, circuit: FillDischarge, ambient: Ambient) -> OneMuscle:
+    """Air, position, speed, openings -> tension [N] and mass flow into it [kg/s]."""
+    law, per_length = muscle.contractile, 1.0 / muscle.geometry.resting_length
+    k, c = stretch_factor(muscle.geometry)
+    rt, outside, cc = GAS_CONSTANT * ambient.temperature, ambient.pressure, c * c
+    source = absolute(circuit.supply.pressure, ambient)
+    fill_flow, discharge_flow = (valve_flow(v, ambient.temperature) for v in (circuit.fill, circuit.discharge))
+    stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth
+    low_x, scale_x = law.least_contraction, 2.0 / (law.greatest_contraction - law.least_contraction)
+    low_q, scale_q = law.least_pressure, 2.0 / (law.greatest_pressure - law.least_pressure)
+    least, greatest, tangent = law.least_force, law.greatest_force, beyond_box(law)
+    (a00, a10, a20, a30, a40, a50, a01, a11, a21, a31, a41, a02, a12, a22, a32, a03, a13, a23, a04, a14, a05) = (
+        law.coefficients
+    )
+
+    def one(air: float, position: float, speed: float, fill: float, discharge: float) -> tuple[float, float]:
+        contraction = position * per_length
+        s = 1.0 - contraction
+        p = air * rt / (k * s * (1.0 - cc * s * s))
+        gauge = p - outside
+        x, q = (contraction - low_x) * scale_x - 1.0, (gauge - low_q) * scale_q - 1.0
+        if -1.0 <= x <= 1.0 and -1.0 <= q <= 1.0:
+            r0 = a00 + x * (a10 + x * (a20 + x * (a30 + x * (a40 + x * a50))))
+            r1 = a01 + x * (a11 + x * (a21 + x * (a31 + x * a41)))
+            r2 = a02 + x * (a12 + x * (a22 + x * a32))
+            force = r0 + q * (r1 + q * (r2 + q * (a03 + x * (a13 + x * a23) + q * (a04 + x * a14 + q * a05))))
+        else:
+            force = tangent(x, q)
+        force = least if force < least else greatest if force > greatest else force
+        tension = force - stiffness * position - (damping + growth * gauge) * speed
+        flow = 0.0
+        if fill:
+            flow += fill * fill_flow(source, p)
+        if discharge:
+            flow -= discharge * discharge_flow(p, outside)
+        return (tension if tension > 0.0 else 0.0), flow
+
+    return one
+
+
+def several(plant: Plant) -> Callable[[Sequence[float]], Rates]:
+    """Rates of the hanging plants with more than one muscle, under given openings."""
+    load = plant.mechanism
+    inverse_mass, gravity = 1.0 / load.mass, load.gravity
+    muscles = [one_muscle(m, c, plant.ambient) for m, c in zip(plant.muscles, plant.circuits, strict=True)]
+
+    def under(openings: Sequence[float]) -> Rates:
+        parts = list(zip(muscles, openings[::2], openings[1::2], strict=True))
+
+        def rates(t: float, y: Any) -> list[float]:
+            *airs, position, speed = y.tolist()
+            pull, found = 0.0, []
+            for air, (one, fill, discharge) in zip(airs, parts):  # noqa: B905 - checked above, and this is timed
+                tension, flow = one(air, position, speed, fill, discharge)
+                pull += tension
+                found.append(flow)
+            found += (speed, pull * inverse_mass - gravity)
+            return found
+
+        return rates
+
+    return under
