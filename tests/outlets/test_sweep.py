@@ -271,6 +271,49 @@ def test_a_chunk_that_is_damaged_is_computed_anew(folder: Path, monkeypatch: pyt
         assert file.read_bytes() == whole
 
 
+def test_a_chunk_appears_whole_or_not_at_all(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    study = load_study(folder / "study.toml")
+
+    def refusing(*given):
+        raise OSError(28, "no space left")
+
+    monkeypatch.setattr(chunk.os, "replace", refusing)
+    with pytest.raises(OSError, match="no space left"):
+        chunk.write(chunk.computed(study, 0), folder / "chunk.npz")
+    assert not {p.name for p in folder.iterdir()} - {"muscle.toml", "scenario.toml", "study.toml"}
+
+
+def test_the_way_in_which_a_start_is_given_is_an_input_too(folder: Path):
+    """At rest, or held where it happens to rest: equal for the scenario itself, but not for what varies."""
+    edited(folder, 'model = "Isometric"\ncontraction = 0.05', 'model = "HangingMass"\nmass = "5 kg"', "scenario.toml")
+    edited(
+        folder,
+        '"mechanism.contraction" = { model = "Uniform", low = "2 %", high = "10 %" }',
+        '"mechanism.mass" = [4, 6]',
+    )
+    at_rest = load_study(folder / "study.toml")
+    place = at_rest.source.scenario.start["position"]
+    edited(folder, 'pressure = "0.5 bar"', f'pressure = "0.5 bar", position = {place!r}', "scenario.toml")
+    held = load_study(folder / "study.toml")
+    assert held.source.scenario.start == pytest.approx(at_rest.source.scenario.start)
+    assert held.scenario(0).start != pytest.approx(at_rest.scenario(0).start)
+    assert held.mark() != at_rest.mark()
+
+
+def test_a_reason_is_the_same_from_wherever_the_study_was_read(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    """A worker knows the study by its whole path, and reasons are results."""
+    edited(folder, "[design]", '"run.duration" = ["0 s"]\n[design]')
+    monkeypatch.chdir(folder)
+    here, elsewhere = (chunk.computed(load_study(path), 0) for path in ("study.toml", folder / "study.toml"))
+    assert list(here.reasons) == list(elsewhere.reasons)
+    assert here.reasons[0].startswith("scenario.toml, [run], duration is 0.0; it must be greater than zero")
+
+
+def test_a_worker_leaves_ctrl_c_to_the_process_that_it_works_for():
+    with processes(2) as executor:
+        assert executor.submit(signal.getsignal, signal.SIGINT).result() == signal.SIG_IGN
+
+
 def test_a_worker_that_reads_another_study_refuses(folder: Path):
     study = load_study(folder / "study.toml")
     with pytest.raises(FileError, match="a worker reads another study than the one that was started"):
