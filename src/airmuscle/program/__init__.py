@@ -4,5 +4,6 @@
 system does not need.
 """
 
+from .system import Differentiated as Differentiated
 from .system import StateVariable as StateVariable
 from .system import System as System

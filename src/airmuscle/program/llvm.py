@@ -50,6 +50,10 @@ class Block:
             self.lines.append(f"  {self._known[expression]} = {expression}")
         return self._known[expression]
 
+    def constant(self, value: float) -> str:
+        """A constant."""
+        return _constant(value)
+
     def load(self, array: str, index: int) -> str:
         """The value of an array element, or of a scalar argument."""
         if array in self.scalars:
@@ -100,20 +104,23 @@ class Block:
         return simple[operation]()
 
 
-def write(
-    block: Block, code: Code, inputs: Sequence[str], stores: Mapping[int, str], held: Mapping[Operand, int]
-) -> None:
-    """Append code to a block: `inputs` and `stores` name the arrays; `held` says which operands stand in `c`."""
-    values = run(block, code.body, inputs, held)
-    for output, index, operand in code.outputs:
-        block.store(stores[output], index, _value(block, operand, inputs, held, values))
+def computed(
+    block: Block, code: Code, inputs: Sequence[str], held: Mapping[Operand, int], given: Mapping[Operand, str]
+) -> dict[tuple[int, int], str]:
+    """Append code to a block: `inputs` name the arrays, `held` says which operands stand in `c`, `given` which are known.
+
+    Returns the names of the results by output and index.
+    """
+    values = run(block, code.body, inputs, held, given)
+    return {(o, i): _value(block, operand, inputs, held, values) for o, i, operand in code.outputs}
 
 
 def run(
-    block: Block, body: Sequence[Instruction], inputs: Sequence[str], held: Mapping[Operand, int]
-) -> dict[Operand, str]:
-    """Append instructions to a block; the names of their results."""
-    values: dict[Operand, str] = {}
+    block: Block, body: Sequence[Instruction], inputs: Sequence[str], held: Mapping[Operand, int],
+    given: Mapping[Operand, str],
+) -> dict[Operand, str]:  # fmt: skip
+    """Append instructions to a block; the names of their results, and of what was given."""
+    values = dict(given)
     for line in body:
         arguments = [_value(block, a, inputs, held, values) for a in line.arguments]
         values[line.result] = block.operate(line.operation, arguments)
@@ -125,11 +132,11 @@ def _value(
 ) -> str:
     if operand in held:
         return block.load("c", held[operand])
+    if operand in values:
+        return values[operand]
     if operand[0] == "c":
-        return _constant(float(operand[1]))
-    if operand[0] == "in":
-        return block.load(inputs[operand[1]], operand[2])
-    return values[operand]
+        return block.constant(float(operand[1]))
+    return block.load(inputs[operand[1]], operand[2])
 
 
 def hand_over(
@@ -139,7 +146,7 @@ def hand_over(
 
     `places` are the values that stand there already: functions that need the same value share its place.
     """
-    values = run(block, once, inputs, {})
+    values = run(block, once, inputs, {}, {})
     held = {}
     for operand in handed:
         value = _value(block, operand, inputs, {}, values)

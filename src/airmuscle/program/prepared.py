@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import declare
-from . import llvm
-from .printed import Sizes, Traced, explicit_module, implicit_module, traced
-from .system import System
+from . import llvm, printed, tangent
+from .printed import Sizes, Traced
+from .system import Differentiated, System
 
 _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "drift", "outputs")
 
@@ -22,8 +22,14 @@ class Program:
     """The compiled functions of one structure; it keeps the machine code alive and is never pickled."""
 
     def __init__(self, system: System) -> None:
-        self.traced: Traced = traced(system)
-        text, self.sizes = implicit_module(self.traced)
+        self._form: Traced | tangent.Moved
+        if isinstance(system, Differentiated):
+            self._form = tangent.moved(system)
+            text, self.sizes = tangent.implicit_module(self._form)
+        else:
+            self._form = printed.traced(system)
+            text, self.sizes = printed.implicit_module(self._form)
+        self.output_names = self._form.output_names
         self._engine = llvm.compiled(text)
         self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
         self._steps: dict[Any, tuple[Any, int]] = {}
@@ -37,7 +43,9 @@ class Program:
     ) -> tuple[int, npt.NDArray[np.float64]]:
         """The address of an explicit step of this tableau, and what it needs of the parameters."""
         if (a, b) not in self._steps:
-            text, held = explicit_module(self.traced, a, b)
+            form = self._form
+            moved = isinstance(form, tangent.Moved)
+            text, held = tangent.explicit_module(form, a, b) if moved else printed.explicit_module(form, a, b)
             self._steps[a, b] = llvm.compiled(text), held
         engine, held = self._steps[a, b]
         return int(engine.get_function_address("step")), _handed(engine, parameters, held)
@@ -76,7 +84,7 @@ class Prepared:
     @property
     def output_names(self) -> tuple[str, ...]:
         """The outputs, in the order of their vector."""
-        return self.program.traced.output_names
+        return self.program.output_names
 
     def nominal(self) -> npt.NDArray[np.float64]:
         """The size of each state below which its relative error no longer matters."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import casadi
@@ -11,7 +11,7 @@ import casadi
 from .. import trace
 from ..errors import TraceError
 from . import llvm, lu
-from .instructions import Code, hoisted, instructions
+from .instructions import Code, Operand, hoisted, instructions
 from .system import System
 
 PARAMETERS = "p"
@@ -77,17 +77,28 @@ class Printer:
 
     def add(self, name: str, inputs: dict[str, Any], outputs: dict[str, Any], scalars: Sequence[str] = ()) -> None:
         """Print `name(inputs..., outputs...)`, with `c` in place of the parameters."""
-        code = instructions(list(inputs.values()), list(outputs.values()))
-        names, targets = list(inputs), dict(enumerate(outputs))
-        block = llvm.Block(scalars)
-        if PARAMETERS in inputs:
+        code, block = instructions(list(inputs.values()), list(outputs.values())), llvm.Block(scalars)
+        targets = list(outputs)
+        for (output, index), value in self.compute(block, code, list(inputs)).items():
+            block.store(targets[output], index, value)
+        self.end(name, [*inputs, *outputs], block)
+
+    def compute(
+        self, block: llvm.Block, code: Code, names: Sequence[str], given: Mapping[Operand, str] | None = None
+    ) -> dict[tuple[int, int], str]:
+        """Append code to a function: `names` are its arguments, `given` inputs whose values are there already.
+
+        Returns the names of the results by output and index; nothing is stored.
+        """
+        held: dict[Operand, int] = {}
+        if PARAMETERS in names:
             code, once, handed = hoisted(code, names.index(PARAMETERS))
             held = llvm.hand_over(self._prepare, once, handed, names, self._places)
-        else:
-            code, held = Code(code.body, code.outputs), {}
-        llvm.write(block, code, names, targets, held)
-        arguments = ["c" if n == PARAMETERS else n for n in names] + list(outputs)
-        self.text.append(llvm.function(name, arguments, block))
+        return llvm.computed(block, code, names, held, given or {})
+
+    def end(self, name: str, arguments: Sequence[str], block: llvm.Block) -> None:
+        """Close a function; the argument that holds parameters becomes `c`."""
+        self.text.append(llvm.function(name, ["c" if a == PARAMETERS else a for a in arguments], block))
 
     def module(self) -> str:
         """All functions and `prepare`, as one LLVM text.
