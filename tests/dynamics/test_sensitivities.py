@@ -37,7 +37,9 @@ TIMES = np.linspace(0.0, 5.0, 251)
 
 FORMULAS = {
     "products": lambda x, y: (x + 2 * y) * (x - y) / (4 + y * y) - x,
-    "powers": lambda x, y: (2 + ops.absolute_value(x)) ** 1.7 + x**3 + y**2 + (4 + y) ** -1 + (3 + x) ** (2 + y),
+    "powers": lambda x, y: (
+        (2 + ops.absolute_value(x)) ** 1.7 + x**3 + y**2 + (4 + y) ** -1 + (3 + x) ** (2 + y) + (3 + y) ** (3 + y)
+    ),
     "roots": lambda x, y: ops.sqrt(x * x + y * y + 1),
     "exponentials": lambda x, y: ops.exp(x / 4) * ops.log(5 + y) + ops.exp(x * y) * ops.exp(y),
     "angles": lambda x, y: ops.sin(x) * ops.cos(y) + ops.tan(x / 4) - ops.arctan(y * x),

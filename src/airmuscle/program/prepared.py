@@ -70,6 +70,8 @@ class Prepared:
     program: Program
     parameters: npt.NDArray[np.float64]
     held: npt.NDArray[np.float64]
+    known_nominal: npt.NDArray[np.float64] | None = None
+    """The nominal sizes of the states, where they are not to be asked of the system."""
 
     @property
     def sizes(self) -> Sizes:
@@ -88,7 +90,11 @@ class Prepared:
 
     def nominal(self) -> npt.NDArray[np.float64]:
         """The size of each state below which its relative error no longer matters."""
-        return np.array([s.nominal for s in self.system.states])
+        return np.array([s.nominal for s in self.system.states]) if self.known_nominal is None else self.known_nominal
+
+    def at(self, parameters: npt.NDArray[np.float64], nominal: npt.NDArray[np.float64]) -> Prepared:
+        """The same system with other parameters, its nominal sizes given: for those who change them often."""
+        return Prepared(self.system, self.program, parameters, self.program.held(parameters), nominal)
 
     def call(self, name: str, *arrays: npt.NDArray[np.float64] | float) -> None:
         """Call one printed function by hand; arrays are passed by address, floats by value."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,9 +15,12 @@ from ...errors import IdentificationError, ParameterError, suggestion
 from ...plant import Plant
 from ...program import System
 
+if TYPE_CHECKING:
+    from ...program.function import Function
+
 Array = npt.NDArray[np.float64]
 ITERATIONS = 50
-_conditions: dict[Any, Any] = {}
+_conditions: dict[Any, Function] = {}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -60,9 +63,11 @@ class Start:
             )
 
 
-def conditions(system: System, start: Start) -> Any:
-    """The CasADi function (state, leaves) -> (values known, rates to vanish, their slopes by state, by leaf)."""
+def conditions(system: System, start: Start) -> Function:
+    """The function (state, leaves) -> (values known and rates to vanish, their slopes by state, by leaf)."""
     import casadi
+
+    from ...program.function import Function
 
     key = (declare.structure(system), tuple(start.known), start.still)
     if key not in _conditions:
@@ -74,30 +79,30 @@ def conditions(system: System, start: Start) -> Any:
         start.refuse_unfit(system, values)
         rates = model.rates(state, shut)
         g = casadi.vertcat(*(casadi.SX(values[n]) for n in start.known), *(casadi.SX(rates[n]) for n in start.still))
-        outputs = casadi.cse([g, casadi.jacobian(g, x), casadi.jacobian(g, p)])
-        _conditions[key] = casadi.Function("start", [x, p], outputs)
+        outputs = {"values": g, "by_state": casadi.jacobian(g, x), "by_leaf": casadi.jacobian(g, p)}
+        _conditions[key] = Function({"x": x, "leaves": p}, outputs)
     return _conditions[key]
 
 
 def solved(
-    function: Any, start: Start, leaves: Array, known: Array, guess: Array, sizes: Sequence[float]
+    function: Function, start: Start, leaves: Array, known: Array, guess: Array, sizes: Array
 ) -> tuple[Array, Array, Array]:
     """The state (n,) with these leaves and known values, and its slopes by known value (n, k) and by leaf (n, p).
 
     `function` is that of `conditions`, made once for a structure.
     Raises IdentificationError where no state meets the conditions.
     """
-    target, size = np.concatenate([known, np.zeros(len(start.still))]), np.asarray(sizes)
-    x, best = guess.copy(), np.inf
+    target, x, best = np.concatenate([known, np.zeros(len(start.still))]), guess, np.inf
     for _ in range(ITERATIONS):
-        g, by_state, by_leaf = (np.asarray(part) for part in function(x, leaves))
-        step = _newton(by_state * size, target - g[:, 0])
+        g, by_state, by_leaf = function(x, leaves)
+        matrix = by_state * sizes
+        step = _newton(matrix, target - g[:, 0])
         best = float(np.abs(step).max())
         if not np.isfinite(best):
             break
-        x = x + size * step * min(1.0, 10.0 / max(best, 1e-300))
-        if best < 1e-11 * max(1.0, float(np.abs(x / size).max())):
-            inverse = np.linalg.pinv(by_state * size) * size[:, None]
+        x = x + sizes * step * min(1.0, 10.0 / max(best, 1e-300))
+        if best < 1e-11 * max(1.0, float(np.abs(x / sizes).max())):
+            inverse = _inverse(matrix) * sizes[:, None]
             return x, inverse[:, : known.size], -inverse @ by_leaf
     raise IdentificationError(
         f"no state meets the start "
@@ -111,4 +116,14 @@ def _newton(matrix: Array, error: Array) -> Array:
         return np.full(error.size, np.nan)
     rows = np.abs(matrix).max(axis=1)
     rows[rows == 0] = 1.0
-    return np.asarray(np.linalg.lstsq(matrix / rows[:, None], error / rows, rcond=1e-14)[0])
+    try:
+        return np.linalg.solve(matrix / rows[:, None], error / rows)
+    except np.linalg.LinAlgError:  # a direction that changes nothing: the shortest step
+        return np.asarray(np.linalg.lstsq(matrix / rows[:, None], error / rows, rcond=1e-14)[0])
+
+
+def _inverse(matrix: Array) -> Array:
+    try:
+        return np.linalg.inv(matrix)
+    except np.linalg.LinAlgError:
+        return np.linalg.pinv(matrix)

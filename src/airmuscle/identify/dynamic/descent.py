@@ -1,0 +1,78 @@
+"""Levenberg-Marquardt within bounds, for residuals whose slopes come with them at little cost.
+
+    (N + lambda D^2) s = -g,   N = J^T J, g = J^T r over the unknowns that are loose, D the greatest norms of J's columns
+
+An unknown on its bound, which the descent would push beyond, is held for that step; a step that leaves the bounds ends
+on them. The damping follows the ratio of actual to promised descent.
+
+Reference: Moré, J. J., The Levenberg-Marquardt algorithm: implementation and theory, Lecture Notes in Mathematics 630,
+Springer 1978 (scaling by D); Nielsen, H. B., Damping parameter in Marquardt's method, IMM-REP-1999-05, DTU 1999.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Residuals = Callable[[Array], tuple[Array, Array] | None]
+"""Residuals (R,) and slopes (R, P) at unknowns (P,); None where they cannot be had."""
+FIRST_DAMPING, LEAST_DAMPING = 1e-3, 1e-12
+FAR, LEAST_FAR = 0.7, 0.25
+"""How far an unknown may go in one step: by this share of itself, or of its scale or bounds where that is more. Chosen:
+far from the optimum a step that promises much leads to plants that cannot be run, or only in tiny steps of time."""
+ENOUGH = 1e-10
+"""A promised relative descent below which the search ends, and likewise a step."""
+
+
+def descended(residuals: Residuals, begin: Array, low: Array, high: Array, most: int) -> tuple[Array, float]:
+    """The unknowns of a least sum of squares near `begin`, and that sum; infinite where `begin` itself cannot be run.
+
+    `most` is how often the residuals may be asked for.
+    """
+    x = np.clip(begin, low, high)
+    found = residuals(x)
+    if found is None:
+        return x, np.inf
+    r, j = found
+    cost, scale, damping, growth = float(r @ r), np.zeros(x.size), FIRST_DAMPING, 2.0
+    for _ in range(most - 1):
+        normal, gradient = j.T @ j, j.T @ r
+        scale = np.maximum(scale, np.sqrt(np.diag(normal)))
+        reach = np.maximum(FAR * np.abs(x), LEAST_FAR * np.minimum(high - low, 1.0))
+        near = np.maximum(low, x - reach), np.minimum(high, x + reach)
+        step = _step(normal, gradient, damping * np.where(scale > 0, scale, 1.0) ** 2, x, *near)
+        promised = -float(step @ (2 * gradient + normal @ step))
+        if promised <= ENOUGH * cost and damping < 1 or _small(step, x, scale):
+            break
+        tried = residuals(x + step)
+        ratio = (cost - float(tried[0] @ tried[0])) / promised if tried is not None and promised > 0 else -1.0
+        if tried is not None and ratio > 0:
+            x, (r, j), cost = x + step, tried, float(tried[0] @ tried[0])
+            damping, growth = max(damping * max(1 / 3, 1 - (2 * ratio - 1) ** 3), LEAST_DAMPING), 2.0
+        else:
+            damping, growth = damping * growth, 2 * growth
+    return x, cost
+
+
+def _small(step: Array, x: Array, scale: Array) -> bool:
+    return bool(np.linalg.norm(scale * step) <= ENOUGH * np.linalg.norm(scale * x))
+
+
+def _step(normal: Array, gradient: Array, damping: Array, x: Array, low: Array, high: Array) -> Array:
+    """The damped step; unknowns that it would carry beyond a bound go to that bound, and the others are found anew."""
+    loose = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
+    step = np.zeros(x.size)
+    while loose.any():
+        k, held = np.flatnonzero(loose), np.flatnonzero(~loose)
+        matrix = normal[np.ix_(k, k)] + np.diag(damping[k])
+        step[k] = np.linalg.solve(matrix, -gradient[k] - normal[np.ix_(k, held)] @ step[held])
+        ends = np.clip(x + step, low, high)
+        beyond = loose & (ends != x + step)
+        if not beyond.any():
+            break
+        step[beyond] = (ends - x)[beyond]
+        loose &= ~beyond
+    return step
