@@ -46,7 +46,11 @@ class Course:
         self._moved = [[place[path] for path in unknowns[k].paths] for k in self.mine]
         self._leaves = declare.flatten(self.plant)
         self._conditions = conditions(self.plant, experiment.start)
-        self._known = list(experiment.start.known)
+        self._known = np.array(list(experiment.start.known.values()), dtype=float)
+        self._own_values = [(j, i) for j, k in enumerate(self.columns) for i in _place_known(unknowns[k], experiment)]
+        self._shares = np.zeros((self._leaves.size, len(self.columns)))
+        for j, k in enumerate(self.columns):
+            self._shares[[place[path] for path in unknowns[k].paths], j] = 1.0
         self._sizes = np.array([s.nominal for s in self.plant.states])
         self._guess = np.array([experiment.start.guess[s.name] for s in self.plant.states])
         self._last_clock: _Clock | None = None
@@ -60,22 +64,15 @@ class Course:
 
     def start(self, values: Array) -> tuple[Array, Array]:
         """The state at the start (n,) and its derivatives by every column (n, K)."""
-        known = np.array([self.experiment.start.known[name] for name in self._known])
-        for k in self.columns:
-            what = self.unknowns[k].what
-            if isinstance(what, StartValue):
-                known[self._known.index(what.name)] = values[k]
+        known = self._known.copy()
+        for j, i in self._own_values:
+            known[i] = values[self.columns[j]]
         state, by_known, by_leaf = solved(
             self._conditions, self.experiment.start, self.leaves(values), known, self._guess, self._sizes
         )
-        places = dict(zip(self.mine, self._moved, strict=True))
-        slopes = np.zeros((state.size, len(self.columns)))
-        for j, k in enumerate(self.columns):
-            what = self.unknowns[k].what
-            if isinstance(what, StartValue):
-                slopes[:, j] = by_known[:, self._known.index(what.name)]
-            else:
-                slopes[:, j] = by_leaf[:, places[k]].sum(axis=1)
+        slopes = by_leaf @ self._shares
+        for j, i in self._own_values:
+            slopes[:, j] = by_known[:, i]
         return state, slopes
 
     def start_time(self, values: Array) -> float:
@@ -90,9 +87,11 @@ class Course:
         """
         outputs, before = self._outputs(values)
         count, columns = len(self.names), self.ready.sizes.outputs // len(self.names) - 2
+        by_column = outputs[:, count:-count].reshape(-1, count, columns)
+        if len(self.columns) == len(self.unknowns):
+            return outputs[:, :count], by_column
         slopes = np.zeros((*self.measured.shape, len(self.unknowns)))
-        if self.columns:
-            slopes[:, :, self.columns] = outputs[:, count:-count].reshape(-1, count, columns)
+        slopes[:, :, self.columns] = by_column[:, :, : len(self.columns)]
         for k in self.mine:
             if isinstance(self.unknowns[k].what, StartTime):
                 slopes[:, :, k] = np.where(before[:, None], 0.0, -outputs[:, -count:])
@@ -139,6 +138,12 @@ class _Clock(NamedTuple):
     before: npt.NDArray[np.bool_]
     segments: Segments
     inputs: Array
+
+
+def _place_known(unknown: Unknown, experiment: Experiment) -> list[int]:
+    """Where among the start's known values an unknown stands, if it is one of them."""
+    known, what = list(experiment.start.known), unknown.what
+    return [known.index(what.name)] if isinstance(what, StartValue) else []
 
 
 def _rising(experiment: Experiment) -> Array:

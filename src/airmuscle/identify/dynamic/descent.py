@@ -40,7 +40,7 @@ def descended(residuals: Residuals, begin: Array, low: Array, high: Array, most:
     cost, scale, damping, growth = float(r @ r), np.zeros(x.size), FIRST_DAMPING, 2.0
     for _ in range(most - 1):
         normal, gradient = j.T @ j, j.T @ r
-        scale = np.maximum(scale, np.sqrt(np.diag(normal)))
+        scale = np.maximum(scale, np.sqrt(normal.diagonal()))
         reach = np.maximum(FAR * np.abs(x), LEAST_FAR * np.minimum(high - low, 1.0))
         near = np.maximum(low, x - reach), np.minimum(high, x + reach)
         step = _step(normal, gradient, damping * np.where(scale > 0, scale, 1.0) ** 2, x, *near)
@@ -66,9 +66,8 @@ def _step(normal: Array, gradient: Array, damping: Array, x: Array, low: Array, 
     loose = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
     step = np.zeros(x.size)
     while loose.any():
-        k, held = np.flatnonzero(loose), np.flatnonzero(~loose)
-        matrix = normal[np.ix_(k, k)] + np.diag(damping[k])
-        step[k] = np.linalg.solve(matrix, -gradient[k] - normal[np.ix_(k, held)] @ step[held])
+        matrix, right = normal + np.diag(damping), -gradient - normal @ np.where(loose, 0.0, step)
+        step[loose] = np.linalg.solve(matrix[loose][:, loose], right[loose])
         ends = np.clip(x + step, low, high)
         beyond = loose & (ends != x + step)
         if not beyond.any():

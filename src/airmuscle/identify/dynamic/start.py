@@ -19,7 +19,11 @@ if TYPE_CHECKING:
     from ...program.function import Function
 
 Array = npt.NDArray[np.float64]
-ITERATIONS = 50
+_WHY = {
+    1: "where the search came to, some state changes none of what is asked",
+    2: "the search left all bounds",
+    3: "the search did not come to an end",
+}
 _conditions: dict[Any, Function] = {}
 
 
@@ -92,38 +96,17 @@ def solved(
     `function` is that of `conditions`, made once for a structure.
     Raises IdentificationError where no state meets the conditions.
     """
-    target, x, best = np.concatenate([known, np.zeros(len(start.still))]), guess, np.inf
-    for _ in range(ITERATIONS):
-        g, by_state, by_leaf = function(x, leaves)
-        matrix = by_state * sizes
-        step = _newton(matrix, target - g[:, 0])
-        best = float(np.abs(step).max())
-        if not np.isfinite(best):
-            break
-        x = x + sizes * step * min(1.0, 10.0 / max(best, 1e-300))
-        if best < 1e-11 * max(1.0, float(np.abs(x / sizes).max())):
-            inverse = _inverse(matrix) * sizes[:, None]
-            return x, inverse[:, : known.size], -inverse @ by_leaf
-    raise IdentificationError(
-        f"no state meets the start "
-        f"{dict(zip(start.known, known.tolist(), strict=True))} with {', '.join(start.still) or 'nothing'} at rest; "
-        f"the last step of the search was {best:.2g} of the nominal size."
-    )
+    from ...engine.once import announce_compilation
+    from ...engine.root import root
 
-
-def _newton(matrix: Array, error: Array) -> Array:
-    if not (np.isfinite(matrix).all() and np.isfinite(error).all()):
-        return np.full(error.size, np.nan)
-    rows = np.abs(matrix).max(axis=1)
-    rows[rows == 0] = 1.0
-    try:
-        return np.linalg.solve(matrix / rows[:, None], error / rows)
-    except np.linalg.LinAlgError:  # a direction that changes nothing: the shortest step
-        return np.asarray(np.linalg.lstsq(matrix / rows[:, None], error / rows, rcond=1e-14)[0])
-
-
-def _inverse(matrix: Array) -> Array:
-    try:
-        return np.linalg.inv(matrix)
-    except np.linalg.LinAlgError:
-        return np.linalg.pinv(matrix)
+    announce_compilation(root)
+    n, x, target = guess.size, guess.copy(), np.concatenate([known, np.zeros(len(start.still))])
+    values, by_state, by_leaf, work = np.empty(n), np.empty((n, n)), np.empty((n, leaves.size)), np.zeros(n * n + n)
+    status = root(function.address, leaves, target, sizes, x, values, by_state, by_leaf, work)
+    if status != 0:
+        raise IdentificationError(
+            f"no state meets the start {dict(zip(start.known, known.tolist(), strict=True))} with "
+            f"{', '.join(start.still) or 'nothing'} at rest: {_WHY[status]}."
+        )
+    inverse = sizes[:, None] * np.linalg.inv(by_state * sizes)
+    return x, inverse[:, : known.size], -inverse @ by_leaf
