@@ -99,7 +99,7 @@ def fit_dynamic(
     courses = tuple(Course(plant, e, i, wanted, observed, method) for i, e in enumerate(experiments))
     problem = Problem(courses, wanted, np.array(list(observed.values()), dtype=float))
     _refuse_too_little(problem)
-    outcomes = sorted(_solved(problem, _starts(problem, starts, seed)), key=lambda outcome: outcome[1])
+    outcomes = sorted(_solved(problem, spread(problem, starts, seed)), key=lambda outcome: outcome[1])
     best, cost = outcomes[0]
     if not np.isfinite(cost):
         problem.residuals(np.array([u.value for u in wanted]) / problem.scales)  # raises the reason, if it is one
@@ -129,7 +129,7 @@ def _refuse_too_little(problem: Problem) -> None:
         raise ParameterError("the standard deviation of an observed quantity must be positive, in SI.")
 
 
-def _starts(problem: Problem, count: int, seed: int) -> list[Array]:
+def spread(problem: Problem, count: int, seed: int) -> list[Array]:
     """The plant's own values, then a Latin hypercube, even in the logarithm where the range is positive."""
     own = np.array([u.value for u in problem.unknowns])
     rng, cells = np.random.default_rng(seed), count - 1
