@@ -38,7 +38,9 @@ class Opponent(NamedTuple):
     step: float | None
 
     def __str__(self) -> str:
-        return f"SciPy, LSODA {self.rtol:g}, {'its own difference step' if self.step is None else f'step {self.step:g}'}"
+        return (
+            f"SciPy, LSODA {self.rtol:g}, {'its own difference step' if self.step is None else f'step {self.step:g}'}"
+        )
 
 
 OPPONENTS = (Opponent(1e-6, 1e-4), Opponent(1e-8, 1e-5), Opponent(1e-8, None))

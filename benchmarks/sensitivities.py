@@ -202,7 +202,9 @@ def section(rounds: int) -> Section:
         ratios |= {name: found.ratio_to(own) * ratios[OWN] for name, found in beside.items()}
         times |= beside
         least = min(found.ratio_to(own) for found in beside.values())
-        bars.append(Bar("residual and Jacobian: JAX jacfwd, its quicker form / library", least, 10.0, "x", at_least=True))
+        bars.append(
+            Bar("residual and Jacobian: JAX jacfwd, its quicker form / library", least, 10.0, "x", at_least=True)
+        )
     rows, reference = [], jacobian(Rodas4(1e-11))()[1]
     for name, found in times.items():
         method, _, variant = name.partition(", ")

@@ -21,8 +21,7 @@ Row = dict[Operand, Operand]
 """The derivatives of one result by the inputs that it depends on."""
 ZERO, ONE, LESS, TWO, HALF = (("c", value) for value in (0.0, 1.0, -1.0, 2.0, 0.5))
 _COMMUTE = (casadi.OP_ADD, casadi.OP_MUL)
-_FLAT = (casadi.OP_LE, casadi.OP_LT, casadi.OP_EQ, casadi.OP_NE, casadi.OP_NOT, casadi.OP_AND, casadi.OP_OR,
-         casadi.OP_SIGN)  # fmt: skip
+_CONDITIONS = (casadi.OP_LE, casadi.OP_LT, casadi.OP_EQ, casadi.OP_NE, casadi.OP_NOT, casadi.OP_AND, casadi.OP_OR)
 
 
 class Tape:
@@ -30,8 +29,20 @@ class Tape:
 
     def __init__(self, body: Iterable[Instruction]) -> None:
         self.body = list(body)
-        self._known = {(line.operation, line.arguments): line.result for line in self.body}
-        self._masks: set[Operand] = {line.result for line in self.body if line.operation in _FLAT[:-1]}
+        self._known: dict[tuple[int, tuple[Operand, ...]], Operand] = {}
+        self._masks: set[Operand] = set()
+        for line in self.body:
+            self._note(line)
+
+    def _note(self, line: Instruction) -> None:
+        self._known[line.operation, line.arguments] = line.result
+        product = line.operation == casadi.OP_IF_ELSE_ZERO and line.arguments[1] in self._masks
+        if line.operation in _CONDITIONS or product:
+            self._masks.add(line.result)
+
+    def take(self, longer: Tape) -> None:
+        """Go on from where another one that began as this stands."""
+        self.body, self._known, self._masks = longer.body, longer._known, longer._masks
 
     def put(self, operation: int, *arguments: Operand) -> Operand:
         """The result of an operation, which is appended unless it is known."""
@@ -40,9 +51,7 @@ class Tape:
         if (operation, arguments) not in self._known:
             result = ("t", "d", len(self.body))
             self.body.append(Instruction(operation, result, arguments))
-            self._known[operation, arguments] = result
-            if operation in _FLAT[:-1] or (operation == casadi.OP_IF_ELSE_ZERO and arguments[1] in self._masks):
-                self._masks.add(result)
+            self._note(self.body[-1])
         return self._known[operation, arguments]
 
     def add(self, a: Operand, b: Operand) -> Operand:
@@ -120,22 +129,31 @@ _RULES: dict[int, Rule] = {
     casadi.OP_IF_ELSE_ZERO: lambda t, x, r: (ZERO, x[0]),
     SELECT: lambda t, x, r: (ZERO, x[0], t.put(casadi.OP_NOT, x[0])),
     casadi.OP_ASSIGN: lambda t, x, r: (ONE,),
-    **{operation: lambda t, x, r: (ZERO,) * len(x) for operation in _FLAT},
+    **{operation: lambda t, x, r: (ZERO,) * len(x) for operation in (*_CONDITIONS, casadi.OP_SIGN)},
 }  # fmt: skip
 
 
 def derivatives(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand]) -> list[Row]:
     """The derivatives of results by inputs, whose instructions are appended to the tape.
 
+    Vertices that are alike in cost go in the order of the instructions or against it, whichever needs fewer operations.
     Raises TraceError for an operation that has no rule.
     """
+    tries = [Tape(tape.body), Tape(tape.body)]
+    found = [_eliminated(one, results, inputs, sign) for one, sign in zip(tries, (1, -1), strict=True)]
+    best = min((0, 1), key=lambda i: len(tries[i].body))
+    tape.take(tries[best])
+    return found[best]
+
+
+def _eliminated(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand], sign: int) -> list[Row]:
     into, out = _graph(tape, set(results), set(inputs))
     ends = {("end", i): r for i, r in enumerate(results)}
     for end, result in ends.items():
         if result in into or result in set(inputs):
             into[end] = {result: ONE}
             out.setdefault(result, set()).add(end)
-    order = {line.result: number for number, line in enumerate(tape.body)}
+    order = {line.result: sign * number for number, line in enumerate(tape.body)}
 
     def entry(vertex: Operand) -> tuple[int, int, Operand]:
         return len(into[vertex]) * len(out.get(vertex, ())), order[vertex], vertex
