@@ -23,11 +23,11 @@ HEADING = ("variant", "seconds for 100 starts", "evaluations a start", "starts a
 TEXT = (
     "The record of the section before; the plant's own values and 99 starts a factor of three around them. The library "
     "is `fit_dynamic` with Rodas4(1e-6), all 100 starts to the end, its result with standard deviations included. "
-    "SciPy's `least_squares` (trf, the same bounds, scaled by its Jacobian) takes differences of `solve_ivp` with LSODA "
-    "and rates written by hand in Python, whose start at rest is found by hand too; as SciPy has it, and with a "
+    "SciPy's `least_squares` (trf, the same bounds, scaled by its Jacobian) takes differences of `solve_ivp` with "
+    "LSODA and rates written by hand in Python, whose start at rest is found by hand too; as SciPy has it, and with a "
     "difference step chosen for the tolerance of the runs. It is run from one start a round, none of which fails, and "
-    "what it takes is scaled to the starts that can be run at all: where no rest exists both sides stop at once. A start "
-    "has reached the optimum within a thousandth of the least sum of squares."
+    "what it takes is scaled to the starts that can be run at all: where no rest exists both sides stop at once. A "
+    "start has reached the optimum within a thousandth of the least sum of squares."
 )
 
 

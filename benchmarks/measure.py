@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import metadata
 from typing import Any
 
-PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "casadi", "lmfit")
+PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "casadi", "lmfit", "jax")
 LEAST = 0.004
 """A variant quicker than this [s] is called several times in a round, so that it is timed warm and beyond the clock."""
 

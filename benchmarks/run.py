@@ -1,4 +1,4 @@
-"""Run all benchmarks and write RESULTS.md beside this file; about three minutes.
+"""Run all benchmarks and write RESULTS.md beside this file; about four minutes.
 
 ./run python benchmarks/run.py [--rounds-factor 1.0] [--print-only]
 """
@@ -16,9 +16,11 @@ os.environ.setdefault(
 )  # before NumPy: a second thread that waits for a core slows both sides
 
 import bootstrap
+import identification
 import new_plant
 import ode8
 import rodas4
+import sensitivities
 import startup
 import static_fit
 from measure import Bar, Section, machine, show, table, today, versions
@@ -27,6 +29,8 @@ RESULTS = pathlib.Path(__file__).with_name("RESULTS.md")
 SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (rodas4.section, 25),
     (ode8.section, 15),
+    (sensitivities.section, 15),
+    (identification.section, 3),
     (static_fit.section, 15),
     (bootstrap.section, 5),
     (new_plant.section, 7),

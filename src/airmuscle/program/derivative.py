@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Sequence
 import casadi
 
 from ..errors import TraceError
-from .instructions import SELECT, Code, Instruction, Operand
+from .instructions import SELECT, Instruction, Operand
 
 Row = dict[Operand, Operand]
 """The derivatives of one result by the inputs that it depends on."""

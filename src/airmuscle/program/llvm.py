@@ -107,12 +107,12 @@ class Block:
 def computed(
     block: Block, code: Code, inputs: Sequence[str], held: Mapping[Operand, int], given: Mapping[Operand, str]
 ) -> dict[tuple[int, int], str]:
-    """Append code to a block: `inputs` name the arrays, `held` says which operands stand in `c`, `given` which are known.
+    """Append code to a block: `inputs` name the arrays, `held` says what stands in `c`, `given` what is known.
 
     Returns the names of the results by output and index.
     """
     values = run(block, code.body, inputs, held, given)
-    return {(o, i): _value(block, operand, inputs, held, values) for o, i, operand in code.outputs}
+    return {(o, i): value_of(block, operand, inputs, held, values) for o, i, operand in code.outputs}
 
 
 def run(
@@ -122,12 +122,19 @@ def run(
     """Append instructions to a block; the names of their results, and of what was given."""
     values = dict(given)
     for line in body:
-        arguments = [_value(block, a, inputs, held, values) for a in line.arguments]
-        values[line.result] = block.operate(line.operation, arguments)
+        append(block, line, inputs, held, values)
     return values
 
 
-def _value(
+def append(
+    block: Block, line: Instruction, inputs: Sequence[str], held: Mapping[Operand, int], values: dict[Operand, str]
+) -> None:
+    """Append one instruction, and add the name of its result to `values`."""
+    arguments = [value_of(block, a, inputs, held, values) for a in line.arguments]
+    values[line.result] = block.operate(line.operation, arguments)
+
+
+def value_of(
     block: Block, operand: Operand, inputs: Sequence[str], held: Mapping[Operand, int], values: Mapping[Operand, str]
 ) -> str:
     if operand in held:
@@ -149,7 +156,7 @@ def hand_over(
     values = run(block, once, inputs, {}, {})
     held = {}
     for operand in handed:
-        value = _value(block, operand, inputs, {}, values)
+        value = value_of(block, operand, inputs, {}, values)
         if value not in places:
             places[value] = len(places)
             block.store("c", places[value], value)

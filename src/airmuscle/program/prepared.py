@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import declare
-from . import llvm, printed, tangent
+from . import llvm, printed, tangent, tangent_step
 from .printed import Sizes, Traced
 from .system import Differentiated, System
 
@@ -44,8 +44,10 @@ class Program:
         """The address of an explicit step of this tableau, and what it needs of the parameters."""
         if (a, b) not in self._steps:
             form = self._form
-            moved = isinstance(form, tangent.Moved)
-            text, held = tangent.explicit_module(form, a, b) if moved else printed.explicit_module(form, a, b)
+            if isinstance(form, tangent.Moved):
+                text, held = tangent_step.explicit_module(form, a, b)
+            else:
+                text, held = printed.explicit_module(form, a, b)
             self._steps[a, b] = llvm.compiled(text), held
         engine, held = self._steps[a, b]
         return int(engine.get_function_address("step")), _handed(engine, parameters, held)

@@ -90,11 +90,15 @@ class Printer:
 
         Returns the names of the results by output and index; nothing is stored.
         """
-        held: dict[Operand, int] = {}
-        if PARAMETERS in names:
-            code, once, handed = hoisted(code, names.index(PARAMETERS))
-            held = llvm.hand_over(self._prepare, once, handed, names, self._places)
+        code, held = self.without_parameters(code, names)
         return llvm.computed(block, code, names, held, given or {})
+
+    def without_parameters(self, code: Code, names: Sequence[str]) -> tuple[Code, dict[Operand, int]]:
+        """Code less what depends on parameters alone, which goes to `prepare`; what of it stands where in `c`."""
+        if PARAMETERS not in names:
+            return code, {}
+        code, once, handed = hoisted(code, names.index(PARAMETERS))
+        return code, llvm.hand_over(self._prepare, once, handed, names, self._places)
 
     def end(self, name: str, arguments: Sequence[str], block: llvm.Block) -> None:
         """Close a function; the argument that holds parameters becomes `c`."""

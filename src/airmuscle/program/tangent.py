@@ -1,4 +1,4 @@
-"""A system printed together with the derivatives of its states along columns: the step itself is differentiated.
+"""A system with the derivatives of its states along columns, and the functions of an implicit step of both.
 
 The state is x (n,) followed by S = dx/dtheta (n, K), row by row. All columns share the rates, their Jacobian J and
 the LU factors of d I - J; what differs from column to column is one vector operation. A Rosenbrock step also needs
@@ -123,38 +123,6 @@ def stored(values: Sequence[Value], array: str) -> None:
     for value in values:
         value.store(array, index)
         index += max(value.lanes, 1)
-
-
-def explicit_module(t: Moved, a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[str, int]:
-    """One whole step of an explicit method, as in `printed.explicit_module`: step(x, u, c, w, h, y)."""
-    rates = Values(t, t.inner.f)
-    along = rates.along(rates.results)
-    printer, block = Printer(), Block(["h"])
-    h, x = Value(block, "%h"), [loaded(block, "x", i) for i in range(t.size)] + t.rows(block, "x")
-    inputs = [(("in", POINT.index("u"), i), i) for i in range(t.inner.u.numel())]
-    slopes: list[list[Value]] = []
-
-    def times_h(weight: float) -> Value:
-        return h * Value(block, block.constant(weight))
-
-    def after(row: Sequence[float]) -> list[Value]:
-        """States and S after the stages so far, each with its weight."""
-        found = list(x)
-        for weight, slope in zip(row, slopes, strict=True):
-            if weight:
-                found = [value + d * times_h(weight) for value, d in zip(found, slope, strict=True)]
-        return found
-
-    for row in ((), *a):
-        at = after(row)
-        given = {("in", POINT.index("x"), i): at[i].name for i in range(t.size)}
-        for operand, i in inputs:
-            given[operand] = (loaded(block, "u", i) + loaded(block, "w", i) * times_h(sum(row))).name
-        values = rates.compute(printer, block, [*rates.results, *along.parts], POINT, given)
-        slopes.append([values[f] for f in rates.results] + along.rows(values, at[t.size :]))
-    stored(after(b), "y")
-    printer.end("step", ["x", "u", PARAMETERS, "w", "h", "y"], block)
-    return printer.module(), printer.held
 
 
 def implicit_module(t: Moved) -> tuple[str, Sizes]:

@@ -12,7 +12,7 @@ from .llvm import FLAGS, Block
 class Value:
     """The name of a value in a block: one `double`, or with `lanes` a vector `<lanes x double>`.
 
-    A number that meets a column is spread over its lanes. The lanes need not be a power of two: LLVM fills registers up.
+    A number that meets a column is spread over its lanes, which need not be a power of two.
     """
 
     block: Block

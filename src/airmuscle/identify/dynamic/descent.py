@@ -1,9 +1,9 @@
 """Levenberg-Marquardt within bounds, for residuals whose slopes come with them at little cost.
 
-    (N + lambda D^2) s = -g,   N = J^T J, g = J^T r over the unknowns that are loose, D the greatest norms of J's columns
+    (N + lambda D^2) s = -g,   N = J^T J, g = J^T r,   D the greatest norms of J's columns so far
 
-An unknown on its bound, which the descent would push beyond, is held for that step; a step that leaves the bounds ends
-on them. The damping follows the ratio of actual to promised descent.
+An unknown on its bound, which the descent would push beyond, is held for that step; one that the step would carry
+beyond goes to its bound, and the others are found anew. The damping follows the ratio of actual to promised descent.
 
 Reference: Moré, J. J., The Levenberg-Marquardt algorithm: implementation and theory, Lecture Notes in Mathematics 630,
 Springer 1978 (scaling by D); Nielsen, H. B., Damping parameter in Marquardt's method, IMM-REP-1999-05, DTU 1999.
@@ -41,14 +41,16 @@ def descended(residuals: Residuals, begin: Array, low: Array, high: Array, most:
     for _ in range(most - 1):
         normal, gradient = j.T @ j, j.T @ r
         scale = np.maximum(scale, np.sqrt(normal.diagonal()))
+        step = _step(normal, gradient, damping * np.where(scale > 0, scale, 1.0) ** 2, x, low, high)
         reach = np.maximum(FAR * np.abs(x), LEAST_FAR * np.minimum(high - low, 1.0))
-        near = np.maximum(low, x - reach), np.minimum(high, x + reach)
-        step = _step(normal, gradient, damping * np.where(scale > 0, scale, 1.0) ** 2, x, *near)
-        promised = -float(step @ (2 * gradient + normal @ step))
-        if promised <= ENOUGH * cost and damping < 1 or _small(step, x, scale):
+        step = step / max(1.0, float((np.abs(step) / reach).max()))
+        if _small(step, x, scale):
             break
-        tried = residuals(x + step)
-        ratio = (cost - float(tried[0] @ tried[0])) / promised if tried is not None and promised > 0 else -1.0
+        promised = -float(step @ (2 * gradient + normal @ step))
+        if 0 <= promised <= ENOUGH * cost and damping < 1:
+            break
+        tried = residuals(x + step) if promised > 0 else None
+        ratio = (cost - float(tried[0] @ tried[0])) / promised if tried is not None else -1.0
         if tried is not None and ratio > 0:
             x, (r, j), cost = x + step, tried, float(tried[0] @ tried[0])
             damping, growth = max(damping * max(1 / 3, 1 - (2 * ratio - 1) ** 3), LEAST_DAMPING), 2.0
