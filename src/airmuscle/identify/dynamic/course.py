@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ... import declare
 from ...command import Segments
 from ...errors import IdentificationError, ParameterError
-from ...method import Method
+from ...method import INTERRUPTED, Method
 from ...program import System
 from ...sensitive import Sensitive
 from .experiment import Experiment, StartTime, StartValue, Unknown
@@ -110,6 +110,8 @@ class Course:
         if self.columns:
             full[state.size :] = slopes.ravel()
         course = self.method.run(ready, clock.segments, 0.0, full, clock.times, most_steps=1_000_000)
+        if course.status == INTERRUPTED:
+            raise KeyboardInterrupt
         if course.status != 0:
             raise IdentificationError(
                 f"{self.experiment.recording.origin}: the run ended early, at {course.time:.4g} s."
