@@ -15,6 +15,7 @@ os.environ.setdefault(
     "OPENBLAS_NUM_THREADS", "1"
 )  # before NumPy: a second thread that waits for a core slows both sides
 
+import batch
 import bootstrap
 import identification
 import new_plant
@@ -29,6 +30,7 @@ RESULTS = pathlib.Path(__file__).with_name("RESULTS.md")
 SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (rodas4.section, 25),
     (ode8.section, 15),
+    (batch.section, 7),
     (sensitivities.section, 15),
     (identification.section, 3),
     (static_fit.section, 15),

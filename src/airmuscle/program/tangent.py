@@ -143,9 +143,14 @@ def implicit_module(t: Moved) -> tuple[str, Sizes]:
     _print_along(printer, "outputs", outputs, POINT, "o", slope)
     further, count = len(step.moving) * t.lanes, inner.o.numel()
     return printer.module(), Sizes(
-        t.size * (1 + t.lanes), inner.u.numel(), inner.p.numel(), printer.held, len(step.jacobian) + further,
-        step.factors.numel() + further, count * (2 + t.lanes),
-    )  # fmt: skip
+        states=t.size * (1 + t.lanes),
+        inputs=inner.u.numel(),
+        parameters=inner.p.numel() + t.lanes,  # a scale for each column comes last
+        held=printer.held,
+        jacobian=len(step.jacobian) + further,
+        factors=step.factors.numel() + further,
+        outputs=count * (2 + t.lanes),
+    )
 
 
 def _print_along(

@@ -23,7 +23,7 @@ class _Stage:
     ) -> None:
         self.rates, self.along, self.block, self.values = rates, along, block, given
         wanted = tuple((0, i, operand) for i, operand in enumerate([*rates.results, *along.parts]))
-        code, self.held = printer.without_parameters(finished(Code(tuple(rates.tape.body), wanted)), POINT)
+        code, self.held = printer.set_apart(finished(Code(tuple(rates.tape.body), wanted)), POINT)
         needed, first = set(rates.results), []
         for line in reversed(code.body):
             if line.result in needed:
