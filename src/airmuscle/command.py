@@ -5,14 +5,22 @@ from __future__ import annotations
 import abc
 import dataclasses
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from .errors import ParameterError, suggestion
 
+if TYPE_CHECKING:
+    from .recording import Recording
+
 Array = npt.NDArray[np.float64]
+MOST_INSTANTS = 10_000_000
+"""Instants of one command that fit a usual memory."""
+COARSEST, MOST_POINTS = 64, 100_000
+"""Lines that a function is followed by at first, and points at most."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -25,9 +33,20 @@ class Segments:
 
     def inputs_at(self, times: Array, start: float) -> Array:
         """The inputs (N, m) at times (N,); at an instant those that begin there."""
-        starts = np.concatenate([[start], self.ends[:-1]])
+        starts = self.starts(start)
         index = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, self.ends.size - 1)
         return np.asarray(self.values[index] + (times - starts[index])[:, None] * self.slopes[index])
+
+    def starts(self, start: float) -> Array:
+        """Where each segment begins (S,)."""
+        return np.concatenate([[start], self.ends[:-1]])
+
+    def cut_at(self, starts: Array, start: float) -> Segments:
+        """The same course with segments that begin at other instants (R,), in rising order, the first not before
+        `start`; within them it must have no instant of its own."""
+        index = np.maximum(np.searchsorted(self.starts(start), starts, side="right") - 1, 0)
+        ends = np.append(starts[1:], self.ends[-1])
+        return Segments(ends, self.inputs_at(starts, start), self.slopes[index])
 
 
 class Command(abc.ABC):
@@ -80,13 +99,12 @@ class Schedule(Command):
         refuse_unknown_input(list(self.changes), inputs)
         end = start + duration
         instants = {time for changes in self.changes.values() for time, _ in changes if start < time < end}
-        ends = np.array([*sorted(instants), end])
-        starts = np.concatenate([[start], ends[:-1]])
-        values = np.zeros((ends.size, len(inputs)))
+        starts = np.array([start, *sorted(instants)])
+        values = np.zeros((starts.size, len(inputs)))
         for i, name in enumerate(inputs):
-            for time, value in self.changes.get(name, ()):
-                values[starts >= time, i] = value
-        return Segments(ends, values, np.zeros_like(values))
+            times, levels = np.array([(-np.inf, 0.0), *self.changes.get(name, ())], dtype=float).T
+            values[:, i] = levels[np.searchsorted(times, starts, side="right") - 1]
+        return Segments(np.append(starts[1:], end), values, np.zeros_like(values))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -102,6 +120,28 @@ class Signal(Command):
                 raise ParameterError(f"the signal of '{name}' must be finite points (time, value); it is {points}.")
             _refuse_disorder("signal", "times", name, [time for time, _ in points])
 
+    @classmethod
+    def recorded(cls, recording: Recording, columns: Mapping[str, str]) -> Signal:
+        """What was measured, as a command: for each input the column of the recording that it follows.
+
+        `Signal.recorded(read_csv("bench.csv"), {"fill": "fill"})`; the values are those of the recording, in SI.
+        """
+        times = recording["time"].tolist()
+        return cls({name: tuple(zip(times, recording[c].tolist(), strict=True)) for name, c in columns.items()})
+
+    @classmethod
+    def sampled(
+        cls, functions: Mapping[str, Callable[[float], float]], *, duration: float, start: float = 0.0,
+        error: float = 1e-4,
+    ) -> Signal:  # fmt: skip
+        """Functions of time [s], followed to within `error` by straight lines that are halved until they do.
+
+        Each line is held against its function at a quarter, a half and three quarters of it, and none is longer than
+        1/64 of the duration (chosen); what a function does between those points is not seen. Raises ParameterError for
+        a function that 100 000 points do not follow, and for one that jumps: give that one as a Schedule.
+        """
+        return cls({name: _followed(name, f, start, start + duration, error) for name, f in functions.items()})
+
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
         refuse_unknown_input(list(self.points), inputs)
         end = start + duration
@@ -114,6 +154,64 @@ class Signal(Command):
                 times, levels = np.array(self.points[name], dtype=float).T
                 values[:, i] = np.interp(edges, times, levels)
         return Segments(ends, values[:-1], np.diff(values, axis=0) / np.diff(edges)[:, None])
+
+
+def _followed(
+    name: str, function: Callable[[float], float], start: float, end: float, error: float
+) -> tuple[tuple[float, float], ...]:
+    """Points on a function whose connecting lines stay within `error` of it."""
+    if not (0 < error < np.inf and -np.inf < start < end < np.inf):
+        raise ParameterError(
+            f"the signal of '{name}': from {start!r} to {end!r} s within {error!r}; an error above 0 is needed, and a "
+            "duration above 0."
+        )
+    times = np.linspace(start, end, COARSEST + 1)
+    values = np.array([function(t) for t in times.tolist()], dtype=float)
+    while True:
+        lengths = np.diff(times)
+        between = times[:-1] + np.array([[0.25], [0.5], [0.75]]) * lengths
+        found = np.array([[function(t) for t in row] for row in between.tolist()], dtype=float)
+        away = np.abs(found - np.interp(between, times, values)).max(axis=0)
+        at = np.flatnonzero(away > error)
+        if at.size == 0:
+            return tuple(zip(times.tolist(), values.tolist(), strict=True))
+        if times.size + at.size > MOST_POINTS or lengths[at].min() < 1e-9 * (end - start):
+            raise ParameterError(
+                f"the signal of '{name}' is not followed to {error:g} by {times.size} points: it differs by "
+                f"{away.max():g} at {times[np.argmax(away)]:g} s. Allow a larger error; give what jumps as a Schedule."
+            )
+        times, values = np.insert(times, at + 1, between[1, at]), np.insert(values, at + 1, found[1, at])
+
+
+@dataclasses.dataclass(frozen=True)
+class Periodic(Command):
+    """The first `period` [s] of another command, from its time 0 on, over and over, before time 0 too.
+
+    Drivers go around it, `Driven(Periodic(...), ...)`: inside it they would begin anew with every period.
+    """
+
+    inner: Command
+    period: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.period < np.inf:
+            raise ParameterError(f"Periodic.period is {self.period!r} s; it must be positive and finite.")
+
+    def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
+        once, end = self.inner.segments(inputs, 0.0, self.period), start + duration
+        first, last = np.floor(start / self.period), np.ceil(end / self.period)
+        if (last - first) * once.ends.size > MOST_INSTANTS:
+            raise ParameterError(
+                f"a command of {once.ends.size} pieces every {self.period:g} s makes more than {MOST_INSTANTS} "
+                f"instants in {duration:g} s. Simulate a shorter time."
+            )
+        begins, size = self.period * np.arange(first, last), (int(last - first), 1)
+        starts = (begins[:, None] + once.starts(0.0)).ravel()
+        rounding = 4 * np.spacing(max(abs(start), self.period))
+        starts[np.abs(starts - start) <= rounding] = start  # 3 * 0.1 is more than 0.3: no piece of 1e-17 s
+        whole = Segments(np.append(starts[1:], end), np.tile(once.values, size), np.tile(once.slopes, size))
+        within = starts[(starts > start) & (starts < end)]
+        return whole.cut_at(np.append(start, within), float(starts[0]))
 
 
 REST = Schedule({})

@@ -1,80 +1,111 @@
-"""Energy books: a plant that also integrates what its parts take and give, so that each balance can be checked."""
+"""Books: a plant that also integrates what its parts take and give, so that each balance can be checked."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-from . import trace
 from .declare import model
+from .muscle import Muscle, SeriesSpring
 from .ops import Value
-from .plant import Plant, Port
-from .program import StateVariable
+from .plant import Plant, Port, total_air
+from .variables import StateVariable
 
-_METERS = {
-    "work_of_tension": "work of all tensions on the mechanism",
-    "work_of_air": "work of the air on its enclosures, against their absolute pressure",
-    "energy_of_flow": "energy that came in with the air",
-    "damping_heat": "work that the dampers turned into heat",
-}
-_FRICTION = {"friction_work": "work done against friction: heat, and what its bristles hold"}
+_METERS = (
+    StateVariable("work_of_tension", "J", 1.0, "work of all tensions on the mechanism"),
+    StateVariable("work_of_air", "J", 1.0, "work of the air on its enclosures, against their absolute pressure"),
+    StateVariable("energy_of_flow", "J", 1.0, "energy that came into the muscles with the air"),
+    StateVariable("heat_to_air", "J", 1.0, "heat that the walls gave to the air in the muscles"),
+    StateVariable("damping_heat", "J", 1.0, "work that the dampers turned into heat"),
+    StateVariable("work_of_contractile", "J", 1.0, "work of the contractile elements"),
+    StateVariable("element_work", "J", 1.0, "work done against springs, creep and end stops: heat, and what they hold"),
+    StateVariable("air_supplied", "kg", 1e-3, "air that came from outside the plant"),
+    StateVariable("air_exhausted", "kg", 1e-3, "air that went to the surroundings"),
+)
+_FRICTION = StateVariable("friction_work", "J", 1.0, "work done against friction: heat, and what its bristles hold")
 
 
 @model
 class Metered:
-    """A plant with four meters [J] as further states, five where a muscle has friction, and its energies as outputs.
+    """A plant with meters as further states, and its energies and its air as outputs.
 
-    Two books must close. Mechanical: kinetic + potential energy grow by `work_of_tension`, as long as the latch does
-    no work. Air: `air_energy` grows by `energy_of_flow` less `work_of_air`.
+    Four books must close. Mechanical: kinetic + potential energy grow by `work_of_tension`, which counts the push of an
+    end stop, as long as the latch and what the mechanism loses by itself do no work. Muscle: `work_of_contractile` is
+    `work_of_tension` + `damping_heat` + `element_work` + `friction_work` (where there is friction), as long as no
+    muscle hangs slack: a slack one passes nothing on. Air: `air_energy`, of the air in the muscles, grows by
+    `energy_of_flow` + `heat_to_air` less `work_of_air`. Mass: `air_total`, of all air, grows by `air_supplied` less
+    `air_exhausted`.
     """
 
     plant: Plant
 
     @property
-    def meters(self) -> dict[str, str]:
-        """Name and meaning of every meter."""
-        return _METERS | (_FRICTION if any(m.friction.states for m in self.plant.muscles) else {})
+    def meters(self) -> tuple[StateVariable, ...]:
+        """Every meter."""
+        return (*_METERS, _FRICTION) if any(m.friction.states for m in self.plant.muscles) else _METERS
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
         """The plant's states, then the meters."""
-        return (*self.plant.states, *(StateVariable(name, "J", 1.0, meaning) for name, meaning in self.meters.items()))
+        return (*self.plant.states, *self.meters)
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """The plant's inputs."""
         return self.plant.inputs
 
+    def reset(self, state: Mapping[str, float]) -> dict[str, float]:
+        """A state of the plant with every meter at zero."""
+        return {**state, **{meter.name: 0.0 for meter in self.meters}}
+
     def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
         """The plant's rates, and the power that each meter integrates."""
         plant = self.plant
         ports = plant.ports(state)
-        rates = dict.fromkeys(self.meters, 0.0)
-        flows = plant.mass_flows(ports, inputs)
-        for muscle, prefix, port, flow in zip(plant.muscles, plant.prefixes, ports, flows, strict=True):
-            per_length = muscle.geometry.volume_growth(port.contraction) / muscle.geometry.resting_length
-            rates["work_of_tension"] += port.tension * port.speed
-            rates["work_of_air"] += port.absolute_pressure * per_length * port.speed
-            rates["energy_of_flow"] += self._potential(state[f"{prefix}air_mass"], port) * flow
-            rates["damping_heat"] += muscle.damper.force(port.pressure, port.speed) * port.speed
-            if muscle.friction.states:
-                rates["friction_work"] += port.friction * port.speed
-        return {**plant.rates(state, inputs), **rates}
-
-    def _potential(self, air_mass: Value, port: Port) -> Value:
-        """Energy that a kilogram brings along [J/kg]: the slope of the air's energy by its mass."""
-        gas, ambient = self.plant.gas, self.plant.ambient
-        return trace.directional(lambda x: [gas.energy(x[0], port.volume, ambient)], [air_mass], [1.0])[0]
+        powers: dict[str, Value] = dict.fromkeys((meter.name for meter in self.meters), 0.0)
+        responses = plant.responses(ports, state, inputs)
+        flows = [flow for response in responses for flow in response.flows]
+        for muscle, port, flow in zip(plant.muscles, ports, flows, strict=True):
+            powers["work_of_tension"] += port.tension * port.speed
+            powers["work_of_air"] += port.air.pressure * port.volume_rate
+            powers["energy_of_flow"] += plant.gas.carried(port.states, flow, port.volume, plant.ambient)
+            powers["heat_to_air"] += plant.gas.warmed(port.air, plant.ambient)
+            for name, power in _muscle_powers(muscle, port).items():
+                powers[name] += power
+        for response in responses:
+            powers["air_supplied"] += response.drawn.mass
+            powers["air_exhausted"] += response.exhausted.mass
+        return {**plant.rates(state, inputs), **powers}
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Any]:
-        """The plant's outputs, and kinetic, potential and air energy [J]."""
+        """The plant's outputs; kinetic, potential and the muscles' air energy [J]; mass of all air [kg]."""
         plant = self.plant
-        air: Value = 0.0
-        for prefix, port in zip(plant.prefixes, plant.ports(state), strict=True):
-            air = air + plant.gas.energy(state[f"{prefix}air_mass"], port.volume, plant.ambient)
+        own = {s.name: state[s.name] for s in plant.states}
         return {
             **plant.outputs(state, inputs),
             "kinetic_energy": plant.mechanism.kinetic_energy(state, state),
             "potential_energy": plant.mechanism.potential_energy(state),
-            "air_energy": air,
+            "air_energy": sum(self._stored(port) for port in plant.ports(state)),
+            "air_total": total_air(own),
         }
+
+    def _stored(self, port: Port) -> Value:
+        return self.plant.gas.stored(port.states, port.volume, self.plant.ambient)
+
+
+def _muscle_powers(muscle: Muscle, port: Port) -> dict[str, Value]:
+    """What the elements inside a muscle give and take [W]."""
+    pressure, inner, speed = port.pressure, port.inner_contraction, port.inner_speed
+    length = muscle.geometry.resting_length
+    against = muscle.spring.force(pressure, inner, length) + muscle.stop.force(inner, speed, length)
+    if muscle.creep.states:
+        against = against + muscle.creep.force(port.states)
+    held = against * speed
+    if isinstance(muscle.series, SeriesSpring):
+        held = held + port.tension * (speed - port.speed)
+    found = {
+        "work_of_contractile": muscle.contractile.force(pressure, inner) * speed,
+        "element_work": held,
+        "damping_heat": muscle.damper.force(pressure, inner, speed) * speed,
+    }
+    return {**found, "friction_work": port.friction * speed} if muscle.friction.states else found

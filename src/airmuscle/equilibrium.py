@@ -122,6 +122,9 @@ class _Search:
         """The pull [N] of a single muscle that would hold the load; NaN for several muscles."""
         if len(self.plant.muscles) > 1:
             return float("nan")
-        state, name = self.state(x), self.coordinate
-        zero, one = (float(self.plant.mechanism.acceleration(state, state, [t], self.inputs)[name]) for t in (0.0, 1.0))
-        return -zero / (one - zero)
+        state, mechanism = self.state(x), self.plant.mechanism
+        found = []
+        for tension in (0.0, 1.0):
+            pulls = mechanism.pulls(state, [tension], self.plant.resting_lengths)
+            found.append(float(mechanism.acceleration(state, state, pulls, self.inputs)[self.coordinate]))
+        return -found[0] / (found[1] - found[0])

@@ -20,11 +20,11 @@ Array = npt.NDArray[np.float64]
 REASONS = {
     0: "done",
     2: "the step became too small",
-    3: "the rates are not finite",
+    3: "a rate or an output is not finite",
     4: "it took more steps than allowed",
     5: "it was interrupted",
 }
-PAUSED, TOO_MANY, INTERRUPTED = 1, 4, 5
+PAUSED, NOT_FINITE, TOO_MANY, INTERRUPTED = 1, 3, 4, 5
 BUDGET = 100_000
 """Steps between two looks at whether the user wants to stop."""
 

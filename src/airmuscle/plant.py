@@ -2,38 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
-from .circuit import Circuit
+from .circuit import Circuit, Response
+from .circuit.supply import refuse_shared
 from .declare import model
 from .errors import ParameterError, TraceError
-from .gas import Ambient, Gas, Polytropic, absolute, gauge, refuse_vacuum
+from .gas import Air, Ambient, Flow, Gas, Polytropic, absolute, gauge, refuse_vacuum
 from .mechanism import Mechanism
 from .muscle import Muscle
 from .ops import Value
 from .program import StateVariable
+from .variables import Input, outside, renamed, within
 
 
 class Port(NamedTuple):
-    """One muscle at one moment: contraction [1], shortening speed [m/s], volume [m3], pressures [Pa], forces [N]."""
+    """One muscle at one moment: contraction [1], shortening speed [m/s], volume [m3], pressures [Pa], forces [N].
+
+    `inner_contraction` and `inner_speed` are those of the contractile part, which differ from the fittings' beside a
+    series spring. `states` are the muscle's own and those of its air, by their own names; `rates` those of the former.
+    """
 
     contraction: Value
     speed: Value
     volume: Value
-    absolute_pressure: Value
+    air: Air
     pressure: Value
     tension: Value
     friction: Value
-    bristles: Mapping[str, Value]
+    inner_contraction: Value
+    inner_speed: Value
+    volume_rate: Value
+    states: Mapping[str, Value]
+    rates: Mapping[str, Value]
 
 
 @model
 class Plant:
     """Ordinary differential equations of muscles, valves and load. Air mass [kg] is the state, pressure an output.
 
-    `muscle` and `circuit` are one each, or tuples of the same length. With one muscle the names are plain
-    (`air_mass`, `pressure`, `bristle`); with several they carry its name (`left.pressure`, `left.bristle`).
+    `muscle` is one or a tuple. `circuit` is a tuple with one for each muscle, or a single one that feeds them all.
+    With one muscle the names are plain (`air_mass`, `pressure`, `bristle`); with several they carry its name
+    (`left.pressure`, `left.bristle`). What belongs to a circuit in a tuple carries the name of its muscle.
     """
 
     muscle: Muscle | tuple[Muscle, ...]
@@ -43,9 +54,20 @@ class Plant:
     ambient: Ambient = Ambient()
 
     def check(self) -> None:
+        kinds = {"mechanism": Mechanism, "gas": Gas, "ambient": Ambient}
+        parts = [(field, getattr(self, field), kind) for field, kind in kinds.items()]
+        parts += [("muscle", m, Muscle) for m in self.muscles] + [("circuit", c, Circuit) for c in self.circuits]
+        for field, part, kind in parts:
+            if not isinstance(part, kind):
+                raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {part!r}.")
+        for circuit in self.circuits:
+            refuse_shared(f"Plant: its {type(circuit).__name__}", circuit.supply)
         names = [m.name for m in self.muscles]
-        if len(self.circuits) != len(names):
-            raise ParameterError(f"Plant: {len(names)} muscles need as many circuits; {len(self.circuits)} given.")
+        ports = sum(c.ports for c in self.circuits)
+        if ports != len(names):
+            raise ParameterError(f"Plant: its circuits feed {ports} muscles; {len(names)} are given.")
+        if isinstance(self.circuit, tuple) and any(c.ports != 1 for c in self.circuit):
+            raise ParameterError("Plant: a circuit that feeds several muscles stands alone, not in a tuple.")
         if len(set(names)) < len(names):
             raise ParameterError(f"Plant: muscles need different names; they are {names}.")
         for muscle in self.muscles:
@@ -55,6 +77,13 @@ class Plant:
                         f"{type(part).__name__} of {muscle.name} is not closed-form and cannot enter a plant. Use "
                         "as_force_law(law, box) for a characteristic, as_polynomial(geometry) for a geometry."
                     )
+        self._refuse_twice()
+
+    def _refuse_twice(self) -> None:
+        names = [s.name for s in self.states] + [i.name for i in self.commands]
+        for name in names:
+            if names.count(name) > 1:
+                raise ParameterError(f"Plant: two of its parts use the name '{name}'; rename one of them.")
 
     @property
     def muscles(self) -> tuple[Muscle, ...]:
@@ -63,7 +92,7 @@ class Plant:
 
     @property
     def circuits(self) -> tuple[Circuit, ...]:
-        """The circuit of each muscle."""
+        """The circuits: one for each muscle, or a single one for all."""
         return self.circuit if isinstance(self.circuit, tuple) else (self.circuit,)
 
     @property
@@ -72,108 +101,163 @@ class Plant:
         return ("",) if len(self.muscles) == 1 else tuple(f"{m.name}." for m in self.muscles)
 
     @property
+    def circuit_prefixes(self) -> tuple[str, ...]:
+        """What the names of each circuit's quantities begin with."""
+        return self.prefixes if len(self.circuits) == len(self.muscles) else ("",)
+
+    @property
+    def resting_lengths(self) -> list[Value]:
+        """Of every muscle [m]."""
+        return [m.geometry.resting_length for m in self.muscles]
+
+    @property
     def states(self) -> tuple[StateVariable, ...]:
-        """Air masses, the mechanism's coordinates and their speeds, then the bristles of the muscles' friction."""
-        air, bristles = [], []
+        """What the muscles' air holds, the mechanism's coordinates and speeds, then states of muscles and circuits."""
+        air, inner = [], []
         for prefix, muscle in zip(self.prefixes, self.muscles, strict=True):
-            size = self.gas.air_mass(self.ambient.pressure, muscle.geometry.volume(0.05), self.ambient)
-            air.append(StateVariable(f"{prefix}air_mass", "kg", size, f"mass of the air in {muscle.name}"))
-            for b in muscle.friction.states:
-                bristles.append(StateVariable(f"{prefix}{b.name}", b.unit, b.nominal, f"{b.meaning} of {muscle.name}"))
+            of_air = self.gas.states(muscle.geometry.volume(0.05), self.ambient)
+            air += _of_muscle(prefix, muscle, of_air)
+            inner += _of_muscle(prefix, muscle, muscle.states)
         moving = []
         for c in self.mechanism.coordinates:
             moving.append(StateVariable(c.name, c.unit, c.nominal, f"{c.name} of the load"))
             moving.append(StateVariable(c.speed, f"{c.unit}/s", c.nominal_speed, f"{c.speed} of the load"))
-        return (*air, *moving, *bristles)
+        circuits = [s for p, c in self._circuits() for s in renamed(p, c.states(self.ambient))]
+        return (*air, *moving, *inner, *circuits)
+
+    @property
+    def commands(self) -> tuple[Input, ...]:
+        """Inputs of the circuits, then of the mechanism, with what may be commanded."""
+        return (*(i for p, c in self._circuits() for i in renamed(p, c.inputs)), *self.mechanism.inputs)
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Openings of the valves, then inputs of the mechanism."""
-        valves = [f"{p}{name}" for p, c in zip(self.prefixes, self.circuits, strict=True) for name in c.inputs]
-        return (*valves, *self.mechanism.inputs)
+        """The names of all inputs."""
+        return tuple(i.name for i in self.commands)
+
+    def _circuits(self) -> Iterator[tuple[str, Circuit]]:
+        return zip(self.circuit_prefixes, self.circuits, strict=True)
 
     def ports(self, state: Mapping[str, Value]) -> tuple[Port, ...]:
         """Every muscle at a state."""
-        lengths = [m.geometry.resting_length for m in self.muscles]
-        contractions = self.mechanism.contractions(state, lengths)
-        speeds = self.mechanism.contraction_speeds(state, state, lengths)
+        contractions = self.mechanism.contractions(state, self.resting_lengths)
+        speeds = self.mechanism.contraction_speeds(state, state, self.resting_lengths)
         return tuple(
-            self._port(m, state[f"{prefix}air_mass"], contraction, speed, _bristles(m, prefix, state))
-            for m, prefix, contraction, speed in zip(self.muscles, self.prefixes, contractions, speeds, strict=True)
+            self._port(muscle, within(prefix, state), contraction, speed)
+            for muscle, prefix, contraction, speed in zip(
+                self.muscles, self.prefixes, contractions, speeds, strict=True
+            )
         )
 
-    def _port(
-        self, muscle: Muscle, air_mass: Value, contraction: Value, speed: Value, bristles: Mapping[str, Value]
-    ) -> Port:
-        volume = muscle.geometry.volume(contraction)
-        inside = self.gas.pressure(air_mass, volume, self.ambient)
-        pressure = gauge(inside, self.ambient)
-        tension = muscle.tension(pressure, contraction, speed, bristles)
-        friction = muscle.friction_force(speed, bristles)
-        return Port(contraction, speed, volume, inside, pressure, tension, friction, bristles)
+    def _port(self, muscle: Muscle, state: Mapping[str, Value], contraction: Value, speed: Value) -> Port:
+        inner = muscle.inner_contraction(contraction, state)
+        volume = muscle.volume(inner, state)
+        air = self.gas.air(state, volume, self.ambient)
+        pressure = gauge(air.pressure, self.ambient)
+        pull = muscle.pull(pressure, inner, contraction, speed, state)
+        rates = muscle.rates(state, pressure, pull.speed)
+        growth = muscle.geometry.volume_growth(inner) * pull.speed / muscle.geometry.resting_length
+        growth = sum((rates[s.name] for s in muscle.wall.states), growth)
+        return Port(
+            contraction, speed, volume, air, pressure, pull.tension, pull.friction, inner, pull.speed, growth, state,
+            rates,
+        )  # fmt: skip
 
-    def mass_flows(self, ports: tuple[Port, ...], inputs: Mapping[str, Value]) -> tuple[Value, ...]:
-        """Mass flow [kg/s] into every muscle."""
-        flows = []
-        for port, circuit, prefix in zip(ports, self.circuits, self.prefixes, strict=True):
-            openings = {name: inputs[f"{prefix}{name}"] for name in circuit.inputs}
-            flows.append(circuit.mass_flow(port.absolute_pressure, openings, self.ambient))
-        return tuple(flows)
+    def responses(
+        self, ports: tuple[Port, ...], state: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> tuple[Response, ...]:
+        """What every circuit does."""
+        airs = [port.air for port in ports]
+        shares = [tuple(airs)] if len(self.circuits) < len(ports) else [(air,) for air in airs]
+        return tuple(
+            circuit.respond(share, within(prefix, state), within(prefix, inputs), self.ambient)
+            for (prefix, circuit), share in zip(self._circuits(), shares, strict=True)
+        )
 
     def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
         """The time derivative of every state."""
         ports = self.ports(state)
-        rates = {f"{p}air_mass": q for p, q in zip(self.prefixes, self.mass_flows(ports, inputs), strict=True)}
-        pulls = self.mechanism.acceleration(state, state, [port.tension for port in ports], inputs)
+        done = self.responses(ports, state, inputs)
+        rates: dict[str, Value] = {}
+        for port, prefix, flow in zip(ports, self.prefixes, _flows(done), strict=True):
+            rates |= outside(prefix, self.gas.rates(port.states, port.air, flow, port.volume_rate, self.ambient))
+            rates |= outside(prefix, port.rates)
+        accelerations = self._accelerations(state, ports, inputs)
         for c in self.mechanism.coordinates:
-            rates[c.name] = state[c.speed]
-            rates[c.speed] = pulls[c.name]
-        for muscle, prefix, port in zip(self.muscles, self.prefixes, ports, strict=True):
-            bending = muscle.friction.rates(port.bristles, port.speed)
-            rates |= {f"{prefix}{name}": rate for name, rate in bending.items()}
+            rates |= {c.name: state[c.speed], c.speed: accelerations[c.name]}
+        for (prefix, _), response in zip(self._circuits(), done, strict=True):
+            rates |= outside(prefix, response.rates)
         return rates
 
+    def _accelerations(
+        self, state: Mapping[str, Value], ports: tuple[Port, ...], inputs: Mapping[str, Value]
+    ) -> Mapping[str, Value]:
+        pulls = self.mechanism.pulls(state, [port.tension for port in ports], self.resting_lengths)
+        return self.mechanism.acceleration(state, state, pulls, inputs)
+
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
-        """Gauge pressure, contraction, tension, friction, volume and mass flow of every muscle; accelerations."""
+        """Gauge pressure, contraction, tension, volume, mass flow of every muscle (temperature where the gas keeps
+        account of it, friction where there is any), what circuits show, and accelerations."""
         ports = self.ports(state)
+        done = self.responses(ports, state, inputs)
         found: dict[str, Value] = {}
-        flows = self.mass_flows(ports, inputs)
-        for muscle, prefix, port, flow in zip(self.muscles, self.prefixes, ports, flows, strict=True):
+        for muscle, prefix, port, flow in zip(self.muscles, self.prefixes, ports, _flows(done), strict=True):
             found[f"{prefix}pressure"] = port.pressure
             found[f"{prefix}contraction"] = port.contraction
             found[f"{prefix}force"] = port.tension
             found[f"{prefix}volume"] = port.volume
-            found[f"{prefix}mass_flow"] = flow
+            found[f"{prefix}mass_flow"] = flow.mass
             if muscle.friction.states:
                 found[f"{prefix}friction"] = port.friction
-        pulls = self.mechanism.acceleration(state, state, [port.tension for port in ports], inputs)
+            if "internal_energy" in port.states:
+                found[f"{prefix}temperature"] = port.air.temperature
+        for (prefix, _), response in zip(self._circuits(), done, strict=True):
+            found |= outside(prefix, response.outputs)
+        accelerations = self._accelerations(state, ports, inputs)
         for c in self.mechanism.coordinates:
-            found["acceleration" if len(pulls) == 1 else f"{c.name}.acceleration"] = pulls[c.name]
+            found["acceleration" if len(accelerations) == 1 else f"{c.name}.acceleration"] = accelerations[c.name]
         return found
 
-    def state_at(self, *, pressure: float | tuple[float, ...], **coordinates: float) -> dict[str, float]:
-        """A state by what is known of it: gauge pressure [Pa] of the muscle (or of each), coordinates, speeds.
+    def state_at(self, *, pressure: float | tuple[float, ...], **values: float) -> dict[str, float]:
+        """A state by what is known of it: gauge pressure [Pa] of the muscle (or of each), and states by name.
 
-        What is not named is 0, bristles too. Raises ParameterError for a pressure below absolute zero or an unknown
-        name.
+        Coordinates and speeds that are not named are 0; walls, tubes, tanks and series springs are settled at this
+        pressure, bristles relaxed. Names with a dot are passed as `**{"left.bristle": 1e-4}`. Raises ParameterError
+        for a pressure below absolute zero or an unknown name.
         """
         pressures = pressure if isinstance(pressure, tuple) else (pressure,) * len(self.muscles)
-        moving = {s.name: 0.0 for s in self.states[len(self.muscles) :]}
-        for name in coordinates:
-            if name not in moving:
-                raise ParameterError(f"Plant: no coordinate '{name}'; there are {', '.join(moving) or 'none'}.")
-        moving |= coordinates
-        lengths = [m.geometry.resting_length for m in self.muscles]
-        contractions = self.mechanism.contractions(moving, lengths)
-        air = {}
-        for muscle, prefix, p, contraction in zip(self.muscles, self.prefixes, pressures, contractions, strict=True):
+        air = {f"{p}{s.name}" for p, m in zip(self.prefixes, self.muscles, strict=True)
+               for s in self.gas.states(m.geometry.volume(0.05), self.ambient)}  # fmt: skip
+        order = [s.name for s in self.states]
+        free = [name for name in order if name not in air]
+        for name in values:
+            if name not in free:
+                raise ParameterError(f"Plant: no coordinate '{name}'; there are {', '.join(free) or 'none'}.")
+        state = {n: 0.0 for c in self.mechanism.coordinates for n in (c.name, c.speed)} | values
+        contractions = self.mechanism.contractions(state, self.resting_lengths)
+        airs = []
+        for muscle, prefix, p, eps in zip(self.muscles, self.prefixes, pressures, contractions, strict=True):
             refuse_vacuum(p, self.ambient)
-            muscle.geometry.refuse_out_of_reach(contraction)
-            volume = muscle.geometry.volume(contraction)
-            air[f"{prefix}air_mass"] = float(self.gas.air_mass(absolute(p, self.ambient), volume, self.ambient))
-        return {**air, **moving}
+            muscle.geometry.refuse_out_of_reach(eps)
+            own = {**muscle.settled(p, eps), **within(prefix, values)}
+            volume = muscle.volume(muscle.inner_contraction(eps, own), own)
+            content = self.gas.content(absolute(p, self.ambient), volume, self.ambient)
+            airs.append(self.gas.air(content, volume, self.ambient))
+            state = {**outside(prefix, {**content, **own}), **state}
+        shares = [tuple(airs)] if len(self.circuits) < len(airs) else [(air,) for air in airs]
+        for (prefix, circuit), share in zip(self._circuits(), shares, strict=True):
+            state = {**outside(prefix, circuit.settled(share, self.ambient)), **state}
+        return {name: float(state[name]) for name in order}
 
 
-def _bristles(muscle: Muscle, prefix: str, state: Mapping[str, Value]) -> dict[str, Value]:
-    """A muscle's bristles by their own names, taken from the plant's state."""
-    return {b.name: state[f"{prefix}{b.name}"] for b in muscle.friction.states}
+def _of_muscle(prefix: str, muscle: Muscle, states: tuple[StateVariable, ...]) -> list[StateVariable]:
+    return [StateVariable(f"{prefix}{s.name}", s.unit, s.nominal, f"{s.meaning} of {muscle.name}") for s in states]
+
+
+def _flows(responses: tuple[Response, ...]) -> list[Flow]:
+    return [flow for response in responses for flow in response.flows]
+
+
+def total_air(state: Mapping[str, Any]) -> Value:
+    """Mass of all air that is in a plant [kg]: what its muscles, tubes and tanks hold."""
+    return sum(value for name, value in state.items() if name.endswith("air_mass"))

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from .command import Command, Schedule, Segments
 from .equilibrium import equilibrium
 from .errors import ParameterError, SimulationError, suggestion
-from .method import INTERRUPTED, REASONS, Course, Method, Rodas4
+from .method import INTERRUPTED, NOT_FINITE, REASONS, Course, Method, Rodas4
 from .plant import Plant
 from .program import System
 from .recording import Recording
@@ -61,11 +61,13 @@ def simulate(
     method = method or Rodas4()
     ready = prepared(plant)
     segments = command.segments(plant.inputs, start_time, duration)
-    refuse_beyond_opening(plant, segments, start_time)
+    refuse_beyond_range(plant, segments, start_time)
     times = output_times(output, start_time, duration, segments.ends)
     state = _vector(plant, start)
     course = method.run(ready, segments, start_time, state, times)
-    recording = _recorded(ready, course, segments, times, start_time, method)
+    results, inputs = _results(ready, course, segments, times, start_time)
+    course = _stopped_where_not_finite(course, results, times)
+    recording = _recorded(ready, course, results, inputs, times, method)
     if course.status != 0:
         problem = _problem(plant, course, start_time + duration)
         recording = dataclasses.replace(recording, notes=(*recording.notes, problem))
@@ -77,24 +79,35 @@ def simulate(
 def advance(
     plant: System,
     state: Mapping[str, float],
-    inputs: Mapping[str, float],
+    inputs: Mapping[str, float] | Segments,
     dt: float,
     method: Method | None = None,
+    *,
+    start_time: float = 0.0,
 ) -> dict[str, float]:
     """The state after `dt` [s] with the inputs held: the seam that controllers and exports call.
 
-    Raises SimulationError where the step fails, ParameterError for an unknown name or an opening beyond 0 to 1.
+    Inputs that move meanwhile, as a driver makes them, are given as Segments from `start_time` on:
+    `segments, memory = Driven(hold, drivers).step(memory, plant.inputs, start_time, dt)`.
+    Raises SimulationError where the step fails, ParameterError for an unknown name or an input beyond its range.
     """
     from .program.prepared import prepared
 
     if not 0 < dt < np.inf:
         raise ParameterError(f"advance: dt is {dt!r} s; it must be positive and finite.")
-    hold = Schedule({name: ((0.0, float(value)),) for name, value in inputs.items()})
-    segments = hold.segments(plant.inputs, 0.0, dt)
-    refuse_beyond_opening(plant, segments, 0.0)
-    course = (method or Rodas4()).run(prepared(plant), segments, 0.0, _vector(plant, state), np.empty(0))
+    if isinstance(inputs, Segments):
+        segments = inputs
+        if abs(float(segments.ends[-1]) - start_time - dt) > 1e-9 * dt:
+            raise ParameterError(
+                f"advance: the segments end at {segments.ends[-1]:g} s; start_time + dt is {start_time + dt:g} s."
+            )
+    else:
+        hold = Schedule({name: ((start_time, float(value)),) for name, value in inputs.items()})
+        segments = hold.segments(plant.inputs, start_time, dt)
+    refuse_beyond_range(plant, segments, start_time)
+    course = (method or Rodas4()).run(prepared(plant), segments, start_time, _vector(plant, state), np.empty(0))
     if course.status != 0:
-        raise SimulationError(_problem(plant, course, dt))
+        raise SimulationError(_problem(plant, course, start_time + dt))
     return {s.name: float(v) for s, v in zip(plant.states, course.state, strict=True)}
 
 
@@ -116,22 +129,28 @@ def output_times(output: float | npt.ArrayLike | None, start: float, duration: f
         grid = np.sort(np.asarray(output, dtype=float))
         if grid.size and not (grid[0] >= start and grid[-1] <= end):
             raise ParameterError(f"simulate: output instants must lie within {start:g} to {end:g} s.")
-    apart = np.min(np.abs(grid[:, None] - instants[None, :]), axis=1) > 1e-9 * duration if grid.size else grid > 0
+    behind = np.searchsorted(instants, grid)  # two neighbours of each: a table of all pairs would not fit the memory
+    before, after = instants[np.maximum(behind - 1, 0)], instants[np.minimum(behind, instants.size - 1)]
+    apart = np.minimum(np.abs(grid - before), np.abs(grid - after)) > 1e-9 * duration
     return np.unique(np.concatenate([grid[apart], instants]))
 
 
-def refuse_beyond_opening(plant: System, segments: Segments, start: float) -> None:
-    """Raise ParameterError where a Plant is commanded beyond shut and open; the inputs of other systems are theirs."""
+def refuse_beyond_range(plant: System, segments: Segments, start: float) -> None:
+    """Raise ParameterError where a Plant is commanded beyond what its inputs allow; other systems' are theirs."""
     if not isinstance(plant, Plant):
         return
     lengths = np.diff(segments.ends, prepend=start)[:, None]
+    least, greatest = (np.array([getattr(i, end) for i in plant.commands]) for end in ("least", "greatest"))
+    slack = 1e-9 * (greatest - least)
     for values in (segments.values, segments.values + segments.slopes * lengths):
-        beyond = (values < -1e-9) | (values > 1 + 1e-9)
+        beyond = (values < least - slack) | (values > greatest + slack)
         if beyond.any():
             row, column = np.argwhere(beyond)[0]
+            given = plant.commands[column]
+            unit = "" if given.unit == "1" else f" {given.unit}"
             raise ParameterError(
-                f"the input '{plant.inputs[column]}' is {values[row, column]:g} before {segments.ends[row]:g} s; "
-                "allowed are 0 (shut, or free) to 1 (open, or held)."
+                f"the input '{given.name}' is {values[row, column]:g}{unit} before {segments.ends[row]:g} s; allowed "
+                f"are {given.least:g} to {given.greatest:g}{unit} ({given.meaning})."
             )
 
 
@@ -157,18 +176,33 @@ def _vector(plant: System, state: Mapping[str, float]) -> Array:
     return values
 
 
-def _recorded(
-    ready: Prepared, course: Course, segments: Segments, times: Array, start: float, method: Method
-) -> Recording:
+def _results(ready: Prepared, course: Course, segments: Segments, times: Array, start: float) -> tuple[Array, Array]:
+    """Outputs (N, K) and inputs (N, m) at the rows that were reached."""
     from .engine.evaluate import evaluate
     from .engine.once import announce_compilation
 
-    plant, reached = ready.system, course.reached
-    states = np.ascontiguousarray(course.rows[:reached])
-    inputs = np.ascontiguousarray(segments.inputs_at(times[:reached], start))
-    results = np.empty((reached, ready.sizes.outputs))
+    states = np.ascontiguousarray(course.rows[: course.reached])
+    inputs = np.ascontiguousarray(segments.inputs_at(times[: course.reached], start))
+    results = np.empty((course.reached, ready.sizes.outputs))
     announce_compilation(evaluate)
     evaluate(ready.address["outputs"], ready.held, states, inputs, results)
+    return results, inputs
+
+
+def _stopped_where_not_finite(course: Course, results: Array, times: Array) -> Course:
+    """The course up to the first row whose outputs are not finite: a fixed step can be finite and yet far off."""
+    bad = np.flatnonzero(~np.isfinite(results).all(axis=1))
+    if not bad.size:
+        return course
+    row = int(bad[0])
+    return course._replace(reached=row, time=float(times[row]), state=course.rows[row], status=NOT_FINITE)
+
+
+def _recorded(
+    ready: Prepared, course: Course, results: Array, inputs: Array, times: Array, method: Method
+) -> Recording:
+    plant, reached = ready.system, course.reached
+    states, results, inputs = course.rows[:reached], results[:reached], inputs[:reached]
     columns: dict[str, Any] = {"time": times[:reached]}
     columns |= {s.name: states[:, i] for i, s in enumerate(plant.states)}
     columns |= {name: results[:, i] for i, name in enumerate(ready.output_names)}

@@ -68,7 +68,7 @@ def slope(thing: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
     """The exact derivative of `thing.method(*arguments)` by argument number `wrt`, shaped like the arguments."""
     if ops.is_symbol(*arguments):
         return _symbolic_slope(thing, method, arguments, wrt)
-    if any(type(x).__module__.startswith("jax") for x in arguments):
+    if _is_jax(*arguments):
         return _jax_slope(thing, method, arguments, wrt)
     results, shape, _ = _evaluated(thing, method, arguments)
     found = results[1 + wrt].reshape(shape)
@@ -97,15 +97,50 @@ def _jax_slope(thing: Any, method: str, arguments: tuple[Any, ...], wrt: int) ->
 def directional(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], along: Sequence[Any]) -> tuple[Any, ...]:
     """The exact derivative of a vector function over `ops` at a point, along a direction: J(at) along.
 
-    `at` and `along` hold numbers or CasADi symbols; `function` takes the point as one sequence.
+    `at` and `along` hold numbers, CasADi symbols or JAX arrays; `function` takes the point as one sequence.
     """
+    if _is_jax(*at, *along):
+        import jax  # type: ignore[import-not-found, unused-ignore]
+
+        point, direction = ([jax.numpy.asarray(x, dtype=float) for x in given] for given in (at, along))
+        return tuple(jax.jvp(lambda x: tuple(function(x)), (point,), (direction,))[1])
     import casadi
 
-    point, direction = casadi.SX.sym("x", len(at)), casadi.vertcat(*along)
-    values = casadi.vertcat(*(casadi.SX(v) for v in function([point[i] for i in range(len(at))])))
-    derivative = casadi.substitute(casadi.jtimes(values, point, direction), point, casadi.vertcat(*at))
-    parts = tuple(derivative[i] for i in range(derivative.numel()))
-    return parts if ops.is_symbol(*at, *along) else tuple(float(part) for part in parts)
+    x, values = _symbolic_values(function, len(at))
+    return _put_in(casadi.jtimes(values, x, casadi.vertcat(*along)), x, at, ops.is_symbol(*at, *along))
+
+
+def pulled_back(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], weights: Sequence[Any]) -> tuple[Any, ...]:
+    """The exact gradient of the weighted sum of a vector function over `ops`: J(at)^T weights, as `directional`."""
+    if _is_jax(*at, *weights):
+        import jax  # type: ignore[import-not-found, unused-ignore]
+
+        point = [jax.numpy.asarray(x, dtype=float) for x in at]
+        gradient = jax.grad(lambda x: sum(w * y for w, y in zip(weights, function(x), strict=True)))
+        return tuple(gradient(point))
+    import casadi
+
+    x, values = _symbolic_values(function, len(at))
+    return _put_in(casadi.jtimes(values, x, casadi.vertcat(*weights), True), x, at, ops.is_symbol(*at, *weights))
+
+
+def _is_jax(*operands: Any) -> bool:
+    return any(type(x).__module__.startswith("jax") for x in operands)
+
+
+def _symbolic_values(function: Callable[[Any], Sequence[Any]], count: int) -> tuple[Any, Any]:
+    import casadi
+
+    x = casadi.SX.sym("x", count)
+    return x, casadi.vertcat(*(casadi.SX(v) for v in function([x[i] for i in range(count)])))
+
+
+def _put_in(derivative: Any, x: Any, at: Sequence[Any], symbolic: bool) -> tuple[Any, ...]:
+    import casadi
+
+    found = casadi.substitute(derivative, x, casadi.vertcat(*at))
+    parts = tuple(found[i] for i in range(found.numel()))
+    return parts if symbolic else tuple(float(part) for part in parts)
 
 
 def jacobian(thing: Any, method: str, *arguments: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:

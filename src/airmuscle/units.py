@@ -36,6 +36,7 @@ _FACTORS: dict[str, tuple[float, str]] = {
     "K": (K, "K"), "rad": (rad, "rad"), "deg": (degree, "rad"), "°": (degree, "rad"), "degree": (degree, "rad"),
     "m3": (1.0, "m3"), "m^3": (1.0, "m3"), "m³": (1.0, "m3"), "kg/s": (1.0, "kg/s"), "m/s": (1.0, "m/s"),
     "N/m": (1.0, "N/m"), "N/mm": (1e3, "N/m"), "J": (J, "J"), "m3/(s Pa)": (1.0, "m3/(s Pa)"),
+    "dm3/(s bar)": (1e-8, "m3/(s Pa)"), "m3/s": (1.0, "m3/s"), "l/min": (1e-3 / 60.0, "m3/s"),
     "cm3": (1e-6, "m3"), "cm^3": (1e-6, "m3"), "N/bar": (1e-5, "N/Pa"), "MPa/m": (1e6, "Pa/m"),
     "GPa/m^2": (1e9, "Pa/m^2"), "MPa/m^3": (1e6, "Pa/m^3"),
 }  # fmt: skip

@@ -228,7 +228,7 @@ def test_a_plant_that_fails_does_not_stop_the_others():
     found = simulate_batch(plain(), thick_and_thin(20, {3, 17}), PULSE, duration=0.3, start=start, method=FAST)
     assert list(found.failed) == [3, 17]
     assert found.status[3] == 3
-    assert "because the rates are not finite" in found.reason(17)
+    assert "because a rate or an output is not finite" in found.reason(17)
     assert found.reason(4) == "done"
     assert np.isfinite(found["pressure"][4]).all()
     alone = simulate(found.plant(3), PULSE, duration=0.3, start=start, method=FAST, complete=False)

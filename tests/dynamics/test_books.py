@@ -47,7 +47,7 @@ def test_both_energy_books_close(gas):
     """A fill, a shut phase with oscillation and a discharge, as one run at rtol 1e-10."""
     plant = Plant(chosen_muscle(), CIRCUIT, HangingMass(10.0), gas)
     metered = Metered(plant)
-    start = plant.state_at(pressure=1.5e5, position=0.0) | {n.name: 0.0 for n in metered.states[3:]}
+    start = metered.reset(plant.state_at(pressure=1.5e5, position=0.0))
     command = Schedule({"fill": ((0.3, 1), (0.8, 0)), "discharge": ((1.5, 1), (1.8, 0))})
     run = simulate(metered, command, duration=2.5, start=start, method=Rodas4(1e-10))
 

@@ -12,14 +12,25 @@ import pytest
 from filling import hanging
 
 from airmuscle import declare
-from airmuscle.circuit import FillDischarge, Supply, Valve
+from airmuscle.circuit import FillDischarge, Leaking, Line, Supply, Tube, Valve
 from airmuscle.command import Schedule
 from airmuscle.equilibrium import equilibrium
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.gas import Polytropic
-from airmuscle.identify.dynamic import Experiment, FreeFill, Start, StartTime, StartValue, fit_dynamic, identifiable
+from airmuscle.friction import Dahl
+from airmuscle.gas import EnergyBalance, Polytropic
+from airmuscle.geometry import Vessel
+from airmuscle.identify.dynamic import (
+    Experiment,
+    Start,
+    StartTime,
+    StartValue,
+    fit_dynamic,
+    identifiable,
+    where_sensed,
+)
 from airmuscle.mechanism import HangingMass, Isometric
 from airmuscle.method import INTERRUPTED, Rodas4
+from airmuscle.muscle import Muscle, SwellingWall
 from airmuscle.plant import Plant
 from airmuscle.simulate import simulate
 
@@ -213,21 +224,107 @@ def test_the_derivative_of_a_start_at_rest_is_that_of_the_equilibrium():
         assert slopes[i, 1] == pytest.approx((higher[name] - lower[name]) / 200.0, rel=1e-4, abs=1e-15)
 
 
+OPEN = Schedule({"fill": ((0.0, 1.0),)})
+
+
+def free_muscle(lag=0.2, tube=3e-5):
+    """An unloaded muscle of unknown length behind a valve and a line."""
+    muscle = dataclasses.replace(Muscle.ideal(Vessel(1e-4)), wall=SwellingWall(1e-4, 150e3, 6e4, lag))
+    valves = FillDischarge(Supply(620e3), Valve(1e-9, 0.4), Valve(0.0, 0.3))
+    return Plant(muscle, Line(valves, Tube(Valve(2e-9, 0.3), tube)), Isometric(0.0))
+
+
+def free_fill(plant, sensed, seed=2, first=1e4):
+    run = simulate(plant, OPEN, duration=2.0, start=plant.state_at(pressure=first), output=0.005)
+    return Experiment(noisy(run, seed, **{sensed: 500.0}), OPEN, Start.held(plant, first))
+
+
 def test_line_and_muscle_are_told_from_a_sensor_in_the_line():
-    plant = FreeFill(
-        Supply(620e3), Valve(1e-9, 0.4), Valve(2e-9, 0.3), line_volume=3e-5, rest_volume=1e-4, growth_volume=1e-4,
-        middle=150e3, breadth=6e4, lag=0.2,
-    )  # fmt: skip
-    command = Schedule({"fill": ((0.0, 1.0),)})
-    run = simulate(plant, command, duration=2.0, start=plant.guess(1e4), output=0.005)
-    start = Start({"line.pressure": 1e4, "pressure": 1e4}, plant.guess(1e4), ("volume",))
-    record = Experiment(noisy(run, 2, **{"line.pressure": 500.0}), command, start)
-    free = ("valve.conductance", "valve.critical_ratio", "line_volume", "line.conductance", "growth_volume", "lag")
-    guess = changed(plant, line_volume=1.5, lag=0.6, growth_volume=1.4, line__conductance=0.8)
-    fit = fit_dynamic(guess, [record], free=free, observed={"line.pressure": 500.0}, starts=3)
+    plant = free_muscle()
+    valve, line, wall = "circuit.circuit.fill", "circuit.tube", "muscle.wall"
+    free = (f"{valve}.conductance", f"{valve}.critical_ratio", f"{line}.volume", f"{line}.orifice.conductance",
+            f"{wall}.growth_volume", f"{wall}.lag")  # fmt: skip
+    guess = changed(plant, circuit__tube__volume=1.5, circuit__tube__orifice__conductance=0.8,
+                    muscle__wall__lag=0.6, muscle__wall__growth_volume=1.4)  # fmt: skip
+    fit = fit_dynamic(
+        guess, [free_fill(plant, "tube.pressure")], free=free, observed={"tube.pressure": 500.0}, starts=3
+    )
     for estimate in fit.estimates:
         assert abs(estimate.value - truth(plant, estimate.name)) < 3.5 * estimate.deviation, estimate.name
     assert fit.scatter == pytest.approx(1.0, abs=0.12)
+
+
+@pytest.mark.parametrize("sensed", ["tube.pressure", "pressure"])
+def test_a_fill_tells_whether_it_was_sensed_before_the_muscle(sensed):
+    """A small line behind a large valve and before a narrow tube fills at once and then waits for the muscle.
+
+    Both descriptions are fitted to the same record: one growing volume sensed inside, and line and muscle.
+    """
+    plant = free_muscle(lag=2.0, tube=1e-6)
+    plant = changed(plant, circuit__circuit__fill__conductance=0.4, circuit__tube__orifice__conductance=0.3)
+    record = free_fill(plant, sensed)
+    values = record.recording[sensed]
+    recording = record.recording.with_columns(**{"pressure": values, "tube.pressure": values})
+    lone = dataclasses.replace(free_muscle(lag=0.005), circuit=plant.circuit.circuit)
+    valve, wall = "circuit.fill", "muscle.wall"
+    inside = fit_dynamic(
+        lone, [Experiment(recording, OPEN, Start.held(lone, 1e4))], observed={"pressure": 500.0}, starts=3,
+        free=(f"{valve}.conductance", f"{valve}.critical_ratio", f"{wall}.growth_volume", f"{wall}.middle"),
+        bounds={f"{valve}.critical_ratio": (0.1, 0.6), f"{wall}.growth_volume": (0.0, 2e-4)},
+    )  # fmt: skip
+    line = ("circuit.circuit.fill.conductance", "circuit.tube.volume", "circuit.tube.orifice.conductance")
+    before = fit_dynamic(
+        plant, [Experiment(recording, OPEN, record.start)], free=line, observed={"tube.pressure": 500.0}
+    )
+    found = where_sensed(inside=inside, before=before)
+    assert found.before_muscle == (sensed == "tube.pressure")
+    assert str(found).startswith("looks sensed before the muscle") == (sensed == "tube.pressure")
+    assert inside.rms("pressure") == found.inside
+    assert found.rise == np.ptp(values)
+    other = dataclasses.replace(record, recording=noisy(record.recording, 3, **{sensed: 1.0}))
+    elsewhere = fit_dynamic(plant, [other], free=line, observed={sensed: 500.0})
+    with pytest.raises(IdentificationError, match="different rows"):
+        where_sensed(inside=inside, before=elsewhere)
+
+
+def test_the_heat_through_the_wall_is_found_from_the_pressure_of_a_fill_and_a_hold():
+    """After the valve shuts the warm air cools, and its pressure falls with a time constant m c_v/(hA)."""
+    plant = dataclasses.replace(rigid_plant(), gas=EnergyBalance(0.5))
+    command, start = Schedule({"fill": ((0.0, 1.0), (0.4, 0.0))}), Start.held(plant, 0.0)
+    run = simulate(plant, command, duration=1.5, start=plant.state_at(pressure=0.0), output=0.005)
+    record = Experiment(noisy(run, 4, pressure=300.0), command, start)
+    free = ("gas.heat_transfer", "circuit.fill.conductance")
+    guess = changed(plant, gas__heat_transfer=3.0, circuit__fill__conductance=0.8)
+    fit = fit_dynamic(guess, [record], free=free, observed={"pressure": 300.0})
+    for estimate in fit.estimates:
+        assert abs(estimate.value - truth(plant, estimate.name)) < 3.5 * estimate.deviation, estimate.name
+        assert estimate.deviation < 0.05 * estimate.value
+
+
+def test_a_leak_is_found_from_a_hold_with_shut_valves():
+    plant = rigid_plant()
+    plant = dataclasses.replace(plant, circuit=Leaking(plant.circuit, Valve(2e-11, 0.3)))
+    rest, start = Schedule({}), Start.held(plant, 3e5)
+    run = simulate(plant, rest, duration=10.0, start=plant.state_at(pressure=3e5), output=0.05)
+    record = Experiment(noisy(run, 8, pressure=300.0), rest, start)
+    guess = changed(plant, circuit__leak__conductance=4.0)
+    fit = fit_dynamic(guess, [record], free=("circuit.leak.conductance",), observed={"pressure": 300.0},
+                      own=(StartValue("pressure", 2e4),))  # fmt: skip
+    leak = fit["circuit.leak.conductance"]
+    assert abs(leak.value - 2e-11) < 3.5 * leak.deviation
+    assert leak.deviation < 0.02 * leak.value
+
+
+def test_friction_is_found_from_the_way_up_and_down():
+    plant = moving()
+    plant = dataclasses.replace(plant, muscle=dataclasses.replace(plant.muscle, friction=Dahl(4e4, 15.0)))
+    record = recorded(plant, 11)
+    free = ("muscle.friction.stiffness", "muscle.friction.coulomb_force", "muscle.damper.damping")
+    guess = changed(plant, muscle__friction__stiffness=0.5, muscle__friction__coulomb_force=1.6)
+    fit = fit_dynamic(guess, [record], free=free, observed=SENSORS)
+    for estimate in fit.estimates:
+        assert abs(estimate.value - truth(plant, estimate.name)) < 3.5 * estimate.deviation, estimate.name
+    assert fit["muscle.friction.coulomb_force"].deviation < 1.0
 
 
 # Bad input

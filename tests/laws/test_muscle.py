@@ -32,15 +32,15 @@ def test_the_tension_is_contractile_less_spring_less_damper_and_never_negative(p
 @given(contraction)
 def test_a_hardening_spring_is_the_constant_one_at_rest_and_stiffer_beyond(eps):
     constant, hardening = LinearSpring(2000.0), CubicSpring(2000.0, 50.0)
-    assert abs(hardening.force(eps, 0.3)) >= abs(constant.force(eps, 0.3))
-    assert CubicSpring(2000.0, 0.0).force(eps, 0.3) == constant.force(eps, 0.3)
+    assert abs(hardening.force(0.0, eps, 0.3)) >= abs(constant.force(0.0, eps, 0.3))
+    assert CubicSpring(2000.0, 0.0).force(0.0, eps, 0.3) == constant.force(0.0, eps, 0.3)
 
 
 @given(pressure, speed)
 def test_a_damper_takes_energy_whatever_the_direction(p, v):
     for damper in (LinearDamper(100.0), PressureDamper(100.0, 1e-3)):
-        assert damper.force(p, v) * v >= 0.0
-    assert PressureDamper(100.0, 1e-3).force(2e5, 0.5) == pytest.approx(0.5 * (100.0 + 200.0))
+        assert damper.force(p, 0.1, v) * v >= 0.0
+    assert PressureDamper(100.0, 1e-3).force(2e5, 0.1, 0.5) == pytest.approx(0.5 * (100.0 + 200.0))
 
 
 @given(st.floats(1e4, 5e5), st.floats(0.0, 0.25))

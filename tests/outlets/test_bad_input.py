@@ -288,7 +288,9 @@ def test_a_run_that_cannot_be(plant: Plant):
         with pytest.raises(ParameterError, match=f"simulate: .*{name}"):
             simulate(plant, Schedule({}), **{"duration": 1.0, **given})
     for opening in (7.0, -0.5):
-        with pytest.raises(ParameterError, match=rf"the input 'fill' is {opening:g} before 1 s; allowed are 0 \(shut"):
+        with pytest.raises(
+            ParameterError, match=rf"the input 'fill' is {opening:g} before 1 s; allowed are 0 to 1 \(opening, 0 shut"
+        ):
             simulate(plant, Schedule({"fill": ((0, opening),)}), duration=1.0)
         with pytest.raises(ParameterError, match=rf"the input 'fill' is {opening:g}"):
             advance(plant, equilibrium(plant, pressure=0.0), {"fill": opening}, 0.1)

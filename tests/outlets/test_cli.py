@@ -24,6 +24,7 @@ from airmuscle.cli.app import app
 from airmuscle.cli.cite import as_bibtex
 from airmuscle.errors import UnknownName
 from airmuscle.library.catalogue import load, names
+from airmuscle.library.valve_catalogue import valve_names
 from airmuscle.recording import read_csv
 from airmuscle.reference import Reference
 from airmuscle.report.chapter import Chapter, Claim, Equal
@@ -74,11 +75,14 @@ def assert_failed(result: Result, message: str) -> None:
 
 # Help and usage
 
-COMMANDS = ("reproduce", "list", "show", "cite", "solve", "inspect", "fit", "plan", "simulate")
+COMMANDS = (
+    "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "plan",
+    "simulate", "schema",
+)  # fmt: skip
 
 
 def test_the_commands_stand_in_the_order_of_use():
-    listed = re.findall(r"^  (\w+)  ", airmuscle("--help").output.partition("Commands:")[2], re.MULTILINE)
+    listed = re.findall(r"^  ([\w-]+)  ", airmuscle("--help").output.partition("Commands:")[2], re.MULTILINE)
     assert listed == list(COMMANDS)
 
 
@@ -114,10 +118,9 @@ def test_wrong_usage_is_exit_code_2(arguments: tuple[str, ...]):
 
 
 def test_list_names_every_entry_with_title_kind_and_trust():
-    listed = {
-        entry["name"]: entry for entry in json.loads(airmuscle("list", "--json").output) if entry["kind"] != "data set"
-    }
-    assert tuple(listed) == names()
+    found = json.loads(airmuscle("list", "--json").output)
+    listed = {entry["name"]: entry for entry in found if entry["kind"] != "data set"}
+    assert tuple(listed) == (*names(), *valve_names())
     entry = load(MUSCLE)
     assert listed[MUSCLE] == {
         "name": MUSCLE,
@@ -134,7 +137,7 @@ def test_list_calls_a_muscle_what_can_be_simulated():
     for entry in json.loads(airmuscle("list", "--json").output):
         if entry["kind"].startswith("muscle"):
             assert load(entry["name"]).muscle.geometry.resting_length > 0
-        elif entry["kind"] != "data set":
+        elif entry["kind"].startswith("characteristic"):
             with pytest.raises(UnknownName, match="is a characteristic, not yet a muscle"):
                 _ = load(entry["name"]).muscle
 
@@ -318,7 +321,7 @@ def test_fit_starts_from_a_library_entry_and_keeps_what_is_fixed(tmp_path: Path)
 @pytest.mark.parametrize(
     ("rows", "options", "message"),
     [
-        (36, ("--characteristic", "ChouHannaford1996"), "ChouHannaford1996 needs values to start from"),
+        (36, ("--characteristic", "Saga2007"), "--characteristic: Saga2007 needs values to start from"),
         (36, ("--characteristic", "ContractileSurfac"), "no library entry 'ContractileSurfac'"),
         (20, ("--characteristic", "ContractileSurface"), ".*has 21 parameters to be found, but only 19 points"),
         (36, ("--characteristic", "ContractileSurface", "--robust", "5 mm"), "--robust: unit 'mm' cannot become 'N'"),
@@ -364,6 +367,57 @@ def test_simulate_writes_a_recording_that_reads_back(scenario: Path, tmp_path: P
     shut = recording["time"] > 0.31
     assert np.ptp(recording["air_mass"][shut]) < 1e-12, "and then shut"
     assert (tmp_path / "run" / "figures" / "run.svg").exists()
+
+
+def test_a_run_that_fails_keeps_what_it_has_and_says_why(scenario: Path, tmp_path: Path):
+    """A valve of half a metre fills the muscle in a millisecond and throws the load to where no law was measured."""
+    example = (Path(__file__).resolve().parents[2] / "examples" / "fill_discharge.toml").read_text(encoding="utf-8")
+    torn = example.replace("2.6167e-9", "9e-6").replace('gas = "Isothermal"', "")
+    scenario.write_text(torn, encoding="utf-8")
+    result = airmuscle("simulate", scenario, "--out", tmp_path / "run")
+    assert result.exit_code == 1
+    kept, error = result.stderr.splitlines()[-2:]
+    assert kept == f"what was computed until then stands in {tmp_path / 'run'}"
+    found = re.fullmatch(
+        r"error: the run ended at (\S+) of 25 s because .* steps, at air_mass .* kg, .*\. \S+ .*\.", error
+    )
+    assert found, error
+    lines = (tmp_path / "run" / "recording.csv").read_text(encoding="utf-8").splitlines()
+    rows = np.array([[float(cell) for cell in line.split(",")] for line in lines if line[0].isdigit()])
+    assert 5.0 < rows[-1, 0] <= float(found[1])
+    assert np.isfinite(rows).all()
+    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    assert "A run of 25 s that ended early, at " in page
+    assert f"<p>{error.removeprefix('error: ').capitalize()[:30]}" in page, "the last note says why"
+
+
+def test_the_report_of_a_run_shows_inputs_parameters_sources_and_notes(scenario: Path, tmp_path: Path):
+    named = re.sub(
+        r"\[plant.muscle.contractile\](.|\n)*?damper", '[plant.muscle]\nlibrary = "dmsp-20"\ndamper', SCENARIO
+    )
+    driver = '[command.drivers]\nfill = [{ model = "PWM", frequency = "50 Hz" }, { model = "OnOff", opening_delay = "1 ms" }]'
+    named = named.replace('pressure = "1 bar" }', 'pressure = "0 bar" }')
+    scenario.write_text(f"{named}\n{driver}\n[output]\ncolumns = ['force']", encoding="utf-8")
+    result = airmuscle("simulate", scenario, "--out", tmp_path / "run")
+    assert result.exit_code == 0, result.output
+    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    for text in (
+        "A run of 0.5 s. The recording is recording.csv.",
+        "left the box of its characteristic in pressure",
+        "Inputs of the plant; dashed, what the drivers were told.",
+        "fill 1 from 0.1 s, 0 from 0.3 s; driven: fill by PWM(frequency=50.0, smallest_pulse=0.0), OnOff(opening_delay=",
+        "<td>muscle.contractile.wall_thickness</td>",
+        "Rodas4(rtol=1e-06)",
+        "Martens",
+    ):
+        assert text in page, text
+    assert list(read_csv(tmp_path / "run" / "recording.csv")) == ["time", "force"]
+    assert {p.name for p in (tmp_path / "run" / "figures").iterdir()} == {
+        "run.svg",
+        "run.png",
+        "inputs.svg",
+        "inputs.png",
+    }
 
 
 def test_simulate_prints_json(scenario: Path, tmp_path: Path):

@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 
 from airmuscle.circuit import ClosedChamber
-from airmuscle.command import Schedule, Signal
+from airmuscle.command import Periodic, Schedule, Signal
+from airmuscle.driver import PWM, Driven, OnOff
 from airmuscle.errors import (
     AirmuscleError,
+    ColumnError,
     FileError,
     NoEquilibrium,
     ParameterError,
@@ -28,12 +30,14 @@ from airmuscle.geometry import Braid
 from airmuscle.library.catalogue import load, save
 from airmuscle.library.entry import Entry
 from airmuscle.library.scenario import load_scenario
+from airmuscle.library.valve_catalogue import load_valve
 from airmuscle.mechanism import HangingMass, Held, Isometric
 from airmuscle.method import DormandPrince8, Rodas4, RungeKutta4
 from airmuscle.muscle import LinearDamper
+from airmuscle.report.run_chapter import _inputs
 
 PAGE = (Path(__file__).parents[2] / "docs" / "scenario.md").read_text(encoding="utf-8")
-WHOLE, FITTED, PAIR = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
+WHOLE, FITTED, PAIR, DRIVEN, LINE = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
 
 MUSCLE = 'muscle = "chou-hannaford"'
 MASS = 'model = "HangingMass"\nmass = "5 kg"'
@@ -81,6 +85,7 @@ def test_the_page_runs(tmp_path: Path):
     assert scenario.plant.circuit.supply.pressure == 650e3 - 101_325.0
     assert scenario.command == Schedule({"fill": ((5.0, 1.0), (15.0, 0.0)), "discharge": ((19.0, 1.0),)})
     assert (scenario.duration, scenario.output, scenario.method) == (25.0, 0.01, Rodas4(rtol=1e-8))
+    assert scenario.columns == ("pressure", "position")
     run = scenario.simulate()
     assert run["pressure"].max() == pytest.approx(650e3 - 101_325.0, rel=1e-3), "filled up to the supply"
     assert run["pressure"][-1] == pytest.approx(0.0, abs=100.0), "and discharged"
@@ -168,6 +173,89 @@ def test_a_signal_is_linear_between_its_points(tmp_path: Path):
     assert run["fill"][run["time"] == 0.15] == pytest.approx(0.5)
 
 
+OPENINGS = "time [ms],fill [%],valve\n0,0,0.5\n100,50,0.5\n300,0,0.25\n"
+
+
+def driven(folder: Path, *changes: tuple[str, str]) -> Path:
+    """The scenario with the command of the page, and its data file beside it."""
+    (folder / "openings.csv").write_text(OPENINGS, encoding="utf-8")
+    return written(folder, (f"[command]\n{FILL}", DRIVEN), *changes)
+
+
+def test_the_command_of_the_page_runs(tmp_path: Path):
+    scenario = load_scenario(driven(tmp_path))
+    told = Signal({"fill": ((0, 0), (0.1, 0.5), (0.3, 0)), "discharge": ((0, 0.5), (0.1, 0.5), (0.3, 0.25))})
+    drivers = {
+        "fill": OnOff(opening_delay=5e-3, closing_delay=2e-3),
+        "discharge": (PWM(50.0, smallest_pulse=1e-3), OnOff(opening_delay=2e-3)),
+    }
+    assert scenario.command == Driven(Periodic(told, 0.4), drivers)
+    run = scenario.simulate()
+    assert np.count_nonzero(np.diff(run["discharge"]) > 0) == 15, "a pulse in each period of the carrier"
+
+
+def test_a_recorded_command_may_be_held_and_rows_may_stand_beside_it(tmp_path: Path):
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "bench.csv").write_text(OPENINGS, encoding="utf-8")
+    file = 'file = "data/bench.csv"\ndischarge = [["0.1 s", 1]]'
+    fill = ((0.0, 0.0), (0.1, 0.5), (0.3, 0.0))
+    for model, kind in (("", Signal), ('model = "Schedule"\n', Schedule)):
+        command = load_scenario(written(tmp_path, (FILL, f"{model}{file}"))).command
+        assert command == kind({"fill": fill, "discharge": ((0.1, 1.0),)})
+
+
+@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+def test_a_driver_may_have_the_delays_of_a_valve_of_the_catalogue(tmp_path: Path):
+    response = load_valve("smc-sx91").response
+    command = load_scenario(
+        written(tmp_path, (FILL, f'{FILL}\ndrivers = {{ fill = {{ library = "smc-sx91" }} }}'))
+    ).command
+    assert command.drivers == {"fill": OnOff(response.opening_delay, response.closing_delay)}
+
+
+def test_an_input_is_read_in_its_own_unit(tmp_path: Path):
+    valve = '{ model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }'
+    regulator = f"""model = "ProportionalRegulator"
+supply = {{ model = "Supply", pressure = "6 bar" }}
+fill = {valve}
+discharge = {valve}
+lag = {{ model = "Follower", frequency = "20 Hz", damping_ratio = 0.7 }}
+"""
+    i, j = GOOD.index('model = "FillDischarge"'), GOOD.index("[plant.mechanism]")
+    text = GOOD[:i] + regulator + GOOD[j:].replace(FILL, 'setpoint = [["0.1 s", "2 bar"], ["0.2 s", 1e5]]')
+    scenario = load_scenario(written(tmp_path, text=text))
+    assert scenario.command == Schedule({"setpoint": ((0.1, 2e5), (0.2, 1e5))})
+    assert "setpoint\n[Pa]" in [axis.get_ylabel() for axis in _inputs(scenario, scenario.simulate()).figure.axes]
+    with pytest.raises(UnitError, match=r"\[command\], setpoint: unit 'mm' cannot become 'Pa'"):
+        load_scenario(written(tmp_path, ('"2 bar"', '"2 mm"'), text=text))
+
+
+def test_columns_called_like_inputs_are_taken_unasked(tmp_path: Path):
+    (tmp_path / "bench.csv").write_text("time [s],discharge [1],fill [1]\n0,1,0\n1,0.5,0.2\n", encoding="utf-8")
+    command = load_scenario(written(tmp_path, (FILL, 'file = "bench.csv"'))).command
+    assert command == Signal({"fill": ((0, 0), (1, 0.2)), "discharge": ((0, 1), (1, 0.5))})
+
+
+def test_the_file_of_a_run_holds_the_columns_that_are_asked_for(tmp_path: Path):
+    path = written(tmp_path, ("[run]", '[output]\ncolumns = ["force", "fill"]\n[run]'))
+    scenario = load_scenario(path)
+    run = scenario.simulate()
+    assert list(scenario.chosen(run)) == ["time", "force", "fill"]
+    everything = load_scenario(written(tmp_path))
+    assert list(everything.chosen(run)) == list(run)
+
+
+def test_a_muscle_of_the_library_keeps_the_box_of_its_law(tmp_path: Path):
+    entry = load("dmsp-20-300")
+    named = 'muscle = { library = "dmsp-20", damper = { model = "LinearDamper", damping = 7 } }'
+    assert load_scenario(written(tmp_path, (MUSCLE, named))).plant.muscle.box == entry.box
+    law = 'contractile = { model = "ChouHannaford1996", geometry = { model = "Braid", radius = "10 mm", braid_angle = "25 deg", resting_length = "300 mm" } }'
+    other = f'muscle = {{ library = "dmsp-20", {law} }}'
+    assert load_scenario(written(tmp_path, (MUSCLE, other))).plant.muscle.box is None, (
+        "another law was measured elsewhere"
+    )
+
+
 def test_the_start_is_rest_at_a_pressure_or_a_state(tmp_path: Path):
     at_rest = load_scenario(written(tmp_path))
     assert at_rest.plant.ports(at_rest.start)[0].tension == pytest.approx(5 * 9.80665)
@@ -250,7 +338,91 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             r"\[command\]: the signal of 'fill' must be finite points",
         ),
         (FILL, 'model = "Shedule"', UnknownName, r"\[command\], model: no model 'Shedule'.*Did you mean 'Schedule'\?"),
-        (FILL, 'model = "Braid"', ParameterError, r"\[command\]: Braid is no command"),
+        (FILL, 'model = "Braid"', ParameterError, r"\[command\]: Braid is no command; there are Schedule and Signal"),
+        (
+            FILL,
+            f'{FILL}\nperiod = "0 s"',
+            ParameterError,
+            r"\[command\]: Periodic.period is 0.0 s; it must be positive",
+        ),
+        (FILL, f"{FILL}\nperiod = nan", ParameterError, r"\[command\], period is nan; it must be finite"),
+        (FILL, f'{FILL}\nperiod = "1 bar"', UnitError, r"\[command\], period: unit 'bar' cannot become 's'"),
+        (FILL, "file = 3", ParameterError, r"\[command\]: file is 3; it must be text"),
+        (FILL, 'file = "no.csv"', FileError, r"\[command\]: .*no\.csv"),
+        (
+            FILL,
+            'columns = { fill = "x" }',
+            ParameterError,
+            r"\[command\]: columns are named, but no file; write file =",
+        ),
+        (
+            FILL,
+            "drivers = 3",
+            ParameterError,
+            r"\[command.drivers\] is 3; write \[command.drivers\] and fill = \{ model",
+        ),
+        (FILL, 'drivers = { fil = "OnOff" }', ParameterError, r"\[command.drivers\]: .* no input 'fil'.*mean 'fill'\?"),
+        (
+            FILL,
+            'drivers = { fill = "OnOf" }',
+            UnknownName,
+            r"\[command.drivers.fill\], model: .*Did you mean 'OnOff'\?",
+        ),
+        (
+            FILL,
+            'drivers = { fill = "PWM" }',
+            ParameterError,
+            r"\[command.drivers.fill\]: PWM needs 'frequency' \[1/s\]",
+        ),
+        (
+            FILL,
+            'drivers = { fill = ["Rodas4"] }',
+            ParameterError,
+            r"\[command.drivers.fill.\[0\]\]: Rodas4 is no driver",
+        ),
+        (
+            FILL,
+            f'{FILL}\ndrivers = {{ fill = {{ model = "OnOff", opening_delay = "-1 s" }} }}',
+            ParameterError,
+            r"\[command.drivers.fill\]: OnOff.opening_delay .* is -1 s; allowed are 0 to 10 s",
+        ),
+        (
+            FILL,
+            'fill = [[0, 2]]\ndrivers = { fill = "OnOff" }',
+            ParameterError,
+            r"\[command\]: the driver of 'fill' is told 2 before",
+        ),
+        (
+            FILL,
+            'drivers = { fill = { library = "ckd-m4ga1-r" } }',
+            ParameterError,
+            r"\[command.drivers.fill\]: ckd-m4ga1-r: no response is published; write model = ",
+        ),
+        (
+            FILL,
+            'drivers = { fill = { library = "matrix-821", path = "valve" } }',
+            ParameterError,
+            r"\[command.drivers.fill\]: 'path' is not known here",
+        ),
+        # what is written
+        (
+            "[run]",
+            "[output]\ncolumns = 3\n[run]",
+            ParameterError,
+            r'\[output\], columns is 3; write columns = \["pressure"',
+        ),
+        (
+            "[run]",
+            '[output]\ncolumns = ["presure"]\n[run]',
+            ParameterError,
+            r"\[output\]: the run has no column 'presure'; there are time, air_mass, .*Did you mean 'pressure'\?",
+        ),
+        (
+            "[run]",
+            '[output]\ncolumn = ["force"]\n[run]',
+            ParameterError,
+            r"\[output\]: 'column' is not known here; .*'columns'\?",
+        ),
         (FILL, "model = 3", UnknownName, r"\[command\], model is 3; it must be a name in quotes"),
         # the run
         (DURATION, "duration = 0", ParameterError, r"\[run\], duration is 0; it must be greater than zero"),
@@ -287,6 +459,42 @@ def test_a_bad_scenario_is_told_what_is_wrong(
     with pytest.raises(kind, match=message) as raised:
         load_scenario(path)
     assert "scenario.toml" in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "kind", "message"),
+    [
+        (
+            'fill = "fill"',
+            'fill = "fil"',
+            ColumnError,
+            r"\[command\]: openings.csv: no column 'fil'; .*Did you mean 'fill'\?",
+        ),
+        (
+            "{ fill = ",
+            "{ fil = ",
+            ParameterError,
+            r"\[command\]: the plant has no input 'fil'; .*Did you mean 'fill'\?",
+        ),
+        (
+            'fill = "fill"',
+            "fill = 3",
+            ParameterError,
+            r"\[command\], columns is .*; write columns = \{ fill = \"valve\" \}",
+        ),
+        ("period", "fill = [[0, 1]]\nperiod", ParameterError, r"\[command\]: 'fill' stands in the file and here too"),
+    ],
+)
+def test_a_recorded_command_that_cannot_be_read_is_told(tmp_path: Path, was, becomes, kind, message):
+    with pytest.raises(kind, match=message):
+        load_scenario(driven(tmp_path, (was, becomes)))
+
+
+def test_a_recording_without_a_column_of_an_input_says_how_to_name_one(tmp_path: Path):
+    path = driven(tmp_path, ('columns = { fill = "fill", discharge = "valve" }\n', ""))
+    (tmp_path / "openings.csv").write_text("time [s],valve\n0,0\n1,1\n", encoding="utf-8")
+    with pytest.raises(ColumnError, match=r"no column called like an input \(fill, discharge\); there are time, valve"):
+        load_scenario(path)
 
 
 def test_a_plant_that_cannot_rest_names_muscle_and_forces(tmp_path: Path):

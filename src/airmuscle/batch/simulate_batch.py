@@ -12,7 +12,7 @@ from ..command import Command, Segments
 from ..errors import ParameterError, suggestion
 from ..method import INTERRUPTED, Explicit, Method, Rodas4
 from ..program import System
-from ..simulate import output_times, refuse_beyond_opening
+from ..simulate import output_times, refuse_beyond_range
 from .precision import Double, Precision
 from .result import NOT_STARTED, Batch
 from .side_by_side import blocks, refuse_single
@@ -113,7 +113,7 @@ def _segments(
             raise ParameterError(f"commands, row {row}: {one!r} is no Command; give a Schedule or a Signal.")
         try:
             known[id(one)] = one.segments(plant.inputs, begin, duration)
-            refuse_beyond_opening(plant, known[id(one)], begin)
+            refuse_beyond_range(plant, known[id(one)], begin)
         except ParameterError as error:
             where = "" if isinstance(command, Command) else f"commands, row {row}: "
             raise ParameterError(f"{where}{error}") from None

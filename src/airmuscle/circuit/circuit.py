@@ -1,62 +1,80 @@
-"""How valves are connected to a muscle."""
+"""What a circuit is: it takes air from a supply, and gives each muscle the flow that its valves let through."""
 
 from __future__ import annotations
 
 import abc
+import dataclasses
 from collections.abc import Mapping
+from typing import ClassVar
 
-from ..declare import model, parameter
-from ..gas import Ambient, absolute
+from ..gas import STILL, Air, Ambient, Flow
 from ..ops import Value
-from .valve import Valve
+from ..reference import Reference
+from ..variables import Input, StateVariable, outside, renamed, within
+from .supply import Source
+
+SUPPLY = "supply."
+"""What the names of the supply's states begin with."""
 
 
-@model
-class Supply:
-    """Air at a constant pressure."""
+@dataclasses.dataclass(frozen=True)
+class Response:
+    """What a circuit does at one moment: flow into every muscle, rates of its own states, what one may want to see.
 
-    pressure: float = parameter("Pa", "p_s", "gauge pressure of the supply", bounds=(-1e5, 5e6))
+    `drawn` is what it takes from its supply, `exhausted` what it gives to the surroundings.
+    """
+
+    flows: tuple[Flow, ...]
+    drawn: Flow = STILL
+    exhausted: Flow = STILL
+    rates: Mapping[str, Value] = dataclasses.field(default_factory=dict)
+    outputs: Mapping[str, Value] = dataclasses.field(default_factory=dict)
 
 
 class Circuit(abc.ABC):
-    """The pneumatic side of a muscle: inputs that open valves, and the mass flow that follows."""
+    """The pneumatic side of one muscle or more: inputs that are commanded, states, and the flow that follows."""
+
+    references: ClassVar[tuple[Reference, ...]] = ()
+    supply: Source
+
+    @property
+    def ports(self) -> int:
+        """How many muscles it feeds."""
+        return 1
 
     @property
     @abc.abstractmethod
-    def inputs(self) -> tuple[str, ...]:
-        """The names of the openings, each 0 shut to 1 open."""
+    def inputs(self) -> tuple[Input, ...]:
+        """What is commanded."""
 
-    @abc.abstractmethod
-    def mass_flow(self, pressure: Value, openings: Mapping[str, Value], ambient: Ambient) -> Value:
-        """Mass flow [kg/s] into the muscle at its absolute pressure [Pa]."""
-
-
-@model
-class FillDischarge(Circuit):
-    """Two on/off valves with closed centre: one from the supply, one to the surroundings."""
-
-    supply: Supply
-    fill: Valve
-    discharge: Valve
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return ("fill", "discharge")
-
-    def mass_flow(self, pressure: Value, openings: Mapping[str, Value], ambient: Ambient) -> Value:
-        source = absolute(self.supply.pressure, ambient)
-        incoming = self.fill.mass_flow(source, pressure, openings["fill"], ambient.temperature)
-        outgoing = self.discharge.mass_flow(pressure, ambient.pressure, openings["discharge"], ambient.temperature)
-        return incoming - outgoing
-
-
-@model
-class ClosedChamber(Circuit):
-    """No connection at all: the air mass stays what it is."""
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
+    def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
+        """Its states without those of its supply."""
         return ()
 
-    def mass_flow(self, pressure: Value, openings: Mapping[str, Value], ambient: Ambient) -> Value:
-        return 0.0 * pressure
+    def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        """Its own states at rest, with every input at zero and this air in the muscles."""
+        return {}
+
+    @abc.abstractmethod
+    def draw(
+        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        ambient: Ambient,
+    ) -> Response:  # fmt: skip
+        """What it does between this air at its supply and this air in the muscles."""
+
+    def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
+        """All its states."""
+        return (*self.own_states(ambient), *renamed(SUPPLY, self.supply.states(ambient)))
+
+    def settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        """All its states at rest."""
+        return {**self.own_settled(airs, ambient), **outside(SUPPLY, self.supply.settled(ambient))}
+
+    def respond(
+        self, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value], ambient: Ambient
+    ) -> Response:
+        """What it does with this air in the muscles; `drawn` is then what comes from outside the plant."""
+        of_supply = within(SUPPLY, state)
+        done = self.draw(self.supply.air(of_supply, ambient), airs, state, inputs, ambient)
+        rates, taken = self.supply.balance(of_supply, done.drawn, ambient)
+        return dataclasses.replace(done, rates={**done.rates, **outside(SUPPLY, rates)}, drawn=taken)

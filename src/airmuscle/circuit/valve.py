@@ -9,6 +9,7 @@ from ..declare import model, parameter
 from ..gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
 from ..ops import Value
 from ..reference import Reference
+from .orifice import Orifice
 
 ISO6358 = Reference(
     "iso-6358",
@@ -21,7 +22,7 @@ ISO6358 = Reference(
 
 
 @model
-class Valve:
+class Valve(Orifice):
     """An on/off valve or orifice with sonic conductance C and critical pressure ratio b.
 
         qm = C rho0 p1 sqrt(T0/T1) phi,   phi = 1                                choked, p2/p1 <= b

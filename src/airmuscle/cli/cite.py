@@ -28,11 +28,11 @@ def cite(
       airmuscle cite dmsp-20-300 --bibtex >> references.bib
     """
     from .. import reference
-    from ..library.catalogue import load
+    from ..library.find import find
 
     if json and bibtex:
         raise typer.BadParameter("--json and --bibtex exclude each other")
-    found = reference.cite(load(name))
+    found = reference.cite(find(name))
     if json:
         print_json([dataclasses.asdict(source) for source in found])
         return

@@ -21,11 +21,11 @@ class Head:
 
 
 def list_entries(json: Json = False) -> None:
-    """List the muscles, laws and data sets of the library.
+    """List the muscles, laws, valves and data sets of the library.
 
     A muscle can be simulated; a characteristic lacks a geometry for that, or is not solved for the force.
-    A data set is a FILE that `airmuscle fit` knows by its name. Trust says how the numbers came here:
-    printed, measured, second hand, fitted or chosen.
+    A valve stands in a scenario as { library = NAME }. A data set is a FILE that `airmuscle fit` knows by its
+    name. Trust says how the numbers came here: printed, measured, data sheet, second hand, fitted or chosen.
 
     \b
     Examples:
@@ -41,10 +41,12 @@ def list_entries(json: Json = False) -> None:
 
 def heads() -> list[Head]:
     """The heads of all library entries and data sets; nothing is built, so that listing stays quick."""
+    from ..library import valve_catalogue
     from ..library.catalogue import DATA, FOLDER, measured_names, names
 
     return [
         *(_entry_head(FOLDER / f"{name}.toml") for name in names()),
+        *(_valve_head(valve_catalogue.FOLDER / f"{name}.toml") for name in valve_catalogue.valve_names()),
         *(_data_head(DATA / f"{name}.csv") for name in measured_names()),
     ]
 
@@ -61,6 +63,13 @@ def _entry_head(path: Path) -> Head:
     return Head(
         path.stem, tables["title"], f"{'muscle' if muscle else 'characteristic'}, {law['model']}", tables["trust"]
     )
+
+
+def _valve_head(path: Path) -> Head:
+    import tomllib
+
+    tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    return Head(path.stem, tables["title"], f"valve, {tables['valve']['model']}", tables["trust"])
 
 
 def _data_head(path: Path) -> Head:

@@ -12,8 +12,12 @@ from .terminal import print_json, print_table
 
 if TYPE_CHECKING:
     from ..library.entry import Entry
+    from ..library.valve_catalogue import ValveEntry
 
-PARTS = ("characteristic", "geometry", "spring", "damper", "box")
+PARTS = (
+    "characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "box", "valve",
+    "exhaust", "response",
+)  # fmt: skip
 MANY = 30
 """Values of one list above which the table shows its ends only."""
 
@@ -24,22 +28,24 @@ def show(name: Name, json: Json = False) -> None:
     \b
     Examples:
       airmuscle show dmsp-20-300
+      airmuscle show matrix-821
       airmuscle show my/muscle.toml --json
     """
-    from ..library.catalogue import load
+    from ..library.find import find
 
-    entry = load(name)
+    entry = find(name)
     if json:
         print_json(described(entry))
         return
     _print(described(entry))
 
 
-def described(entry: Entry) -> dict[str, Any]:
+def described(entry: Entry | ValveEntry) -> dict[str, Any]:
     """An entry as plain data, all numbers SI."""
     from ..reference import cite
 
-    parts = {part: getattr(entry, part) for part in PARTS if getattr(entry, part) is not None}
+    parts = {part: getattr(entry, part) for part in PARTS if getattr(entry, part, None) is not None}
+    own_geometry = getattr(parts.get("characteristic"), "geometry", None)  # a geometric law has it among its parameters
     return {
         "name": entry.name,
         "title": entry.title,
@@ -50,7 +56,7 @@ def described(entry: Entry) -> dict[str, Any]:
         "parameters": [
             row
             for part, thing in parts.items()
-            if part != "geometry" or thing != getattr(entry.characteristic, "geometry", None)
+            if part != "geometry" or thing != own_geometry
             for row in _parameters(part, thing)
         ],
         "checks": [

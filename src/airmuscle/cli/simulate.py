@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,10 +13,6 @@ from .terminal import print_json, print_table
 if TYPE_CHECKING:
     from ..library.scenario import Scenario
     from ..recording import Recording
-    from ..report.chapter import Chapter
-
-SHOWN = ("pressure", "contraction", "force", "tension", "position", "speed", "fill", "discharge", "held")
-"""Columns that the figure draws, in this order; the file holds all."""
 
 
 def simulate(
@@ -30,7 +26,8 @@ def simulate(
 
     \b
     Writes DIR/recording.csv, DIR/report.html and DIR/figures/.
-    A run that ends early leaves what was computed until then, and exit code 1.
+    A run that ends early leaves what was computed until then, and exit code 1: the last note says when, why, at
+    which state, and what to do.
 
     \b
     Examples:
@@ -87,40 +84,10 @@ def _print(scenario: Scenario, recording: Recording) -> None:
 
 def _write(scenario: Scenario, recording: Recording, out: Path) -> None:
     from ..recording.write_csv import write_csv
+    from ..report.run_chapter import run_chapter
     from ..report.staged import staged
     from ..report.write import fill
 
     with staged(out) as place:
-        write_csv(recording, place / "recording.csv")
-        fill(place, [_chapter(scenario, recording)], title="Simulation")
-
-
-def _chapter(scenario: Scenario, recording: Recording) -> Chapter:
-    from ..reference import cite
-    from ..report.chapter import Chapter, Plot
-    from ..report.parameters import parameter_table
-
-    notes = "\n\n".join(note[:1].upper() + note[1:] + "." for note in recording.notes)
-    return Chapter(
-        paper="simulation",
-        title=scenario.title,
-        summary=f"A run of {scenario.duration:g} s; the whole recording is recording.csv.\n\n{notes}",
-        plots=(Plot("run", f"{scenario.title}, simulated.", recording.plot(*_shown(recording))),),
-        tables=(parameter_table(scenario.plant, "parameters", "Parameters of the plant"),),
-        references=tuple(cite(scenario.plant)),
-        chosen=_settings(scenario),
-    )
-
-
-def _shown(recording: Recording) -> list[str]:
-    last: dict[str, Any] = {name: name.rpartition(".")[2] for name in recording}
-    return [name for kind in SHOWN for name in recording if last[name] == kind]
-
-
-def _settings(scenario: Scenario) -> tuple[tuple[str, str, str], ...]:
-    start = ", ".join(f"{name} {value:.6g}" for name, value in scenario.start.items())
-    return (
-        ("method", str(scenario.method), "scenario"),
-        ("start (SI)", start, "scenario"),
-        ("command", str(scenario.command), "scenario"),
-    )
+        write_csv(scenario.chosen(recording), place / "recording.csv")
+        fill(place, [run_chapter(scenario, recording)], title="Simulation")

@@ -1,6 +1,5 @@
 """Force with memory, against the motion of a muscle."""
 
-from .base import Bristle as Bristle
 from .base import Friction as Friction
 from .base import NoFriction as NoFriction
 from .bouc_wen import BoucWen as BoucWen

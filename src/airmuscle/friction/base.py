@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 import abc
-import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from ..declare import model
 from ..ops import Value
 from ..reference import Reference
-
-
-@dataclasses.dataclass(frozen=True)
-class Bristle:
-    """One inner state of a friction law: its name, its unit, and the size below which its error does not matter."""
-
-    name: str
-    unit: str
-    nominal: float
-    meaning: str
+from ..variables import StateVariable
 
 
 class Friction(abc.ABC):
@@ -38,7 +28,7 @@ class Friction(abc.ABC):
 
     @property
     @abc.abstractmethod
-    def states(self) -> tuple[Bristle, ...]:
+    def states(self) -> tuple[StateVariable, ...]:
         """The bristles; all are 0 in a muscle that has never moved."""
 
     @abc.abstractmethod
@@ -72,7 +62,7 @@ class NoFriction(Friction):
     """F = 0: a muscle without hysteresis."""
 
     @property
-    def states(self) -> tuple[Bristle, ...]:
+    def states(self) -> tuple[StateVariable, ...]:
         return ()
 
     def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:

@@ -9,7 +9,8 @@ from .. import ops
 from ..declare import model, parameter
 from ..ops import Value
 from ..reference import Reference
-from .base import Bristle, Friction
+from ..variables import StateVariable
+from .base import Friction
 from .path import autonomous
 
 BOUC1967 = Reference(
@@ -59,8 +60,8 @@ class BoucWen(Friction):
     unloading: float = parameter("1", "sigma", "shape of unloading", bounds=(0.5, 20.0), default=0.5)
 
     @property
-    def states(self) -> tuple[Bristle, ...]:
-        return (Bristle("bristle", "m", self.travel, "deflection of the bristle"),)
+    def states(self) -> tuple[StateVariable, ...]:
+        return (StateVariable("bristle", "m", self.travel, "deflection of the bristle"),)
 
     @property
     def travel(self) -> float:

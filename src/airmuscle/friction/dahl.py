@@ -9,7 +9,8 @@ from .. import ops
 from ..declare import model, parameter
 from ..ops import Value
 from ..reference import Reference
-from .base import Bristle, Friction
+from ..variables import StateVariable
+from .base import Friction
 from .path import deflection
 
 DAHL1968 = Reference(
@@ -37,8 +38,8 @@ class Dahl(Friction):
     coulomb_force: float = parameter("N", "F_C", "friction force in sliding", bounds=(1e-6, 1e5))
 
     @property
-    def states(self) -> tuple[Bristle, ...]:
-        return (Bristle("bristle", "m", self.travel, "deflection of the bristle"),)
+    def states(self) -> tuple[StateVariable, ...]:
+        return (StateVariable("bristle", "m", self.travel, "deflection of the bristle"),)
 
     @property
     def travel(self) -> float:

@@ -9,7 +9,8 @@ from .. import ops
 from ..declare import model, parameter
 from ..ops import Value
 from ..reference import Reference
-from .base import Bristle, Friction
+from ..variables import StateVariable
+from .base import Friction
 from .path import deflection, speeds
 
 CANUDAS_DE_WIT1995 = Reference(
@@ -51,8 +52,8 @@ class LuGre(Friction):
     damping: float = parameter("N s/m", "sigma_2", "viscous damping in sliding", bounds=(0.0, 1e6), default=0.0)
 
     @property
-    def states(self) -> tuple[Bristle, ...]:
-        return (Bristle("bristle", "m", self.travel, "mean deflection of the bristles"),)
+    def states(self) -> tuple[StateVariable, ...]:
+        return (StateVariable("bristle", "m", self.travel, "mean deflection of the bristles"),)
 
     @property
     def travel(self) -> float:

@@ -10,7 +10,8 @@ from ..declare import model, parameter
 from ..errors import ParameterError
 from ..ops import Value
 from ..reference import Reference
-from .base import Bristle, Friction
+from ..variables import StateVariable
+from .base import Friction
 from .path import stops
 
 IWAN1966 = Reference(
@@ -90,9 +91,10 @@ class MaxwellSlip(Friction):
         refuse_uneven("MaxwellSlip", self.stiffnesses, self.limits)
 
     @property
-    def states(self) -> tuple[Bristle, ...]:
+    def states(self) -> tuple[StateVariable, ...]:
         return tuple(
-            Bristle(f"bristle{i}", "m", limit, f"deflection of element {i}") for i, limit in enumerate(self.limits, 1)
+            StateVariable(f"bristle{i}", "m", limit, f"deflection of element {i}")
+            for i, limit in enumerate(self.limits, 1)
         )
 
     @property

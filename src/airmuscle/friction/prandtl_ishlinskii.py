@@ -10,7 +10,8 @@ from ..declare import model, parameter
 from ..errors import ParameterError
 from ..ops import Value
 from ..reference import Reference
-from .base import Bristle, Friction
+from ..variables import StateVariable
+from .base import Friction
 from .maxwell_slip import refuse_uneven, yielding
 from .path import stops
 
@@ -82,9 +83,9 @@ class PrandtlIshlinskii(Friction):
                     )
 
     @property
-    def states(self) -> tuple[Bristle, ...]:
+    def states(self) -> tuple[StateVariable, ...]:
         return tuple(
-            Bristle(f"stop{i}", "m", limit, f"deflection of stop {i}") for i, limit in enumerate(self.limits, 1)
+            StateVariable(f"stop{i}", "m", limit, f"deflection of stop {i}") for i, limit in enumerate(self.limits, 1)
         )
 
     @property

@@ -6,3 +6,4 @@ from .chebyshev import ChebyshevGeometry as ChebyshevGeometry
 from .pleated import PleatedTube as PleatedTube
 from .straight_fibre import StraightFibre as StraightFibre
 from .tabulated import TabulatedGeometry as TabulatedGeometry
+from .vessel import Vessel as Vessel

@@ -2,7 +2,8 @@
 
 A table names its class, `model = "Braid"`, and gives its fields by name: numbers in the declared unit or text
 with a unit (`"300 mm"`), lists for tuples, tables for models inside models. A list may also be a column of a
-data file, `{ file = "data/map.csv", column = "force" }`, beside the file that names it.
+data file, `{ file = "data/map.csv", column = "force" }`, beside the file that names it. A valve may be one of the
+catalogue, `{ library = "matrix-821" }`, or of a file of the same form, `{ library = "my/valve.toml" }`.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import Any
 from ..declare import Parameter, field_or_suggestion, parameters
 from ..errors import ParameterError
 from .models import model_class
-from .place import Place, number, said_at
+from .place import Place, number, refuse_unknown, said_at, text
 
 
 def build(table: Mapping[str, Any], place: Place, ready: Mapping[str, Any] | None = None) -> Any:
@@ -27,6 +28,8 @@ def build(table: Mapping[str, Any], place: Place, ready: Mapping[str, Any] | Non
     """
     if not isinstance(table, Mapping):
         raise ParameterError(f'{place}: {table!r} is not a table; write model = "..." and its parameters under it.')
+    if "library" in table and "model" not in table:
+        return _from_catalogue(table, place)
     if not isinstance(table.get("model"), str):
         raise ParameterError(f'{place}: no model is named; write model = "Braid", say, and its parameters under it.')
     cls = model_class(table["model"], f"{place}, model")
@@ -45,6 +48,16 @@ def build(table: Mapping[str, Any], place: Place, ready: Mapping[str, Any] | Non
     }
     with said_at(place):
         return cls(**values, **(ready or {}))
+
+
+def _from_catalogue(table: Mapping[str, Any], place: Place) -> Any:
+    """A valve of the catalogue, or of a file beside the one that names it."""
+    from .valve_catalogue import PATHS, load_valve  # which is built from tables itself
+
+    refuse_unknown(table, ("library", "path"), place)
+    name, path = (text({"path": PATHS[0], **table}, key, place, needed=True) for key in ("library", "path"))
+    with said_at(place):
+        return load_valve(place.folder / name if name.endswith(".toml") else name).along(path)
 
 
 def _refuse_missing(cls: type[Any], given: Mapping[str, Any], hints: Mapping[str, Any], place: Place) -> None:

@@ -9,8 +9,9 @@ from typing import Any
 from ..characteristic.base import Characteristic
 from ..characteristic.box import Box
 from ..errors import ParameterError, suggestion
+from ..friction.base import Friction
 from ..geometry.base import Geometry
-from ..muscle import Damper, Spring
+from ..muscle import CreepElements, Damper, Series, Spring, Stop, Wall
 from ..reference import Reference
 from .build import build
 from .entry import Check, Entry
@@ -26,7 +27,10 @@ _GIVEN = {
     "volume": ("contraction",),
 }
 _TEXTS = ("title", "trust", "note", "warning")
-_PARTS = {"characteristic": Characteristic, "geometry": Geometry, "spring": Spring, "damper": Damper}
+_PARTS = {
+    "characteristic": Characteristic, "geometry": Geometry, "spring": Spring, "damper": Damper, "friction": Friction,
+    "wall": Wall, "series": Series, "stop": Stop, "creep": CreepElements,
+}  # fmt: skip
 _KEYS = (*_TEXTS, *_PARTS, "box", "check", "reference")
 _CHECK_TEXTS = ("quantity", "source")
 _CHECK_KEYS = (*_CHECK_TEXTS, "equals", "tolerance", *QUANTITIES)
@@ -53,8 +57,8 @@ def entry_from(tables: Mapping[str, Any], name: str, file: Path, folder: Path) -
         **texts,
         **parts,
         box=_box(tables["box"], place.inside("box")) if "box" in tables else None,
-        checks=tuple(_check(t, p) for t, p in _rows(tables, "check", place)),
-        references=tuple(_reference(t, p) for t, p in _rows(tables, "reference", place)),
+        checks=tuple(_check(t, p) for t, p in rows_of(tables, "check", place)),
+        references=references_from(tables, place),
     )
 
 
@@ -63,7 +67,8 @@ def _box(table: Any, place: Place) -> Any:
     return checked(build(named, place), Box, place)
 
 
-def _rows(tables: Mapping[str, Any], key: str, place: Place) -> list[tuple[Mapping[str, Any], Place]]:
+def rows_of(tables: Mapping[str, Any], key: str, place: Place) -> list[tuple[Mapping[str, Any], Place]]:
+    """The tables written as [[key]], each with its place."""
     rows = tables.get(key, [])
     if not isinstance(rows, list) or not all(isinstance(row, Mapping) for row in rows):
         raise ParameterError(f"{place}: '{key}' must be written as [[{key}]], once for each.")
@@ -95,6 +100,11 @@ def _check(table: Mapping[str, Any], place: Place) -> Check:
 
 def _value(table: Mapping[str, Any], key: str, quantity: str, place: Place) -> float:
     return finite(table[key], QUANTITIES[quantity], f"{place}, {key}")
+
+
+def references_from(tables: Mapping[str, Any], place: Place) -> tuple[Reference, ...]:
+    """The sources that a file names."""
+    return tuple(_reference(t, p) for t, p in rows_of(tables, "reference", place))
 
 
 def _reference(table: Mapping[str, Any], place: Place) -> Reference:

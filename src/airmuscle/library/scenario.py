@@ -1,4 +1,4 @@
-"""A simulation written down as a file: [plant], [command] and [run].
+"""A simulation written down as a file: [plant], [command], [run] and [output].
 
     [plant]
     muscle = "dmsp-20-300"                      a library name or a muscle file; or a table [plant.muscle] with
@@ -6,13 +6,15 @@
     gas = "Isothermal"                          optional; polytropic otherwise
     [plant.circuit]                             model = "FillDischarge" with supply, fill and discharge
     [plant.mechanism]                           model = "HangingMass", mass = "5 kg"
-    [command]
+    [command]                                   see command_table.py
     fill = [["5 s", 1], ["15 s", 0]]            every input of the plant: instants, and the value from then on
     [run]
     duration = "25 s"
     output = "10 ms"                            optional
     start = { pressure = "0 bar" }              optional: rest at this pressure; or a state, position = "10 mm"
     method = { model = "Rodas4", rtol = 1e-8 }  optional
+    [output]
+    columns = ["pressure", "force"]             optional: what the file of the run holds beside the time; or all
 
 Components are tables with `model` and their parameters; later components need no new grammar.
 """
@@ -26,21 +28,23 @@ from types import NoneType
 from typing import Any
 
 from ..characteristic.base import ForceLaw
-from ..command import Command, refuse_unknown_input
+from ..command import Command
 from ..equilibrium import equilibrium
-from ..errors import ParameterError
+from ..errors import ParameterError, suggestion
 from ..method import Method, Rodas4
+from ..muscle import Muscle
 from ..plant import Plant
 from ..recording import Recording
-from ..simulate import refuse_beyond_opening, simulate
+from ..simulate import refuse_beyond_range, simulate
 from .build import build
 from .catalogue import load, parsed
+from .command_table import command_from
 from .entry import Entry
-from .models import model_class
 from .place import Place, checked, finite, refuse_unknown, said_at, text
 
-_TABLES = ("title", "plant", "command", "run")
-_RUN = ("duration", "start_time", "output", "start", "method")
+TABLES = ("title", "plant", "command", "run", "output")
+RUN = ("duration", "start_time", "output", "start", "method")
+OUTPUT = ("columns",)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,6 +59,8 @@ class Scenario:
     start_time: float = 0.0
     output: float | None = None
     method: Method = dataclasses.field(default_factory=Rodas4)
+    columns: tuple[str, ...] = ()
+    """What the file of the run holds beside the time; empty: everything."""
 
     def simulate(self, *, complete: bool = True) -> Recording:
         """The run as a Recording; see `airmuscle.simulate`."""
@@ -69,33 +75,44 @@ class Scenario:
             complete=complete,
         )
 
+    def chosen(self, recording: Recording) -> Recording:
+        """The recording with the columns that the scenario asks for."""
+        kept = {name: recording[name] for name in recording if not self.columns or name in ("time", *self.columns)}
+        return dataclasses.replace(recording, columns=kept)
+
 
 def load_scenario(path: str | Path) -> Scenario:
     """The scenario in a file. Raises FileError, ParameterError, UnitError or UnknownName, saying where."""
     file = Path(path)
-    tables = parsed(file)
-    place = Place(str(file), "", file.parent)
-    refuse_unknown(tables, _TABLES, place)
+    return scenario_from(parsed(file), Place(str(file), "", file.parent))
+
+
+def scenario_from(tables: Mapping[str, Any], place: Place, plant: Plant | None = None) -> Scenario:
+    """The scenario that the tables of a file describe; a `plant` that is given stands for the table [plant]."""
+    refuse_unknown(tables, TABLES, place)
     for key in ("plant", "run"):
         _table(tables.get(key), key, place)
-    plant = _plant(tables["plant"], place.inside("plant"))
+    plant = plant or _plant(tables["plant"], place.inside("plant"))
     run, at = tables["run"], place.inside("run")
-    refuse_unknown(run, _RUN, at)
+    refuse_unknown(run, RUN, at)
     if "duration" not in run:
         raise ParameterError(f"{at}: 'duration' is missing; write it like duration = \"25 s\".")
     duration, start_time = _length(run, "duration", at), finite(run.get("start_time", 0.0), "s", f"{at}, start_time")
-    command = _command(_table(tables.get("command", {}), "command", place), plant, place.inside("command"))
+    table = _table(tables.get("command", {}), "command", place)
+    command = command_from(table, plant.commands, place.inside("command"))
     with said_at(place.inside("command")):
-        refuse_beyond_opening(plant, command.segments(plant.inputs, start_time, duration), start_time)
+        refuse_beyond_range(plant, command.segments(plant.inputs, start_time, duration), start_time)
+    start = _start(run.get("start", {"pressure": 0.0}), plant, at.inside("start"))
     return Scenario(
-        title=text(tables, "title", place, needed=False) or file.stem,
+        title=text(tables, "title", place, needed=False) or Path(place.file).stem,
         plant=plant,
         command=command,
         duration=duration,
-        start=_start(run.get("start", {"pressure": 0.0}), plant, at.inside("start")),
+        start=start,
         start_time=start_time,
         output=_length(run, "output", at) if "output" in run else None,
         method=_object(run["method"], Method, at.inside("method")) if "method" in run else Rodas4(),
+        columns=_columns(_table(tables.get("output", {}), "output", place), plant, start, place.inside("output")),
     )
 
 
@@ -147,7 +164,10 @@ def _entry(given: Any, place: Place) -> Entry:
 
 def _parts(entry: Entry, replaced: Mapping[str, Any], place: Place) -> dict[str, Any]:
     """The parts of an entry that a table leaves as they are; what it lacks, such as a geometry, the table may give."""
-    parts = {"contractile": entry.characteristic, **{n: getattr(entry, n) for n in ("geometry", "spring", "damper")}}
+    names = [f.name for f in dataclasses.fields(Muscle) if f.name not in ("contractile", "name")]
+    parts = {"contractile": entry.characteristic, **{name: getattr(entry, name, None) for name in names}}
+    if "contractile" in replaced:
+        del parts["box"]  # it tells where the law that is replaced was measured
     left = {name: part for name, part in parts.items() if part is not None and name not in replaced}
     if not isinstance(left.get("contractile"), ForceLaw | NoneType):
         raise ParameterError(
@@ -155,33 +175,6 @@ def _parts(entry: Entry, replaced: Mapping[str, Any], place: Place) -> dict[str,
             "a plant needs a ForceLaw. In Python, as_force_law(law, box) makes one."
         )
     return left
-
-
-def _command(table: Mapping[str, Any], plant: Plant, place: Place) -> Command:
-    rows = {key: value for key, value in table.items() if key != "model"}
-    with said_at(place):
-        refuse_unknown_input(list(rows), plant.inputs)
-    points = {
-        key: tuple(_point(row, f"{place}, {key}") for row in _list(given, f"{place}, {key}"))
-        for key, given in rows.items()
-    }
-    kind = model_class(table.get("model", "Schedule"), f"{place}, model")
-    if not issubclass(kind, Command):
-        raise ParameterError(f"{place}: {kind.__name__} is no command.")
-    with said_at(place):
-        return kind(points)  # type: ignore[call-arg]  # every command that a file can name is made of its points
-
-
-def _list(rows: Any, where: str) -> list[Any]:
-    if not isinstance(rows, list):
-        raise ParameterError(f'{where} is {rows!r}; write instants and values, [["5 s", 1], ["15 s", 0]].')
-    return rows
-
-
-def _point(row: Any, where: str) -> tuple[float, float]:
-    if not (isinstance(row, list) and len(row) == 2):
-        raise ParameterError(f'{where} holds {row!r}; each is an instant and a value, ["5 s", 1].')
-    return finite(row[0], "s", where), finite(row[1], "1", where)
 
 
 def _start(given: Any, plant: Plant, place: Place) -> dict[str, float]:
@@ -198,5 +191,23 @@ def _start(given: Any, plant: Plant, place: Place) -> dict[str, float]:
         return plant.state_at(pressure=pressure, **values) if values else equilibrium(plant, pressure=pressure)
 
 
+def _columns(table: Mapping[str, Any], plant: Plant, start: Mapping[str, float], place: Place) -> tuple[str, ...]:
+    refuse_unknown(table, OUTPUT, place)
+    given = table.get("columns", [])
+    if not isinstance(given, list) or not all(isinstance(name, str) for name in given):
+        raise ParameterError(f'{place}, columns is {given!r}; write columns = ["pressure", "force"].')
+    known = ["time", *start, *plant.outputs(start, dict.fromkeys(plant.inputs, 0.0)), *plant.inputs]
+    for name in given:
+        if name not in known:
+            raise ParameterError(
+                f"{place}: the run has no column '{name}'; there are {', '.join(known)}.{suggestion(name, known)}"
+            )
+    return tuple(given)
+
+
 def _object(given: Any, kind: type[Any], place: Place) -> Any:
     return checked(build({"model": given} if isinstance(given, str) else given, place), kind, place)
+
+
+plant_from, muscle_from = _plant, _muscle
+"""The grammar of a plant and of a muscle, for other files that hold them."""

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from .. import trace
 from ..ops import Value
+from ..variables import Input
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,8 +31,8 @@ class Mechanism(abc.ABC):
         """The generalised coordinates, in order."""
 
     @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of the inputs that act on the mechanism."""
+    def inputs(self) -> tuple[Input, ...]:
+        """The inputs that act on the mechanism."""
         return ()
 
     @abc.abstractmethod
@@ -52,15 +53,28 @@ class Mechanism(abc.ABC):
         )
         return tuple(length * rate for length, rate in zip(resting_lengths, rates, strict=True))
 
+    def pulls(
+        self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
+    ) -> dict[str, Value]:
+        """Generalised force of the muscles' tensions [N] on every coordinate: virtual work, J^T F, from `contractions`.
+
+        Newtons for a coordinate in metres, newton metres for an angle.
+        """
+        names = [c.name for c in self.coordinates]
+        if not names:
+            return {}
+        found = trace.pulled_back(
+            lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths),
+            [q[name] for name in names],
+            [tension * length for tension, length in zip(tensions, resting_lengths, strict=True)],
+        )
+        return dict(zip(names, found, strict=True))
+
     @abc.abstractmethod
     def acceleration(
-        self,
-        q: Mapping[str, Value],
-        v: Mapping[str, Value],
-        tensions: Sequence[Value],
-        inputs: Mapping[str, Value],
+        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
-        """Acceleration of every coordinate under the muscles' tensions [N]."""
+        """Acceleration of every coordinate under the generalised forces `pulls` and the mechanism's own."""
 
     def potential_energy(self, q: Mapping[str, Value]) -> Value:
         """Energy of position [J]."""

@@ -28,14 +28,15 @@ class HangingMass(Mechanism):
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return tuple(q["position"] / length for length in resting_lengths)
 
+    def pulls(
+        self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
+    ) -> dict[str, Value]:
+        return {"position": sum(tensions, 0.0)}
+
     def acceleration(
-        self,
-        q: Mapping[str, Value],
-        v: Mapping[str, Value],
-        tensions: Sequence[Value],
-        inputs: Mapping[str, Value],
+        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
-        return {"position": sum(tensions, 0.0) / self.mass - self.gravity}
+        return {"position": pulls["position"] / self.mass - self.gravity}
 
     def potential_energy(self, q: Mapping[str, Value]) -> Value:
         return self.mass * self.gravity * q["position"]

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from ..declare import model
 from ..ops import Value
+from ..variables import Input
 from .base import Coordinate, Mechanism
 
 
@@ -23,20 +24,21 @@ class Held(Mechanism):
         return self.inner.coordinates
 
     @property
-    def inputs(self) -> tuple[str, ...]:
-        return ("held", *self.inner.inputs)
+    def inputs(self) -> tuple[Input, ...]:
+        return (Input("held", meaning="1 held, 0 free"), *self.inner.inputs)
 
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return self.inner.contractions(q, resting_lengths)
 
+    def pulls(
+        self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
+    ) -> dict[str, Value]:
+        return self.inner.pulls(q, tensions, resting_lengths)
+
     def acceleration(
-        self,
-        q: Mapping[str, Value],
-        v: Mapping[str, Value],
-        tensions: Sequence[Value],
-        inputs: Mapping[str, Value],
+        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
-        free = self.inner.acceleration(q, v, tensions, inputs)
+        free = self.inner.acceleration(q, v, pulls, inputs)
         return {name: (1.0 - inputs["held"]) * value for name, value in free.items()}
 
     def potential_energy(self, q: Mapping[str, Value]) -> Value:

@@ -23,10 +23,6 @@ class Isometric(Mechanism):
         return tuple(self.contraction for _ in resting_lengths)
 
     def acceleration(
-        self,
-        q: Mapping[str, Value],
-        v: Mapping[str, Value],
-        tensions: Sequence[Value],
-        inputs: Mapping[str, Value],
+        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
         return {}

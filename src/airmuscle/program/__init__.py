@@ -4,6 +4,6 @@
 system does not need.
 """
 
+from ..variables import StateVariable as StateVariable
 from .system import Differentiated as Differentiated
-from .system import StateVariable as StateVariable
 from .system import System as System

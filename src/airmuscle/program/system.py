@@ -2,21 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from typing import Protocol, runtime_checkable
 
 from ..ops import Value
-
-
-@dataclasses.dataclass(frozen=True)
-class StateVariable:
-    """One state: its name, its unit, and the size below which its relative error no longer matters."""
-
-    name: str
-    unit: str
-    nominal: float
-    meaning: str = ""
+from ..variables import StateVariable
 
 
 class System(Protocol):

@@ -4,7 +4,7 @@ from .experiment import Experiment as Experiment
 from .experiment import StartTime as StartTime
 from .experiment import StartValue as StartValue
 from .fit import fit_dynamic as fit_dynamic
-from .free_fill import FreeFill as FreeFill
 from .identifiable import identifiable as identifiable
 from .result import DynamicFit as DynamicFit
+from .sensing import where_sensed as where_sensed
 from .start import Start as Start

@@ -13,7 +13,7 @@ Array = npt.NDArray[np.float64]
 NORMAL_95 = 1.96
 """Root of the growth of the sum of squares, in variances of the residuals, at the ends of a 95 % interval."""
 REACH = 4.0
-"""Standard deviations that a profile looks to either side."""
+"""Standard deviations that a profile looks to either side, at most twice its value."""
 
 BETTER = 0.1
 """A sum of squares that is less by this says that the fit had not come to its end; chosen."""
@@ -61,9 +61,8 @@ def profile(fit: DynamicFit, name: str, points: int) -> Profile:
     best = fit.values / problem.scales
     (low, high), variance = (bound[k] for bound in problem.bounds), max(fit.scatter, 1e-300) ** 2
     deviation = fit.estimates[k].deviation / problem.scales[k]
-    search = np.array(problem.unknowns[k].search) / problem.scales[k]
-    reach = REACH * deviation if np.isfinite(deviation) else float(np.ptp(search))
-    reach = min(reach, float(np.ptp(search)))
+    span = min(high - low, 2.0 * abs(best[k]) or 1.0)
+    reach = min(REACH * deviation, span) if np.isfinite(deviation) else span
     rows = [(best[k], fit.costs[0], best)]
     for side in (-1.0, 1.0):
         at = best.copy()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from ...program.function import Function
 
 Array = npt.NDArray[np.float64]
+NUDGE = 100.0
+"""A little more gauge pressure [Pa], by which states that settle with it are found."""
 _WHY = {
     1: "where the search came to, some state changes none of what is asked",
     2: "the search left all bounds",
@@ -29,7 +31,7 @@ _conditions: dict[Any, Function] = {}
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Start:
-    """Conditions that fix a state: `known` values of states or outputs, and states that stand `still`.
+    """Conditions that fix a state: `known` values of states or outputs, states that stand `still`, `equal` outputs.
 
     Together they must be as many as the states; `guess` is where the search for the state begins. Inputs count as zero.
     """
@@ -37,34 +39,65 @@ class Start:
     known: Mapping[str, float]
     guess: Mapping[str, float]
     still: tuple[str, ...] = ()
+    equal: tuple[tuple[str, str], ...] = ()
 
     @classmethod
     def at_rest(cls, plant: Plant, pressure: float) -> Start:
-        """A plant of one muscle in equilibrium at a gauge pressure [Pa]."""
+        """A plant of one muscle in equilibrium at a gauge pressure [Pa], its walls and tubes settled."""
         speeds = [c.speed for c in plant.mechanism.coordinates]
-        known = {"pressure": pressure} | dict.fromkeys(speeds, 0.0)
-        return cls(known, equilibrium(plant, pressure=pressure), tuple(speeds))
+        places = [c.name for c in plant.mechanism.coordinates]
+        state = equilibrium(plant, pressure=pressure)
+        known, still, equal = _settled(plant, state, pressure, (*speeds, *places))
+        known |= dict.fromkeys(speeds, 0.0)
+        return cls({"pressure": pressure, **known}, state, (*still, *speeds), equal)
 
     @classmethod
     def held(cls, plant: Plant, pressure: float, **coordinates: float) -> Start:
-        """A plant of one muscle at a gauge pressure [Pa], its coordinates known, at rest unless speeds are given."""
+        """A plant of one muscle at a gauge pressure [Pa], its coordinates known, at rest unless speeds are given.
+
+        Walls and tubes are settled at this pressure, and go with it where it is an unknown.
+        """
         state = plant.state_at(pressure=pressure, **coordinates)
-        moving = {name: value for name, value in state.items() if name != "air_mass"}
-        return cls({"pressure": pressure} | moving, state)
+        known, still, equal = _settled(plant, state, pressure)
+        return cls({"pressure": pressure, **known}, state, still, equal)
 
     def refuse_unfit(self, system: System, values: Mapping[str, Any]) -> None:
         """Raise ParameterError for a name that the system lacks, or too few or many conditions."""
         names = [s.name for s in system.states]
-        for name in (*self.known, *self.still):
+        for name in (*self.known, *self.still, *(n for pair in self.equal for n in pair)):
             if name not in (names if name in self.still else values):
                 raise ParameterError(
                     f"the start names '{name}'; the system has {', '.join(values)}.{suggestion(name, values)}"
                 )
-        if len(self.known) + len(self.still) != len(names) or set(self.guess) != set(names):
+        if len(self.known) + len(self.still) + len(self.equal) != len(names) or set(self.guess) != set(names):
             raise ParameterError(
                 f"the start must give as many conditions as there are states ({', '.join(names)}), and a guess "
                 f"of each; known are {', '.join(self.known) or 'none'}, still {', '.join(self.still) or 'none'}."
             )
+
+
+def _settled(
+    plant: Plant, state: Mapping[str, float], pressure: float, left: Sequence[str] = ()
+) -> tuple[dict[str, float], tuple[str, ...], tuple[tuple[str, str], ...]]:
+    """How the states besides the air mass are fixed: those that a little more pressure leaves alone are known.
+
+    Of the others a tube has the pressure of the muscle, and the rest stands still.
+    """
+    moving = {c.name: state[c.name] for c in plant.mechanism.coordinates}
+    moving |= {c.speed: state[c.speed] for c in plant.mechanism.coordinates}
+    other = plant.state_at(pressure=pressure + NUDGE, **moving)
+    shown = plant.outputs(state, dict.fromkeys(plant.inputs, 0.0))
+    known, still, equal = {}, [], []
+    for name, value in state.items():
+        if name == "air_mass" or name in left:
+            continue
+        if other[name] == value:
+            known[name] = value
+        elif (of_tube := f"{name.removesuffix('air_mass')}pressure") in shown:
+            equal.append((of_tube, "pressure"))
+        else:
+            still.append(name)
+    return known, tuple(still), tuple(equal)
 
 
 def conditions(system: System, start: Start) -> Function:
@@ -73,7 +106,7 @@ def conditions(system: System, start: Start) -> Function:
 
     from ...program.function import Function
 
-    key = (declare.structure(system), tuple(start.known), start.still)
+    key = (declare.structure(system), tuple(start.known), start.still, start.equal)
     if key not in _conditions:
         model, p = trace.symbolic(system)
         x = casadi.SX.sym("x", len(system.states))
@@ -82,7 +115,11 @@ def conditions(system: System, start: Start) -> Function:
         values = {**model.outputs(state, shut), **state}
         start.refuse_unfit(system, values)
         rates = model.rates(state, shut)
-        g = casadi.vertcat(*(casadi.SX(values[n]) for n in start.known), *(casadi.SX(rates[n]) for n in start.still))
+        g = casadi.vertcat(
+            *(casadi.SX(values[n]) for n in start.known),
+            *(casadi.SX(rates[n]) for n in start.still),
+            *(casadi.SX(values[a] - values[b]) for a, b in start.equal),
+        )
         outputs = {"values": g, "by_state": casadi.jacobian(g, x), "by_leaf": casadi.jacobian(g, p)}
         _conditions[key] = Function({"x": x, "leaves": p}, outputs)
     return _conditions[key]
@@ -100,13 +137,14 @@ def solved(
     from ...engine.root import root
 
     announce_compilation(root)
-    n, x, target = guess.size, guess.copy(), np.concatenate([known, np.zeros(len(start.still))])
+    n, x, target = guess.size, guess.copy(), np.concatenate([known, np.zeros(len(start.still) + len(start.equal))])
     values, by_state, by_leaf, work = np.empty(n), np.empty((n, n)), np.empty((n, leaves.size)), np.zeros(n * n + n)
     status = root(function.address, leaves, target, sizes, x, values, by_state, by_leaf, work)
     if status != 0:
         raise IdentificationError(
             f"no state meets the start {dict(zip(start.known, known.tolist(), strict=True))} with "
-            f"{', '.join(start.still) or 'nothing'} at rest: {_WHY[status]}."
+            f"{', '.join(start.still) or 'nothing'} at rest and "
+            f"{', '.join(f'{a} = {b}' for a, b in start.equal) or 'nothing'} equal: {_WHY[status]}."
         )
     inverse = sizes[:, None] * np.linalg.inv(by_state * sizes)
     return x, inverse[:, : known.size], -inverse @ by_leaf

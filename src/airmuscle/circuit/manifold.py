@@ -1,0 +1,112 @@
+"""Circuits made of circuits: one that leaks, and several on one supply."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+
+from ..declare import model
+from ..errors import ParameterError
+from ..gas import Air, Ambient
+from ..ops import Value
+from ..variables import Input, StateVariable, outside, renamed, within
+from .circuit import SUPPLY, Circuit, Response
+from .fill_discharge import surroundings
+from .orifice import Orifice
+from .supply import Shared, Source
+from .through import through
+
+
+@model
+class Leaking(Circuit):
+    """A circuit whose muscles also lose air to the surroundings through a leak each."""
+
+    circuit: Circuit
+    leak: Orifice
+
+    @property
+    def supply(self) -> Source:  # type: ignore[override]  # the circuit's own
+        return self.circuit.supply
+
+    @property
+    def ports(self) -> int:
+        return self.circuit.ports
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        return self.circuit.inputs
+
+    def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
+        return self.circuit.own_states(ambient)
+
+    def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        return self.circuit.own_settled(airs, ambient)
+
+    def draw(
+        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        ambient: Ambient,
+    ) -> Response:  # fmt: skip
+        done = self.circuit.draw(inlet, airs, state, inputs, ambient)
+        lost = [through(self.leak, air, surroundings(ambient)) for air in airs]
+        flows = tuple(flow - leaking for flow, leaking in zip(done.flows, lost, strict=True))
+        return dataclasses.replace(done, flows=flows, exhausted=sum(lost, done.exhausted))
+
+
+@model
+class Manifold(Circuit):
+    """Several circuits on one supply, so that one that draws much starves the others; each has a name."""
+
+    supply: Source
+    branches: tuple[Circuit, ...]
+    names: tuple[str, ...]
+
+    def check(self) -> None:
+        if len(self.names) != len(self.branches) or len(set(self.names)) != len(self.names) or not self.names:
+            raise ParameterError(f"Manifold: {len(self.branches)} branches need as many different names: {self.names}.")
+        for name in self.names:
+            if not name or "." in name or f"{name}." == SUPPLY:
+                raise ParameterError(
+                    f"Manifold: a branch cannot be named {name!r}; give a word without a dot, and not 'supply', which "
+                    "names the manifold's own."
+                )
+        for name, branch in zip(self.names, self.branches, strict=True):
+            if not isinstance(branch.supply, Shared):
+                raise ParameterError(
+                    f"Manifold: branch '{name}' has a supply of its own; give it Shared(), as the manifold feeds it."
+                )
+
+    def _parts(self) -> Iterator[tuple[str, Circuit]]:
+        return zip((f"{name}." for name in self.names), self.branches, strict=True)
+
+    @property
+    def ports(self) -> int:
+        return sum(branch.ports for branch in self.branches)
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        return tuple(i for name, branch in self._parts() for i in renamed(name, branch.inputs))
+
+    def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
+        return tuple(s for name, branch in self._parts() for s in renamed(name, branch.own_states(ambient)))
+
+    def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        found: dict[str, Value] = {}
+        left = list(airs)
+        for name, branch in self._parts():
+            mine, left = tuple(left[: branch.ports]), left[branch.ports :]
+            found |= outside(name, branch.own_settled(mine, ambient))
+        return found
+
+    def draw(
+        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        ambient: Ambient,
+    ) -> Response:  # fmt: skip
+        total, left = Response(()), list(airs)
+        for name, branch in self._parts():
+            mine, left = tuple(left[: branch.ports]), left[branch.ports :]
+            done = branch.draw(inlet, mine, within(name, state), within(name, inputs), ambient)
+            total = Response(
+                total.flows + done.flows, total.drawn + done.drawn, total.exhausted + done.exhausted,
+                {**total.rates, **outside(name, done.rates)}, {**total.outputs, **outside(name, done.outputs)},
+            )  # fmt: skip
+        return total

@@ -1,0 +1,36 @@
+"""A rigid vessel: the volume does not depend on contraction."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from ..declare import model, parameter
+from ..ops import Value
+from .base import Geometry
+
+
+@model
+class Vessel(Geometry):
+    """V constant: a chamber on a bench, or a muscle whose contraction nobody recorded (with a wall that swells)."""
+
+    enclosed_volume: float = parameter("m3", "V_0", "volume", bounds=(1e-7, 1e-1))
+    resting_length: float = parameter(
+        "m", "L_0", "length between the fittings", bounds=(1e-3, 10.0), fitted=False, default=0.2
+    )
+
+    @property
+    def contraction_reach(self) -> tuple[float, float]:
+        return (-0.5, 0.9)
+
+    def volume(self, contraction: Value) -> Value:
+        return self.enclosed_volume + 0.0 * contraction
+
+    def volume_growth(self, contraction: Value) -> Value:
+        return 0.0 * contraction
+
+    def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        self.refuse_out_of_reach(contraction)
+        length = self.resting_length * (1.0 - contraction)
+        radius = (self.enclosed_volume / (np.pi * length)) ** 0.5
+        return np.linspace(-length / 2, length / 2, points), np.full(points, radius)

@@ -1,0 +1,124 @@
+"""A simulated run as a chapter: its courses, what was commanded and what came of it, parameters, settings, sources."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..command import Command, Periodic, Schedule, Segments, Signal
+from ..driver import Driven
+from ..figures import BLACK, BLUE, legend_below, new_figure
+from ..library.scenario import Scenario
+from ..recording import Recording
+from ..reference import cite
+from .chapter import Chapter, Plot
+from .parameters import parameter_table
+
+SHOWN = ("pressure", "contraction", "force", "tension", "friction", "position", "angle", "speed")
+"""Columns that the figure draws, in this order; the file holds all."""
+MOST_PIECES = 300
+"""Pieces of a command that a figure tells apart; of a longer one it shows the beginning."""
+MOST_CHANGES = 6
+"""Changes of an input that are spelt out."""
+
+
+def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
+    """The chapter of a run, whole or as far as it came."""
+    notes = "\n\n".join(_sentence(note) for note in recording.notes)
+    plots = [Plot("run", f"{scenario.title}, simulated.", recording.plot(*_shown(recording)))]
+    if scenario.plant.inputs:
+        plots.append(_inputs(scenario, recording))
+    return Chapter(
+        paper="simulation",
+        title=scenario.title,
+        summary=f"{_length(scenario, recording)} The recording is recording.csv.\n\n{notes}",
+        plots=tuple(plots),
+        tables=(parameter_table(scenario.plant, "parameters", "Parameters of the plant"),),
+        references=tuple(cite(scenario.plant)),
+        chosen=_settings(scenario),
+    )
+
+
+def _sentence(note: str) -> str:
+    return f"{note[:1].upper()}{note[1:].rstrip('.')}."
+
+
+def _length(scenario: Scenario, recording: Recording) -> str:
+    reached, end = float(recording["time"][-1]), scenario.start_time + scenario.duration
+    if reached < end:
+        return f"A run of {scenario.duration:g} s that ended early, at {reached:.6g} s; the last note says why."
+    return f"A run of {scenario.duration:g} s."
+
+
+def _shown(recording: Recording) -> list[str]:
+    return [name for kind in SHOWN for name in recording if name.rpartition(".")[2] == kind]
+
+
+def _inputs(scenario: Scenario, recording: Recording) -> Plot:
+    """Every input as the plant had it, with its jumps, and behind it what a driver was told."""
+    command, inputs = scenario.command, scenario.plant.inputs
+    units = {given.name: "" if given.unit == "1" else f"\n[{given.unit}]" for given in scenario.plant.commands}
+    start, reached = scenario.start_time, float(recording["time"][-1])
+    end = reached if reached > start else start + scenario.duration
+    had = command.segments(inputs, start, end - start)
+    shortened = had.ends.size > MOST_PIECES
+    if shortened:
+        had = command.segments(inputs, start, float(had.ends[MOST_PIECES - 1]) - start)
+    told = command.inner.segments(inputs, start, float(had.ends[-1]) - start) if isinstance(command, Driven) else None
+    figure, axes = new_figure(
+        len(inputs), 1, height=0.9 + 0.9 * len(inputs), sharex=True, sharey=len(set(units.values())) == 1, squeeze=False
+    )  # one height for all of one unit: openings are compared
+    for i, (name, axis) in enumerate(zip(inputs, axes[:, 0], strict=True)):
+        if told is not None:
+            axis.plot(*_corners(told, start, i), color=BLACK, linestyle="--", linewidth=0.9, label="command")
+        axis.plot(*_corners(had, start, i), color=BLUE, label="what the plant had")
+        axis.set_ylabel(f"{name}{units[name]}")
+    axes[-1, 0].set_xlabel("time [s]")
+    figure.align_ylabels()
+    if told is not None:
+        legend_below(figure, axes[0, 0])
+    part = f"; the first {MOST_PIECES} pieces" if shortened else ""
+    behind = "; dashed, what the drivers were told" if told is not None else ""
+    return Plot("inputs", f"Inputs of the plant{part}{behind}.", figure)
+
+
+def _corners(segments: Segments, start: float, i: int) -> tuple[Any, Any]:
+    """Times and values at both ends of every piece, so that a jump is drawn upright."""
+    starts = segments.starts(start)
+    first = segments.values[:, i]
+    last = first + segments.slopes[:, i] * (segments.ends - starts)
+    return np.column_stack([starts, segments.ends]).ravel(), np.column_stack([first, last]).ravel()
+
+
+def _settings(scenario: Scenario) -> tuple[tuple[str, str, str], ...]:
+    start = ", ".join(f"{name} {value:.6g}" for name, value in scenario.start.items())
+    return (
+        ("method", str(scenario.method), "scenario"),
+        ("start (SI)", start, "scenario"),
+        ("command", in_words(scenario.command), "scenario"),
+    )
+
+
+def in_words(command: Command) -> str:
+    """A command in a sentence, however long its tables are."""
+    if isinstance(command, Driven):
+        chains = (f"{name} by {', '.join(map(str, chain))}" for name, chain in command.chains.items())
+        return f"{in_words(command.inner)}; driven: {'; '.join(chains)}"
+    if isinstance(command, Periodic):
+        return f"every {command.period:g} s: {in_words(command.inner)}"
+    if isinstance(command, Schedule):
+        return "; ".join(_changes(name, rows, "from") for name, rows in command.changes.items()) or "none"
+    if isinstance(command, Signal):
+        return "; ".join(_changes(name, rows, "at") for name, rows in command.points.items()) or "none"
+    return str(command)
+
+
+def _changes(name: str, rows: Sequence[tuple[float, float]], word: str) -> str:
+    if len(rows) > MOST_CHANGES:
+        values = [value for _, value in rows]
+        return (
+            f"{name}: {len(rows)} values from {min(values):g} to {max(values):g}, {rows[0][0]:g} to {rows[-1][0]:g} s"
+        )
+    return f"{name} {', '.join(f'{value:g} {word} {time:g} s' for time, value in rows)}"

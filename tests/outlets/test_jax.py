@@ -1,0 +1,88 @@
+"""A plant inside the user's own JAX program: jit, vmap and grad work, and the numbers are NumPy's.
+
+Rates are compared relative to their size or the size of their state in a second, whichever is larger.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from joints import chosen_muscle
+
+from airmuscle import declare
+from airmuscle.circuit import FillDischarge, Leaking, Line, Supply, Tank, Tube, Valve
+from airmuscle.contact import HuntCrossley
+from airmuscle.equilibrium import equilibrium
+from airmuscle.friction import MaxwellSlip
+from airmuscle.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.mechanism import HangingMass
+from airmuscle.muscle import CreepElements, EndStop, LaggingWall, SeriesSpring
+from airmuscle.plant import Plant
+
+jax = pytest.importorskip("jax")
+jax.config.update("jax_enable_x64", True)
+jnp = jax.numpy
+
+VALVE = Valve(2.6e-9, 0.43)
+GASES = [Isothermal(), Polytropic(1.2), EnergyBalance(1.0)]
+INPUTS = {"fill": 0.3, "discharge": 0.1}
+
+
+def plant_of_everything(gas):
+    muscle = replace(
+        chosen_muscle(),
+        friction=MaxwellSlip((4e4, 2e4), (2e-4, 1e-3)),
+        wall=LaggingWall(2e-11, 0.2),
+        series=SeriesSpring(2e4),
+        stop=EndStop(0.12, HuntCrossley(1e8)),
+        creep=CreepElements((500.0,), (2.0,)),
+    )
+    valves = FillDischarge(Tank(Supply(5e5), Valve(3e-9, 0.3), 1e-3), VALVE, VALVE)
+    circuit = Leaking(Line(valves, Tube(Valve(1e-8, 0.2), 2e-5, 3)), Valve(1e-12, 0.3))
+    return Plant(muscle, circuit, HangingMass(10.0), gas)
+
+
+def as_jax(values):
+    return {name: jnp.asarray(value) for name, value in values.items()}
+
+
+@pytest.mark.parametrize("gas", GASES, ids=repr)
+def test_the_rates_under_jit_are_those_of_numpy(gas):
+    plant = plant_of_everything(gas)
+    state = equilibrium(plant, pressure=2e5)
+    expected = plant.rates(state, INPUTS)
+    found = jax.jit(plant.rates)(as_jax(state), as_jax(INPUTS))
+    for variable in plant.states:
+        size = abs(float(expected[variable.name])) + 100 * variable.nominal
+        assert abs(float(found[variable.name]) - float(expected[variable.name])) < 1e-12 * size, variable.name
+
+
+@pytest.mark.parametrize("gas", GASES, ids=repr)
+def test_outputs_over_many_states_at_once_are_those_of_each(gas):
+    plant = plant_of_everything(gas)
+    state = equilibrium(plant, pressure=2e5)
+    heights = np.linspace(0.9, 1.1, 7) * state["position"]
+    forces = jax.vmap(lambda y: plant.outputs({**as_jax(state), "position": y}, as_jax(INPUTS))["force"])(heights)
+    each = [float(plant.outputs({**state, "position": float(y)}, INPUTS)["force"]) for y in heights]
+    np.testing.assert_allclose(forces, each, rtol=1e-12, atol=1e-10)
+
+
+def test_a_gradient_by_every_parameter_is_the_difference_quotient():
+    plant = plant_of_everything(EnergyBalance(1.0))
+    state = equilibrium(plant, pressure=2e5)
+    leaves = declare.flatten(plant)
+
+    def inflow(values):
+        rates = declare.rebuild(plant, list(values)).rates(as_jax(state), as_jax(INPUTS))
+        return 1e3 * rates["tube1.air_mass"] + rates["speed"]
+
+    gradient = np.asarray(jax.jit(jax.grad(inflow))(jnp.asarray(leaves)))
+    assert np.isfinite(gradient).all()
+    for path in ("circuit.circuit.circuit.fill.conductance", "muscle.series.stiffness", "mechanism.mass"):
+        i = [leaf.path for leaf in declare.leaves(plant)].index(path)
+        step = 1e-6 * leaves[i] * np.eye(leaves.size)[i]
+        quotient = (inflow(leaves + step) - inflow(leaves - step)) / (2e-6 * leaves[i])
+        assert gradient[i] == pytest.approx(float(quotient), rel=1e-6), path
+        assert gradient[i] != 0.0

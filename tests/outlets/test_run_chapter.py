@@ -1,0 +1,60 @@
+"""The chapter of a run says what was commanded in a line, however long it was, and draws inputs with their jumps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airmuscle.command import Periodic, Schedule, Signal
+from airmuscle.driver import PWM, Driven
+from airmuscle.library.scenario import load_scenario
+from airmuscle.report.run_chapter import MOST_PIECES, in_words, run_chapter
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (Schedule({}), "none"),
+        (Schedule({"fill": ((5, 1), (15, 0)), "discharge": ((19, 1),)}), "fill 1 from 5 s, 0 from 15 s; discharge 1 from 19 s"),
+        (Signal({"fill": ((0, 0), (2, 0.5))}), "fill 0 at 0 s, 0.5 at 2 s"),
+        (Schedule({"fill": tuple((i, i % 2) for i in range(1000))}), "fill: 1000 values from 0 to 1, 0 to 999 s"),
+        (Periodic(Schedule({"fill": ((1, 1),)}), 2.0), "every 2 s: fill 1 from 1 s"),
+        (Driven(Schedule({"fill": ((1, 0.5),)}), {"fill": PWM(50.0)}), "fill 0.5 from 1 s; driven: fill by PWM(frequency=50.0, smallest_pulse=0.0)"),
+    ],
+)  # fmt: skip
+def test_a_command_in_words(command, words: str):
+    assert in_words(command) == words
+
+
+def drawn(command, duration: float):
+    scenario = replace(load_scenario(EXAMPLE), command=command, duration=duration)
+    plot = run_chapter(scenario, scenario.simulate()).plots[-1]
+    return plot, {line.get_label(): line.get_xydata() for line in plot.figure.axes[0].lines}
+
+
+def test_a_jump_is_upright():
+    plot, lines = drawn(Schedule({"fill": ((0.1, 1), (0.2, 0))}), 0.3)
+    assert plot.caption == "Inputs of the plant."
+    assert lines["what the plant had"].tolist() == [[0, 0], [0.1, 0], [0.1, 1], [0.2, 1], [0.2, 0], [0.3, 0]]
+
+
+def test_of_a_long_command_the_beginning_is_drawn_beside_what_the_driver_was_told():
+    command = Driven(Schedule({"fill": ((0.0, 0.5),)}), {"fill": PWM(1000.0)})
+    plot, lines = drawn(command, 0.5)
+    assert plot.caption == "Inputs of the plant; the first 300 pieces; dashed, what the drivers were told."
+    had, told = lines["what the plant had"], lines["command"]
+    assert had[-1, 0] == told[-1, 0] == pytest.approx(MOST_PIECES * 0.5e-3)
+    assert np.array_equal(told[:, 1], [0.5, 0.5])
+
+
+def test_a_run_that_ended_at_once_still_shows_what_was_commanded():
+    scenario = load_scenario(EXAMPLE)
+    run = scenario.simulate()
+    chapter = run_chapter(scenario, run.rows(slice(0, 1)))
+    assert chapter.summary.startswith("A run of 25 s that ended early, at 0 s; the last note says why.")
+    assert chapter.plots[-1].figure.axes[0].lines[0].get_xdata()[-1] == 25.0

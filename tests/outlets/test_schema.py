@@ -1,0 +1,228 @@
+"""The schemas are the program's own models: what the files of docs, examples and library hold passes, what is broken
+does not, and nothing that a schema refuses is read by the program.
+
+A validator of the few keywords that the schemas use stands in this file; jsonschema judges too, where it is installed.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from airmuscle.cli.app import app
+from airmuscle.declare import parameters
+from airmuscle.errors import AirmuscleError
+from airmuscle.library.catalogue import load, names, to_toml
+from airmuscle.library.models import model_class
+from airmuscle.library.read import entry_from
+from airmuscle.library.scenario import load_scenario
+from airmuscle.library.schema import muscle_schema, scenario_schema
+
+ROOT = Path(__file__).parents[2]
+LIBRARY = sorted((ROOT / "src" / "airmuscle" / "library").glob("*.toml"))
+EXAMPLES = sorted((ROOT / "examples").glob("*.toml"))
+SCENARIO, MUSCLE = scenario_schema(), muscle_schema()
+ABOUT = {"$schema", "$defs", "title", "description", "default"}
+TYPES = {"object": dict, "array": list, "string": str, "boolean": bool, "integer": int, "number": (int, float)}
+
+
+def blocks(page: str) -> list[str]:
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    return re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
+
+
+def is_type(value: Any, kind: str) -> bool:
+    return isinstance(value, TYPES[kind]) and (kind == "boolean" or not isinstance(value, bool))
+
+
+def faults(value: Any, schema: dict[str, Any], root: dict[str, Any], where: str = "") -> list[str]:
+    """What a value has against a schema. A keyword that is not judged here is an error of the test."""
+    found: list[str] = []
+    for keyword, given in schema.items():
+        match keyword:
+            case "$ref":
+                found += faults(value, root["$defs"][given.removeprefix("#/$defs/")], root, where)
+            case "anyOf":
+                found += [f"{where}: none of {len(given)}"] if all(faults(value, s, root) for s in given) else []
+            case "type":
+                found += [] if is_type(value, given) else [f"{where}: no {given}"]
+            case "enum":
+                found += [] if value in given else [f"{where}: none of {given}"]
+            case "const":
+                found += [] if value == given else [f"{where}: not {given}"]
+            case "minimum" | "maximum" if is_type(value, "number"):
+                found += [] if (value >= given if keyword == "minimum" else value <= given) else [f"{where}: {keyword}"]
+            case "pattern" if isinstance(value, str):
+                found += [] if re.search(given, value) else [f"{where}: no number with a unit"]
+            case "minItems" | "maxItems" if isinstance(value, list):
+                found += [] if (len(value) >= given if keyword == "minItems" else len(value) <= given) else [where]
+            case "prefixItems" if isinstance(value, list):
+                pairs = zip(value, given, strict=False)
+                found += [f for i, (item, s) in enumerate(pairs) for f in faults(item, s, root, f"{where}[{i}]")]
+            case "items" if isinstance(value, list):
+                found += [f for i, item in enumerate(value) for f in faults(item, given, root, f"{where}[{i}]")]
+            case "required" if isinstance(value, dict):
+                found += [f"{where}: lacks {key}" for key in given if key not in value]
+            case "properties" if isinstance(value, dict):
+                here = [key for key in given if key in value]
+                found += [f for key in here for f in faults(value[key], given[key], root, f"{where}.{key}")]
+            case "additionalProperties" if isinstance(value, dict):
+                rest = {key: item for key, item in value.items() if key not in schema.get("properties", {})}
+                if given is False:
+                    found += [f"{where}: {key} is not known" for key in rest]
+                else:
+                    found += [f for key, item in rest.items() for f in faults(item, given, root, f"{where}.{key}")]
+            case _ if keyword in ABOUT or keyword in JUDGED:
+                continue
+            case _:
+                raise AssertionError(f"the test does not judge '{keyword}'")
+    return found
+
+
+JUDGED = {
+    "minimum", "maximum", "pattern", "minItems", "maxItems", "prefixItems", "items", "required", "properties",
+    "additionalProperties",
+}  # fmt: skip
+
+
+def judged(value: Any, schema: dict[str, Any]) -> list[str]:
+    """The faults, on which jsonschema, where it is installed, must agree."""
+    found = faults(value, schema, schema)
+    try:
+        import jsonschema
+    except ImportError:
+        return found
+    theirs = list(jsonschema.Draft202012Validator(schema).iter_errors(value))
+    assert bool(theirs) == bool(found), (found, [e.message for e in theirs])
+    return found
+
+
+# What is right passes
+
+
+@pytest.mark.parametrize("path", LIBRARY, ids=lambda p: p.stem)
+def test_every_file_of_the_library_passes(path: Path):
+    assert judged(tomllib.loads(path.read_text(encoding="utf-8")), MUSCLE) == []
+
+
+@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+@pytest.mark.parametrize("name", names())
+def test_every_entry_passes_in_the_form_that_fit_and_save_write(name: str):
+    assert judged(tomllib.loads(to_toml(load(name))), MUSCLE) == []
+
+
+@pytest.mark.parametrize("text", blocks("muscle-file.md"))
+def test_the_muscle_of_the_page_passes(text: str):
+    assert judged(tomllib.loads(text), MUSCLE) == []
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
+def test_every_example_passes(path: Path):
+    assert judged(tomllib.loads(path.read_text(encoding="utf-8")), SCENARIO) == []
+
+
+@pytest.mark.parametrize("text", blocks("scenario.md"))
+def test_every_table_of_the_page_passes(text: str):
+    """Pieces of a scenario lack tables; the tables that they have must pass."""
+    tables = tomllib.loads(text)
+    schema = {**SCENARIO, "required": []}
+    part = {**schema["properties"]["plant"], "required": []}
+    schema["properties"] = {**schema["properties"], "plant": part}
+    assert judged(tables, schema) == []
+
+
+# What is broken does not
+
+GOOD = (ROOT / "examples" / "fill_discharge.toml").read_text(encoding="utf-8")
+BROKEN = [
+    ("duration =", "duratoin =", ".run: duratoin is not known"),
+    ('duration = "25 s"', "duration = true", ".run.duration: none of"),
+    ('duration = "25 s"', "duration = -3", ".run.duration: none of"),
+    ('duration = "25 s"', 'duration = "25,5 s"', ".run.duration: none of"),
+    ('duration = "25 s"', 'duration = "25"', ".run.duration: none of"),
+    ("[run]", "[Run]", ": lacks run"),
+    ("[command]", "[commands]", ": commands is not known"),
+    ('"HangingMass"', '"HangingMas"', ".plant.mechanism: none of"),
+    ('"HangingMass"', '"Valve"', ".plant.mechanism: none of"),
+    ("mass = ", "mas = ", ".plant.mechanism: none of"),
+    ('mass = "10 kg"', "mass = 1e9", ".plant.mechanism: none of"),
+    ('gas = "Isothermal"', 'gas = "Isotherm"', ".plant.gas: none of"),
+    ('gas = "Isothermal"', "gaz = 1", ".plant: gaz is not known"),
+    ("critical_ratio = 0.433 }\ndis", "critical_ration = 0.433 }\ndis", ".plant.circuit: none of"),
+    ("damping = ", "dampin = ", ".plant.muscle: none of"),
+    ('library = "dmsp-20-300"\n', "", ".plant.muscle: none of"),
+    ('fill = [["5 s", 1], ["15 s", 0]]', 'fill = [["5 s"], ["15 s", 0]]', ".command.fill[0]"),
+    ('fill = [["5 s", 1], ["15 s", 0]]', "fill = 1", ".command.fill: no array"),
+    ('fill = [["5 s", 1], ["15 s", 0]]', "fill = [[0, true]]", ".command.fill[0][1]: none of"),
+    ("[command]", '[command]\nmodel = "Shedule"', ".command.model: none of ['Schedule', 'Signal']"),
+    ("[command]", '[command]\ndrivers = { fill = "OnOf" }', ".command.drivers.fill: none of"),
+    ("[command]", '[command]\ndrivers = { fill = { model = "PWM" } }', ".command.drivers.fill: none of"),
+    ("[command]", "[command]\nfile = 3", ".command.file: no string"),
+    ("[run]", "[output]\ncolumns = 3\n[run]", ".output.columns: no array"),
+    ("[run]", '[run]\nmethod = { model = "RungeKutta4" }', ".run.method: none of"),
+    ("title =", "titel =", ": titel is not known"),
+]
+
+
+@pytest.mark.parametrize(("was", "becomes", "fault"), BROKEN)
+def test_a_broken_scenario_is_found_by_the_schema_and_refused_by_the_program(
+    tmp_path: Path, was: str, becomes: str, fault: str
+):
+    assert was in GOOD
+    text = GOOD.replace(was, becomes, 1)
+    found = judged(tomllib.loads(text), SCENARIO)
+    assert any(f.startswith(fault) for f in found), found
+    (tmp_path / "scenario.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(AirmuscleError):
+        load_scenario(tmp_path / "scenario.toml")
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "fault"),
+    [
+        ("title =", "titel =", ": lacks title"),
+        ('wall_thickness = "1.8 mm"', "wall_thicknes = 1e-3", ".characteristic: none of"),
+        ('wall_thickness = "1.8 mm"', "wall_thickness = [1e-3]", ".characteristic: none of"),
+        ('wall_thickness = "1.8 mm"\n', "", ".characteristic: none of"),
+        ('quantity = "force"', 'quantity = "stiffness"', ".check[0].quantity: none of"),
+        ('equals = "328.0 N"', "", ".check[0]: lacks equals"),
+        ("greatest_contraction", "greatest_contractoin", ".box: greatest_contractoin is not known"),
+    ],
+)
+def test_a_broken_muscle_is_found_by_the_schema_and_refused_by_the_program(was: str, becomes: str, fault: str):
+    (text,) = blocks("muscle-file.md")
+    tables = tomllib.loads(text.replace(was, becomes, 1))
+    found = judged(tables, MUSCLE)
+    assert any(f.startswith(fault) for f in found), found
+    with pytest.raises(AirmuscleError):
+        entry_from(tables, "broken", Path("broken.toml"), ROOT)
+
+
+# It is generated
+
+
+def test_unit_meaning_and_bounds_are_those_of_the_declaration():
+    (declared,) = [p for p in parameters(model_class("Valve", "test")) if p.name == "conductance"]
+    shown = SCENARIO["$defs"]["Valve"]["properties"]["conductance"]
+    assert shown["description"] == f"{declared.symbol} [{declared.unit}]: {declared.meaning}"
+    assert (shown["anyOf"][0]["minimum"], shown["anyOf"][0]["maximum"]) == declared.bounds
+
+
+def test_the_command_prints_or_writes_what_editors_read(tmp_path: Path):
+    printed = CliRunner().invoke(app, ["schema"])
+    assert (printed.exit_code, json.loads(printed.stdout)) == (0, SCENARIO)
+    file = tmp_path / "new" / "muscle.schema.json"
+    written = CliRunner().invoke(app, ["schema", "--muscle", "--out", str(file)])
+    assert (written.exit_code, written.stdout) == (0, f"schema: {file}\n")
+    assert json.loads(file.read_text(encoding="utf-8")) == MUSCLE
+    assert [p.name for p in file.parent.iterdir()] == [file.name]
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    refused = CliRunner().invoke(app, ["schema", "--out", str(tmp_path / "file" / "x.json")])
+    assert refused.exit_code == 1
+    assert "cannot be written to" in refused.stderr

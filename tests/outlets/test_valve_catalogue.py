@@ -1,0 +1,236 @@
+"""Real valves by name: their published flows come out of their law, every number has a source, bad files are refused.
+
+A valve of the catalogue stands in a scenario as `{ library = "matrix-821" }`.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from airmuscle.circuit import CheckValve, Valve
+from airmuscle.cli.app import app
+from airmuscle.errors import AirmuscleWarning, FileError, ParameterError, UnitError, UnknownName
+from airmuscle.library.build import build
+from airmuscle.library.find import find
+from airmuscle.library.place import Place
+from airmuscle.library.scenario import load_scenario
+from airmuscle.library.valve_catalogue import load_valve, valve_names
+from airmuscle.reference import cite
+from airmuscle.reproduce.hosovsky_plant import MATRIX
+
+pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+every_valve = pytest.mark.parametrize("name", valve_names())
+GOOD = """
+title = "A valve of ours"
+trust = "measured"
+[valve]
+model = "IndexedValve"
+conductance = "2 dm3/(s bar)"
+critical_ratio = 0.3
+subsonic_index = 0.55
+[exhaust]
+model = "Valve"
+conductance = "3 dm3/(s bar)"
+critical_ratio = 0.25
+[response]
+opening_delay = "4 ms"
+closing_delay = "7 ms"
+[[check]]
+upstream = "7 bara"
+downstream = "1 bara"
+flow = "840 l/min"
+tolerance = "1 l/min"
+source = "the bench"
+[[reference]]
+key = "ours"
+authors = "We"
+title = "Notes"
+where = "here"
+"""
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "valve.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@every_valve
+def test_published_flows_come_out_of_the_law(name: str):
+    entry = load_valve(name)
+    for check in entry.checks:
+        assert abs(entry.flow(**dict(check.given)) - check.equals) <= check.tolerance, check.source
+
+
+def test_enough_of_the_catalogue_is_judged_by_a_published_flow():
+    assert sum(bool(load_valve(name).checks) for name in valve_names()) >= 8
+
+
+def test_a_check_fails_when_the_valve_changes():
+    entry = load_valve("smc-sy5000")
+    (check,) = entry.checks
+    other = Valve(1.01 * entry.valve.conductance, entry.valve.critical_ratio)
+    flow = other.mass_flow(*(p for _, p in check.given), 1.0, 293.15) / 1.185
+    assert abs(flow - check.equals) > check.tolerance
+
+
+@every_valve
+def test_every_valve_says_where_it_is_from_and_what_was_converted(name: str):
+    entry = load_valve(name)
+    assert entry.references, "no source"
+    assert entry.trust in ("printed", "data sheet, second hand", "second hand, converted")
+    assert entry.note
+    assert ("chosen" in entry.note) == ("converted" in entry.trust)
+    assert all(check.source for check in entry.checks)
+    assert {r.key for r in cite(entry)} >= {r.key for r in entry.references}
+
+
+def test_the_valve_of_the_third_paper():
+    assert load_valve("matrix-821").valve == MATRIX
+    assert load_valve("matrix").name == "matrix-821"
+
+
+def test_the_paths_of_a_valve_may_differ():
+    entry = load_valve("ckd-m4ga1-r")
+    for path, conductance in (("valve", 0.99e-8), ("exhaust", 1.2e-8)):
+        assert entry.along(path).conductance == pytest.approx(conductance, rel=1e-12)
+        assert entry.along(path).critical_ratio == 0.20
+    assert isinstance(load_valve("smc-ak2000-01").valve, CheckValve)
+
+
+def test_a_file_of_the_user_is_read_in_si(tmp_path: Path):
+    entry = load_valve(written(tmp_path, GOOD))
+    assert entry.valve.conductance == pytest.approx(2e-8)
+    assert (entry.response.opening_delay, entry.response.closing_delay) == pytest.approx((4e-3, 7e-3))
+    (check,) = entry.checks
+    assert entry.flow(**dict(check.given)) == pytest.approx(check.equals, rel=1e-9)
+    assert dict(check.given) == {"upstream": 7e5, "downstream": 1e5}
+    assert find(tmp_path / "valve.toml") == find(str(tmp_path / "valve.toml")) == entry
+
+
+def test_the_page_on_valves_is_true(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    page = (Path(__file__).parents[2] / "docs" / "valves.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    exec(compile(code, "valves.md", "exec"), {})
+    assert capsys.readouterr().out.count("Valve(") == 2
+    _, own = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+    entry = load_valve(written(tmp_path, own))
+    (check,) = entry.checks
+    assert abs(entry.flow(**dict(check.given)) - check.equals) <= check.tolerance
+
+
+def test_a_limit_of_use_is_a_warning():
+    with pytest.warns(AirmuscleWarning, match=r"smc-sx91: Made for 0\.2 MPa at most"):
+        load_valve("smc-sx91")
+
+
+def test_a_table_may_name_a_valve_of_the_catalogue_or_of_a_file_beside_it(tmp_path: Path):
+    place = Place("scenario.toml", "plant.circuit.fill", written(tmp_path, GOOD).parent)
+    assert build({"library": "matrix-821"}, place) == MATRIX
+    assert build({"library": "ckd-m4ga1-r", "path": "exhaust"}, place) == load_valve("ckd-m4ga1-r").exhaust
+    assert build({"library": "valve.toml", "path": "exhaust"}, place).conductance == pytest.approx(3e-8)
+
+
+SCENARIO = """
+[plant]
+muscle = "dmsp-20-300"
+[plant.circuit]
+model = "FillDischarge"
+supply = { model = "Supply", pressure = "5 bar" }
+fill = { library = "matrix-821" }
+discharge = { library = "ckd-m4ga1-r", path = "exhaust" }
+[plant.mechanism]
+model = "Isometric"
+contraction = 0.0
+[command]
+fill = [["0 s", 1]]
+[run]
+duration = "0.2 s"
+"""
+
+
+def test_a_scenario_runs_with_valves_of_the_catalogue(tmp_path: Path):
+    path = tmp_path / "scenario.toml"
+    path.write_text(SCENARIO, encoding="utf-8")
+    scenario = load_scenario(path)
+    assert scenario.plant.circuit.fill == MATRIX
+    assert scenario.simulate()["pressure"][-1] > 1e5
+    assert {"hosovsky"} & {r.key for r in load_valve("matrix-821").references}
+
+
+@pytest.mark.parametrize(
+    ("table", "error", "message"),
+    [
+        ({"library": "matrx-821"}, UnknownName, r"\[fill\]: no valve 'matrx-821'; .* Did you mean 'matrix-821'\?"),
+        ({"library": "dmsp-20-300"}, UnknownName, "no valve 'dmsp-20-300'"),
+        ({"library": "ckd"}, UnknownName, "'ckd' is the beginning of several"),
+        (
+            {"library": "matrix-821", "path": "exhaust"},
+            UnknownName,
+            "matrix-821 has no path 'exhaust'; there are valve",
+        ),
+        ({"library": "matrix-821", "path": "exaust"}, UnknownName, r"no path 'exaust'.* Did you mean 'exhaust'\?"),
+        ({"library": "matrix-821", "conductance": 1e-8}, ParameterError, "'conductance' is not known here"),
+        ({"library": 821}, ParameterError, "library is 821; it must be text"),
+        ({"library": "none.toml"}, FileError, r"none\.toml: there is no such file"),
+    ],
+)
+def test_a_valve_that_is_not_there_is_refused(tmp_path: Path, table, error, message: str):
+    with pytest.raises(error, match=message):
+        build(table, Place("scenario.toml", "fill", tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "error", "message"),
+    [
+        ("[valve]", "[valv]", ParameterError, r"'valv' is not known here.* Did you mean 'valve'\?"),
+        ('title = "A valve of ours"', "", ParameterError, "'title' is missing"),
+        ('model = "IndexedValve"', 'model = "Supply"\npressure = 1e5', ParameterError, r"\[valve\]: .*'conductance'"),
+        ('"2 dm3/(s bar)"', '"2 dm3/s"', UnitError, r"\[valve\], conductance: unit 'dm3/s' cannot become"),
+        ('"4 ms"', '"-4 ms"', ParameterError, r"\[response\]: .*opening_delay .* allowed are 0 to 1 s"),
+        ('"4 ms"', '"4 mm"', UnitError, r"\[response\], opening_delay: unit 'mm' cannot become 's'"),
+        ('closing_delay = "7 ms"', "", ParameterError, "'closing_delay' is missing"),
+        ('upstream = "7 bara"', 'upstream = "7 barg"', UnitError, r"\[check 1\], upstream: unit 'barg' is gauge"),
+        ('flow = "840 l/min"', "", ParameterError, r"\[check 1\]: 'flow' is missing; it is a number in m3/s"),
+        ('flow = "840 l/min"', "flow = nan", ParameterError, r"\[check 1\], flow is nan; it must be finite"),
+        ('source = "the bench"', "", ParameterError, r"\[check 1\]: 'source' is missing"),
+        ("[[check]]", "[check]", ParameterError, r"'check' must be written as \[\[check\]\]"),
+        ('key = "ours"', "key = 1", ParameterError, "key is 1; it must be text"),
+        ("[valve]", "valve = 3\n[other]", ParameterError, "'other' is not known here"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said_with_its_place(tmp_path: Path, old, new, error, message: str):
+    with pytest.raises(error, match=message):
+        load_valve(written(tmp_path, GOOD.replace(old, new, 1)))
+
+
+def test_a_file_without_a_valve_or_with_another_thing_is_refused(tmp_path: Path):
+    with pytest.raises(ParameterError, match=r"the table \[valve\] is missing"):
+        load_valve(written(tmp_path, 'title = "t"\ntrust = "chosen"\n'))
+    supply = '[valve]\nmodel = "Supply"\npressure = "6 bar"\n'
+    with pytest.raises(ParameterError, match="Supply is no orifice"):
+        load_valve(written(tmp_path, f'title = "t"\ntrust = "chosen"\n{supply}'))
+    head = "response = 3\n"
+    with pytest.raises(ParameterError, match=r"\[response\]: 3 is no table"):
+        load_valve(written(tmp_path, head + GOOD.partition("[response]")[0]))
+
+
+def test_the_command_line_lists_shows_and_cites_valves():
+    def run(*arguments: str):
+        return CliRunner().invoke(app, list(arguments), env={"COLUMNS": "160"})
+
+    listed = {entry["name"]: entry for entry in json.loads(run("list", "--json").output)}
+    assert listed["matrix-821"]["kind"] == "valve, Valve"
+    shown = json.loads(run("show", "smc-sx91", "--json").stdout)
+    values = {p["name"]: p["value"] for p in shown["parameters"]}
+    assert values["valve.conductance"] == pytest.approx(2.5e-9)
+    assert values["response.opening_delay"] == pytest.approx(0.01)
+    assert shown["checks"][0]["quantity"] == "flow"
+    assert all(word in run("show", "matrix-821").output for word in ("critical pressure ratio", "0.433", "Hosovsky"))
+    assert "SM-P00077-A/3" in run("cite", "ckd-m4ga1").output
+    assert "festo-mh2" in run("show", "festo").output + run("show", "festo").stderr
