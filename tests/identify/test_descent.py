@@ -33,7 +33,7 @@ def valley(x):
 
 @pytest.mark.parametrize("begin", [(-1.2, 1.0), (3.0, -2.0), (0.1, 0.1)])
 def test_a_curved_valley_is_followed_to_its_end(begin):
-    found, cost = descended(rosenbrock, np.array(begin), *FREE, 200)
+    found, cost, _ = descended(rosenbrock, np.array(begin), *FREE, 200)
     np.testing.assert_allclose(found, [1.0, 1.0], atol=1e-8)
     assert cost < 1e-16
 
@@ -44,7 +44,15 @@ def test_a_curved_valley_is_followed_to_its_end(begin):
 def test_the_optimum_is_that_of_trf(low, high):
     """With no bound, one, or both unknowns on a bound."""
     begin, ends = np.array([1.4, 1.5]).clip(low, high), (np.full(2, low), np.full(2, high))
-    found, cost = descended(decay, begin, *ends, 200)
+    asked = []
+
+    def counted(x):
+        asked.append(x)
+        return decay(x)
+
+    found, cost, ended = descended(counted, begin, *ends, 200)
+    assert ended
+    assert len(asked) <= 12
     expected = least_squares(
         lambda x: decay(x)[0], begin, lambda x: decay(x)[1], ends, ftol=1e-14, xtol=1e-14, gtol=1e-14
     )
@@ -53,7 +61,7 @@ def test_the_optimum_is_that_of_trf(low, high):
 
 
 def test_what_is_not_determined_does_not_hinder():
-    found, cost = descended(valley, np.array([5.0, -1.0]), *FREE, 100)
+    found, cost, _ = descended(valley, np.array([5.0, -1.0]), *FREE, 100)
     assert found.sum() == pytest.approx(3.2)
     assert cost == pytest.approx(0.05)
 
@@ -66,7 +74,7 @@ def test_a_place_that_cannot_be_run_is_gone_round():
         asked.append(float(x[0]))
         return (np.exp(x) - 1, np.exp(x)[:, None]) if x[0] < 0.01 else None
 
-    found, cost = descended(residuals, np.array([-2.0]), np.array([-9.0]), np.array([9.0]), 200)
+    found, cost, _ = descended(residuals, np.array([-2.0]), np.array([-9.0]), np.array([9.0]), 200)
     assert found[0] == pytest.approx(0.0, abs=1e-8)
     assert cost < 1e-16
     assert max(asked) > 0.01
@@ -80,5 +88,5 @@ def test_no_more_is_asked_than_allowed():
         asked.append(x)
         return rosenbrock(x)
 
-    descended(counted, np.array([-1.2, 1.0]), *FREE, 5)
+    assert not descended(counted, np.array([-1.2, 1.0]), *FREE, 5).ended
     assert len(asked) == 5

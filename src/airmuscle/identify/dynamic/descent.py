@@ -12,6 +12,7 @@ Springer 1978 (scaling by D); Nielsen, H. B., Damping parameter in Marquardt's m
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -27,15 +28,23 @@ ENOUGH = 1e-10
 """A promised relative descent below which the search ends, and likewise a step."""
 
 
-def descended(residuals: Residuals, begin: Array, low: Array, high: Array, most: int) -> tuple[Array, float]:
-    """The unknowns of a least sum of squares near `begin`, and that sum; infinite where `begin` itself cannot be run.
+class Descent(NamedTuple):
+    """Where a search stands: unknowns, the sum of squares there, and whether it came to its end."""
+
+    x: Array
+    cost: float
+    ended: bool
+
+
+def descended(residuals: Residuals, begin: Array, low: Array, high: Array, most: int) -> Descent:
+    """The search for a least sum of squares near `begin`; that sum is infinite where `begin` itself cannot be run.
 
     `most` is how often the residuals may be asked for.
     """
     x = np.clip(begin, low, high)
     found = residuals(x)
     if found is None:
-        return x, np.inf
+        return Descent(x, np.inf, True)
     r, j = found
     cost, scale, damping, growth = float(r @ r), np.zeros(x.size), FIRST_DAMPING, 2.0
     for _ in range(most - 1):
@@ -44,11 +53,9 @@ def descended(residuals: Residuals, begin: Array, low: Array, high: Array, most:
         step = _step(normal, gradient, damping * np.where(scale > 0, scale, 1.0) ** 2, x, low, high)
         reach = np.maximum(FAR * np.abs(x), LEAST_FAR * np.minimum(high - low, 1.0))
         step = step / max(1.0, float((np.abs(step) / reach).max()))
-        if _small(step, x, scale):
-            break
         promised = -float(step @ (2 * gradient + normal @ step))
-        if 0 <= promised <= ENOUGH * cost and damping < 1:
-            break
+        if _small(step, x, scale) or (0 <= promised <= ENOUGH * cost and damping < 1):
+            return Descent(x, cost, True)
         tried = residuals(x + step) if promised > 0 else None
         ratio = (cost - float(tried[0] @ tried[0])) / promised if tried is not None else -1.0
         if tried is not None and ratio > 0:
@@ -56,7 +63,7 @@ def descended(residuals: Residuals, begin: Array, low: Array, high: Array, most:
             damping, growth = max(damping * max(1 / 3, 1 - (2 * ratio - 1) ** 3), LEAST_DAMPING), 2.0
         else:
             damping, growth = damping * growth, 2 * growth
-    return x, cost
+    return Descent(x, cost, False)
 
 
 def _small(step: Array, x: Array, scale: Array) -> bool:
