@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from airmuscle.identify.dynamic.descent import descended
+from airmuscle.identify.dynamic.descent import descended, step_within
 
 FREE = np.full(2, -np.inf), np.full(2, np.inf)
 
@@ -90,3 +90,19 @@ def test_no_more_is_asked_than_allowed():
 
     assert not descended(counted, np.array([-1.2, 1.0]), *FREE, 5).ended
     assert len(asked) == 5
+
+
+def test_a_step_onto_a_bound_is_the_best_within_it():
+    """Of a quadratic of three unknowns: what a bound stops stands on it, and the others have no slope there."""
+    rng = np.random.default_rng(3)
+    a = rng.standard_normal((8, 3))
+    normal, gradient, x = a.T @ a, a.T @ rng.standard_normal(8), np.zeros(3)
+    whole = np.linalg.solve(normal, -gradient)
+    low, high = np.full(3, -9.0), np.full(3, 9.0)
+    high[np.argmax(np.abs(whole))] = low[np.argmax(np.abs(whole))] = 0.3 * whole[np.argmax(np.abs(whole))]
+    low, high = np.where(whole < 0, low, -9.0), np.where(whole < 0, 9.0, high)
+    found = step_within(normal, gradient, np.zeros(3), x, low, high)
+    held = np.argmax(np.abs(whole))
+    assert found[held] == pytest.approx(0.3 * whole[held])
+    np.testing.assert_allclose(np.delete(gradient + normal @ found, held), 0.0, atol=1e-12)
+    assert abs((gradient + normal @ found)[held]) > 0.1

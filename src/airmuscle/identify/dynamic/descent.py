@@ -50,7 +50,7 @@ def descended(residuals: Residuals, begin: Array, low: Array, high: Array, most:
     for _ in range(most - 1):
         normal, gradient = j.T @ j, j.T @ r
         scale = np.maximum(scale, np.sqrt(normal.diagonal()))
-        step = _step(normal, gradient, damping * np.where(scale > 0, scale, 1.0) ** 2, x, low, high)
+        step = step_within(normal, gradient, damping * np.where(scale > 0, scale, 1.0) ** 2, x, low, high)
         reach = np.maximum(FAR * np.abs(x), LEAST_FAR * np.minimum(high - low, 1.0))
         step = step / max(1.0, float((np.abs(step) / reach).max()))
         promised = -float(step @ (2 * gradient + normal @ step))
@@ -70,7 +70,7 @@ def _small(step: Array, x: Array, scale: Array) -> bool:
     return bool(np.linalg.norm(scale * step) <= ENOUGH * np.linalg.norm(scale * x))
 
 
-def _step(normal: Array, gradient: Array, damping: Array, x: Array, low: Array, high: Array) -> Array:
+def step_within(normal: Array, gradient: Array, damping: Array, x: Array, low: Array, high: Array) -> Array:
     """The damped step; unknowns that it would carry beyond a bound go to that bound, and the others are found anew."""
     loose = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
     step = np.zeros(x.size)
