@@ -14,7 +14,7 @@ from typing import Any
 import casadi
 
 from . import lu
-from .derivative import ZERO, Tape, derivatives
+from .elimination import ZERO, Tape, derivatives
 from .instructions import Code, Operand, finished, recorded
 from .llvm import Block
 from .printed import PARAMETERS, Printer, Sizes, Traced, traced
