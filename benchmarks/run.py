@@ -1,4 +1,4 @@
-"""Run all benchmarks and write RESULTS.md beside this file; about five minutes.
+"""Run all benchmarks and write RESULTS.md beside this file; some minutes.
 
 ./run python benchmarks/run.py [--rounds-factor 1.0] [--print-only]
 """
@@ -20,12 +20,14 @@ import bootstrap
 import components
 import derivative
 import growth
+import identification
 import memory
 import mujoco_peer
 import new_plant
 import ode8
 import peers
 import rodas4
+import sensitivities
 import startup
 import static_fit
 from measure import Bar, Section, machine, show, table, today, versions
@@ -41,6 +43,8 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (components.section, 25),
     (growth.section, 7),
     (memory.section, 1),
+    (sensitivities.section, 15),
+    (identification.section, 3),
     (static_fit.section, 15),
     (bootstrap.section, 5),
     (new_plant.section, 7),

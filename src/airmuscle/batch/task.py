@@ -53,10 +53,7 @@ class Task:
 
     def alone(self, index: int) -> None:
         """Run one plant by itself, exactly as `simulate` would, and put its rows and its end in place."""
-        variations, program = self.variations, self.ready.program
-        parameters = variations.parameters(index)
-        held = program.held(parameters)
-        one = _OfOne(self.ready.system, program, parameters, held, self.nominal[index])
+        one = self.ready.at(self.variations.parameters(index), self.nominal[index])
         course = self.method.run(one, self.segments[index], self.begin, self.starts[index], self.times)
         self._put(index, one, course)
 
@@ -101,13 +98,3 @@ class Task:
         """Put in place that the user stopped before these were run."""
         for index in indices:
             self.without(int(index), INTERRUPTED)
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class _OfOne(Prepared):
-    """A program with the parameters of one plant of a batch, whose nominal sizes are known already."""
-
-    sizes_of_states: Array
-
-    def nominal(self) -> Array:
-        return self.sizes_of_states

@@ -35,6 +35,11 @@ class Code:
 
 def instructions(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
     """The instructions that compute the non-zeros of `outputs` (CasADi SX) from `inputs`."""
+    return finished(recorded(inputs, outputs))
+
+
+def recorded(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
+    """The instructions as CasADi has them, the larger and smaller of two still as choices, which have derivatives."""
     function = casadi.Function("code", list(inputs), casadi.cse(list(outputs)))
     current: dict[int, Operand] = {}
     body: list[Instruction] = []
@@ -52,10 +57,23 @@ def instructions(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
             name = ("t", len(body))
             body.append(Instruction(operation, name, tuple(current[i] for i in source)))
             current[target[0]] = name
-    return _without_unused(_selects(body), tuple(results))
+    return Code(tuple(_selects(body)), tuple(results))
 
 
-def _selects(body: list[Instruction]) -> list[Instruction]:
+def finished(code: Code) -> Code:
+    """Code as it is printed: choices found, what nobody needs left out."""
+    body = _selects(code.body)
+    by_result = {line.result: line for line in body}
+    chosen: list[Instruction] = []
+    for line in body:
+        if line.operation == casadi.OP_IF_ELSE_ZERO:
+            chosen += _extreme_of_zero(line, by_result)
+        else:
+            chosen.append(_extreme(line, by_result) if line.operation == SELECT else line)
+    return _without_unused(chosen, code.outputs)
+
+
+def _selects(body: Sequence[Instruction]) -> list[Instruction]:
     """Each sum of a mask and its opposite mask as one SELECT."""
     by_result = {line.result: line for line in body}
 
@@ -74,10 +92,7 @@ def _selects(body: list[Instruction]) -> list[Instruction]:
             line = Instruction(SELECT, line.result, (first.arguments[0], first.arguments[1], second.arguments[1]))
         elif first and second and negated(first.arguments[0]) == second.arguments[0]:
             line = Instruction(SELECT, line.result, (second.arguments[0], second.arguments[1], first.arguments[1]))
-        if line.operation == casadi.OP_IF_ELSE_ZERO:
-            chosen += _extreme_of_zero(line, by_result)
-        else:
-            chosen.append(_extreme(line, by_result) if line.operation == SELECT else line)
+        chosen.append(line)
     return chosen
 
 

@@ -147,13 +147,15 @@ class Block:
         return simple[operation]()
 
 
-def write(
-    block: Block, code: Code, inputs: Sequence[str], stores: Mapping[int, str], held: Mapping[Operand, int]
-) -> None:
-    """Append code to a block: `inputs` and `stores` name the arrays; `held` says which operands stand in `c`."""
-    values = run(block, code.body, inputs, held)
-    for output, index, operand in code.outputs:
-        block.store(stores[output], index, value_of(block, operand, inputs, held, values))
+def computed(
+    block: Block, code: Code, inputs: Sequence[str], held: Mapping[Operand, int], given: Mapping[Operand, str]
+) -> dict[tuple[int, int], str]:
+    """Append code to a block: `inputs` name the arrays, `held` says what stands in `c`, `given` what is known.
+
+    Returns the names of the results by output and index.
+    """
+    values = run(block, code.body, inputs, held, given)
+    return {(o, i): value_of(block, operand, inputs, held, values) for o, i, operand in code.outputs}
 
 
 def run(
@@ -164,11 +166,18 @@ def run(
     given: Mapping[Operand, str] | None = None,
 ) -> dict[Operand, str]:
     """Append instructions to a block; the names of their results, and of the operands `given` beforehand."""
-    values: dict[Operand, str] = dict(given or {})
+    values = dict(given or {})
     for line in body:
-        arguments = [value_of(block, a, inputs, held, values) for a in line.arguments]
-        values[line.result] = block.operate(line.operation, arguments)
+        append(block, line, inputs, held, values)
     return values
+
+
+def append(
+    block: Block, line: Instruction, inputs: Sequence[str], held: Mapping[Operand, int], values: dict[Operand, str]
+) -> None:
+    """Append one instruction, and add the name of its result to `values`."""
+    arguments = [value_of(block, a, inputs, held, values) for a in line.arguments]
+    values[line.result] = block.operate(line.operation, arguments)
 
 
 def value_of(
