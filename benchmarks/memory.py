@@ -10,8 +10,8 @@ from new_plant import MUSCLES, process
 
 HEADING = ("after", "peak so far [MB]")
 TEXT = (
-    "Resident memory of one process at its peak, as the system tells it. A run keeps its rows, eight bytes a state, and "
-    "makes from them the columns of its Recording: time, states, outputs and inputs."
+    "Resident memory of one process at its peak, as the system tells it. A run keeps its rows, eight bytes a state, "
+    "and makes from them the columns of its Recording: time, states, outputs and inputs."
 )
 TASKS = {
     "Python and NumPy": "import numpy",
