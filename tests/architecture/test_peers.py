@@ -48,6 +48,15 @@ def test_a_peer_finds_the_same_course(module, solver, states):
     assert run.error(found, reference(run)) < 1e-8
 
 
+@pytest.mark.skipif("gcc" not in ode8.compilers(), reason="no gcc on the path")
+def test_so_does_casadi_with_gcc_and_leaves_nothing_behind(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run = runs()[3]
+    call = peer_solvers.casadi_cvodes_jit(run, prepared(run.system))(1e-8)
+    assert not list(tmp_path.iterdir())  # while the solver lives, for a process that is killed cleans nothing up
+    assert run.error(call(), reference(run)) < 1e-8
+
+
 @pytest.mark.slow
 def test_so_does_diffrax():
     pytest.importorskip("diffrax")
