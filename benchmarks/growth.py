@@ -1,4 +1,4 @@
-"""How the cost of a simulated second grows: with the tolerance, muscles in one plant, a carrier's frequency."""
+"""How the cost of a simulated second grows: with the tolerance, with muscles in a plant, with a carrier's frequency."""
 
 from __future__ import annotations
 

@@ -4,7 +4,8 @@
 
 FOLDER holds CSV files named `..._cut<cm>cm_held<cm>cm_test<n>.csv` with the columns time, pressure, force, length and
 rest_length, units in the headings. Rows above 2 N of repeat 8 are fitted, those of repeat 9 judge. Beside every
-figure stands what the two repeats differ by themselves: a fit below that has learnt one of them by heart.
+figure stands what the two repeats differ by themselves: a fit below that has learnt one of them by heart. Which law to
+take is asked of repeat 8 alone, for each purpose, before repeat 9 is looked at.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 import pandas as pd
 
 from airmuscle.errors import IdentificationError
-from airmuscle.identify import fit
+from airmuscle.identify import Blocks, Specimens, compare, fit
 from airmuscle.identify.candidates import Candidate, standard_candidates, surface
 from airmuscle.identify.compare import errors_in_force
 from airmuscle.recording import Recording
@@ -84,11 +85,15 @@ def line(name: str, parameters: int, errors: Sequence[float], least: float) -> s
 
 
 def judged(candidate: Candidate, train: list[Recording], test: list[Recording], specimens: list[str]) -> list[float]:
-    """Error on the next repeat, and on each specimen that was left out."""
+    """Error on the next repeat, and on each specimen that was left out; NaN where the others do not determine it."""
     law, fixed = candidate.law, candidate.fixed
     errors = [rms(errors_in_force(fit(law, train, fixed=fixed).model, test, CEILING))]
     for name in specimens:
-        model = fit(law, of_specimen(train, name, others=True), fixed=fixed).model
+        try:
+            model = fit(law, of_specimen(train, name, others=True), fixed=fixed).model
+        except IdentificationError:  # two lengths do not determine it
+            errors.append(np.nan)
+            continue
         errors.append(rms(errors_in_force(model, of_specimen(test, name), CEILING)))
     return errors
 
@@ -112,8 +117,10 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     train, test = repeats(parser.parse_args().folder)
     specimens = sorted({str(run.constants["specimen"]) for run in train})
+    for how in (Blocks(), Specimens()):
+        print(compare(train, leave_out=how).reason, flush=True)
     least = floor(train, test)
-    print(f"rms error in force [N]; fitted to repeat 8 ({sum(map(len, train))} rows), judged on repeat 9")
+    print(f"\nrms error in force [N]; fitted to repeat 8 ({sum(map(len, train))} rows), judged on repeat 9")
     columns = "".join(f"{'no ' + name:>9}" for name in specimens)
     print(f"{'law':<46}{'P':>5}{'next':>9}{columns}{'floor':>9}")
     each = [best_rank(of_specimen(train, name), of_specimen(test, name)) for name in specimens]

@@ -1,4 +1,4 @@
-"""Run all benchmarks and write RESULTS.md beside this file; about five minutes.
+"""Run all benchmarks and write RESULTS.md beside this file; some minutes.
 
 ./run python benchmarks/run.py [--rounds-factor 1.0] [--print-only]
 """
@@ -15,16 +15,19 @@ os.environ.setdefault(
     "OPENBLAS_NUM_THREADS", "1"
 )  # before NumPy: a second thread that waits for a core slows both sides
 
+import batch
 import bootstrap
 import components
 import derivative
 import growth
+import identification
 import memory
 import mujoco_peer
 import new_plant
 import ode8
 import peers
 import rodas4
+import sensitivities
 import startup
 import static_fit
 from measure import Bar, Section, machine, show, table, today, versions
@@ -34,11 +37,14 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (rodas4.section, 25),
     (peers.section, 9),
     (ode8.section, 15),
+    (batch.section, 7),
     (mujoco_peer.section, 5),
     (derivative.section, 25),
     (components.section, 25),
     (growth.section, 7),
     (memory.section, 1),
+    (sensitivities.section, 15),
+    (identification.section, 3),
     (static_fit.section, 15),
     (bootstrap.section, 5),
     (new_plant.section, 7),

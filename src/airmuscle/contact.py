@@ -24,9 +24,9 @@ HUNT_CROSSLEY1975 = Reference(
 class HuntCrossley:
     """F = K delta^(3/2) (1 + c delta'), never pulling.
 
-    delta depth of the contact [m], K stiffness, c damping: the force begins and ends at zero without a jump, and the
-    bodies lose about 2/3 c v of their speed v in an impact. Reference: Hunt and Crossley (1975); the exponent is that
-    of Hertz.
+    delta depth of the contact [m], K stiffness, c damping: the force begins and ends at zero without a jump, and a
+    slow impact at a speed v ends with (1 - 2/3 c v) of it (for c v = 0.1 that is 0.933, and exactly 0.938).
+    Reference: Hunt and Crossley (1975); the exponent is that of Hertz.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (HUNT_CROSSLEY1975,)
@@ -36,7 +36,15 @@ class HuntCrossley:
 
     def force(self, depth: Value, speed: Value) -> Value:
         """Force [N] at a depth [m], 0 where there is no contact, that grows at a speed [m/s]."""
-        return self.stiffness * depth * _root(depth) * ops.maximum(1.0 + self.damping * speed, 0.0)
+        return self.elastic(depth) * ops.maximum(1.0 + self.damping * speed, 0.0)
+
+    def elastic(self, depth: Value) -> Value:
+        """Force [N] at a depth [m] that does not change; times c it is the coefficient of the damping [N s/m]."""
+        return self.stiffness * depth * _root(depth)
+
+    def energy(self, depth: Value) -> Value:
+        """Energy [J] that it holds elastically at a depth [m]: (2/5) K delta^(5/2)."""
+        return 0.4 * self.stiffness * depth**2 * _root(depth)
 
 
 def _root(depth: Value) -> Value:

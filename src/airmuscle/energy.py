@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from .declare import model
+from .muscle import Muscle, SeriesSpring
 from .ops import Value
 from .plant import Plant, Port, total_air
 from .variables import StateVariable
@@ -16,6 +17,9 @@ _METERS = (
     StateVariable("energy_of_flow", "J", 1.0, "energy that came into the muscles with the air"),
     StateVariable("heat_to_air", "J", 1.0, "heat that the walls gave to the air in the muscles"),
     StateVariable("damping_heat", "J", 1.0, "work that the dampers turned into heat"),
+    StateVariable("work_of_contractile", "J", 1.0, "work of the contractile elements"),
+    StateVariable("element_work", "J", 1.0, "work done against springs, creep and end stops: heat, and what they hold"),
+    StateVariable("mechanism_loss", "J", 1.0, "work that the mechanism lost to its dampers, stops and drives"),
     StateVariable("air_supplied", "kg", 1e-3, "air that came from outside the plant"),
     StateVariable("air_exhausted", "kg", 1e-3, "air that went to the surroundings"),
 )
@@ -26,9 +30,12 @@ _FRICTION = StateVariable("friction_work", "J", 1.0, "work done against friction
 class Metered:
     """A plant with meters as further states, and its energies and its air as outputs.
 
-    Three books must close. Mechanical: kinetic + potential energy grow by `work_of_tension`, as long as the latch and
-    what the mechanism loses by itself do no work. Air: `air_energy` grows by `energy_of_flow` + `heat_to_air` less
-    `work_of_air`. Mass: `air_total` grows by `air_supplied` less `air_exhausted`.
+    Four books must close. Mechanical: kinetic + potential energy grow by `work_of_tension`, which counts the push of an
+    end stop, less `mechanism_loss`, as long as a latch moves only from rest. Muscle: `work_of_contractile` is
+    `work_of_tension` + `damping_heat` + `element_work` + `friction_work` (where there is friction), as long as no
+    muscle hangs slack: a slack one passes nothing on. Air: `air_energy`, of the air in the muscles, grows by
+    `energy_of_flow` + `heat_to_air` less `work_of_air`. Mass: `air_total`, of all air, grows by `air_supplied` less
+    `air_exhausted`.
     """
 
     plant: Plant
@@ -64,10 +71,10 @@ class Metered:
             powers["work_of_air"] += port.air.pressure * port.volume_rate
             powers["energy_of_flow"] += plant.gas.carried(port.states, flow, port.volume, plant.ambient)
             powers["heat_to_air"] += plant.gas.warmed(port.air, plant.ambient)
-            damping = muscle.damper.force(port.pressure, port.inner_contraction, port.inner_speed)
-            powers["damping_heat"] += damping * port.inner_speed
-            if muscle.friction.states:
-                powers["friction_work"] += port.friction * port.inner_speed
+            for name, power in _muscle_powers(muscle, port).items():
+                powers[name] += power
+        pulls = plant.mechanism.pulls(state, [port.tension for port in ports], plant.resting_lengths)
+        powers["mechanism_loss"] += plant.mechanism.lost_power(state, state, pulls, inputs)
         for response in responses:
             powers["air_supplied"] += response.drawn.mass
             powers["air_exhausted"] += response.exhausted.mass
@@ -87,3 +94,21 @@ class Metered:
 
     def _stored(self, port: Port) -> Value:
         return self.plant.gas.stored(port.states, port.volume, self.plant.ambient)
+
+
+def _muscle_powers(muscle: Muscle, port: Port) -> dict[str, Value]:
+    """What the elements inside a muscle give and take [W]."""
+    pressure, inner, speed = port.pressure, port.inner_contraction, port.inner_speed
+    length = muscle.geometry.resting_length
+    against = muscle.spring.force(pressure, inner, length) + muscle.stop.force(inner, speed, length)
+    if muscle.creep.states:
+        against = against + muscle.creep.force(port.states)
+    held = against * speed
+    if isinstance(muscle.series, SeriesSpring):
+        held = held + port.tension * (speed - port.speed)
+    found = {
+        "work_of_contractile": muscle.contractile.force(pressure, inner) * speed,
+        "element_work": held,
+        "damping_heat": muscle.damper.force(pressure, inner, speed) * speed,
+    }
+    return {**found, "friction_work": port.friction * speed} if muscle.friction.states else found

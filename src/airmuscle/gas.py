@@ -134,6 +134,10 @@ class Gas(abc.ABC):
     def carried(self, content: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
         """Power [W] that comes in with the flow."""
 
+    @abc.abstractmethod
+    def sound_speed(self, air: Air) -> Value:
+        """Speed [m/s] at which a small disturbance travels: sqrt(dp/drho) along the process."""
+
     def warmed(self, air: Air, ambient: Ambient) -> Value:
         """Heat [W] that the wall gives to the air, where the gas keeps account of it."""
         return 0.0
@@ -199,6 +203,9 @@ class Isothermal(Process):
         ratio = self.pressure(air_mass, volume, ambient) / ambient.pressure
         return air_mass * GAS_CONSTANT * ambient.temperature * (ops.log(ratio) - 1.0)
 
+    def sound_speed(self, air: Air) -> Value:
+        return ops.sqrt(GAS_CONSTANT * air.temperature)
+
 
 @model
 class Polytropic(Process):
@@ -225,6 +232,9 @@ class Polytropic(Process):
 
     def energy(self, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
         return self.pressure(air_mass, volume, ambient) * volume / (self.exponent - 1.0)
+
+    def sound_speed(self, air: Air) -> Value:
+        return ops.sqrt(self.exponent * GAS_CONSTANT * air.temperature)
 
 
 @model
@@ -268,6 +278,10 @@ class EnergyBalance(Gas):
 
     def carried(self, content: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
         return flow.enthalpy
+
+    def sound_speed(self, air: Air) -> Value:
+        """That of adiabatic sound; a heat transfer that is large within a period brings it down to the isothermal."""
+        return ops.sqrt(HEAT_RATIO * GAS_CONSTANT * air.temperature)
 
     def warmed(self, air: Air, ambient: Ambient) -> Value:
         return self.heat_transfer * (ambient.temperature - air.temperature)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from .circuit import Circuit, Response
+from .circuit.supply import refuse_shared
 from .declare import model
 from .errors import ParameterError, TraceError
 from .gas import Air, Ambient, Flow, Gas, Polytropic, absolute, gauge, refuse_vacuum
@@ -59,10 +60,16 @@ class Plant:
         for field, part, kind in parts:
             if not isinstance(part, kind):
                 raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {part!r}.")
+        for circuit in self.circuits:
+            refuse_shared(f"Plant: its {type(circuit).__name__}", circuit.supply)
         names = [m.name for m in self.muscles]
         ports = sum(c.ports for c in self.circuits)
         if ports != len(names):
             raise ParameterError(f"Plant: its circuits feed {ports} muscles; {len(names)} are given.")
+        taken = self.mechanism.muscles
+        if taken not in (None, len(names)):
+            owner = type(self.mechanism).__name__
+            raise ParameterError(f"Plant: {owner} takes {taken} muscles; {len(names)} are given.")
         if isinstance(self.circuit, tuple) and any(c.ports != 1 for c in self.circuit):
             raise ParameterError("Plant: a circuit that feeds several muscles stands alone, not in a tuple.")
         if len(set(names)) < len(names):
@@ -212,7 +219,7 @@ class Plant:
             found |= outside(prefix, response.outputs)
         accelerations = self._accelerations(state, ports, inputs)
         for c in self.mechanism.coordinates:
-            found["acceleration" if len(accelerations) == 1 else f"{c.name}.acceleration"] = accelerations[c.name]
+            found[c.acceleration] = accelerations[c.name]
         return found
 
     def state_at(self, *, pressure: float | tuple[float, ...], **values: float) -> dict[str, float]:
@@ -220,9 +227,12 @@ class Plant:
 
         Coordinates and speeds that are not named are 0; walls, tubes, tanks and series springs are settled at this
         pressure, bristles relaxed. Names with a dot are passed as `**{"left.bristle": 1e-4}`. Raises ParameterError
-        for a pressure below absolute zero or an unknown name.
+        for a pressure below absolute zero, another number of pressures than muscles, an unknown name, or a wall that
+        takes all volume away.
         """
         pressures = pressure if isinstance(pressure, tuple) else (pressure,) * len(self.muscles)
+        if len(pressures) != len(self.muscles):
+            raise ParameterError(f"Plant: {len(pressures)} pressures are given for {len(self.muscles)} muscles.")
         air = {f"{p}{s.name}" for p, m in zip(self.prefixes, self.muscles, strict=True)
                for s in self.gas.states(m.geometry.volume(0.05), self.ambient)}  # fmt: skip
         order = [s.name for s in self.states]
@@ -238,6 +248,10 @@ class Plant:
             muscle.geometry.refuse_out_of_reach(eps)
             own = {**muscle.settled(p, eps), **within(prefix, values)}
             volume = muscle.volume(muscle.inner_contraction(eps, own), own)
+            if not volume > 0.0:
+                raise ParameterError(
+                    f"Plant: {muscle.name} encloses {volume:g} m3 at {p:g} Pa; its wall gives too much."
+                )
             content = self.gas.content(absolute(p, self.ambient), volume, self.ambient)
             airs.append(self.gas.air(content, volume, self.ambient))
             state = {**outside(prefix, {**content, **own}), **state}

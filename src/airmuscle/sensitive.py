@@ -25,16 +25,22 @@ class Sensitive:
     A column is a group of leaf paths that share one value (`("circuit.fill.conductance",
     "circuit.discharge.conductance")`), or an empty group for something that acts on the start alone. A step of this
     system is exactly the derivative of the same step of the inner system, because it uses the Jacobian of the whole.
-    Columns steer the step ten times less than states do. Inputs that move are held in y'.
+    Columns steer the step ten times less than states do. Inputs that move are held in y'. `observed` names the states
+    and outputs y; all of them unless named.
+
+    `rates` and `outputs` are the law; what runs is printed from the inner system, all columns in one vector.
     """
 
     inner: System
     columns: tuple[tuple[str, ...], ...]
     scales: tuple[float, ...] = parameter("1", "theta_k", "size of a change of each column", fitted=False)
+    observed: tuple[str, ...] = ()
 
     def check(self) -> None:
-        if len(self.scales) != len(self.columns):
-            raise ParameterError(f"Sensitive: {len(self.columns)} columns need as many scales, not {len(self.scales)}.")
+        if not self.columns or len(self.scales) != len(self.columns):
+            raise ParameterError(
+                f"Sensitive: {len(self.columns)} columns need as many scales, one at least, not {len(self.scales)}."
+            )
         known = [leaf.path for leaf in declare.leaves(self.inner)]
         for path in (path for group in self.columns for path in group):
             if path not in known:
@@ -42,15 +48,40 @@ class Sensitive:
                     f"{type(self.inner).__name__} has no parameter '{path}'; there are {', '.join(known)}."
                     f"{suggestion(path, known)}"
                 )
+        values = _Symbols(self.inner).call("outputs") if self.observed else {}
+        for name in self.observed:
+            if name not in values:
+                raise ParameterError(
+                    f"{type(self.inner).__name__} has no state or output '{name}'; there are {', '.join(values)}."
+                    f"{suggestion(name, values)}"
+                )
+
+    @property
+    def places(self) -> tuple[tuple[int, ...], ...]:
+        """For every column the places of its paths among the inner leaves."""
+        place = {leaf.path: i for i, leaf in enumerate(declare.leaves(self.inner))}
+        return tuple(tuple(place[path] for path in group) for group in self.columns)
+
+    @property
+    def observed_names(self) -> tuple[str, ...]:
+        """What is observed, by name."""
+        return self.observed or tuple(_Symbols(self.inner).call("outputs"))
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Values of what is observed, the derivatives of each by every column, their slopes in time."""
+        names = self.observed_names
+        further = [sensitivity(n, k) for n in names for k in range(len(self.columns))]
+        return (*names, *further, *(f"{n}.rate" for n in names))
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
-        """The inner system's states, then for every column the derivatives of all of them."""
+        """The inner system's states, then for each of them the derivatives by every column."""
         inner = self.inner.states
         further = [
             StateVariable(sensitivity(s.name, k), s.unit, LOOSER * s.nominal / scale, f"d {s.name} by column {k}")
-            for k, scale in enumerate(self.scales)
             for s in inner
+            for k, scale in enumerate(self.scales)
         ]
         return (*inner, *further)
 
@@ -67,11 +98,11 @@ class Sensitive:
         return {**{n: rates[n] for n in order}, **further}
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
-        """Inner states and outputs, their derivatives by every column, and their slopes in time (`pressure.rate`)."""
+        """What is observed, its derivatives by every column, and its slopes in time (`pressure.rate`)."""
         values, along = self._differentiated("outputs", state, inputs)
-        further = {sensitivity(n, k): column[n] for k, column in enumerate(along) for n in values}
-        slopes = {f"{n}.rate": slope for n, slope in self._slopes(state, inputs).items()}
-        return {**values, **further, **slopes}
+        slopes, names = self._slopes(state, inputs), self.observed_names
+        further = {sensitivity(n, k): column[n] for n in names for k, column in enumerate(along)}
+        return {n: values[n] for n in names} | further | {f"{n}.rate": slopes[n] for n in names}
 
     def _differentiated(
         self, method: str, state: Mapping[str, Value], inputs: Mapping[str, Value]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import batch
 import measure
 import new_plant
 import numpy as np
@@ -18,6 +19,7 @@ import startup
 import static_fit
 from filling import runs
 
+from airmuscle import declare
 from airmuscle.command import Schedule
 from airmuscle.method import DormandPrince8, Rodas4
 from airmuscle.program.prepared import prepared
@@ -69,6 +71,27 @@ def test_the_c_computes_the_same_steps(tmp_path):
     for library in ode8.compiled(tmp_path).values():
         found = ode8.in_c(short, library, segments)()[:21]
         np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-12)
+
+
+def test_c_numpy_and_lanes_compute_the_same_batch(tmp_path):
+    """Over 0.7 s, within which a valve opens: 37 plants, whose number is no multiple of any block."""
+    timed = batch.variants(tmp_path, 37, 0.7)
+    assert any("C, gcc" in name for name in timed) or not ode8.compilers()
+    ends = {name: call() for name, (_, call) in timed.items()}
+    parameters = batch.varied(batch.hanging(), 37)
+    table = batch.constants(declare.rebuild(batch.hanging(), list(parameters.values())), 37)
+    ends["NumPy"] = batch.in_numpy(table, runs()[3].vector, 0.7)
+    batch.refuse_other_ends(ends, "simulate_batch", runs()[3].nominal)
+    table[0, 3] *= 1.0001
+    ends["NumPy"] = batch.in_numpy(table, runs()[3].vector, 0.7)
+    with pytest.raises(AssertionError, match="NumPy ends"):
+        batch.refuse_other_ends(ends, "simulate_batch", runs()[3].nominal)
+
+
+def test_the_section_of_the_batch_holds_its_rows_and_bars():
+    section = batch.section(rounds=1, count=16, seconds=0.02)
+    assert section.rows[0][:3] == ("simulate_batch (0.02 s simulated)", "16", "1")
+    assert any("NumPy" in bar.what for bar in section.bars)
 
 
 def test_lmfit_finds_the_same_coefficients():

@@ -28,6 +28,7 @@ FORMULAS = {
     "angles": lambda x, y: ops.sin(x) * ops.cos(y) + ops.tan(x / 4) - ops.arctan(y * x),
     "hyperbolics": lambda x, y: ops.sinh(x / 3) - ops.cosh(y / 3) + ops.arcsinh(x),
     "choices": lambda x, y: ops.where(x >= y, x * 3, y - 1) + ops.where(ops.both(x > 0, y > 0), 1.0, -1.0),
+    "tangents": lambda x, y: ops.where(x * y >= 0, 0.0, x * y) * (y - x) + ops.where(y <= 0, 0.0, y * (3 + x)) + x,
     "extremes": lambda x, y: ops.maximum(x, y) * 2 - ops.minimum(x * y, 1.0) + ops.clip(x, -1.0, 1.5),
 }
 

@@ -2,7 +2,7 @@
 
 The order by cross-validated error need not be that in sample: more coefficients always meet the points better that
 they were fitted to. The simplest law is taken that is no worse than the best by more than one standard error of the
-difference. What the data do not determine is excluded, with the reason. The muscle file of the recommended law loads
+difference, for the purpose that what was left out stands for. What the data do not determine is excluded, with the reason. The muscle file of the recommended law loads
 back to the same numbers.
 """
 
@@ -16,14 +16,15 @@ import pytest
 from typer.testing import CliRunner
 
 import airmuscle as am
-from airmuscle.characteristic import Hunt2017, TonduLopez2000
+from airmuscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.cli.app import app
-from airmuscle.errors import IdentificationError
+from airmuscle.cli.fit_more import part_of
+from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
-from airmuscle.identify import Candidate, Levels, Runs, Specimens, compare
+from airmuscle.identify import Blocks, Candidate, Levels, Runs, Specimens, compare
 from airmuscle.identify.candidates import surface
 from airmuscle.identify.force_of import force_of
-from airmuscle.identify.leave_out import natural
+from airmuscle.identify.leave_out import KEPT, natural
 from airmuscle.recording import Recording, write_csv
 
 TRUTH = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
@@ -134,6 +135,60 @@ def test_laws_of_every_direction_are_judged_in_force():
     assert force_of(law, np.array([1e5]), np.array([0.2]), 1000.0) == 0.0
 
 
+def labelled(run: Recording, how) -> list[str]:
+    return how.labels([run])[0].tolist()
+
+
+def test_blocks_leave_stretches_of_every_run_out_and_keep_its_ends():
+    run = isometric(0.1, seed=1, rows=100)
+    labels = labelled(run, Blocks(count=4))
+    shares = (run["pressure"] - run["pressure"].min()) / np.ptp(run["pressure"])
+    inside = (shares >= 1 / 8) & (shares < 7 / 8)
+    assert [label == KEPT for label in labels] == (~inside).tolist()
+    stretch = (8 * shares[inside]).astype(int)
+    assert [label for label in labels if label != KEPT] == [f"block {s % 4 + 1}" for s in stretch]
+    two = Blocks(count=4).labels([run, run])
+    assert all(a == KEPT or a != b for a, b in zip(*two, strict=True))
+    found = compare(bench(), CANDIDATES[:1], leave_out=Blocks())
+    rows = sum(part.rows for part in found.recommended.left_out)
+    assert rows == int((np.concatenate(Blocks().labels(bench())) != KEPT).sum())
+    with pytest.raises(ParameterError, match="2 or more"):
+        Blocks(count=1)
+
+
+def test_what_is_left_out_decides_what_the_law_is_for():
+    """Specimens that each have a bend of their own: within them a rich law is right, and for another a plain one."""
+    inner = ContractileSurface((300.0, -200.0, 180.0), 0.5e5, 6e5, 0.0, 0.2, -1e6, 1e6, 1)
+    runs = []
+    for i, length in enumerate((0.1, 0.17, 0.26, 0.4)):
+        bend = (25.0, -20.0, 30.0, -35.0)[i]
+        for contraction in np.linspace(0.0, 0.14, 6) + 0.004 * i:
+            random = np.random.default_rng(len(runs))
+            pressure, held = np.linspace(1e5, 6e5, 25), np.full(25, contraction)
+            force = inner.polynomial(pressure, held) + bend * np.sin(45 * held) + 1.0 * random.standard_normal(25)
+            columns = {"pressure": pressure, "contraction": held, "force": force}
+            runs.append(Recording(columns, f"run {len(runs)}", {"resting_length": length, "specimen": f"{length} m"}))
+    candidates = [Candidate("plain", surface(1)), Candidate("rich", InverseLength(surface(5), surface(3), 0.4, 0.4))]
+    within, beyond = (compare(runs, candidates, leave_out=how) for how in (Blocks(), Specimens()))
+    assert (within.recommended.candidate.name, beyond.recommended.candidate.name) == ("rich", "plain")
+    assert within.purpose in within.reason
+    assert "muscles and contractions that were measured" in within.reason
+    assert beyond.purpose in str(beyond).splitlines()[0]
+    assert "a muscle of the type that was not measured" in beyond.reason
+
+
+@pytest.mark.parametrize(
+    ("word", "how"), [("run", Runs()), ("specimen", Specimens()), ("block", Blocks()), ("pressure", Levels("pressure"))]
+)
+def test_the_command_knows_each_way_by_a_word(word: str, how):
+    assert part_of(word) == how
+
+
+def test_each_way_of_leaving_out_has_a_purpose_of_its_own():
+    purposes = [how.purpose for how in (Runs(), Specimens(), Levels("pressure"), Blocks())]
+    assert len(set(purposes)) == 4
+
+
 def test_the_command_writes_a_muscle_that_loads_back(tmp_path: Path):
     files = []
     for i, run in enumerate(bench()):
@@ -144,6 +199,7 @@ def test_the_command_writes_a_muscle_that_loads_back(tmp_path: Path):
     done = CliRunner().invoke(app, ["fit", *map(str, files), *options])
     assert done.exit_code == 0, done.output
     printed = json.loads(done.stdout)
+    assert printed["purpose"] == Runs().purpose
     assert printed["recommended"] == printed["ranking"][0]["law"] or "standard error" in printed["reason"]
     entry = am.load(out / "muscle.toml")
     fitted = {p["name"]: p["value"] for p in printed["fit"]["parameters"]}

@@ -29,6 +29,7 @@ from airmuscle.identify.dynamic import (
     where_sensed,
 )
 from airmuscle.mechanism import HangingMass, Isometric
+from airmuscle.method import INTERRUPTED, Rodas4
 from airmuscle.muscle import Muscle, SwellingWall
 from airmuscle.plant import Plant
 from airmuscle.simulate import simulate
@@ -370,6 +371,41 @@ def test_records_that_cannot_be_used_are_refused():
         fit_dynamic(plant, [short], **question)
     with pytest.raises(ParameterError, match="as many conditions as there are states"):
         fit_dynamic(plant, [dataclasses.replace(record, start=Start({}, {"air_mass": 1e-4}))], **question)
+
+
+@pytest.mark.parametrize(
+    ("known", "still", "message"),
+    [
+        ({"position": 0.0, "contraction": 0.0, "speed": 0.0}, (), "some state changes none of what is asked"),
+        ({"pressure": -5e5, "position": 0.0, "speed": 0.0}, (), "no state meets the start|ended early"),
+        ({"pressure": 0.0, "speed": 0.0}, ("speed",), "no state meets the start"),
+    ],
+)
+def test_a_start_that_does_not_exist_is_refused(known, still, message):
+    """Conditions that say one thing twice; a pressure below absolute zero; rest under a load that nothing bears."""
+    plant = dataclasses.replace(moving(), mechanism=HangingMass(1e5))
+    record = dataclasses.replace(recorded(moving(), 1), start=Start(known, moving().state_at(pressure=0.0), still))
+    with pytest.raises(IdentificationError, match=message):
+        fit_dynamic(plant, [record], free=("muscle.damper.damping",), observed=SENSORS)
+
+
+def test_starts_on_several_cores_give_what_one_after_another_gives(monkeypatch):
+    plant, free = rigid_plant(), ("circuit.fill.conductance", "circuit.supply.pressure")
+    found = []
+    for cores in (1, 3):
+        monkeypatch.setattr("os.cpu_count", lambda cores=cores: cores)
+        found.append(fit_dynamic(plant, [rigid_fill(plant)], free=free, observed={"pressure": 300.0}, starts=7))
+    np.testing.assert_array_equal(found[0].costs, found[1].costs)
+    np.testing.assert_array_equal(found[0].values, found[1].values)
+
+
+def test_an_interrupted_run_ends_the_fit(monkeypatch):
+    """A start whose run is interrupted is not one that failed."""
+    plant, record = rigid_plant(), rigid_fill(rigid_plant())
+    whole = Rodas4.run
+    monkeypatch.setattr(Rodas4, "run", lambda *a, **k: whole(*a, **k)._replace(status=INTERRUPTED))
+    with pytest.raises(KeyboardInterrupt):
+        fit_dynamic(plant, [record], free=("circuit.fill.conductance",), observed={"pressure": 300.0})
 
 
 def test_a_heavier_load_is_another_plant_of_the_same_structure():

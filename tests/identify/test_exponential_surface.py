@@ -13,9 +13,15 @@ from airmuscle import trace
 from airmuscle.characteristic.borzikova import SAM_30X290, BorzikovaExponential
 from airmuscle.errors import IdentificationError
 from airmuscle.identify.correlation_index import correlation_index
-from airmuscle.identify.exponential_surface import SurfaceProblem, linearised, nonlinear
-from airmuscle.identify.monotone_surface import Rule, monotone, monotonicity_breaks, slope_constraints
-from airmuscle.identify.surface_basis import Chebyshev, LoadBox, Monomials, conditioning
+from airmuscle.identify.surface.basis import Chebyshev, LoadBox, Monomials, conditioning
+from airmuscle.identify.surface.exponential import SurfaceProblem, linearised, nonlinear
+from airmuscle.identify.surface.monotone import (
+    FALLS_WITH_PRESSURE,
+    RISES_WITH_FORCE,
+    monotone,
+    monotonicity_breaks,
+    slope_constraints,
+)
 from airmuscle.recording import Recording
 
 CURVES = SAM_30X290.sample()
@@ -152,16 +158,16 @@ def test_conditioning_of_the_plane_curves(basis, condition, digit):
 # Places of the surface through the curves, read off its slopes on a grid of 201 x 201.
 def test_breaks_are_named_with_their_places():
     rises, falls, falls_at_the_end, rises_at_the_start = monotonicity_breaks(EXACT)
-    assert (rises.rule, rises_at_the_start.rule) == (Rule.RISES_WITH_FORCE,) * 2
-    assert (falls.rule, falls_at_the_end.rule) == (Rule.FALLS_WITH_PRESSURE,) * 2
-    assert rises.force == pytest.approx((202, 260), abs=1)
+    assert (rises.rule, rises_at_the_start.rule) == (RISES_WITH_FORCE,) * 2
+    assert (falls.rule, falls_at_the_end.rule) == (FALLS_WITH_PRESSURE,) * 2
+    assert rises.across == pytest.approx((202, 260), abs=1)
     assert rises.pressure == pytest.approx((0.09e5, 3.5e5), abs=0.02e5)
     assert rises.share + rises_at_the_start.share == pytest.approx(0.17, abs=0.01)
     assert falls.pressure == pytest.approx((0.0, 0.61e5), abs=0.02e5)
-    assert falls_at_the_end.force == pytest.approx((94, 249), abs=1.5)
+    assert falls_at_the_end.across == pytest.approx((94, 249), abs=1.5)
     assert falls_at_the_end.pressure == pytest.approx((3.22e5, 3.5e5), abs=0.02e5)
     assert rises.worst_slope > 0 > falls.worst_slope
-    assert "rises with force between 0.09 and 3.50 bar, 202 and 260 N (16.1% of the box)" in str(rises)
+    assert "rises with force between 8.75 and 350 kPa, 202 N and 260 N (16.1% of the box)" in str(rises)
 
 
 def test_a_box_without_a_break_has_none():

@@ -386,6 +386,39 @@ def test_a_robust_fit_forgets_gross_errors():
     assert any("Huber(scale=3.0), in N" in note for note in robust.notes)
 
 
+@pytest.mark.parametrize("scale", [1000.0, 10.0, 1.0, 0.1, 0.01])
+@pytest.mark.parametrize("kind", [Huber, SoftL1])
+@pytest.mark.parametrize(("name", "degree"), [("dmsp-20-300", 5), ("festo-tool-dmsp-40", 5), ("festo-tool-dmsp-20", 2)])
+def test_a_robust_loss_of_any_scale_settles_where_no_change_helps(name: str, degree: int, kind, scale: float):
+    """Maps with slack rows, of which the shortest length of the DMSP-20-300 has nothing else."""
+    recording = read_csv(DATA / f"{name}.csv")
+    loss = kind(scale)
+    found = fit(ContractileSurface.blank(degree, greatest_force=1e5), recording, loss=loss)
+    assert found.rank == len(exponents(degree))
+
+    def total(values: np.ndarray) -> float:
+        return float(np.sum(loss.rho((found.problem.errors(found.problem.modelled(values)) / scale) ** 2)[0]))
+
+    random, least = np.random.default_rng(3), total(found.values)
+    for size in (1e-3, 1e-2, 0.1, 1.0):
+        changes = size * random.standard_normal((20, found.values.size)) * np.abs(found.values)
+        assert min(total(found.values + change) for change in changes) > least * (1 - 1e-6)
+
+
+def test_a_wide_robust_loss_is_least_squares_for_slack_rows_too():
+    recording = read_csv(DATA / "dmsp-20-300.csv")
+    start = ContractileSurface.blank(5, greatest_force=2000.0)
+    plain, robust = fit(start, recording), fit(start, recording, loss=Huber(1000.0))
+    assert robust.values == pytest.approx(plain.values, rel=1e-6, abs=1e-6)
+
+
+def test_a_loss_narrower_than_the_noise_is_noted():
+    recording = points(surface(2).force, noise=5.0)
+    start = ContractileSurface.blank(2, **WIDE)
+    assert any("standard deviations come out too small" in n for n in fit(start, recording, loss=Huber(0.5)).notes)
+    assert not any("too small" in n for n in fit(start, recording, loss=Huber(15.0)).notes)
+
+
 # Units and scales
 
 

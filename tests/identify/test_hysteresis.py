@@ -21,6 +21,7 @@ from airmuscle.identify.hysteresis.creep import Creep, fit_creep
 from airmuscle.identify.hysteresis.evidence import aicc, effective_rows, f_test
 from airmuscle.identify.hysteresis.plot import plot_loops, winding
 from airmuscle.recording import Recording
+from airmuscle.recording.segment import ways_along
 
 LENGTH = 0.2
 LIMITS = (3e-4, 1.2e-3, 5e-3)
@@ -154,8 +155,18 @@ def test_a_friction_that_does_not_carry_over_to_the_second_run_is_not_justified(
 def test_the_gap_between_branches_and_between_runs_is_measured_place_by_place():
     path = np.concatenate([np.linspace(0, 1, 200), np.linspace(1, 0, 200)])
     loop = np.where(np.arange(400) < 200, -2.0, 3.0)
-    assert gap(path, loop) == pytest.approx(5.0 * np.ones(24), abs=0.2)
-    assert repeat_difference(path, loop, path, loop + 1.5) == pytest.approx(1.5 * np.ones(48))
+    way = ways_along(path)
+    assert gap(path, loop, way) == pytest.approx(5.0 * np.ones(24), abs=0.2)
+    assert repeat_difference(path, loop, way, path, loop + 1.5, way) == pytest.approx(1.5 * np.ones(48))
+
+
+def test_an_inner_loop_belongs_to_both_branches():
+    """Up, half back, up, down: both falling ways lie 5 N above the rising ones, at every place they share."""
+    path = np.concatenate([np.linspace(a, b, 100) for a, b in ((0, 1), (1, 0.5), (0.5, 1), (1, 0))])
+    way = ways_along(path)
+    assert [int(s) for s in way[[50, 150, 250, 350]]] == [1, -1, 1, -1]
+    assert gap(path, np.where(way > 0, -2.0, 3.0), way) == pytest.approx(5.0 * np.ones(24))
+    assert not ways_along(np.ones(20)).any()
 
 
 def test_the_criteria_meet_their_definitions():

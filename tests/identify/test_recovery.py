@@ -1,7 +1,7 @@
-"""What made the data comes back from noisy data within the bands that the fit states, for every traceable law.
+"""What made the data comes back from noisy data within the bands that the fit states, for every law of the library.
 
-Each characteristic of the library that is closed-form makes points on its own box with noise; the fit starts
-elsewhere. The force (or what the law gives) must be held by its 99.9 % bands, and parameters that the data determine
+Each characteristic of the library that has parameters makes points on its own box with noise; the fit starts elsewhere.
+Tables have no parameters, and are refused. The force (or what the law gives) must be held by its 99.9 % bands, and parameters that the data determine
 by their standard deviations.
 """
 
@@ -16,9 +16,10 @@ from airmuscle import declare
 from airmuscle.characteristic import Box
 from airmuscle.characteristic.base import ContractionLaw, ForceLaw
 from airmuscle.characteristic.clamped import Clamped
-from airmuscle.errors import AirmuscleWarning
+from airmuscle.characteristic.tabulated import Tabulated
+from airmuscle.errors import AirmuscleWarning, IdentificationError
 from airmuscle.identify import UNCENSORED, band, fit
-from airmuscle.identify.problem import _can_be_traced, direction_of
+from airmuscle.identify.problem import direction_of
 from airmuscle.identify.profile import weakly_determined
 from airmuscle.library import catalogue
 from airmuscle.recording import Recording
@@ -26,7 +27,10 @@ from airmuscle.recording import Recording
 HELD = {
     "saga2007": ("wall_thickness",),  # multiplies the modulus: only their product is felt
     "saga2007-circle": ("wall_thickness",),
+    "saga2007-exact": ("wall_thickness",),
 }
+LEAST_CONTRACTION = {"saga2007-exact": 0.04}
+"""Below it the rubber at rest would draw the tube in below its end rings, of which that law says nothing."""
 
 
 def law_of(name: str):
@@ -37,28 +41,23 @@ def law_of(name: str):
 
 
 def recoverable() -> list[str]:
-    found = []
-    for name in catalogue.names():
-        law, _ = law_of(name)
-        fitted = any(leaf.declared.fitted for leaf in declare.leaves(law))
-        if _can_be_traced(law) and fitted:
-            found.append(name)
-    return found
+    return [n for n in catalogue.names() if any(leaf.declared.fitted for leaf in declare.leaves(law_of(n)[0]))]
 
 
-def simulated(law, box: Box, seed: int) -> tuple[Recording, Recording, float]:
+def simulated(law, box: Box, seed: int, least: float = -0.02) -> tuple[Recording, Recording, float]:
     """Noisy points, the same points without noise, and the noise: 0.5 % of the range of what the law gives."""
     random = np.random.default_rng(seed)
+    low, high = max(box.contraction[0], least), box.contraction[1]
     pressure = random.uniform(*box.pressure, 400)
     direction = direction_of(law)
     if isinstance(law, ForceLaw):
-        contraction = random.uniform(max(box.contraction[0], -0.02), box.contraction[1], 400)
+        contraction = random.uniform(low, high, 400)
         columns = {"pressure": pressure, "contraction": contraction, "force": law.unclamped(pressure, contraction)}
     elif isinstance(law, ContractionLaw):
         force = random.uniform(*law.force_reach, 400)
         columns = {"pressure": pressure, "force": force, "contraction": law.contraction(pressure, force)}
     else:
-        contraction, force = random.uniform(*box.contraction, 400), random.uniform(0.0, 60.0, 400)
+        contraction, force = random.uniform(low, high, 400), random.uniform(0.0, 60.0, 400)
         columns = {"contraction": contraction, "force": force, "pressure": law.pressure(contraction, force)}
         inside = (columns["pressure"] > 0) & (columns["pressure"] < 8e5)
         columns = {key: values[inside] for key, values in columns.items()}
@@ -84,7 +83,7 @@ def test_a_law_is_recovered_within_its_bands(name: str):
     law, box = law_of(name)
     inner = law.inner if isinstance(law, Clamped) else law
     fixed = HELD.get(name, ())
-    noisy, exact, noise = simulated(inner, box, seed=7)
+    noisy, exact, noise = simulated(inner, box, 7, LEAST_CONTRACTION.get(name, -0.02))
     found = fit(disturbed(inner, fixed), noisy, censoring=UNCENSORED, fixed=fixed)
     assert found.sigma == pytest.approx(noise, rel=0.15)
     stated = band(found, exact, level=0.999)
@@ -99,7 +98,11 @@ def test_a_law_is_recovered_within_its_bands(name: str):
             assert abs(estimate.value - true[estimate.name]) < 4.5 * estimate.deviation, estimate.name
 
 
-def test_most_of_the_library_is_tried():
-    names = set(recoverable())
-    assert {"hunt2017-festo-10", "reynolds2003", "serres2009", "dmsp-20-300", "tondu-lopez", "saga2007-circle"} <= names
-    assert len(names) >= 10
+def test_every_law_of_the_library_is_tried_and_a_table_has_nothing_to_find():
+    tables = {name for name in catalogue.names() if isinstance(law_of(name)[0], Tabulated)}
+    assert set(recoverable()) | tables == set(catalogue.names())
+    assert tables == {"festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40"}
+    for name in tables:
+        law, box = law_of(name)
+        with pytest.raises(IdentificationError, match="cannot be fitted"):
+            fit(law, simulated(law, box, 7)[1])

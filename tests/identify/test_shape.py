@@ -14,7 +14,7 @@ from airmuscle.errors import IdentificationError, NoSolution
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify import convert, fit, fit_shaped, shape_breaks
 from airmuscle.identify.candidates import surface
-from airmuscle.identify.shape import ShapeRule, shape_constraints
+from airmuscle.identify.surface.shape import FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION, shape_constraints
 from airmuscle.recording import Recording
 
 MUSCLE = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
@@ -31,7 +31,7 @@ def points(n: int, noise: float, seed: int = 2) -> Recording:
 def test_few_and_noisy_points_bend_a_free_surface_and_not_a_shaped_one():
     data = points(40, 60.0)
     found = fit_shaped(surface(4), data)
-    assert {b.rule for b in found.broken} == set(ShapeRule)
+    assert {b.rule for b in found.broken} == {FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION}
     assert shape_breaks(found.model, found.model.box, points=201) == ()
     assert found.rmse > found.unconstrained
     grid = np.meshgrid(np.linspace(*found.model.box.pressure, 60), np.linspace(*found.model.box.contraction, 60))
@@ -85,7 +85,7 @@ def test_at_points_of_free_contraction_the_force_is_zero():
 def test_the_place_of_a_break_is_named():
     law = Sarosi2012(0.0, 0.0, -1.0, 4e-3, 1e-3, 50.0)  # gains force with contraction everywhere
     (found,) = shape_breaks(law, BOX)
-    assert found.rule is ShapeRule.RISES_WITH_CONTRACTION
+    assert found.rule is RISES_WITH_CONTRACTION
     assert found.share == 1.0
     assert found.worst[0] == 6e5
     assert found.worst_slope == pytest.approx(4e-3 * 6e5)

@@ -75,11 +75,14 @@ def assert_failed(result: Result, message: str) -> None:
 
 # Help and usage
 
-COMMANDS = ("reproduce", "list", "show", "cite", "solve", "inspect", "fit", "plan", "simulate", "schema")
+COMMANDS = (
+    "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "plan",
+    "simulate", "sweep", "schema",
+)  # fmt: skip
 
 
 def test_the_commands_stand_in_the_order_of_use():
-    listed = re.findall(r"^  (\w+)  ", airmuscle("--help").output.partition("Commands:")[2], re.MULTILINE)
+    listed = re.findall(r"^  ([\w-]+)  ", airmuscle("--help").output.partition("Commands:")[2], re.MULTILINE)
     assert listed == list(COMMANDS)
 
 
@@ -318,7 +321,7 @@ def test_fit_starts_from_a_library_entry_and_keeps_what_is_fixed(tmp_path: Path)
 @pytest.mark.parametrize(
     ("rows", "options", "message"),
     [
-        (36, ("--characteristic", "ChouHannaford1996"), "ChouHannaford1996 needs values to start from"),
+        (36, ("--characteristic", "Saga2007"), "--characteristic: Saga2007 needs values to start from"),
         (36, ("--characteristic", "ContractileSurfac"), "no library entry 'ContractileSurfac'"),
         (20, ("--characteristic", "ContractileSurface"), ".*has 21 parameters to be found, but only 19 points"),
         (36, ("--characteristic", "ContractileSurface", "--robust", "5 mm"), "--robust: unit 'mm' cannot become 'N'"),

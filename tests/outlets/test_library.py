@@ -14,11 +14,15 @@ import pytest
 
 from airmuscle.characteristic.chou_hannaford1996 import ChouHannaford1996
 from airmuscle.characteristic.clamped import Clamped
+from airmuscle.contact import HuntCrossley
 from airmuscle.errors import AirmuscleError, AirmuscleWarning, FileError, ParameterError, UnitError, UnknownName
+from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
 from airmuscle.geometry.braid import Braid
 from airmuscle.library import catalogue
 from airmuscle.library.models import model_class, model_names
-from airmuscle.muscle import LinearDamper, LinearSpring, PressureDamper
+from airmuscle.library.place import Place
+from airmuscle.library.scenario import muscle_from
+from airmuscle.muscle import CreepElements, EndStop, LinearDamper, LinearSpring, PressureDamper, SwellingWall
 from airmuscle.reference import cite
 
 GOOD = """
@@ -94,10 +98,59 @@ def test_the_page_on_muscle_files_holds_the_muscle_that_it_names(tmp_path: Path)
     (text,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
     entry = catalogue.load(written(tmp_path, text))
     assert entry.muscle.damper == LinearDamper(200.0)
+    assert entry.muscle.friction == Dahl(3e4, 12.0)
     assert entry.characteristic.force(375e3, 0.11) == pytest.approx(
         catalogue.load("dmsp-20-300").characteristic.force(375e3, 0.11), rel=1e-4
     )
     assert entry.checks[0].tolerance == 38.9
+
+
+FRICTION = [
+    Dahl(3e4, 12.5),
+    LuGre(3e4, 12.5, 2.5, 0.004, 3.0, 40.0),
+    BoucWen(3e4, 12.5, 1.7, 0.8),
+    MaxwellSlip((2e4, 1e4), (3e-4, 1.2e-3), 0.1),
+    PrandtlIshlinskii((2e4, 1e4), (3e-4, 1.2e-3), (6.0, -6.0), (0.6, -0.5)),
+]
+
+
+@pytest.mark.parametrize("law", FRICTION, ids=lambda law: type(law).__name__)
+def test_a_muscle_file_carries_its_friction(law, tmp_path: Path):
+    entry = dataclasses.replace(catalogue.load("chou-hannaford"), friction=law)
+    again = catalogue.load(catalogue.save(entry, tmp_path / "muscle.toml"))
+    assert again == dataclasses.replace(entry, name="muscle")
+    assert again.muscle.friction == law
+    assert {r.key for r in cite(again)} >= {r.key for r in law.references}
+    bristles = {state.name: 1e-4 for state in law.states}
+    held = again.muscle.unslackened(3e5, 0.1, 0.01, bristles)
+    assert held == dataclasses.replace(entry, friction=None).muscle.unslackened(3e5, 0.1) - law.force(bristles, 0.01)
+
+
+def test_a_plant_takes_over_the_friction_of_its_muscle_file_unless_it_states_another(tmp_path: Path):
+    entry = dataclasses.replace(catalogue.load("dmsp-20-300"), friction=FRICTION[0])
+    catalogue.save(entry, tmp_path / "muscle.toml")
+    table = {"library": "muscle.toml", "damper": {"model": "LinearDamper", "damping": 100.0}}
+    place = Place("scenario.toml", "plant.muscle", tmp_path)
+    assert muscle_from(table, place).friction == FRICTION[0]
+    assert muscle_from({**table, "friction": {"model": "NoFriction"}}, place).friction == NoFriction()
+
+
+def test_a_muscle_file_carries_wall_stop_and_creep(tmp_path: Path):
+    parts = {
+        "wall": SwellingWall(1e-5, 1.5e5, 5e4, 0.2),
+        "stop": EndStop(0.25, HuntCrossley(1e7)),
+        "creep": CreepElements((500.0,), (8.0,)),
+    }
+    entry = dataclasses.replace(catalogue.load("dmsp-20-300"), **parts)
+    again = catalogue.load(catalogue.save(entry, tmp_path / "muscle.toml"))
+    assert again == dataclasses.replace(entry, name="muscle")
+    assert {name: getattr(again.muscle, name) for name in parts} == parts
+
+
+def test_a_friction_of_another_kind_is_refused(tmp_path: Path):
+    spring = '[friction]\nmodel = "LinearSpring"\nstiffness = 1.0\n'
+    with pytest.raises(ParameterError, match=r"\[friction\]: LinearSpring is no friction"):
+        catalogue.load(written(tmp_path, GOOD.replace("[box]", spring + "[box]")))
 
 
 def test_a_saved_muscle_loads_to_the_same_numbers(tmp_path: Path):

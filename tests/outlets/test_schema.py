@@ -26,7 +26,8 @@ from airmuscle.library.schema import muscle_schema, scenario_schema
 
 ROOT = Path(__file__).parents[2]
 LIBRARY = sorted((ROOT / "src" / "airmuscle" / "library").glob("*.toml"))
-EXAMPLES = sorted((ROOT / "examples").glob("*.toml"))
+EXAMPLES = [p for p in sorted((ROOT / "examples").glob("*.toml")) if "[vary]" not in p.read_text(encoding="utf-8")]
+"""Scenarios; a study of many runs has a grammar of its own."""
 SCENARIO, MUSCLE = scenario_schema(), muscle_schema()
 ABOUT = {"$schema", "$defs", "title", "description", "default"}
 TYPES = {"object": dict, "array": list, "string": str, "boolean": bool, "integer": int, "number": (int, float)}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from airmuscle.characteristic.borzikova import SAM_30X290
-from airmuscle.identify.surface_basis import LoadBox
+from airmuscle.identify.surface.basis import LoadBox
 from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_PRINTED
 from airmuscle.reproduce import borzikova
 from airmuscle.reproduce.borzikova_surfaces import (

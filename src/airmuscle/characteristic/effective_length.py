@@ -44,6 +44,12 @@ class EffectiveLength(ForceLaw):
         length, active = self.resting_length, self.resting_length - self.dead_length
         return ((low * active - self.end_shift) / length, (high * active - self.end_shift) / length)
 
+    @property
+    def linear_in(self) -> tuple[str, ...]:
+        """What the inner law is linear in; the lengths are not among it."""
+        named = getattr(self.inner, "linear_in", ())
+        return tuple(f"inner.{field}" for field in ((named,) if isinstance(named, str) else named))
+
     def of_length(self, resting_length: float) -> EffectiveLength:
         """The law of a muscle of the same type with this length [m] between the fittings."""
         return dataclasses.replace(self, resting_length=resting_length)

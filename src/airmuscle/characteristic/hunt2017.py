@@ -36,6 +36,7 @@ class Hunt2017(PressureLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (HUNT_2017,)
+    linear_in: ClassVar[tuple[str, ...]] = ("offset", "scale", "by_force")
 
     greatest_contraction: float = parameter(
         "1", "eps_max", "contraction of the specimen at 620 kPa without load", bounds=(0.01, 0.5), fitted=False

@@ -30,6 +30,7 @@ class Sarosi2012(ForceLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (SAROSI_2012,)
+    linear_in: ClassVar[tuple[str, ...]] = ("a1", "a2", "a4", "a5", "a6")
 
     a1: float = parameter("N/Pa", "a_1", "growth of the exponential part with pressure")
     a2: float = parameter("N", "a_2", "exponential part without pressure")

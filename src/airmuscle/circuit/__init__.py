@@ -5,12 +5,13 @@ from .circuit import Circuit as Circuit
 from .circuit import Response as Response
 from .combination import in_parallel as in_parallel
 from .combination import in_series as in_series
+from .conduit import Conduit as Conduit
+from .distributed_tube import DistributedTube as DistributedTube
 from .fill_discharge import ClosedChamber as ClosedChamber
 from .fill_discharge import FillDischarge as FillDischarge
 from .fill_discharge import ThreePosition as ThreePosition
 from .indexed_valve import IndexedValve as IndexedValve
 from .line import Line as Line
-from .line import Tube as Tube
 from .manifold import Leaking as Leaking
 from .manifold import Manifold as Manifold
 from .orifice import Orifice as Orifice
@@ -22,4 +23,6 @@ from .supply import Shared as Shared
 from .supply import Source as Source
 from .supply import Supply as Supply
 from .supply import Tank as Tank
+from .tube import Tube as Tube
+from .tube import TubeOrifice as TubeOrifice
 from .valve import Valve as Valve

@@ -43,7 +43,7 @@ class FillDischarge(Circuit):
 
 @model
 class ThreePosition(Circuit):
-    """A 3/3 valve with closed centre: one input, 1 fills, 0 shuts, -1 discharges."""
+    """A 3/3 valve with closed centre: one input, `valve`; 1 fills, 0 shuts, -1 discharges, less is part of the area."""
 
     supply: Source
     fill: Orifice
@@ -51,15 +51,15 @@ class ThreePosition(Circuit):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        return (Input("position", "1", -1.0, 1.0, "1 fill, 0 shut, -1 discharge"),)
+        return (Input("valve", "1", -1.0, 1.0, "1 fill, 0 shut, -1 discharge"),)
 
     def draw(
         self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
     ) -> Response:  # fmt: skip
-        position = inputs["position"]
-        incoming = through(self.fill, inlet, airs[0], ops.maximum(position, 0.0))
-        outgoing = through(self.discharge, airs[0], surroundings(ambient), ops.maximum(-position, 0.0))
+        place = inputs["valve"]
+        incoming = through(self.fill, inlet, airs[0], ops.maximum(place, 0.0))
+        outgoing = through(self.discharge, airs[0], surroundings(ambient), ops.maximum(-place, 0.0))
         return Response((incoming - outgoing,), incoming, outgoing)
 
 

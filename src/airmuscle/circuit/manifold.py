@@ -10,7 +10,7 @@ from ..errors import ParameterError
 from ..gas import Air, Ambient
 from ..ops import Value
 from ..variables import Input, StateVariable, outside, renamed, within
-from .circuit import Circuit, Response
+from .circuit import SUPPLY, Circuit, Response
 from .fill_discharge import surroundings
 from .orifice import Orifice
 from .supply import Shared, Source
@@ -63,7 +63,13 @@ class Manifold(Circuit):
     def check(self) -> None:
         if len(self.names) != len(self.branches) or len(set(self.names)) != len(self.names) or not self.names:
             raise ParameterError(f"Manifold: {len(self.branches)} branches need as many different names: {self.names}.")
-        for name, branch in self._parts():
+        for name in self.names:
+            if not name or "." in name or f"{name}." == SUPPLY:
+                raise ParameterError(
+                    f"Manifold: a branch cannot be named {name!r}; give a word without a dot, and not 'supply', which "
+                    "names the manifold's own."
+                )
+        for name, branch in zip(self.names, self.branches, strict=True):
             if not isinstance(branch.supply, Shared):
                 raise ParameterError(
                     f"Manifold: branch '{name}' has a supply of its own; give it Shared(), as the manifold feeds it."

@@ -49,7 +49,7 @@ class ProportionalValve(Circuit):
     """How many muscles it feeds, one or two."""
 
     def check(self) -> None:
-        if self.muscles not in (1, 2):
+        if isinstance(self.muscles, bool) or self.muscles not in (1, 2):
             raise ParameterError(f"ProportionalValve: it feeds one muscle or two, not {self.muscles!r}.")
 
     @property

@@ -49,7 +49,16 @@ class Shared(Source):
     """The supply of a branch in a `Manifold`, which feeds all its branches from one supply of its own."""
 
     def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
-        raise ParameterError("Shared() is the supply of a branch in a Manifold; elsewhere give a Supply or a Tank.")
+        raise ParameterError("Shared() is the supply of a branch in a Manifold; it has no air of its own.")
+
+
+def refuse_shared(owner: str, supply: Source) -> None:
+    """Raise ParameterError for a Shared() where no manifold stands before it."""
+    if isinstance(supply, Shared):
+        raise ParameterError(
+            f"{owner}: Shared() is the supply of a branch in a Manifold, which has one of its own; here give a Supply, "
+            "a Tank or a RegulatedSupply."
+        )
 
 
 @model
@@ -64,6 +73,9 @@ class Tank(Source):
     feed: Orifice
     volume: float = parameter("m3", "V_T", "volume of the tank", bounds=(1e-6, 1e2))
     gas: Gas = Isothermal()
+
+    def check(self) -> None:
+        refuse_shared("Tank", self.supply)
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         return (*self.gas.states(self.volume, ambient), *renamed("supply.", self.supply.states(ambient)))
@@ -90,7 +102,9 @@ class RegulatedSupply(Source):
 
         opening = clip((p_set - p)/B, 0, 1)
 
-    p outlet pressure, B proportional band, in which the outlet droops from no flow to full flow. It relieves nothing.
+    p outlet pressure, B proportional band, in which the outlet droops from no flow to full flow. It relieves nothing;
+    air flows back through it where its own supply has fallen below the outlet. It begins at the pressure that it is
+    set to, or at that of its supply where this is lower.
     """
 
     supply: Source
@@ -100,12 +114,16 @@ class RegulatedSupply(Source):
     volume: float = parameter("m3", "V_r", "volume of its outlet", bounds=(1e-7, 1.0), default=5e-5)
     gas: Gas = Isothermal()
 
+    def check(self) -> None:
+        refuse_shared("RegulatedSupply", self.supply)
+
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         return (*self.gas.states(self.volume, ambient), *renamed("supply.", self.supply.states(ambient)))
 
     def settled(self, ambient: Ambient) -> dict[str, Value]:
-        content = self.gas.content(absolute(self.pressure, ambient), self.volume, ambient)
-        return {**content, **outside("supply.", self.supply.settled(ambient))}
+        before = self.supply.settled(ambient)
+        pressure = min(absolute(self.pressure, ambient), self.supply.air(before, ambient).pressure)
+        return {**self.gas.content(pressure, self.volume, ambient), **outside("supply.", before)}
 
     def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
         return self.gas.air(state, self.volume, ambient)

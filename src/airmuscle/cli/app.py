@@ -14,15 +14,20 @@ from typer.core import TyperGroup
 
 from ..errors import AirmuscleError, AirmuscleWarning
 from .cite import cite
+from .convert import convert
 from .fit import fit
+from .fit_dynamic import fit_dynamic
+from .hysteresis import hysteresis
 from .inspect import inspect
 from .list import list_entries
 from .plan import plan
+from .remedies import in_options
 from .reproduce import reproduce
 from .schema import schema
 from .show import show
 from .simulate import simulate
 from .solve import solve
+from .sweep import sweep
 
 
 class Commands(TyperGroup):
@@ -38,7 +43,7 @@ class Commands(TyperGroup):
             try:
                 return super().invoke(ctx)
             except AirmuscleError as error:
-                typer.echo(f"error: {error}", err=True)
+                typer.echo(f"error: {in_options(str(error))}", err=True)
                 raise typer.Exit(1) from None
             except BrokenPipeError:
                 raise
@@ -53,7 +58,7 @@ class Commands(TyperGroup):
 def _show_warning(others: Any, message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
     """One line for a warning of ours; those of others say where they come from."""
     if issubclass(category, AirmuscleWarning):
-        typer.echo(f"warning: {message}", err=True)
+        typer.echo(f"warning: {in_options(str(message))}", err=True)
     else:
         others(message, category, *place, **more)
 
@@ -74,8 +79,12 @@ app.command("cite")(cite)
 app.command("solve", short_help="From two of pressure, contraction and force get the third.")(solve)
 app.command("inspect", short_help="Show what was understood of bench files.")(inspect)
 app.command("fit")(fit)
+app.command("convert", short_help="Bring one model as near to another as it comes.")(convert)
+app.command("hysteresis", short_help="Fit friction to loops, and say whether the data justify it.")(hysteresis)
+app.command("fit-dynamic", short_help="Find a plant's numbers from records of its motion.")(fit_dynamic)
 app.command("plan", short_help="Say which runs tell most about a muscle on your bench.")(plan)
 app.command("simulate", short_help="Simulate a plant that a scenario file describes.")(simulate)
+app.command("sweep", short_help="Run a scenario many times, with numbers that vary.")(sweep)
 app.command("schema", short_help="Print what editors need to check scenario and muscle files.")(schema)
 
 

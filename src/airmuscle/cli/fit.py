@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .bench_files import Files, Length, Surroundings, Units, measured
+from .fit_start import start_of
 from .options import Folder, Json, Map
+from .remedies import in_options
 from .terminal import print_json
 
 if TYPE_CHECKING:
@@ -18,11 +21,9 @@ if TYPE_CHECKING:
     from ..library.entry import Entry
     from ..recording import Recording
     from ..report.chapter import Chapter
+    from .fit_more import Asked
+    from .fit_start import Start
 
-Files = Annotated[
-    list[Path],
-    typer.Argument(metavar="FILES", help="CSV, Excel, MAT, TDMS or MDF: pressure, contraction or length, force."),
-]
 Law = Annotated[
     str | None,
     typer.Option(
@@ -30,10 +31,6 @@ Law = Annotated[
         metavar="NAME",
         help="Where to start: a library entry, a muscle's TOML file, or ContractileSurface, which needs no start.",
     ),
-]
-Units = Annotated[
-    list[str] | None,
-    typer.Option("--unit", metavar="COLUMN=UNIT", help="The unit of a column whose heading states none; repeat it."),
 ]
 Fixed = Annotated[
     list[str] | None, typer.Option("--fix", metavar="PARAMETER", help="Leave this parameter as it starts; repeat it.")
@@ -45,14 +42,36 @@ Uncensored = Annotated[
     bool, typer.Option("--uncensored", help="Take rows at zero force as measured; else they are bounds only.")
 ]
 
+EqualWeights = Annotated[
+    bool, typer.Option("--equal-weights", help="All rows count alike, whatever the sensors of several rigs resolve.")
+]
 Compare = Annotated[bool, typer.Option("--compare", help="Fit every law that the data determine, and rank them.")]
 LeftOut = Annotated[
     str | None,
-    typer.Option(metavar="PART", help="What a comparison leaves out in turn: run, specimen, contraction, pressure."),
+    typer.Option(
+        metavar="PART",
+        help="What a comparison leaves out and a bootstrap draws: run, specimen, contraction, pressure, block.",
+    ),
 ]
-Length = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Length unpressurised and unloaded: '300 mm'.")]
-Surroundings = Annotated[
-    str | None, typer.Option(metavar="QUANTITY", help="What absolute pressures are reduced by: '98 kPa'.")
+Refits = Annotated[
+    int | None, typer.Option(min=20, max=100_000, metavar="N", help="Refit N times to parts of the data drawn anew.")
+]
+Profiled = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="PARAMETER",
+        help="Profile likelihood of this parameter; 'weak' takes all that are nearly not determined. Repeat it.",
+    ),
+]
+Shape = Annotated[
+    bool,
+    typer.Option("--shape", help="A ContractileSurface that neither falls with pressure nor rises with contraction."),
+]
+Free = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="PRESSURE=CONTRACTION", help="With --shape: where the muscle hangs free, '3 bar=18 %'. Repeat it."
+    ),
 ]
 
 
@@ -61,6 +80,10 @@ def fit(
     characteristic: Law = None,
     compare: Compare = False,
     leave_out: LeftOut = None,
+    bootstrap: Refits = None,
+    profile: Profiled = None,
+    shape: Shape = False,
+    free: Free = None,
     out: Folder = Path("fit"),
     resting_length: Length = None,
     ambient: Surroundings = None,
@@ -70,6 +93,7 @@ def fit(
     fix: Fixed = None,
     robust: Robust = None,
     uncensored: Uncensored = False,
+    equal_weights: EqualWeights = False,
     json: Json = False,
 ) -> None:
     """Fit a characteristic to measured points, or compare all.
@@ -83,91 +107,62 @@ def fit(
       airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out fit
       airmuscle fit bench.csv --characteristic dmsp-20-300 --unit pressure=bar --fix wall_thickness
       airmuscle fit dmsp-20-300 --characteristic ContractileSurface --degree 4 --robust "10 N"
+      airmuscle fit runs/*.csv --characteristic dmsp-20-300 --bootstrap 1000 --profile weak
+      airmuscle fit bench.csv --characteristic ContractileSurface --shape --free "3 bar=18 %"
       airmuscle fit runs/*.xlsx --mapping rig.toml --compare --leave-out run
       airmuscle solve fit/muscle.toml --pressure "3 bar" --force "100 N"
     """
-    from ..report.staged import refuse_unwritable
+    from .fit_more import Asked, More
 
     if characteristic is None and not compare:
         raise typer.BadParameter("name a law to fit with --characteristic, or let --compare find one")
-    units = _by_column(unit)
-    recordings = _measured(files, units=units, mapping=mapping, resting_length=resting_length, ambient=ambient)
-    if compare or characteristic is None:
-        from .fit_compare import compared
+    more = More.of(bootstrap, profile, leave_out, shape, free, compare)
+    asked = Asked(more, tuple(fix or ()), degree, robust, uncensored, equal_weights, out, json)
+    recordings = measured(files, unit, mapping=mapping, resting_length=resting_length, ambient=ambient)
+    if characteristic is not None and not compare:
+        _one(files, recordings, characteristic, asked)
+        return
+    from .fit_compare import compared
 
-        refuse_unwritable(out)
-        compared(files, recordings, characteristic=characteristic, fixed=tuple(fix or ()), leave_out=leave_out,
-                 degree=degree, robust=robust, uncensored=uncensored, out=out, json=json)  # fmt: skip
+    compared(files, recordings, characteristic, asked)
+
+
+def _one(files: list[Path], recordings: list[Recording], characteristic: str, asked: Asked) -> None:
+    """Fit the law that was named."""
+    from ..report.staged import refuse_unwritable
+
+    start = start_of(characteristic, recordings, asked.degree)
+    refuse_unwritable(asked.out)
+    result = _identified(start, recordings, asked)
+    found = asked.more.find(result, recordings)
+    entry = fitted(result, start.entry, files)
+    write(result, found.shaped_entry(entry), recordings, asked.out, found.chapters())
+    if asked.json:
+        print_json(as_data(result) | found.as_data())
         return
-    start = start_of(characteristic, recordings, degree)
-    refuse_unwritable(out)
-    result = _identified(start, recordings, robust, uncensored, fix)
-    write(result, fitted(result, start, files), recordings, out)
-    if json:
-        print_json(as_data(result))
-        return
-    typer.echo(str(result))
+    echo([str(result), *found.lines()], asked.out)
+
+
+def echo(lines: Sequence[str], out: Path) -> None:
+    """What was found, and where it stands."""
+    for line in lines:
+        typer.echo(in_options(line))
     typer.echo(f"muscle: {out / 'muscle.toml'}")
     typer.echo(f"report: {out / 'report.html'}")
 
 
-def _identified(
-    start: Entry, recordings: list[Recording], robust: str | None, uncensored: bool, fixed: list[str] | None
-) -> Fit:
+def _identified(start: Start, recordings: list[Recording], asked: Asked) -> Fit:
     from ..identify import UNCENSORED
     from ..identify import fit as identify
 
     return identify(
-        start.characteristic,
+        start.entry.characteristic,
         recordings,
-        loss=loss_of(robust, start.characteristic),
-        censoring=UNCENSORED if uncensored else None,
-        fixed=fixed or (),
+        loss=loss_of(asked.robust, start.entry.characteristic),
+        censoring=UNCENSORED if asked.uncensored else None,
+        sigma=1.0 if asked.equal_weights else None,
+        fixed=(*asked.fixed, *start.fixed),
     )
-
-
-def _measured(files: list[Path], **options: Any) -> list[Recording]:
-    """The runs in files, read together so that contradictions show, then the data sets of the library."""
-    from ..errors import ParameterError
-    from ..library.catalogue import measured
-    from ..recording import read
-
-    here = {entry.name for entry in Path().iterdir()}
-    names = [f for f in files if not f.suffix and len(f.parts) == 1 and f.name not in here]
-    own = [f for f in files if f not in names]
-    given = [name for name, value in options.items() if value]
-    if names and given:
-        raise ParameterError(
-            f"{names[0]}: a data set of the library brings its units and constants along; leave out {', '.join(given)}."
-        )
-    return [*(read(own, **options) if own else ()), *(measured(str(name)) for name in names)]
-
-
-def _by_column(texts: list[str] | None) -> dict[str, str]:
-    parts = [text.partition("=") for text in texts or ()]
-    if not all(name and sign for name, sign, _ in parts):
-        raise typer.BadParameter(f"--unit wants COLUMN=UNIT, like pressure=bar, not {', '.join(texts or ())}")
-    return {name.strip(): found.strip() for name, _, found in parts}
-
-
-def start_of(name: str, recordings: list[Recording], degree: int) -> Entry:
-    """The library entry to start from, or a bare one around a law that needs no start."""
-    from ..errors import ParameterError
-    from ..library.catalogue import load
-    from ..library.entry import Entry
-    from ..library.models import model_class, model_names
-
-    if name not in model_names():
-        return load(name)
-    cls = model_class(name, "--characteristic")
-    if not hasattr(cls, "blank"):
-        raise ParameterError(
-            f"--characteristic: {name} needs values to start from. Name a library entry made of it "
-            "(airmuscle list shows which), or write a muscle file with your own."
-        )
-    # A clamp at twice what was measured cuts off no point, and still limits extrapolation.
-    law = cls.blank(degree, greatest_force=2.0 * max(1.0, *(float(run["force"].max()) for run in recordings)))
-    return Entry(name, name, "chosen", law)
 
 
 def loss_of(robust: str | None, law: Characteristic) -> Any:
@@ -220,6 +215,8 @@ def as_data(result: Fit) -> dict[str, Any]:
 
 def write(result: Fit, entry: Entry, recordings: list[Recording], out: Path, chapters: Sequence[Chapter] = ()) -> None:
     """Muscle and report in one folder, whole or not at all; `chapters` stand before the fit's own."""
+    import dataclasses
+
     from ..library.catalogue import save
     from ..report.fit_chapter import fit_chapter
     from ..report.staged import staged
@@ -228,4 +225,5 @@ def write(result: Fit, entry: Entry, recordings: list[Recording], out: Path, cha
     with staged(out) as place:
         save(entry, place / "muscle.toml")
         notes = tuple(dict.fromkeys(note for run in recordings for note in run.notes))
-        fill(place, [*chapters, fit_chapter(result, entry, notes)], title="Fit")
+        worded = dataclasses.replace(result, notes=tuple(in_options(note) for note in result.notes))
+        fill(place, [*chapters, fit_chapter(worded, entry, notes)], title="Fit")

@@ -2,80 +2,64 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from .remedies import in_options
 from .terminal import print_json
 
 if TYPE_CHECKING:
     from ..identify.candidates import Candidate
     from ..identify.compare import Comparison
-    from ..identify.leave_out import LeaveOut
     from ..recording import Recording
+    from .fit_more import Asked
 
 
-def compared(
-    files: list[Path],
-    recordings: list[Recording],
-    *,
-    characteristic: str | None,
-    fixed: tuple[str, ...],
-    leave_out: str | None,
-    degree: int,
-    robust: str | None,
-    uncensored: bool,
-    out: Path,
-    json: bool,
-) -> None:
+def compared(files: list[Path], recordings: list[Recording], characteristic: str | None, asked: Asked) -> None:
     """Compare, print the ranking, and write the recommended muscle with its report."""
     from ..identify.compare import compare
     from ..report.compare_chapter import compare_chapter
-    from .fit import fitted, write
+    from ..report.staged import refuse_unwritable
+    from .fit import echo, fitted, write
 
-    if uncensored or robust is not None:
-        raise typer.BadParameter("--compare judges by squared errors of the rows that pull: no --robust, --uncensored")
-    candidates = _candidates(recordings, characteristic, degree, fixed)
-    said = None if json else lambda name: typer.echo(f"  {name}", err=True)
-    found = compare(recordings, candidates, leave_out=_part(leave_out), progress=said)
+    if asked.uncensored or asked.robust is not None or asked.equal_weights:
+        raise typer.BadParameter(
+            "--compare judges by squared errors of the rows that pull: no --robust, --uncensored, --equal-weights"
+        )
+    refuse_unwritable(asked.out)
+    candidates = _candidates(recordings, characteristic, asked)
+    said = None if asked.json else lambda name: typer.echo(f"  {name}", err=True)
+    found = _worded(compare(recordings, candidates, leave_out=asked.more.by, progress=said))
     chosen = found.recommended
+    sure = asked.more.find(chosen.fit, recordings)
     entry = fitted(chosen.fit, _bare(chosen.candidate), files)
-    write(chosen.fit, entry, recordings, out, [compare_chapter(found)])
-    if json:
-        print_json(_as_data(found))
+    write(chosen.fit, entry, recordings, asked.out, [compare_chapter(found), *sure.chapters()])
+    if asked.json:
+        print_json(_as_data(found) | sure.as_data())
         return
-    typer.echo(str(found))
-    typer.echo(f"muscle: {out / 'muscle.toml'}")
-    typer.echo(f"report: {out / 'report.html'}")
+    echo([str(found), *sure.lines()], asked.out)
 
 
-def _candidates(
-    recordings: list[Recording], characteristic: str | None, degree: int, fixed: tuple[str, ...]
-) -> list[Candidate]:
+def _worded(found: Comparison) -> Comparison:
+    """The reasons of exclusions with the remedies of the command line."""
+    excluded = tuple(dataclasses.replace(each, why=in_options(each.why)) for each in found.excluded)
+    return dataclasses.replace(found, excluded=excluded)
+
+
+def _candidates(recordings: list[Recording], characteristic: str | None, asked: Asked) -> list[Candidate]:
     """All that start from data alone, and the one named beside them."""
     from ..identify.candidates import Candidate, standard_candidates
-    from .fit import start_of
+    from .fit_start import start_of
 
     found = list(standard_candidates(recordings))
     if characteristic is not None:
-        law = start_of(characteristic, recordings, degree).characteristic
-        found.append(Candidate(f"{characteristic} (named)", law, fixed))
+        start = start_of(characteristic, recordings, asked.degree)
+        law = start.entry.characteristic
+        found.append(Candidate(f"{characteristic} (named)", law, (*asked.fixed, *start.fixed)))
     return found
-
-
-def _part(word: str | None) -> LeaveOut | None:
-    from ..identify.leave_out import Levels, Runs, Specimens
-
-    parts: dict[str, LeaveOut] = {
-        "run": Runs(),
-        "specimen": Specimens(),
-        "contraction": Levels("contraction"),
-        "pressure": Levels("pressure"),
-    }
-    if word is not None and word not in parts:
-        raise typer.BadParameter(f"--leave-out is '{word}'; it may be {', '.join(parts)}")
-    return None if word is None else parts[word]
 
 
 def _bare(candidate: Candidate) -> Any:
@@ -92,6 +76,7 @@ def _as_data(found: Comparison) -> dict[str, Any]:
         "recommended": found.recommended.candidate.name,
         "reason": found.reason,
         "left_out": found.leave_out.word,
+        "purpose": found.purpose,
         "ranking": [
             {
                 "law": c.candidate.name,

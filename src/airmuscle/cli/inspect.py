@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .bench_files import Length, Surroundings, Units, pairs
 from .options import Json, Map, OptionalFolder
 from .terminal import print_json, print_table
 
@@ -20,14 +21,6 @@ Files = Annotated[
 Columns = Annotated[
     list[str] | None,
     typer.Option("--column", metavar="COLUMN=HEADING", help="'Channel 1=pressure [bara]', '3=length [mm]'; repeat it."),
-]
-Units = Annotated[
-    list[str] | None,
-    typer.Option("--unit", metavar="COLUMN=UNIT", help="The unit of a column whose heading states none; repeat it."),
-]
-Length = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Length unpressurised and unloaded: '300 mm'.")]
-Surroundings = Annotated[
-    str | None, typer.Option(metavar="QUANTITY", help="What absolute pressures are reduced by: '98 kPa'.")
 ]
 Text = Annotated[str | None, typer.Option(metavar="SIGN", help="Of text files, where it is not recognised.")]
 Sheet = Annotated[str | None, typer.Option(metavar="NAME", help="Worksheet of an Excel file; all without it.")]
@@ -65,7 +58,7 @@ def inspect(
 
     told = _told(mapping, column=column, resting_length=resting_length, ambient=ambient, delimiter=delimiter,
                  decimal=decimal, sheet=sheet, group=group)  # fmt: skip
-    seen = inspect_all(_recordings(files, told, _pairs("--unit", unit)))
+    seen = inspect_all(_recordings(files, told, pairs("--unit", unit)))
     if out:
         _draw(seen, out)
     if json:
@@ -82,14 +75,7 @@ def _told(path: Path | None, *, column: list[str] | None, **given: Any) -> Colum
     from ..recording.mapping import read_mapping
 
     base = read_mapping(path) if path else ColumnMapping()
-    return base.with_given(columns=_pairs("--column", column), **given)
-
-
-def _pairs(option: str, texts: list[str] | None) -> dict[str, str]:
-    parts = [text.partition("=") for text in texts or ()]
-    if not all(name and sign for name, sign, _ in parts):
-        raise typer.BadParameter(f"{option} wants NAME=TEXT, not {', '.join(texts or ())}")
-    return {name.strip(): found.strip() for name, _, found in parts}
+    return base.with_given(columns=pairs("--column", column), **given)
 
 
 def _recordings(files: list[str], told: ColumnMapping, units: dict[str, str]) -> tuple[Recording, ...]:

@@ -14,7 +14,10 @@ if TYPE_CHECKING:
     from ..library.entry import Entry
     from ..library.valve_catalogue import ValveEntry
 
-PARTS = ("characteristic", "geometry", "spring", "damper", "box", "valve", "exhaust", "response")
+PARTS = (
+    "characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "box", "valve",
+    "exhaust", "response",
+)  # fmt: skip
 MANY = 30
 """Values of one list above which the table shows its ends only."""
 

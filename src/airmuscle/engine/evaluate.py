@@ -9,7 +9,7 @@ import numba
 from .address import invoke, pointer
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", nogil=True)
 def evaluate(function: Any, c: Any, states: Any, inputs: Any, results: Any) -> None:
     """Fill results (N, k) with function(x, u, c, o) at states (N, n) and inputs (N, m), all C-contiguous."""
     for row in range(states.shape[0]):

@@ -16,7 +16,7 @@ from .address import invoke, pointer
 DONE, PAUSED, STEP_TOO_SMALL, NOT_FINITE = 0, 1, 2, 3
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
 def fixed_step(
     step: Any, c: Any, y: Any, ends: Any, values: Any, slopes: Any, times: Any, rows: Any,
     length: Any, clock: Any, count: Any, budget: Any, work: Any,

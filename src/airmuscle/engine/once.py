@@ -6,9 +6,14 @@ import pathlib
 import sys
 from typing import Any
 
+_announced: set[Any] = set()
+
 
 def announce_compilation(kernel: Any) -> None:
     """Say on stderr that a kernel is about to be compiled, if this machine has not compiled it before."""
+    if kernel in _announced:
+        return
+    _announced.add(kernel)
     if kernel.signatures:
         return
     cache = getattr(getattr(kernel, "_cache", None), "_cache_file", None)

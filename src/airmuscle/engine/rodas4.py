@@ -40,7 +40,7 @@ H31, H32, H33, H34, H35 = (
 )  # fmt: skip
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
 def rodas4(
     stage: Any, jac: Any, factor: Any, solve: Any, drift: Any, jacobian_size: Any, factor_size: Any,
     c: Any, y: Any, ends: Any, values: Any, slopes: Any, times: Any, rows: Any,

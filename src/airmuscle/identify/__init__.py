@@ -13,6 +13,7 @@ from .compare import compare as compare
 from .convert import Conversion as Conversion
 from .convert import convert as convert
 from .fit import fit as fit
+from .leave_out import Blocks as Blocks
 from .leave_out import LeaveOut as LeaveOut
 from .leave_out import Levels as Levels
 from .leave_out import Runs as Runs
@@ -26,6 +27,6 @@ from .profile import profile as profile
 from .profile import weakly_determined as weakly_determined
 from .result import Estimate as Estimate
 from .result import Fit as Fit
-from .shape import ShapedFit as ShapedFit
-from .shape import fit_shaped as fit_shaped
-from .shape import shape_breaks as shape_breaks
+from .surface.shape import ShapedFit as ShapedFit
+from .surface.shape import fit_shaped as fit_shaped
+from .surface.shape import shape_breaks as shape_breaks

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -59,20 +59,22 @@ def bootstrap(
     refits: int = 1000,
     by: LeaveOut | None = None,
     seed: int = 0,
+    progress: Callable[[float], None] | None = None,
 ) -> Bootstrap:
     """Refit a law to parts of its data drawn with replacement (Efron and Tibshirani (1993), An Introduction to the
     Bootstrap, chapter 9).
 
     `recordings` are those that were fitted; `by` says what is drawn: Runs(), Levels(...) or Specimens(), without it
     the first of which there are three. Rows that are cut off take part as far as the fit itself contradicts them.
-    Laws linear in their parameters are refitted all at once. Raises IdentificationError.
+    Laws linear in their parameters are refitted all at once; for others `progress` is called with the part done.
+    Raises IdentificationError.
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     which, count = _parts(fit, runs, by or natural(runs))
     drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=refits).astype(float)
     problem = fit.problem
     at_once = is_linear(problem) and isinstance(fit.loss, LeastSquares)
-    values = _linear(problem, fit.values, which, drawn) if at_once else _one_by_one(fit, which, drawn)
+    values = _linear(problem, fit.values, which, drawn) if at_once else _one_by_one(fit, which, drawn, progress)
     return Bootstrap(fit, values, count, seed)
 
 
@@ -127,9 +129,11 @@ def _determined(normal: Array) -> npt.NDArray[np.bool_]:
     return np.asarray(np.linalg.eigvalsh(normal)[:, 0] > _LEAST)
 
 
-def _one_by_one(fit: Fit, which: Places, drawn: Array) -> Array:
+def _one_by_one(fit: Fit, which: Places, drawn: Array, progress: Callable[[float], None] | None = None) -> Array:
     found = np.full((drawn.shape[0], len(fit.estimates)), np.nan)
     for i, counts in enumerate(drawn):
+        if progress is not None:
+            progress(i / len(drawn))
         times = counts[which]
         kept = times > 0
         problem = dataclasses.replace(

@@ -118,10 +118,10 @@ def _of_a_length(sizes: Sizes, length: float) -> list[Candidate]:
 
 def _families(length: float) -> list[Candidate]:
     found = []
-    for degree in (3, 5):
+    for degree in range(2, 6):
         inner = surface(degree)
         found.append(Candidate(f"effective length, degree {degree}", EffectiveLength(inner, length, 0.005)))
-        for change in (1, 2):
+        for change in range(1, min(degree, 3) + 1):
             words = f"degree {degree}, its change {change}"
             args = (inner, surface(change), length, length)
             found.append(Candidate(f"term in 1/L0, {words}", InverseLength(*args)))

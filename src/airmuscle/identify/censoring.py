@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from ..characteristic.base import Characteristic, ForceLaw
+from ..recording import Recording
+from ..recording.segment import sensors
+from .weights import deviations
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,3 +44,18 @@ def censoring_of(law: Characteristic) -> Censoring:
     if not isinstance(law, ForceLaw):
         return UNCENSORED
     return Censoring(getattr(law, "least_force", 0.0), getattr(law, "greatest_force", math.inf))
+
+
+def within_sensor(censoring: Censoring, law: Characteristic, runs: Sequence[Recording]) -> Censoring:
+    """The range narrowed to what the force sensor of the runs can read, where it shows an end at which it is cut off.
+
+    Told only where all runs state their time and come from one rig; laws in force alone, which can use a bound.
+    """
+    timed = bool(runs) and all("time" in run.columns and "force" in run.columns and len(run) for run in runs)
+    if not isinstance(law, ForceLaw) or not timed or deviations(runs, "force") is not None:
+        return censoring
+    sensor = sensors(runs)["force"]
+    near = 0.25 * sensor.resolution
+    return Censoring(
+        max(censoring.least_force, sensor.least + near), min(censoring.greatest_force, sensor.greatest - near)
+    )

@@ -66,6 +66,11 @@ class Comparison:
     recommended: Contender
     reason: str
 
+    @property
+    def purpose(self) -> str:
+        """What the recommended law is for: what was left out decides it."""
+        return self.leave_out.purpose
+
     def __getitem__(self, name: str) -> Contender:
         """A contender by its name."""
         found = {contender.candidate.name: contender for contender in self.contenders}
@@ -80,7 +85,8 @@ class Comparison:
             for c in self.contenders
         ]
         out = [f"excluded: {e.name}. {e.why}" for e in self.excluded]
-        return "\n".join([f"Left out in turn: each {self.leave_out.word}", "", head, *rows, "", self.reason, *out])
+        said = f"Left out in turn: each {self.leave_out.word}, so the ranking is for {self.purpose}."
+        return "\n".join([said, "", head, *rows, "", self.reason, *out])
 
 
 def compare(
@@ -94,10 +100,12 @@ def compare(
     """Fit all candidates, rank them by their error on parts that were left out, and recommend one.
 
     Without `candidates` all laws are tried that can be started from data alone. `leave_out` is Runs(),
-    Levels("contraction"), Levels("pressure") or Specimens(); without it the first of these that the data have three
-    of: specimens, runs, levels. All errors are compared in force, whatever a law is solved for. The simplest law is
-    recommended that is no worse than the best by more than one standard error of their difference (Breiman et al.,
-    Classification and Regression Trees (1984), section 3.4.3). Raises IdentificationError where none is determined.
+    Levels("contraction"), Levels("pressure"), Specimens() or Blocks(), and decides what the ranking is for (its
+    `purpose`): a law for muscles not measured is not the best one for those measured. Without it the first that the
+    data have three of: specimens, runs, levels. All errors are compared in force, whatever a law is solved for. The
+    simplest law is recommended that is no worse than the best by more than one standard error of their difference
+    (Breiman et al., Classification and Regression Trees (1984), section 3.4.3). Raises IdentificationError where none
+    is determined.
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     how = leave_out or natural(runs)
@@ -171,7 +179,8 @@ def _recommended(contenders: Sequence[Contender], how: LeaveOut) -> tuple[Conten
     best = contenders[0]
     close = [c for c in contenders if _excess(c, best) <= 0]
     chosen = min(close, key=lambda c: (c.parameters, c.cross_validated))
-    said = f"Recommended: {chosen.candidate.name}, {chosen.cross_validated:.4g} N on each {how.word} left out"
+    said = f"Recommended for {how.purpose}: {chosen.candidate.name}, "
+    said += f"{chosen.cross_validated:.4g} N on each {how.word} left out"
     if chosen is best:
         return chosen, f"{said}, the least of all, with {chosen.parameters} parameters."
     return chosen, (

@@ -15,11 +15,11 @@ from .censoring import UNCENSORED
 from .fit import fit
 from .loss import Array
 
-_POINTS = 24
+POINTS = 24
 """Pressures and contractions that the other law is fitted to; one more of each judges it."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Conversion:
     """The other model with the parameters that bring it nearest, and its errors in force over the box."""
 
@@ -32,6 +32,8 @@ class Conversion:
     """Where it stands [Pa]."""
     contraction: float
     """Where it stands [1]."""
+    judged: Recording
+    """The points between, where the first law pulls, with its force and the `error` of the other [N]."""
 
     def __str__(self) -> str:
         return (
@@ -46,32 +48,41 @@ def convert(characteristic: Characteristic, other: Characteristic, box: Box) -> 
     `other` gives the structure and the start values, as in `fit`. Raises IdentificationError where the box does not
     determine it, NoSolution where the first law pulls nowhere on it.
     """
-    given = _points(characteristic, box, _POINTS)
-    if not len(given):
-        raise NoSolution(f"{type(characteristic).__name__} pulls nowhere on the box: nothing to convert.")
+    given = on_grid(characteristic, box, POINTS)
     law: Any = other
     if hasattr(law, "greatest_force") and law.greatest_force <= float(given["force"].max()):
         law = dataclasses.replace(law, greatest_force=2.0 * float(given["force"].max()))
     model = fit(law, given, censoring=UNCENSORED).model
-    judged = _points(characteristic, box, _POINTS + 1)
-    difference = np.asarray(model.force(judged["pressure"], judged["contraction"])) - judged["force"]
-    if not np.isfinite(difference).all():
-        raise IdentificationError(f"{type(other).__name__} has no force somewhere on the box; choose a smaller one.")
+    judged = on_grid(characteristic, box, POINTS + 1)
+    difference = _forces(model, judged["pressure"], judged["contraction"]) - judged["force"]
+    lacking = np.flatnonzero(~np.isfinite(difference))
+    if lacking.size:
+        p, c = judged["pressure"][lacking[0]], judged["contraction"][lacking[0]]
+        raise IdentificationError(
+            f"{type(other).__name__}, brought as near as it comes, has no force at {lacking.size} of {len(judged)} "
+            f"points where {type(characteristic).__name__} pulls, the first at {p / 1e3:.4g} kPa and {c:.2%}; choose a "
+            "smaller box."
+        )
     at = int(np.argmax(np.abs(difference)))
     return Conversion(
         model, float(np.sqrt(np.mean(difference**2))), float(difference[at]), float(judged["pressure"][at]),
-        float(judged["contraction"][at]),
+        float(judged["contraction"][at]), judged.with_columns(error=difference),
     )  # fmt: skip
 
 
-def _points(law: Characteristic, box: Box, count: int) -> Recording:
-    """A grid of the box, denser towards its edges, less where the law has no force or is slack."""
+def on_grid(law: Characteristic, box: Box, count: int) -> Recording:
+    """The forces of a law on a grid of the box, denser towards its edges; points without force or slack left out.
+
+    Raises NoSolution where none is left.
+    """
     places = (1 - np.cos(np.pi * np.arange(count) / (count - 1))) / 2
     (p_low, p_high), (c_low, c_high) = box.pressure, box.contraction
     pressure, contraction = np.meshgrid(p_low + (p_high - p_low) * places, c_low + (c_high - c_low) * places)
     p, c = pressure.ravel(), contraction.ravel()
     force = _forces(law, p, c)
     pulls = force > 0
+    if not pulls.any():
+        raise NoSolution(f"{type(law).__name__} pulls nowhere on the box: nothing to convert.")
     columns = {"pressure": p[pulls], "contraction": c[pulls], "force": force[pulls]}
     return Recording(columns, type(law).__name__)
 

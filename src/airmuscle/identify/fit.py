@@ -13,13 +13,14 @@ from .. import declare
 from ..characteristic.base import Characteristic
 from ..errors import IdentificationError
 from ..recording import Recording
-from .censoring import Censoring, censoring_of
+from .censoring import Censoring, censoring_of, within_sensor
 from .correlation_index import correlation_index
 from .loss import Array, LeastSquares, Loss
-from .problem import RESTING_LENGTH, Problem, answers, pose
+from .problem import RESTING_LENGTH, Problem, answers, direction_of, pose
 from .result import Estimate, Extreme, Fit
 from .solve import Solution, solve
 from .statistics import Statistics, statistics
+from .weights import deviations
 
 POINT = ("pressure", "contraction", "force")
 ILL_CONDITIONED = 1e5
@@ -39,21 +40,26 @@ def fit(
 
     `characteristic` gives the structure and the start values; its parameters that are declared as not fitted, and
     those named in `fixed`, stay. Errors are taken in the direction that the law gives (force, contraction or
-    pressure), within the declared bounds. Rows at zero or full force are cut off and count only where the law
-    contradicts them; `censoring` states another range, `UNCENSORED` takes every row as it stands.
-    `sigma` are the standard deviations of the rows, of which only the ratios matter. `loss` is LeastSquares(),
+    pressure), within the declared bounds. Rows at zero or full force, or where the force sensor shows that it is cut
+    off, count only where the law contradicts them; `censoring` states another range, `UNCENSORED` takes every row as
+    it stands.
+    `sigma` are the standard deviations of the rows, of which only the ratios matter; without it recordings from
+    several rigs weigh by what their sensors resolve, and `sigma=1.0` weighs all alike. `loss` is LeastSquares(),
     Huber(scale) or SoftL1(scale), the scale in the unit of the fitted quantity.
 
     Raises IdentificationError where the points cannot determine the parameters, and says which.
     """
     data, dropped = _points(recording)
-    weights = _weights(data, dropped, sigma)
+    by_rig = None if sigma is not None else _by_rig(characteristic, recording)
+    weights = _weights(data, dropped, sigma if by_rig is None else _by_row(by_rig, recording))
     data, weights = data.rows(~dropped), weights[~dropped]
     law = _with_box(_of_length(characteristic, data), data)
-    problem = pose(law, data, censoring or censoring_of(law), weights, fixed)
+    runs = [recording] if isinstance(recording, Recording) else list(recording)
+    problem = pose(law, data, censoring or within_sensor(censoring_of(law), law, runs), weights, fixed)
     solution = solve(problem, loss)
     found = statistics(problem, solution, loss)
-    notes = _notes(problem, found, loss, int(np.count_nonzero(dropped)))
+    notes = (*_notes(problem, found, loss, int(np.count_nonzero(dropped))), *_of_rigs(by_rig, problem))
+    notes += _narrow(problem, solution, loss)
     return _result(problem, solution, found, loss, int(np.count_nonzero(dropped)), notes)
 
 
@@ -88,6 +94,26 @@ def _weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLi
         raise IdentificationError(f"{data.origin}: every sigma must be finite and greater than zero.")
     weights = 1.0 / deviations
     return np.asarray(weights / np.sqrt(np.mean(weights[~dropped] ** 2)))
+
+
+def _by_rig(law: Characteristic, recording: Recording | Sequence[Recording]) -> Array | None:
+    """The sensors' deviations by recording, where there are several that differ."""
+    if isinstance(recording, Recording) or len(recording) < 2:
+        return None
+    return deviations(recording, direction_of(law).quantity)
+
+
+def _by_row(by_rig: Array, recording: Any) -> Array:
+    return np.repeat(by_rig, [len(run) for run in recording])
+
+
+def _of_rigs(by_rig: Array | None, problem: Problem) -> list[str]:
+    if by_rig is None:
+        return []
+    return [
+        "The recordings come from rigs whose sensors differ: rows weigh by standard deviations of "
+        f"{min(by_rig):.3g} to {max(by_rig):.3g} {problem.direction.unit}; sigma=1.0 counts all alike."
+    ]
 
 
 def _of_length(law: Any, data: Recording) -> Any:
@@ -193,6 +219,19 @@ def _notes(problem: Problem, found: Statistics, loss: Loss, dropped: int) -> tup
     if not isinstance(loss, LeastSquares):
         notes.append(f"Robust: {loss}, in {problem.direction.unit}.")
     return tuple(notes)
+
+
+def _narrow(problem: Problem, solution: Solution, loss: Loss) -> tuple[str, ...]:
+    """A robust loss so narrow that nearly every row is an outlier to it."""
+    measured = problem.sides == 0
+    errors = np.abs(problem.errors(solution.modelled))[measured]
+    inside = int(np.count_nonzero(errors <= loss.scale))
+    if isinstance(loss, LeastSquares) or inside >= errors.size / 2:
+        return ()
+    return (
+        f"Only {inside} of {errors.size} rows lie within the scale of {loss}: the standard deviations come out too "
+        "small. A scale of about three times the noise gives ones to be trusted.",
+    )
 
 
 def _other_lengths(problem: Problem) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -33,5 +34,6 @@ def plot_fit(fit: Fit) -> Any:
     parity.set(xlabel=f"measured {name} [{unit}]", ylabel=f"modelled {name} [{unit}]")
     residual.set(xlabel=f"measured {name} [{unit}]", ylabel=f"model less measured [{unit}]")
     figure.legend(*parity.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=8)
-    figure.suptitle(f"{type(fit.model).__name__} fitted to {fit.recording.origin}", fontsize=9)
+    title = f"{type(fit.model).__name__} fitted to {fit.recording.origin}"
+    figure.suptitle(textwrap.fill(title, 90), fontsize=9)
     return figure

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import dataclasses
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..declare import Leaf
 from ..errors import IdentificationError
 from .loss import Array, LeastSquares, Loss
+from .one_sided import least_squares_of, measured_alone_determine
 from .problem import Problem
+from .separable import linear_leaves, projected_start
 
 STEPS = 500
 """Iterations after which a fit gives up; none that was seen needed a fifth of them."""
 _FINE = 1e-14
-RANK_TOLERANCE = 1e-10
-"""Singular values of the scaled design below this part of the greatest count as zero (chosen): a parameter that
-ten digits of the data do not determine is not determined."""
-_SLIGHT = 1e-4
-"""Weight of a row that is cut off and not contradicted, where nothing else decides (chosen)."""
+_OFFSET = 1e-3
+"""Relative offset at which parameters count as found, that of Bates and Watts."""
+_SAME = 1e-8
+"""Singular values below this part of the greatest tell of parameters that replace each other (chosen)."""
 
 
 class Solution(NamedTuple):
@@ -32,19 +34,28 @@ class Solution(NamedTuple):
 def solve(problem: Problem, loss: Loss) -> Solution:
     """The free parameters that make the loss least. Raises IdentificationError where the search fails."""
     if not is_linear(problem):
-        return _solve_iterating(problem, loss, problem.start)
+        return _solve_iterating(problem, loss, projected_start(problem))
     found = _solve_linear(problem)
-    return found if isinstance(loss, LeastSquares) else _solve_iterating(problem, loss, found.values)
+    if isinstance(loss, LeastSquares):
+        return found
+    robust = _solve_iterating(problem, loss, found.values)
+    if measured_alone_determine(problem, robust.slopes):
+        return robust
+    # The search stops as soon as no bound is contradicted, and no row speaks any more for what bounds alone determine.
+    return _solve_linear(_reweighted(problem, loss, robust))
+
+
+def _reweighted(problem: Problem, loss: Loss, solution: Solution) -> Problem:
+    """The problem of which a robust solution is the least-squares one: every square weighted by rho' there."""
+    slope = loss.rho((problem.errors(solution.modelled) / loss.scale) ** 2)[1]
+    return dataclasses.replace(problem, weights=problem.weights * np.sqrt(slope))
 
 
 def is_linear(problem: Problem) -> bool:
     """Whether the law is linear in all that is to be found, and nothing bounds it."""
-    named = getattr(problem.law, "linear_in", ())
-    fields = (named,) if isinstance(named, str) else named
     leaves: list[Leaf] = [problem.leaves[i] for i in problem.free]
-    return bool(fields) and all(
-        leaf.path.partition("[")[0] in fields and leaf.declared.bounds == (-np.inf, np.inf) for leaf in leaves
-    )
+    unbounded = all(leaf.declared.bounds == (-np.inf, np.inf) for leaf in leaves)
+    return unbounded and bool(linear_leaves(problem).all())
 
 
 def design(problem: Problem) -> tuple[Array, Array]:
@@ -57,35 +68,9 @@ def design(problem: Problem) -> tuple[Array, Array]:
 
 
 def _solve_linear(problem: Problem) -> Solution:
-    """Least squares at once, or again on the rows that count until these are the same.
-
-    Squares on one side of a bound make a convex sum, of which each pass is a Newton step. Where the measured rows
-    alone leave parameters open, a law may fall below its bounds without end; of all that are equally good, the one
-    nearest to the bounds is taken.
-    """
     slopes, constant = design(problem)
-    norms = np.linalg.norm(slopes, axis=0)
-    norms[norms == 0] = 1.0
-    matrix = problem.weights[:, None] * (slopes / norms)
-    goal = problem.weights * (problem.goal - constant)
-    measured = problem.sides == 0
-    determined = measured.all() or measured_rank(problem, slopes) == len(norms)
-    counting = np.ones(len(goal), dtype=bool)
-    for _ in range(50):
-        share = np.where(counting, 1.0, 0.0 if determined else _SLIGHT)
-        found = np.linalg.lstsq(share[:, None] * matrix, share * goal, rcond=1e-13)[0] / norms
-        modelled = slopes @ found + constant
-        previous, counting = counting, problem.counting(modelled)
-        if measured.all() or np.array_equal(counting, previous):
-            return Solution(found, modelled, slopes)
-    return _solve_iterating(problem, LeastSquares(), found)  # whole steps went in a circle
-
-
-def measured_rank(problem: Problem, slopes: Array) -> int:
-    """How many parameters the rows that are not cut off determine by themselves."""
-    matrix = (problem.weights[:, None] * slopes)[problem.sides == 0]
-    norms = np.linalg.norm(matrix, axis=0)
-    return int(np.linalg.matrix_rank(matrix / np.where(norms > 0, norms, 1.0), rtol=RANK_TOLERANCE))
+    values = least_squares_of(problem, slopes, constant)
+    return Solution(values, slopes @ values + constant, slopes)
 
 
 def _solve_iterating(problem: Problem, loss: Loss, start: Array) -> Solution:
@@ -108,23 +93,38 @@ def _solve_iterating(problem: Problem, loss: Loss, start: Array) -> Solution:
 
     if np.abs(errors(start / scale)).max() < 1e-14:  # it meets every row already: there is no slope to follow
         return Solution(start, problem.modelled(start), problem.slopes(start))
-    result = least_squares(
-        errors,
-        start / scale,
-        jac=slopes,
-        bounds=(low / scale, high / scale),
-        x_scale="jac",
-        loss="linear" if isinstance(loss, LeastSquares) else loss.rho,
-        f_scale=loss.scale / spread,
-        ftol=_FINE,
-        xtol=_FINE,
-        gtol=None,
-        max_nfev=STEPS,
-    )
-    if result.status <= 0:
+    options: dict[str, Any] = {
+        "jac": slopes,
+        "bounds": (low / scale, high / scale),
+        "x_scale": "jac",
+        "loss": "linear" if isinstance(loss, LeastSquares) else loss.rho,
+        "f_scale": loss.scale / spread,
+        "ftol": _FINE,
+        "xtol": _FINE,
+        "gtol": None,
+        "max_nfev": STEPS,
+    }
+    result = least_squares(errors, start / scale, **options)
+    if result.status <= 0 and not _is_least(result):  # it creeps along a bound, which the other method steps onto
+        result = least_squares(errors, result.x, method="dogbox", **options)
+    if result.status <= 0 and not _is_least(result):
         raise _no_end(problem)
     values = np.clip(result.x * scale, low, high)
     return Solution(values, problem.modelled(values), problem.slopes(values))
+
+
+def _is_least(result: Any) -> bool:
+    """Whether hardly anything of the errors lies along the slopes, though a search creeps on.
+
+    Where parameters replace each other it does so for ever. The relative offset of Bates and Watts, Technometrics
+    23:179 (1981), says that there is nothing left to find.
+    """
+    norms = np.linalg.norm(result.jac, axis=0)
+    norms[norms == 0] = 1.0
+    along = np.linalg.lstsq((result.jac / norms).T, result.grad / norms, rcond=_SAME)[0]
+    squares, size = float(along @ along), norms.size
+    spare = max(result.fun.size - size, 1)
+    return bool(squares / size <= _OFFSET**2 * (2 * result.cost - squares) / spare)
 
 
 def _refuse_non_finite(problem: Problem, start: Array) -> None:

@@ -9,8 +9,9 @@ import numpy.typing as npt
 
 from ..errors import IdentificationError
 from .loss import Array, Loss
+from .one_sided import RANK_TOLERANCE, measured_rank
 from .problem import Problem
-from .solve import RANK_TOLERANCE, Solution, measured_rank
+from .solve import Solution
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -12,7 +12,11 @@ from ..geometry.base import Geometry
 from ..reference import Reference
 
 if TYPE_CHECKING:
-    from ..muscle import Damper, Muscle, Spring
+    from ..friction.base import Friction
+    from ..muscle import CreepElements, Damper, Muscle, Series, Spring, Stop, Wall
+
+OPTIONAL = ("spring", "damper", "friction", "wall", "series", "stop", "creep")
+"""Parts that a muscle may do without, as fields of an entry and tables of its file."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,6 +45,11 @@ class Entry:
     geometry: Geometry | None = None
     spring: Spring | None = None
     damper: Damper | None = None
+    friction: Friction | None = None
+    wall: Wall | None = None
+    series: Series | None = None
+    stop: Stop | None = None
+    creep: CreepElements | None = None
     note: str = ""
     warning: str = ""
     box: Box | None = None
@@ -59,5 +68,5 @@ class Entry:
                 else "a law solved for the force: see as_force_law"
             )
             raise UnknownName(f"{self.name} is a characteristic, not yet a muscle; it lacks {lack}.")
-        given = {part: getattr(self, part) for part in ("spring", "damper") if getattr(self, part) is not None}
+        given = {part: getattr(self, part) for part in OPTIONAL if getattr(self, part) is not None}
         return Muscle(self.characteristic, self.geometry, box=self.box, **given)

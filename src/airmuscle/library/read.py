@@ -9,8 +9,9 @@ from typing import Any
 from ..characteristic.base import Characteristic
 from ..characteristic.box import Box
 from ..errors import ParameterError, suggestion
+from ..friction.base import Friction
 from ..geometry.base import Geometry
-from ..muscle import Damper, Spring
+from ..muscle import CreepElements, Damper, Series, Spring, Stop, Wall
 from ..reference import Reference
 from .build import build
 from .entry import Check, Entry
@@ -26,7 +27,10 @@ _GIVEN = {
     "volume": ("contraction",),
 }
 _TEXTS = ("title", "trust", "note", "warning")
-_PARTS = {"characteristic": Characteristic, "geometry": Geometry, "spring": Spring, "damper": Damper}
+_PARTS = {
+    "characteristic": Characteristic, "geometry": Geometry, "spring": Spring, "damper": Damper, "friction": Friction,
+    "wall": Wall, "series": Series, "stop": Stop, "creep": CreepElements,
+}  # fmt: skip
 _KEYS = (*_TEXTS, *_PARTS, "box", "check", "reference")
 _CHECK_TEXTS = ("quantity", "source")
 _CHECK_KEYS = (*_CHECK_TEXTS, "equals", "tolerance", *QUANTITIES)

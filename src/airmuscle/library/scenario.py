@@ -84,12 +84,15 @@ class Scenario:
 def load_scenario(path: str | Path) -> Scenario:
     """The scenario in a file. Raises FileError, ParameterError, UnitError or UnknownName, saying where."""
     file = Path(path)
-    tables = parsed(file)
-    place = Place(str(file), "", file.parent)
+    return scenario_from(parsed(file), Place(str(file), "", file.parent))
+
+
+def scenario_from(tables: Mapping[str, Any], place: Place, plant: Plant | None = None) -> Scenario:
+    """The scenario that the tables of a file describe; a `plant` that is given stands for the table [plant]."""
     refuse_unknown(tables, TABLES, place)
     for key in ("plant", "run"):
         _table(tables.get(key), key, place)
-    plant = _plant(tables["plant"], place.inside("plant"))
+    plant = plant or _plant(tables["plant"], place.inside("plant"))
     run, at = tables["run"], place.inside("run")
     refuse_unknown(run, RUN, at)
     if "duration" not in run:
@@ -101,7 +104,7 @@ def load_scenario(path: str | Path) -> Scenario:
         refuse_beyond_range(plant, command.segments(plant.inputs, start_time, duration), start_time)
     start = _start(run.get("start", {"pressure": 0.0}), plant, at.inside("start"))
     return Scenario(
-        title=text(tables, "title", place, needed=False) or file.stem,
+        title=text(tables, "title", place, needed=False) or Path(place.file).stem,
         plant=plant,
         command=command,
         duration=duration,
@@ -204,3 +207,7 @@ def _columns(table: Mapping[str, Any], plant: Plant, start: Mapping[str, float],
 
 def _object(given: Any, kind: type[Any], place: Place) -> Any:
     return checked(build({"model": given} if isinstance(given, str) else given, place), kind, place)
+
+
+plant_from, muscle_from = _plant, _muscle
+"""The grammar of a plant and of a muscle, for other files that hold them."""

@@ -10,24 +10,37 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FileError
-from .entry import Check, Entry
+from .entry import OPTIONAL, Check, Entry
 
 
 def to_toml(entry: Entry) -> str:
     """The text of a library file for this entry; numbers in SI, with all their digits."""
     texts = {key: getattr(entry, key) for key in ("title", "trust", "note", "warning")}
     lines = [f"{key} = {_value(text)}" for key, text in texts.items() if text]
-    for part in ("characteristic", "geometry", "spring", "damper"):
+    for part in ("characteristic", "geometry", *OPTIONAL):
         built = getattr(entry, part)
         belongs_to_law = part == "geometry" and built == getattr(entry.characteristic, "geometry", None)
         if built is not None and not belongs_to_law:
-            lines += _table(part, _described(built))
+            lines += part_lines(part, built)
     if entry.box is not None:
         lines += _table("box", dataclasses.asdict(entry.box))
     for check in entry.checks:
         lines += _table("[check]", _row(check))
     for reference in entry.references:
         lines += _table("[reference]", {k: v for k, v in dataclasses.asdict(reference).items() if v not in (None, "")})
+    return "\n".join(lines) + "\n"
+
+
+def part_lines(name: str, thing: Any) -> list[str]:
+    """The lines of one table of such a file: [friction], say, with the model and its numbers."""
+    return list(_table(name, _described(thing)))
+
+
+def scenario_toml(title: str, plant: Any, command: Mapping[str, Any], run: Mapping[str, Any], note: str = "") -> str:
+    """The text of a scenario that `load_scenario` reads back: a plant with all its numbers, a command as written."""
+    lines = [f"# {line}" for line in note.splitlines()]
+    lines += [f"title = {_value(title)}", *_table("plant", _described(plant))]
+    lines += [*_table("command", command), *_table("run", run)]
     return "\n".join(lines) + "\n"
 
 

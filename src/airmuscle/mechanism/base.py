@@ -10,16 +10,29 @@ from .. import trace
 from ..ops import Value
 from ..variables import Input
 
+INFINITY = float("inf")
+
 
 @dataclasses.dataclass(frozen=True)
 class Coordinate:
-    """One generalised coordinate with the name of its speed; `nominal` are sizes below which errors do not matter."""
+    """One generalised coordinate with the name of its speed; `nominal` are sizes below which errors do not matter.
+
+    `least` and `greatest` say where a search for rest may look; they are no stops.
+    """
 
     name: str
     speed: str
     unit: str
     nominal: float
     nominal_speed: float
+    least: float = -INFINITY
+    greatest: float = INFINITY
+
+    @property
+    def acceleration(self) -> str:
+        """The name of its acceleration: that of its speed with the one word for the other."""
+        found = self.speed.replace("speed", "acceleration")
+        return found if found != self.speed else f"{self.name}.acceleration"
 
 
 class Mechanism(abc.ABC):
@@ -34,6 +47,11 @@ class Mechanism(abc.ABC):
     def inputs(self) -> tuple[Input, ...]:
         """The inputs that act on the mechanism."""
         return ()
+
+    @property
+    def muscles(self) -> int | None:
+        """How many muscles it takes; None for any number."""
+        return None
 
     @abc.abstractmethod
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
@@ -75,6 +93,12 @@ class Mechanism(abc.ABC):
         self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
         """Acceleration of every coordinate under the generalised forces `pulls` and the mechanism's own."""
+
+    def lost_power(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> Value:
+        """Power [W] that leaves it otherwise than to the muscles: by its own dampers, stops and drives."""
+        return 0.0
 
     def potential_energy(self, q: Mapping[str, Value]) -> Value:
         """Energy of position [J]."""

@@ -6,9 +6,13 @@ from .damper import DirectionalDamper as DirectionalDamper
 from .damper import LinearDamper as LinearDamper
 from .damper import PressureDamper as PressureDamper
 from .muscle import Muscle as Muscle
+from .reynolds2003 import Reynolds2003Damper as Reynolds2003Damper
+from .reynolds2003 import Reynolds2003Spring as Reynolds2003Spring
 from .series import RigidSeries as RigidSeries
 from .series import Series as Series
 from .series import SeriesSpring as SeriesSpring
+from .serres2009 import Serres2009Damper as Serres2009Damper
+from .serres2009 import Serres2009Spring as Serres2009Spring
 from .spring import CubicSpring as CubicSpring
 from .spring import LinearSpring as LinearSpring
 from .spring import Spring as Spring

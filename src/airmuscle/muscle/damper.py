@@ -23,12 +23,12 @@ class Damper(abc.ABC):
             return shortening * speed
         return ops.where(speed >= 0, shortening, lengthening) * speed
 
-    def speed(self, pressure: Value, contraction: Value, force: Value) -> Value:
-        """Speed of contraction [m/s] at which the damper holds a force [N]."""
+    def speed(self, pressure: Value, contraction: Value, force: Value, beside: Value = 0.0) -> Value:
+        """Speed of contraction [m/s] at which the damper, with a coefficient [N s/m] `beside` it, holds a force [N]."""
         shortening, lengthening = self.coefficients(pressure, contraction)
         if shortening is lengthening:
-            return force / shortening
-        return force / ops.where(force >= 0, shortening, lengthening)
+            return force / (shortening + beside)
+        return force / (ops.where(force >= 0, shortening, lengthening) + beside)
 
 
 @model
@@ -43,22 +43,22 @@ class LinearDamper(Damper):
 
 @model
 class PressureDamper(Damper):
-    """F_TL = (b_0 + b_p p) v: a coefficient that grows linearly with gauge pressure."""
+    """F_TL = max(b_0 + b_p p, 0) v: a coefficient that grows linearly with gauge pressure, and never drives."""
 
     damping: float = parameter("N s/m", "b_0", "damping coefficient at ambient pressure", bounds=(0.0, 1e6))
     growth: float = parameter("N s/(m Pa)", "b_p", "growth of the coefficient with gauge pressure", bounds=(0.0, 1.0))
 
     def coefficients(self, pressure: Value, contraction: Value) -> tuple[Value, Value]:
-        coefficient = self.damping + self.growth * pressure
+        coefficient = ops.maximum(self.damping + self.growth * pressure, 0.0)
         return coefficient, coefficient
 
 
 @model
 class DirectionalDamper(Damper):
-    """F_TL = b(p) v, with one line b = b_0 + b_p p for shortening and another for lengthening.
+    """F_TL = b(p) v, with one line b = max(b_0 + b_p p, 0) for shortening and another for lengthening.
 
-    The form in which Reynolds et al. (2003) identify damping: apart for contraction and relaxation, each linear in
-    pressure. The force is continuous at standstill.
+    p gauge pressure. The form in which Reynolds et al. (2003) identify damping (`Reynolds2003Damper` has their numbers,
+    `Serres2009Damper` those of a Festo muscle). The force is continuous at standstill.
     """
 
     shortening: float = parameter("N s/m", "b_c0", "coefficient of shortening at ambient pressure", bounds=(0.0, 1e6))

@@ -46,8 +46,9 @@ class Muscle:
         F = max(0, F_KE(p, eps) - F_PP(p, eps) - F_TL(p, eps, v) - F_R - F_C) - F_S
 
     F_KE contractile characteristic, F_PP parallel spring, F_TL damper, F_R friction, F_C creeping elements, F_S end
-    stop. A muscle pulls; only its end stop pushes. With a series spring all of that acts inside it, and the
-    contraction of the contractile part is a state: F_SE(s) = F(p, eps', v'), which the damper turns into a speed.
+    stop. A muscle pulls; only its end stop pushes. With a series spring of stretch s all of that acts inside it, and
+    the contraction eps' of the contractile part is a state: F_SE(s) = F(p, eps', v') without the max, as what is inside
+    may push itself apart; damper and stop turn what is left of the force into the speed v' = L0 eps''.
     Reference: Hosovsky et al., equation (1), which has contractile element, spring and damper; the others are off
     unless given.
     """
@@ -83,11 +84,12 @@ class Muscle:
             self._refuse_beside_series()
 
     def _refuse_beside_series(self) -> None:
-        if not min(self.damper.coefficients(0.0, 0.0)) > 0.0:
-            raise ParameterError(
-                f"{self.name}: a series spring needs a damper greater than 0 beside the contractile element, which "
-                f"gives its speed; the damper is {self.damper}."
-            )
+        for pressure in (-1e5, 0.0, 1e6):  # every damper is linear in pressure, or made of lines
+            if not min(self.damper.coefficients(pressure, 0.0)) > 0.0:
+                raise ParameterError(
+                    f"{self.name}: a series spring needs a damper greater than 0 beside the contractile element, which "
+                    f"gives its speed; at {pressure / 1e3:g} kPa gauge that of {self.damper} is not."
+                )
         if not self.friction.rate_independent:
             raise ParameterError(
                 f"{self.name}: beside a series spring friction must not depend on speed; {self.friction} does. "
@@ -110,15 +112,20 @@ class Muscle:
         return found
 
     def _settled_inner(self, pressure: float, contraction: float, series: SeriesSpring) -> float:
-        """Where the contractile part pulls as much as the series spring holds; by bisection, as both are monotone."""
+        """Where the contractile part pulls as much as the series spring holds; by bisection, as both are monotone.
+
+        Where it pushes itself apart and the spring hangs slack, it is the place at which it no longer does.
+        """
         length = self.geometry.resting_length
 
         def excess(inner: float) -> float:
-            return float(self._held(pressure, inner, 0.0, RELAXED) - series.force((inner - contraction) * length))
+            return float(self.static(pressure, inner) - series.force((inner - contraction) * length))
 
-        low, high = contraction, contraction + max(excess(contraction), 0.0) / (series.stiffness * length)
+        here, (least, most) = excess(contraction), self.geometry.contraction_reach
+        low, high = contraction, contraction + max(here, 0.0) / (series.stiffness * length)
+        low, high = (min(least, contraction), contraction) if here < 0.0 else (low, min(high, max(most, contraction)))
         while low < (middle := (low + high) / 2) < high:
-            low, high = (middle, high) if excess(middle) > 0 else (low, middle)
+            low, high = (middle, high) if excess(middle) >= 0 else (low, middle)
         return low
 
     def inner_contraction(self, contraction: Value, state: Mapping[str, Value] = RELAXED) -> Value:
@@ -139,8 +146,12 @@ class Muscle:
             friction = self.friction_force(speed, state)
             return Pull(self.tension(pressure, contraction, speed, state), friction, speed)
         tension = self.series.force((inner_contraction - contraction) * self.geometry.resting_length)
-        left = self._held(pressure, inner_contraction, 0.0, state) - tension
+        left = self.unslackened(pressure, inner_contraction, 0.0, state) - tension
         inside = self.damper.speed(pressure, inner_contraction, left)
+        if not isinstance(self.stop, NoStop):
+            # The contact never pulls: of the speeds with and without it the lesser is the one at which it does not.
+            still, growth = self.stop.parts(inner_contraction, self.geometry.resting_length)
+            inside = ops.minimum(inside, self.damper.speed(pressure, inner_contraction, left - still, growth))
         return Pull(tension, self.friction_force(inside, state), inside)
 
     def rates(self, state: Mapping[str, Value], pressure: Value, inner_speed: Value) -> dict[str, Value]:
@@ -173,10 +184,10 @@ class Muscle:
         )
         return total - self.creep.force({**self._still(), **state}) if self.creep.states else total
 
-    def _held(self, pressure: Value, contraction: Value, speed: Value, state: Mapping[str, Value]) -> Value:
-        """The forces of all elements but the damper [N], with the end stop."""
-        static = self.unslackened(pressure, contraction, speed, state)
-        return static - self.stop.force(contraction, speed, self.geometry.resting_length)
+    def static(self, pressure: Value, contraction: Value) -> Value:
+        """The sum of the elements' forces [N] at standstill, end stop and all, with everything else relaxed."""
+        elements = self.unslackened(pressure, contraction)
+        return elements - self.stop.force(contraction, 0.0, self.geometry.resting_length)
 
     def friction_force(self, speed: Value, state: Mapping[str, Value] = RELAXED) -> Value:
         """Force of the friction against contraction [N]."""
@@ -191,7 +202,9 @@ class Muscle:
     def stiffness(self, pressure: Value, contraction: Value) -> Value:
         """-dF/deps at constant pressure [N], exact where the muscle is taut; divide by the resting length for N/m.
 
-        With shut valves the pressure rises as the muscle is pulled, and it is stiffer: `stiffness_shut`. Friction is
+        That of the contractile part with spring and end stop: a series spring makes the muscle softer.
+
+        With shut valves the pressure rises as the muscle is pulled, and it is stiffer: module `stiffness`. Friction is
         left out: its bristles add theirs until they slide.
         """
-        return -trace.slope(self, "unslackened", pressure, contraction, wrt=1)
+        return -trace.slope(self, "static", pressure, contraction, wrt=1)

@@ -17,6 +17,10 @@ class Stop(abc.ABC):
     def force(self, contraction: Value, speed: Value, resting_length: Value) -> Value:
         """Force [N] against contraction [1] at a speed of shortening [m/s]."""
 
+    @abc.abstractmethod
+    def parts(self, contraction: Value, resting_length: Value) -> tuple[Value, Value]:
+        """Force [N] at standstill, and the coefficient [N s/m] by which it grows with the speed of shortening."""
+
 
 @model
 class NoStop(Stop):
@@ -24,6 +28,9 @@ class NoStop(Stop):
 
     def force(self, contraction: Value, speed: Value, resting_length: Value) -> Value:
         return 0.0
+
+    def parts(self, contraction: Value, resting_length: Value) -> tuple[Value, Value]:
+        return 0.0, 0.0
 
 
 @model
@@ -34,5 +41,12 @@ class EndStop(Stop):
     contact: HuntCrossley
 
     def force(self, contraction: Value, speed: Value, resting_length: Value) -> Value:
-        depth = ops.maximum(contraction - self.contraction, 0.0) * resting_length
-        return self.contact.force(depth, speed)
+        return self.contact.force(self.depth(contraction, resting_length), speed)
+
+    def parts(self, contraction: Value, resting_length: Value) -> tuple[Value, Value]:
+        still = self.contact.elastic(self.depth(contraction, resting_length))
+        return still, self.contact.damping * still
+
+    def depth(self, contraction: Value, resting_length: Value) -> Value:
+        """How far [m] the muscle is beyond where the contact begins."""
+        return ops.maximum(contraction - self.contraction, 0.0) * resting_length

@@ -64,10 +64,11 @@ class _Lagging(Wall):
 class LaggingWall(_Lagging):
     """An elastic wall that gives way with a lag: V_w' = (c p - V_w)/tau, a spring and a damper in parallel.
 
-    c compliance, tau lag. It is passive: of the work (p V_w') it stores V_w^2/(2 c), the rest is heat.
+    p gauge pressure, c compliance, tau lag. It is passive: of the work p V_w' it stores V_w^2/(2 c), and the rest,
+    tau V_w'^2/c, is heat.
     """
 
-    compliance: float = parameter("m3/Pa", "c", "volume that the wall adds for each pascal", bounds=(0.0, 1e-6))
+    compliance: float = parameter("m3/Pa", "c", "volume that the wall adds for each pascal", bounds=(0.0, 1e-8))
     lag: float = parameter("s", "tau", "time by which the wall lags", bounds=(1e-4, 100.0))
 
     def settled_volume(self, pressure: Value) -> Value:
@@ -90,5 +91,8 @@ class SwellingWall(_Lagging):
     lag: float = parameter("s", "tau", "time by which the wall lags", bounds=(1e-4, 100.0))
 
     def settled_volume(self, pressure: Value) -> Value:
-        at, none = (ops.exp(-(p - self.middle) / self.breadth) for p in (pressure, 0.0))
-        return self.growth_volume * (1.0 / (1.0 + at) - 1.0 / (1.0 + none))
+        return self.growth_volume * (self._share(pressure) - self._share(0.0))
+
+    def _share(self, pressure: Value) -> Value:
+        # Beyond 50 breadths the share is 0 or 1 to the last digit; the exponential and its slope stay finite.
+        return 1.0 / (1.0 + ops.exp(ops.clip((self.middle - pressure) / self.breadth, -50.0, 50.0)))

@@ -5,4 +5,5 @@ system does not need.
 """
 
 from ..variables import StateVariable as StateVariable
+from .system import Differentiated as Differentiated
 from .system import System as System

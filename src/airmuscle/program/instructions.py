@@ -35,6 +35,11 @@ class Code:
 
 def instructions(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
     """The instructions that compute the non-zeros of `outputs` (CasADi SX) from `inputs`."""
+    return finished(recorded(inputs, outputs))
+
+
+def recorded(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
+    """The instructions as CasADi has them, the larger and smaller of two still as choices, which have derivatives."""
     function = casadi.Function("code", list(inputs), casadi.cse(list(outputs)))
     current: dict[int, Operand] = {}
     body: list[Instruction] = []
@@ -52,10 +57,23 @@ def instructions(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
             name = ("t", len(body))
             body.append(Instruction(operation, name, tuple(current[i] for i in source)))
             current[target[0]] = name
-    return _without_unused(_selects(body), tuple(results))
+    return Code(tuple(_selects(body)), tuple(results))
 
 
-def _selects(body: list[Instruction]) -> list[Instruction]:
+def finished(code: Code) -> Code:
+    """Code as it is printed: choices found, what nobody needs left out."""
+    body = _selects(code.body)
+    by_result = {line.result: line for line in body}
+    chosen: list[Instruction] = []
+    for line in body:
+        if line.operation == casadi.OP_IF_ELSE_ZERO:
+            chosen += _extreme_of_zero(line, by_result)
+        else:
+            chosen.append(_extreme(line, by_result) if line.operation == SELECT else line)
+    return _without_unused(chosen, code.outputs)
+
+
+def _selects(body: Sequence[Instruction]) -> list[Instruction]:
     """Each sum of a mask and its opposite mask as one SELECT."""
     by_result = {line.result: line for line in body}
 
@@ -74,8 +92,34 @@ def _selects(body: list[Instruction]) -> list[Instruction]:
             line = Instruction(SELECT, line.result, (first.arguments[0], first.arguments[1], second.arguments[1]))
         elif first and second and negated(first.arguments[0]) == second.arguments[0]:
             line = Instruction(SELECT, line.result, (second.arguments[0], second.arguments[1], first.arguments[1]))
-        chosen.append(_extreme(line, by_result) if line.operation == SELECT else line)
+        chosen.append(line)
     return chosen
+
+
+def _extreme_of_zero(line: Instruction, by_result: Mapping[Operand, Instruction]) -> list[Instruction]:
+    """A mask that hides a number below zero, or above it, as the larger or smaller of the two; so too in a product,
+    which can then be fused with a sum.
+
+    NaN is hidden or shown as by the mask: where the comparison fails, the second of the two is chosen.
+    """
+    (condition, masked), zero = line.arguments, ("c", 0.0)
+    test, product = by_result.get(condition), by_result.get(masked)
+    opposite = test is not None and test.operation == casadi.OP_NOT
+    if test is not None and opposite:
+        test = by_result.get(test.arguments[0])
+    if test is None or test.operation not in (casadi.OP_LE, casadi.OP_LT) or zero not in test.arguments:
+        return [line]
+    number = test.arguments[test.arguments[0] == zero]
+    larger = (test.arguments[0] == zero) != opposite
+    pair = (zero, number) if opposite else (number, zero)
+    extreme = Instruction(MAXIMUM if larger else MINIMUM, line.result, pair)
+    if number == masked:
+        return [extreme]
+    if product is None or product.operation != casadi.OP_MUL or number not in product.arguments:
+        return [line]
+    other = product.arguments[product.arguments[0] == number]
+    extreme = Instruction(extreme.operation, ("t", "extreme of", line.result), pair)
+    return [extreme, Instruction(casadi.OP_MUL, line.result, (extreme.result, other))]
 
 
 def _extreme(line: Instruction, by_result: Mapping[Operand, Instruction]) -> Instruction:

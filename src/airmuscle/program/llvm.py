@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import struct
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,37 +10,40 @@ import casadi
 
 from ..errors import TraceError
 from .instructions import MAXIMUM, MINIMUM, SELECT, Code, Instruction, Operand
+from .numbers import DOUBLE, Number
 
 FLAGS = "nsz arcp contract reassoc afn"
 """Fast arithmetic that keeps NaN and infinity: a failed step must still show (never nnan, ninf)."""
 
 _BINARY = {casadi.OP_ADD: "fadd", casadi.OP_SUB: "fsub", casadi.OP_MUL: "fmul", casadi.OP_DIV: "fdiv"}
+_INTRINSICS = {casadi.OP_SQRT: "sqrt", casadi.OP_FABS: "fabs"}
 _CALLS = {
-    casadi.OP_SQRT: "llvm.sqrt.f64", casadi.OP_FABS: "llvm.fabs.f64", casadi.OP_EXP: "exp", casadi.OP_LOG: "log",
-    casadi.OP_SIN: "sin", casadi.OP_COS: "cos", casadi.OP_TAN: "tan", casadi.OP_ATAN: "atan", casadi.OP_SINH: "sinh",
-    casadi.OP_COSH: "cosh", casadi.OP_TANH: "tanh", casadi.OP_ASINH: "asinh", casadi.OP_ASIN: "asin",
-    casadi.OP_ACOS: "acos", casadi.OP_LOG1P: "log1p", casadi.OP_EXPM1: "expm1",
+    casadi.OP_EXP: "exp", casadi.OP_LOG: "log", casadi.OP_SIN: "sin", casadi.OP_COS: "cos", casadi.OP_TAN: "tan",
+    casadi.OP_ATAN: "atan", casadi.OP_SINH: "sinh", casadi.OP_COSH: "cosh", casadi.OP_TANH: "tanh",
+    casadi.OP_ASINH: "asinh", casadi.OP_ASIN: "asin", casadi.OP_ACOS: "acos", casadi.OP_LOG1P: "log1p",
+    casadi.OP_EXPM1: "expm1",
 }  # fmt: skip
 _COMPARISONS = {casadi.OP_LE: "ole", casadi.OP_LT: "olt", casadi.OP_EQ: "oeq", casadi.OP_NE: "une"}
-_DECLARATIONS = "".join(f"declare double @{name}(double)\n" for name in sorted(set(_CALLS.values()))) + (
+_OF_ONE = (*sorted(_CALLS.values()), *(DOUBLE.intrinsic(name) for name in _INTRINSICS.values()))
+_DECLARATIONS = "".join(f"declare double @{name}(double)\n" for name in _OF_ONE) + (
     "declare double @pow(double, double)\n"
 )
 
 
-def _constant(value: float) -> str:
-    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
-
-
-ONE, ZERO, LESS = _constant(1.0), _constant(0.0), _constant(-1.0)
-
-
 class Block:
-    """The lines of one LLVM function under construction; what is computed once is not computed again."""
+    """The lines of one LLVM function under construction; what is computed once is not computed again.
 
-    def __init__(self, scalars: Sequence[str] = ()) -> None:
+    Every value is a `number`. In lanes, functions that LLVM has not are called by the names in `needed`, which
+    `elementary` prints.
+    """
+
+    def __init__(self, scalars: Sequence[str] = (), number: Number = DOUBLE) -> None:
         self.lines: list[str] = []
         self.scalars = frozenset(scalars)
+        self.number = number
+        self.needed: dict[str, int] = {}
         self._known: dict[str, str] = {}
+        self._constants: dict[str, float] = {}
 
     def put(self, expression: str) -> str:
         """The name of the value of `expression`, which is computed unless it is known."""
@@ -50,49 +52,94 @@ class Block:
             self.lines.append(f"  {self._known[expression]} = {expression}")
         return self._known[expression]
 
+    def constant(self, value: float) -> str:
+        """A constant; in lanes the same in all of them, which LLVM sees through."""
+        number = self.number
+        found = number.literal(value)
+        if number.lanes > 1:
+            first = self.put(f"insertelement {number.text} poison, {number.element} {found}, i32 0")
+            places = f"<{number.lanes} x i32> zeroinitializer"
+            found = self.put(f"shufflevector {number.text} {first}, {number.text} poison, {places}")
+        self._constants[found] = value
+        return found
+
     def load(self, array: str, index: int) -> str:
         """The value of an array element, or of a scalar argument."""
         if array in self.scalars:
             return f"%{array}"
-        place = self.put(f"getelementptr inbounds double, ptr %{array}, i64 {index}")
-        return self.put(f"load double, ptr {place}, align 8")
+        place = self.put(f"getelementptr inbounds {self.number.text}, ptr %{array}, i64 {index}")
+        return self.put(f"load {self.number.text}, ptr {place}, align {self.number.alignment}")
 
     def store(self, array: str, index: int, value: str) -> None:
         """Write a value into an array element."""
-        place = self.put(f"getelementptr inbounds double, ptr %{array}, i64 {index}")
-        self.lines.append(f"  store double {value}, ptr {place}, align 8")
+        place = self.put(f"getelementptr inbounds {self.number.text}, ptr %{array}, i64 {index}")
+        self.lines.append(f"  store {self.number.text} {value}, ptr {place}, align {self.number.alignment}")
 
     def choose(self, comparison: str, a: str, b: str, when_true: str, when_false: str) -> str:
         """`when_true` where `a comparison b`, else `when_false`."""
-        test = self.put(f"fcmp {comparison} double {a}, {b}")
-        return self.put(f"select i1 {test}, double {when_true}, double {when_false}")
+        number = self.number
+        test = self.put(f"fcmp {comparison} {number.text} {a}, {b}")
+        return self.put(f"select {number.mask} {test}, {number.text} {when_true}, {number.text} {when_false}")
+
+    def call(self, function: str, x: Sequence[str]) -> str:
+        """A function of the C library, or what stands for it in lanes."""
+        number = self.number
+        arguments = ", ".join(f"{number.text} {a}" for a in x)
+        if number == DOUBLE:
+            return self.put(f"call {FLAGS} double @{function}({arguments})")
+        self.needed[function] = len(x)
+        return self.put(f"call {number.text} @{number.function(function)}({arguments})")
+
+    def intrinsic(self, name: str, x: Sequence[str], flags: str = FLAGS) -> str:
+        """A function that LLVM has."""
+        arguments = ", ".join(f"{self.number.text} {a}" for a in x)
+        return self.put(f"call {flags} {self.number.text} @{self.number.intrinsic(name)}({arguments})")
+
+    def power(self, base: str, exponent: str) -> str:
+        """base**exponent; in lanes whole and half constants are products, as LLVM makes them of one number."""
+        value = self._constants.get(exponent)
+        if self.number == DOUBLE or value is None or abs(value) > 16 or not (2 * value).is_integer():
+            return self.call("pow", (base, exponent))
+        found, square, left = self.constant(1.0), base, int(abs(value))
+        while left:
+            if left % 2:
+                found = self.put(f"fmul {FLAGS} {self.number.text} {found}, {square}")
+            square, left = self.put(f"fmul {FLAGS} {self.number.text} {square}, {square}"), left // 2
+        if abs(value) % 1:
+            found = self.put(f"fmul {FLAGS} {self.number.text} {found}, {self.intrinsic('sqrt', (base,))}")
+        return found if value >= 0 else self.put(f"fdiv {FLAGS} {self.number.text} {self.constant(1.0)}, {found}")
 
     def operate(self, operation: int, x: Sequence[str]) -> str:
         """The printed form of one CasADi operation on values; raises TraceError for one that is not known."""
+        kind, one, zero = self.number.text, self.constant(1.0), self.constant(0.0)
         if operation in _BINARY:
-            return self.put(f"{_BINARY[operation]} {FLAGS} double {x[0]}, {x[1]}")
+            return self.put(f"{_BINARY[operation]} {FLAGS} {kind} {x[0]}, {x[1]}")
+        if operation in _INTRINSICS:
+            return self.intrinsic(_INTRINSICS[operation], x[:1])
         if operation in _CALLS:
-            return self.put(f"call {FLAGS} double @{_CALLS[operation]}(double {x[0]})")
+            return self.call(_CALLS[operation], x[:1])
         if operation in _COMPARISONS:
-            return self.choose(_COMPARISONS[operation], x[0], x[1], ONE, ZERO)
+            return self.choose(_COMPARISONS[operation], x[0], x[1], one, zero)
         simple = {
-            casadi.OP_NEG: lambda: self.put(f"fneg {FLAGS} double {x[0]}"),
-            casadi.OP_SQ: lambda: self.put(f"fmul {FLAGS} double {x[0]}, {x[0]}"),
-            casadi.OP_TWICE: lambda: self.put(f"fadd {FLAGS} double {x[0]}, {x[0]}"),
-            casadi.OP_INV: lambda: self.put(f"fdiv {FLAGS} double {ONE}, {x[0]}"),
-            casadi.OP_POW: lambda: self.put(f"call {FLAGS} double @pow(double {x[0]}, double {x[1]})"),
-            casadi.OP_CONSTPOW: lambda: self.put(f"call {FLAGS} double @pow(double {x[0]}, double {x[1]})"),
-            casadi.OP_NOT: lambda: self.choose("oeq", x[0], ZERO, ONE, ZERO),
-            casadi.OP_AND: lambda: self.put(f"fmul double {x[0]}, {x[1]}"),
-            casadi.OP_OR: lambda: self.choose("une", self.put(f"fadd double {x[0]}, {x[1]}"), ZERO, ONE, ZERO),
+            casadi.OP_NEG: lambda: self.put(f"fneg {FLAGS} {kind} {x[0]}"),
+            casadi.OP_SQ: lambda: self.put(f"fmul {FLAGS} {kind} {x[0]}, {x[0]}"),
+            casadi.OP_TWICE: lambda: self.put(f"fadd {FLAGS} {kind} {x[0]}, {x[0]}"),
+            casadi.OP_INV: lambda: self.put(f"fdiv {FLAGS} {kind} {one}, {x[0]}"),
+            casadi.OP_POW: lambda: self.power(x[0], x[1]),
+            casadi.OP_CONSTPOW: lambda: self.power(x[0], x[1]),
+            casadi.OP_NOT: lambda: self.choose("oeq", x[0], zero, one, zero),
+            casadi.OP_AND: lambda: self.put(f"fmul {kind} {x[0]}, {x[1]}"),
+            casadi.OP_OR: lambda: self.choose("une", self.put(f"fadd {kind} {x[0]}, {x[1]}"), zero, one, zero),
             casadi.OP_FMIN: lambda: self.choose("olt", x[0], x[1], x[0], x[1]),
             casadi.OP_FMAX: lambda: self.choose("ogt", x[0], x[1], x[0], x[1]),
             # strict: of two equal numbers either is the larger, and this is what the processor's instruction does
             MINIMUM: lambda: self.choose("olt", x[0], x[1], x[0], x[1]),
             MAXIMUM: lambda: self.choose("ogt", x[0], x[1], x[0], x[1]),
-            casadi.OP_IF_ELSE_ZERO: lambda: self.choose("une", x[0], ZERO, x[1], ZERO),
-            casadi.OP_SIGN: lambda: self.choose("ogt", x[0], ZERO, ONE, self.choose("olt", x[0], ZERO, LESS, ZERO)),
-            SELECT: lambda: self.choose("une", x[0], ZERO, x[1], x[2]),
+            casadi.OP_IF_ELSE_ZERO: lambda: self.choose("une", x[0], zero, x[1], zero),
+            casadi.OP_SIGN: lambda: self.choose(
+                "ogt", x[0], zero, one, self.choose("olt", x[0], zero, self.constant(-1.0), zero)
+            ),
+            SELECT: lambda: self.choose("une", x[0], zero, x[1], x[2]),
             casadi.OP_ASSIGN: lambda: x[0],
         }  # fmt: skip
         if operation not in simple:
@@ -100,36 +147,50 @@ class Block:
         return simple[operation]()
 
 
-def write(
-    block: Block, code: Code, inputs: Sequence[str], stores: Mapping[int, str], held: Mapping[Operand, int]
-) -> None:
-    """Append code to a block: `inputs` and `stores` name the arrays; `held` says which operands stand in `c`."""
-    values = run(block, code.body, inputs, held)
-    for output, index, operand in code.outputs:
-        block.store(stores[output], index, _value(block, operand, inputs, held, values))
+def computed(
+    block: Block, code: Code, inputs: Sequence[str], held: Mapping[Operand, int], given: Mapping[Operand, str]
+) -> dict[tuple[int, int], str]:
+    """Append code to a block: `inputs` name the arrays, `held` says what stands in `c`, `given` what is known.
+
+    Returns the names of the results by output and index.
+    """
+    values = run(block, code.body, inputs, held, given)
+    return {(o, i): value_of(block, operand, inputs, held, values) for o, i, operand in code.outputs}
 
 
 def run(
-    block: Block, body: Sequence[Instruction], inputs: Sequence[str], held: Mapping[Operand, int]
+    block: Block,
+    body: Sequence[Instruction],
+    inputs: Sequence[str],
+    held: Mapping[Operand, int],
+    given: Mapping[Operand, str] | None = None,
 ) -> dict[Operand, str]:
-    """Append instructions to a block; the names of their results."""
-    values: dict[Operand, str] = {}
+    """Append instructions to a block; the names of their results, and of the operands `given` beforehand."""
+    values = dict(given or {})
     for line in body:
-        arguments = [_value(block, a, inputs, held, values) for a in line.arguments]
-        values[line.result] = block.operate(line.operation, arguments)
+        append(block, line, inputs, held, values)
     return values
 
 
-def _value(
+def append(
+    block: Block, line: Instruction, inputs: Sequence[str], held: Mapping[Operand, int], values: dict[Operand, str]
+) -> None:
+    """Append one instruction, and add the name of its result to `values`."""
+    arguments = [value_of(block, a, inputs, held, values) for a in line.arguments]
+    values[line.result] = block.operate(line.operation, arguments)
+
+
+def value_of(
     block: Block, operand: Operand, inputs: Sequence[str], held: Mapping[Operand, int], values: Mapping[Operand, str]
 ) -> str:
+    """The name of an operand's value, which is loaded if it stands in an array."""
+    if operand in values:
+        return values[operand]
     if operand in held:
         return block.load("c", held[operand])
     if operand[0] == "c":
-        return _constant(float(operand[1]))
-    if operand[0] == "in":
-        return block.load(inputs[operand[1]], operand[2])
-    return values[operand]
+        return block.constant(float(operand[1]))
+    return block.load(inputs[operand[1]], operand[2])
 
 
 def hand_over(
@@ -142,7 +203,7 @@ def hand_over(
     values = run(block, once, inputs, {})
     held = {}
     for operand in handed:
-        value = _value(block, operand, inputs, {}, values)
+        value = value_of(block, operand, inputs, {}, values)
         if value not in places:
             places[value] = len(places)
             block.store("c", places[value], value)
@@ -154,6 +215,13 @@ def function(name: str, arguments: Sequence[str], block: Block, attributes: str 
     """The LLVM text of a function that returns nothing; arrays are pointers that do not overlap."""
     signature = ", ".join(f"double %{a}" if a in block.scalars else f"ptr noalias nocapture %{a}" for a in arguments)
     return f"define void @{name}({signature}) {attributes} {{\n" + "\n".join(block.lines) + "\n  ret void\n}\n"
+
+
+def function_of_values(name: str, arguments: Sequence[str], block: Block, number: Number, value: str) -> str:
+    """The LLVM text of a function within a module, which takes and returns values."""
+    signature = ", ".join(f"{number.text} {a}" for a in arguments)
+    head = f"define internal {number.text} @{name}({signature}) nounwind {{\n"
+    return head + "\n".join(block.lines) + f"\n  ret {number.text} {value}\n}}\n"
 
 
 @functools.cache

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
+import functools
+import threading
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,9 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import declare
-from . import llvm
-from .printed import Sizes, Traced, explicit_module, implicit_module, traced
-from .system import System
+from . import llvm, printed, tangent, tangent_step
+from .numbers import Number
+from .printed import Sizes, Traced
+from .printed_lanes import lanes_module
+from .system import Differentiated, System
 
 _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "drift", "outputs")
 
@@ -22,11 +26,24 @@ class Program:
     """The compiled functions of one structure; it keeps the machine code alive and is never pickled."""
 
     def __init__(self, system: System) -> None:
-        self.traced: Traced = traced(system)
-        text, self.sizes = implicit_module(self.traced)
+        self._system = system
+        self._form: Traced | tangent.Moved
+        if isinstance(system, Differentiated):
+            self._form = tangent.moved(system)
+            text, self.sizes = tangent.implicit_module(self._form)
+        else:
+            self._form = printed.traced(system)
+            text, self.sizes = printed.implicit_module(self._form)
+        self.output_names = self._form.output_names
         self._engine = llvm.compiled(text)
         self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
         self._steps: dict[Any, tuple[Any, int]] = {}
+        self._compiling = threading.Lock()  # of two threads that ask for a step, one makes it: an engine must not go
+
+    @functools.cached_property
+    def traced(self) -> Traced:
+        """The system's own rates and outputs as expressions, also of a differentiated one."""
+        return self._form if isinstance(self._form, Traced) else printed.traced(self._system)
 
     def held(self, parameters: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """What the functions need of a set of parameters, computed once."""
@@ -36,18 +53,37 @@ class Program:
         self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...], parameters: npt.NDArray[np.float64]
     ) -> tuple[int, npt.NDArray[np.float64]]:
         """The address of an explicit step of this tableau, and what it needs of the parameters."""
-        if (a, b) not in self._steps:
-            text, held = explicit_module(self.traced, a, b)
-            self._steps[a, b] = llvm.compiled(text), held
+        with self._compiling:
+            if (a, b) not in self._steps:
+                text, held = self._printed_step(a, b)
+                self._steps[a, b] = llvm.compiled(text), held
         engine, held = self._steps[a, b]
         return int(engine.get_function_address("step")), _handed(engine, parameters, held)
 
+    def _printed_step(self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...]) -> tuple[str, int]:
+        if isinstance(self._form, tangent.Moved):
+            return tangent_step.explicit_module(self._form, a, b)
+        return printed.explicit_module(self._form, a, b)
+
+    def lanes(
+        self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...], number: Number
+    ) -> tuple[tuple[int, int, int], int]:
+        """The addresses of `prepare`, the explicit step and `outputs` in lanes, and how long `c` must be."""
+        with self._compiling:
+            if (a, b, number) not in self._steps:
+                text, held = lanes_module(self.traced, a, b, number)
+                self._steps[a, b, number] = llvm.compiled(text), held
+        engine, held = self._steps[a, b, number]
+        prepare, step, outputs = (int(engine.get_function_address(n)) for n in ("prepare", "step", "outputs"))
+        return (prepare, step, outputs), held
+
+
+_PREPARE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+
 
 def _handed(engine: Any, parameters: npt.NDArray[np.float64], size: int) -> npt.NDArray[np.float64]:
-    pointer = ctypes.c_void_p
     handed = np.zeros(max(size, 1))
-    prepare = ctypes.CFUNCTYPE(None, pointer, pointer)(engine.get_function_address("prepare"))
-    prepare(parameters.ctypes.data, handed.ctypes.data)
+    _PREPARE(engine.get_function_address("prepare"))(parameters.ctypes.data, handed.ctypes.data)
     return handed
 
 
@@ -62,6 +98,8 @@ class Prepared:
     program: Program
     parameters: npt.NDArray[np.float64]
     held: npt.NDArray[np.float64]
+    known_nominal: npt.NDArray[np.float64] | None = None
+    """The nominal sizes of the states, where they are not to be asked of the system."""
 
     @property
     def sizes(self) -> Sizes:
@@ -76,11 +114,15 @@ class Prepared:
     @property
     def output_names(self) -> tuple[str, ...]:
         """The outputs, in the order of their vector."""
-        return self.program.traced.output_names
+        return self.program.output_names
 
     def nominal(self) -> npt.NDArray[np.float64]:
         """The size of each state below which its relative error no longer matters."""
-        return np.array([s.nominal for s in self.system.states])
+        return np.array([s.nominal for s in self.system.states]) if self.known_nominal is None else self.known_nominal
+
+    def at(self, parameters: npt.NDArray[np.float64], nominal: npt.NDArray[np.float64]) -> Prepared:
+        """The same system with other parameters, its nominal sizes given: for those who change them often."""
+        return Prepared(self.system, self.program, parameters, self.program.held(parameters), nominal)
 
     def call(self, name: str, *arrays: npt.NDArray[np.float64] | float) -> None:
         """Call one printed function by hand; arrays are passed by address, floats by value."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import casadi
@@ -11,7 +11,8 @@ import casadi
 from .. import trace
 from ..errors import TraceError
 from . import llvm, lu
-from .instructions import Code, hoisted, instructions
+from .instructions import Code, Operand, hoisted, instructions
+from .numbers import DOUBLE, Number
 from .system import System
 
 PARAMETERS = "p"
@@ -63,11 +64,16 @@ class Sizes:
 
 
 class Printer:
-    """Collects functions; what each needs of the parameters alone is gathered into one `prepare(p, c)`."""
+    """Collects functions; what each needs of the parameters alone is gathered into one `prepare(p, c)`.
 
-    def __init__(self) -> None:
+    Every element of every array is a `number`; in lanes one of each plant.
+    """
+
+    def __init__(self, number: Number = DOUBLE) -> None:
         self.text: list[str] = []
-        self._prepare = llvm.Block()
+        self.needed: dict[str, int] = {}
+        self._number = number
+        self._prepare = llvm.Block((), number)
         self._places: dict[str, int] = {}
 
     @property
@@ -77,17 +83,37 @@ class Printer:
 
     def add(self, name: str, inputs: dict[str, Any], outputs: dict[str, Any], scalars: Sequence[str] = ()) -> None:
         """Print `name(inputs..., outputs...)`, with `c` in place of the parameters."""
-        code = instructions(list(inputs.values()), list(outputs.values()))
-        names, targets = list(inputs), dict(enumerate(outputs))
-        block = llvm.Block(scalars)
-        if PARAMETERS in inputs:
-            code, once, handed = hoisted(code, names.index(PARAMETERS))
-            held = llvm.hand_over(self._prepare, once, handed, names, self._places)
-        else:
-            code, held = Code(code.body, code.outputs), {}
-        llvm.write(block, code, names, targets, held)
-        arguments = ["c" if n == PARAMETERS else n for n in names] + list(outputs)
-        self.text.append(llvm.function(name, arguments, block))
+        code, block = instructions(list(inputs.values()), list(outputs.values())), llvm.Block(scalars, self._number)
+        targets = list(outputs)
+        for (output, index), value in self.compute(block, code, list(inputs)).items():
+            block.store(targets[output], index, value)
+        self.end(name, [*inputs, *outputs], block)
+
+    def compute(
+        self, block: llvm.Block, code: Code, names: Sequence[str], given: Mapping[Operand, str] | None = None
+    ) -> dict[tuple[int, int], str]:
+        """Append code to a function: `names` are its arguments, `given` inputs whose values are there already.
+
+        Returns the names of the results by output and index; nothing is stored.
+        """
+        code, held = self.set_apart(code, names)
+        return llvm.computed(block, code, names, held, given or {})
+
+    def end(self, name: str, arguments: Sequence[str], block: llvm.Block) -> None:
+        """Close a function; the argument that holds parameters becomes `c`."""
+        self.text.append(llvm.function(name, ["c" if a == PARAMETERS else a for a in arguments], block))
+        self.needed |= {**block.needed, **self._prepare.needed}
+
+    def without_parameters(self, inputs: dict[str, Any], outputs: dict[str, Any]) -> tuple[Code, dict[Operand, int]]:
+        """The code of outputs without what depends on parameters alone, and where in `c` that stands."""
+        return self.set_apart(instructions(list(inputs.values()), list(outputs.values())), list(inputs))
+
+    def set_apart(self, code: Code, names: Sequence[str]) -> tuple[Code, dict[Operand, int]]:
+        """Code less what depends on parameters alone, which goes to `prepare`, and where in `c` that stands."""
+        if PARAMETERS not in names:
+            return code, {}
+        code, once, handed = hoisted(code, names.index(PARAMETERS))
+        return code, llvm.hand_over(self._prepare, once, handed, names, self._places)
 
     def module(self) -> str:
         """All functions and `prepare`, as one LLVM text.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from ..ops import Value
 from ..variables import StateVariable
@@ -28,3 +28,27 @@ class System(Protocol):
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> Mapping[str, Value]:
         """Further quantities of interest at a state."""
+
+
+@runtime_checkable
+class Differentiated(System, Protocol):
+    """A system that carries another's states, then their derivatives along columns, state by state.
+
+    It is a System like any other; its program is printed from the inner one, which costs less than its own rates.
+    """
+
+    @property
+    def inner(self) -> System:
+        """The system whose states come first."""
+
+    @property
+    def places(self) -> tuple[tuple[int, ...], ...]:
+        """For every column the places among the inner leaves that move together."""
+
+    @property
+    def observed_names(self) -> tuple[str, ...]:
+        """Inner states and outputs that are given as outputs."""
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Values of what is observed, the derivatives of each, their slopes in time."""

@@ -28,6 +28,7 @@ SPELLINGS: dict[str, tuple[str, ...]] = {
     ),
     "m": ("m", "mm", "cm"), "1": ("1", "%", "-"), "N": ("N", "kN"), "s": ("s", "ms", "min"), "m/s": ("m/s", "mm/s"),
     "m/s^2": ("m/s^2", "m/s2"), "m3": ("m3", "cm3"), "kg": ("kg", "g"), "kg/s": ("kg/s", "g/s"), "K": ("K", "°C"),
+    "rad": ("rad", "deg"), "rad/s": ("rad/s", "deg/s"), "rad/s^2": ("rad/s^2", "deg/s^2"),
 }  # fmt: skip
 """How units of each kind are usually written: what messages suggest, and what counts in `pressure_kPa`."""
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..reference import cite
+from .band_plot import band_plot
 from .chapter import Chapter, Plot, Table
-from .chart import SAME_PRESSURE, Array, chart, isobars
+from .chart import chart, isobars
+from .levels import levels_of
+from .shape_chapter import breaks_table
 
 if TYPE_CHECKING:
     from ..identify.result import Fit
@@ -21,12 +22,13 @@ MOST_CURVES = 8
 def fit_chapter(fit: Fit, entry: Entry, notes: Sequence[str] = ()) -> Chapter:
     """A fit's figures of merit, parameters, isobars with the measured points, and errors, row by row."""
     said = "\n\n".join((*fit.notes, *notes))
+    errors = Plot("errors", "Model against measurement, and the errors.", fit.plot())
     return Chapter(
         paper="fit",
         title=entry.title,
         summary=f"{entry.note}\n\n{said}",
-        tables=(_figures(fit), _parameters(fit), _correlations(fit), _rows(fit)),
-        plots=(_isobars(fit, entry), Plot("errors", "Model against measurement, and the errors.", fit.plot())),
+        tables=(_figures(fit), _parameters(fit), *_shape(fit), _correlations(fit), _rows(fit)),
+        plots=tuple(plot for plot in (_isobars(fit, entry), errors, band_plot(fit)) if plot is not None),
         references=tuple(cite(entry)),
     )
 
@@ -75,15 +77,13 @@ def _rows(fit: Fit) -> Table:
 
 def _isobars(fit: Fit, entry: Entry) -> Plot:
     """The isobars of the fitted law at pressures that were measured, with their points."""
-    levels = pressure_levels(fit.recording["pressure"])
-    if levels.size > MOST_CURVES:
-        levels = levels[np.unique(np.linspace(0, levels.size - 1, MOST_CURVES).astype(int))]
-    curves = isobars(fit.model, entry.box, pressures=levels)
+    curves = isobars(fit.model, entry.box, pressures=levels_of(fit.recording["pressure"], MOST_CURVES))
     return chart(fit.model, entry.title, curves, entry.box, measured=fit.recording)
 
 
-def pressure_levels(pressures: Array) -> Array:
-    """The pressures that a bench held: the medians of groups that lie closer together than a bench holds them."""
-    ordered = np.sort(pressures)
-    ends = np.flatnonzero(np.diff(ordered) > SAME_PRESSURE * ordered[-1]) + 1
-    return np.array([np.median(group) for group in np.split(ordered, ends)])
+def _shape(fit: Fit) -> list[Table]:
+    """Where the fitted law breaks what every muscle keeps, if it does anywhere."""
+    from ..identify.surface.shape import broken_by
+
+    found = broken_by(fit)
+    return [breaks_table(found, "shape", "Where the law behaves as no muscle does")] if found else []

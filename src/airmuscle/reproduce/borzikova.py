@@ -11,8 +11,8 @@ import numpy as np
 
 from ..characteristic.base import ContractionLaw
 from ..characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
-from ..identify.exponential_surface import linearised, nonlinear
-from ..identify.surface_basis import Chebyshev, LoadBox, conditioning
+from ..identify.surface.basis import Chebyshev, LoadBox, conditioning
+from ..identify.surface.exponential import linearised, nonlinear
 from ..recording import Recording
 from ..report.chapter import AtLeast, Chapter, Claim, Equal
 from .borzikova_figures import plots

@@ -11,7 +11,7 @@ from .. import trace
 from ..characteristic.base import ContractionLaw
 from ..characteristic.borzikova import PlaneCurves
 from ..figures import BLACK, BLUE, DASHES, LINES, MARKERS, ORANGE, RED, legend_outside, new_figure
-from ..identify.surface_basis import LoadBox
+from ..identify.surface.basis import LoadBox
 from ..report.chapter import Plot
 from ..units import bar
 from .borzikova_surfaces import EXPONENTIAL, MISPRINT_MENDED, MONOTONE, REPAIRED

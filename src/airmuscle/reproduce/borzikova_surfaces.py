@@ -11,8 +11,8 @@ from ..characteristic.base import ContractionLaw
 from ..characteristic.borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential, PlaneCurves
 from ..errors import AirmuscleWarning
 from ..identify.correlation_index import CorrelationIndex, correlation_index
-from ..identify.monotone_surface import monotone
-from ..identify.surface_basis import LoadBox
+from ..identify.surface.basis import LoadBox
+from ..identify.surface.monotone import monotone
 from ..library.catalogue import load
 from ..recording import Recording
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..characteristic.base import ContractionLaw
 from ..characteristic.borzikova import PlaneCurves
-from ..identify.exponential_surface import SurfaceFit, linearised, nonlinear
-from ..identify.monotone_surface import monotonicity_breaks
-from ..identify.surface_basis import Basis, Chebyshev, LoadBox, Monomials, conditioning
+from ..identify.surface.basis import Basis, Chebyshev, LoadBox, Monomials, conditioning
+from ..identify.surface.exponential import SurfaceFit, linearised, nonlinear
+from ..identify.surface.monotone import monotonicity_breaks
 from ..recording import Recording
 from ..report.chapter import Table
 from ..units import bar, percent
@@ -228,9 +228,9 @@ def break_table(laws: Mapping[str, ContractionLaw]) -> Table:
         "Where a surface breaks monotonicity inside its box",
         {
             "surface": [name for name, _ in found],
-            "rule broken": [b.rule.value for _, b in found],
+            "rule broken": [b.rule.words for _, b in found],
             "pressure [bar]": [f"{b.pressure[0] / bar:.2f} to {b.pressure[1] / bar:.2f}" for _, b in found],
-            "force [N]": [f"{b.force[0]:.0f} to {b.force[1]:.0f}" for _, b in found],
+            "force [N]": [f"{b.across[0]:.0f} to {b.across[1]:.0f}" for _, b in found],
             "part of the box [%]": [f"{100 * b.share:.1f}" for _, b in found],
             "most at [bar]": [f"{b.worst[0] / bar:.2f}" for _, b in found],
             "most at [N]": [f"{b.worst[1]:.0f}" for _, b in found],

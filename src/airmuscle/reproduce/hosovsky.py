@@ -12,10 +12,11 @@ from ..check import maxwell_defect
 from ..figures import LINES, legend_outside, new_figure
 from ..geometry.base import Geometry
 from ..identify import Fit
-from ..identify.solve import measured_rank
+from ..identify.one_sided import measured_rank
 from ..library import catalogue
 from ..reference import cite
 from ..report.chapter import Chapter, Claim, Equal, Plot, Table
+from . import hosovsky_causes as causing
 from . import hosovsky_fill as filling
 from . import hosovsky_release as releasing
 from .hosovsky_plant import MAPS, MATRIX, MATRIX_CATALOGUE, PAPER, Numbers, muscle, surface, surface_fit
@@ -72,20 +73,24 @@ def coefficients() -> Table:
     return Table("hosovsky_coefficients", "The 21 coefficients in plain units", columns, note)
 
 
-def chapter(numbers: Numbers | None = None) -> Chapter:
-    """The chapter of the report; `numbers` are those that the paper does not print."""
-    numbers = numbers or Numbers()
+def chapter(numbers: Numbers | None = None, suspected: causing.Suspected | None = None) -> Chapter:
+    """The chapter of the report; `numbers` and those of the suspected causes are what the paper does not print."""
+    numbers, suspected = numbers or Numbers(), suspected or causing.Suspected()
     fill = filling.run_fill(numbers)
-    table, effect_plot = filling.effects(numbers)
+    effects = causing.effects(numbers, suspected)
     low, high = releasing.pair(numbers)
     ranges = releasing.over_ranges(numbers)
     return Chapter(
         PAPER,
         "Hosovsky et al.: muscle dynamics after Hill",
         SUMMARY,
-        claims=(*surface_claims(surface_fit()), *filling.claims(fill), *releasing.claims(low, high, ranges)),
+        claims=(
+            *surface_claims(surface_fit()),
+            *filling.claims(fill, causing.in_words(effects)),
+            *releasing.claims(low, high, ranges),
+        ),
         tables=(
-            table,
+            causing.table(effects),
             ranges,
             coefficients(),
             maxwell_table(numbers),
@@ -96,11 +101,11 @@ def chapter(numbers: Numbers | None = None) -> Chapter:
             surface_figure(),
             filling.valve_figure(MATRIX, fill.plant.ambient.temperature),
             filling.figure_3(fill),
-            effect_plot,
+            causing.figure(effects),
             releasing.figure_4(low, high),
         ),
         references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(catalogue.load(MAPS[0]))),
-        chosen=numbers.rows(),
+        chosen=(*numbers.rows(), *suspected.rows()),
     )
 
 

@@ -1,28 +1,20 @@
-"""Fill and discharge, Fig. 3 of the third paper, and what each suspected cause changes in it."""
+"""Fill and discharge, Fig. 3 of the third paper."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
 
 import numpy as np
 
 from ..circuit import Valve
-from ..command import Schedule
-from ..figures import BLACK, DASHES, LINES, legend_below, new_figure
-from ..gas import Polytropic
+from ..figures import BLACK, LINES, new_figure
 from ..method import DormandPrince8, Method, Rodas4
-from ..muscle import CubicSpring, LinearSpring
 from ..plant import Plant
 from ..recording import Recording
-from ..report.chapter import AtMost, Claim, Equal, Plot, Table
+from ..report.chapter import AtMost, Claim, Equal, Plot
 from ..simulate import simulate
 from .hosovsky_plant import MATRIX, PAPER, Numbers, hanging, plant
-
-SCHEDULE = Schedule({"fill": ((5.0, 1.0), (15.0, 0.0)), "discharge": ((19.0, 1.0), (25.0, 0.0))})
-"""Fill valve open at 5 s and shut at 15 s, discharge valve open at 19 s and shut at 25 s, as printed."""
-DURATION = 25.0
-FILLING, DISCHARGING = (5.0, 15.0), (19.0, 25.0)
+from .hosovsky_schedule import DISCHARGING, DURATION, FILLING, SCHEDULE
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -42,50 +34,6 @@ def run_fill(numbers: Numbers, valve: Valve = MATRIX) -> Fill:
 
 def _run(system: Plant, method: Method) -> Recording:
     return simulate(system, SCHEDULE, duration=DURATION, method=method)
-
-
-def causes(numbers: Numbers) -> dict[str, Plant]:
-    """The plant with each suspected cause that is built here exchanged, one at a time."""
-    stiffness = numbers.stiffness.value
-    exchanged: dict[str, dict[str, Any]] = {
-        "as printed: isothermal, constant spring": {},
-        "polytropic gas, n = 1.2": {"gas": Polytropic(1.2)},
-        "polytropic gas, n = 1.4": {"gas": Polytropic(1.4)},
-        "no parallel spring": {"spring": LinearSpring(0.0)},
-        "spring three times as stiff": {"spring": LinearSpring(3 * stiffness)},
-        "spring that hardens with contraction": {"spring": CubicSpring(stiffness, 100.0)},
-    }
-    return {name: plant(numbers, hanging(numbers), **parts) for name, parts in exchanged.items()}
-
-
-def effects(numbers: Numbers) -> tuple[Table, Plot]:
-    """What each cause changes against the plant as printed: greatest difference while filling and discharging."""
-    runs = {name: _run(system, Rodas4(1e-8)) for name, system in causes(numbers).items()}
-    base = next(iter(runs.values()))
-    rows: dict[str, list[Any]] = {"exchanged": list(runs)[1:]}
-    for phase, (begin, end) in (("filling", FILLING), ("discharging", DISCHARGING)):
-        here = (base["time"] >= begin) & (base["time"] <= end)
-        for column, unit, scale in (("pressure", "kPa", 1e3), ("position", "mm", 1e-3)):
-            header = f"greatest change of {column} while {phase} [{unit}]"
-            rows[header] = [
-                float(np.abs(run[column] - base[column])[here].max()) / scale for run in list(runs.values())[1:]
-            ]
-    table = Table(
-        "hosovsky_effects",
-        "What each suspected cause changes",
-        rows,
-        "a component exchanged in the plant, one at a time",
-    )
-    figure, axes = new_figure(2, 1, height=5.0, sharex=True)
-    for i, (name, run) in enumerate(list(runs.items())[1:]):
-        style = {"color": LINES[i], "linestyle": DASHES[i], "label": name}
-        axes[0].plot(run["time"], (run["pressure"] - base["pressure"]) / 1e3, **style)
-        axes[1].plot(run["time"], (run["position"] - base["position"]) * 1e3, **style)
-    axes[0].set_ylabel("change of pressure [kPa]")
-    axes[1].set(ylabel="change of position [mm]", xlabel="time [s]")
-    legend_below(figure, axes[0])
-    caption = "Fill and discharge: what each suspected cause changes against the isothermal plant with constant spring."
-    return table, Plot("hosovsky_effects", caption, figure)
 
 
 def figure_3(fill: Fill) -> Plot:
@@ -132,8 +80,8 @@ def choke_ends_at(plant: Plant) -> tuple[float, float]:
     return float(pressure[subsonic]), float(np.diff(pressure).max())
 
 
-def claims(fill: Fill) -> tuple[Claim, ...]:
-    """What the paper says of valve, solver and fill, held against the run."""
+def claims(fill: Fill, explained: str = "") -> tuple[Claim, ...]:
+    """What the paper says of valve, solver and fill, held against the run; `explained` says what makes it deviate."""
     valve = fill.plant.circuits[0].fill  # type: ignore[attr-defined]
     per_minute = valve.conductance * 1e5 * 60e3
     steps = int(fill.printed_method.notes[0].split(": ")[1].split()[0])
@@ -156,5 +104,5 @@ def claims(fill: Fill) -> tuple[Claim, ...]:
         Claim(PAPER, "ode8 at 1e-4 s is fine enough: distance from Rodas4 in pressure", AtMost(1.0, chosen=True),
               apart_p, "Pa", "the bound is chosen here"),
         Claim(PAPER, "model and muscle agree well in discharge, larger deviations while filling", None, None, "kPa",
-              "the measured line of Fig. 3 has no numbers; what the suspected causes change stands in a table"),
+              f"the measured line of Fig. 3 has no numbers. {explained}".strip()),
     )  # fmt: skip

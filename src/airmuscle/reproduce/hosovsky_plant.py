@@ -6,13 +6,13 @@ import dataclasses
 import functools
 
 from ..characteristic.contractile_surface import ContractileSurface
-from ..circuit import FillDischarge, Supply, Valve
+from ..circuit import Conduit, FillDischarge, Line, Orifice, Supply, Valve
 from ..gas import Ambient, Gas, Isothermal
 from ..geometry.braid import Braid
 from ..identify import Fit, fit
 from ..library import catalogue
 from ..mechanism import HangingMass, Held, Mechanism
-from ..muscle import LinearDamper, LinearSpring, Muscle, Spring
+from ..muscle import LinearDamper, LinearSpring, Muscle, RigidWall, Spring, Wall
 from ..plant import Plant
 from ..reference import CHOSEN, Reference
 
@@ -104,12 +104,16 @@ def plant(
     *,
     gas: Gas | None = None,
     spring: Spring | None = None,
-    valve: Valve = MATRIX,
+    wall: Wall | None = None,
+    valve: Orifice = MATRIX,
+    tube: Conduit | None = None,
     data: str = MAPS[0],
 ) -> Plant:
-    """Muscle, two valves with closed centre, load and gas; isothermal as in the paper unless given."""
-    circuit = FillDischarge(Supply(FULL_PRESSURE), valve, valve)
-    return Plant(muscle(numbers, data, spring), circuit, mechanism, gas or Isothermal(), Ambient())
+    """Muscle, two valves with closed centre, load and gas; isothermal, no line, a rigid wall as in the paper."""
+    valves = FillDischarge(Supply(FULL_PRESSURE), valve, valve)
+    fed = dataclasses.replace(muscle(numbers, data, spring), wall=wall or RigidWall())
+    circuit = valves if tube is None else Line(valves, tube)
+    return Plant(fed, circuit, mechanism, gas or Isothermal(), Ambient())
 
 
 def hanging(numbers: Numbers) -> HangingMass:

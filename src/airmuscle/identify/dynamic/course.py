@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ... import declare
-from ...errors import IdentificationError, ParameterError, suggestion
-from ...method import Method
+from ...command import Segments
+from ...errors import IdentificationError, ParameterError
+from ...method import INTERRUPTED, Method
 from ...program import System
-from ...sensitive import Sensitive, sensitivity
+from ...sensitive import Sensitive
 from .experiment import Experiment, StartTime, StartValue, Unknown
 from .start import conditions, solved
 
@@ -33,48 +33,46 @@ class Course:
         self.unknowns = unknowns
         self.mine = [k for k, u in enumerate(unknowns) if u.record in (None, number)]
         self.columns = [k for k in self.mine if not isinstance(unknowns[k].what, StartTime)]
-        groups = tuple(unknowns[k].paths for k in self.columns)
-        system = Sensitive(self.plant, groups, tuple(unknowns[k].scale for k in self.columns))
-        self.ready = prepared(system)
         self.names = tuple(observed)
         self.times = _rising(experiment)
         self.measured = np.column_stack([experiment.recording[name] for name in self.names])
-        self._place = {leaf.path: i for i, leaf in enumerate(declare.leaves(self.plant))}
+        self.kept = np.isfinite(self.measured)
+        self.whole = bool(self.kept.all())
+        groups = tuple(unknowns[k].paths for k in self.columns) or ((),)
+        scales = tuple(unknowns[k].scale for k in self.columns) or (1.0,)
+        self.ready = prepared(_sensitive(self.plant, groups, scales, self.names, experiment))
+        self._nominal = self.ready.nominal()
+        place = {leaf.path: i for i, leaf in enumerate(declare.leaves(self.plant))}
+        self._moved = [[place[path] for path in unknowns[k].paths] for k in self.mine]
         self._leaves = declare.flatten(self.plant)
         self._conditions = conditions(self.plant, experiment.start)
-        self._known = list(experiment.start.known)
-        self._sizes = [s.nominal for s in self.plant.states]
+        self._known = np.array(list(experiment.start.known.values()), dtype=float)
+        self._own_values = [(j, i) for j, k in enumerate(self.columns) for i in _place_known(unknowns[k], experiment)]
+        self._shares = np.zeros((self._leaves.size, len(self.columns)))
+        for j, k in enumerate(self.columns):
+            self._shares[[place[path] for path in unknowns[k].paths], j] = 1.0
+        self._sizes = np.array([s.nominal for s in self.plant.states])
         self._guess = np.array([experiment.start.guess[s.name] for s in self.plant.states])
-        outputs = list(self.ready.output_names)
-        self._value = [_index(outputs, name, experiment) for name in self.names]
-        self._slope = [outputs.index(f"{name}.rate") for name in self.names]
-        self._by = [[outputs.index(sensitivity(name, k)) for name in self.names] for k in range(len(groups))]
+        self._last_clock: _Clock | None = None
 
     def leaves(self, values: Array) -> Array:
         """The plant's leaves with the unknowns at `values`."""
         found = self._leaves.copy()
-        for k in self.mine:
-            for path in self.unknowns[k].paths:
-                found[self._place[path]] = values[k]
+        for k, places in zip(self.mine, self._moved, strict=True):
+            found[places] = values[k]
         return found
 
     def start(self, values: Array) -> tuple[Array, Array]:
         """The state at the start (n,) and its derivatives by every column (n, K)."""
-        known = np.array([self.experiment.start.known[name] for name in self._known])
-        for k in self.columns:
-            what = self.unknowns[k].what
-            if isinstance(what, StartValue):
-                known[self._known.index(what.name)] = values[k]
+        known = self._known.copy()
+        for j, i in self._own_values:
+            known[i] = values[self.columns[j]]
         state, by_known, by_leaf = solved(
             self._conditions, self.experiment.start, self.leaves(values), known, self._guess, self._sizes
         )
-        slopes = np.zeros((state.size, len(self.columns)))
-        for j, k in enumerate(self.columns):
-            what = self.unknowns[k].what
-            if isinstance(what, StartValue):
-                slopes[:, j] = by_known[:, self._known.index(what.name)]
-            else:
-                slopes[:, j] = sum(by_leaf[:, self._place[path]] for path in self.unknowns[k].paths)
+        slopes = by_leaf @ self._shares
+        for j, i in self._own_values:
+            slopes[:, j] = by_known[:, i]
         return state, slopes
 
     def start_time(self, values: Array) -> float:
@@ -88,34 +86,66 @@ class Course:
         Raises IdentificationError where the run fails or its start does not exist.
         """
         outputs, before = self._outputs(values)
+        count, columns = len(self.names), self.ready.sizes.outputs // len(self.names) - 2
+        by_column = outputs[:, count:-count].reshape(-1, count, columns)
+        if len(self.columns) == len(self.unknowns):
+            return outputs[:, :count], by_column
         slopes = np.zeros((*self.measured.shape, len(self.unknowns)))
-        for j, k in enumerate(self.columns):
-            slopes[:, :, k] = outputs[:, self._by[j]]
+        slopes[:, :, self.columns] = by_column[:, :, : len(self.columns)]
         for k in self.mine:
             if isinstance(self.unknowns[k].what, StartTime):
-                slopes[:, :, k] = np.where(before[:, None], 0.0, -outputs[:, self._slope])
-        return outputs[:, self._value], slopes
+                slopes[:, :, k] = np.where(before[:, None], 0.0, -outputs[:, -count:])
+        return outputs[:, :count], slopes
 
     def _outputs(self, values: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
         from ...engine.evaluate import evaluate
 
         state, slopes = self.start(values)
-        clock = self.times - self.start_time(values)
-        before = clock < 0
-        inputs = self.plant.inputs
-        segments = self.experiment.command.segments(inputs, 0.0, max(float(clock[-1]), 1e-9))
-        leaves = np.concatenate([self.leaves(values), self.ready.parameters[self._leaves.size :]])
-        ready = dataclasses.replace(self.ready, parameters=leaves, held=self.ready.program.held(leaves))
-        full = np.concatenate([state, slopes.T.ravel()])
-        course = self.method.run(ready, segments, 0.0, full, np.maximum(clock, 0.0), most_steps=1_000_000)
+        clock = self._clock(self.start_time(values))
+        leaves = self.ready.parameters.copy()
+        leaves[: self._leaves.size] = self.leaves(values)
+        ready = self.ready.at(leaves, self._nominal)
+        full = np.zeros(self._nominal.size)
+        full[: state.size] = state
+        if self.columns:
+            full[state.size :] = slopes.ravel()
+        course = self.method.run(ready, clock.segments, 0.0, full, clock.times, most_steps=1_000_000)
+        if course.status == INTERRUPTED:
+            raise KeyboardInterrupt
         if course.status != 0:
             raise IdentificationError(
                 f"{self.experiment.recording.origin}: the run ended early, at {course.time:.4g} s."
             )
-        under = np.ascontiguousarray(segments.inputs_at(np.maximum(clock, 0.0), 0.0))
-        results = np.empty((clock.size, ready.sizes.outputs))
-        evaluate(ready.address["outputs"], ready.held, course.rows, under, results)
-        return results, before
+        results = np.empty((clock.times.size, ready.sizes.outputs))
+        evaluate(ready.address["outputs"], ready.held, course.rows, clock.inputs, results)
+        return results, clock.before
+
+    def _clock(self, begin: float) -> _Clock:
+        """The record seen from where the run begins; the last one is kept, as most fits ask for one alone."""
+        known = self._last_clock
+        if known is None or known.begin != begin:
+            clock = self.times - begin
+            times, inputs = np.maximum(clock, 0.0), self.plant.inputs
+            segments = self.experiment.command.segments(inputs, 0.0, max(float(clock[-1]), 1e-9))
+            under = np.ascontiguousarray(segments.inputs_at(times, 0.0))
+            self._last_clock = known = _Clock(begin, times, clock < 0, segments, under)
+        return known
+
+
+class _Clock(NamedTuple):
+    """Rows of a record counted from the start of the run, and the command there."""
+
+    begin: float
+    times: Array
+    before: npt.NDArray[np.bool_]
+    segments: Segments
+    inputs: Array
+
+
+def _place_known(unknown: Unknown, experiment: Experiment) -> list[int]:
+    """Where among the start's known values an unknown stands, if it is one of them."""
+    known, what = list(experiment.start.known), unknown.what
+    return [known.index(what.name)] if isinstance(what, StartValue) else []
 
 
 def _rising(experiment: Experiment) -> Array:
@@ -127,27 +157,31 @@ def _rising(experiment: Experiment) -> Array:
     return times
 
 
-def _index(outputs: list[str], name: str, experiment: Experiment) -> int:
-    if name not in outputs:
-        known = [n for n in outputs if not n.startswith("d ") and not n.endswith(".rate")]
-        raise ParameterError(
-            f"{experiment.recording.origin}: the plant has no output '{name}'; there are {', '.join(known)}."
-            f"{suggestion(name, known)}"
-        )
-    return outputs.index(name)
+def _sensitive(
+    plant: System, groups: tuple[tuple[str, ...], ...], scales: tuple[float, ...], names: tuple[str, ...],
+    experiment: Experiment,
+) -> Sensitive:  # fmt: skip
+    try:
+        return Sensitive(plant, groups, scales, names)
+    except ParameterError as error:
+        raise ParameterError(f"{experiment.recording.origin}: {error}") from None
 
 
-def stacked(courses: Sequence[Course], values: Array, deviations: Array) -> tuple[Array, Array]:
-    """Residuals (R,) in standard deviations, model less measured, rows without a reading left out; slopes (R, P)."""
+def stacked(courses: Sequence[Course], values: Array, deviations: Array, scales: Array) -> tuple[Array, Array]:
+    """Residuals (R,) in standard deviations, model less measured, rows without a reading left out.
+
+    And their slopes (R, P) by the unknowns in units of their scales.
+    """
     errors, slopes = [], []
     for course in courses:
         modelled, by = course.evaluate(values)
-        kept = np.isfinite(course.measured)
-        errors.append(((modelled - course.measured) / deviations)[kept])
-        slopes.append((by / deviations[:, None])[kept])
-    return np.concatenate(errors), np.concatenate(slopes)
+        error, by = (modelled - course.measured) / deviations, by * (scales / deviations[:, None])
+        whole = course.whole
+        errors.append(error.ravel() if whole else error[course.kept])
+        slopes.append(by.reshape(-1, scales.size) if whole else by[course.kept])
+    return (errors[0], slopes[0]) if len(errors) == 1 else (np.concatenate(errors), np.concatenate(slopes))
 
 
 def observations(courses: Sequence[Course]) -> Any:
     """How many readings take part."""
-    return sum(int(np.isfinite(course.measured).sum()) for course in courses)
+    return sum(int(course.kept.sum()) for course in courses)

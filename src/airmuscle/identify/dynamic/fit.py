@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +16,7 @@ from ...method import Method, Rodas4
 from ...program import System
 from ..result import Estimate
 from .course import Course, observations, stacked
+from .descent import Descent, descended
 from .experiment import Experiment, Own, Shared, Unknown, unknowns
 from .identifiable import Identifiability, identifiable
 from .result import DynamicFit
@@ -20,6 +24,9 @@ from .result import DynamicFit
 Array = npt.NDArray[np.float64]
 CORRELATED = 0.3
 """Correlation of neighbouring residuals from which on they are called model error, not noise; chosen."""
+
+FIRST_LOOK, HOPELESS = 30, 1000.0
+"""Runs after which a start whose sum of squares is so many times the least of all is left where it stands; chosen."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -30,11 +37,12 @@ class Problem:
     unknowns: tuple[Unknown, ...]
     deviations: Array
 
-    @property
+    @functools.cached_property
     def scales(self) -> Array:
+        """The size of a change of each unknown."""
         return np.array([u.scale for u in self.unknowns])
 
-    @property
+    @functools.cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds in units of the scales."""
         low, high = np.array([u.low for u in self.unknowns]), np.array([u.high for u in self.unknowns])
@@ -42,64 +50,30 @@ class Problem:
 
     def residuals(self, scaled: Array) -> tuple[Array, Array]:
         """Residuals (R,) in sensor deviations and their slopes (R, P) by the scaled unknowns."""
-        errors, slopes = stacked(self.courses, scaled * self.scales, self.deviations)
-        return errors, slopes * self.scales
+        return stacked(self.courses, scaled * self.scales, self.deviations, self.scales)
 
     def solve(self, scaled: Array, held: Sequence[int] = (), most: int = 200) -> tuple[Array, float]:
         """The least squares from a start, some unknowns held: unknowns and sum of squares, infinite where it fails."""
-        from scipy.optimize import least_squares
+        found = self.descent(scaled, held, most)
+        return found.x, found.cost
 
-        loose = [k for k in range(scaled.size) if k not in held]
-        whole, (low, high) = scaled.copy(), self.bounds
-        if not loose:
-            return whole, self._cost(whole)
-        search = _Search(self, whole, loose)
-        begin = np.clip(scaled[loose], low[loose], high[loose])
-        try:
-            found = least_squares(
-                search.errors, begin, search.slopes, (low[loose], high[loose]), "trf", ftol=1e-10, xtol=1e-10,
-                gtol=1e-12, x_scale="jac", max_nfev=most,
-            )  # fmt: skip
-        except (AirmuscleError, ValueError):  # the start itself cannot be run
-            return scaled, np.inf
+    def descent(self, scaled: Array, held: Sequence[int] = (), most: int = 200) -> Descent:
+        """The same, and whether the search came to its end."""
+        loose, whole, (low, high) = [k for k in range(scaled.size) if k not in held], scaled.copy(), self.bounds
+
+        def residuals(x: Array) -> tuple[Array, Array] | None:
+            at = scaled.copy()
+            at[loose] = x
+            try:
+                errors, slopes = self.residuals(at)
+            except AirmuscleError:
+                return None
+            fine = np.isfinite(errors).all() and np.isfinite(slopes).all()
+            return (errors, slopes[:, loose] if held else slopes) if fine else None
+
+        found = descended(residuals, scaled[loose], low[loose], high[loose], most)
         whole[loose] = found.x
-        return whole, 2.0 * float(found.cost)
-
-    def _cost(self, scaled: Array) -> float:
-        try:
-            return float(np.sum(self.residuals(scaled)[0] ** 2))
-        except AirmuscleError:
-            return np.inf
-
-
-class _Search:
-    """What the solver calls: residuals, and slopes at the same place without a second run."""
-
-    def __init__(self, problem: Problem, whole: Array, loose: Sequence[int]) -> None:
-        self.problem, self.whole, self.loose = problem, whole.copy(), list(loose)
-        self.at = b""
-        self.found: tuple[Array, Array] = (np.empty(0), np.empty((0, 0)))
-
-    def _run(self, x: Array) -> None:
-        if x.tobytes() != self.at:
-            self.whole[self.loose] = x
-            self.found = self.problem.residuals(self.whole)
-            self.at = x.tobytes()
-
-    def errors(self, x: Array) -> Array:
-        """Residuals; infinite where the plant cannot be run, which the solver takes as a step too far."""
-        try:
-            self._run(x)
-        except AirmuscleError:
-            if not self.found[0].size:
-                raise
-            return np.full_like(self.found[0], np.inf)
-        return self.found[0]
-
-    def slopes(self, x: Array) -> Array:
-        """Slopes of the residuals by the unknowns that are loose."""
-        self._run(x)
-        return self.found[1][:, self.loose]
+        return found._replace(x=whole)
 
 
 def fit_dynamic(
@@ -121,7 +95,8 @@ def fit_dynamic(
     observed  the outputs that were measured, each with the standard deviation of its sensor, in SI
     own       what every record has for itself: paths (supply pressure), StartTime(margin), StartValue(name, margin)
     bounds    by first path; those declared otherwise
-    starts    number of starts: the plant's own values, and a Latin hypercube a factor of three around them
+    starts    number of starts: the plant's own values, and a Latin hypercube a factor of three around them; one that
+              after 30 runs is a thousand times worse than the best is left where it stands
     method    Rodas4(rtol=1e-6) unless given
 
     Standard deviations are scaled by the scatter of the residuals. What the records cannot tell apart is named in
@@ -134,12 +109,28 @@ def fit_dynamic(
     courses = tuple(Course(plant, e, i, wanted, observed, method) for i, e in enumerate(experiments))
     problem = Problem(courses, wanted, np.array(list(observed.values()), dtype=float))
     _refuse_too_little(problem)
-    outcomes = sorted((problem.solve(z) for z in _starts(problem, starts, seed)), key=lambda outcome: outcome[1])
+    outcomes = sorted(_solved(problem, spread(problem, starts, seed)), key=lambda outcome: outcome[1])
     best, cost = outcomes[0]
     if not np.isfinite(cost):
         problem.residuals(np.array([u.value for u in wanted]) / problem.scales)  # raises the reason, if it is one
         raise IdentificationError("the plant could not be run from any start; look at the bounds and the start.")
     return _result(problem, best, np.array([c for _, c in outcomes]))
+
+
+def _solved(problem: Problem, begins: Sequence[Array]) -> list[tuple[Array, float]]:
+    """The least squares from every start, on all cores: the kernels leave Python to the others while they run."""
+    if len(begins) == 1:
+        return [problem.solve(begins[0])]
+    pool = ThreadPoolExecutor(min(len(begins), os.cpu_count() or 1))
+    try:
+        found = list(pool.map(lambda z: problem.descent(z, most=FIRST_LOOK), begins))
+        least = min(one.cost for one in found)
+        hopeful = [i for i, one in enumerate(found) if not one.ended and one.cost <= HOPELESS * least]
+        for i, one in zip(hopeful, pool.map(lambda i: problem.descent(found[i].x), hopeful), strict=True):
+            found[i] = one
+        return [(one.x, one.cost) for one in found]
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def _refuse_too_little(problem: Problem) -> None:
@@ -152,7 +143,7 @@ def _refuse_too_little(problem: Problem) -> None:
         raise ParameterError("the standard deviation of an observed quantity must be positive, in SI.")
 
 
-def _starts(problem: Problem, count: int, seed: int) -> list[Array]:
+def spread(problem: Problem, count: int, seed: int) -> list[Array]:
     """The plant's own values, then a Latin hypercube, even in the logarithm where the range is positive."""
     own = np.array([u.value for u in problem.unknowns])
     rng, cells = np.random.default_rng(seed), count - 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,11 +15,18 @@ from ...errors import IdentificationError, ParameterError, suggestion
 from ...plant import Plant
 from ...program import System
 
+if TYPE_CHECKING:
+    from ...program.function import Function
+
 Array = npt.NDArray[np.float64]
-ITERATIONS = 50
 NUDGE = 100.0
 """A little more gauge pressure [Pa], by which states that settle with it are found."""
-_conditions: dict[Any, Any] = {}
+_WHY = {
+    1: "where the search came to, some state changes none of what is asked",
+    2: "the search left all bounds",
+    3: "the search did not come to an end",
+}
+_conditions: dict[Any, Function] = {}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -93,9 +100,11 @@ def _settled(
     return known, tuple(still), tuple(equal)
 
 
-def conditions(system: System, start: Start) -> Any:
-    """The CasADi function (state, leaves) -> (values known, rates to vanish, their slopes by state, by leaf)."""
+def conditions(system: System, start: Start) -> Function:
+    """The function (state, leaves) -> (values known and rates to vanish, their slopes by state, by leaf)."""
     import casadi
+
+    from ...program.function import Function
 
     key = (declare.structure(system), tuple(start.known), start.still, start.equal)
     if key not in _conditions:
@@ -111,42 +120,31 @@ def conditions(system: System, start: Start) -> Any:
             *(casadi.SX(rates[n]) for n in start.still),
             *(casadi.SX(values[a] - values[b]) for a, b in start.equal),
         )
-        outputs = casadi.cse([g, casadi.jacobian(g, x), casadi.jacobian(g, p)])
-        _conditions[key] = casadi.Function("start", [x, p], outputs)
+        outputs = {"values": g, "by_state": casadi.jacobian(g, x), "by_leaf": casadi.jacobian(g, p)}
+        _conditions[key] = Function({"x": x, "leaves": p}, outputs)
     return _conditions[key]
 
 
 def solved(
-    function: Any, start: Start, leaves: Array, known: Array, guess: Array, sizes: Sequence[float]
+    function: Function, start: Start, leaves: Array, known: Array, guess: Array, sizes: Array
 ) -> tuple[Array, Array, Array]:
     """The state (n,) with these leaves and known values, and its slopes by known value (n, k) and by leaf (n, p).
 
     `function` is that of `conditions`, made once for a structure.
     Raises IdentificationError where no state meets the conditions.
     """
-    target, size = np.concatenate([known, np.zeros(len(start.still) + len(start.equal))]), np.asarray(sizes)
-    x, best = guess.copy(), np.inf
-    for _ in range(ITERATIONS):
-        g, by_state, by_leaf = (np.asarray(part) for part in function(x, leaves))
-        step = _newton(by_state * size, target - g[:, 0])
-        best = float(np.abs(step).max())
-        if not np.isfinite(best):
-            break
-        x = x + size * step * min(1.0, 10.0 / max(best, 1e-300))
-        if best < 1e-11 * max(1.0, float(np.abs(x / size).max())):
-            inverse = np.linalg.pinv(by_state * size) * size[:, None]
-            return x, inverse[:, : known.size], -inverse @ by_leaf
-    raise IdentificationError(
-        f"no state meets the start "
-        f"{dict(zip(start.known, known.tolist(), strict=True))} with {', '.join(start.still) or 'nothing'} at rest and "
-        f"{', '.join(f'{a} = {b}' for a, b in start.equal) or 'nothing'} equal; "
-        f"the last step of the search was {best:.2g} of the nominal size."
-    )
+    from ...engine.once import announce_compilation
+    from ...engine.root import root
 
-
-def _newton(matrix: Array, error: Array) -> Array:
-    if not (np.isfinite(matrix).all() and np.isfinite(error).all()):
-        return np.full(error.size, np.nan)
-    rows = np.abs(matrix).max(axis=1)
-    rows[rows == 0] = 1.0
-    return np.asarray(np.linalg.lstsq(matrix / rows[:, None], error / rows, rcond=1e-14)[0])
+    announce_compilation(root)
+    n, x, target = guess.size, guess.copy(), np.concatenate([known, np.zeros(len(start.still) + len(start.equal))])
+    values, by_state, by_leaf, work = np.empty(n), np.empty((n, n)), np.empty((n, leaves.size)), np.zeros(n * n + n)
+    status = root(function.address, leaves, target, sizes, x, values, by_state, by_leaf, work)
+    if status != 0:
+        raise IdentificationError(
+            f"no state meets the start {dict(zip(start.known, known.tolist(), strict=True))} with "
+            f"{', '.join(start.still) or 'nothing'} at rest and "
+            f"{', '.join(f'{a} = {b}' for a, b in start.equal) or 'nothing'} equal: {_WHY[status]}."
+        )
+    inverse = sizes[:, None] * np.linalg.inv(by_state * sizes)
+    return x, inverse[:, : known.size], -inverse @ by_leaf

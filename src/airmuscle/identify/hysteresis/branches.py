@@ -1,9 +1,8 @@
-"""The branches of a loop, found from its path, and what lies between them."""
+"""What lies between the branches of a loop, and between two runs of it; `recording.segment` finds the branches."""
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from ..loss import Array
 
@@ -11,16 +10,13 @@ PLACES = 24
 """Places along the path at which branches are compared (chosen)."""
 
 
-def rising(path: Array) -> npt.NDArray[np.bool_]:
-    """The rows up to the greatest value of a path of one loop: the inflating branch of a ramp of pressure."""
-    return np.arange(path.size) <= int(np.argmax(path))
-
-
 def between(path: Array, values: Array, other_path: Array, other_values: Array) -> Array:
     """Differences of two branches, the second less the first, at places of the path where both have rows.
 
     Give errors from one common static curve, not forces: within a place a steep curve would look like a difference.
     """
+    if not path.size or not other_path.size:
+        return np.empty(0)
     low, high = max(path.min(), other_path.min()), min(path.max(), other_path.max())
     edges = np.linspace(low, high, PLACES + 1)
     means = _means(path, values, edges), _means(other_path, other_values, edges)
@@ -37,14 +33,15 @@ def _means(path: Array, values: Array, edges: Array) -> Array:
     return means
 
 
-def gap(path: Array, values: Array) -> Array:
-    """Falling less rising branch of one loop, at places along its path."""
-    up = rising(path)
-    return between(path[up], values[up], path[~up], values[~up])
+def gap(path: Array, values: Array, way: Array) -> Array:
+    """Falling less rising branches, at places along the path; `way` is 1 where a row rises, -1 where it falls."""
+    up, down = way > 0, way < 0
+    return between(path[up], values[up], path[down], values[down])
 
 
-def repeat_difference(path: Array, values: Array, other_path: Array, other_values: Array) -> Array:
+def repeat_difference(
+    path: Array, values: Array, way: Array, other_path: Array, other_values: Array, other_way: Array
+) -> Array:
     """What a second run of the same loop gives beyond the first, branch by branch, at places along the path."""
-    up, other_up = rising(path), rising(other_path)
-    pairs = ((up, other_up), (~up, ~other_up))
+    pairs = ((way > 0, other_way > 0), (way < 0, other_way < 0))
     return np.concatenate([between(path[a], values[a], other_path[b], other_values[b]) for a, b in pairs])

@@ -16,8 +16,9 @@ from ...declare import Leaf, model, parameter
 from ...errors import IdentificationError
 from ...friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, PrandtlIshlinskii
 from ...recording import Recording
+from ...recording.segment import ways_along
 from ..loss import Array
-from .result import Course, HysteresisFit, judged
+from .result import MILLIMETRES, Axis, Course, HysteresisFit, judged
 
 Mask = npt.NDArray[np.bool_]
 
@@ -28,6 +29,11 @@ class Slide(abc.ABC):
     @abc.abstractmethod
     def path(self, recording: Recording) -> Array:
         """Displacement [m] by row, shape (N,)."""
+
+    @property
+    def axis(self) -> Axis:
+        """What figures draw instead of metres."""
+        return MILLIMETRES
 
 
 @model
@@ -52,6 +58,10 @@ class OnPressure(Slide):
 
     def path(self, recording: Recording) -> Array:
         return self.travel_per_pressure * recording["pressure"]
+
+    @property
+    def axis(self) -> Axis:
+        return Axis("gauge pressure [kPa]", 1e-3 / self.travel_per_pressure)
 
 
 class StaticCurve(abc.ABC):
@@ -127,7 +137,7 @@ def fit_hysteresis(
     `repeat` is a second run of the same loop with its chosen rows: it gives the floor of repeatability, and a judge.
     Raises IdentificationError where there are too few rows or the path does not move.
     """
-    run = _course(recording, static, slide, chosen)
+    run = course(recording, static, slide, chosen)
     free = [leaf for leaf in declare.leaves(friction) if leaf.declared.fitted]
     if run.rows.sum() <= len(free) + run.columns.shape[1] + 2 or not np.ptp(run.path) > 0:
         raise IdentificationError(
@@ -136,15 +146,18 @@ def fit_hysteresis(
             "curve. Give a run that goes up and down, or choose more rows."
         )
     found = _linear(friction, run) if friction.linear_in else _searched(friction, run)
-    other = _course(repeat[0], static, slide, repeat[1]) if repeat else None
+    other = course(repeat[0], static, slide, repeat[1]) if repeat else None
     return judged(found, len(free), run, other)
 
 
-def _course(recording: Recording, static: StaticCurve, slide: Slide, chosen: Mask | None) -> Course:
+def course(recording: Recording, static: StaticCurve, slide: Slide, chosen: Mask | None) -> Course:
+    """A run as a fit of friction sees it."""
     goal = recording["force"] - static.known(recording)
     rows = np.isfinite(goal) if chosen is None else np.asarray(chosen, dtype=bool) & np.isfinite(goal)
     time = recording.columns.get("time")
-    return Course(recording.origin, slide.path(recording), time, goal, static.columns(recording), rows)
+    path = slide.path(recording)
+    way = ways_along(path, time)
+    return Course(recording.origin, path, time, goal, static.columns(recording), rows, way, slide.axis)
 
 
 def _linear(friction: Any, run: Course) -> Friction:

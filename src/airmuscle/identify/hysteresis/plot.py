@@ -10,6 +10,7 @@ import numpy as np
 from ...figures import DASHES, LINES, legend_below, new_figure
 from ...friction import Friction
 from ..loss import Array
+from .result import MILLIMETRES, Axis
 
 if TYPE_CHECKING:
     from .result import HysteresisFit
@@ -28,7 +29,7 @@ def winding(travel: float) -> Array:
     return travel * np.concatenate([*legs, [TURNS[-1]]])
 
 
-def plot_loops(friction: Friction) -> Any:
+def plot_loops(friction: Friction, axis: Axis = MILLIMETRES) -> Any:
     """Force over displacement of a friction law: from rest, around the outer loop, through two inner ones."""
     path = winding(friction.travel or 1e-3)
     force = friction.replay(path)
@@ -41,8 +42,8 @@ def plot_loops(friction: Friction) -> Any:
     for (name, first, last), style in zip(parts, (0, 1, 2, 2), strict=True):
         rows, label = slice(first, last), name or None
         shown = force if style else outer
-        axes.plot(path[rows] * 1e3, shown[rows], color=LINES[style], linestyle=DASHES[style], label=label)
-    axes.set(xlabel="displacement [mm]", ylabel="friction [N]", title=type(friction).__name__)
+        axes.plot(path[rows] * axis.factor, shown[rows], color=LINES[style], linestyle=DASHES[style], label=label)
+    axes.set(xlabel=axis.label, ylabel="friction [N]", title=type(friction).__name__)
     legend_below(figure, axes, 3)
     return figure
 
@@ -52,14 +53,14 @@ def plot_hysteresis(fit: HysteresisFit) -> Any:
     run = fit.course
     left = run.goal - run.columns @ fit.coefficients
     figure, (upper, lower) = new_figure(2, 1, width=6.0, height=5.6, sharex=True)
-    path = run.path * 1e3
+    path = run.path * run.axis.factor
     force = -fit.friction.replay(run.path, run.time)
     upper.plot(path[run.rows], left[run.rows], "o", color=LINES[0], alpha=0.5, label="measured, less static curve")
     upper.plot(path, force, color=LINES[1], label=f"{type(fit.friction).__name__}, along the whole path")
     upper.set_ylabel("force [N]")
     lower.plot(path[run.rows], (left - force)[run.rows], "o", color=LINES[0], alpha=0.5)
     lower.axhline(0.0, color=LINES[1])
-    lower.set(xlabel="displacement [mm]", ylabel="measured less modelled [N]")
+    lower.set(xlabel=run.axis.label, ylabel="measured less modelled [N]")
     upper.set_title(f"{run.origin}: rms {fit.plain_rmse:.3g} N without, {fit.rmse:.3g} N with friction")
     legend_below(figure, upper, 2)
     return figure

@@ -18,6 +18,17 @@ RARE = 0.01
 """Probability below which an F test counts (chosen)."""
 
 
+@dataclasses.dataclass(frozen=True)
+class Axis:
+    """How a path [m] is drawn: what the axis says, and its unit in one metre."""
+
+    label: str
+    factor: float
+
+
+MILLIMETRES = Axis("displacement [mm]", 1e3)
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Course:
     """One run as the fit sees it: the path, the force that the static columns and the friction shall explain."""
@@ -29,6 +40,9 @@ class Course:
     columns: Array
     rows: npt.NDArray[np.bool_]
     """Where errors count."""
+    way: Array
+    """1 where the path rises, -1 where it falls."""
+    axis: Axis = MILLIMETRES
 
     def coefficients(self, friction: Friction | None) -> Array:
         """Of the static columns, best beside this friction, or without any."""
@@ -91,8 +105,7 @@ class HysteresisFit:
         """Whether the data justify this friction, in words with the numbers."""
         name = type(self.friction).__name__
         text = (
-            f"{name} lowers the rms error from {self.plain_rmse:.3g} to {self.rmse:.3g} N and the gap between the "
-            f"branches from {self.gap:.3g} to {self.gap_left:.3g} N. AICc "
+            f"{name} lowers the rms error from {self.plain_rmse:.3g} to {self.rmse:.3g} N and {self._gaps}. AICc "
             f"{'falls' if self.aicc_gain > 0 else 'rises'} by {abs(self.aicc_gain):.3g} over {self.effective_rows:.0f} "
             f"independent rows; idle parameters would do as well with a probability of {self.chance:.2g}."
         )
@@ -106,6 +119,12 @@ class HysteresisFit:
         if self.unsettled:
             text += f" Not determined: {', '.join(self.unsettled)}."
         return f"{text} The data {'justify' if self.justified else 'do not justify'} this friction."
+
+    @property
+    def _gaps(self) -> str:
+        if not np.isfinite(self.gap):
+            return "the branches have no place in common where rows count"
+        return f"the gap between the branches from {self.gap:.3g} to {self.gap_left:.3g} N"
 
     def plot(self) -> Any:
         """The loop and what the friction explains of it; a Matplotlib figure."""
@@ -127,20 +146,21 @@ def judged(friction: Friction, free: int, run: Course, repeat: Course | None) ->
     errors, plain = run.errors(friction, with_it)[run.rows], run.errors(None, without)[run.rows]
     square, plain_square = float(np.mean(errors**2)), float(np.mean(plain**2))
     rows, base = effective_rows(errors), run.columns.shape[1]
-    path = run.path[run.rows]
+    path, way = run.path[run.rows], run.way[run.rows]
     again = plain_again = floor = float("nan")
     if repeat is not None:
         again = _rms(repeat.remainder(friction))
         plain_again = _rms(repeat.remainder(None))
         other = repeat.errors(None, without)[repeat.rows]
-        floor = _rms(branches.repeat_difference(path, plain, repeat.path[repeat.rows], other)) / np.sqrt(2)
+        beside = (repeat.path[repeat.rows], other, repeat.way[repeat.rows])
+        floor = _rms(branches.repeat_difference(path, plain, way, *beside)) / np.sqrt(2)
     return HysteresisFit(
         friction=friction,
         coefficients=with_it,
         rmse=float(np.sqrt(square)),
         plain_rmse=float(np.sqrt(plain_square)),
-        gap=_rms(branches.gap(path, plain)),
-        gap_left=_rms(branches.gap(path, errors)),
+        gap=_rms(branches.gap(path, plain, way)),
+        gap_left=_rms(branches.gap(path, errors, way)),
         effective_rows=rows,
         aicc_gain=aicc(plain_square, rows, base) - aicc(square, rows, base + free),
         chance=f_test(plain_square, square, rows, base + free, free),

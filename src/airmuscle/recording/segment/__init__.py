@@ -3,6 +3,7 @@
 from .branches import Branch as Branch
 from .branches import branches as branches
 from .branches import directions as directions
+from .branches import ways_along as ways_along
 from .findings import Finding as Finding
 from .findings import refuse_unswept as refuse_unswept
 from .inspection import Inspection as Inspection

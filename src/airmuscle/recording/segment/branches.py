@@ -50,17 +50,35 @@ def branches(recording: Recording, sensor: Sensor | None = None, *, swing: float
     """
     if "pressure" not in recording or len(recording) < 3:
         return ()
-    pressure = recording["pressure"]
-    calm = pressure
-    if "time" in recording:
-        calm = running_median(pressure, 2 * row_count(SPIKE / 2.0, recording["time"], 1) + 1)
-    least = max(swing * float(np.ptp(calm)), 10.0 * (sensor.deviation if sensor else 0.0))
-    if not float(np.ptp(calm)) > least:
-        return ()
+    calm = _without_spikes(recording["pressure"], recording.columns.get("time"))
+    found = _ways(calm, max(swing * float(np.ptp(calm)), 10.0 * (sensor.deviation if sensor else 0.0)))
+    return tuple(_branch(calm, stretch, direction) for stretch, direction in found)
+
+
+def ways_along(values: Array, time: Array | None = None, *, swing: float = SWING) -> Array:
+    """By row of any path: 1 where it rises, -1 where it falls, told as branches are told from the pressure.
+
+    0 throughout where it does not move.
+    """
+    calm = _without_spikes(values, time)
+    signs = np.zeros(len(values))
+    for stretch, direction in _ways(calm, swing * float(np.ptp(calm)) if len(calm) else 0.0):
+        signs[stretch.rows] = direction
+    return signs
+
+
+def _without_spikes(values: Array, time: Array | None) -> Array:
+    return values if time is None else running_median(values, 2 * row_count(SPIKE / 2.0, time, 1) + 1)
+
+
+def _ways(calm: Array, least: float) -> list[tuple[Stretch, int]]:
+    """The stretches between turns, each with its direction; none where all stays within `least`."""
+    if not len(calm) or not float(np.ptp(calm)) > least:
+        return []
     turns = list(_turns(calm, least))
-    starts = [0, *(row for row, _ in turns[1:]), len(pressure)]
+    starts = [0, *(row for row, _ in turns[1:]), len(calm)]
     pairs = zip(itertools.pairwise(starts), turns, strict=True)
-    return tuple(_branch(calm, Stretch(a, b), direction) for (a, b), (_, direction) in pairs)
+    return [(Stretch(a, b), direction) for (a, b), (_, direction) in pairs]
 
 
 def _turns(pressure: Array, least: float) -> Iterator[tuple[int, int]]:

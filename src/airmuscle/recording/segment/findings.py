@@ -19,6 +19,8 @@ SATURATED = 0.5
 """The part of the rows at an end of a sensor from which on a fit would have little left (chosen)."""
 UNSETTLED = 0.02
 """A record is short where its last tenth still changes by this part of the range (chosen)."""
+WITHIN_NOISE = 10.0
+"""A pressure whose range is less than this many deviations of its sensor is constant (chosen)."""
 FEW_ROWS = 5
 """A step seen in fewer rows than this is too fast for its sampling (chosen)."""
 
@@ -122,6 +124,8 @@ def _of_length(recording: Recording, timing: Sampling | None, sensed: Mapping[st
         return
     pressure = recording["pressure"]
     reach = float(np.ptp(pressure))
+    if reach <= WITHIN_NOISE * (sensed["pressure"].deviation if "pressure" in sensed else 0.0):
+        return
     last = pressure[-max(len(pressure) // 10, 3) :]
     calm = quasi_static(recording, sensed)
     if reach > 0 and not calm[-1] and abs(last[-1] - last[0]) > UNSETTLED * reach:

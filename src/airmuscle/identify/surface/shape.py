@@ -7,77 +7,40 @@ cells, which enclose the slopes, the inequalities hold at every point of the box
 from __future__ import annotations
 
 import dataclasses
-import enum
-import itertools
-import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.polynomial import polynomial
 
-from .. import trace
-from ..characteristic.base import ForceLaw
-from ..characteristic.box import Box
-from ..characteristic.contractile_surface import ContractileSurface, exponents
-from ..errors import IdentificationError
-from ..recording import Recording
-from .fit import fit
-from .loss import Array
-from .monotone_surface import constrained
-from .places import places
+from ...characteristic.base import ForceLaw
+from ...characteristic.box import Box
+from ...characteristic.contractile_surface import ContractileSurface, exponents
+from ...errors import IdentificationError
+from ...recording import Recording
+from ..fit import fit
+from ..loss import Array
+from ..result import Fit
+from .breaks import Break, Rule, breaks_of
+from .enclosure import constrained, enclosure
 
 _MARGIN = 1e-9
 """Least slope on the box scaled to -1..1, in parts of the greatest force, so that rounding turns none round; chosen."""
-_LEVEL = 1e-9
-"""Slopes below this part of the greatest are rounding; chosen."""
+FALLS_WITH_PRESSURE = Rule("force falls with pressure", "force", 0, -1.0)
+RISES_WITH_CONTRACTION = Rule("force rises with contraction", "force", 1, 1.0)
 
 
-class ShapeRule(enum.Enum):
-    """What the force of a muscle never does."""
-
-    FALLS_WITH_PRESSURE = "force falls with pressure"
-    RISES_WITH_CONTRACTION = "force rises with contraction"
-
-
-@dataclasses.dataclass(frozen=True)
-class ShapeBreak:
-    """One connected place of a box where a law breaks a rule."""
-
-    rule: ShapeRule
-    pressure: tuple[float, float]
-    """Gauge pressures [Pa] between which it lies."""
-    contraction: tuple[float, float]
-    """Contractions [1] between which it lies."""
-    share: float
-    """Its part of the box [1]."""
-    worst: tuple[float, float]
-    """Gauge pressure [Pa] and contraction [1] where the rule is broken most."""
-    worst_slope: float
-    """The slope there [N/Pa or N]."""
-
-    def __str__(self) -> str:
-        (p0, p1), (c0, c1) = self.pressure, self.contraction
-        return (
-            f"{self.rule.value} between {p0 / 1e3:.4g} and {p1 / 1e3:.4g} kPa, {c0:.2%} and {c1:.2%} "
-            f"({self.share:.1%} of the box), most at {self.worst[0] / 1e3:.4g} kPa and {self.worst[1]:.2%}"
-        )
-
-
-def shape_breaks(law: ForceLaw, box: Box, *, points: int = 101) -> tuple[ShapeBreak, ...]:
+def shape_breaks(law: ForceLaw, box: Box, *, points: int = 101) -> tuple[Break, ...]:
     """The places of a box where a muscle's force falls with pressure or rises with contraction, largest first."""
     sides = (np.linspace(*box.pressure, points), np.linspace(*box.contraction, points))
-    pressure, contraction = np.meshgrid(*sides, indexing="ij")
-    found: list[ShapeBreak] = []
-    rules = ((ShapeRule.FALLS_WITH_PRESSURE, 0, -1.0), (ShapeRule.RISES_WITH_CONTRACTION, 1, 1.0))
-    for rule, argument, sign in rules:
-        slope = np.asarray(trace.slope(law, "force", pressure, contraction, wrt=argument))
-        against = sign * slope
-        felt = np.where(against > _LEVEL * np.abs(slope).max(), against, 0.0)
-        found += [
-            ShapeBreak(rule, p.first, p.second, p.share, p.worst, sign * p.height)
-            for p in places(felt, pressure, contraction)
-        ]
-    return tuple(sorted(found, key=lambda b: -b.share))
+    return breaks_of(law, (FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION), *np.meshgrid(*sides, indexing="ij"))
+
+
+def broken_by(fit: Fit, *, points: int = 101) -> tuple[Break, ...]:
+    """The places in the data's box where a fitted law breaks a rule; none for laws that are no closed-form force."""
+    law = fit.model
+    if not isinstance(law, ForceLaw) or not law.traceable or not all(low < high for low, high in fit.ranges.values()):
+        return ()
+    return shape_breaks(law, fit.box, points=points)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,7 +52,7 @@ class ShapedFit:
     """Root mean square error over the fitted rows [N]."""
     unconstrained: float
     """The same without conditions [N]: what they cost is the difference."""
-    broken: tuple[ShapeBreak, ...]
+    broken: tuple[Break, ...]
     """Where the surface without conditions breaks a rule."""
 
 
@@ -151,17 +114,11 @@ def shape_constraints(degree: int, cells: tuple[int, int]) -> Array:
 
 def _enclosure(degree: int, cells: int, *, slope: bool) -> Array:
     """Bernstein coefficients, on even cells of -1..1, of 1, x, .. x^degree or their slopes, one column each."""
-    size = degree if slope else degree + 1
-    t = np.linspace(0.0, 1.0, size) if size > 1 else np.array([0.5])
-    order = np.arange(size)
-    binomials = np.array([math.comb(size - 1, int(j)) for j in order])
-    bernstein = binomials * t[:, None] ** order * (1.0 - t[:, None]) ** (size - 1 - order)
-    blocks = []
-    for low, high in itertools.pairwise(np.linspace(-1.0, 1.0, cells + 1)):
-        x = low + (high - low) * t
-        values = polynomial.polyvander(x, degree)
-        if slope:
-            powers = np.arange(1, degree + 1)
-            values = np.column_stack([np.zeros(x.size), values[:, :-1] * powers])
-        blocks.append(np.linalg.solve(bernstein, values))
-    return np.vstack(blocks)
+    if not slope:
+        return enclosure(lambda x: np.asarray(polynomial.polyvander(x, degree)), degree + 1, cells)
+    powers = np.arange(1, degree + 1)
+
+    def slopes(x: Array) -> Array:
+        return np.column_stack([np.zeros(x.size), polynomial.polyvander(x, degree - 1) * powers])
+
+    return enclosure(slopes, degree, cells)

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import chebyshev, polynomial
 
-from ..characteristic.base import Characteristic
-from ..recording import Recording
-from ..units import bar
+from ...characteristic.base import Characteristic
+from ...recording import Recording
+from ...units import bar
 
 Array = npt.NDArray[np.float64]
 

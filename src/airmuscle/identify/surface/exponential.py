@@ -11,11 +11,11 @@ import dataclasses
 
 import numpy as np
 
-from ..characteristic.borzikova import BorzikovaExponential
-from ..errors import IdentificationError
-from ..recording import Recording
-from .correlation_index import CorrelationIndex, correlation_index
-from .surface_basis import Array, Chebyshev, Conditioning, LoadBox
+from ...characteristic.borzikova import BorzikovaExponential
+from ...errors import IdentificationError
+from ...recording import Recording
+from ..correlation_index import CorrelationIndex, correlation_index
+from .basis import Array, Chebyshev, Conditioning, LoadBox
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,0 +1,219 @@
+"""Residual and Jacobian of 5 s by eight parameters, against the library's own simulation and against JAX's jacfwd."""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import casadi
+import numpy as np
+from filling import Array, hanging
+from measure import Bar, Section, interleaved, of_time, show
+
+from airmuscle import declare
+from airmuscle.command import Schedule, Segments
+from airmuscle.engine.evaluate import evaluate
+from airmuscle.identify.dynamic import Experiment, Start
+from airmuscle.identify.dynamic.course import Course
+from airmuscle.identify.dynamic.experiment import unknowns
+from airmuscle.identify.dynamic.fit import Problem
+from airmuscle.method import Method, Rodas4, RungeKutta4
+from airmuscle.plant import Plant
+from airmuscle.program.instructions import MAXIMUM, MINIMUM, SELECT, Code, Operand, instructions
+from airmuscle.program.prepared import prepared
+from airmuscle.program.printed import traced
+from airmuscle.simulate import simulate
+
+FREE = (
+    "circuit.fill.conductance",
+    "circuit.fill.critical_ratio",
+    "circuit.discharge.conductance",
+    "circuit.supply.pressure",
+    "muscle.spring.stiffness",
+    "muscle.damper.damping",
+    "muscle.damper.growth",
+    "mechanism.mass",
+)
+SENSORS = {"pressure": 1e3, "position": 1e-4}
+"""Standard deviations of the noise [Pa, m]; chosen."""
+DURATION, SPACING, STEP = 5.0, 0.01, 1e-3
+COMMAND = Schedule({"fill": ((0.5, 1.0), (2.5, 0.0)), "discharge": ((3.0, 1.0), (4.5, 0.0))})
+METHODS: dict[str, Method] = {"RungeKutta4(1e-3)": RungeKutta4(STEP), "Rodas4(1e-6)": Rodas4()}
+OWN = "RungeKutta4(1e-3), residual and Jacobian"
+FORMS = ("a tuple", "an array")
+HEADING = ("method", "variant", "median", "least", "simulations of its kind", "greatest difference of the Jacobian")
+TEXT = (
+    "The plant of three states filled and discharged within 5 s; 501 rows of pressure and position; eight parameters. "
+    "A simulation is the kernel and the two outputs at the rows, from a start that is given. Residual and Jacobian are "
+    "what the fit calls: the start, at rest for these parameters, and its derivatives too, and rows weighted by the "
+    "sensors. JAX is given the library's own equations, the start and its derivatives, as one jitted function of "
+    "`lax.scan` with RK4 and `jacfwd`, 64 bits, on one thread; the state as a tuple of numbers, and as an array. "
+    "Differences are from the residual's Jacobian of Rodas4 at rtol 1e-11, relative to each column's greatest."
+)
+
+
+class Case(NamedTuple):
+    """A plant, its record with noise, and the residuals of a method over the scaled parameters."""
+
+    plant: Plant
+    experiment: Experiment
+
+    def problem(self, method: Method) -> Problem:
+        wanted = unknowns(self.plant, [self.experiment], FREE, (), {})
+        course = Course(self.plant, self.experiment, 0, wanted, SENSORS, method)
+        return Problem((course,), wanted, np.array(list(SENSORS.values())))
+
+    @property
+    def segments(self) -> Segments:
+        return COMMAND.segments(self.plant.inputs, 0.0, DURATION)
+
+
+@functools.cache
+def case() -> Case:
+    """The record that both benchmarks of identification use."""
+    plant, rng = hanging(), np.random.default_rng(1)
+    run = simulate(plant, COMMAND, duration=DURATION, output=SPACING)
+    noisy = {name: run[name] + size * rng.standard_normal(len(run)) for name, size in SENSORS.items()}
+    return Case(plant, Experiment(run.with_columns(**noisy), COMMAND, Start.at_rest(plant, 0.0)))
+
+
+def simulation(method: Method) -> Callable[[], Array]:
+    """The kernel, and all outputs at the rows."""
+    ready, segments = prepared(case().plant), case().segments
+    times = case().experiment.recording["time"]
+    start = np.array([case().experiment.start.guess[s.name] for s in case().plant.states])
+    under, results = np.ascontiguousarray(segments.inputs_at(times, 0.0)), np.empty((times.size, ready.sizes.outputs))
+
+    def run() -> Array:
+        rows = method.run(ready, segments, 0.0, start, times).rows
+        evaluate(ready.address["outputs"], ready.held, rows, under, results)
+        return results
+
+    return run
+
+
+def jacobian(method: Method) -> Callable[[], tuple[Array, Array]]:
+    """Residual (R,) and Jacobian (R, 8) by the parameters in units of their values."""
+    problem = case().problem(method)
+    at = np.array([u.value for u in problem.unknowns]) / problem.scales
+    return lambda: problem.residuals(at)
+
+
+def in_jax(code: Code, inputs: Sequence[Any]) -> list[Any]:
+    """The library's equations, instruction by instruction, on JAX values."""
+    import jax.numpy as jnp
+
+    table: dict[int, Callable[..., Any]] = {
+        casadi.OP_ADD: lambda a, b: a + b, casadi.OP_SUB: lambda a, b: a - b, casadi.OP_MUL: lambda a, b: a * b,
+        casadi.OP_DIV: lambda a, b: a / b, casadi.OP_NEG: lambda a: -a, casadi.OP_SQ: lambda a: a * a,
+        casadi.OP_TWICE: lambda a: a + a, casadi.OP_INV: lambda a: 1.0 / a, casadi.OP_SQRT: jnp.sqrt,
+        casadi.OP_SIN: jnp.sin, casadi.OP_COS: jnp.cos, casadi.OP_LE: lambda a, b: jnp.where(a <= b, 1.0, 0.0),
+        casadi.OP_LT: lambda a, b: jnp.where(a < b, 1.0, 0.0), casadi.OP_NOT: lambda a: 1.0 - a,
+        casadi.OP_IF_ELSE_ZERO: lambda c, a: jnp.where(c != 0, a, 0.0), SELECT: lambda c, a, b: jnp.where(c != 0, a, b),
+        MAXIMUM: jnp.maximum, MINIMUM: jnp.minimum,
+    }  # fmt: skip
+    known: dict[Operand, Any] = {}
+
+    def value(operand: Operand) -> Any:
+        if operand[0] == "t":
+            return known[operand]
+        return operand[1] if operand[0] == "c" else inputs[operand[1]][operand[2]]
+
+    for line in code.body:
+        known[line.result] = table[line.operation](*(value(a) for a in line.arguments))
+    return [value(operand) for _, _, operand in code.outputs]
+
+
+def with_jax(form: str) -> Callable[[], tuple[Array, Array]]:
+    """The same residual and Jacobian as one function of JAX; raises ImportError where JAX is not there."""
+    os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")  # one thread serves it best
+    import jax
+    import jax.numpy as jnp
+
+    jax.config.update("jax_enable_x64", True)
+    stacked = form == FORMS[1]
+    plant, leaves = case().plant, list(declare.leaves(case().plant))
+    places = [[leaf.path for leaf in leaves].index(path) for path in FREE]
+    values = np.array([leaves[place].value for place in places])
+    start, by_start = case().problem(RungeKutta4(STEP)).courses[0].start(values)
+    t, names = traced(plant), [s.name for s in plant.states]
+    outputs = list(t.output_names)
+    seen = [t.o[outputs.index(name)] if name in outputs else t.x[names.index(name)] for name in SENSORS]
+    rates = instructions([t.x, t.u, t.p], [t.f])
+    observed = instructions([t.x, t.u, t.p], [casadi.vertcat(*seen)])
+    recording, count = case().experiment.recording, round(DURATION / STEP)
+    openings = case().segments.inputs_at((np.arange(count) + 0.5) * STEP, 0.0)
+    held = jnp.asarray(openings.reshape(-1, round(SPACING / STEP), openings.shape[1]))
+
+    def residual(scaled: Any) -> Any:
+        p: list[Any] = [leaf.value for leaf in leaves]
+        for k, place in enumerate(places):
+            p[place] = scaled[k] * values[k]
+
+        def moved(x: Any, h: float, k: Any) -> Any:
+            return tuple(a + h * b for a, b in zip(x, k, strict=True))
+
+        def step(x: Any, u: Any) -> Any:
+            k1 = in_jax(rates, (x, u, p))
+            k2 = in_jax(rates, (moved(x, STEP / 2, k1), u, p))
+            k3 = in_jax(rates, (moved(x, STEP / 2, k2), u, p))
+            k4 = in_jax(rates, (moved(x, STEP, k3), u, p))
+            return moved(x, STEP / 6, [a + 2 * (b + c) + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True)])
+
+        def one(x: Any, u: Any) -> Any:
+            return (jnp.stack(step(tuple(x), u)) if stacked else step(x, u)), None
+
+        def row(x: Any, u: Any) -> Any:
+            end = jax.lax.scan(one, x, u)[0]
+            return end, end
+
+        begin = tuple(start[i] + (by_start[i] * values) @ (scaled - 1.0) for i in range(start.size))
+        rows = jax.lax.scan(row, jnp.stack(begin) if stacked else begin, held)[1]
+        columns = [jnp.concatenate([begin[i][None], rows[:, i] if stacked else rows[i]]) for i in range(start.size)]
+        modelled = in_jax(observed, (columns, [0.0] * held.shape[2], p))
+        errors = [(y - recording[name]) / size for y, (name, size) in zip(modelled, SENSORS.items(), strict=True)]
+        return jnp.stack(errors, axis=1).ravel()
+
+    both = jax.jit(lambda z: (residual(z), jax.jacfwd(residual)(z)))
+    at = jnp.ones(len(FREE))
+    return lambda: tuple(np.asarray(part) for part in both(at))  # type: ignore[return-value]
+
+
+def section(rounds: int) -> Section:
+    variants: dict[str, Callable[[], Any]] = {}
+    for name, method in METHODS.items():
+        variants[f"{name}, simulation"] = simulation(method)
+        variants[f"{name}, residual and Jacobian"] = jacobian(method)
+    times = interleaved(variants, rounds)
+    ratios = {name: found.ratio_to(times[f"{name.partition(',')[0]}, simulation"]) for name, found in times.items()}
+    limits = {OWN: 2.0, "Rodas4(1e-6), residual and Jacobian": 5.0}
+    bars = [Bar(f"{name}, 8 parameters", ratios[name], limit, "simulations") for name, limit in limits.items()]
+    text = TEXT
+    try:
+        opponents = {f"RungeKutta4(1e-3), JAX jacfwd, state as {form}": with_jax(form) for form in FORMS}
+    except ImportError:
+        text += "\n\nJAX is not installed here, so that its rows are left out."
+    else:
+        # Apart from the others: the threads that JAX keeps waiting slow whatever comes after it.
+        beside = interleaved({OWN: variants[OWN], **opponents}, max(rounds // 2, 1))
+        own, variants = beside.pop(OWN), variants | opponents
+        ratios |= {name: found.ratio_to(own) * ratios[OWN] for name, found in beside.items()}
+        times |= beside
+        least = min(found.ratio_to(own) for found in beside.values())
+        bars.append(
+            Bar("residual and Jacobian: JAX jacfwd, its quicker form / library", least, 10.0, "x", at_least=True)
+        )
+    rows, reference = [], jacobian(Rodas4(1e-11))()[1]
+    for name, found in times.items():
+        method, _, variant = name.partition(", ")
+        difference = ""
+        if variant != "simulation":
+            difference = f"{(np.abs(variants[name]()[1] - reference) / np.abs(reference).max(axis=0)).max():.0e}"
+        rows.append((method, variant, of_time(found.median), of_time(found.least), f"{ratios[name]:.3g}", difference))
+    return Section("Residual and Jacobian by eight parameters", text, HEADING, tuple(rows), tuple(bars))
+
+
+if __name__ == "__main__":
+    show(section(15))

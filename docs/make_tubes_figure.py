@@ -1,0 +1,87 @@
+"""Draws docs/images/tubes.png, lumped tubes judged by one with inertia: python docs/make_tubes_figure.py"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airmuscle.characteristic import VirtualWork
+from airmuscle.circuit import DistributedTube, FillDischarge, Line, Supply, Tube, Valve
+from airmuscle.command import Schedule
+from airmuscle.figures import DASHES, LINES, MARKERS, new_figure, save
+from airmuscle.gas import Air, Isothermal
+from airmuscle.geometry import Braid
+from airmuscle.mechanism import Isometric
+from airmuscle.method import Rodas4
+from airmuscle.muscle import Muscle
+from airmuscle.plant import Plant
+from airmuscle.simulate import simulate
+
+PICTURE = Path(__file__).parent / "images" / "tubes.png"
+DIAMETER, PRESSURE = 4e-3, 6e5
+LENGTHS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+SMALL, LARGE = "C = 0.26 dm³/(s bar)", "C = 1 dm³/(s bar)"
+VALVES = {SMALL: 2.6167e-9, LARGE: 1e-8}
+FINE = 40
+"""Pieces of the tube that judges."""
+
+
+def fill(tube: Tube | DistributedTube, conductance: float, duration: float = 0.6, spacing: float = 5e-4) -> Any:
+    """A muscle of 20 mm and 300 mm, held at 10 %, filled from 6 bar through a valve and a tube."""
+    braid = Braid(0.010, 0.426, 0.300)
+    valve = Valve(conductance, 0.433)
+    circuit = Line(FillDischarge(Supply(PRESSURE), valve, valve), tube)
+    plant = Plant(Muscle(VirtualWork(braid), braid), circuit, Isometric(0.1), Isothermal())
+    start = plant.state_at(pressure=0.0)
+    opened = Schedule({"fill": ((0.0, 1.0),)})
+    return simulate(plant, opened, duration=duration, start=start, method=Rodas4(1e-6), output=spacing)
+
+
+def lumped(length: float, pieces: int) -> Tube:
+    """The tube without inertia, by its size."""
+    return Tube.of_size(length, DIAMETER, pieces)
+
+
+def error(length: float, pieces: int, conductance: float, fine: int = FINE) -> float:
+    """The greatest error of the muscle's pressure, as a share of the supply's gauge pressure [1]."""
+    judge = fill(DistributedTube(length, DIAMETER, fine), conductance)
+    return float(np.abs(fill(lumped(length, pieces), conductance)["pressure"] - judge["pressure"]).max()) / PRESSURE
+
+
+def draw() -> Any:
+    """Left the flow into the muscle as it starts, right the error over the length."""
+    figure, (left, right) = new_figure(1, 2, width=9.0, height=3.4)
+    conductance = VALVES[LARGE]
+    courses = {
+        "with inertia, 40 pieces": DistributedTube(2.0, DIAMETER, FINE),
+        "lumped, 1 piece": lumped(2.0, 1),
+        "lumped, 5 pieces": lumped(2.0, 5),
+    }
+    for i, (name, tube) in enumerate(courses.items()):
+        run = fill(tube, conductance, 0.04, 2e-5)
+        left.plot(run["time"] * 1e3, run["mass_flow"] * 1e3, color=LINES[i], linestyle=DASHES[i], label=name)
+    left.axvline(2.0 / Isothermal().sound_speed(Air(1e5, 293.15)) * 1e3, color="0.5", linewidth=0.8, linestyle=":")
+    left.set(xlabel="time after the valve opened [ms]", ylabel="flow into the muscle [g/s]", xlim=(0, 40))
+    left.set_title(f"2 m of 4 mm behind a valve with {LARGE}; dotted: L/c")
+    left.legend(loc="upper left", bbox_to_anchor=(0.25, 0.5))
+    for i, (name, size) in enumerate(VALVES.items()):
+        for pieces, style in ((1, "-"), (5, "--")):
+            errors = [100 * error(length, pieces, size) for length in LENGTHS]
+            label = f"valve with {name}, {pieces} piece{'s' * (pieces > 1)}"
+            right.loglog(LENGTHS, errors, style, color=LINES[i], marker=MARKERS[i], label=label)
+    right.set(xlabel="length of the tube [m]", ylabel="greatest error of the pressure [% of supply]")
+    right.set_title("error of lumped tubes of 4 mm while a muscle fills")
+    right.set_ylim(0.05, 100)
+    right.set_yticks([0.1, 1, 10], ["0.1", "1", "10"])
+    right.legend(loc="upper left")
+    ticks = [0.25, 0.5, 1, 2, 4, 8]
+    right.set_xticks(ticks, [f"{t:g}" for t in ticks])
+    right.minorticks_off()
+    return figure
+
+
+if __name__ == "__main__":
+    save(draw(), PICTURE)
+    print(f"wrote {PICTURE}")

@@ -1,0 +1,108 @@
+"""One queue of work, all cores, and a user who may stop it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+PATIENCE = 2.0
+"""Seconds after which a bar is drawn, on a terminal."""
+
+
+def cores_here() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class Queue:
+    """Pieces of work that threads take one after the other; `stop` is a flag that kernels look at."""
+
+    def __init__(self, pieces: int) -> None:
+        self.stop: npt.NDArray[np.int64] = np.zeros(1, dtype=np.int64)
+        self.done = 0
+        self.error: BaseException | None = None
+        self._pieces = iter(range(pieces))
+        self._lock = threading.Lock()
+
+    def _take(self) -> int | None:
+        with self._lock:
+            return None if self.stop[0] else next(self._pieces, None)
+
+    def work(self, worker: Callable[[int], Any]) -> None:
+        """Take pieces until there are none, or until someone failed or stops it."""
+        try:
+            while (piece := self._take()) is not None:
+                worker(piece)
+                with self._lock:
+                    self.done += 1
+        except BaseException as error:
+            self.error = error
+            self.stop[0] = 1
+
+
+def shared_out(queue: Queue, workers: list[Callable[[int], Any]], advanced: Callable[[int], None]) -> bool:
+    """Let each worker run on a thread of its own until the queue is empty; whether it was not interrupted."""
+    threads = [threading.Thread(target=queue.work, args=(worker,), daemon=True) for worker in workers]
+    for thread in threads:
+        thread.start()
+    interrupted = False
+    try:
+        for thread in threads:
+            while thread.is_alive():
+                thread.join(0.05)
+                advanced(queue.done)
+    except KeyboardInterrupt:
+        interrupted = True
+        queue.stop[0] = 1
+        for thread in threads:
+            thread.join()
+    if queue.error is not None:
+        raise queue.error
+    return not interrupted
+
+
+@contextlib.contextmanager
+def progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
+    """A function that is told how many are done; it draws a bar on a terminal once that takes long."""
+    begun, bar = time.monotonic(), _Bar(what, total)
+
+    def advanced(done: int) -> None:
+        if time.monotonic() - begun > PATIENCE and sys.stderr.isatty():
+            bar.show(done)
+
+    try:
+        yield advanced
+    finally:
+        bar.close()
+
+
+class _Bar:
+    """A bar of rich, which is imported only when it is drawn."""
+
+    def __init__(self, what: str, total: int) -> None:
+        self.what, self.total = what, total
+        self._drawn: Any = None
+
+    def show(self, done: int) -> None:
+        from rich.console import Console
+        from rich.progress import Progress
+
+        if self._drawn is None:
+            self._drawn = Progress(console=Console(stderr=True), transient=True)
+            self._task = self._drawn.add_task(self.what, total=self.total)
+            self._drawn.start()
+        self._drawn.update(self._task, completed=done)
+
+    def close(self) -> None:
+        if self._drawn is not None:
+            self._drawn.stop()

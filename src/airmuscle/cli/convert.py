@@ -1,0 +1,145 @@
+"""`airmuscle convert`: one model into another, with the error that stays."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .fit_start import start_of
+from .options import Json, Name
+from .terminal import print_json, print_table
+
+if TYPE_CHECKING:
+    from ..characteristic.box import Box
+    from ..identify.convert import Conversion
+    from ..library.entry import Entry
+
+BANDS = 6
+"""Parts of the box, by pressure, whose errors are printed."""
+Model = Annotated[
+    str, typer.Argument(metavar="MODEL", help="The other law: ContractileSurface, Sarosi2012, or an entry made of it.")
+]
+Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Muscle file for the other law.")]
+Pressure = Annotated[str | None, typer.Option(metavar="QUANTITY", help="End of the box; else that of the muscle.")]
+Contraction = Annotated[str | None, typer.Option(metavar="QUANTITY", help="End of the box; else that of the muscle.")]
+
+
+def convert(
+    name: Name,
+    model: Model,
+    out: Out = None,
+    least_pressure: Pressure = None,
+    greatest_pressure: Pressure = None,
+    least_contraction: Contraction = None,
+    greatest_contraction: Contraction = None,
+    degree: Annotated[int, typer.Option(min=1, max=9, help="Total degree of a ContractileSurface.")] = 5,
+    json: Json = False,
+) -> None:
+    """Bring another model as near to a muscle's law as it comes, and say how near that is.
+
+    \b
+    Compared in force, where the first law pulls, over the box of the muscle or the one that you state.
+    With --out, FILE is a muscle with the other law and all other parts as they were.
+
+    \b
+    Examples:
+      airmuscle convert dmsp-20-300 ContractileSurface --degree 5 --out surface.toml
+      airmuscle convert fit/muscle.toml Sarosi2012 --greatest-pressure "5 bar"
+    """
+    from ..identify import convert as converted
+    from ..identify.convert import POINTS, on_grid
+    from ..library.catalogue import load, save
+
+    entry = load(name)
+    box = _box(entry, (least_pressure, greatest_pressure, least_contraction, greatest_contraction))
+    grid = on_grid(entry.characteristic, box, POINTS)
+    rest = getattr(entry.geometry, "resting_length", None)
+    start = start_of(model, [grid if rest is None else grid.with_constants(resting_length=rest)], degree, "MODEL")
+    found = converted(entry.characteristic, start.entry.characteristic, box)
+    if out is not None:
+        save(_changed(entry, found, box), out)
+    if json:
+        print_json(_as_data(found, box))
+        return
+    _print(entry, found, box)
+    if out is not None:
+        typer.echo(f"muscle: {out}")
+
+
+def _box(entry: Entry, given: tuple[str | None, str | None, str | None, str | None]) -> Box:
+    """The muscle's box, with the ends that were given put in."""
+    from ..characteristic.box import Box
+    from ..errors import ParameterError
+    from ..report.chart import box_of
+    from ..units import quantity
+
+    names = ("least_pressure", "greatest_pressure", "least_contraction", "greatest_contraction")
+    own = box_of(entry.characteristic, entry.box)
+    ends: dict[str, float] = {} if own is None else {name: getattr(own, name) for name in names}
+    for name, text, unit in zip(names, given, ("Pa", "Pa", "1", "1"), strict=True):
+        if text is not None:
+            ends[name] = quantity(text, unit, where=f"--{name.replace('_', '-')}")
+    lacking = [f"--{name.replace('_', '-')}" for name in names if name not in ends]
+    if lacking:
+        raise ParameterError(f"{entry.name} states no box to convert it on; give {', '.join(lacking)}.")
+    return Box(**ends)
+
+
+def _changed(entry: Entry, found: Conversion, box: Box) -> Entry:
+    """The muscle with the other law; its checks were of the first."""
+    import dataclasses
+
+    title = f"{type(found.model).__name__} in place of {type(entry.characteristic).__name__}: {entry.title}"
+    note = f"Converted from {entry.name}: {found}. {entry.note}".strip()
+    return dataclasses.replace(
+        entry, name="muscle", title=title, trust="fitted", note=note, characteristic=found.model, box=box, checks=()
+    )
+
+
+def _by_pressure(found: Conversion, box: Box) -> list[dict[str, float]]:
+    """Errors in parts of the box by pressure."""
+    import numpy as np
+
+    edges = np.linspace(*box.pressure, BANDS + 1)
+    rows = []
+    for low, high in itertools.pairwise(edges):
+        here = (found.judged["pressure"] >= low) & (found.judged["pressure"] <= high)
+        if here.any():
+            error, force = found.judged["error"][here], found.judged["force"][here]
+            rows.append({"least_pressure": float(low), "greatest_pressure": float(high),
+                         "rms": float(np.sqrt(np.mean(error**2))), "greatest": float(np.abs(error).max()),
+                         "greatest_force": float(force.max())})  # fmt: skip
+    return rows
+
+
+def _as_data(found: Conversion, box: Box) -> dict[str, Any]:
+    import dataclasses
+
+    from ..declare import leaves
+
+    return {
+        "model": type(found.model).__name__,
+        "parameters": {leaf.path: leaf.value for leaf in leaves(found.model)},
+        "box": dataclasses.asdict(box),
+        "rms": found.rms,
+        "greatest": found.greatest,
+        "greatest_at": {"pressure": found.pressure, "contraction": found.contraction},
+        "by_pressure": _by_pressure(found, box),
+    }
+
+
+def _print(entry: Entry, found: Conversion, box: Box) -> None:
+    (p0, p1), (c0, c1) = box.pressure, box.contraction
+    typer.echo(f"{entry.name}, {type(entry.characteristic).__name__}, over {p0 / 1e3:.4g} to {p1 / 1e3:.4g} kPa and "
+               f"{c0:.2%} to {c1:.2%}")  # fmt: skip
+    typer.echo(f"{found}\n")
+    rows = [
+        (f"{row['least_pressure'] / 1e3:.4g} to {row['greatest_pressure'] / 1e3:.4g}",
+         *(f"{row[key]:.4g}" for key in ("rms", "greatest", "greatest_force")))
+        for row in _by_pressure(found, box)
+    ]  # fmt: skip
+    heads = ("pressure [kPa]", "rms error [N]", "greatest error [N]", "greatest force [N]")
+    print_table(heads, rows, right=heads[1:])

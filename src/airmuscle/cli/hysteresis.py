@@ -1,0 +1,187 @@
+"""`airmuscle hysteresis`: friction from loops."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .bench_files import Files, Length, Surroundings, Units, measured
+from .options import Folder, Json, Map
+from .terminal import print_json, print_table
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..identify.hysteresis import HysteresisFit, LoopFit
+    from ..library.entry import Entry
+    from ..recording import Recording
+
+Muscle = Annotated[
+    str | None, typer.Option(metavar="NAME", help="The muscle that gets the friction: a library entry, a TOML file.")
+]
+Given = Annotated[
+    bool, typer.Option("--given", help="The muscle's own law, with an offset, is the curve without friction.")
+]
+Degree = Annotated[int, typer.Option(min=0, max=9, help="Degree of the curve without friction in what is swept.")]
+AllRows = Annotated[bool, typer.Option("--all-rows", help="Rows in which pressure or length move quickly count too.")]
+Elements = Annotated[int, typer.Option(min=1, max=30, help="Elements of MaxwellSlip and PrandtlIshlinskii.")]
+Creep = Annotated[bool, typer.Option("--creep", help="Also fit creep to the longest hold of every file.")]
+
+
+def hysteresis(
+    files: Files,
+    muscle: Muscle = None,
+    given: Given = False,
+    degree: Degree = 3,
+    all_rows: AllRows = False,
+    elements: Elements = 8,
+    creep: Creep = False,
+    out: Folder = Path("hysteresis"),
+    resting_length: Length = None,
+    ambient: Surroundings = None,
+    unit: Units = None,
+    mapping: Map = None,
+    json: Json = False,
+) -> None:
+    """Fit friction laws to inflating and deflating branches, and say whether the data justify any.
+
+    \b
+    Runs are told by what they hold; a second run at the same level judges the first.
+    Writes DIR/report.html, and DIR/muscle.toml where --muscle names one, else DIR/friction.toml,
+    if the data justify a friction that a plant can take.
+
+    \b
+    Examples:
+      airmuscle hysteresis loop1.csv loop2.csv --resting-length "200 mm" --out friction
+      airmuscle hysteresis loops/*.csv --muscle fit/muscle.toml --mapping rig.toml --creep
+    """
+    from ..identify.hysteresis import find_loops, fit_loop
+    from ..library.catalogue import load
+    from ..report.staged import refuse_unwritable
+
+    if given and muscle is None:
+        raise typer.BadParameter("--given takes the law of the muscle that --muscle names")
+    recordings = measured(files, unit, mapping=mapping, resting_length=resting_length, ambient=ambient)
+    entry = None if muscle is None else load(muscle)
+    law = entry.characteristic if entry is not None and given else None
+    loops = find_loops(recordings, characteristic=law, degree=degree, all_rows=all_rows)
+    refuse_unwritable(out)
+    said = None if json else lambda name: typer.echo(f"  {name}", err=True)
+    found = [fit_loop(loop, elements=elements, progress=said) for loop in loops]
+    crept = _creep(recordings) if creep else []
+    chosen = _chosen(found)
+    written = _write(found, crept, chosen, entry, out)
+    if json:
+        print_json({"loops": [_as_data(each) for each in found], "creep": crept, "written": str(written or "")})
+        return
+    _print(found, crept)
+    typer.echo(
+        f"{written.stem}: {written}" if written else "no friction to write: none that a plant takes is justified"
+    )
+    typer.echo(f"report: {out / 'report.html'}")
+
+
+def _chosen(found: Sequence[LoopFit]) -> HysteresisFit | None:
+    """The friction to write: that of the loop with most independent rows among those a plant can take."""
+    usable = [each.recommended for each in found if each.recommended is not None and each.enters_a_plant]
+    return max(usable, key=lambda fit: fit.effective_rows, default=None)
+
+
+def _creep(recordings: Sequence[Recording]) -> list[str]:
+    """What is to be said of creep in each recording's longest hold."""
+    from ..identify.hysteresis import fit_creep, holds
+
+    said = []
+    for recording in recordings:
+        found = max(holds(recording), key=lambda hold: len(hold.stretch), default=None)
+        if found is None:
+            said.append(f"{recording.origin}: pressure and load, or pressure and length, are never held for 12 rows.")
+            continue
+        rows = f"{found.stretch.start + 1} to {found.stretch.stop}"
+        verdict = fit_creep(recording.rows(found.stretch.rows), found.quantity).verdict
+        said.append(f"{recording.origin}, {found.quantity} in rows {rows}: {verdict}")
+    return said
+
+
+def _write(
+    found: Sequence[LoopFit], creep: Sequence[str], chosen: HysteresisFit | None, entry: Entry | None, out: Path
+) -> Path | None:
+    from ..library.catalogue import save
+    from ..library.write import part_lines
+    from ..report.hysteresis_chapter import hysteresis_chapters
+    from ..report.staged import staged
+    from ..report.write import fill
+
+    name = None if chosen is None else "friction.toml" if entry is None else "muscle.toml"
+    with staged(out) as place:
+        fill(place, hysteresis_chapters(found, creep), title="Friction")
+        if chosen is not None and entry is not None:
+            save(_with_friction(entry, chosen), place / "muscle.toml")
+        elif chosen is not None:
+            lines = [f"# {chosen.verdict}", *part_lines("friction", chosen.friction)]
+            (place / "friction.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return out / name if name else None
+
+
+def _with_friction(entry: Entry, chosen: HysteresisFit) -> Entry:
+    """The muscle with what was found; checks of the muscle without friction stay, being of its law."""
+    import dataclasses
+
+    note = f"{entry.note} Friction from {chosen.course.origin}: {chosen.verdict}".strip()
+    return dataclasses.replace(entry, name="muscle", friction=chosen.friction, note=note)
+
+
+def _print(found: Sequence[LoopFit], creep: Sequence[str]) -> None:
+    from ..report.hysteresis_chapter import counted
+
+    for each in found:
+        typer.echo(f"{each.loop.recording.origin}: {each.loop.in_words}. {counted(each.loop)}")
+        rows = [
+            (type(f.friction).__name__, f"{f.plain_rmse:.3g} to {f.rmse:.3g} N", _judge(f),
+             f"{f.aicc_gain:.3g}", f"{f.chance:.2g}", "yes" if f.justified else "no")
+            for f in each.fits
+        ]  # fmt: skip
+        heads = ("law", "rms error", "on second run", "AICc falls by", "by chance", "justified")
+        print_table(heads, rows, right=heads[3:5])
+        best = each.recommended
+        typer.echo(str(best) if best is not None else "The data justify no friction in this loop.")
+        if best is not None and not each.enters_a_plant:
+            typer.echo("note: friction on the pressure describes isometric loops only; it does not enter a plant.")
+        for name, why in each.failed.items():
+            typer.echo(f"note: {name} was not fitted: {why}")
+        typer.echo("")
+    for text in creep:
+        typer.echo(f"creep: {text}")
+
+
+def _judge(fit: HysteresisFit) -> str:
+    import math
+
+    return f"{fit.plain_repeat_rmse:.3g} to {fit.repeat_rmse:.3g} N" if math.isfinite(fit.repeat_rmse) else ""
+
+
+def _as_data(found: LoopFit) -> dict[str, Any]:
+    """A loop with its fits as plain data, all numbers SI."""
+    from ..declare import leaves
+
+    return {
+        "origin": found.loop.recording.origin,
+        "run": found.loop.run.kind.name,
+        "held": found.loop.run.column,
+        "value": found.loop.run.value,
+        "recommended": type(found.recommended.friction).__name__ if found.recommended else None,
+        "enters_a_plant": found.enters_a_plant,
+        "laws": [
+            {
+                "law": type(f.friction).__name__, "parameters": {p.path: p.value for p in leaves(f.friction)},
+                "rmse": f.rmse, "plain_rmse": f.plain_rmse, "gap": f.gap, "gap_left": f.gap_left,
+                "repeat_rmse": f.repeat_rmse, "plain_repeat_rmse": f.plain_repeat_rmse,
+                "repeatability": f.repeatability, "aicc_gain": f.aicc_gain, "chance": f.chance,
+                "justified": f.justified, "not_determined": list(f.unsettled),
+            }
+            for f in found.fits
+        ],
+        "failed": dict(found.failed),
+    }  # fmt: skip

@@ -1,0 +1,165 @@
+"""`airmuscle sweep`: many runs of one scenario."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .options import Folder, Json
+from .terminal import print_json, print_table
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from ..report.chapter import Table
+    from ..sweep import Study, StudyResult
+
+
+def sweep(
+    study: Annotated[
+        Path,
+        typer.Argument(metavar="STUDY.toml", help="A file with scenario, [vary], [design] and [outcome]."),
+    ],
+    out: Folder = Path("study"),
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=1024, help="Processes on this machine; all cores unless given.")
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A running Dask cluster instead: tcp://host:8786.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Run a study: a scenario many times, with numbers that vary on a grid or by chance.
+
+    \b
+    Writes DIR/results.csv (one row a run), DIR/report.html, DIR/figures/ and DIR/data/.
+    What is done is kept in DIR/chunks at once: after Ctrl-C or a kill the same command goes on from there, and
+    the result is the same to the last bit. A run that fails leaves its reason in results.csv.
+
+    \b
+    Examples:
+      airmuscle sweep examples/valve_study.toml --out study
+      airmuscle sweep study.toml --workers 8
+      airmuscle sweep study.toml --dask tcp://head-node:8786
+    """
+    from ..errors import InputError, SimulationError
+    from ..sweep import load_study
+    from ..sweep.chapter import write_study
+
+    if workers is not None and dask is not None:
+        raise InputError("--workers and --dask exclude each other: a Dask cluster has its own workers.")
+    result = _run(load_study(study), out, workers, dask)
+    page = write_study(result, out)
+    if json:
+        print_json(_as_data(result))
+    else:
+        _print(result)
+    if result.failed.size == len(result.study):
+        raise SimulationError(f"all {len(result.study)} runs failed; the first because: {result.reasons[0]}")
+    if not json:
+        typer.echo(f"results: {out / 'results.csv'}")
+        typer.echo(f"report: {page}")
+
+
+def _run(study: Study, out: Path, workers: int | None, dask: str | None) -> StudyResult:
+    """The study's result; when it ends early, a line says what is kept and how to go on."""
+    from ..errors import AirmuscleError
+    from ..sweep import run_study
+
+    done = 0
+
+    def remembered(now: int, of: int) -> None:
+        nonlocal done
+        done = now
+        show(now, of)
+
+    try:
+        with _bar(study.title) as show, _executor(study, workers, dask) as executor:
+            return run_study(study, out, executor, remembered)
+    except (AirmuscleError, KeyboardInterrupt):
+        if done:
+            kept = f"{done} of {len(study)} runs are kept in {out / 'chunks'}"
+            typer.echo(f"{kept}; the same command goes on from there", err=True)
+        raise
+
+
+def _executor(
+    study: Study, workers: int | None, dask: str | None
+) -> contextlib.AbstractContextManager[Executor | None]:
+    from ..sweep import dask_cluster, processes
+    from ..sweep.executors import cores_here
+
+    if dask is not None:
+        return dask_cluster(dask)
+    return processes(min(workers or cores_here(), len(study.chunks)))
+
+
+@contextlib.contextmanager
+def _bar(title: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar on stderr while the block lasts."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=None)
+        yield lambda done, of: bar.update(task, completed=done, total=of)
+
+
+def _print(result: StudyResult) -> None:
+    from ..sweep.chapter import reasons_table, sensitivity_table
+
+    study, indices = result.study, result.indices()
+    failed = f", {result.failed.size} failed" if result.failed.size else ""
+    typer.echo(f"{study.title}: {len(study)} runs{failed}, {study.design}")
+    if study.scalars:
+        _print_table(result.statistics())
+    if indices:
+        _print_table(sensitivity_table(study, indices))
+    if result.failed.size:
+        _print_table(reasons_table(result))
+
+
+def _print_table(table: Table) -> None:
+    from ..report.wording import number, rows
+
+    words = [tuple(value if isinstance(value, str) else _short(number(value)) for value in row) for row in rows(table)]
+    numeric = [h.strip() for h, values in table.columns.items() if not isinstance(next(iter(values)), str)]
+    print_table([header.strip() for header in table.columns], words, right=numeric)
+
+
+def _short(text: str) -> str:
+    """Four digits are enough beside each other."""
+    try:
+        return f"{float(text):.4g}" if "." in text or "e" in text else text
+    except ValueError:
+        return text
+
+
+def _as_data(result: StudyResult) -> dict[str, Any]:
+    study = result.study
+    statistics = result.statistics().columns if study.scalars else {}
+    indices = {
+        name: {
+            "first_order": found.first,
+            "first_order_interval": found.first_interval,
+            "total": found.total,
+            "total_interval": found.total_interval,
+        }
+        for name, found in result.indices().items()
+    }
+    return {
+        "title": study.title,
+        "runs": len(study),
+        "failed": int(result.failed.size),
+        "varied": [number.path for number in study.numbers],
+        "outcomes": {
+            name: {key: values[i] for key, values in statistics.items() if key != "outcome"}
+            for i, name in enumerate(study.scalars)
+        },
+        "sensitivities": indices,
+    }

@@ -1,0 +1,48 @@
+"""Holds: stretches in which pressure and load, or pressure and length, stay, so that what moves is creep."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...recording import Recording
+from ...recording.segment import Stretch, plateaus
+from ...recording.segment.runs import BAND
+from ...recording.segment.sensor import noise_of
+from ...recording.segment.stretch import level_stretches
+from ..loss import Array
+
+FEWEST = 12
+"""Rows that a fit of creep needs."""
+STILL = 5e-4
+"""Contraction within which a frame holds the length (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Hold:
+    """Rows of a hold, and which quantity creeps in it: the contraction under a load, the force at a length."""
+
+    stretch: Stretch
+    quantity: str
+
+
+def holds(recording: Recording) -> Iterator[Hold]:
+    """The holds of a recording among its plateaus of pressure; none without time."""
+    force, contraction = recording["force"], recording["contraction"]
+    for plateau in plateaus(recording):
+        if len(plateau.stretch) >= FEWEST and np.ptp(force[plateau.stretch.rows]) <= BAND * np.abs(force).max():
+            yield Hold(plateau.stretch, "contraction")
+            continue
+        for level in level_stretches(contraction, STILL, within=plateau.stretch):
+            still = _arrived(contraction, level)
+            if len(still) >= FEWEST:
+                yield Hold(still, "force")
+
+
+def _arrived(values: Array, level: Stretch) -> Stretch:
+    """The stretch without the rows on the way to its level and away from it."""
+    inside = values[level.rows]
+    near = np.flatnonzero(np.abs(inside - np.median(inside)) <= max(STILL / 10.0, 4.0 * noise_of(inside)))
+    return Stretch(level.start + int(near[0]), level.start + int(near[-1]) + 1) if near.size else Stretch(0, 0)

@@ -1,0 +1,50 @@
+"""What a row weighs: the inverse of its sensor's standard deviation, where recordings come from several rigs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import ColumnError
+from ..recording import Recording
+from ..recording.segment import sensors
+from .loss import Array
+
+APART = 2.0
+"""Ratio of neighbouring deviations from which on two sensors differ (chosen: one sensor's estimates scatter less)."""
+
+
+def deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
+    """The standard deviation [SI] of one reading in each recording; None where all readings weigh alike.
+
+    Noise and rounding count where every recording states its time; else rounding alone, since the order of other rows
+    is no history. Recordings whose deviations lie close together count as of one rig and share their median. None too
+    where a sensor shows neither noise nor resolution.
+    """
+    timed = all("time" in run.columns for run in runs)
+    try:
+        alone = np.array([_deviation(run, quantity, timed) for run in runs])
+    except ColumnError:
+        return None
+    if not alone.size or not (alone > 0).all():
+        return None
+    order = np.argsort(alone)
+    rigs = np.split(order, np.flatnonzero(alone[order][1:] > APART * alone[order][:-1]) + 1)
+    if len(rigs) < 2:
+        return None
+    found = np.empty(alone.size)
+    for rig in rigs:
+        found[rig] = np.median(alone[rig])
+    return found
+
+
+def _deviation(run: Recording, quantity: str, timed: bool) -> float:
+    """Of one recording's sensor; 0 where it shows nothing."""
+    values = run[quantity][np.isfinite(run[quantity])]
+    if not values.size:
+        return 0.0
+    sensor = sensors(Recording({quantity: values}, run.origin)).get(quantity)
+    if sensor is None:
+        return 0.0
+    return sensor.deviation if timed else float(sensor.resolution / np.sqrt(12.0))

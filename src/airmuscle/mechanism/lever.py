@@ -1,0 +1,82 @@
+"""A lever that muscles turn and a mass loads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from .. import ops
+from ..declare import model, parameter
+from ..errors import ParameterError
+from ..ops import Value
+from .base import Coordinate, Mechanism
+from .hanging_mass import STANDARD_GRAVITY
+
+
+@model
+class Lever(Mechanism):
+    """(J + m b^2) phi'' = sum F_i d(L0_i eps_i)/dphi - m g b cos phi - d phi'.
+
+        eps_i = 1 - sqrt((a_i cos phi - a_i)^2 + (h_i - a_i sin phi)^2)/L0_i,   h_i = L0_i (1 - eps_0i)
+
+    phi angle from the level, a_i arm at which muscle i pulls, with its other end straight above where that place is
+    when the lever is level; b arm of the mass m; J inertia of the lever itself, d viscous friction. A muscle on a
+    negative arm pulls the other way round. Muscles at rest (eps_0i = 0) or contracted when the lever is level.
+    """
+
+    arms: tuple[float, ...] = parameter("m", "a_i", "arm at which each muscle pulls", bounds=(-10.0, 10.0))
+    mass: float = parameter("kg", "m", "mass of the load", bounds=(0.0, 1e5))
+    load_arm: float = parameter("m", "b", "arm of the load", bounds=(-10.0, 10.0))
+    inertia: float = parameter("kg m^2", "J", "moment of inertia of the lever itself", bounds=(0.0, 1e4), default=0.0)
+    damping: float = parameter("N m s/rad", "d", "viscous friction of the bearing", bounds=(0.0, 1e5), default=0.0)
+    offsets: tuple[float, ...] = parameter(
+        "1", "eps_0i", "contraction of each muscle while the lever is level", bounds=(-0.5, 0.9), default=()
+    )
+    gravity: float = parameter(
+        "m/s^2", "g", "acceleration of gravity", bounds=(0.0, 20.0), fitted=False, default=STANDARD_GRAVITY
+    )
+
+    def check(self) -> None:
+        if not self.arms or len(self.offsets) not in (0, len(self.arms)):
+            raise ParameterError(
+                f"Lever: {len(self.arms)} arms and {len(self.offsets)} offsets; give an arm for every muscle, and "
+                "an offset for each or none."
+            )
+        if not self._total_inertia() > 0.0:
+            raise ParameterError("Lever: a lever without inertia and without a mass on its arm cannot move; give one.")
+
+    @property
+    def muscles(self) -> int | None:
+        return len(self.arms)
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        return (Coordinate("angle", "angular_speed", "rad", 0.05, 1.0, -0.5 * ops.pi, 0.5 * ops.pi),)
+
+    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+        aside, up = ops.cos(q["angle"]) - 1.0, ops.sin(q["angle"])
+        offsets = self.offsets or (0.0,) * len(self.arms)
+        found = []
+        for arm, offset, length in zip(self.arms, offsets, resting_lengths, strict=True):
+            height = length * (1.0 - offset)
+            found.append(1.0 - ops.sqrt((arm * aside) ** 2 + (height - arm * up) ** 2) / length)
+        return tuple(found)
+
+    def _total_inertia(self) -> Value:
+        return self.inertia + self.mass * self.load_arm**2
+
+    def acceleration(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> Mapping[str, Value]:
+        weight = self.mass * self.gravity * self.load_arm * ops.cos(q["angle"])
+        return {"angle": (pulls["angle"] - weight - self.damping * v["angular_speed"]) / self._total_inertia()}
+
+    def lost_power(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> Value:
+        return self.damping * v["angular_speed"] ** 2
+
+    def potential_energy(self, q: Mapping[str, Value]) -> Value:
+        return self.mass * self.gravity * self.load_arm * ops.sin(q["angle"])
+
+    def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
+        return 0.5 * self._total_inertia() * v["angular_speed"] ** 2

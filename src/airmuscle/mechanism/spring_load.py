@@ -1,0 +1,37 @@
+"""A mass on a spring and a damper."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ..declare import model, parameter
+from ..ops import Value
+from .translation import Translation
+
+
+@model
+class SpringLoad(Translation):
+    """m y'' = F - F_0 - k y - d y', with y from where the muscle has its resting length.
+
+    m mass, k stiffness, d damping, F_0 force of the spring at y = 0; a weight m g may be a part of it. All muscles
+    pull at the same place.
+    """
+
+    mass: float = parameter("kg", "m", "mass of the load", bounds=(1e-4, 1e5))
+    stiffness: float = parameter("N/m", "k", "stiffness of the spring", bounds=(0.0, 1e8))
+    damping: float = parameter("N s/m", "d", "damping coefficient of the load", bounds=(0.0, 1e6), default=0.0)
+    preload: float = parameter("N", "F_0", "force of the spring at position 0", bounds=(-1e6, 1e6), default=0.0)
+
+    def acceleration(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> Mapping[str, Value]:
+        held = self.preload + self.stiffness * q["position"] + self.damping * v["speed"]
+        return {"position": (pulls["position"] - held) / self.mass}
+
+    def lost_power(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> Value:
+        return self.damping * v["speed"] ** 2
+
+    def potential_energy(self, q: Mapping[str, Value]) -> Value:
+        return (self.preload + 0.5 * self.stiffness * q["position"]) * q["position"]

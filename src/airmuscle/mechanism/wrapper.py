@@ -1,0 +1,51 @@
+"""What stands around any mechanism and changes a part of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ..ops import Value
+from ..variables import Input
+from .base import Coordinate, Mechanism
+
+
+class Wrapper(Mechanism):
+    """All is the inner mechanism's, but what a wrapper says otherwise; it adds to the pulls, or to the contractions."""
+
+    inner: Mechanism
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        return self.inner.coordinates
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        return self.inner.inputs
+
+    @property
+    def muscles(self) -> int | None:
+        return self.inner.muscles
+
+    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+        return self.inner.contractions(q, resting_lengths)
+
+    def pulls(
+        self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
+    ) -> dict[str, Value]:
+        return self.inner.pulls(q, tensions, resting_lengths)
+
+    def acceleration(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> Mapping[str, Value]:
+        return self.inner.acceleration(q, v, pulls, inputs)
+
+    def lost_power(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> Value:
+        return self.inner.lost_power(q, v, pulls, inputs)
+
+    def potential_energy(self, q: Mapping[str, Value]) -> Value:
+        return self.inner.potential_energy(q)
+
+    def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
+        return self.inner.kinetic_energy(q, v)

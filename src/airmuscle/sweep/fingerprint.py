@@ -1,0 +1,51 @@
+"""The fingerprint of what results depend on: descriptions of models, and of the program that computes with them."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import json
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+NOT_COMPUTING = ("cli", "report", "reproduce", "studio", "export", "identify", "control")
+"""Parts of the program on which no run depends."""
+PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "casadi")
+
+
+def fingerprint(*things: Any) -> str:
+    """Sixty-four hexadecimal digits that change with anything in the things: numbers, texts, tables, models."""
+    text = json.dumps([_described(thing) for thing in things], ensure_ascii=False, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _described(thing: Any) -> Any:
+    """A thing in JSON's words, every bit of its numbers kept."""
+    if thing is None or isinstance(thing, bool | str | int):
+        return thing
+    if isinstance(thing, float):
+        return float(thing).hex()
+    if isinstance(thing, np.ndarray):
+        return [str(thing.dtype), thing.shape, hashlib.sha256(np.ascontiguousarray(thing).tobytes()).hexdigest()]
+    if isinstance(thing, Mapping):
+        return {"keys": [[_described(k), _described(v)] for k, v in thing.items()]}
+    if isinstance(thing, list | tuple):
+        return [_described(item) for item in thing]
+    if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
+        fields = {f.name: _described(getattr(thing, f.name)) for f in dataclasses.fields(thing)}
+        return [f"{type(thing).__module__}.{type(thing).__qualname__}", fields]
+    return repr(thing)  # a date of a TOML file; what no part of a scenario should be is told apart by its words
+
+
+@functools.cache
+def program() -> str:
+    """The fingerprint of this program: its version and its own files, and the versions of what computes for it."""
+    files = [p for p in sorted(ROOT.rglob("*.py")) if p.relative_to(ROOT).parts[0] not in NOT_COMPUTING]
+    contents = [(p.relative_to(ROOT).as_posix(), hashlib.sha256(p.read_bytes()).hexdigest()) for p in files]
+    return fingerprint(metadata.version("airmuscle"), contents, [(name, metadata.version(name)) for name in PACKAGES])

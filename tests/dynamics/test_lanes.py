@@ -1,0 +1,214 @@
+"""The lane printer is the scalar printer with another type: every operation in lanes means what it means in NumPy, also
+at zero, infinity and NaN; exp, log, pow, sin and cos, which have forms of their own, err by a unit of the last place at most."""
+
+from __future__ import annotations
+
+import ctypes
+
+import casadi
+import numpy as np
+import pytest
+
+from airmuscle.batch.side_by_side import aligned
+from airmuscle.errors import TraceError
+from airmuscle.program import elementary, llvm
+from airmuscle.program.instructions import MAXIMUM, MINIMUM, SELECT
+from airmuscle.program.numbers import Number
+from airmuscle.program.printed import Printer
+
+NUMBERS = {"16 doubles": Number(64, 16), "8 doubles": Number(64, 8), "32 singles": Number(32, 32)}
+WIDE = max(number.lanes for number in NUMBERS.values())
+ENDS = np.array(
+    [0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -3.0, 1e-300, 5e-324, 1e300, -1e300, 40.0, np.inf, -np.inf, np.nan, 3.0]
+)
+
+
+def run(number, expressions, *columns):
+    """The expressions of x, y, z at every row of the columns, computed in lanes; (rows, expressions)."""
+    symbols = casadi.SX.sym("x", len(columns))
+    printer = Printer(number)
+    outputs = casadi.vertcat(*expressions(*(symbols[i] for i in range(len(columns)))))
+    printer.add("f", {"x": symbols}, {"y": casadi.densify(outputs)})
+    parts = [elementary.definition(name, count, number) for name, count in printer.needed.items()]
+    text = "\n".join([elementary.declarations({number}), *parts, printer.module()])
+    return call(llvm.compiled(text), number, columns, outputs.numel())
+
+
+def call(engine, number, columns, results):
+    kind = np.float64 if number.bits == 64 else np.float32
+    x, y = aligned((len(columns), results), number.lanes, kind)
+    function = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(engine.get_function_address("f"))
+    size, found = len(columns[0]), []
+    for at in range(0, size, number.lanes):
+        rows = np.minimum(np.arange(at, at + number.lanes), size - 1)
+        for i, column in enumerate(columns):
+            x[i] = np.asarray(column)[rows]
+        function(x.ctypes.data, y.ctypes.data)
+        found.append(y.T.copy())
+    return np.concatenate(found)[:size]
+
+
+OPERATIONS = {
+    "sum, difference, product, quotient": (lambda x, y: [x + y, x - y, x * y, x / y], lambda x, y: [x + y, x - y, x * y, x / y]),
+    "negative, square, twice, inverse": (lambda x, y: [-x, x**2, 2 * x, 1 / y], lambda x, y: [-x, x * x, x + x, 1 / y]),
+    "root and size": (lambda x, y: [casadi.sqrt(x), casadi.fabs(y)], lambda x, y: [np.sqrt(x), np.abs(y)]),
+    "comparisons": (
+        lambda x, y: [x < y, x <= y, x == y, x != y, casadi.logic_not(x)],
+        lambda x, y: [x < y, x <= y, x == y, x != y, x == 0],
+    ),
+    "and, or": (
+        lambda x, y: [casadi.logic_and(x > 0, y > 0), casadi.logic_or(x > 0, y > 0)],
+        lambda x, y: [(x > 0) & (y > 0), (x > 0) | (y > 0)],
+    ),
+    "choices": (
+        lambda x, y: [casadi.if_else(x > y, x, y), casadi.if_else(x > 0, y, 0), casadi.if_else(x < y, x * 3, y - 1)],
+        lambda x, y: [np.where(x > y, x, y), np.where(x > 0, y, 0), np.where(x < y, x * 3, y - 1)],
+    ),
+    "masks of what is below or above zero": (
+        lambda x, y: [casadi.if_else(x >= 0, x, 0), casadi.if_else(x >= 0, 0, x), casadi.if_else(x <= 0, 0, x)],
+        lambda x, y: [np.where(x >= 0, x, 0), np.where(x >= 0, 0, x), np.where(x <= 0, 0, x)],
+    ),
+    "extremes": (
+        lambda x, y: [casadi.fmin(x, y), casadi.fmax(x, y), casadi.sign(x)],
+        lambda x, y: [np.where(x < y, x, y), np.where(x > y, x, y), np.where(x > 0, 1, np.where(x < 0, -1, 0))],
+    ),
+    "exponentials": (
+        lambda x, y: [casadi.exp(x), casadi.log(x), casadi.log1p(x), casadi.expm1(x)],
+        lambda x, y: [np.exp(x), np.log(x), np.log1p(x), np.expm1(x)],
+    ),
+    "angles": (
+        lambda x, y: [casadi.sin(x), casadi.cos(x), casadi.tan(x), casadi.atan(x), casadi.asin(x), casadi.acos(x)],
+        lambda x, y: [np.sin(x), np.cos(x), np.tan(x), np.arctan(x), np.arcsin(x), np.arccos(x)],
+    ),
+    "hyperbolics": (
+        lambda x, y: [casadi.sinh(x), casadi.cosh(x), casadi.tanh(x), casadi.asinh(x)],
+        lambda x, y: [np.sinh(x), np.cosh(x), np.tanh(x), np.arcsinh(x)],
+    ),
+    "powers": (
+        lambda x, y: [x**y, x**3, x**-2, x**0.5, x**-1.5, x**1.7, x**7.5, x**17],
+        lambda x, y: [np.power(x, y), *(np.power(x, k) for k in (3.0, -2.0, 0.5, -1.5, 1.7, 7.5, 17.0))],
+    ),
+}  # fmt: skip
+
+
+def arguments(kind, ordinary):
+    """Ordinary numbers in pairs and, unless only those are wanted, every pair of the ends."""
+    rng = np.random.default_rng(2)
+    x, y = rng.uniform(-3, 3, (2, 64))
+    if not ordinary:
+        with np.errstate(over="ignore"):
+            ends = np.unique(ENDS.astype(kind))
+        x, y = np.concatenate([x, np.repeat(ends, ends.size)]), np.concatenate([y, np.tile(ends, ends.size)])
+    return x.astype(kind), y.astype(kind)
+
+
+@pytest.mark.parametrize("number", NUMBERS.values(), ids=NUMBERS)
+@pytest.mark.parametrize("name", OPERATIONS)
+def test_an_operation_in_lanes_means_what_it_means_in_numpy(name, number):
+    """Constant powers that are products, and sums in the fast arithmetic, are held to ordinary numbers."""
+    kind, tolerance = (np.float64, 4e-15) if number.bits == 64 else (np.float32, 2e-6)
+    x, y = arguments(kind, ordinary=name == "powers")
+    if name == "powers":
+        x = np.abs(x) + kind(0.1)
+    symbolic, numeric = OPERATIONS[name]
+    with np.errstate(all="ignore"):
+        expected = np.column_stack([np.asarray(column, dtype=kind) for column in numeric(x, y)])
+    np.testing.assert_allclose(run(number, symbolic, x, y), expected, rtol=tolerance, atol=0)
+
+
+@pytest.mark.parametrize("number", NUMBERS.values(), ids=NUMBERS)
+def test_the_printers_own_operations_choose_lane_by_lane(number):
+    block = llvm.Block((), number)
+    a, b = block.load("x", 0), block.load("x", 1)
+    for i, (operation, operands) in enumerate(
+        [(MAXIMUM, (a, b)), (MINIMUM, (a, b)), (SELECT, (a, b, a)), (casadi.OP_ASSIGN, (b,)), (casadi.OP_AND, (a, b))]
+    ):
+        block.store("y", i, block.operate(operation, operands))
+    engine = llvm.compiled(llvm.function("f", ["x", "y"], block))
+    kind = np.float64 if number.bits == 64 else np.float32
+    x, y = (
+        column.astype(kind) for column in ([0.0, 1.0, 0.0, -2.0] * 5, np.arange(20.0)) for column in [np.array(column)]
+    )
+    found = call(engine, number, (x, y), 5)
+    expected = [np.maximum(x, y), np.minimum(x, y), np.where(x != 0, y, x), y, x * y]
+    np.testing.assert_array_equal(found, np.column_stack(expected))
+
+
+def test_an_unknown_operation_is_refused_in_lanes_too():
+    with pytest.raises(TraceError, match=r"CasADi operation \d+ has no printed form"):
+        run(NUMBERS["8 doubles"], lambda x: [casadi.erf(x)], [1.0])
+
+
+def units_of_last_place(found, exact):
+    """Errors against extended precision, where the result is an ordinary number."""
+    with np.errstate(all="ignore"):
+        usual = np.isfinite(found) & (np.abs(exact) > 1e-290) & (np.abs(exact) < 1e300)
+    return np.abs(found[usual] - exact[usual]) / np.spacing(np.abs(found[usual]))
+
+
+extended = pytest.mark.skipif(np.finfo(np.longdouble).nmant <= 52, reason="no extended precision to compare with")
+
+
+@extended
+def test_exp_errs_by_less_than_a_unit_over_its_whole_range():
+    x = np.concatenate([np.linspace(-745, 709.7, 40001), np.linspace(-1, 1, 20001), 10.0 ** np.linspace(-300, 0, 301)])
+    found = run(NUMBERS["16 doubles"], lambda x: [casadi.exp(x)], x)[:, 0]
+    assert units_of_last_place(found, np.exp(x.astype(np.longdouble))).max() < 0.9
+    tiny = np.exp(x.astype(np.longdouble)) < 1e-290
+    assert np.abs(found[tiny] - np.exp(x[tiny])).max() <= 1e-305
+    np.testing.assert_array_equal(
+        run(NUMBERS["16 doubles"], lambda x: [casadi.exp(x)], [710.0, 1e9, -746.0, -1e9, -0.0])[:, 0],
+        [np.inf, np.inf, 0.0, 0.0, 1.0],
+    )
+
+
+@extended
+def test_log_errs_by_less_than_a_unit_over_its_whole_range():
+    x = np.concatenate(
+        [10.0 ** np.linspace(-323, 308, 40001), 1 + np.linspace(-0.3, 0.42, 20001), [5e-324, 2.0**-1022]]
+    )
+    found = run(NUMBERS["16 doubles"], lambda x: [casadi.log(x)], x)[:, 0]
+    exact = np.log(x.astype(np.longdouble))
+    near = exact != 0
+    assert (np.abs(found[near] - exact[near]) / np.spacing(np.abs(found[near]))).max() < 0.51
+    np.testing.assert_array_equal(
+        run(NUMBERS["16 doubles"], lambda x: [casadi.log(x)], [0.0, -0.0, 1.0, -1.0, np.inf])[:, 0],
+        [-np.inf, -np.inf, 0.0, np.nan, np.inf],
+    )
+
+
+@extended
+def test_pow_errs_by_about_a_unit_over_its_whole_range():
+    rng = np.random.default_rng(4)
+    x = np.concatenate([10.0 ** rng.uniform(-300, 300, 40000), rng.uniform(0.5, 2, 40000)])
+    y = np.concatenate([rng.uniform(-1, 1, 40000), rng.uniform(-900, 900, 40000)])
+    found = run(NUMBERS["16 doubles"], lambda x, y: [x**y], x, y)[:, 0]
+    with np.errstate(all="ignore"):
+        exact = np.power(x.astype(np.longdouble), y.astype(np.longdouble))
+    assert units_of_last_place(found, exact).max() < 1.1
+
+
+@extended
+@pytest.mark.parametrize(("symbolic", "exact"), [(casadi.sin, np.sin), (casadi.cos, np.cos)], ids=["sin", "cos"])
+def test_sin_and_cos_err_by_less_than_a_unit(symbolic, exact):
+    """Also next to multiples of a quarter turn; what is large, infinite or NaN is left to the C library."""
+    quarters = np.arange(-600.0, 600.0) * np.pi / 2
+    x = np.concatenate(
+        [np.linspace(-10, 10, 40001), quarters, np.nextafter(quarters, 1e9), np.linspace(-9e5, 9e5, 40001)]
+    )
+    found = run(NUMBERS["16 doubles"], lambda x: [symbolic(x)], x)[:, 0]
+    reduced = exact(x.astype(np.longdouble))
+    assert units_of_last_place(found, reduced).max() < 0.85
+    x = np.array([0.0, -0.0, 1e-300, 1e7, -1e22, 1e300, np.inf, np.nan, 0.5])
+    with np.errstate(all="ignore"):
+        np.testing.assert_allclose(run(NUMBERS["16 doubles"], lambda x: [symbolic(x)], x)[:, 0], exact(x), rtol=2e-16)
+
+
+def test_pow_has_the_exceptions_of_ieee_754():
+    ends = np.concatenate([ENDS, [-2.5, -0.5, 1.5, -1.5, 2.0**53, -(2.0**53) - 2, 4.0, -4.0]])
+    x, y = np.repeat(ends, ends.size), np.tile(ends, ends.size)
+    found = run(NUMBERS["16 doubles"], lambda x, y: [x**y], x, y)[:, 0]
+    with np.errstate(all="ignore"):
+        expected = np.power(x, y)
+    np.testing.assert_allclose(found, expected, rtol=1e-14, atol=0)
+    np.testing.assert_array_equal(np.signbit(found[~np.isnan(expected)]), np.signbit(expected[~np.isnan(expected)]))

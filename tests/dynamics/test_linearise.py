@@ -1,0 +1,180 @@
+"""Near a state a plant is x' = A x + B u, y = C x + D u, with the exact derivatives of what is simulated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from joints import chosen_muscle, joint, joint_start
+from scipy.signal import lsim
+
+from airmuscle.circuit import (
+    ClosedChamber,
+    FillDischarge,
+    Follower,
+    Line,
+    ProportionalRegulator,
+    ProportionalValve,
+    Supply,
+    Tube,
+    Valve,
+)
+from airmuscle.command import Schedule
+from airmuscle.equilibrium import equilibrium
+from airmuscle.errors import AirmuscleError, ParameterError
+from airmuscle.friction import LuGre
+from airmuscle.gas import EnergyBalance, Isothermal
+from airmuscle.linearise import linearise
+from airmuscle.mechanism import AntagonisticJoint, HangingMass, SpringLoad
+from airmuscle.method import Rodas4
+from airmuscle.muscle import SeriesSpring
+from airmuscle.plant import Plant
+from airmuscle.program.prepared import prepared
+from airmuscle.simulate import simulate
+
+VALVE = Valve(2.6e-9, 0.433)
+LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))
+JOINT = AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12)
+PROPORTIONAL = ProportionalValve(Supply(6e5), VALVE, VALVE, Follower(50.0), muscles=2)
+HANGING = Plant(chosen_muscle(), FillDischarge(Supply(6e5), VALVE, VALVE), HangingMass(20.0))
+REGULATED = Plant(
+    replace(chosen_muscle(), series=SeriesSpring(5e4)),
+    Line(ProportionalRegulator(Supply(6e5), VALVE, VALVE, Follower(20.0)), Tube(Valve(1e-8, 0.2), 2e-5)),
+    SpringLoad(5.0, 2e3, 10.0, 40.0), EnergyBalance(0.5),
+)  # fmt: skip
+CASES = {
+    "hanging": (HANGING, {"fill": 0.3, "discharge": 0.1}),
+    "joint": (Plant((LEFT, RIGHT), PROPORTIONAL, JOINT, Isothermal()), {"command": 0.2}),
+    "regulated": (REGULATED, {"setpoint": 3.2e5}),
+    "friction": (
+        replace(HANGING, muscle=replace(chosen_muscle(), friction=LuGre(1e5, 300.0, 5.0, 10.0, 6.0, 0.01))),
+        {},
+    ),
+}
+
+
+def moving(plant, pressure=3e5):
+    """A state away from rest and from kinks."""
+    state = equilibrium(plant, pressure=pressure)
+    push = {"speed": 0.02, "angular_speed": 0.2, "spool": 0.1, "regulated": 8e3, "tube.air_mass": 1e-6, "bristle": 1e-6}
+    return {n: v + push.get(n, 0.0) for n, v in state.items()}
+
+
+@pytest.mark.parametrize(("plant", "inputs"), CASES.values(), ids=CASES)
+def test_the_matrices_are_the_slopes_of_rates_and_outputs(plant, inputs):
+    state = moving(plant)
+    found = linearise(plant, state, inputs)
+    ready = prepared(plant)
+    x, u = np.array([state[n] for n in found.states]), np.array([found.given[n] for n in found.inputs])
+    np.testing.assert_allclose(found.rates, ready.rates(x, u), rtol=1e-9, atol=1e-9)
+
+    def values(x, u):
+        named = dict(zip(found.states, map(float, x), strict=True)), dict(zip(found.inputs, map(float, u), strict=True))
+        further = {**named[0], **plant.outputs(*named)}
+        return np.concatenate([ready.rates(x, u), [float(further[n]) for n in found.outputs]])
+
+    whole = np.vstack([np.hstack([found.A, found.B]), np.hstack([found.C, found.D])])
+    sizes = [s.nominal for s in plant.states] + [1e5 if n == "setpoint" else 0.1 for n in found.inputs]
+    for i, size in enumerate(sizes):
+        h = 1e-5 * size * np.eye(len(sizes))[i]
+        n = len(x)
+        slope = (values(x + h[:n], u + h[n:]) - values(x - h[:n], u - h[n:])) / (2e-5 * size)
+        rows = np.abs(whole * sizes).max(axis=1) / size  # the greatest change of each row, by a change of this size
+        assert (np.abs(whole[:, i] - slope) <= 2e-5 * np.abs(slope) + 1e-8 * rows).all()
+
+
+def test_it_follows_a_small_step_of_the_simulated_plant():
+    """The error is of second order: half the step leaves a quarter of it."""
+    start, times = equilibrium(HANGING, pressure=3e5), np.linspace(0.0, 0.3, 61)
+    found = linearise(HANGING, start).part(("fill",), ("position", "pressure", "force"))
+    errors = []
+    for step in (4e-4, 2e-4):
+        command = Schedule({"fill": ((0.0, step),)})
+        run = simulate(HANGING, command, duration=0.3, start=start, output=times, method=Rodas4(1e-12))
+        _, linear, _ = lsim(found.to_scipy(), np.full((61, 1), step), times)
+        moved = np.column_stack([run[n] - run[n][0] for n in found.outputs])
+        assert moved[-1, 1] > 10.0
+        errors.append(np.abs(moved - linear).max(axis=0))
+        assert (errors[-1] < 2e-2 * np.abs(moved).max(axis=0)).all()
+    assert errors[1] / errors[0] == pytest.approx(0.25, rel=0.1)
+
+
+def test_a_hanging_mass_with_shut_valves_swings_with_its_shut_stiffness():
+    """Pole of m s^2 + d s + k/L0 = 0 with the damper of the muscle, and one at zero for the air that is shut in."""
+    plant = Plant(chosen_muscle(), ClosedChamber(), HangingMass(20.0), Isothermal())
+    state = equilibrium(plant, pressure=3e5)
+    found = linearise(plant, state)
+    stiff = found.stiffness.per_metre["muscle"].shut_valves
+    resting, first, second = found.poles
+    assert resting.value == 0
+    assert np.isnan(resting.damping_ratio)
+    assert first.frequency == pytest.approx(np.sqrt(stiff / 20.0) / (2 * np.pi), rel=1e-9)
+    assert first.damping_ratio == pytest.approx(150.0 / (2 * np.sqrt(stiff * 20.0)), rel=1e-9)
+    assert second.value == pytest.approx(first.value.conjugate())
+    assert stiff == found.stiffness.coordinates["position"].shut_valves
+
+
+def test_names_and_units_come_along():
+    plant, inputs = CASES["joint"]
+    found = linearise(plant, moving(plant), inputs)
+    assert found.states == tuple(s.name for s in plant.states)
+    assert found.outputs[: len(found.states)] == found.states
+    assert (found.inputs, found.given) == (("command",), {"command": 0.2})
+    assert {found.units[n] for n in ("left.pressure", "right.pressure")} == {"Pa"}
+    assert (found.units["angle"], found.units["angular_speed"], found.units["angular_acceleration"]) == (
+        "rad",
+        "rad/s",
+        "rad/s^2",
+    )
+    assert set(found.units) >= {*found.states, *found.inputs, *found.outputs}
+    assert repr(found).startswith("Linearised(6 states, inputs command, 17 outputs; poles ")
+
+
+def test_scipy_and_python_control_see_the_same_system():
+    plant, inputs = CASES["joint"]
+    found = linearise(plant, moving(plant), inputs).part(outputs=("angle", "left.pressure"))
+    frequencies = np.array([0.1, 1.0, 10.0])
+    response = found.response(frequencies)
+    assert response.shape == (3, 2, 1)
+    in_scipy = found.to_scipy()
+    for name in "ABCD":
+        np.testing.assert_array_equal(getattr(in_scipy, name), getattr(found, name))
+    control = pytest.importorskip("control")
+    system = found.to_control()
+    assert isinstance(system, control.StateSpace)
+    assert (system.input_labels, system.output_labels) == (["command"], ["angle", "left_pressure"])
+    np.testing.assert_allclose(system(2j * np.pi * 1.0)[:, 0], response[1, :, 0], rtol=1e-9)
+    assert sorted(system.poles(), key=abs)[-1] == pytest.approx(found.poles[-1].value, rel=1e-6)
+
+
+def test_without_python_control_the_error_says_what_to_do(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "control", None)
+    with pytest.raises(AirmuscleError, match=r"pip install control, or use to_scipy\(\)"):
+        linearise(HANGING, moving(HANGING)).to_control()
+
+
+def test_an_own_system_is_linearised_like_a_plant():
+    system = joint()
+    found = linearise(system, joint_start(system), {"left.fill": 0.5})
+    assert found.stiffness is None
+    assert found.A.shape == (6, 6)
+    assert found.units["left.force"] == "N"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda s: linearise(HANGING, {**s, "positon": 0.0}), "no state 'positon'.*Did you mean 'position'"),
+        (lambda s: linearise(HANGING, {"position": 0.0}), "the state lacks air_mass, speed"),
+        (lambda s: linearise(HANGING, {**s, "speed": float("nan")}), "must be finite"),
+        (lambda s: linearise(HANGING, s, {"fil": 1.0}), "no input 'fil'"),
+        (lambda s: linearise(HANGING, s, {"fill": 1.5}), "the input 'fill' is 1.5; allowed are 0 to 1"),
+        (lambda s: linearise(HANGING, s).part(outputs=("presure",)), "no output 'presure'.*Did you mean 'pressure'"),
+        (lambda s: linearise(HANGING, s).response([-1.0]), "must be finite and not negative"),
+        (lambda s: linearise(joint(), joint_start(joint()), {"fill": 1.0}), "no input 'fill'; there are left.fill"),
+    ],
+)
+def test_bad_input_is_refused(change, message):
+    with pytest.raises(ParameterError, match=message):
+        change(moving(HANGING))

@@ -1,0 +1,135 @@
+"""Two stiffnesses: at constant pressure, k_p = -dF/deps, and with shut valves, where the pressure follows the gas.
+
+polytropic:  dp/deps = -n p_abs/V dV/deps
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from joints import chosen_muscle
+
+from airmuscle.characteristic.virtual_work import VirtualWork
+from airmuscle.circuit import ClosedChamber
+from airmuscle.equilibrium import equilibrium
+from airmuscle.gas import HEAT_RATIO, EnergyBalance, Isothermal, Polytropic, absolute
+from airmuscle.geometry import Braid
+from airmuscle.mechanism import AntagonisticJoint, HangingMass, InSeries, Isometric, Lever, Prescribed
+from airmuscle.method import Rodas4
+from airmuscle.motion import follow
+from airmuscle.muscle import LinearSpring, Muscle, SeriesSpring
+from airmuscle.plant import Plant
+from airmuscle.simulate import simulate
+from airmuscle.stiffness import stiffness
+
+BRAID = Braid(0.01, 0.4363, 0.2)
+MUSCLE = Muscle(VirtualWork(BRAID), BRAID, LinearSpring(3000.0))
+"""Without a damper, so that a pull however quick shows the stiffness alone."""
+EXPONENTS = [(Isothermal(), 1.0), (Polytropic(1.2), 1.2), (EnergyBalance(0.0), HEAT_RATIO)]
+by_gas = pytest.mark.parametrize(("gas", "exponent"), EXPONENTS, ids=str)
+
+
+def pulled(gas, pressure=3e5, contraction=0.12):
+    """The tensions of a muscle that is slowly pulled by 0.5 mm on either side of a contraction, valves shut."""
+    plant = Plant(MUSCLE, ClosedChamber(), Prescribed(), gas)
+    middle, amplitude = contraction * 0.2, 5e-4
+    motion = follow([0.0, 2.0, 4.0], [middle + amplitude, middle, middle - amplitude])
+    start = plant.state_at(pressure=pressure, position=middle)
+    start |= {"position": middle + amplitude, "speed": 0.0}
+    if "internal_energy" in start:  # put there without heat, as its content in the middle is
+        before, after = (BRAID.volume(x / 0.2) for x in (middle, middle + amplitude))
+        start["internal_energy"] *= (before / after) ** (HEAT_RATIO - 1)
+    run = simulate(plant, motion.command, duration=4.0, start=start, method=Rodas4(1e-11), output=0.01)
+    return plant, run
+
+
+@by_gas
+def test_the_stiffness_with_shut_valves_is_that_of_a_simulated_pull(gas, exponent):
+    plant, run = pulled(gas)
+    state = plant.state_at(pressure=3e5, position=0.024)
+    found = stiffness(plant, state).muscles["muscle"]
+    near = np.abs(run["contraction"] - 0.12) < 1.3e-3
+    slope = np.polyfit(run["contraction"][near] - 0.12, run["force"][near], 3)[-2]
+    assert found.shut_valves == pytest.approx(-slope, rel=1e-5)
+    assert found.shut_valves > 1.2 * found.constant_pressure
+
+
+@by_gas
+@given(st.floats(2e5, 6e5), st.floats(0.0, 0.15))
+@settings(max_examples=20, deadline=None)
+def test_both_are_their_formulas(gas, exponent, pressure, contraction):
+    plant = Plant(MUSCLE, ClosedChamber(), Isometric(contraction), gas)
+    found = stiffness(plant, plant.state_at(pressure=pressure))
+    area, growth, volume = (
+        VirtualWork(BRAID).area(contraction),
+        BRAID.volume_growth(contraction),
+        BRAID.volume(contraction),
+    )
+    at_pressure = MUSCLE.stiffness(pressure, contraction)
+    following = area * exponent * absolute(pressure, plant.ambient) / volume * growth
+    assert found.muscles["muscle"].constant_pressure == pytest.approx(at_pressure, rel=1e-9)
+    assert found.muscles["muscle"].shut_valves == pytest.approx(at_pressure + following, rel=1e-9)
+    assert found.per_metre["muscle"] == pytest.approx([k / 0.2 for k in found.muscles["muscle"]])
+    assert found.coordinates == {}
+
+
+def test_a_series_spring_stands_in_series():
+    """Against the static tension of the whole at two contractions, with the same air."""
+    muscle = replace(chosen_muscle(), series=SeriesSpring(4e4))
+    gas, h = Polytropic(1.2), 1e-6
+    middle = Plant(muscle, ClosedChamber(), Isometric(0.1), gas)
+    state = middle.state_at(pressure=2e5)
+    found = stiffness(middle, state).muscles["muscle"]
+
+    def tension(contraction, **air):
+        plant = replace(middle, mechanism=Isometric(contraction))
+        return plant.outputs(equilibrium(plant, **air), {})["force"]
+
+    for expected, air in (
+        (found.constant_pressure, {"pressure": 2e5}),
+        (found.shut_valves, {"air_mass": state["air_mass"]}),
+    ):
+        slope = (tension(0.1 + h, **air) - tension(0.1 - h, **air)) / (2 * h)
+        assert expected == pytest.approx(-slope, rel=1e-5)
+    rigid = stiffness(
+        replace(middle, muscle=chosen_muscle()),
+        Plant(chosen_muscle(), ClosedChamber(), Isometric(0.1), gas).state_at(pressure=2e5),
+    )
+    assert found.constant_pressure < rigid.muscles["muscle"].constant_pressure
+
+
+@pytest.mark.parametrize(
+    "mechanism",
+    [
+        AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12),
+        Lever((0.05, 0.04), 4.0, 0.3, offsets=(0.1, 0.12)),
+        InSeries(HangingMass(5.0), (0.2,)),
+    ],
+    ids=lambda m: type(m).__name__,
+)
+@pytest.mark.parametrize("gas", [Isothermal(), Polytropic(1.2)], ids=repr)
+def test_that_of_a_coordinate_is_the_slope_of_the_pull_with_the_same_air(mechanism, gas):
+    muscles = tuple(replace(MUSCLE, name=name) for name in ("left", "right"))
+    plant = Plant(muscles, (ClosedChamber(), ClosedChamber()), mechanism, gas)
+    place = {c.name: 0.05 * (i + 1) * 10 * c.nominal for i, c in enumerate(mechanism.coordinates)}
+    state = plant.state_at(pressure=(3e5, 2e5), **place)
+    found = stiffness(plant, state).coordinates
+    assert set(found) == set(place)
+    for c in mechanism.coordinates:
+        h, pulls = 1e-6 * c.nominal, []
+        for sign in (1, -1):
+            moved = {**state, c.name: state[c.name] + sign * h}
+            tensions = [float(port.tension) for port in plant.ports(moved)]
+            pulls.append(mechanism.pulls(moved, tensions, plant.resting_lengths)[c.name])
+        assert found[c.name].shut_valves == pytest.approx(-(pulls[0] - pulls[1]) / (2 * h), rel=1e-5)
+        assert found[c.name].shut_valves > found[c.name].constant_pressure
+
+
+def test_a_slack_muscle_has_none():
+    plant = Plant(MUSCLE, ClosedChamber(), Isometric(0.3), Isothermal())
+    found = stiffness(plant, plant.state_at(pressure=1e3)).muscles["muscle"]
+    assert found == (0.0, 0.0)

@@ -1,0 +1,108 @@
+"""Levenberg-Marquardt within bounds ends where the sum of squares has no slope that a bound does not hold: where SciPy's
+trf ends too. Starts found by Newton's method meet their conditions exactly.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from airmuscle.identify.dynamic.descent import descended, step_within
+
+FREE = np.full(2, -np.inf), np.full(2, np.inf)
+
+
+def rosenbrock(x):
+    """Minimum 0 at (1, 1), at the end of a curved valley."""
+    return np.array([10 * (x[1] - x[0] ** 2), 1 - x[0]]), np.array([[-20 * x[0], 10.0], [-1.0, 0.0]])
+
+
+def decay(x, t=np.linspace(0, 3, 40)):
+    """Two rates that are hard to tell apart, and noise: the sum of squares does not vanish."""
+    noise = 1e-2 * np.random.default_rng(1).standard_normal(t.size)
+    first, second = np.exp(-x[0] * t), np.exp(-x[1] * t)
+    measured = np.exp(-t) + np.exp(-2.5 * t) + noise
+    return first + second - measured, np.column_stack([-t * first, -t * second])
+
+
+def valley(x):
+    """Only the sum counts: every point of a line is as good."""
+    return np.array([x[0] + x[1] - 3.0, 2 * (x[0] + x[1]) - 6.5]), np.array([[1.0, 1.0], [2.0, 2.0]])
+
+
+@pytest.mark.parametrize("begin", [(-1.2, 1.0), (3.0, -2.0), (0.1, 0.1)])
+def test_a_curved_valley_is_followed_to_its_end(begin):
+    found, cost, _ = descended(rosenbrock, np.array(begin), *FREE, 200)
+    np.testing.assert_allclose(found, [1.0, 1.0], atol=1e-8)
+    assert cost < 1e-16
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(-np.inf, np.inf), (0.0, 2.0), (1.2, 2.0), (0.0, 0.8)], ids=["free", "one", "both", "other"]
+)
+def test_the_optimum_is_that_of_trf(low, high):
+    """With no bound, one, or both unknowns on a bound."""
+    begin, ends = np.array([1.4, 1.5]).clip(low, high), (np.full(2, low), np.full(2, high))
+    asked = []
+
+    def counted(x):
+        asked.append(x)
+        return decay(x)
+
+    found, cost, ended = descended(counted, begin, *ends, 200)
+    assert ended
+    assert len(asked) <= 12
+    expected = least_squares(
+        lambda x: decay(x)[0], begin, lambda x: decay(x)[1], ends, ftol=1e-14, xtol=1e-14, gtol=1e-14
+    )
+    np.testing.assert_allclose(found, expected.x, atol=3e-5)
+    assert cost == pytest.approx(2 * expected.cost, rel=1e-8)
+
+
+def test_what_is_not_determined_does_not_hinder():
+    found, cost, _ = descended(valley, np.array([5.0, -1.0]), *FREE, 100)
+    assert found.sum() == pytest.approx(3.2)
+    assert cost == pytest.approx(0.05)
+
+
+def test_a_place_that_cannot_be_run_is_gone_round():
+    """exp(x) = 1 from x = -2, where nothing beyond 0.01 can be run: a step leads to 0.017."""
+    asked = []
+
+    def residuals(x):
+        asked.append(float(x[0]))
+        return (np.exp(x) - 1, np.exp(x)[:, None]) if x[0] < 0.01 else None
+
+    found, cost, _ = descended(residuals, np.array([-2.0]), np.array([-9.0]), np.array([9.0]), 200)
+    assert found[0] == pytest.approx(0.0, abs=1e-8)
+    assert cost < 1e-16
+    assert max(asked) > 0.01
+    assert descended(residuals, np.array([2.0]), np.array([-9.0]), np.array([9.0]), 200)[1] == np.inf
+
+
+def test_no_more_is_asked_than_allowed():
+    asked = []
+
+    def counted(x):
+        asked.append(x)
+        return rosenbrock(x)
+
+    assert not descended(counted, np.array([-1.2, 1.0]), *FREE, 5).ended
+    assert len(asked) == 5
+
+
+def test_a_step_onto_a_bound_is_the_best_within_it():
+    """Of a quadratic of three unknowns: what a bound stops stands on it, and the others have no slope there."""
+    rng = np.random.default_rng(3)
+    a = rng.standard_normal((8, 3))
+    normal, gradient, x = a.T @ a, a.T @ rng.standard_normal(8), np.zeros(3)
+    whole = np.linalg.solve(normal, -gradient)
+    low, high = np.full(3, -9.0), np.full(3, 9.0)
+    high[np.argmax(np.abs(whole))] = low[np.argmax(np.abs(whole))] = 0.3 * whole[np.argmax(np.abs(whole))]
+    low, high = np.where(whole < 0, low, -9.0), np.where(whole < 0, 9.0, high)
+    found = step_within(normal, gradient, np.zeros(3), x, low, high)
+    held = np.argmax(np.abs(whole))
+    assert found[held] == pytest.approx(0.3 * whole[held])
+    np.testing.assert_allclose(np.delete(gradient + normal @ found, held), 0.0, atol=1e-12)
+    assert abs((gradient + normal @ found)[held]) > 0.1

@@ -1,0 +1,89 @@
+"""`airmuscle convert` brings one law near another, and the error it prints is the one between the two files.
+
+A law that holds the other gives it back; a box that is not known is asked for; other parts of the muscle stay.
+"""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from airmuscle.cli.app import app
+from airmuscle.library.catalogue import load
+
+MUSCLE = "dmsp-20-300"
+
+
+def airmuscle(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
+
+
+def test_the_printed_error_is_that_between_the_two_files(tmp_path):
+    result = airmuscle("convert", MUSCLE, "ContractileSurface", "--degree", 3, "--out", tmp_path / "m.toml", "--json")
+    assert result.exit_code == 0, result.stderr
+    said = json.loads(result.stdout)
+    first, second = load(MUSCLE), load(tmp_path / "m.toml")
+    assert (second.geometry, second.damper, second.checks) == (first.geometry, first.damper, ())
+    grid = [
+        g.ravel() for g in np.meshgrid(np.linspace(*first.box.pressure, 90), np.linspace(*first.box.contraction, 90))
+    ]
+    force = first.characteristic.force(*grid)
+    error = (second.characteristic.force(*grid) - force)[force > 0]
+    assert said["rms"] == pytest.approx(np.sqrt(np.mean(error**2)), rel=0.15)
+    assert abs(said["greatest"]) == pytest.approx(np.abs(error).max(), rel=0.15)
+    assert max(row["greatest"] for row in said["by_pressure"]) == pytest.approx(abs(said["greatest"]))
+    together = np.sqrt(np.mean([row["rms"] ** 2 for row in said["by_pressure"]]))
+    assert together == pytest.approx(said["rms"], rel=0.15)
+
+
+def test_a_law_that_holds_the_other_gives_it_back(tmp_path):
+    airmuscle("convert", "chou-hannaford", "ContractileSurface", "--degree", 3, "--out", tmp_path / "surface.toml")
+    result = airmuscle("convert", tmp_path / "surface.toml", "ChouHannaford1996", "--json")
+    said = json.loads(result.stdout)
+    assert said["rms"] < 1e-6
+    before = load("chou-hannaford").characteristic
+    assert said["parameters"]["geometry.braid_angle"] == pytest.approx(before.geometry.braid_angle, rel=1e-4)
+
+
+def test_a_stated_end_takes_the_place_of_the_muscles(tmp_path):
+    wide = json.loads(airmuscle("convert", MUSCLE, "Sarosi2012", "--json").stdout)
+    narrow = json.loads(
+        airmuscle(
+            "convert", MUSCLE, "Sarosi2012", "--least-pressure", "3 bar", "--greatest-contraction", "15 %", "--json"
+        ).stdout
+    )
+    assert narrow["box"]["least_pressure"] == 3e5
+    assert narrow["box"]["greatest_contraction"] == 0.15
+    assert narrow["rms"] < 0.5 * wide["rms"]
+
+
+def test_the_table_is_printed(tmp_path):
+    said = airmuscle("convert", MUSCLE, "ContractileSurface", "--degree", 2, "--out", tmp_path / "m.toml").stdout
+    assert "MartensBoblan2017, over 35 to 675 kPa and 1.33% to 26.00%" in said
+    assert "greatest error [N]" in said
+    assert said.splitlines()[-1] == f"muscle: {tmp_path / 'm.toml'}"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("borzikova-exponential", "ContractileSurface"), "states no box to convert it on; give --least-pressure, "),
+        ((MUSCLE, "ContractileSurfac"), "no library entry 'ContractileSurfac'"),
+        ((MUSCLE, "Saga2007"), "MODEL: Saga2007 needs values to start from"),
+        ((MUSCLE, "hunt"), "has no force at"),
+        ((MUSCLE, "ContractileSurface", "--least-pressure", "7 bar"), "must lie below greatest_pressure"),
+        (
+            (MUSCLE, "ContractileSurface", "--least-contraction", "25.9 %", "--greatest-pressure", "1 bar"),
+            "nothing to c",
+        ),
+        ((MUSCLE, "ContractileSurface", "--least-pressure", "7 mm"), "--least-pressure: unit 'mm' cannot become 'Pa'"),
+    ],
+)
+def test_what_cannot_be_converted_is_refused(arguments, message, tmp_path):
+    result = airmuscle("convert", *arguments, "--out", tmp_path / "m.toml")
+    assert result.exit_code == 1
+    assert message in result.stderr
+    assert not list(tmp_path.iterdir())

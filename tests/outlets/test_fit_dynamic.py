@@ -1,0 +1,297 @@
+"""A dynamic fit from a file: what a simulated record was made with is found, printed, drawn and written as a scenario.
+
+What the records cannot tell is named with the experiment that would; a study that cannot be is refused by its place.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from airmuscle.cli.app import app
+from airmuscle.declare import leaves
+from airmuscle.dynamic_study import load_study
+from airmuscle.identify.dynamic import StartTime, StartValue
+from airmuscle.library.scenario import load_scenario
+from airmuscle.mechanism import HangingMass
+from airmuscle.recording import Recording, read_csv
+from airmuscle.recording.write_csv import write_csv
+
+PLANT = """
+[plant]
+gas = {{ model = "Polytropic", exponent = {exponent} }}
+[plant.muscle]
+library = "dmsp-20-300"
+damper = {{ model = "LinearDamper", damping = {damping} }}
+[plant.circuit]
+model = "FillDischarge"
+supply = {{ model = "Supply", pressure = "5 bar" }}
+fill = {{ model = "Valve", conductance = {conductance}, critical_ratio = 0.3 }}
+discharge = {{ model = "Valve", conductance = {conductance}, critical_ratio = 0.3 }}
+[plant.mechanism]
+model = "HangingMass"
+mass = "10 kg"
+[command]
+fill = [["0.1 s", 1], ["1 s", 0]]
+discharge = [["1.3 s", 1]]
+"""
+TRUE = {"exponent": 1.25, "damping": 200.0, "conductance": 3e-9}
+START = {"exponent": 1.1, "damping": 100.0, "conductance": 4e-9}
+RUN = '[run]\nduration = "2 s"\noutput = "10 ms"\nstart = { pressure = "0.6 bar" }\n'
+VALVES = '["circuit.fill.conductance", "circuit.discharge.conductance"]'
+ASKED = f"""
+[observed]
+pressure = "500 Pa"
+position = {{ deviation = "50 um", column = "height" }}
+[fit]
+free = [{VALVES}, "gas.exponent", "muscle.damper.damping"]
+own = ["circuit.supply.pressure"]
+start_time = "50 ms"
+starts = 2
+[fit.bounds]
+"gas.exponent" = [1.01, 1.4]
+"""
+RECORD = '[[record]]\nfile = "{}"\nstart_time = "0.2 s"\nstart = {{ pressure = "0.6 bar" }}\n'
+
+
+def airmuscle(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """Two noisy records of one plant, begun 13 ms after and 4 ms before what the study says."""
+    place = tmp_path_factory.mktemp("study")
+    (place / "truth.toml").write_text(PLANT.format(**TRUE) + RUN, encoding="utf-8")
+    rng = np.random.default_rng(1)
+    for name, shift in (("run1", 0.213), ("run2", 0.196)):
+        run = load_scenario(place / "truth.toml").simulate()
+        noise = rng.standard_normal((2, len(run)))
+        columns = {"time": run["time"] + shift, "pressure": run["pressure"] + 500.0 * noise[0]}
+        write_csv(Recording({**columns, "height": run["position"] + 5e-5 * noise[1]}, name), place / f"{name}.csv")
+    study = PLANT.format(**START) + ASKED + RECORD.format("run1.csv") + RECORD.format("run2.csv")
+    (place / "study.toml").write_text(study, encoding="utf-8")
+    return place
+
+
+def variant(folder: Path, **changes: str) -> Path:
+    """The study with pieces of its text replaced, in a file of its own beside the records."""
+    text = (folder / "study.toml").read_text(encoding="utf-8")
+    for was, becomes in changes.values():
+        assert was in text
+        text = text.replace(was, becomes)
+    path = folder / "variant.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_what_the_records_were_made_with_is_found_written_and_simulated(folder, tmp_path):
+    out = tmp_path / "out"
+    result = airmuscle("fit-dynamic", folder / "study.toml", "--profile", "gas.exponent", "--out", out, "--json")
+    assert result.exit_code == 0, result.stderr
+    said = json.loads(result.stdout)
+    found = {e["name"]: (e["value"], e["deviation"]) for e in said["parameters"]}
+    for name, true in (
+        ("circuit.fill.conductance", 3e-9), ("gas.exponent", 1.25), ("muscle.damper.damping", 200.0),
+        ("circuit.supply.pressure of record 2", 5e5), ("start time of record 1", 0.213),
+        ("start time of record 2", 0.196),
+    ):  # fmt: skip
+        value, deviation = found[name]
+        assert abs(value - true) < 3.5 * deviation, name
+    low, high = said["profiles"]["gas.exponent"]["interval"]
+    value, deviation = found["gas.exponent"]
+    assert (low, high) == pytest.approx((value - 1.96 * deviation, value + 1.96 * deviation), abs=0.15 * deviation)
+    assert said["records"][0]["rms"]["position"] == pytest.approx(5e-5, rel=0.15)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert all(word in page for word in ("Record 2: run2.csv", "Profiles", "it may be shorter than the dynamics"))
+    assert {"record-1.svg", "record-2.png", "profiles.svg"} <= {p.name for p in (out / "figures").iterdir()}
+    again = load_scenario(out / "scenario-1.toml")
+    assert again.start["position"] == pytest.approx(load_scenario(folder / "truth.toml").start["position"], abs=1e-5)
+    written = {leaf.path: leaf.value for leaf in leaves(again.plant)}
+    assert written["circuit.discharge.conductance"] == found["circuit.fill.conductance"][0]
+    assert written["circuit.supply.pressure"] == found["circuit.supply.pressure of record 1"][0]
+    run = again.simulate()
+    measured = read_csv(folder / "run1.csv")
+    height = np.interp(measured["time"] - found["start time of record 1"][0], run["time"], run["position"])
+    assert np.sqrt(np.mean((height - measured["height"]) ** 2)) == pytest.approx(5e-5, rel=0.2)
+
+
+def test_what_cannot_be_told_apart_is_printed_with_its_experiment(folder, tmp_path):
+    path = variant(
+        folder, held=('"HangingMass"\nmass = "10 kg"', '"Isometric"\ncontraction = 0.05'),
+        free=(f'free = [{VALVES}, "gas.exponent", "muscle.damper.damping"]',
+              f'free = [{VALVES}, "muscle.geometry.resting_length"]'),
+        bounds=('[fit.bounds]\n"gas.exponent" = [1.01, 1.4]\n', ""),
+        observed=('position = { deviation = "50 um", column = "height" }\n', ""),
+        one=(RECORD.format("run2.csv"), ""),
+    )  # fmt: skip
+    result = airmuscle("fit-dynamic", path, "--profile", "weak", "--points", 2, "--starts", 1, "--out", tmp_path / "o")
+    assert result.exit_code == 0, result.stderr
+    assert "rigid vessel of known volume" in result.stdout
+    assert "muscle.geometry.resting_length [m], 95 % from" in result.stdout
+    assert "What the records do not determine" in (tmp_path / "o" / "report.html").read_text(encoding="utf-8")
+    assert (tmp_path / "o" / "scenario.toml").exists()
+
+
+def test_a_study_says_what_it_was_told(folder):
+    path = variant(
+        folder, start=('start_time = "50 ms"', 'start_time = "50 ms"\nstart = { pressure = "2 kPa" }\nseed = 3'),
+        method=("starts = 2", 'starts = 2\nmethod = { model = "Rodas4", rtol = 1e-7 }'),
+        load=(RECORD.format("run2.csv"),
+              '[[record]]\nfile = "run2.csv"\nfirst = "0.3 s"\nlast = "1 s"\n[record.command]\nfill = [[0, 1]]\n'
+              '[record.plant.mechanism]\nmodel = "HangingMass"\nmass = "12 kg"\n'),
+    )  # fmt: skip
+    study = load_study(path)
+    first, second = study.experiments
+    assert study.own == ("circuit.supply.pressure", StartTime(0.05), StartValue("pressure", 2e3))
+    assert (study.seed, study.starts, study.bounds) == (3, 2, {"gas.exponent": (1.01, 1.4)})
+    assert study.method.rtol == 1e-7
+    assert study.observed == pytest.approx({"pressure": 500.0, "position": 5e-5})
+    assert (first.plant.mechanism, second.plant.mechanism) == (HangingMass(10.0), HangingMass(12.0))
+    assert (second.recording["time"].min(), second.recording["time"].max()) == pytest.approx((0.3, 1.0), abs=0.011)
+    assert second.start.known["pressure"] == pytest.approx(np.median(second.recording["pressure"][:3]))
+    assert first.start.known["pressure"] == 6e4
+    assert second.command.segments(("fill", "discharge"), 0.0, 1.0).values.tolist() == [[1.0, 0.0]]
+
+
+UNLOADED = """
+[plant]
+[plant.muscle.contractile]
+model = "VirtualWork"
+geometry = { model = "Vessel", enclosed_volume = "100 mL" }
+[plant.muscle]
+geometry = { model = "Vessel", enclosed_volume = "100 mL" }
+wall = { model = "SwellingWall", growth_volume = 1e-4, middle = "150 kPa", breadth = "50 kPa", lag = "0.2 s" }
+[plant.circuit]
+model = "Line"
+[plant.circuit.circuit]
+model = "FillDischarge"
+supply = { model = "Supply", pressure = "6 bar" }
+fill = { model = "Valve", conductance = 5e-10, critical_ratio = 0.4 }
+discharge = { model = "Valve", conductance = 0.0, critical_ratio = 0.3 }
+[plant.circuit.tube]
+model = "Tube"
+volume = 2e-5
+orifice = { model = "Valve", conductance = 1.3e-9, critical_ratio = 0.3 }
+[plant.mechanism]
+model = "Isometric"
+contraction = 0.0
+[command]
+fill = [[0, 1]]
+[observed]
+"tube.pressure" = { deviation = "500 Pa", column = "pressure" }
+[fit]
+free = ["circuit.circuit.fill.conductance"]
+[[record]]
+file = "run1.csv"
+"""
+
+
+def test_an_unloaded_muscle_behind_a_tube_is_fitted_and_written_too(folder, tmp_path):
+    (folder / "fill.toml").write_text(UNLOADED, encoding="utf-8")
+    study = load_study(folder / "fill.toml")
+    (experiment,) = study.experiments
+    assert experiment.start.known["pressure"] == pytest.approx(np.median(experiment.recording["pressure"][:3]))
+    result = airmuscle("fit-dynamic", folder / "fill.toml", "--out", tmp_path / "out", "--json")
+    assert result.exit_code == 0, result.stderr
+    (found,) = json.loads(result.stdout)["parameters"]
+    plant = load_scenario(tmp_path / "out" / "scenario.toml").plant
+    assert plant.circuit.circuit.fill.conductance == found["value"]
+    assert plant.muscle.wall == study.plant.muscle.wall
+
+
+def test_a_command_may_stand_in_a_file_and_is_found_from_the_written_scenario(folder, tmp_path):
+    (folder / "valve.csv").write_text(
+        "time [s],fill [1],discharge [1]\n0,0,0\n0.1,0,0\n0.11,1,0\n1,1,0\n1.01,0,0\n1.3,0,0\n1.31,0,1\n",
+        encoding="utf-8",
+    )
+    path = variant(folder, file=('fill = [["0.1 s", 1], ["1 s", 0]]\ndischarge = [["1.3 s", 1]]', 'file = "valve.csv"'),
+                   once=(RECORD.format("run2.csv"), ""), few=("starts = 2", "starts = 1"))  # fmt: skip
+    result = airmuscle("fit-dynamic", path, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.stderr
+    command = load_scenario(tmp_path / "out" / "scenario.toml").command
+    found = command.segments(("fill", "discharge"), 0.0, 2.0).inputs_at(np.array([0.05, 0.5, 1.5]), 0.0)
+    assert found[:, 0].tolist() == [0.0, 1.0, 0.0]
+
+
+REFUSED = {
+    "no record": ('[[record]]\nfile = "run1.csv"', "[[recor]]", "'recor' is not known here"),
+    "a file that is not there": ('"run1.csv"', '"run3.csv"', "run3.csv"),
+    "an unknown path": ('"gas.exponent", "m', '"gas.exponen", "m', "no parameter 'gas.exponen'"),
+    "an unknown path in bounds": ('"gas.exponent" =', '"gas.exponen" =', "Did you mean 'gas.exponent'"),
+    "bounds upside down": ("[1.01, 1.4]", "[1.4, 1.01]", "the least value must lie below the greatest"),
+    "bounds beyond what can be": ("[1.01, 1.4]", "[1.0, 1.4]", "allowed are 1.001 to 1.667"),
+    "one bound": ("[1.01, 1.4]", "1.4", "write the least and the greatest value"),
+    "bounds of another kind": ("[1.01, 1.4]", '["1 m", 1.4]', "unit 'm' cannot become"),
+    "a start beyond its bounds": ("[1.01, 1.4]", "[1.2, 1.4]", "gas.exponent starts at 1.1; its bounds are 1.2 to 1.4"),
+    "a deviation of zero": ('"500 Pa"', '"0 Pa"', "a sensor's standard deviation is above zero"),
+    "a deviation of another kind": ('"500 Pa"', '"500 mm"', "[observed], pressure: unit 'mm' cannot become 'Pa'"),
+    "a column that is not there": ('"height"', '"heigth"', "no column 'heigth'; there are time, pressure, height"),
+    "no such output": (
+        'position = { deviation = "50 um"',
+        "heading = { deviation = 5e-5",
+        "the plant has no output 'heading'",
+    ),
+    "a margin of zero": ('"50 ms"', '"0 ms"', "start_time is '0 ms'; it must be greater than zero"),
+    "no whole number": ("starts = 2", "starts = 2.5", "starts is 2.5; it must be a whole number, 1 or more"),
+    "a command of no input": ("discharge = [[", "exhaust = [[", "no input 'exhaust'"),
+    "no list": ('own = ["circuit.supply.pressure"]', 'own = "circuit.supply.pressure"', "write a list of paths"),
+    "nothing observed": ('pressure = "500 Pa"\nposition = { deviation = "50 um", column = "height" }', "", "observed"),
+    "an empty stretch": ('start_time = "0.2 s"', 'start_time = "0.2 s"\nfirst = "9 s"', "no row lies between"),
+    "a key without meaning": ('start_time = "0.2 s"', 'star = "0.2 s"', "'star' is not known here"),
+    "nothing free": (
+        f'free = [{VALVES}, "gas.exponent", "muscle.damper.damping"]\nown = ["circuit.supply.pressure"]\n'
+        'start_time = "50 ms"\n',
+        "",
+        "bounds of 'gas.exponent', which is not free",
+    ),
+}
+
+
+@pytest.mark.parametrize(("was", "becomes", "message"), REFUSED.values(), ids=REFUSED.keys())
+def test_a_study_that_cannot_be_is_refused(folder, tmp_path, was, becomes, message):
+    result = airmuscle("fit-dynamic", variant(folder, change=(was, becomes)), "--out", tmp_path / "out")
+    assert result.exit_code == 1, result.stdout
+    assert message in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_unknown_profile_is_refused(folder, tmp_path):
+    result = airmuscle("fit-dynamic", folder / "study.toml", "--profile", "gas.exponen", "--out", tmp_path / "out")
+    assert "the fit has no 'gas.exponen'" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_record_whose_time_repeats_is_refused(folder, tmp_path):
+    lines = (folder / "run1.csv").read_text(encoding="utf-8").splitlines()
+    (folder / "run3.csv").write_text("\n".join([*lines[:30], lines[29], *lines[30:]]) + "\n", encoding="utf-8")
+    result = airmuscle("fit-dynamic", variant(folder, file=('"run1.csv"', '"run3.csv"')), "--out", tmp_path / "out")
+    assert "repeats the time of the row before" in result.stderr
+
+
+def test_the_page_on_dynamic_identification_holds_a_study_that_loads(folder):
+    page = (Path(__file__).parents[2] / "docs" / "dynamic-identification.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+    (folder / "page.toml").write_text(text, encoding="utf-8")
+    study = load_study(folder / "page.toml")
+    assert [e.plant.mechanism.mass for e in study.experiments] == [10.0, 12.0]
+    assert study.free[0] == ("circuit.fill.conductance", "circuit.discharge.conductance")
+
+
+def test_a_start_that_was_found_begins_the_written_scenario(folder, tmp_path):
+    path = variant(
+        folder, start=('start = { pressure = "0.6 bar" }', 'start = { pressure = "0.62 bar" }'),
+        nuisance=('start_time = "50 ms"', 'start_time = "50 ms"\nstart = { pressure = "5 kPa" }'),
+        one=(RECORD.format("run2.csv").replace("0.6 bar", "0.62 bar"), ""), quick=("starts = 2", "starts = 1"),
+    )  # fmt: skip
+    result = airmuscle("fit-dynamic", path, "--out", tmp_path / "out", "--json")
+    found = {e["name"]: e for e in json.loads(result.stdout)["parameters"]}["start pressure of record 1"]
+    assert found["value"] == pytest.approx(6e4, abs=4 * found["deviation"])
+    assert found["deviation"] < 300.0
+    text = (tmp_path / "out" / "scenario.toml").read_text(encoding="utf-8")
+    assert float(re.search(r"\[run\.start\]\npressure = (\S+)", text)[1]) == found["value"]

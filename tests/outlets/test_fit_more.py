@@ -1,0 +1,205 @@
+"""What `airmuscle fit` answers beyond the fit is what the library answers: bootstrap, profiles, shape, bands.
+
+Remedies are those of the command line. A surface held to a muscle's shape is the one that is written.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from airmuscle import measured
+from airmuscle.characteristic import ContractileSurface, Sarosi2012
+from airmuscle.characteristic.box import Box
+from airmuscle.cli.app import app
+from airmuscle.cli.remedies import in_options
+from airmuscle.identify import Levels, band, bootstrap, fit, fit_shaped, profile, shape_breaks, weakly_determined
+from airmuscle.identify.candidates import surface
+from airmuscle.library.catalogue import load
+from airmuscle.recording import Recording
+from airmuscle.recording.write_csv import write_csv
+from airmuscle.report.band_plot import band_plot
+from airmuscle.report.levels import levels_of
+
+MUSCLE = "dmsp-20-300"
+SURFACE = ("--characteristic", "ContractileSurface", "--degree", "2")
+SAROSI = Sarosi2012(1.2e-4, 420.0, -57.0, -8.7e-3, 2.7e-3, -310.0)
+BOX = Box(1e5, 6e5, 0.0, 0.2)
+
+
+def airmuscle(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
+
+
+def bench(path: Path, noise: float = 5.0, count: int = 120, seed: int = 1) -> Recording:
+    """Points on six levels of pressure, with noise that bends a surface of high degree."""
+    rng = np.random.default_rng(seed)
+    pressure = np.repeat(np.linspace(*BOX.pressure, 6), count // 6)
+    contraction = rng.uniform(*BOX.contraction, pressure.size)
+    force = SAROSI.force(pressure, contraction) + noise * rng.standard_normal(pressure.size)
+    columns = {"pressure": pressure, "contraction": contraction, "force": np.maximum(force, 0.0)}
+    recording = Recording(columns, path.name)
+    write_csv(recording, path)
+    return recording
+
+
+def test_bootstrap_and_profiles_are_those_of_the_library(tmp_path):
+    recording = bench(tmp_path / "bench.csv")
+    asked = ("--bootstrap", 50, "--leave-out", "pressure", "--profile", "weak", "--profile", "coefficients[0]")
+    result = airmuscle("fit", tmp_path / "bench.csv", *SURFACE, *asked, "--json", "--out", tmp_path / "fit")
+    assert result.exit_code == 0, result.stderr
+    said = json.loads(result.stdout)
+    found = fit(surface(2), recording)
+    drawn = bootstrap(found, recording, refits=50, by=Levels("pressure"))
+    ends = dict(zip(found.names, drawn.intervals().tolist(), strict=True))
+    assert said["bootstrap"]["refits"] == 50
+    assert said["bootstrap"]["parts"] == 6
+    for name, pair in said["bootstrap"]["intervals"].items():
+        assert pair == pytest.approx(ends[name], rel=1e-6)
+    one = profile(found, "coefficients[0]")
+    assert said["profiles"]["coefficients[0]"]["low"] == pytest.approx(one.low, rel=1e-6)
+    assert set(said["profiles"]) == {"coefficients[0]", *weakly_determined(found)}
+    page = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
+    assert all(word in page for word in ("How sure the parameters are", "50 refits to 6 parts", "2.5 %, profile"))
+    assert {"intervals.svg", "bands.svg"} <= {p.name for p in (tmp_path / "fit" / "figures").iterdir()}
+
+
+def test_weak_says_so_where_no_parameter_is(tmp_path):
+    bench(tmp_path / "bench.csv")
+    result = airmuscle("fit", tmp_path / "bench.csv", *SURFACE, "--profile", "weak", "--out", tmp_path / "fit")
+    assert "profile: no parameter is nearly undetermined" in result.stdout
+
+
+def test_a_muscle_with_a_law_of_tied_parameters_has_them_profiled(tmp_path):
+    result = airmuscle("fit", MUSCLE, "--characteristic", MUSCLE, "--profile", "weak", "--json", "--out", tmp_path)
+    weak = weakly_determined(fit(load(MUSCLE).characteristic, measured(MUSCLE), fixed=("wall_thickness",)))
+    assert set(json.loads(result.stdout)["profiles"]) == set(weak) != set()
+
+
+def test_a_shape_on_request_is_the_one_written(tmp_path):
+    recording = bench(tmp_path / "bench.csv", noise=60.0, count=48)
+    degree = ("--characteristic", "ContractileSurface", "--degree", "4")
+    loose = airmuscle("fit", tmp_path / "bench.csv", *degree, "--out", tmp_path / "loose")
+    assert "note: force" in loose.stdout
+    assert "of the box), most at" in loose.stdout
+    assert "Where the law behaves as no muscle does" in (tmp_path / "loose" / "report.html").read_text("utf-8")
+    result = airmuscle("fit", tmp_path / "bench.csv", *degree, "--shape", "--out", tmp_path / "fit")
+    assert "shape: rms" in result.stdout
+    law = load(tmp_path / "fit" / "muscle.toml").characteristic
+    assert shape_breaks(law, law.box, points=201) == ()
+    assert law.coefficients == pytest.approx(fit_shaped(surface(4), recording).model.coefficients, abs=1e-6)
+    assert "keeps a muscle&#39;s shape" in (tmp_path / "fit" / "report.html").read_text("utf-8")
+
+
+def test_the_force_is_zero_where_the_muscle_hangs_free(tmp_path):
+    bench(tmp_path / "bench.csv")
+    asked = (*SURFACE, "--shape", "--free", "2 bar=18 %", "--free", "600 kPa=19.5 %")
+    assert airmuscle("fit", tmp_path / "bench.csv", *asked, "--out", tmp_path / "fit").exit_code == 0
+    law = load(tmp_path / "fit" / "muscle.toml").characteristic
+    for pressure, contraction in ((2e5, 0.18), (6e5, 0.195)):
+        assert law.unclamped(pressure, contraction) == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "message"),
+    [
+        ((*SURFACE, "--free", "2 bar=18 %"), 2, "give --shape"),
+        ((*SURFACE, "--shape", "--free", "2 bar"), 2, "like '3 bar=18 %'"),
+        ((*SURFACE, "--shape", "--free", "2 N=18 %"), 1, "--free: unit 'N' cannot become 'Pa'"),
+        (("--compare", "--shape"), 2, "no --compare"),
+        (("--characteristic", "Sarosi2012", "--shape"), 1, "only a ContractileSurface can be held to one"),
+        ((*SURFACE, "--profile", "coefficient[0]"), 1, "no parameter 'coefficient[0]'"),
+        ((*SURFACE, "--bootstrap", "50", "--leave-out", "run"), 1, "choose --leave-out contraction"),
+        ((*SURFACE, "--bootstrap", "3"), 2, "greater than or equal to 20"),
+        ((*SURFACE, "--profile", "coefficients[0]", "--robust", "5 N"), 1, "a robust loss is no likelihood"),
+        ((*SURFACE, "--leave-out", "row"), 2, "it may be run, specimen, contraction, pressure"),
+        (("--characteristic", "ContractileSurface", "--degree", "9"), 1, "--fix 'coefficients"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused(options, code, message, tmp_path):
+    bench(tmp_path / "bench.csv")
+    result = airmuscle("fit", tmp_path / "bench.csv", *options, "--out", tmp_path / "fit")
+    assert result.exit_code == code
+    said = " ".join(result.stderr.replace("│", " ").split())
+    assert message in said
+    assert not (tmp_path / "fit").exists()
+
+
+def test_a_law_that_data_can_start_needs_no_entry(tmp_path):
+    bench(tmp_path / "bench.csv", noise=0.5)
+    result = airmuscle(
+        "fit", tmp_path / "bench.csv", "--characteristic", "Sarosi2012", "--json", "--out", tmp_path / "f"
+    )
+    assert json.loads(result.stdout)["rmse"] == pytest.approx(0.5, rel=0.2)
+
+
+# Remedies
+
+
+@pytest.mark.parametrize(
+    ("said", "option"),
+    [
+        ("or hold one fixed: fixed=('geometry.radius',).", "or hold one fixed: --fix 'geometry.radius'."),
+        ("a lower degree, or hold some with fixed=.", "a lower degree, or hold some with --fix."),
+        ("give the true one with units={'pressure': ...}.", "give the true one with --unit 'pressure=...'."),
+        ("count; censoring=UNCENSORED fits them as they stand.", "count; --uncensored fits them as they stand."),
+        ("or draw by Levels('contraction').", "or choose --leave-out contraction."),
+        ("nothing of ours: x=1", "nothing of ours: x=1"),
+    ],
+)
+def test_a_remedy_is_in_the_words_of_the_command_line(said, option):
+    assert in_options(said) == option
+
+
+def test_the_report_names_options_too(tmp_path):
+    recording = bench(tmp_path / "bench.csv", noise=30.0)
+    assert (recording["force"] == 0).any()
+    airmuscle("fit", tmp_path / "bench.csv", *SURFACE, "--out", tmp_path / "fit")
+    page = (tmp_path / "fit" / "report.html").read_text("utf-8")
+    assert "--uncensored fits them as they stand" in page
+    assert "censoring=" not in page
+
+
+# The figure of bands
+
+
+def test_the_figure_draws_the_band_that_the_library_gives(tmp_path):
+    found = fit(surface(2), bench(tmp_path / "bench.csv"))
+    plot = band_plot(found)
+    left, right = plot.figure.axes
+    curve, half = left.lines[0], right.lines[0]
+    x = np.asarray(curve.get_xdata()) / 100
+    points = Recording({"pressure": np.full(x.size, 1e5), "contraction": x}, "curve")
+    expected = band(found, points)
+    kept = np.isfinite(x)
+    assert np.asarray(curve.get_ydata())[kept] == pytest.approx(expected.value[kept])
+    assert np.asarray(half.get_ydata())[kept] == pytest.approx((expected.high - expected.value)[kept])
+    assert left.get_ylabel() == "force [N]"
+
+
+def test_without_a_point_to_spare_there_is_no_band():
+    columns = {"pressure": [1e5, 3e5, 1e5], "contraction": [0.0, 0.0, 0.1], "force": [100.0, 300.0, 50.0]}
+    rows = Recording({name: np.array(values) for name, values in columns.items()}, "three")
+    assert band_plot(fit(ContractileSurface.blank(1, greatest_force=1e3), rows)) is None
+
+
+def test_levels_are_those_held_and_a_ramp_has_quantiles():
+    held = np.repeat([1e5, 2e5, 4e5], 20) + np.tile([-50.0, 50.0], 30)
+    assert levels_of(held, 5) == pytest.approx([1e5, 2e5, 4e5])
+    assert levels_of(np.repeat(np.linspace(1e5, 6e5, 11), 5), 3).size == 3
+    assert levels_of(np.linspace(0.0, 1e5, 1001), 3) == pytest.approx([1e4, 5e4, 9e4])
+
+
+def test_exclusions_of_a_comparison_name_options_everywhere(tmp_path):
+    bench(tmp_path / "bench.csv", noise=1.0, count=60)
+    asked = ("--compare", "--leave-out", "pressure", "--profile", "weak")
+    result = airmuscle("fit", tmp_path / "bench.csv", *asked, "--out", tmp_path / "fit")
+    assert result.exit_code == 0, result.stderr
+    page = (tmp_path / "fit" / "report.html").read_text("utf-8")
+    assert "--fix" in result.stdout
+    assert "fixed=" not in result.stdout + page
+    assert "profile: " in result.stdout

@@ -1,0 +1,164 @@
+"""From loops on a bench to a muscle file with friction in it: `airmuscle hysteresis`.
+
+Friction that made the loops comes back through the command line, judged by the second run; where there is none, or
+where only the pressure moved, nothing is written. A run that does not come back is refused.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from airmuscle.cli.app import app
+from airmuscle.friction import MaxwellSlip
+from airmuscle.identify.hysteresis import OnPressure, find_loops, holds
+from airmuscle.identify.hysteresis.plot import plot_loops
+from airmuscle.library.catalogue import load
+from airmuscle.library.place import Place
+from airmuscle.library.scenario import muscle_from
+from airmuscle.recording import Recording, read
+from airmuscle.recording.write_csv import write_csv
+
+SLIP = MaxwellSlip((2e4, 1e4, 3e3), (3e-4, 1.2e-3, 5e-3))
+TURNS = (0.02, 0.14, 0.08, 0.12, 0.05, 0.14, 0.02)
+MUSCLE = "dmsp-20-300"
+LENGTH = ("--resting-length", "300 mm")
+
+
+def airmuscle(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
+
+
+def loop(path: Path, seed: int, friction: MaxwellSlip | None = SLIP, turns=TURNS, rows=150) -> Path:
+    """A loop of contraction at 300 kPa with minor loops, held at its end, as the muscle of the library would pull."""
+    moving = [np.linspace(a, b, rows) for a, b in itertools.pairwise(turns)]
+    contraction = np.concatenate([*moving, np.full(40, turns[-1])])
+    rng, count = np.random.default_rng(seed), contraction.size
+    force = load(MUSCLE).characteristic.force(3e5, contraction) + 0.5 * rng.standard_normal(count)
+    if friction is not None:
+        force = force - friction.replay((contraction - contraction[0]) * 0.3)
+    columns = {
+        "time": 0.2 * np.arange(count), "pressure": 3e5 + 50.0 * rng.standard_normal(count),
+        "contraction": contraction, "force": force,
+    }  # fmt: skip
+    write_csv(Recording(columns, path.name), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("loops")
+    return [loop(folder / f"loop{seed}.csv", seed) for seed in (1, 2)]
+
+
+def test_the_friction_of_two_loops_enters_the_muscle_file(two, tmp_path):
+    result = airmuscle("hysteresis", *two, *LENGTH, "--muscle", MUSCLE, "--creep", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.stderr
+    assert "loop1.csv: isobaric at 300 kPa. 4" in result.stdout
+    assert "The data justify this friction." in result.stdout
+    assert "creep: loop2.csv, force in rows 90" in result.stdout
+    entry = load(tmp_path / "out" / "muscle.toml")
+    assert entry.characteristic == load(MUSCLE).characteristic
+    path = np.concatenate([np.linspace(a, b, 50) for a, b in itertools.pairwise(TURNS)]) * 0.3
+    made, found = (law.replay(path - path[0]) for law in (SLIP, entry.friction))
+    assert np.sqrt(np.mean((made - found) ** 2)) < 0.05 * np.abs(made).max()  # the grid of limits is not the true one
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert all(word in page for word in ("minor loops", "Friction laws", "MaxwellSlip", "second run at the same level"))
+    shown = airmuscle("show", tmp_path / "out" / "muscle.toml")
+    assert "friction MaxwellSlip" in shown.stdout
+    assert "friction.stiffnesses[0]" in shown.stdout
+
+
+def test_without_a_muscle_the_friction_stands_in_a_table_that_a_plant_takes(two, tmp_path):
+    import tomllib
+
+    result = airmuscle("hysteresis", two[0], *LENGTH, "--out", tmp_path, "--json")
+    data = json.loads(result.stdout)
+    assert data["written"] == str(tmp_path / "friction.toml")
+    (found,) = data["loops"]
+    assert found["recommended"] == found["laws"][0]["law"]
+    assert found["laws"][0]["repeat_rmse"] is None, "one run has no second"
+    table = tomllib.loads((tmp_path / "friction.toml").read_text(encoding="utf-8"))
+    muscle = muscle_from({"library": MUSCLE, **table}, Place("scenario.toml", "plant.muscle", tmp_path))
+    assert type(muscle.friction).__name__ == found["recommended"]
+
+
+def test_a_loop_without_friction_writes_none(tmp_path):
+    file = loop(tmp_path / "loop.csv", 3, friction=None, turns=TURNS[-3:])
+    again = loop(tmp_path / "again.csv", 4, friction=None, turns=TURNS[-3:])
+    result = airmuscle("hysteresis", file, again, *LENGTH, "--muscle", MUSCLE, "--given", "--out", tmp_path / "out")
+    assert "The data justify no friction in this loop." in result.stdout
+    assert "no friction to write" in result.stdout
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"report.html", "figures", "data"}
+
+
+def test_friction_on_the_pressure_is_reported_and_not_written(tmp_path):
+    pressure = np.concatenate([np.linspace(0.5e5, 5e5, 300), np.linspace(5e5, 0.5e5, 300)])
+    rng = np.random.default_rng(5)
+    force = 2e-3 * pressure - SLIP.replay(1e-8 * (pressure - pressure[0])) + 0.1 * rng.standard_normal(600)
+    columns = {"time": 0.2 * np.arange(600), "pressure": pressure, "contraction": np.full(600, 0.05), "force": force}
+    write_csv(Recording(columns, "ramp"), tmp_path / "ramp.csv")
+    result = airmuscle("hysteresis", tmp_path / "ramp.csv", *LENGTH, "--degree", 1, "--out", tmp_path / "out")
+    assert "isometric at 5.00%" in result.stdout
+    assert "does not enter a plant" in result.stdout
+    assert not list((tmp_path / "out").glob("*.toml"))
+
+
+def test_figures_of_it_stand_over_the_pressure():
+    axes = plot_loops(SLIP, OnPressure().axis).axes[0]
+    assert axes.get_xlabel() == "gauge pressure [kPa]"
+    drawn = np.concatenate([line.get_xdata() for line in axes.lines])
+    assert drawn.max() == pytest.approx(2.0 * SLIP.travel * 1e5, rel=1e-6), "1 mm stands for 100 kPa"
+
+
+def test_a_second_run_at_another_level_is_a_loop_of_its_own(two):
+    first, second = read(two, resting_length=0.3)
+    assert [found.repeat is not None for found in find_loops([first, second])] == [True]
+    other = second.with_columns(pressure=second["pressure"] + 5e4)
+    assert [found.repeat for found in find_loops([first, other])] == [None, None]
+
+
+@pytest.mark.parametrize(
+    ("turns", "options", "message"),
+    [
+        ((0.02, 0.14), LENGTH, "loop.csv: no branch along which the path falls: a loop goes up and down."),
+        (TURNS, (), "loop.csv: friction against shortening needs the resting length"),
+        (TURNS, (*LENGTH, "--muscle", "none-such"), "no library entry 'none-such'"),
+    ],
+)
+def test_what_is_no_loop_is_refused(turns, options, message, tmp_path):
+    file = loop(tmp_path / "loop.csv", 1, turns=turns)
+    result = airmuscle("hysteresis", file, *options, "--out", tmp_path / "out")
+    assert result.exit_code == 1
+    assert message in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_quick_rows_do_not_count_unless_told_to(tmp_path):
+    file = loop(tmp_path / "quick.csv", 1, rows=8)
+    refused = airmuscle("hysteresis", file, *LENGTH, "--out", tmp_path / "out")
+    assert "none counts (quiet, pulling, not cut off)" in refused.stderr
+    assert "--all-rows" in refused.stderr
+    assert airmuscle("hysteresis", file, *LENGTH, "--all-rows", "--out", tmp_path / "out").exit_code == 0
+
+
+def test_a_hold_begins_where_the_length_has_arrived(two):
+    (recording,) = read(two[0], resting_length=0.3)
+    (found,) = holds(recording)
+    assert (found.stretch.start, found.stretch.stop, found.quantity) == (899, 940, "force")
+    weight = recording.with_columns(force=np.full(len(recording), 200.0))
+    assert {hold.quantity for hold in holds(weight)} == {"contraction"}
+
+
+def test_rows_on_the_way_to_a_hold_are_none_of_it():
+    """The length creeps up by 0.01 % a row, less than what counts as held, and then stands for 40 rows."""
+    contraction = np.concatenate([np.linspace(0.0897, 0.1, 103, endpoint=False), np.full(40, 0.1)])
+    rows = {"time": 0.5 * np.arange(143), "pressure": np.full(143, 3e5), "contraction": contraction}
+    force = np.linspace(100.0, 300.0, 143)
+    found = max(holds(Recording({**rows, "force": force}, "hold")), key=lambda hold: len(hold.stretch))
+    assert (found.stretch.start, found.stretch.stop) == (103, 143)

@@ -1,0 +1,61 @@
+"""The pages on mechanisms and on linearisation are true: their code runs, their tables name what there is."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from airmuscle import mechanism
+from airmuscle.library.build import build
+from airmuscle.library.models import model_names
+from airmuscle.library.place import Place
+from airmuscle.mechanism import AntagonisticJoint, Mechanism, StoppedJoint
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def blocks(page, language):
+    text = (DOCS / page).read_text(encoding="utf-8")
+    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+
+
+def run(page):
+    """What the page's code leaves, all of it in one place as a reader would type it."""
+    found: dict[str, object] = {}
+    for block in blocks(page, "python"):
+        exec(compile(block, page, "exec"), found)
+    return found
+
+
+def test_the_code_on_mechanisms_runs(capsys):
+    found = run("mechanisms.md")
+    assert found["run"]["angle"][-1] > 0.1
+    assert found["pull"]["position"].max() == pytest.approx(0.03, abs=1e-9)
+    assert re.fullmatch(r"0\.\d{3} rad\n", capsys.readouterr().out)
+
+
+def test_the_code_on_linearisation_runs(capsys):
+    found = run("linearise.md")
+    assert found["shut"]["position"] < found["rest"]["position"]
+    assert found["small"].outputs == ("position", "pressure")
+    stiffnesses = re.match(r"(\d+) and (\d+) N/m\n", capsys.readouterr().out)
+    assert int(stiffnesses[2]) > int(stiffnesses[1])
+
+
+def test_the_table_of_a_scenario_is_built():
+    table = tomllib.loads(blocks("mechanisms.md", "toml")[0])["plant"]["mechanism"]
+    found = build(table, Place("page", "", DOCS))
+    assert isinstance(found, StoppedJoint)
+    assert isinstance(found.inner, AntagonisticJoint)
+    assert found.least == pytest.approx(-0.349066, abs=1e-6)
+
+
+def test_every_mechanism_is_on_the_page_and_may_stand_in_a_file():
+    text = (DOCS / "mechanisms.md").read_text(encoding="utf-8")
+    classes = [c for c in vars(mechanism).values() if isinstance(c, type) and issubclass(c, Mechanism)]
+    final = {c.__name__ for c in classes} - {"Mechanism", "Wrapper"}
+    assert final == {name for name in final if f"`{name}`" in text}
+    assert final <= set(model_names())

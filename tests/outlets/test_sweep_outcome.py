@@ -1,0 +1,139 @@
+"""Outcomes are the numbers that a reader would measure on the curve.
+
+Held against what is known in closed form: straight lines (to rounding), and the step response of a second-order system
+with damping ratio zeta (overshoot exp(-pi zeta / sqrt(1 - zeta^2)), Ogata, Modern Control Engineering, 5.3).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from airmuscle.errors import ParameterError
+from airmuscle.sweep.outcome import (
+    Course,
+    Final,
+    Maximum,
+    Mean,
+    Minimum,
+    Outcome,
+    Overshoot,
+    RootMeanSquare,
+    SettlingTime,
+    TimeToReach,
+)
+
+TIME = np.linspace(0.0, 2.0, 21)
+RAMP = 3.0 * TIME - 1.0
+"""From -1 to 5 on a straight line."""
+
+
+@pytest.mark.parametrize(
+    ("outcome", "expected"),
+    [
+        (Final("x"), 5.0),
+        (Final("x", end=1.03), 2.09),
+        (Maximum("x", end=0.55), 0.65),
+        (Minimum("x", begin=1.234), 2.702),
+        (Mean("x"), 2.0),
+        (Mean("x", begin=0.51, end=1.49), 2.0),
+        (RootMeanSquare("x"), math.sqrt((5.0**3 + 1.0) / 9.0 / 2.0)),
+        (RootMeanSquare("x", begin=1 / 3, end=1.0), math.sqrt(2.0**3 / 9.0 / (2 / 3))),
+        (TimeToReach("x", 2.03), 1.01),
+        (TimeToReach("x", 2.03, begin=0.5), 0.51),
+        (TimeToReach("x", -1.0), 0.0),
+        (TimeToReach("x", 5.0), 2.0),
+        (Overshoot("x"), 0.0),
+        (SettlingTime("x"), 0.98 * 2.0),
+        (SettlingTime("x", band=0.1, begin=1.0), 0.9),
+    ],
+)
+def test_on_a_straight_line(outcome, expected):
+    assert outcome.number(TIME, RAMP) == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+def test_what_a_run_does_not_have_is_not_a_number():
+    assert math.isnan(TimeToReach("x", 5.1).number(TIME, RAMP))
+    assert math.isnan(Final("x", begin=2.5).number(TIME, RAMP))
+    assert math.isnan(Overshoot("x").number(TIME, np.ones_like(TIME)))
+    assert SettlingTime("x").number(TIME, np.ones_like(TIME)) == 0.0
+    assert math.isnan(SettlingTime("x").number(TIME, np.sin(np.pi * TIME) * (TIME < 2)))  # it comes back to its start
+
+
+def test_a_falling_column_reaches_its_level_too():
+    assert TimeToReach("x", 0.5).number(TIME, -RAMP) == pytest.approx(1 / 6)
+    assert SettlingTime("x").number(TIME, -RAMP) == pytest.approx(1.96)
+
+
+@pytest.mark.parametrize("zeta", [0.2, 0.5, 0.7])
+@pytest.mark.parametrize("sign", [1.0, -4.0])
+def test_the_step_response_of_second_order(zeta, sign):
+    t = np.linspace(0.0, 80.0, 80_001)
+    damped = math.sqrt(1 - zeta**2)
+    envelope = np.exp(-zeta * t)
+    y = sign * (1.0 - envelope * (np.cos(damped * t) + zeta / damped * np.sin(damped * t))) + 7.0
+    assert Overshoot("y").number(t, y) == pytest.approx(math.exp(-math.pi * zeta / damped), rel=1e-4)
+    settled = SettlingTime("y", band=0.05).number(t, y)
+    away = np.abs(y - y[-1]) / abs(sign)
+    assert away[t > settled + 1e-3].max() <= 0.05
+    assert away[t < settled].max() > 0.05
+    assert away[np.searchsorted(t, settled)] == pytest.approx(0.05, abs=1e-3)
+
+
+@settings(deadline=None)
+@given(arrays(float, 12, elements=st.floats(-1e3, 1e3)), st.floats(0.1, 10), st.floats(-100, 100))
+def test_numbers_turn_with_the_scale_and_shift_of_their_column(values, factor, shift):
+    time = np.linspace(0.0, 1.0, 12)
+    for outcome in (Final("x"), Maximum("x"), Minimum("x"), Mean("x")):
+        expected = factor * outcome.number(time, values) + shift
+        assert outcome.number(time, factor * values + shift) == pytest.approx(expected, rel=1e-9, abs=1e-6)
+    low, mean, high = (o.number(time, values) for o in (Minimum("x"), Mean("x"), Maximum("x")))
+    assert low - 1e-9 <= mean <= high + 1e-9
+    assert abs(mean) - 1e-9 <= RootMeanSquare("x").number(time, values) <= max(-low, high) + 1e-9
+
+
+@settings(deadline=None)
+@given(st.floats(0.0, 0.95), st.floats(0.01, 1.0))
+def test_a_window_ends_where_it_says_wherever_the_rows_are(begin, length):
+    end = begin + length
+    coarse = Mean("x", begin=begin, end=end).number(TIME, RAMP)
+    assert coarse == pytest.approx(3.0 * (begin + min(end, 2.0)) / 2.0 - 1.0, abs=1e-9)
+
+
+def test_a_course_stands_on_its_instants():
+    course = Course("x", 0.25, begin=0.5).within(0.0, 2.0)
+    assert course.instants == pytest.approx([0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0])
+    assert course.rows(TIME, RAMP) == pytest.approx(3.0 * course.instants - 1.0)
+    half = course.rows(TIME[:11], RAMP[:11])
+    assert np.isfinite(half[:3]).all()
+    assert np.isnan(half[3:]).all()
+
+
+def test_units_follow_from_the_column():
+    found: list[tuple[Outcome, str]] = [
+        (Final("p"), "Pa"), (RootMeanSquare("p"), "Pa"), (TimeToReach("p", 1.0), "s"), (Overshoot("p"), "1"),
+        (SettlingTime("p"), "s"), (Course("p", 0.1), "Pa"),
+    ]  # fmt: skip
+    for outcome, unit in found:
+        assert outcome.unit("Pa") == unit
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Final("x", begin=1.0, end=1.0), "its end must be later than its begin"),
+        (lambda: Final("x", begin=math.nan), "its end must be later than its begin"),
+        (lambda: TimeToReach("x", math.inf), "it must be finite"),
+        (lambda: SettlingTime("x", band=0.0), "it must lie between 0 and 1"),
+        (lambda: Course("x", 0.0), "it must be positive and finite"),
+        (lambda: Course("x", 1e-9).within(0.0, 1.0), "2 to 1000000 instants"),
+    ],
+)
+def test_what_cannot_be_is_refused(make, message):
+    with pytest.raises(ParameterError, match=message):
+        make()

@@ -1,0 +1,167 @@
+"""Plants in which every component stands that enters one, for what must hold of them all; numbers are chosen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from joints import chosen_muscle
+
+from airmuscle import circuit, friction, geometry
+from airmuscle.characteristic import (
+    CircleVirtualWork,
+    Clamped,
+    ContractileSurface,
+    EffectiveLength,
+    InverseLength,
+    LogarithmicLength,
+    RubberLine,
+    VirtualWork,
+    as_force_law,
+)
+from airmuscle.characteristic.box import Box
+from airmuscle.circuit import FillDischarge, Supply, Valve
+from airmuscle.contact import HuntCrossley
+from airmuscle.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.geometry.catenary import Catenary
+from airmuscle.geometry.chebyshev import as_polynomial
+from airmuscle.geometry.parabola import Parabola, TrueArcParabola
+from airmuscle.geometry.vessel import Vessel
+from airmuscle.library import catalogue
+from airmuscle.mechanism import (
+    AntagonisticJoint,
+    HangingMass,
+    Held,
+    InSeries,
+    Isometric,
+    Isotonic,
+    Lever,
+    Mounted,
+    Prescribed,
+    Pulley,
+    SpringLoad,
+    Stopped,
+    StoppedJoint,
+)
+from airmuscle.muscle import (
+    CreepElements,
+    CubicSpring,
+    DirectionalDamper,
+    EndStop,
+    LaggingWall,
+    LinearDamper,
+    LinearSpring,
+    Muscle,
+    PressureDamper,
+    Reynolds2003Damper,
+    Reynolds2003Spring,
+    SeriesSpring,
+    Serres2009Damper,
+    Serres2009Spring,
+    SwellingWall,
+)
+from airmuscle.plant import Plant
+
+VALVE, OTHER = Valve(1e-8, 0.4), Valve(3e-9, 0.2)
+TWO_VALVES = FillDischarge(Supply(5e5), VALVE, OTHER)
+BRAID = geometry.Braid(0.01, 0.4363, 0.2)
+FIBRES = geometry.StraightFibre(0.2, 0.02)
+SPOOL = circuit.Follower(20.0, 0.7)
+STOP = EndStop(0.1, HuntCrossley(1e9))
+SLIPS = ((4e4, 2e4), (2e-4, 8e-4))
+SURFACE = ContractileSurface((300.0, -200.0, 40.0, 10.0, 5.0, 3.0), 0.0, 6e5, 0.0, 0.25, 0.0, 1200.0, 2)
+
+
+def of(contractile=None, volume=BRAID, **parts):
+    """A muscle of which some parts are exchanged, with a load and two valves."""
+    contractile = contractile or Clamped(VirtualWork(BRAID), 0.0, 1200.0)
+    parts = {"spring": LinearSpring(3000.0), "damper": LinearDamper(150.0), **parts}
+    return Plant(Muscle(contractile, volume, **parts), TWO_VALVES, HangingMass(10.0), Isothermal())
+
+
+def fed(by, count=1, gas=EnergyBalance(0.5)):
+    """A circuit that feeds muscles which hang side by side, with heat."""
+    muscles = tuple(replace(chosen_muscle(), name=f"m{i}") for i in range(count))
+    return Plant(muscles if count > 1 else muscles[0], by, HangingMass(10.0 * count), gas)
+
+
+def pulled(mechanism, count=1):
+    """A mechanism that one muscle or several pull at, each with two valves."""
+    muscles = tuple(replace(chosen_muscle(), name=f"m{i}") for i in range(count))
+    return Plant(muscles, (TWO_VALVES,) * count, mechanism, Isothermal())
+
+
+def listed(name):
+    return of(catalogue.load(name).characteristic)
+
+
+EXAMPLES = {
+    # characteristics
+    **{name: listed(name) for name in ("chou-hannaford", "dmsp-20-300", "reynolds2003", "serres2009", "tondu-lopez")},
+    "sarosi": listed("sarosi-dmsp-20-200n"),
+    "surface": of(SURFACE),
+    "stand-in": of(as_force_law(VirtualWork(BRAID), Box(0.0, 6e5, 0.0, 0.25), degree=3)),
+    "dead length": of(EffectiveLength(SURFACE, 0.2, 0.02, 0.001)),
+    "inverse length": of(InverseLength(SURFACE, SURFACE, 0.2, 0.3)),
+    "logarithmic length": of(LogarithmicLength(SURFACE, SURFACE, 0.2, 0.3)),
+    "circle": of(CircleVirtualWork(FIBRES, RubberLine(3e5, 1e5), 2e-3), FIBRES),
+    # geometries
+    **{
+        type(m).__name__: of(SURFACE, geometry.StraightFibre(0.2, 0.02, meridian=m))
+        for m in (Catenary(), Parabola(), TrueArcParabola())
+    },
+    "vessel": of(SURFACE, Vessel(2e-4), wall=LaggingWall(2e-11, 0.05)),
+    "polynomial volume": of(SURFACE, as_polynomial(BRAID, 8, (-0.05, 0.3))),
+    # elements of a muscle
+    "hardening spring, lopsided damper": of(
+        spring=CubicSpring(3000.0, 100.0), damper=DirectionalDamper(300.0, 150.0, 1e-3, -1e-3)
+    ),
+    "pressure damper, creep": of(damper=PressureDamper(50.0, 1e-3), creep=CreepElements((2e4, 1e4), (0.1, 2.0))),
+    "Reynolds": of(spring=Reynolds2003Spring(), damper=Reynolds2003Damper()),
+    "Serres": of(spring=Serres2009Spring(), damper=Serres2009Damper()),
+    "stop, lagging wall": of(stop=STOP, wall=LaggingWall(2e-11, 0.05)),
+    "series spring with a stop": of(
+        series=SeriesSpring(1e5), stop=STOP, damper=DirectionalDamper(300.0, 150.0, 1e-3, 0.0)
+    ),
+    "swelling wall": of(wall=SwellingWall(4e-5, 2e5, 3e4, 0.05)),
+    # friction
+    "Dahl": of(friction=friction.Dahl(5e4, 20.0)),
+    "LuGre": of(friction=friction.LuGre(5e4, 15.0, 5.0, 0.01, 50.0, 20.0)),
+    "Bouc-Wen": of(friction=friction.BoucWen(5e4, 20.0, 1.7, 0.8)),
+    "Maxwell slip": of(friction=friction.MaxwellSlip(*SLIPS)),
+    "Prandtl-Ishlinskii": of(friction=friction.PrandtlIshlinskii(*SLIPS, (8.0, -8.0), (0.5, -0.5))),
+    # circuits
+    "polytropic": fed(TWO_VALVES, gas=Polytropic(1.3)),
+    "heat": fed(TWO_VALVES),
+    "closed": fed(circuit.ClosedChamber()),
+    "held and let go": Plant(chosen_muscle(), TWO_VALVES, Held(HangingMass(10.0))),
+    "held for good": Plant(chosen_muscle(), TWO_VALVES, Isometric(0.05), EnergyBalance(0.5)),
+    "check valve and cracking pressure": fed(
+        FillDischarge(
+            Supply(5e5), circuit.CheckValve(circuit.IndexedValve(1e-8, 0.3, 0.6, 3e4)), circuit.IndexedValve(1e-8, 0.5, 0.4)
+        )
+    ),
+    "three positions through a tube": fed(circuit.Line(circuit.ThreePosition(Supply(5e5), VALVE, OTHER),
+                                                       circuit.Tube(circuit.TubeOrifice(1.0, 3e-3), 1e-5, 2))),
+    "tube with inertia": fed(circuit.Line(TWO_VALVES, circuit.DistributedTube(1.0, 2e-3, 2, EnergyBalance(0.1)))),
+    "overlap": fed(circuit.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, 0.2, 2), 2),
+    "underlap": fed(circuit.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, -0.2)),
+    "regulator, leak": fed(circuit.Leaking(circuit.ProportionalRegulator(Supply(5e5), VALVE, VALVE, SPOOL), OTHER)),
+    "manifold on tank and regulator": fed(
+        circuit.Manifold(
+            circuit.RegulatedSupply(circuit.Tank(Supply(7e5), OTHER, 1e-3, EnergyBalance(0.1)), VALVE, 4e5),
+            (FillDischarge(circuit.Shared(), VALVE, OTHER), circuit.ThreePosition(circuit.Shared(), VALVE, OTHER)),
+            ("one", "two"),
+        ),
+        2,
+    ),
+    # mechanisms
+    "mass on a spring": pulled(SpringLoad(5.0, 2000.0, 20.0, 50.0)),
+    "constant force": pulled(Isotonic(100.0, 2.0, 5.0)),
+    "prescribed": pulled(Prescribed()),
+    "lever": pulled(Lever((0.03,), 3.0, 0.2)),
+    "pulley with stops": pulled(Stopped(Pulley(0.02, 5.0), -0.005, 0.02, HuntCrossley(1e9))),
+    "joint with stops": pulled(
+        StoppedJoint(Mounted(AntagonisticJoint(0.03, 0.05, 0.2), (0.08, 0.08)), -0.2, 0.2, 0.05, HuntCrossley(1e9)), 2
+    ),
+    "muscles in series": pulled(InSeries(HangingMass(5.0), (0.5,), 1.0), 2),
+}  # fmt: skip
