@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numba
 import numpy as np
-from filling import BRAID
+from filling import BRAID, Array
 from measure import Bar, Section, interleaved, of_time, show
 from new_plant import MUSCLES, many_muscles
 
@@ -37,11 +37,16 @@ def _calls(function: Any, x: Any, u: Any, c: Any, f: Any, count: Any) -> None:
             x[i] += 1e-30 * f[i]
 
 
-def calls(ready: Prepared, start: dict[str, float], count: int = CALLS) -> Callable[[], None]:
-    """So many evaluations of the derivative, one after the other."""
+def calls(ready: Prepared, start: Mapping[str, float], count: int = CALLS) -> Callable[[], Array]:
+    """So many evaluations of the derivative, one after the other; what the last one gave."""
     x = np.array([start[s.name] for s in ready.system.states])
     u, f = np.full(max(ready.sizes.inputs, 1), 0.5), np.empty(x.size)
-    return lambda: _calls(ready.address["rhs"], x, u, ready.held, f, count)
+
+    def call() -> Array:
+        _calls(ready.address["rhs"], x, u, ready.held, f, count)
+        return f
+
+    return call
 
 
 def plain_muscles() -> Plant:

@@ -74,6 +74,8 @@ def in_c(run: Run, library: ctypes.CDLL, segments: Segments | None = None) -> Ca
     segments = segments or run.segments
     plant, start, inputs = constants(run.system), run.vector, np.ascontiguousarray(segments.values)
     steps = np.rint(np.diff([0.0, *segments.ends]) / STEP).astype(np.intc)
+    if (steps % round(SPACING / STEP)).any():
+        raise ValueError("the C writes rows every 10 ms, and every instant must be on one of them")
     rows = np.empty((int(steps.sum()) * round(STEP * 1e6) // round(SPACING * 1e6) + 1, start.size))
     arguments = [plant.ctypes.data, start.ctypes.data, len(steps), steps.ctypes.data, inputs.ctypes.data]
     at = ctypes.c_void_p

@@ -7,7 +7,9 @@ starts anew, or is told to expect a jump, at each instant of the schedule.
 
 from __future__ import annotations
 
+import contextlib
 import os
+import tempfile
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -118,9 +120,15 @@ def casadi_cvodes(run: Run, ready: Prepared, **options: Any) -> Solver:
 
 
 def casadi_cvodes_jit(run: Run, ready: Prepared) -> Solver:
-    """The same with its functions compiled by gcc."""
+    """The same with its functions compiled by gcc, which CasADi does in the folder that the process is in."""
     flags = {"flags": ["-O3", "-march=native"], "compiler": "gcc", "verbose": False}
-    return casadi_cvodes(run, ready, jit=True, compiler="shell", jit_options=flags)
+    solver = casadi_cvodes(run, ready, jit=True, compiler="shell", jit_options=flags)
+
+    def at(rtol: float) -> Callable[[], Array]:
+        with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+            return solver(rtol)
+
+    return at
 
 
 def diffrax_kvaerno5(run: Run, ready: Prepared) -> Solver:

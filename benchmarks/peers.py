@@ -64,8 +64,9 @@ class Peer:
 
 
 COMPILED = (
-    "with compiled rates CVODE is left with its own steps and the call of Python around each evaluation; Rodas4 has "
-    "more states to factor and to solve for, six times a step, as the plant grows"
+    "with compiled rates most of CVODE's time is its own and that of the call of Python around each evaluation, which "
+    "hardly grow with the plant, while a step of Rodas4 does: 0.4 us with 3 states, 0.8 us with 10, 1.4 us with the "
+    "surfaces of six muscles"
 )
 PEERS = (
     Peer("scikit-sundae CVODE, rates by hand", "sksundae", "scikit-sundae", sundae_by_hand, 45.0),
