@@ -1,4 +1,4 @@
-"""A whole plant: a joint with two muscles, a 5/3 proportional valve, a tube to each muscle, and a brake that lets go late.
+"""A whole plant: a joint with two muscles, a proportional valve, a tube to each muscle, a brake that lets go late.
 
 python examples/A3_joint.py        prints where it rests, what it does when the valve opens, and its poles
 
@@ -32,11 +32,9 @@ told = am.Schedule({"command": ((0.1, 0.6), (0.3, 0.0)), "held": ((0, 1), (0.1, 
 command = Driven(told, {"held": OnOff(opening_delay=10 * ms, closing_delay=25 * ms)})
 run = am.simulate(plant, command, duration=2.0, start=rest)
 moves = run["time"][abs(run["angle"] - run["angle"][0]) > 0.1 * degree][0]
-print(
-    f"released and filled from 100 ms on; moves from {moves / ms:.0f} ms on, to {run['angle'].max() / degree:.1f} degrees"
-)
-print(f"ends at {run['angle'][-1] / degree:.1f} degrees, with {run['left.pressure'][-1] / kPa:.0f} and "
-      f"{run['right.pressure'][-1] / kPa:.0f} kPa")  # fmt: skip
+print(f"brake released and valve opened at 100 ms: moves from {moves / ms:.0f} ms on")
+print(f"turns to {run['angle'].max() / degree:.1f} degrees and ends at {run['angle'][-1] / degree:.1f}")
+print(f"pressures then: {run['left.pressure'][-1] / kPa:.0f} and {run['right.pressure'][-1] / kPa:.0f} kPa")
 
 linear = linearise(plant, rest | {"spool": 0.1}, {"command": 0.1})  # beyond the overlap, where the valve answers
 for pole in linear.poles:
