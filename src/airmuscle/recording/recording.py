@@ -78,13 +78,15 @@ class Recording:
     def __iter__(self) -> Iterator[str]:
         return iter(self.columns)
 
-    def in_unit(self, name: str, unit: str) -> Array:
+    def in_unit(self, name: str, unit: str | None) -> Array:
         """A column in this SI unit. A column of no known quantity was taken as it stood; the unit that its heading
-        states, as in `height [mm]`, counts here, and its name is also 'height'. Raises ColumnError and UnitError."""
+        states, as in `height [mm]`, counts here, unless None is asked for, and its name is also 'height'. Raises
+        ColumnError and UnitError."""
         for heading, values in self.columns.items():
             plain, stated = stated_unit(heading)
             if stated is not None and name in (heading, plain):
-                return np.asarray(conversion(stated, unit, where=f"{self.origin}, {heading}")(values))
+                convert = conversion(stated, unit, where=f"{self.origin}, {heading}") if unit else np.asarray
+                return np.asarray(convert(values))
         return self[name]
 
     def rows(self, chosen: Any) -> Recording:
