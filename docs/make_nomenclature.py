@@ -180,6 +180,7 @@ ARGUMENTS = {
     "seed": "start of the random numbers",
     "strain": "hoop strain [1]",
     "surface": "polynomial surface",
+    "unit": "SI unit in which a column is wanted; None for as it stands",
     "units": "units of columns whose headers carry none",
     "functions": "functions of time by input",
     "drivers": "what stands between the command and the opening of an input",

@@ -6,6 +6,7 @@ fill = [["0.1 s", 1], ["1 s", 0]]
 [observed]                                  what was measured, each with its sensor's standard deviation
 pressure = "500 Pa"
 position = { deviation = "50 um", column = "height" }      where the file's column has another name
+                                            (in SI, or with its unit, height [mm])
 [fit]
 free = ["muscle.damper.damping", ["circuit.fill.conductance", "circuit.discharge.conductance"]]
                                             shared by all records; a list in it shares one value
@@ -165,9 +166,13 @@ def _method(table: Mapping[str, Any], place: Place) -> Method | None:
     return found
 
 
-def _unit(name: str, plant: Plant) -> str:
+def _known_unit(name: str, plant: Plant) -> str | None:
     quantity = quantity_of(name)
-    return quantity.unit if quantity else next((s.unit for s in plant.states if s.name == name), "1")
+    return quantity.unit if quantity else next((s.unit for s in plant.states if s.name == name), None)
+
+
+def _unit(name: str, plant: Plant) -> str:
+    return _known_unit(name, plant) or "1"
 
 
 def _observed(table: Mapping[str, Any], plant: Plant, place: Place) -> dict[str, tuple[float, str]]:
@@ -267,7 +272,8 @@ class _Record:
             found = read(self.place.folder / name, **told)
             if len(found) != 1:
                 raise ParameterError(f"{name} holds {len(found)} runs; give a file for each record.")
-            whole = found[0].with_columns(**{output: found[0][column] for output, (_, column) in observed.items()})
+            taken = {name: (column, _known_unit(name, self.shared)) for name, (_, column) in observed.items()}
+            whole = found[0].with_columns(**{name: found[0].in_unit(*column) for name, column in taken.items()})
             return self.cut(whole)
 
     def cut(self, recording: Recording) -> Recording:

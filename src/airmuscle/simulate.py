@@ -240,7 +240,7 @@ def outside_box(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
                 worst = int(np.argmax(beyond))
                 share = float(np.mean(beyond > 0))
                 found.append(
-                    f"{muscle.name} left the box of its characteristic in {name} ({low / scale:.4g} to "
+                    f"{muscle.name} was outside the box of its characteristic in {name} ({low / scale:.4g} to "
                     f"{high / scale:.4g} {unit}) in {share:.0%} of the rows, by at most {beyond[worst] / scale:.4g} "
                     f"{unit} at {columns['time'][worst]:.4g} s; nothing was measured there"
                 )

@@ -144,11 +144,11 @@ def test_a_run_says_when_and_how_far_it_left_what_was_measured():
     plant = Plant(damped, CIRCUIT, HangingMass(10.0))
     start = equilibrium(plant, pressure=0.0)
     run = simulate(plant, Schedule({"fill": ((0.5, 1.0),)}), duration=4.0, start=start)
-    (pressure, contraction) = [note for note in run.notes if "left the box" in note]
+    (pressure, contraction) = [note for note in run.notes if "outside the box" in note]
     assert re.search(
-        r"left the box of its characteristic in pressure \(35 to 675 kPa\) in \d+% of the rows, by at most 35 kPa",
+        r"was outside the box of its characteristic in pressure \(35 to 675 kPa\) in \d+% of the rows, by at most 35 kPa",
         pressure,
     )
     assert re.search(r"in contraction \(1\.333 to 26 %\).*nothing was measured there", contraction)
     inside = simulate(plant, Schedule({}), duration=1.0, start=equilibrium(plant, pressure=4e5))
-    assert not [note for note in inside.notes if "left the box" in note]
+    assert not [note for note in inside.notes if "outside the box" in note]

@@ -403,7 +403,7 @@ def test_the_report_of_a_run_shows_inputs_parameters_sources_and_notes(scenario:
     page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
     for text in (
         "A run of 0.5 s. The recording is recording.csv.",
-        "left the box of its characteristic in pressure",
+        "was outside the box of its characteristic in pressure",
         "Inputs of the plant; dashed, what the drivers were told.",
         "fill 1 from 0.1 s, 0 from 0.3 s; driven: fill by PWM(frequency=50.0, smallest_pulse=0.0), OnOff(opening_delay=",
         "<td>muscle.contractile.wall_thickness</td>",

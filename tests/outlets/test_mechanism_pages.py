@@ -1,4 +1,4 @@
-"""The pages on mechanisms and on linearisation are true: their code runs, their tables name what there is."""
+"""The pages on mechanisms, linearisation, drivers and batches are true: their code runs, tables name what there is."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from airmuscle import mechanism
@@ -13,6 +14,7 @@ from airmuscle.library.build import build
 from airmuscle.library.models import model_names
 from airmuscle.library.place import Place
 from airmuscle.mechanism import AntagonisticJoint, Mechanism, StoppedJoint
+from airmuscle.sensitive import sensitivity
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -43,6 +45,18 @@ def test_the_code_on_linearisation_runs(capsys):
     assert found["small"].outputs == ("position", "pressure")
     stiffnesses = re.match(r"(\d+) and (\d+) N/m\n", capsys.readouterr().out)
     assert int(stiffnesses[2]) > int(stiffnesses[1])
+
+
+def test_the_code_on_drivers_runs():
+    found = run("drivers.md")
+    assert found["run"]["position"].max() > 0.03
+    assert found["state"]["air_mass"] > 2 * found["plant"].state_at(pressure=0.0)["air_mass"]
+
+
+def test_the_code_on_batches_runs():
+    batch = run("batch.md")["batch"]
+    assert not len(batch.failed)
+    assert np.all(batch.final[sensitivity("position", 0)] < 0)  # more load, less way
 
 
 def test_the_table_of_a_scenario_is_built():

@@ -58,3 +58,35 @@ def test_a_run_that_ended_at_once_still_shows_what_was_commanded():
     chapter = run_chapter(scenario, run.rows(slice(0, 1)))
     assert chapter.summary.startswith("A run of 25 s that ended early, at 0 s; the last note says why.")
     assert chapter.plots[-1].figure.axes[0].lines[0].get_xdata()[-1] == 25.0
+
+
+JOINT = """
+[[plant.muscle]]
+library = "dmsp-20-300"
+name = "left"
+[[plant.muscle]]
+library = "dmsp-20-300"
+name = "right"
+[[plant.circuit]]
+model = "ClosedChamber"
+[[plant.circuit]]
+model = "ClosedChamber"
+[plant.mechanism]
+model = "AntagonisticJoint"
+radius = "40 mm"
+inertia = 0.05
+offset = 0.1
+[command]
+[run]
+duration = "10 ms"
+start = { pressure = "2 bar" }
+"""
+
+
+def test_of_a_joint_the_angle_and_its_speed_are_drawn_after_every_muscle(tmp_path):
+    (tmp_path / "joint.toml").write_text(JOINT, encoding="utf-8")
+    scenario = load_scenario(tmp_path / "joint.toml")
+    axes = run_chapter(scenario, scenario.simulate()).plots[0].figure.axes
+    names = [axis.get_ylabel().partition("\n")[0] for axis in axes]
+    assert names[-2:] == ["angle", "angular_speed"]
+    assert {"left.pressure", "right.pressure", "left.force", "right.force"} <= set(names)

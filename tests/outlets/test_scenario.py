@@ -230,6 +230,18 @@ lag = {{ model = "Follower", frequency = "20 Hz", damping_ratio = 0.7 }}
         load_scenario(written(tmp_path, ('"2 bar"', '"2 mm"'), text=text))
 
 
+def test_a_column_of_no_known_quantity_has_the_unit_of_its_heading(tmp_path: Path):
+    (tmp_path / "bench.csv").write_text(
+        "time [s],valve [%],discharge,port [mm]\n0,50,1,1\n1,20,0,1\n", encoding="utf-8"
+    )
+    for column in ("valve", "valve [%]"):
+        table = f'file = "bench.csv"\ncolumns = {{ fill = "{column}", discharge = "discharge" }}'
+        command = load_scenario(written(tmp_path, (FILL, table))).command
+        assert command == Signal({"fill": ((0, 0.5), (1, 0.2)), "discharge": ((0, 1), (1, 0))})
+    with pytest.raises(UnitError, match=r"bench.csv, port \[mm\]: unit 'mm' cannot become a ratio"):
+        load_scenario(written(tmp_path, (FILL, 'file = "bench.csv"\ncolumns = { fill = "port" }')))
+
+
 def test_columns_called_like_inputs_are_taken_unasked(tmp_path: Path):
     (tmp_path / "bench.csv").write_text("time [s],discharge [1],fill [1]\n0,1,0\n1,0.5,0.2\n", encoding="utf-8")
     command = load_scenario(written(tmp_path, (FILL, 'file = "bench.csv"'))).command

@@ -47,7 +47,8 @@ def fit_dynamic(
 
     \b
     Says what the records cannot tell apart, and the experiment that would.
-    Writes DIR/report.html and, of every record, DIR/scenario.toml with the numbers found, to simulate on.
+    Writes DIR/report.html and DIR/scenario.toml with the numbers found, to simulate on; of several records
+    DIR/scenario-1.toml and so on.
 
     \b
     Examples:

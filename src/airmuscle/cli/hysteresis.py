@@ -140,7 +140,8 @@ def _print(found: Sequence[LoopFit], creep: Sequence[str]) -> None:
         typer.echo(f"{each.loop.recording.origin}: {each.loop.in_words}. {counted(each.loop)}")
         rows = [
             (type(f.friction).__name__, f"{f.plain_rmse:.3g} to {f.rmse:.3g} N", _judge(f),
-             f"{f.aicc_gain:.3g}", f"{f.chance:.2g}", "yes" if f.justified else "no")
+             f"{f.aicc_gain:.4g}", "< 1e-300" if f.chance < 1e-300 else f"{f.chance:.2g}",
+             "yes" if f.justified else "no")
             for f in each.fits
         ]  # fmt: skip
         heads = ("law", "rms error", "on second run", "AICc falls by", "by chance", "justified")

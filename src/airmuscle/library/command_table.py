@@ -35,7 +35,7 @@ def command_from(table: Mapping[str, Any], commands: Sequence[Input], place: Pla
     rows = {key: value for key, value in table.items() if key not in KEYS}
     with said_at(place):
         refuse_unknown_input(list(rows), inputs)
-    points = _recorded(table, inputs, place)
+    points = _recorded(table, units, place)
     for key, given in rows.items():
         if key in points:
             raise ParameterError(f"{place}: '{key}' stands in the file and here too; take it out of one of them.")
@@ -69,20 +69,22 @@ def _point(row: Any, unit: str, where: str) -> tuple[float, float]:
     return finite(row[0], "s", where), finite(row[1], unit, where)
 
 
-def _recorded(table: Mapping[str, Any], inputs: Sequence[str], place: Place) -> dict[str, Points]:
+def _recorded(table: Mapping[str, Any], units: Mapping[str, str], place: Place) -> dict[str, Points]:
     """The points of the inputs that follow a column of a data file; none where no file is named."""
-    columns = table.get("columns")
+    columns, inputs = table.get("columns"), tuple(units)
     if "file" not in table:
         if columns is not None:
             raise ParameterError(f'{place}: columns are named, but no file; write file = "bench.csv" beside them.')
         return {}
     from ..recording import read_csv  # pandas, which no other command needs
+    from ..recording.heading import stated_unit
 
     path = text(table, "file", place, needed=True)
     with said_at(place):
         recording = read_csv(place.folder / path)
         if columns is None:
-            columns = {name: name for name in inputs if name in recording}
+            named = {*recording, *(stated_unit(heading)[0] for heading in recording)}
+            columns = {name: name for name in inputs if name in named}
             if not columns:
                 raise ColumnError(
                     f"{path} has no column called like an input ({', '.join(inputs)}); there are "
@@ -92,7 +94,9 @@ def _recorded(table: Mapping[str, Any], inputs: Sequence[str], place: Place) -> 
         raise ParameterError(f'{place}, columns is {columns!r}; write columns = {{ fill = "valve" }}.')
     with said_at(place):
         refuse_unknown_input(list(columns), inputs)
-        return {name: tuple(points) for name, points in Signal.recorded(recording, columns).points.items()}
+        taken = {name: recording.in_unit(column, units[name]) for name, column in columns.items()}
+        signal = Signal.recorded(recording.with_columns(**taken), {name: name for name in columns})
+        return {name: tuple(points) for name, points in signal.points.items()}
 
 
 def _drivers(table: Any, inputs: Sequence[str], place: Place) -> dict[str, Driver | tuple[Driver, ...]]:

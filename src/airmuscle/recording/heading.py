@@ -85,3 +85,9 @@ def _splits(text: str) -> Iterator[tuple[str, str]]:
     name = known_name(found["name"]) if found else None
     if found and name and found["unit"] in SPELLINGS[QUANTITIES[name.rpartition(".")[2]].unit]:
         yield name, found["unit"]
+
+
+def stated_unit(text: str) -> tuple[str, str | None]:
+    """Name and unit of a heading whose quantity is not known, `height [mm]`; no unit where it states none."""
+    found = next((found for form in _MARKED if (found := form.fullmatch(text.strip()))), None)
+    return (found["name"].strip(), found["unit"].strip()) if found else (text.strip(), None)

@@ -10,7 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import ColumnError, suggestion
+from ..units import conversion
 from .columns import quantity_of
+from .heading import stated_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,6 +77,17 @@ class Recording:
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.columns)
+
+    def in_unit(self, name: str, unit: str | None) -> Array:
+        """A column in this SI unit. A column of no known quantity was taken as it stood; the unit that its heading
+        states, as in `height [mm]`, counts here, unless None is asked for, and its name is also 'height'. Raises
+        ColumnError and UnitError."""
+        for heading, values in self.columns.items():
+            plain, stated = stated_unit(heading)
+            if stated is not None and name in (heading, plain):
+                convert = conversion(stated, unit, where=f"{self.origin}, {heading}") if unit else np.asarray
+                return np.asarray(convert(values))
+        return self[name]
 
     def rows(self, chosen: Any) -> Recording:
         """The recording with only the rows picked by a mask, slice or index array."""

@@ -111,7 +111,10 @@ def _measured(loop: Loop) -> Any:
     figure, axes = new_figure(width=6.0, height=3.9)
     axes.plot(recording[name] * factor, recording["force"], color=BLACK, linewidth=0.5, alpha=0.3)
     for sign, colour, word in ((1, BLUE, "rising"), (-1, RED, "falling")):
-        for rows, alpha, label in ((way == sign, 0.15, None), ((way == sign) & loop.chosen, 0.8, word)):
+        for rows, alpha, label in (
+            ((way == sign) & ~loop.chosen, 0.05, None),
+            ((way == sign) & loop.chosen, 0.8, word),
+        ):
             style = {"marker": "o", "linestyle": "none", "markersize": 3, "alpha": alpha, "color": colour}
             axes.plot(recording[name][rows] * factor, recording["force"][rows], label=label, **style)
     axes.set(xlabel=f"{name} [{unit}]", ylabel="force [N]", title=f"{recording.origin}: {loop.in_words}")

@@ -16,7 +16,7 @@ from ..reference import cite
 from .chapter import Chapter, Plot
 from .parameters import parameter_table
 
-SHOWN = ("pressure", "contraction", "force", "tension", "friction", "position", "angle", "speed")
+SHOWN = ("pressure", "contraction", "force", "friction", "position", "angle", "speed", "angular_speed")
 """Columns that the figure draws, in this order; the file holds all."""
 MOST_PIECES = 300
 """Pieces of a command that a figure tells apart; of a longer one it shows the beginning."""

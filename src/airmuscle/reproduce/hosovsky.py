@@ -138,7 +138,7 @@ def _left_boxes(fill: filling.Fill, low: releasing.Release, high: releasing.Rele
     """When and how far the runs left the box in which the surface has data."""
     runs = {"fill and discharge": fill.adaptive, f"release from {low.pressure / 1e3:g} kPa": low.run}
     runs[f"release from {high.pressure / 1e3:g} kPa"] = high.run
-    left = [(name, note) for name, run in runs.items() for note in run.notes if "left the box" in note]
+    left = [(name, note) for name, run in runs.items() for note in run.notes if "outside the box" in note]
     columns = {"run": [name for name, _ in left], "what": [note for _, note in left]}
     return Table("hosovsky_boxes", "Where the runs left the data of the contractile surface", columns)
 

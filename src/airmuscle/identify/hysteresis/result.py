@@ -106,8 +106,9 @@ class HysteresisFit:
         name = type(self.friction).__name__
         text = (
             f"{name} lowers the rms error from {self.plain_rmse:.3g} to {self.rmse:.3g} N and {self._gaps}. AICc "
-            f"{'falls' if self.aicc_gain > 0 else 'rises'} by {abs(self.aicc_gain):.3g} over {self.effective_rows:.0f} "
-            f"independent rows; idle parameters would do as well with a probability of {self.chance:.2g}."
+            f"{'falls' if self.aicc_gain > 0 else 'rises'} by {abs(self.aicc_gain):.4g} over {self.effective_rows:.0f} "
+            f"independent rows; idle parameters would do as well with a probability "
+            f"{'below 1e-300' if self.chance < 1e-300 else f'of {self.chance:.2g}'}."
         )
         if np.isfinite(self.repeat_rmse):
             text += (
