@@ -41,6 +41,23 @@ class Segments:
         """Where each segment begins (S,)."""
         return np.concatenate([[start], self.ends[:-1]])
 
+    def refuse_misshapen(self, inputs: int, start: float) -> None:
+        """Raise ParameterError unless ends rise from `start` [s] and every segment has all inputs, all finite.
+
+        A kernel reads what it is told is there, so this stands before it.
+        """
+        ends, values, slopes = (np.asarray(a, dtype=float) for a in (self.ends, self.values, self.slopes))
+        shape = (ends.size, inputs)
+        if ends.ndim != 1 or not ends.size or values.shape != shape or slopes.shape != shape:
+            raise ParameterError(
+                f"segments have ends {ends.shape}, values {values.shape} and slopes {slopes.shape}; for {inputs} "
+                f"inputs they must be (S,), (S, {inputs}) and (S, {inputs}), with one segment at least."
+            )
+        if not (np.isfinite(ends).all() and np.isfinite(values).all() and np.isfinite(slopes).all()):
+            raise ParameterError("segments hold a number that is not finite.")
+        if not (np.diff(ends, prepend=start) > 0).all():
+            raise ParameterError(f"segments must end in rising order after {start:g} s; they end at {ends.tolist()} s.")
+
     def cut_at(self, starts: Array, start: float) -> Segments:
         """The same course with segments that begin at other instants (R,), in rising order, the first not before
         `start`; within them it must have no instant of its own."""
@@ -55,6 +72,12 @@ class Command(abc.ABC):
     @abc.abstractmethod
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
         """The command for these inputs from `start` on, cut so that every input is linear within a segment."""
+
+
+def refuse_no_command(given: object) -> None:
+    """Raise ParameterError for what is no Command, as a dictionary is."""
+    if not isinstance(given, Command):
+        raise ParameterError(f"the command is {given!r}; give a Schedule, a Signal or another Command.")
 
 
 def refuse_unknown_input(given: Sequence[str], inputs: Sequence[str]) -> None:
