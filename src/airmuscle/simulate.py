@@ -13,6 +13,7 @@ from .command import Command, Schedule, Segments, refuse_no_command
 from .equilibrium import equilibrium
 from .errors import ParameterError, SimulationError
 from .method import INTERRUPTED, LESS_THAN_NONE, NOT_FINITE, REASONS, Course, Method, Rodas4
+from .muscle import SeriesSpring
 from .plant import Plant
 from .program import System
 from .recording import Recording
@@ -245,25 +246,33 @@ def friction_in_words(plant: Plant) -> str:
 
 
 def outside_box(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
-    """When and how far a run left the box in which a muscle's characteristic has data."""
+    """When and how far a run left the box in which a muscle's characteristic has data, or the reach of a geometry."""
     found = []
     for prefix, muscle in zip(plant.prefixes, plant.muscles, strict=True):
+        of_muscle = []
         box = muscle.box or getattr(muscle.contractile, "box", None)
-        if box is None:
-            continue
-        for name, scale, unit in (("pressure", 1e3, "kPa"), ("contraction", 0.01, "%")):
-            low, high = getattr(box, name)
-            values = columns[f"{prefix}{name}"]
-            beyond = np.maximum(low - values, values - high)
-            if (beyond > 1e-9 * (high - low)).any():
-                worst = int(np.argmax(beyond))
-                share = float(np.mean(beyond > 0))
-                found.append(
-                    f"{muscle.name} left the box of its characteristic in {name} ({low / scale:.4g} to "
-                    f"{high / scale:.4g} {unit}) in {share:.0%} of the rows, by at most {beyond[worst] / scale:.4g} "
-                    f"{unit} at {columns['time'][worst]:.4g} s; nothing was measured there"
-                )
+        if box is not None:
+            left, doubt = f"{muscle.name} left the box of its characteristic", "nothing was measured there"
+            of_muscle += [("pressure", box.pressure, left, doubt), ("contraction", box.contraction, left, doubt)]
+        if not isinstance(muscle.series, SeriesSpring):  # a series spring stretches beyond what the muscle does
+            left, doubt = f"{muscle.name} left the reach of its geometry", "no muscle can do this"
+            of_muscle.append(("contraction", muscle.geometry.contraction_reach, left, doubt))
+        for name, bounds, left, doubt in of_muscle:
+            found += _beyond(columns["time"], columns[f"{prefix}{name}"], name, bounds, left, doubt)
     return found
+
+
+def _beyond(time: Array, values: Array, name: str, bounds: tuple[float, float], left: str, doubt: str) -> list[str]:
+    """A note where a column of pressure or contraction leaves its bounds."""
+    (low, high), (scale, unit) = bounds, (1e3, "kPa") if name == "pressure" else (0.01, "%")
+    beyond = np.maximum(low - values, values - high)
+    if not (beyond > 1e-9 * (high - low)).any():
+        return []
+    worst, share = int(np.argmax(beyond)), float(np.mean(beyond > 0))
+    return [
+        f"{left} in {name} ({low / scale:.4g} to {high / scale:.4g} {unit}) in {share:.0%} of the rows, by at most "
+        f"{beyond[worst] / scale:.4g} {unit} at {time[worst]:.4g} s; {doubt}"
+    ]
 
 
 def _problem(plant: System, course: Course, end: float) -> str:

@@ -67,9 +67,10 @@ def refuse_impossible(plant: Plant, state: Mapping[str, float]) -> None:
     """Raise OutOfReach where a muscle cannot take its contraction, ParameterError where it encloses nothing."""
     contractions = plant.mechanism.contractions(state, plant.resting_lengths)
     for muscle, prefix, contraction in zip(plant.muscles, plant.prefixes, contractions, strict=True):
-        muscle.geometry.refuse_out_of_reach(contraction)
         own = within(prefix, state)
-        volume = muscle.volume(muscle.inner_contraction(contraction, own), own)
+        inner = muscle.inner_contraction(contraction, own)
+        muscle.geometry.refuse_out_of_reach(inner)
+        volume = muscle.volume(inner, own)
         if not volume > 0.0:
             raise ParameterError(
                 f"the start: {muscle.name} encloses {volume:g} m3 at a contraction of {contraction:.2%}; choose one "

@@ -161,3 +161,13 @@ def test_a_batch_has_no_more_plants_than_it_has():
 def test_the_response_at_a_pole_is_infinite():
     with pytest.raises(AirmuscleError, match="there is a pole at 0 Hz"):
         linearise(isothermal(), {**STATE, "speed": 0.0}).response([0.0])
+
+
+def test_a_run_says_where_no_muscle_can_be():
+    """A load thrown up far beyond the muscle's own length is no muscle any more; the numbers alone do not say so."""
+    plant = isothermal()
+    run = simulate(plant, Schedule({}), duration=0.1, start={**STATE, "speed": 100.0})
+    (note,) = [note for note in run.notes if "left the reach of its geometry in contraction" in note]
+    assert "no muscle can do this" in note
+    calm = simulate(plant, Schedule({}), duration=0.1, start=STATE)
+    assert not [note for note in calm.notes if "reach" in note]

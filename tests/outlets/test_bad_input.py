@@ -235,6 +235,11 @@ def test_the_pressure_of_the_surroundings_takes_no_gauge_unit():
         quantity("1 barg", ABSOLUTE, where="here")
 
 
+def test_a_unit_is_not_suggested_in_its_own_place():
+    with pytest.raises(UnitError, match=r"write kPa\(a\) or bara\.$"):
+        quantity("1 barg", ABSOLUTE, where="here")
+
+
 def test_a_whole_number_beyond_all_floats():
     with pytest.raises(UnitError, match="here: the number is too large"):
         quantity(10**400, "Pa", where="here")
