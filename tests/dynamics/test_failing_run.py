@@ -7,12 +7,13 @@ import pytest
 from joints import chosen_muscle
 
 from airmuscle.batch import simulate_batch
-from airmuscle.circuit import FillDischarge, Supply, Valve
+from airmuscle.circuit import FillDischarge, Leaking, Line, Manifold, Shared, Supply, Tube, Valve
 from airmuscle.command import Schedule, Segments
+from airmuscle.contact import HuntCrossley
 from airmuscle.errors import AirmuscleError, SimulationError
 from airmuscle.gas import Isothermal
 from airmuscle.linearise import linearise
-from airmuscle.mechanism import HangingMass
+from airmuscle.mechanism import HangingMass, Held, InSeries, Stopped
 from airmuscle.method import LESS_THAN_NONE, RungeKutta4
 from airmuscle.plant import Plant
 from airmuscle.simulate import advance, simulate
@@ -156,6 +157,38 @@ def test_a_batch_has_no_more_plants_than_it_has():
         with pytest.raises(AirmuscleError, match=message):
             simulate_batch(isothermal(), command=FILL, duration=0.1,
                            **{"variations": {"mechanism.mass": [9.0]}, "start": STATE, **given})  # fmt: skip
+
+
+PARTS = [
+    (lambda: FillDischarge(Supply(5e5), 3, VALVE), "FillDischarge: its fill must be of Orifice; it is 3"),
+    (lambda: FillDischarge(5e5, VALVE, VALVE), "its supply must be of Source; it is 500000"),
+    (lambda: Line(FillDischarge(Supply(5e5), VALVE, VALVE), VALVE), "Line: its tube must be of Conduit"),
+    (lambda: Line(FillDischarge(Supply(5e5), VALVE, VALVE), Tube(VALVE, 1e-6, 1, "air")), "its gas must be of Gas"),
+    (lambda: Leaking(None, VALVE), "Leaking: its circuit must be of Circuit; it is None"),
+    (lambda: Manifold(Supply(5e5), (3,), ("a",)), "its branches must be a tuple of Circuit"),
+    (lambda: Manifold(Supply(5e5), FillDischarge(Shared(), VALVE, VALVE), ("a",)), "must be a tuple of Circuit"),
+    (lambda: Manifold(Supply(5e5), (FillDischarge(Shared(), VALVE, VALVE),), (1,)), "names must be a tuple of str"),
+]
+
+
+@pytest.mark.parametrize(("make", "message"), PARTS)
+def test_a_part_of_another_kind_is_named(make, message):
+    with pytest.raises(AirmuscleError, match=message):
+        Plant(chosen_muscle(), make(), HangingMass(10.0))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Held(3), "Held: its inner must be of Mechanism; it is 3"),
+        (lambda: InSeries(3, (1.0,)), "InSeries: its inner must be of Mechanism"),
+        (lambda: Stopped(3, 0.0, 0.1, HuntCrossley(1e9)), "Stopped: its inner must be of Mechanism"),
+        (lambda: Stopped(HangingMass(1.0), 0.0, 0.1, 3), "Stopped: its contact must be of HuntCrossley"),
+    ],
+)
+def test_a_part_of_a_mechanism_is_one(make, message):
+    with pytest.raises(AirmuscleError, match=message):
+        Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), make())
 
 
 def test_the_response_at_a_pole_is_infinite():
