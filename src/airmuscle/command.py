@@ -88,6 +88,11 @@ def refuse_unknown_input(given: Sequence[str], inputs: Sequence[str]) -> None:
             raise ParameterError(f"the plant has no input '{name}'; there are {known}.{suggestion(name, inputs)}")
 
 
+def _refuse_no_mapping(kind: str, given: object) -> None:
+    if not isinstance(given, Mapping):
+        raise ParameterError(f"a {kind} is {given!r}; name the inputs: {{'fill': ((5, 1), (15, 0))}}.")
+
+
 def _pairs(kind: str, name: str, given: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     try:
         return [(0.0 + time, 0.0 + value) for time, value in given]
@@ -112,6 +117,7 @@ class Schedule(Command):
     changes: Mapping[str, Sequence[tuple[float, float]]]
 
     def __post_init__(self) -> None:
+        _refuse_no_mapping("schedule", self.changes)
         for name, given in self.changes.items():
             changes = _pairs("schedule", name, given)
             if changes and not np.isfinite(changes).all():
@@ -137,6 +143,7 @@ class Signal(Command):
     points: Mapping[str, Sequence[tuple[float, float]]]
 
     def __post_init__(self) -> None:
+        _refuse_no_mapping("signal", self.points)
         for name, given in self.points.items():
             points = _pairs("signal", name, given)
             if not points or not np.isfinite(points).all():

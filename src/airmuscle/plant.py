@@ -59,7 +59,7 @@ class Plant:
         parts += [("muscle", m, Muscle) for m in self.muscles] + [("circuit", c, Circuit) for c in self.circuits]
         for field, part, kind in parts:
             if not isinstance(part, kind):
-                raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {part!r}.")
+                raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {str(part)[:80]}.")
         refuse_misplaced((self.muscles, self.circuits, self.mechanism))
         for circuit in self.circuits:
             refuse_shared(f"Plant: its {type(circuit).__name__}", circuit.supply)

@@ -99,6 +99,8 @@ def pieces(ends, values, slopes=None):
     ("segments", "message"),
     [
         (pieces([0.01], [[1.0]]), r"for 2 inputs they must be \(S,\), \(S, 2\)"),
+        (pieces([0.01], [[1.0]], [[0.0, 0.0]]), "they must be"),
+        (pieces([0.01], [[1.0, 0.0]], [[0.0]]), "they must be"),
         (pieces([0.005, 0.01], [[1.0, 0.0]]), "they must be"),
         (pieces([], np.zeros((0, 2))), "one segment at least"),
         (pieces([0.02, 0.01], [[1.0, 0.0]] * 2), "in rising order after 0 s"),

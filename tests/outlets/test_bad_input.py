@@ -280,6 +280,13 @@ def test_a_command_that_is_no_pairs(kind: type, given: object):
         kind({"fill": given})
 
 
+@pytest.mark.parametrize("kind", [Schedule, Signal])
+@pytest.mark.parametrize("given", [None, ((5, 1), (15, 0))])
+def test_a_command_that_names_no_inputs(kind: type, given: object):
+    with pytest.raises(ParameterError, match=r"a (schedule|signal) is .*; name the inputs: {'fill': "):
+        kind(given)
+
+
 @pytest.fixture
 def plant() -> Plant:
     valve = Valve(3e-9, 0.3)
