@@ -41,6 +41,23 @@ class Segments:
         """Where each segment begins (S,)."""
         return np.concatenate([[start], self.ends[:-1]])
 
+    def refuse_misshapen(self, inputs: int, start: float) -> None:
+        """Raise ParameterError unless ends rise from `start` [s] and every segment has all inputs, all finite.
+
+        A kernel reads what it is told is there, so this stands before it.
+        """
+        ends, values, slopes = (np.asarray(a, dtype=float) for a in (self.ends, self.values, self.slopes))
+        shape = (ends.size, inputs)
+        if ends.ndim != 1 or not ends.size or values.shape != shape or slopes.shape != shape:
+            raise ParameterError(
+                f"segments have ends {ends.shape}, values {values.shape} and slopes {slopes.shape}; for {inputs} "
+                f"inputs they must be (S,), (S, {inputs}) and (S, {inputs}), with one segment at least."
+            )
+        if not (np.isfinite(ends).all() and np.isfinite(values).all() and np.isfinite(slopes).all()):
+            raise ParameterError("segments hold a number that is not finite.")
+        if not (np.diff(ends, prepend=start) > 0).all():
+            raise ParameterError(f"segments must end in rising order after {start:g} s; they end at {ends.tolist()} s.")
+
     def cut_at(self, starts: Array, start: float) -> Segments:
         """The same course with segments that begin at other instants (R,), in rising order, the first not before
         `start`; within them it must have no instant of its own."""
@@ -57,12 +74,23 @@ class Command(abc.ABC):
         """The command for these inputs from `start` on, cut so that every input is linear within a segment."""
 
 
+def refuse_no_command(given: object) -> None:
+    """Raise ParameterError for what is no Command, as a dictionary is."""
+    if not isinstance(given, Command):
+        raise ParameterError(f"the command is {given!r}; give a Schedule, a Signal or another Command.")
+
+
 def refuse_unknown_input(given: Sequence[str], inputs: Sequence[str]) -> None:
     """Raise ParameterError, with the nearest name, for a name that is no input of the plant."""
     for name in given:
         if name not in inputs:
             known = ", ".join(inputs) or "none"
             raise ParameterError(f"the plant has no input '{name}'; there are {known}.{suggestion(name, inputs)}")
+
+
+def _refuse_no_mapping(kind: str, given: object) -> None:
+    if not isinstance(given, Mapping):
+        raise ParameterError(f"a {kind} is {given!r}; name the inputs: {{'fill': ((5, 1), (15, 0))}}.")
 
 
 def _pairs(kind: str, name: str, given: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -89,6 +117,7 @@ class Schedule(Command):
     changes: Mapping[str, Sequence[tuple[float, float]]]
 
     def __post_init__(self) -> None:
+        _refuse_no_mapping("schedule", self.changes)
         for name, given in self.changes.items():
             changes = _pairs("schedule", name, given)
             if changes and not np.isfinite(changes).all():
@@ -114,6 +143,7 @@ class Signal(Command):
     points: Mapping[str, Sequence[tuple[float, float]]]
 
     def __post_init__(self) -> None:
+        _refuse_no_mapping("signal", self.points)
         for name, given in self.points.items():
             points = _pairs("signal", name, given)
             if not points or not np.isfinite(points).all():

@@ -7,7 +7,9 @@ Any other field is structure: another model, a tuple of models, a whole number, 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
+import typing
 from collections.abc import Iterator, Sequence
 from typing import Any, TypeVar, dataclass_transform
 
@@ -135,6 +137,33 @@ def leaves(thing: Any, path: str = "") -> Iterator[Leaf]:
                 yield from (Leaf(f"{inner}[{i}]", v, declared[field.name]) for i, v in enumerate(value))
             else:
                 yield Leaf(inner, value, declared[field.name])
+
+
+@functools.cache
+def _kinds(cls: type[Any]) -> dict[str, type[Any]]:
+    """What the structural fields of a model class hold, where that is one class of models."""
+    try:
+        hints = typing.get_type_hints(cls)
+    except NameError:  # a class of one's own, whose annotations name what only a type checker imports
+        return {}
+    plain = {f.name: hints[f.name] for f in dataclasses.fields(cls) if "unit" not in f.metadata}
+    return {n: k for n, k in plain.items() if isinstance(k, type) and k.__module__ not in ("builtins", "types")}
+
+
+def refuse_misplaced(thing: Any) -> None:
+    """Raise ParameterError where a part, anywhere inside a model, is not of the kind that its field holds."""
+    if isinstance(thing, tuple):
+        for item in thing:
+            refuse_misplaced(item)
+    elif dataclasses.is_dataclass(thing) and not isinstance(thing, type):
+        for name, kind in _kinds(type(thing)).items():
+            part = getattr(thing, name)
+            if not isinstance(part, kind):
+                raise ParameterError(
+                    f"{type(thing).__name__}: its {name} must be of {kind.__name__}; it is {str(part)[:80]}."
+                )
+        for field in dataclasses.fields(thing):
+            refuse_misplaced(getattr(thing, field.name))
 
 
 def flatten(thing: Any) -> npt.NDArray[np.float64]:

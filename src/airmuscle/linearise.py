@@ -15,6 +15,7 @@ from .errors import AirmuscleError, ParameterError, suggestion
 from .plant import Plant
 from .program import System
 from .recording.columns import quantity_of
+from .start import refuse_impossible, state_vector
 from .stiffness import Stiffness, stiffness
 
 Array = npt.NDArray[np.float64]
@@ -80,7 +81,13 @@ class Linearised:
             if not (np.isfinite(f) and f >= 0):
                 raise ParameterError(f"response: a frequency is {f!r} Hz; it must be finite and not negative.")
             shifted = 2j * math.pi * f * np.eye(len(self.states)) - self.A
-            found.append(self.C @ np.linalg.solve(shifted, self.B) + self.D)
+            try:
+                found.append(self.C @ np.linalg.solve(shifted, self.B) + self.D)
+            except np.linalg.LinAlgError:
+                raise ParameterError(
+                    f"response: there is a pole at {f:g} Hz, as shut-in air is at 0 Hz, and the response is "
+                    "infinite. Choose another frequency."
+                ) from None
         return np.array(found, dtype=complex)
 
     def to_scipy(self) -> Any:
@@ -124,18 +131,13 @@ def linearise(plant: System, state: Mapping[str, float], inputs: Mapping[str, fl
     from .program.derivatives import derivatives
     from .program.prepared import prepared
 
-    names = [s.name for s in plant.states]
-    for name in state:
-        if name not in names:
-            raise ParameterError(f"the system has no state '{name}'; there are {', '.join(names)}."
-                                 f"{suggestion(name, names)}")  # fmt: skip
-    missing = [name for name in names if name not in state]
-    if missing:
-        raise ParameterError(f"linearise: the state lacks {', '.join(missing)}.")
+    x = state_vector(plant, state).tolist()
+    if isinstance(plant, Plant):
+        refuse_impossible(plant, state)
     given = _inputs(plant, inputs or {})
-    x, u = [float(state[n]) for n in names], list(given.values())
-    if not np.isfinite([*x, *u]).all():
-        raise ParameterError(f"linearise: state and inputs must be finite; they are {dict(state)} and {given}.")
+    names, u = [s.name for s in plant.states], list(given.values())
+    if not np.isfinite(u).all():
+        raise ParameterError(f"linearise: inputs must be finite; they are {given}.")
     ready = prepared(plant)
     at = derivatives(ready, x, u)
     further = [i for i, name in enumerate(ready.output_names) if name not in names]

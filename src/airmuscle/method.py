@@ -23,8 +23,9 @@ REASONS = {
     3: "a rate or an output is not finite",
     4: "it took more steps than allowed",
     5: "it was interrupted",
+    7: "there was less air than none",
 }
-PAUSED, NOT_FINITE, TOO_MANY, INTERRUPTED = 1, 3, 4, 5
+PAUSED, NOT_FINITE, TOO_MANY, INTERRUPTED, LESS_THAN_NONE = 1, 3, 4, 5, 7
 BUDGET = 100_000
 """Steps between two looks at whether the user wants to stop."""
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from .circuit import Circuit, Response
 from .circuit.supply import refuse_shared
-from .declare import model
+from .declare import model, refuse_misplaced
 from .errors import ParameterError, TraceError
 from .gas import Air, Ambient, Flow, Gas, Polytropic, absolute, gauge, refuse_vacuum
 from .mechanism import Mechanism
@@ -59,7 +59,8 @@ class Plant:
         parts += [("muscle", m, Muscle) for m in self.muscles] + [("circuit", c, Circuit) for c in self.circuits]
         for field, part, kind in parts:
             if not isinstance(part, kind):
-                raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {part!r}.")
+                raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {str(part)[:80]}.")
+        refuse_misplaced((self.muscles, self.circuits, self.mechanism))
         for circuit in self.circuits:
             refuse_shared(f"Plant: its {type(circuit).__name__}", circuit.supply)
         names = [m.name for m in self.muscles]

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from .command import Command, Schedule, Segments
+from .command import Command, Schedule, Segments, refuse_no_command
 from .equilibrium import equilibrium
-from .errors import ParameterError, SimulationError, suggestion
-from .method import INTERRUPTED, NOT_FINITE, REASONS, Course, Method, Rodas4
+from .errors import ParameterError, SimulationError
+from .method import INTERRUPTED, LESS_THAN_NONE, NOT_FINITE, REASONS, Course, Method, Rodas4
+from .muscle import SeriesSpring
 from .plant import Plant
 from .program import System
 from .recording import Recording
+from .start import less_than_none, number_of, refuse_impossible, state_vector
 
 if TYPE_CHECKING:
     from .program.prepared import Prepared
@@ -50,6 +52,8 @@ def simulate(
 
     The result does not depend on `output`. Raises ParameterError for an input or state that the plant lacks.
     """
+    refuse_no_command(command)
+    duration, start_time = number_of("simulate: duration", duration), number_of("simulate: start_time", start_time)
     if not (np.isfinite(duration) and duration > 0):
         raise ParameterError(f"simulate: duration is {duration!r} s; it must be positive and finite.")
     if not start_time + duration > start_time:
@@ -58,15 +62,18 @@ def simulate(
 
     if start is None:
         start = _rest(plant)
-    method = method or Rodas4()
+    method = chosen_method(method)
     ready = prepared(plant)
     segments = command.segments(plant.inputs, start_time, duration)
+    segments.refuse_misshapen(len(plant.inputs), start_time)
     refuse_beyond_range(plant, segments, start_time)
     times = output_times(output, start_time, duration, segments.ends)
-    state = _vector(plant, start)
+    state = state_vector(plant, start)
+    if isinstance(plant, Plant):
+        refuse_impossible(plant, start)
     course = method.run(ready, segments, start_time, state, times)
     results, inputs = _results(ready, course, segments, times, start_time)
-    course = _stopped_where_not_finite(course, results, times)
+    course = _stopped_where_impossible(plant, course, results, times)
     recording = _recorded(ready, course, results, inputs, times, method)
     if course.status != 0:
         problem = _problem(plant, course, start_time + duration)
@@ -93,19 +100,25 @@ def advance(
     """
     from .program.prepared import prepared
 
+    dt = number_of("advance: dt", dt)
     if not 0 < dt < np.inf:
         raise ParameterError(f"advance: dt is {dt!r} s; it must be positive and finite.")
     if isinstance(inputs, Segments):
         segments = inputs
+        segments.refuse_misshapen(len(plant.inputs), start_time)
         if abs(float(segments.ends[-1]) - start_time - dt) > 1e-9 * dt:
             raise ParameterError(
                 f"advance: the segments end at {segments.ends[-1]:g} s; start_time + dt is {start_time + dt:g} s."
             )
     else:
-        hold = Schedule({name: ((start_time, float(value)),) for name, value in inputs.items()})
+        if not isinstance(inputs, Mapping):
+            raise ParameterError(f"advance: inputs are {inputs!r}; give a value for each name, or Segments.")
+        hold = Schedule({name: ((start_time, value),) for name, value in inputs.items()})
         segments = hold.segments(plant.inputs, start_time, dt)
     refuse_beyond_range(plant, segments, start_time)
-    course = (method or Rodas4()).run(prepared(plant), segments, start_time, _vector(plant, state), np.empty(0))
+    course = chosen_method(method).run(prepared(plant), segments, start_time, state_vector(plant, state), np.empty(0))
+    if course.status == 0 and less_than_none(plant, course.state).any():
+        course = course._replace(status=LESS_THAN_NONE)
     if course.status != 0:
         raise SimulationError(_problem(plant, course, start_time + dt))
     return {s.name: float(v) for s, v in zip(plant.states, course.state, strict=True)}
@@ -116,7 +129,8 @@ def output_times(output: float | npt.ArrayLike | None, start: float, duration: f
     end = start + duration
     if output is None:
         output = min(duration / 1000, COARSEST)
-    if isinstance(output, float | int):
+    if not np.ndim(output):
+        output = number_of("simulate: output", output)
         if not 0 < output < np.inf:
             raise ParameterError(f"simulate: an output spacing of {output!r} s is not positive and finite.")
         if duration / output > MOST_ROWS:
@@ -126,13 +140,33 @@ def output_times(output: float | npt.ArrayLike | None, start: float, duration: f
             )
         grid = start + output * np.arange(int(np.floor(duration / output * (1 + 1e-12))) + 1)
     else:
-        grid = np.sort(np.asarray(output, dtype=float))
+        grid = _instants(output)
         if grid.size and not (grid[0] >= start and grid[-1] <= end):
             raise ParameterError(f"simulate: output instants must lie within {start:g} to {end:g} s.")
     behind = np.searchsorted(instants, grid)  # two neighbours of each: a table of all pairs would not fit the memory
     before, after = instants[np.maximum(behind - 1, 0)], instants[np.minimum(behind, instants.size - 1)]
     apart = np.minimum(np.abs(grid - before), np.abs(grid - after)) > 1e-9 * duration
     return np.unique(np.concatenate([grid[apart], instants]))
+
+
+def _instants(given: Any) -> Array:
+    """Instants [s] in rising order, from a list of them."""
+    try:
+        found = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        found = np.empty((0, 0))
+    if found.ndim != 1:
+        raise ParameterError(f"simulate: output is {given!r}; give a spacing [s] or a list of instants [s].")
+    return np.sort(found)
+
+
+def chosen_method(method: Method | None) -> Method:
+    """The method that is given, or the default. Raises ParameterError for what is none, as a name is."""
+    if method is None:
+        return Rodas4()
+    if not isinstance(method, Method):
+        raise ParameterError(f"the method is {method!r}; give Rodas4(), RungeKutta4(step) or DormandPrince8(step).")
+    return method
 
 
 def refuse_beyond_range(plant: System, segments: Segments, start: float) -> None:
@@ -160,22 +194,6 @@ def _rest(plant: System) -> Mapping[str, float]:
     raise ParameterError(f"simulate: give the start of {type(plant).__name__}, a value for each state.")
 
 
-def _vector(plant: System, state: Mapping[str, float]) -> Array:
-    names = [s.name for s in plant.states]
-    for name in state:
-        if name not in names:
-            raise ParameterError(
-                f"the plant has no state '{name}'; there are {', '.join(names)}.{suggestion(name, names)}"
-            )
-    missing = [name for name in names if name not in state]
-    if missing:
-        raise ParameterError(f"the start lacks {', '.join(missing)}; use plant.state_at(pressure=...) or equilibrium.")
-    values = np.array([state[name] for name in names], dtype=float)
-    if not np.isfinite(values).all():
-        raise ParameterError(f"the start must be finite; it is {dict(zip(names, values.tolist(), strict=True))}.")
-    return values
-
-
 def _results(ready: Prepared, course: Course, segments: Segments, times: Array, start: float) -> tuple[Array, Array]:
     """Outputs (N, K) and inputs (N, m) at the rows that were reached."""
     from .engine.evaluate import evaluate
@@ -189,13 +207,15 @@ def _results(ready: Prepared, course: Course, segments: Segments, times: Array, 
     return results, inputs
 
 
-def _stopped_where_not_finite(course: Course, results: Array, times: Array) -> Course:
-    """The course up to the first row whose outputs are not finite: a fixed step can be finite and yet far off."""
-    bad = np.flatnonzero(~np.isfinite(results).all(axis=1))
+def _stopped_where_impossible(plant: System, course: Course, results: Array, times: Array) -> Course:
+    """The course up to the first row that cannot be: a fixed step can end in numbers, and yet far off."""
+    not_finite = np.asarray(~np.isfinite(results).all(axis=1))
+    bad = np.flatnonzero(not_finite | less_than_none(plant, course.rows[: course.reached]).any(axis=1))
     if not bad.size:
         return course
     row = int(bad[0])
-    return course._replace(reached=row, time=float(times[row]), state=course.rows[row], status=NOT_FINITE)
+    status = NOT_FINITE if not_finite[row] else LESS_THAN_NONE
+    return course._replace(reached=row, time=float(times[row]), state=course.rows[row], status=status)
 
 
 def _recorded(
@@ -226,25 +246,33 @@ def friction_in_words(plant: Plant) -> str:
 
 
 def outside_box(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
-    """When and how far a run left the box in which a muscle's characteristic has data."""
+    """When and how far a run left the box in which a muscle's characteristic has data, or the reach of a geometry."""
     found = []
     for prefix, muscle in zip(plant.prefixes, plant.muscles, strict=True):
+        of_muscle = []
         box = muscle.box or getattr(muscle.contractile, "box", None)
-        if box is None:
-            continue
-        for name, scale, unit in (("pressure", 1e3, "kPa"), ("contraction", 0.01, "%")):
-            low, high = getattr(box, name)
-            values = columns[f"{prefix}{name}"]
-            beyond = np.maximum(low - values, values - high)
-            if (beyond > 1e-9 * (high - low)).any():
-                worst = int(np.argmax(beyond))
-                share = float(np.mean(beyond > 0))
-                found.append(
-                    f"{muscle.name} was outside the box of its characteristic in {name} ({low / scale:.4g} to "
-                    f"{high / scale:.4g} {unit}) in {share:.0%} of the rows, by at most {beyond[worst] / scale:.4g} "
-                    f"{unit} at {columns['time'][worst]:.4g} s; nothing was measured there"
-                )
+        if box is not None:
+            left, doubt = f"{muscle.name} was outside the box of its characteristic", "nothing was measured there"
+            of_muscle += [("pressure", box.pressure, left, doubt), ("contraction", box.contraction, left, doubt)]
+        if not isinstance(muscle.series, SeriesSpring):  # a series spring stretches beyond what the muscle does
+            left, doubt = f"{muscle.name} was beyond the reach of its geometry", "no muscle can do this"
+            of_muscle.append(("contraction", muscle.geometry.contraction_reach, left, doubt))
+        for name, bounds, left, doubt in of_muscle:
+            found += _beyond(columns["time"], columns[f"{prefix}{name}"], name, bounds, left, doubt)
     return found
+
+
+def _beyond(time: Array, values: Array, name: str, bounds: tuple[float, float], left: str, doubt: str) -> list[str]:
+    """A note where a column of pressure or contraction leaves its bounds."""
+    (low, high), (scale, unit) = bounds, (1e3, "kPa") if name == "pressure" else (0.01, "%")
+    beyond = np.maximum(low - values, values - high)
+    if not (beyond > 1e-9 * (high - low)).any():
+        return []
+    worst, share = int(np.argmax(beyond)), float(np.mean(beyond > 0))
+    return [
+        f"{left} in {name} ({low / scale:.4g} to {high / scale:.4g} {unit}) in {share:.0%} of the rows, by at most "
+        f"{beyond[worst] / scale:.4g} {unit} at {time[worst]:.4g} s; {doubt}"
+    ]
 
 
 def _problem(plant: System, course: Course, end: float) -> str:

@@ -11,6 +11,7 @@ from .gas import STILL, gauge
 from .muscle import Muscle, SeriesSpring
 from .ops import Value
 from .plant import Plant, Port
+from .start import refuse_impossible, state_vector
 
 
 class TwoStiffnesses(NamedTuple):
@@ -44,8 +45,11 @@ def stiffness(plant: Plant, state: Mapping[str, float]) -> Stiffness:
     With shut valves a muscle that is pulled takes up pressure, and is stiffer. Isothermal and polytropic air follow
     their process; with EnergyBalance the pull is too quick for heat, so adiabatic, and a slow one is that of
     Isothermal. A series spring stands in series: 1/k = 1/k_inside + 1/k_SE. Friction, creep and wall do not move. A
-    slack muscle has none.
+    slack muscle has none. Raises ParameterError for an unknown or missing name and for what cannot be, OutOfReach where
+    a muscle cannot take its contraction.
     """
+    state_vector(plant, state)
+    refuse_impossible(plant, state)
     ports = plant.ports(state)
     found = [_of_muscle(plant, muscle, port) for muscle, port in zip(plant.muscles, ports, strict=True)]
     names = [m.name for m in plant.muscles]

@@ -164,4 +164,4 @@ def _nearest(unit: str, target: str) -> str:
     known = (*(name for name, (_, of) in _FACTORS.items() if of == kind and name), *pressures)
     cases = {name.lower(): name for name in known}
     near = difflib.get_close_matches(unit.lower(), cases, n=1)
-    return f" Did you mean '{cases[near[0]]}'?" if near and unit not in _FACTORS else ""
+    return f" Did you mean '{cases[near[0]]}'?" if near and cases[near[0]] != unit and unit not in _FACTORS else ""

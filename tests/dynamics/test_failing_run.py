@@ -6,15 +6,21 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.circuit import FillDischarge, Supply, Valve
-from airmuscle.command import Schedule
-from airmuscle.errors import SimulationError
-from airmuscle.mechanism import HangingMass
-from airmuscle.method import RungeKutta4
+from airmuscle.batch import simulate_batch
+from airmuscle.circuit import FillDischarge, Leaking, Line, Manifold, Shared, Supply, Tube, Valve
+from airmuscle.command import Schedule, Segments
+from airmuscle.contact import HuntCrossley
+from airmuscle.errors import AirmuscleError, SimulationError
+from airmuscle.gas import Isothermal
+from airmuscle.linearise import linearise
+from airmuscle.mechanism import HangingMass, Held, InSeries, Stopped
+from airmuscle.method import LESS_THAN_NONE, RungeKutta4
 from airmuscle.plant import Plant
-from airmuscle.simulate import simulate
+from airmuscle.simulate import advance, simulate
+from airmuscle.stiffness import stiffness
 
 HUGE = Valve(9e-6, 0.3)
+VALVE = Valve(2.6e-9, 0.4)
 FILL = Schedule({"fill": ((0.05, 1.0),)})
 
 
@@ -33,3 +39,170 @@ def test_a_fixed_step_that_is_too_long_is_not_called_a_result():
     kept = simulate(plant, FILL, duration=1.0, start=start, method=RungeKutta4(0.01), complete=False)
     assert len(kept) == len(part)
     assert "not finite" in kept.notes[-1]
+
+
+def isothermal(valve=VALVE):
+    return Plant(chosen_muscle(), FillDischarge(Supply(5e5), valve, valve), HangingMass(10.0), Isothermal())
+
+
+def test_isothermal_air_of_negative_mass_has_a_pressure_and_yet_ends_the_run():
+    """Isothermal air is linear in its mass: numbers stay finite where they have long lost their meaning."""
+    plant, discharge, method = isothermal(HUGE), Schedule({"discharge": ((0.02, 1.0),)}), RungeKutta4(0.01)
+    start = plant.state_at(pressure=3e5)
+    with pytest.raises(SimulationError, match=r"because there was less air than none.*a fixed step too long") as caught:
+        simulate(plant, discharge, duration=0.2, start=start, method=method)
+    assert (caught.value.recording["air_mass"] >= 0.0).all()
+    assert (caught.value.recording["pressure"] >= -101325.0).all()
+    with pytest.raises(SimulationError, match="less air than none"):
+        advance(plant, start, {"discharge": 1.0}, 0.01, method)
+    batch = simulate_batch(
+        plant, {"mechanism.mass": [10.0, 11.0]}, discharge, duration=0.05, start=start, method=method
+    )
+    assert (batch.status == LESS_THAN_NONE).all()
+    assert "less air than none" in batch.reason(1)
+    assert (np.nan_to_num(batch["air_mass"]) >= 0.0).all()
+
+
+STATE = isothermal().state_at(pressure=1e5, position=0.01)
+REACH = chosen_muscle().geometry.contraction_reach
+
+
+@pytest.mark.parametrize(
+    ("state", "message"),
+    [
+        ({**STATE, "air_mass": -1e-3}, "air_mass is -0.001 kg; there is no less air than none"),
+        ({**STATE, "position": "10 mm"}, "position is '10 mm'; it must be one number, in SI"),
+        ({**STATE, "position": [0.0, 0.1]}, "it must be one number, in SI"),
+        ({**STATE, "sped": 0.0}, "no state 'sped'.*Did you mean 'speed'"),
+        ({"air_mass": 1e-3}, "the start lacks position, speed"),
+        ({**STATE, "air_mass": np.nan}, "the start must be finite"),
+        ([1.0, 2.0, 3.0], "the start is .*; give a value for each name"),
+        ({**STATE, "position": 10.0}, "cannot take a contraction of"),
+        ({**STATE, "position": -10.0}, "cannot take a contraction of"),
+        ({**STATE, "position": REACH[1] * chosen_muscle().geometry.resting_length}, "encloses 0 m3|cannot take"),
+    ],
+)
+def test_a_state_that_cannot_be_is_refused_wherever_one_is_given(state, message):
+    plant = isothermal()
+    for act in (lambda: simulate(plant, FILL, duration=0.1, start=state), lambda: linearise(plant, state),
+                lambda: stiffness(plant, state)):  # fmt: skip
+        with pytest.raises(AirmuscleError, match=message):
+            act()
+
+
+def pieces(ends, values, slopes=None):
+    values = np.array(values, dtype=float)
+    return Segments(np.array(ends, dtype=float), values, np.zeros_like(values) if slopes is None else np.array(slopes))
+
+
+@pytest.mark.parametrize(
+    ("segments", "message"),
+    [
+        (pieces([0.01], [[1.0]]), r"for 2 inputs they must be \(S,\), \(S, 2\)"),
+        (pieces([0.01], [[1.0]], [[0.0, 0.0]]), "they must be"),
+        (pieces([0.01], [[1.0, 0.0]], [[0.0]]), "they must be"),
+        (pieces([0.005, 0.01], [[1.0, 0.0]]), "they must be"),
+        (pieces([], np.zeros((0, 2))), "one segment at least"),
+        (pieces([0.02, 0.01], [[1.0, 0.0]] * 2), "in rising order after 0 s"),
+        (pieces([0.01], [[np.nan, 0.0]]), "not finite"),
+        (pieces([np.nan], [[1.0, 0.0]]), "not finite"),
+        (pieces([0.01], [[1.0, 0.0]], [[np.inf, 0.0]]), "not finite"),
+    ],
+)
+def test_segments_of_another_shape_never_reach_a_kernel(segments, message):
+    """A kernel reads as many inputs as the plant has, whether they are there or not."""
+    with pytest.raises(AirmuscleError, match=message):
+        advance(isothermal(), STATE, segments, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"command": {"fill": 1.0}}, "the command is {'fill': 1.0}; give a"),
+        ({"duration": "1 s"}, "duration is '1 s'; it must be one number, in SI"),
+        ({"output": "10 ms"}, "output is '10 ms'; it must be one number"),
+        ({"output": [[0.01, 0.02]]}, "give a spacing"),
+        ({"method": "RK4"}, "the method is 'RK4'; give Rodas4"),
+    ],
+)
+def test_what_a_run_is_told_is_of_its_kind(given, message):
+    with pytest.raises(AirmuscleError, match=message):
+        simulate(isothermal(), **{"command": FILL, "duration": 0.1, "start": STATE, **given})
+    with pytest.raises(AirmuscleError, match=message if "command" not in given else "give one Command|is no Command"):
+        simulate_batch(
+            isothermal(), {}, **{"command": [FILL], "duration": 0.1, "start": STATE, **given}
+        )  # fmt: skip
+
+
+def test_what_a_step_is_told_is_of_its_kind():
+    plant = isothermal()
+    for inputs, dt, message in (({"fill": "open"}, 0.1, "write pairs of time"), ([1.0, 0.0], 0.1, "inputs are"),
+                                ({}, "1 s", "dt is '1 s'")):  # fmt: skip
+        with pytest.raises(AirmuscleError, match=message):
+            advance(plant, STATE, inputs, dt)
+
+
+def test_a_batch_has_no_more_plants_than_it_has():
+    batch = simulate_batch(isothermal(), {}, [FILL, FILL], duration=0.01, start=STATE, keep=())
+    assert batch.reason(-1) == batch.reason(1) == "done"
+    with pytest.raises(AirmuscleError, match="there is no plant 2; there are 0 to 1"):
+        batch.reason(2)
+    wrong = (
+        ({"start": {**STATE, "speed": "fast"}}, "'speed' is 'fast'"),
+        ({"start": {**STATE, "air_mass": -1.0}}, "row 0"),
+    )
+    for given, message in (
+        *wrong,
+        ({"variations": [1, 2]}, "write a column"),
+        ({"variations": {3: [1]}}, "no parameter"),
+    ):
+        with pytest.raises(AirmuscleError, match=message):
+            simulate_batch(isothermal(), command=FILL, duration=0.1,
+                           **{"variations": {"mechanism.mass": [9.0]}, "start": STATE, **given})  # fmt: skip
+
+
+PARTS = [
+    (lambda: FillDischarge(Supply(5e5), 3, VALVE), "FillDischarge: its fill must be of Orifice; it is 3"),
+    (lambda: FillDischarge(5e5, VALVE, VALVE), "its supply must be of Source; it is 500000"),
+    (lambda: Line(FillDischarge(Supply(5e5), VALVE, VALVE), VALVE), "Line: its tube must be of Conduit"),
+    (lambda: Line(FillDischarge(Supply(5e5), VALVE, VALVE), Tube(VALVE, 1e-6, 1, "air")), "its gas must be of Gas"),
+    (lambda: Leaking(None, VALVE), "Leaking: its circuit must be of Circuit; it is None"),
+    (lambda: Manifold(Supply(5e5), (3,), ("a",)), "its branches must be a tuple of Circuit"),
+    (lambda: Manifold(Supply(5e5), FillDischarge(Shared(), VALVE, VALVE), ("a",)), "must be a tuple of Circuit"),
+    (lambda: Manifold(Supply(5e5), (FillDischarge(Shared(), VALVE, VALVE),), (1,)), "names must be a tuple of str"),
+]
+
+
+@pytest.mark.parametrize(("make", "message"), PARTS)
+def test_a_part_of_another_kind_is_named(make, message):
+    with pytest.raises(AirmuscleError, match=message):
+        Plant(chosen_muscle(), make(), HangingMass(10.0))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Held(3), "Held: its inner must be of Mechanism; it is 3"),
+        (lambda: InSeries(3, (1.0,)), "InSeries: its inner must be of Mechanism"),
+        (lambda: Stopped(3, 0.0, 0.1, HuntCrossley(1e9)), "Stopped: its inner must be of Mechanism"),
+        (lambda: Stopped(HangingMass(1.0), 0.0, 0.1, 3), "Stopped: its contact must be of HuntCrossley"),
+    ],
+)
+def test_a_part_of_a_mechanism_is_one(make, message):
+    with pytest.raises(AirmuscleError, match=message):
+        Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), make())
+
+
+def test_the_response_at_a_pole_is_infinite():
+    with pytest.raises(AirmuscleError, match="there is a pole at 0 Hz"):
+        linearise(isothermal(), {**STATE, "speed": 0.0}).response([0.0])
+
+
+def test_a_run_says_where_no_muscle_can_be():
+    """A load thrown up far beyond the muscle's own length is no muscle any more; the numbers alone do not say so."""
+    plant = isothermal()
+    run = simulate(plant, Schedule({}), duration=0.1, start={**STATE, "speed": 100.0})
+    (note,) = [note for note in run.notes if "was beyond the reach of its geometry in contraction" in note]
+    assert "no muscle can do this" in note
+    calm = simulate(plant, Schedule({}), duration=0.1, start=STATE)
+    assert not [note for note in calm.notes if "reach" in note]

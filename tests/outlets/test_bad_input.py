@@ -235,6 +235,11 @@ def test_the_pressure_of_the_surroundings_takes_no_gauge_unit():
         quantity("1 barg", ABSOLUTE, where="here")
 
 
+def test_a_unit_is_not_suggested_in_its_own_place():
+    with pytest.raises(UnitError, match=r"write kPa\(a\) or bara\.$"):
+        quantity("1 barg", ABSOLUTE, where="here")
+
+
 def test_a_whole_number_beyond_all_floats():
     with pytest.raises(UnitError, match="here: the number is too large"):
         quantity(10**400, "Pa", where="here")
@@ -273,6 +278,13 @@ def test_a_parameter_that_cannot_be(given: dict[str, object], message: str):
 def test_a_command_that_is_no_pairs(kind: type, given: object):
     with pytest.raises(ParameterError, match=r"of 'fill' is .*; write pairs of time \[s\] and value, \(\(5, 1\)"):
         kind({"fill": given})
+
+
+@pytest.mark.parametrize("kind", [Schedule, Signal])
+@pytest.mark.parametrize("given", [None, ((5, 1), (15, 0))])
+def test_a_command_that_names_no_inputs(kind: type, given: object):
+    with pytest.raises(ParameterError, match=r"a (schedule|signal) is .*; name the inputs: {'fill': "):
+        kind(given)
 
 
 @pytest.fixture

@@ -237,7 +237,7 @@ REFUSED = {
     "no such output": (
         'position = { deviation = "50 um"',
         "heading = { deviation = 5e-5",
-        "the plant has no output 'heading'",
+        "Plant has no state or output 'heading'",
     ),
     "a margin of zero": ('"50 ms"', '"0 ms"', "start_time is '0 ms'; it must be greater than zero"),
     "no whole number": ("starts = 2", "starts = 2.5", "starts is 2.5; it must be a whole number, 1 or more"),

@@ -227,3 +227,6 @@ def test_the_command_prints_or_writes_what_editors_read(tmp_path: Path):
     refused = CliRunner().invoke(app, ["schema", "--out", str(tmp_path / "file" / "x.json")])
     assert refused.exit_code == 1
     assert "cannot be written to" in refused.stderr
+    nameless = CliRunner().invoke(app, ["schema", "--out", ""])
+    assert nameless.exit_code == 2
+    assert "wants the name of a file" in nameless.stderr

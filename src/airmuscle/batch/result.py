@@ -65,17 +65,23 @@ class Batch:
 
     def reason(self, index: int) -> str:
         """How a plant's run ended, in words."""
+        index = self._place(index)
         return self.reasons.get(int(index), WORDS[int(self.status[index])])
 
     def plant(self, index: int) -> System:
         """One of the plants."""
-        return self.variations.one(index)
+        return self.variations.one(self._place(index))
+
+    def _place(self, index: int) -> int:
+        """The number of a plant, counted from the end where it is negative."""
+        if not -len(self) <= index < len(self):
+            raise ColumnError(f"batch: there is no plant {index}; there are 0 to {len(self) - 1}.")
+        return int(index) % len(self)
 
     def recording(self, index: int) -> Recording:
         """The kept columns of one plant as a Recording, as far as it got."""
-        if not -len(self) <= index < len(self):
-            raise ColumnError(f"batch: there is no plant {index}; there are 0 to {len(self) - 1}.")
-        index, system = index % len(self), self.plant(index)
+        index = self._place(index)
+        system = self.plant(index)
         rows = slice(int(self.reached[index]))
         kept = {name: np.asarray(values[index, rows], dtype=float) for name, values in self.columns.items()}
         columns = {"time": self.time[rows], **kept}

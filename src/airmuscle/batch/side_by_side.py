@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ..errors import ParameterError
 from ..method import Explicit
+from ..start import less_than_none
 from .precision import Precision
 from .task import Task
 from .threads import Queue
@@ -105,7 +106,8 @@ def _run(task: Task, table: Table, room: Block, plants: npt.NDArray[np.intp], st
         column[plants] = room.rows[j, : plants.size]
     task.final[plants] = room.final[: plants.size]
     task.status[plants], task.reached[plants] = room.status[: plants.size], task.times.size
-    for index in plants[room.status[: plants.size] != 0]:
+    airless = less_than_none(task.ready.system, task.final[plants]).any(axis=1)
+    for index in plants[(room.status[: plants.size] != 0) | airless]:
         _explain(task, int(index), room.kind)
 
 

@@ -10,9 +10,10 @@ import numpy.typing as npt
 
 from ..command import Command, Segments
 from ..errors import ParameterError, suggestion
-from ..method import INTERRUPTED, Explicit, Method, Rodas4
+from ..method import INTERRUPTED, Explicit, Method
 from ..program import System
-from ..simulate import output_times, refuse_beyond_range
+from ..simulate import chosen_method, output_times, refuse_beyond_range
+from ..start import number_of
 from .precision import Double, Precision
 from .result import NOT_STARTED, Batch
 from .side_by_side import blocks, refuse_single
@@ -58,8 +59,10 @@ def simulate_batch(
     Raises ParameterError where a path, value, start, command or column cannot be; the row is named. An interrupted
     batch (Ctrl-C) is returned with what was done, the rest having the status of a run that was interrupted.
     """
+    duration = number_of("simulate_batch: duration", duration)
+    start_time = number_of("simulate_batch: start_time", start_time)
     _refuse_nonsense(duration, start_time, cores)
-    method = method or Rodas4()
+    method = chosen_method(method)
     refuse_single(precision, method)
     different = variations_of(plant, variations, _count(start, command))
     count = len(different.values)
@@ -84,7 +87,7 @@ def simulate_batch(
 def _refuse_nonsense(duration: float, start_time: float, cores: int | None) -> None:
     if not (np.isfinite(duration) and duration > 0 and start_time + duration > start_time):
         raise ParameterError(
-            f"simulate_batch: duration is {duration!r} s from {start_time!r} s on; it must be positive and finite."
+            f"simulate_batch: duration is {duration:g} s from {start_time:g} s on; it must be positive and finite."
         )
     if cores is not None and (not isinstance(cores, int) or cores < 1):
         raise ParameterError(f"simulate_batch: cores is {cores!r}; it must be a whole number from 1 on.")
@@ -95,6 +98,8 @@ def _count(start: Mapping[str, npt.ArrayLike] | None, command: Command | Sequenc
     of_starts = count_of_starts(start)
     if isinstance(command, Command):
         return of_starts
+    if not isinstance(command, Sequence):
+        raise ParameterError(f"simulate_batch: the command is {command!r}; give one Command, or a list of them.")
     if of_starts is not None and of_starts != len(command):
         raise ParameterError(f"simulate_batch: there are {len(command)} commands and starts for {of_starts} plants.")
     return len(command)
@@ -113,6 +118,7 @@ def _segments(
             raise ParameterError(f"commands, row {row}: {one!r} is no Command; give a Schedule or a Signal.")
         try:
             known[id(one)] = one.segments(plant.inputs, begin, duration)
+            known[id(one)].refuse_misshapen(len(plant.inputs), begin)
             refuse_beyond_range(plant, known[id(one)], begin)
         except ParameterError as error:
             where = "" if isinstance(command, Command) else f"commands, row {row}: "

@@ -11,6 +11,7 @@ from ..equilibrium import equilibrium
 from ..errors import ParameterError, PhysicsError, suggestion
 from ..plant import Plant
 from ..program import System
+from ..start import less_than_none
 from .variations import Variations
 
 Array = npt.NDArray[np.float64]
@@ -37,10 +38,17 @@ def given_starts(system: System, start: Mapping[str, npt.ArrayLike], count: int)
         raise ParameterError(f"the start lacks {', '.join(missing)}; give a number for all, or a column (N,).")
     found = np.empty((count, len(names)))
     for i, name in enumerate(names):
-        found[:, i] = start[name]
+        try:
+            found[:, i] = start[name]
+        except (TypeError, ValueError):
+            raise ParameterError(
+                f"start: '{name}' is {start[name]!r}; it must be a number for all, or a column (N,)."
+            ) from None
         wrong = np.flatnonzero(~np.isfinite(found[:, i]))
         if wrong.size:
             raise ParameterError(f"start, row {wrong[0]}: '{name}' is {found[wrong[0], i]}; it must be finite.")
+    for row, i in np.argwhere(less_than_none(system, found)):
+        raise ParameterError(f"start, row {row}: '{names[i]}' is {found[row, i]:g}; there is no less air than none.")
     return found
 
 

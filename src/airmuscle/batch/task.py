@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..command import Segments
-from ..method import INTERRUPTED, REASONS, Course, Method
+from ..method import INTERRUPTED, LESS_THAN_NONE, REASONS, Course, Method
 from ..program.prepared import Prepared
+from ..start import less_than_none
 from .variations import Variations
 
 Array = npt.NDArray[np.float64]
@@ -55,7 +56,17 @@ class Task:
         """Run one plant by itself, exactly as `simulate` would, and put its rows and its end in place."""
         one = self.ready.at(self.variations.parameters(index), self.nominal[index])
         course = self.method.run(one, self.segments[index], self.begin, self.starts[index], self.times)
-        self._put(index, one, course)
+        self._put(index, one, self._stopped_without_air(course))
+
+    def _stopped_without_air(self, course: Course) -> Course:
+        """The course up to the first row with less air than none, as `simulate` ends it."""
+        rows = np.vstack([course.rows[: course.reached], course.state])
+        bad = np.flatnonzero(less_than_none(self.ready.system, rows).any(axis=1))
+        if not bad.size:
+            return course
+        row = int(bad[0])
+        time = float(self.times[row]) if row < course.reached else course.time
+        return course._replace(reached=row, time=time, state=rows[row], status=LESS_THAN_NONE)
 
     def _put(self, index: int, one: Prepared, course: Course) -> None:
         from ..engine.evaluate import evaluate

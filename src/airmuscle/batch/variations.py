@@ -126,11 +126,13 @@ def variations_of(system: System, given: Mapping[str, npt.ArrayLike], count: int
 
     `count` is the number of plants where something else than parameters says it.
     """
+    if not isinstance(given, Mapping):
+        raise ParameterError(f"variations: they are {given!r}; write a column of values for each path.")
     leaves = {leaf.path: (place, leaf) for place, leaf in enumerate(declare.leaves(system))}
     columns = []
     for path, values in given.items():
         if path not in leaves:
-            near = suggestion(path, leaves)
+            near = suggestion(str(path), leaves)
             raise ParameterError(
                 f"variations: {type(system).__name__} has no parameter '{path}'.{near} "
                 "Its paths are those of airmuscle.declare.leaves(plant)."

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping
 
-from ..declare import model
+from ..declare import model, refuse_misplaced
 from ..errors import ParameterError
 from ..gas import Air, Ambient
 from ..ops import Value
@@ -61,6 +61,11 @@ class Manifold(Circuit):
     names: tuple[str, ...]
 
     def check(self) -> None:
+        refuse_misplaced(self)
+        for field, kind in (("branches", Circuit), ("names", str)):
+            given = getattr(self, field)
+            if not isinstance(given, tuple) or not all(isinstance(item, kind) for item in given):
+                raise ParameterError(f"Manifold: its {field} must be a tuple of {kind.__name__}; they are {given!r}.")
         if len(self.names) != len(self.branches) or len(set(self.names)) != len(self.names) or not self.names:
             raise ParameterError(f"Manifold: {len(self.branches)} branches need as many different names: {self.names}.")
         for name in self.names:

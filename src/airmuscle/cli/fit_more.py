@@ -147,7 +147,12 @@ def _point(text: str) -> tuple[float, float]:
     pressure, sign, contraction = text.partition("=")
     if not sign:
         raise typer.BadParameter(f"--free wants PRESSURE=CONTRACTION, like '3 bar=18 %', not '{text}'")
-    return quantity(pressure, "Pa", where="--free"), quantity(contraction, "1", where="--free")
+    found = quantity(contraction, "1", where="--free")
+    if not 0.0 <= found < 1.0:
+        raise typer.BadParameter(
+            f"--free: a muscle that hangs free is contracted by 0 to 100 %, not by '{contraction}'"
+        )
+    return quantity(pressure, "Pa", where="--free"), found
 
 
 def _shaped(fit: Fit, recordings: Sequence[Recording], free: tuple[tuple[float, float], ...]) -> ShapedFit:

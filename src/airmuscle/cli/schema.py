@@ -35,6 +35,8 @@ def schema(
     if out is None:
         typer.echo(text, nl=False)
         return
+    if not out.name:
+        raise typer.BadParameter("--out wants the name of a file, like scenario.schema.json")
     with staged(out.parent) as place:
         (place / out.name).write_text(text, encoding="utf-8")
     typer.echo(f"schema: {out}")

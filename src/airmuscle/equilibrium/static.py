@@ -103,6 +103,8 @@ def given_inputs(plant: Plant, inputs: Mapping[str, float] | None) -> dict[str, 
     refuse_unknown_input(list(given), plant.inputs)
     for command in plant.commands:
         value = given.get(command.name, 0.0)
+        if isinstance(value, str) or not np.ndim(value) == 0:
+            raise ParameterError(f"the input '{command.name}' is {value!r}; it must be one number, in SI units.")
         if not command.least <= value <= command.greatest:
             unit = "" if command.unit == "1" else f" {command.unit}"
             raise ParameterError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..declare import model, parameter
+from ..declare import model, parameter, refuse_misplaced
 from ..errors import ParameterError
 from ..ops import Value
 from .base import Coordinate, Mechanism
@@ -30,6 +30,7 @@ class InSeries(Wrapper):
     )
 
     def check(self) -> None:
+        refuse_misplaced(self)
         if not self.node_masses:
             raise ParameterError("InSeries: give the mass of each node; two muscles have one node between them.")
         if self.inner.muscles not in (None, 1):

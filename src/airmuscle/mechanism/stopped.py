@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from .. import ops
 from ..contact import HuntCrossley
-from ..declare import model, parameter
+from ..declare import model, parameter, refuse_misplaced
 from ..errors import ParameterError
 from ..ops import Value
 from .base import Coordinate, Mechanism
@@ -39,6 +39,7 @@ class EndStops(Wrapper):
         """Way of the contact for each unit of the coordinate."""
 
     def check(self) -> None:
+        refuse_misplaced(self)
         fitting = [c.name for c in self.inner.coordinates if c.unit == self.unit]
         name = type(self).__name__
         if self.coordinate and self.coordinate not in fitting:

@@ -52,6 +52,14 @@ class Outcome(abc.ABC):
         instants = np.concatenate([at[:1], time[inside], at[1:]])
         return Window(instants, np.interp(instants, time, values))
 
+    def refuse_outside(self, start: float, duration: float) -> None:
+        """Raise ParameterError where nothing of a run of `duration` from `start` on [s] is looked at."""
+        if not max(self.begin, start) <= min(self.end, start + duration):
+            raise ParameterError(
+                f"{type(self).__name__}: from {self.begin:g} to {self.end:g} s there is nothing of a run from "
+                f"{start:g} to {start + duration:g} s."
+            )
+
     @property
     def instants(self) -> Array:
         """Instants [s] that must be among the rows of a run."""

@@ -202,8 +202,9 @@ def _outcomes(given: Mapping[str, Any], scenario: Scenario, place: Place) -> dic
                 f"{place.inside(name)}: a run has no column '{column}'; there are {', '.join(known)}.{near}"
             )
         outcome = chosen(table, OUTCOMES, place.inside(name), known.get(str(column), "1") or "1")
-        if isinstance(outcome, Course):
-            with said_at(place.inside(name)):
+        with said_at(place.inside(name)):
+            outcome.refuse_outside(scenario.start_time, scenario.duration)
+            if isinstance(outcome, Course):
                 outcome = outcome.within(scenario.start_time, scenario.duration)
         found[name] = outcome
     return found
