@@ -60,6 +60,7 @@ class Plant:
         for field, part, kind in parts:
             if not isinstance(part, kind):
                 raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {str(part)[:80]}.")
+        self._refuse_not_closed_form()
         refuse_misplaced((self.muscles, self.circuits, self.mechanism))
         for circuit in self.circuits:
             refuse_shared(f"Plant: its {type(circuit).__name__}", circuit.supply)
@@ -75,6 +76,9 @@ class Plant:
             raise ParameterError("Plant: a circuit that feeds several muscles stands alone, not in a tuple.")
         if len(set(names)) < len(names):
             raise ParameterError(f"Plant: muscles need different names; they are {names}.")
+        self._refuse_twice()
+
+    def _refuse_not_closed_form(self) -> None:
         for muscle in self.muscles:
             for part in (muscle.contractile, muscle.geometry):
                 if not part.traceable:
@@ -82,7 +86,6 @@ class Plant:
                         f"{type(part).__name__} of {muscle.name} is not closed-form and cannot enter a plant. Use "
                         "as_force_law(law, box) for a characteristic, as_polynomial(geometry) for a geometry."
                     )
-        self._refuse_twice()
 
     def _refuse_twice(self) -> None:
         names = [s.name for s in self.states] + [i.name for i in self.commands]
