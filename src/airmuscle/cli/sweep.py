@@ -69,19 +69,13 @@ def _run(study: Study, out: Path, workers: int | None, dask: str | None) -> Stud
     """The study's result; when it ends early, a line says what is kept and how to go on."""
     from ..errors import AirmuscleError
     from ..sweep import run_study
-
-    done = 0
-
-    def remembered(now: int, of: int) -> None:
-        nonlocal done
-        done = now
-        show(now, of)
+    from ..sweep.run import runs_kept
 
     try:
         with _bar(study.title) as show, _executor(study, workers, dask) as executor:
-            return run_study(study, out, executor, remembered)
+            return run_study(study, out, executor, show)
     except (AirmuscleError, KeyboardInterrupt):
-        if done:
+        if done := runs_kept(study, out):  # counted where they lie: one may have come while all was stopping
             kept = f"{done} of {len(study)} runs are kept in {out / 'chunks'}"
             typer.echo(f"{kept}; the same command goes on from there", err=True)
         raise

@@ -23,13 +23,18 @@ def deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
     where a sensor shows neither noise nor resolution.
     """
     timed = all("time" in run.columns for run in runs)
-    try:
-        alone = np.array([_deviation(run, quantity, timed) for run in runs])
-    except ColumnError:
-        return None
-    if not alone.size or not (alone > 0).all():
-        return None
+    each = []
+    for run in runs:
+        try:
+            each.append(_deviation(run, quantity, timed))
+        except ColumnError:
+            return None
+        if not each[-1] > 0:  # the others need not be looked at
+            return None
+    alone = np.array(each)
     order = np.argsort(alone)
+    if not alone.size:
+        return None
     rigs = np.split(order, np.flatnonzero(alone[order][1:] > APART * alone[order][:-1]) + 1)
     if len(rigs) < 2:
         return None

@@ -53,6 +53,12 @@ def run_study(
     return _together(study, [_read(file) for file in files], nominal)
 
 
+def runs_kept(study: Study, folder: Path | str) -> int:
+    """How many runs of a study `folder` keeps, by what lies there."""
+    kept = Path(folder) / CHUNKS
+    return sum(len(study.rows(index)) for index in study.chunks if read(kept / name_of(study, index)) is not None)
+
+
 def _computed(study: Study, missing: Sequence[int], executor: Executor | None) -> Iterator[tuple[int, Chunk]]:
     """The missing chunks, in the order in which they come."""
     path, mark = str(study.path.resolve()), remember(study)
