@@ -7,14 +7,14 @@ from collections.abc import Mapping
 from ..declare import model
 from ..gas import Air, Ambient, gauge
 from ..ops import Value
-from ..variables import Input, StateVariable, outside, renamed, within
+from ..variables import StateVariable, outside, renamed, within
+from .around import Around
 from .circuit import Circuit, Response
 from .conduit import Conduit
-from .supply import Source
 
 
 @model
-class Line(Circuit):
+class Line(Around):
     """A tube between a circuit's valves and each of its muscles.
 
     `tube.pressure` is that in the tube; with several pieces `tube1.pressure`, ... from the valve on.
@@ -22,18 +22,6 @@ class Line(Circuit):
 
     circuit: Circuit
     tube: Conduit
-
-    @property
-    def supply(self) -> Source:  # type: ignore[override]  # the circuit's own
-        return self.circuit.supply
-
-    @property
-    def ports(self) -> int:
-        return self.circuit.ports
-
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        return self.circuit.inputs
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from ..errors import ParameterError
 from ..gas import Air, Ambient
 from ..ops import Value
 from ..variables import Input, StateVariable, outside, renamed, within
+from .around import Around
 from .circuit import SUPPLY, Circuit, Response
 from .fill_discharge import surroundings
 from .orifice import Orifice
@@ -18,23 +19,11 @@ from .through import through
 
 
 @model
-class Leaking(Circuit):
+class Leaking(Around):
     """A circuit whose muscles also lose air to the surroundings through a leak each."""
 
     circuit: Circuit
     leak: Orifice
-
-    @property
-    def supply(self) -> Source:  # type: ignore[override]  # the circuit's own
-        return self.circuit.supply
-
-    @property
-    def ports(self) -> int:
-        return self.circuit.ports
-
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        return self.circuit.inputs
 
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         return self.circuit.own_states(ambient)

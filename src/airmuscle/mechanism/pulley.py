@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from ..declare import model, parameter
 from ..ops import Value
-from .base import Coordinate, Mechanism
 from .hanging_mass import STANDARD_GRAVITY
+from .translation import Translation
 
 
 @model
-class Pulley(Mechanism):
+class Pulley(Translation):
     """(J/r^2 + i^2 m) y'' = F - i m g - d y', with y from where the muscle has its resting length.
 
     r radius of the drum that the muscle winds, i r that of the drum that lifts the mass m by i y; J inertia of the
@@ -27,18 +27,6 @@ class Pulley(Mechanism):
     gravity: float = parameter(
         "m/s^2", "g", "acceleration of gravity", bounds=(0.0, 20.0), fitted=False, default=STANDARD_GRAVITY
     )
-
-    @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        return (Coordinate("position", "speed", "m", 0.01, 0.1),)
-
-    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
-        return tuple(q["position"] / length for length in resting_lengths)
-
-    def pulls(
-        self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
-    ) -> dict[str, Value]:
-        return {"position": sum(tensions, 0.0)}
 
     def _inertial_mass(self) -> Value:
         return self.inertia / self.radius**2 + self.ratio**2 * self.mass
