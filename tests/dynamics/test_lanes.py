@@ -13,6 +13,7 @@ from airmuscle.batch.side_by_side import aligned
 from airmuscle.errors import TraceError
 from airmuscle.program import elementary, llvm
 from airmuscle.program.instructions import MAXIMUM, MINIMUM, SELECT
+from airmuscle.program.machine import compiled
 from airmuscle.program.numbers import Number
 from airmuscle.program.printed import Printer
 
@@ -31,7 +32,7 @@ def run(number, expressions, *columns):
     printer.add("f", {"x": symbols}, {"y": casadi.densify(outputs)})
     parts = [elementary.definition(name, count, number) for name, count in printer.needed.items()]
     text = "\n".join([elementary.declarations({number}), *parts, printer.module()])
-    return call(llvm.compiled(text), number, columns, outputs.numel())
+    return call(compiled(text), number, columns, outputs.numel())
 
 
 def call(engine, number, columns, results):
@@ -124,7 +125,7 @@ def test_the_printers_own_operations_choose_lane_by_lane(number):
         [(MAXIMUM, (a, b)), (MINIMUM, (a, b)), (SELECT, (a, b, a)), (casadi.OP_ASSIGN, (b,)), (casadi.OP_AND, (a, b))]
     ):
         block.store("y", i, block.operate(operation, operands))
-    engine = llvm.compiled(llvm.function("f", ["x", "y"], block))
+    engine = compiled(llvm.function("f", ["x", "y"], block))
     kind = np.float64 if number.bits == 64 else np.float32
     x, y = (
         column.astype(kind) for column in ([0.0, 1.0, 0.0, -2.0] * 5, np.arange(20.0)) for column in [np.array(column)]

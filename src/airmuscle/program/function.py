@@ -6,7 +6,7 @@ from typing import Any
 
 import casadi
 
-from . import llvm
+from .machine import compiled
 from .printed import Printer
 
 
@@ -20,5 +20,5 @@ class Function:
         rows = {name: casadi.densify(casadi.vec(casadi.SX(value).T)) for name, value in outputs.items()}
         printer = Printer()
         printer.add("function", inputs, rows)
-        self._engine = llvm.compiled(printer.module())
+        self._engine = compiled(printer.module())
         self.address = int(self._engine.get_function_address("function"))

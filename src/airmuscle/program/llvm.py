@@ -1,19 +1,23 @@
-"""Instructions printed as straight-line LLVM IR, and compiled by llvmlite, which numba brings."""
+"""Instructions printed as LLVM IR: straight lines, and branches around what may be skipped."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
 
 import casadi
 
 from ..errors import TraceError
 from .instructions import MAXIMUM, MINIMUM, SELECT, Code, Instruction, Operand
 from .numbers import DOUBLE, Number
+from .pieces import Item, Skippable
+from .skipping import COMMANDED, STEADY, VARYING, skipping
 
 FLAGS = "nsz arcp contract reassoc afn"
 """Fast arithmetic that keeps NaN and infinity: a failed step must still show (never nnan, ninf)."""
+
+LEVEL = {"u": COMMANDED, "w": STEADY, "h": STEADY}
+"""Which arguments do not vary with the states: inputs, their slopes, and the step."""
 
 _BINARY = {casadi.OP_ADD: "fadd", casadi.OP_SUB: "fsub", casadi.OP_MUL: "fmul", casadi.OP_DIV: "fdiv"}
 _INTRINSICS = {casadi.OP_SQRT: "sqrt", casadi.OP_FABS: "fabs"}
@@ -25,9 +29,8 @@ _CALLS = {
 }  # fmt: skip
 _COMPARISONS = {casadi.OP_LE: "ole", casadi.OP_LT: "olt", casadi.OP_EQ: "oeq", casadi.OP_NE: "une"}
 _OF_ONE = (*sorted(_CALLS.values()), *(DOUBLE.intrinsic(name) for name in _INTRINSICS.values()))
-_DECLARATIONS = "".join(f"declare double @{name}(double)\n" for name in _OF_ONE) + (
-    "declare double @pow(double, double)\n"
-)
+DECLARED = "".join(f"declare double @{name}(double)\n" for name in _OF_ONE) + "declare double @pow(double, double)\n"
+"""Functions that printed ones may call, as LLVM wants to know them."""
 
 
 class Block:
@@ -43,14 +46,19 @@ class Block:
         self.number = number
         self.needed: dict[str, int] = {}
         self._known: dict[str, str] = {}
+        self._named = 0
         self._constants: dict[str, float] = {}
 
     def put(self, expression: str) -> str:
         """The name of the value of `expression`, which is computed unless it is known."""
         if expression not in self._known:
-            self._known[expression] = f"%v{len(self._known)}"
+            self._known[expression] = self._name()
             self.lines.append(f"  {self._known[expression]} = {expression}")
         return self._known[expression]
+
+    def _name(self) -> str:
+        self._named += 1
+        return f"%v{self._named}"
 
     def constant(self, value: float) -> str:
         """A constant; in lanes the same in all of them, which LLVM sees through."""
@@ -109,6 +117,38 @@ class Block:
             found = self.put(f"fmul {FLAGS} {self.number.text} {found}, {self.intrinsic('sqrt', (base,))}")
         return found if value >= 0 else self.put(f"fdiv {FLAGS} {self.number.text} {self.constant(1.0)}, {found}")
 
+    def unless_zero(
+        self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
+    ) -> dict[Operand, str]:
+        """What `compute` appends and returns where one of `gates` is not zero, and elsewhere `instead`.
+
+        In lanes it is computed if any of them needs it; a lane that does not has what it has alone.
+        """
+        number, here = self.number, self._name()[1:]
+        self.lines += [f"  br label %{here}.if", f"{here}.if:"]
+        tests = [self.put(f"fcmp une {number.text} {gate}, {self.constant(0.0)}") for gate in gates]
+        test = functools.reduce(lambda a, b: self.put(f"or {number.mask} {a}, {b}"), tests)
+        any_lane = test
+        if number.lanes > 1:
+            bits = self.put(f"bitcast {number.mask} {test} to i{number.lanes}")
+            any_lane = self.put(f"icmp ne i{number.lanes} {bits}, 0")
+        self.lines += [f"  br i1 {any_lane}, label %{here}.then, label %{here}.end", f"{here}.then:"]
+        outside, self._known = self._known, dict(self._known)  # what is computed in here is not known out there
+        found = compute()
+        if number.lanes > 1:
+            for operand, value in instead.items():
+                found[operand] = self.put(
+                    f"select {number.mask} {test}, {number.text} {found[operand]}, {number.text} {value}"
+                )
+        self._known = outside
+        self.lines += [f"  br label %{here}.end", f"{here}.end:"]
+        joined = {}
+        for operand, value in instead.items():
+            joined[operand] = self._name()
+            ways = f"[ {value}, %{here}.if ], [ {found[operand]}, %{here}.then ]"
+            self.lines.append(f"  {joined[operand]} = phi {number.text} {ways}")
+        return joined
+
     def operate(self, operation: int, x: Sequence[str]) -> str:
         """The printed form of one CasADi operation on values; raises TraceError for one that is not known."""
         kind, one, zero = self.number.text, self.constant(1.0), self.constant(0.0)
@@ -154,13 +194,24 @@ def computed(
 
     Returns the names of the results by output and index.
     """
-    values = run(block, code.body, inputs, held, given)
+    values = run(block, with_gates(code, inputs, held), inputs, held, given)
     return {(o, i): value_of(block, operand, inputs, held, values) for o, i, operand in code.outputs}
+
+
+def with_gates(
+    code: Code, inputs: Sequence[str], held: Mapping[Operand, int], early: frozenset[Operand] = frozenset()
+) -> list[Item]:
+    """The instructions of code, those set apart that a shut valve or a number within its clamp makes superfluous."""
+
+    def level(operand: Operand) -> int:
+        return STEADY if operand in held else LEVEL.get(inputs[operand[1]], VARYING)
+
+    return skipping(code, level, early)
 
 
 def run(
     block: Block,
-    body: Sequence[Instruction],
+    body: Sequence[Item],
     inputs: Sequence[str],
     held: Mapping[Operand, int],
     given: Mapping[Operand, str] | None = None,
@@ -173,9 +224,14 @@ def run(
 
 
 def append(
-    block: Block, line: Instruction, inputs: Sequence[str], held: Mapping[Operand, int], values: dict[Operand, str]
+    block: Block, line: Item, inputs: Sequence[str], held: Mapping[Operand, int], values: dict[Operand, str]
 ) -> None:
-    """Append one instruction, and add the name of its result to `values`."""
+    """Append one instruction, or some that may be skipped, and add the names of results to `values`."""
+    if isinstance(line, Skippable):
+        instead = {operand: value_of(block, value, inputs, held, values) for operand, value in line.instead}
+        gates = [value_of(block, gate, inputs, held, values) for gate in line.gates]
+        values |= block.unless_zero(gates, lambda: run(block, line.body, inputs, held, values), instead)
+        return
     arguments = [value_of(block, a, inputs, held, values) for a in line.arguments]
     values[line.result] = block.operate(line.operation, arguments)
 
@@ -222,29 +278,3 @@ def function_of_values(name: str, arguments: Sequence[str], block: Block, number
     signature = ", ".join(f"{number.text} {a}" for a in arguments)
     head = f"define internal {number.text} @{name}({signature}) nounwind {{\n"
     return head + "\n".join(block.lines) + f"\n  ret {number.text} {value}\n}}\n"
-
-
-@functools.cache
-def _target() -> Any:
-    import llvmlite.binding as llvm
-
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    features = llvm.get_host_cpu_features().flatten()
-    target = llvm.Target.from_default_triple()
-    return lambda: target.create_target_machine(cpu=llvm.get_host_cpu_name(), features=features, opt=2)
-
-
-def compiled(text: str) -> Any:
-    """Machine code of LLVM text; the returned engine must stay alive as long as its addresses are used."""
-    import llvmlite.binding as llvm
-
-    machine = _target()()
-    module = llvm.parse_assembly(_DECLARATIONS + text)
-    options = llvm.create_pipeline_tuning_options(speed_level=2)
-    options.slp_vectorization = False
-    passes = llvm.create_pass_builder(machine, options)
-    passes.getModulePassManager().run(module, passes)
-    engine = llvm.create_mcjit_compiler(module, machine)
-    engine.finalize_object()
-    return engine

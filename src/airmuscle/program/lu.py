@@ -1,19 +1,17 @@
-"""Symbolic LU of d I - J, its sparsity worked out while printing; no pivoting."""
+"""Symbolic factors L D U of d I - J, with L and U of unit diagonal; sparsity worked out while printing; no pivoting.
+
+Unit diagonals leave one multiplication by 1/D between the two substitutions, where all states pass side by side: what
+a step waits for is the longest chain, not the sum of operations.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import casadi
 
-Pattern = tuple[tuple[int, int], ...]
-
-
-def non_zeros(matrix: Any) -> Pattern:
-    """The places of a CasADi matrix that are not structurally zero, row by row."""
-    rows, columns = matrix.shape
-    return tuple((i, j) for i in range(rows) for j in range(columns) if not matrix[i, j].is_zero())
+Place = tuple[int, int]
 
 
 def distinct(expressions: Sequence[Any]) -> tuple[Any, tuple[int, ...]]:
@@ -27,50 +25,69 @@ def distinct(expressions: Sequence[Any]) -> tuple[Any, tuple[int, ...]]:
     return casadi.vertcat(*(merged[slots.index(k)] for k in range(len(first)))), slots
 
 
-def shifted(jacobian: Pattern, slots: Sequence[int], size: int) -> tuple[list[list[Any]], Any, Any]:
-    """d I - J as rows of symbols, with the symbols of J's distinct non-zeros and of d."""
-    values, shift = casadi.SX.sym("j", max(slots, default=-1) + 1), casadi.SX.sym("d")
-    matrix = [[casadi.SX(0)] * size for _ in range(size)]
-    for slot, (i, j) in zip(slots, jacobian, strict=True):
-        matrix[i][j] = -values[slot]
-    for i in range(size):
-        matrix[i][i] = matrix[i][i] + shift
-    return matrix, values, shift
+class Factors:
+    """The factors of d I - J, whose non-zeros stand at `places`, and which of J's distinct values stands in each.
+
+    `values` are the distinct factors in terms of the symbols `j` of J's distinct values and `d`.
+    """
+
+    def __init__(self, places: Sequence[Place], slots: Sequence[int], size: int) -> None:
+        self.j, self.d = casadi.SX.sym("j", max(slots, default=-1) + 1), casadi.SX.sym("d")
+        a: dict[Place, Any] = {(i, i): self.d for i in range(size)}
+        for slot, place in zip(slots, places, strict=True):
+            a[place] = a.get(place, casadi.SX(0)) - self.j[slot]
+        self.order = _order(a, size)
+        _factorise(a, self.order)
+        self.values, found = distinct(list(a.values()))
+        self._slots = dict(zip(a, found, strict=True))
+
+    def solved(self, factors: Any, right: Sequence[Any]) -> list[Any]:
+        """x with (d I - J) x = right; `factors[k]` is the k-th of the distinct factors."""
+        at = {place: factors[slot] for place, slot in self._slots.items()}
+        x, order = list(right), self.order
+        for n, i in enumerate(order):
+            for k in order[:n]:
+                if (i, k) in at:
+                    x[i] = x[i] - at[i, k] * x[k]
+        x = [value * at[i, i] for i, value in enumerate(x)]
+        for n, i in reversed(list(enumerate(order))):
+            for k in reversed(order[n + 1 :]):
+                if (i, k) in at:
+                    x[i] = x[i] - at[i, k] * x[k]
+        return x
 
 
-def factorised(matrix: list[list[Any]]) -> list[list[Any]]:
-    """L and U in one matrix, with the inverse pivots on the diagonal."""
-    size = len(matrix)
-    a = [list(row) for row in matrix]
-    for k in range(size):
-        a[k][k] = 1 / a[k][k]
-        for i in range(k + 1, size):
-            if a[i][k].is_zero():
+def _factorise(a: dict[Place, Any], order: Sequence[int]) -> None:
+    """Put L below the diagonal of the given order, U above it, and the inverse of D on it."""
+    for n, k in enumerate(order):
+        later = order[n + 1 :]
+        a[k, k] = 1 / a[k, k]
+        row = {j: a[k, j] for j in later if (k, j) in a}
+        for i in later:
+            if (i, k) not in a:
                 continue
-            a[i][k] = a[i][k] * a[k][k]
-            for j in range(k + 1, size):
-                if not a[k][j].is_zero():
-                    a[i][j] = a[i][j] - a[i][k] * a[k][j]
-    return a
+            a[i, k] = a[i, k] * a[k, k]
+            for j, value in row.items():
+                a[i, j] = a.get((i, j), casadi.SX(0)) - a[i, k] * value
+        for j, value in row.items():
+            a[k, j] = value * a[k, k]
 
 
-def pattern_of(matrix: list[list[Any]]) -> Pattern:
-    """The places of a matrix of expressions that are not structurally zero, row by row."""
-    return tuple((i, j) for i, row in enumerate(matrix) for j, x in enumerate(row) if not x.is_zero())
+def _order(places: Iterable[Place], size: int) -> tuple[int, ...]:
+    """The states in the order of elimination: always the one that may fill in the fewest places (Markowitz).
 
-
-def solved(pattern: Pattern, slots: Sequence[int], factors: Any, right: Sequence[Any]) -> list[Any]:
-    """x with L U x = right, from the distinct factors, which stand at the places of `pattern`."""
-    size = len(right)
-    at = {place: factors[slot] for slot, place in zip(slots, pattern, strict=True)}
-    x = list(right)
-    for i in range(size):
-        for j in range(i):
-            if (i, j) in at:
-                x[i] = x[i] - at[i, j] * x[j]
-    for i in reversed(range(size)):
-        for j in range(i + 1, size):
-            if (i, j) in at:
-                x[i] = x[i] - at[i, j] * x[j]
-        x[i] = x[i] * at[i, i]
-    return x
+    Of equals, the one that has waited for the fewest others: what is independent is then eliminated side by side.
+    """
+    rows = [{j for i, j in places if i == k and j != k} for k in range(size)]
+    columns = [{i for i, j in places if j == k and i != k} for k in range(size)]
+    depth, left, order = [0] * size, set(range(size)), []
+    while left:
+        k = min(left, key=lambda i: (len(rows[i]) * len(columns[i]), depth[i], i))
+        order.append(k)
+        left.remove(k)
+        for i in columns[k]:
+            rows[i] = (rows[i] | rows[k]) - {i, k}
+            depth[i] = max(depth[i], depth[k] + 1)
+        for j in rows[k]:
+            columns[j] = (columns[j] | columns[k]) - {j, k}
+    return tuple(order)

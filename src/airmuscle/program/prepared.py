@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import declare
-from . import llvm, printed, tangent, tangent_step
+from . import printed, tangent, tangent_step
+from .machine import compiled
 from .numbers import Number
 from .printed import Sizes, Traced
 from .printed_lanes import lanes_module
@@ -35,7 +36,7 @@ class Program:
             self._form = printed.traced(system)
             text, self.sizes = printed.implicit_module(self._form)
         self.output_names = self._form.output_names
-        self._engine = llvm.compiled(text)
+        self._engine = compiled(text)
         self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
         self._steps: dict[Any, tuple[Any, int]] = {}
         self._compiling = threading.Lock()  # of two threads that ask for a step, one makes it: an engine must not go
@@ -56,7 +57,7 @@ class Program:
         with self._compiling:
             if (a, b) not in self._steps:
                 text, held = self._printed_step(a, b)
-                self._steps[a, b] = llvm.compiled(text), held
+                self._steps[a, b] = compiled(text), held
         engine, held = self._steps[a, b]
         return int(engine.get_function_address("step")), _handed(engine, parameters, held)
 
@@ -72,7 +73,7 @@ class Program:
         with self._compiling:
             if (a, b, number) not in self._steps:
                 text, held = lanes_module(self.traced, a, b, number)
-                self._steps[a, b, number] = llvm.compiled(text), held
+                self._steps[a, b, number] = compiled(text), held
         engine, held = self._steps[a, b, number]
         prepare, step, outputs = (int(engine.get_function_address(n)) for n in ("prepare", "step", "outputs"))
         return (prepare, step, outputs), held

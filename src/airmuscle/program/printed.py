@@ -10,8 +10,10 @@ import casadi
 
 from .. import trace
 from ..errors import TraceError
-from . import llvm, lu
-from .instructions import Code, Operand, hoisted, instructions
+from . import llvm
+from .elimination import ZERO, Tape, derivatives
+from .instructions import Code, Operand, finished, hoisted, instructions, recorded
+from .lu import Factors
 from .numbers import DOUBLE, Number
 from .system import System
 
@@ -83,10 +85,16 @@ class Printer:
 
     def add(self, name: str, inputs: dict[str, Any], outputs: dict[str, Any], scalars: Sequence[str] = ()) -> None:
         """Print `name(inputs..., outputs...)`, with `c` in place of the parameters."""
-        code, block = instructions(list(inputs.values()), list(outputs.values())), llvm.Block(scalars, self._number)
-        targets = list(outputs)
-        for (output, index), value in self.compute(block, code, list(inputs)).items():
-            block.store(targets[output], index, value)
+        code = instructions(list(inputs.values()), list(outputs.values()))
+        self.add_code(name, list(inputs), code, list(outputs), scalars)
+
+    def add_code(
+        self, name: str, inputs: Sequence[str], code: Code, outputs: Sequence[str], scalars: Sequence[str] = ()
+    ) -> None:
+        """The same of instructions."""
+        block = llvm.Block(scalars, self._number)
+        for (output, index), value in self.compute(block, code, inputs).items():
+            block.store(outputs[output], index, value)
         self.end(name, [*inputs, *outputs], block)
 
     def compute(
@@ -136,28 +144,35 @@ def implicit_module(t: Traced) -> tuple[str, Sizes]:
     outputs(x, u, c, o)
     """
     size = t.x.shape[0]
-    jacobian = casadi.jacobian(t.f, t.x)
-    places = lu.non_zeros(jacobian)
-    values, slots = lu.distinct([jacobian[i, j] for i, j in places])
-    matrix, js, d = lu.shifted(places, slots, size)
-    rows = lu.factorised(matrix)
-    pattern = lu.pattern_of(rows)
-    factors, held = lu.distinct([rows[i][j] for i, j in pattern])
-    a, g, b = (casadi.SX.sym(n, k) for n, k in (("A", factors.numel()), ("g", size), ("b", size)))
-    stage = lu.solved(pattern, held, a, [t.f[i] + g[i] for i in range(size)])
-    solve = lu.solved(pattern, held, a, [b[i] for i in range(size)])
+    slopes, places, slots = _rates_and_slopes(t)
+    lu = Factors(places, slots, size)
+    a, g, b = (casadi.SX.sym(n, k) for n, k in (("A", lu.values.numel()), ("g", size), ("b", size)))
+    stage, solve = lu.solved(a, [t.f[i] + g[i] for i in range(size)]), lu.solved(a, [b[i] for i in range(size)])
     point = {"x": t.x, "u": t.u, PARAMETERS: t.p}
     printer = Printer()
     printer.add("rhs", point, {"f": t.f})
-    printer.add("jac", point, {"f": t.f, "J": values})
-    printer.add("factor", {"J": js, "d": d}, {"A": factors}, ["d"])
+    printer.add_code("jac", list(point), slopes, ["f", "J"])
+    printer.add("factor", {"J": lu.j, "d": lu.d}, {"A": lu.values}, ["d"])
     printer.add("solve", {"A": a, "b": b}, {"y": casadi.vertcat(*solve)})
     printer.add("stage", {**point, "A": a, "g": g}, {"k": casadi.vertcat(*stage)})
     drift = casadi.densify(casadi.jtimes(t.f, t.u, t.w) if t.u.numel() else casadi.SX(size, 1))
     printer.add("drift", {**point, "w": t.w}, {"f": drift})
     printer.add("outputs", point, {"o": t.o})
-    sizes = Sizes(size, t.u.shape[0], t.p.shape[0], printer.held, values.numel(), factors.numel(), t.o.shape[0])
+    sizes = Sizes(size, t.u.shape[0], t.p.shape[0], printer.held, lu.j.numel(), lu.values.numel(), t.o.shape[0])
     return printer.module(), sizes
+
+
+def _rates_and_slopes(t: Traced) -> tuple[Code, tuple[tuple[int, int], ...], tuple[int, ...]]:
+    """The rates and the distinct non-zeros of their Jacobian; its places, and which non-zero stands in each."""
+    code = recorded([t.x, t.u, t.p], [t.f])
+    tape, found = Tape(code.body), {index: operand for _, index, operand in code.outputs}
+    rates = [found.get(i, ZERO) for i in range(t.x.numel())]
+    rows = derivatives(tape, rates, [("in", 0, j) for j in range(t.x.numel())])
+    slopes = {(i, j): row[x] for i, row in enumerate(rows) for j in range(len(rows)) if (x := ("in", 0, j)) in row}
+    distinct = list(dict.fromkeys(slopes.values()))
+    outputs = [(k, i, operand) for k, operands in enumerate((rates, distinct)) for i, operand in enumerate(operands)]
+    slots = tuple(distinct.index(operand) for operand in slopes.values())
+    return finished(Code(tuple(tape.body), tuple(outputs))), tuple(slopes), slots
 
 
 def explicit_module(t: Traced, a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[str, int]:

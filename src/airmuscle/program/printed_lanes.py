@@ -10,6 +10,8 @@ from .llvm import FLAGS, Block
 from .numbers import Number
 from .printed import PARAMETERS, Printer, Traced
 
+POINT = ("x", "u", PARAMETERS)
+"""The arguments that rates and outputs depend on."""
 AT_ONCE = 64
 """Bytes of one value in the step: the widest register (measured; values of two do not fit the registers)."""
 
@@ -22,7 +24,7 @@ def lanes_module(t: Traced, a: Sequence[Sequence[float]], b: Sequence[float], nu
     prepare(p, c)            what both need of the parameters
     """
     printer = Printer(number)
-    point = {"x": t.x, "u": t.u, PARAMETERS: t.p}
+    point = dict(zip(POINT, (t.x, t.u, t.p), strict=True))
     code, held = printer.without_parameters(point, {"f": t.f})
     step = _Step(t, code, held, number)
     text = step.printed(a, b)
@@ -47,7 +49,7 @@ class _Step:
         self.number = Number(number.bits, min(number.lanes, AT_ONCE * 8 // number.bits))
         self.groups = number.lanes // self.number.lanes
         self.states, self.inputs = t.x.shape[0], t.u.shape[0]
-        self.code, self.held = code, held
+        self.items, self.outputs, self.held = llvm.with_gates(code, POINT, held), code.outputs, held
         self.block = Block((), self.number)
 
     def printed(self, a: Sequence[Sequence[float]], b: Sequence[float]) -> str:
@@ -74,8 +76,8 @@ class _Step:
             given["in", 1, i] = self._input(i, sum(row))
         for operand, place in self.held.items():
             given[operand] = self._load(f"c{stage}", place)
-        values = llvm.run(self.block, self.code.body, (), {}, given)
-        found = {i: llvm.value_of(self.block, operand, (), {}, values) for _, i, operand in self.code.outputs}
+        values = llvm.run(self.block, self.items, (), {}, given)
+        found = {i: llvm.value_of(self.block, operand, (), {}, values) for _, i, operand in self.outputs}
         return [found[i] for i in range(self.states)]
 
     def _load(self, array: str, index: int) -> str:

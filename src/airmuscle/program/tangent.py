@@ -13,10 +13,10 @@ from typing import Any
 
 import casadi
 
-from . import lu
 from .elimination import ZERO, Tape, derivatives
 from .instructions import Code, Operand, finished, recorded
 from .llvm import Block
+from .lu import Factors
 from .printed import PARAMETERS, Printer, Sizes, Traced, traced
 from .system import Differentiated
 from .values import Value, loaded, packed
@@ -148,7 +148,7 @@ def implicit_module(t: Moved) -> tuple[str, Sizes]:
         parameters=inner.p.numel() + t.lanes,  # a scale for each column comes last
         held=printer.held,
         jacobian=len(step.jacobian) + further,
-        factors=step.factors.numel() + further,
+        factors=step.lu.values.numel() + further,
         outputs=count * (2 + t.lanes),
     )
 
@@ -178,10 +178,7 @@ class _Step:
         self.jacobian = list(dict.fromkeys(part for _, part in places))
         self.slots = tuple(self.jacobian.index(part) for _, part in places)
         self.bends = self.rates.along(self.jacobian)
-        matrix, self.j, self.d = lu.shifted(self.places, self.slots, t.size)
-        rows = lu.factorised(matrix)
-        self.pattern = lu.pattern_of(rows)
-        self.factors, self.held = lu.distinct([rows[i][j] for i, j in self.pattern])
+        self.lu = Factors(self.places, self.slots, t.size)
 
     @property
     def moving(self) -> list[int]:
@@ -211,10 +208,10 @@ class _Step:
 
     def print_factor(self, printer: Printer) -> None:
         """factor(J, d, A)."""
-        code, block = finished(recorded([self.j, self.d], [self.factors])), Block(["d"])
+        code, block = finished(recorded([self.lu.j, self.lu.d], [self.lu.values])), Block(["d"])
         found = printer.compute(block, code, ["J", "d"])
         bends = self._bends(block, "J", len(self.jacobian))
-        stored([Value(block, found[0, i]) for i in range(self.factors.numel())] + list(bends.values()), "A")
+        stored([Value(block, found[0, i]) for i in range(self.lu.values.numel())] + list(bends.values()), "A")
         printer.end("factor", ["J", "d", "A"], block)
 
     def print_solve(self, printer: Printer) -> None:
@@ -236,10 +233,10 @@ class _Step:
 
     def _solved(self, block: Block, right: list[Value], columns: list[Value]) -> list[Value]:
         """k = (d I - J)^-1 right, then (d I - J)^-1 (columns + dJ k), with the factors and dJ that stand in A."""
-        count = self.factors.numel()
+        count = self.lu.values.numel()
         factors = [loaded(block, "A", q) for q in range(count)]
-        k, bends = lu.solved(self.pattern, self.held, factors, right), self._bends(block, "A", count)
+        k, bends = self.lu.solved(factors, right), self._bends(block, "A", count)
         for (i, j), slot in zip(self.places, self.slots, strict=True):
             if slot in bends:
                 columns[i] = columns[i] + bends[slot] * k[j]
-        return k + lu.solved(self.pattern, self.held, factors, columns)
+        return k + self.lu.solved(factors, columns)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from . import llvm
-from .instructions import Code, Operand, finished
+from .instructions import Code, Instruction, Operand, finished
+from .pieces import Item
 from .printed import PARAMETERS, Printer
 from .tangent import POINT, Along, Moved, Values, stored
 from .values import Value, loaded
@@ -24,12 +25,15 @@ class _Stage:
         self.rates, self.along, self.block, self.values = rates, along, block, given
         wanted = tuple((0, i, operand) for i, operand in enumerate([*rates.results, *along.parts]))
         code, self.held = printer.set_apart(finished(Code(tuple(rates.tape.body), wanted)), POINT)
-        needed, first = set(rates.results), []
+        needed = set(rates.results)
         for line in reversed(code.body):
             if line.result in needed:
                 needed.update(line.arguments)
-                first.append(line)
-        self.first, self.second = first[::-1], [line for line in code.body if line.result not in needed]
+        self.first: list[Item] = []
+        self.second: list[Item] = []
+        for item in llvm.with_gates(code, POINT, self.held, frozenset(needed)):
+            early = (item if isinstance(item, Instruction) else item.body[0]).result in needed
+            (self.first if early else self.second).append(item)
 
     def print_rates(self, before: _Stage | None) -> None:
         """The rates of this stage, and in between the derivatives of the one before."""

@@ -1,0 +1,241 @@
+"""What a zero makes superfluous is skipped, and nothing else changes.
+
+Law: where a gate is zero, whatever is multiplied by it does not matter. So code with branches gives what the same code
+gives without: on graphs drawn at random, on plants at shut valves, at and beyond the ends of a box, one by one and in
+lanes; it computes what it needs, and in lanes no plant sees its neighbour. Opponent: the instructions in their order.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import random
+from typing import Any
+
+import casadi
+import numpy as np
+import pytest
+from filling import hanging
+
+from airmuscle import ops
+from airmuscle.batch import simulate_batch
+from airmuscle.circuit import FillDischarge, Supply, ThreePosition, Valve
+from airmuscle.command import Schedule
+from airmuscle.declare import model, parameter
+from airmuscle.method import RungeKutta4
+from airmuscle.plant import Plant
+from airmuscle.program import StateVariable, llvm
+from airmuscle.program.instructions import MAXIMUM, MINIMUM, SELECT, Code, Instruction, Operand
+from airmuscle.program.pieces import Skippable
+from airmuscle.program.prepared import Program, prepared
+from airmuscle.program.skipping import COMMANDED, STEADY, VARYING, skipping
+
+BINARY = (
+    casadi.OP_ADD,
+    casadi.OP_SUB,
+    casadi.OP_MUL,
+    casadi.OP_LE,
+    casadi.OP_LT,
+    casadi.OP_IF_ELSE_ZERO,
+    MAXIMUM,
+    MINIMUM,
+)
+UNARY = (casadi.OP_NEG, casadi.OP_SQ, casadi.OP_NOT, casadi.OP_FABS, casadi.OP_SQRT)
+MEANING: dict[int, Any] = {
+    casadi.OP_ADD: lambda a, b: a + b,
+    casadi.OP_SUB: lambda a, b: a - b,
+    casadi.OP_MUL: lambda a, b: a * b,
+    casadi.OP_LE: lambda a, b: float(a <= b),
+    casadi.OP_LT: lambda a, b: float(a < b),
+    casadi.OP_IF_ELSE_ZERO: lambda a, b: b if a else 0.0,
+    MAXIMUM: max,
+    MINIMUM: min,
+    casadi.OP_NEG: lambda a: -a,
+    casadi.OP_SQ: lambda a: a * a,
+    casadi.OP_NOT: lambda a: float(not a),
+    casadi.OP_FABS: abs,
+    casadi.OP_SQRT: lambda a: abs(a) ** 0.5,
+    SELECT: lambda a, b, c: b if a else c,
+}
+"""Every operation on numbers that stay small and finite."""
+GRAPHS = 2000
+LEAVES: list[Operand] = [("in", 0, 0), ("in", 0, 1), ("in", 1, 0), ("in", 2, 0), ("c", 0.0), ("c", 1.0)]
+
+
+def drawn(rng: random.Random) -> Code:
+    """A graph of some dozen instructions, clamps, differences from them and choices among them; some of its results."""
+    known, body = list(LEAVES), list[Instruction]()
+
+    def put(operation: int, *arguments: Operand) -> Operand:
+        body.append(Instruction(operation, ("t", len(body)), arguments))
+        known.append(body[-1].result)
+        return known[-1]
+
+    def pick() -> Operand:
+        return known[-rng.randint(1, min(8, len(known))) if rng.random() < 0.6 else rng.randrange(len(known))]
+
+    for _ in range(rng.randint(6, 30)):
+        kind = rng.randrange(10)
+        if kind < 5:
+            put(rng.choice(BINARY), pick(), pick())
+        elif kind < 6:
+            put(rng.choice(UNARY), pick())
+        elif kind < 8:
+            put(SELECT, put(casadi.OP_LE, pick(), pick()), pick(), pick())
+        else:
+            number, ends = pick(), [("c", -1.0), ("c", 1.0)]
+            low = put(MAXIMUM, *rng.sample([number, ends[0]], 2))
+            clamped = put(MINIMUM, *rng.sample([low, ends[1]], 2))
+            put(casadi.OP_SUB, *rng.sample([number, clamped], 2))
+            put(casadi.OP_LE, ends[1], low)
+            put(casadi.OP_LE, ends[0], number)
+    wanted = rng.sample(known[len(LEAVES) :], rng.randint(1, 4))
+    return Code(tuple(body), tuple((0, i, operand) for i, operand in enumerate(wanted)))
+
+
+def level(operand: Operand) -> int:
+    """The first argument varies, the second is commanded, the third steady."""
+    return (VARYING, COMMANDED, STEADY)[operand[1]]
+
+
+class Values(dict[Operand, float]):
+    """The values of operands: of results those computed, of constants themselves."""
+
+    def __missing__(self, operand: Operand) -> float:
+        if operand[0] != "c":
+            raise AssertionError(f"{operand} is used before it is known")
+        return float(operand[1])
+
+
+def computed(items: Any, leaves: dict[Operand, float]) -> tuple[Values, int]:
+    """The values of the results, and how many instructions were run."""
+    values, count = Values(leaves), 0
+    for item in items:
+        if isinstance(item, Skippable) and not any(values[gate] for gate in item.gates):
+            values.update({result: values[value] for result, value in item.instead})
+            continue
+        inner = Values(values)
+        for line in item.body if isinstance(item, Skippable) else [item]:
+            number = MEANING[line.operation](*(inner[a] for a in line.arguments))
+            inner[line.result] = float(np.clip(number, -1e3, 1e3)) if line.operation == casadi.OP_SQ else number
+            count += 1
+        seen = [result for result, _ in item.instead] if isinstance(item, Skippable) else [item.result]
+        values.update({result: inner[result] for result in seen})
+    return values, count
+
+
+def test_random_code_gives_the_same_with_branches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However little a branch saves; with part of the results early, as the rates of a stage are, or none."""
+    monkeypatch.setattr("airmuscle.program.skipping.WORTH", 1)
+    rng, skipped = random.Random(1), 0
+    for _ in range(GRAPHS):
+        code = drawn(rng)
+        early = {rng.choice(code.body).result}  # with all that they need
+        for line in reversed(code.body):
+            if line.result in early:
+                early.update(line.arguments)
+        for ahead in (frozenset[Operand](), frozenset(early)):
+            items = skipping(code, level, ahead)
+            pieces = [{line.result for line in item.body} for item in items if isinstance(item, Skippable)]
+            assert all(piece <= ahead or not piece & ahead for piece in pieces)
+            for _ in range(3):
+                leaves = {leaf: rng.choice([-2.0, -1.0, 0.0, 0.5, 1.0, 3.0]) for leaf in LEAVES[:4]}
+                expected, count = computed(code.body, leaves)
+                found, fewer = computed(items, leaves)
+                skipped += count - fewer
+                assert [found[o] for _, _, o in code.outputs] == [expected[o] for _, _, o in code.outputs]
+    assert skipped > GRAPHS
+
+
+def plant(circuit: Any) -> Plant:
+    valve = Valve(2.6e-9, 0.433)
+    return dataclasses.replace(hanging(), circuit=circuit(Supply(5.5e5), valve, valve))
+
+
+def test_a_shut_valve_and_a_box_not_left_are_skipped() -> None:
+    """Of the rates of a plant, more than a third of all operations; with a valve open, its own come back."""
+    kept: list[Any] = []
+    real = llvm.skipping
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(llvm, "skipping", lambda *a: kept.append((a[0], real(*a))) or kept[-1][1])
+        Program(plant(FillDischarge))
+    code, items = kept[0]
+    skipped = [len(item.body) for item in items if isinstance(item, Skippable)]
+    assert len(skipped) >= 3
+    assert sum(skipped) > len(code.body) / 3
+    assert {len(item.gates) for item in items if isinstance(item, Skippable)} == {1}
+
+
+@pytest.mark.parametrize("circuit", [FillDischarge, ThreePosition])
+def test_plant_has_the_rates_and_slopes_that_it_has_without_branches(circuit: Any) -> None:
+    """At shut and open valves, within the box of the surface, on its edges and beyond them."""
+    system = plant(circuit)
+    new = prepared(system)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(llvm, "skipping", lambda code, *rest: list(code.body))
+        old = Program(system)
+    held, sizes = old.held(new.parameters), new.sizes
+    names = [s.name for s in system.states]
+    rng = np.random.default_rng(4)
+    for openings in (
+        [0.0] * sizes.inputs,
+        [1.0] + [0.0] * (sizes.inputs - 1),
+        [-0.4] * sizes.inputs,
+        [0.3] * sizes.inputs,
+    ):
+        for contraction in (-0.1, -0.05, 0.0, 0.1, 0.35, 0.5):
+            state = system.state_at(pressure=rng.uniform(0, 9e5), position=0.3 * contraction)
+            x = np.array([state[name] for name in names])
+            u, f, g = np.array(openings), np.empty(sizes.states), np.empty(sizes.states)
+            j, k = np.empty(sizes.jacobian), np.empty(sizes.jacobian)
+            new.call("jac", x, u, new.held, f, j)
+            _call(old, "jac", x, u, held, g, k)
+            np.testing.assert_allclose(f, g, rtol=1e-12, atol=1e-15 * np.abs(g).max())
+            np.testing.assert_allclose(j, k, rtol=1e-9, atol=1e-13 * np.abs(k).max())
+
+
+def _call(program: Program, name: str, *arrays: Any) -> None:
+    import ctypes
+
+    kinds = [ctypes.c_void_p] * len(arrays)
+    ctypes.CFUNCTYPE(None, *kinds)(program.address[name])(*(a.ctypes.data for a in arrays))
+
+
+@model
+class Gated:
+    """A rate whose flow is NaN unless its input is zero."""
+
+    scale: float = parameter("1", "a", "any factor", default=1.0)
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        return (StateVariable("level", "1", 1.0),)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return ("opening",)
+
+    def rates(self, state: Any, inputs: Any) -> dict[str, Any]:
+        bad = ops.sqrt(-1.0 - state["level"] ** 2) * ops.exp(state["level"])
+        return {"level": inputs["opening"] * self.scale * bad - state["level"]}
+
+    def outputs(self, state: Any, inputs: Any) -> dict[str, Any]:
+        return {}
+
+
+def test_what_is_skipped_is_not_computed() -> None:
+    ready = prepared(Gated())
+    assert ready.rates([2.0], [0.0]) == pytest.approx([-2.0])
+    assert np.isnan(ready.rates([2.0], [0.5])).all()
+    assert np.isnan(ready.rates([2.0], [np.nan])).all()
+
+
+def test_a_lane_that_skips_does_not_see_its_neighbours() -> None:
+    """Of sixteen plants in one register row every third opens; the others end where they end alone."""
+    opens = [n % 3 == 0 for n in range(16)]
+    commands = [Schedule({"opening": ((0.1, 1.0 if opened else 0.0),)}) for opened in opens]
+    batch = simulate_batch(
+        Gated(), {"scale": np.ones(16)}, commands, duration=0.5, start={"level": 1.0}, method=RungeKutta4(1e-2)
+    )
+    ended = np.asarray(batch.final["level"])
+    np.testing.assert_array_equal(np.isfinite(ended), ~np.array(opens))
+    np.testing.assert_allclose(ended[~np.array(opens)], np.exp(-0.5), rtol=1e-8)
