@@ -73,6 +73,11 @@ class Command(abc.ABC):
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
         """The command for these inputs from `start` on, cut so that every input is linear within a segment."""
 
+    @property
+    def names(self) -> tuple[str, ...] | None:
+        """The inputs that it speaks of; None where it does not say."""
+        return None
+
 
 def refuse_no_command(given: object) -> None:
     """Raise ParameterError for what is no Command, as a dictionary is."""
@@ -124,6 +129,10 @@ class Schedule(Command):
                 raise ParameterError(f"the schedule of '{name}' holds a number that is not finite: {changes}.")
             _refuse_disorder("schedule", "instants", name, [time for time, _ in changes])
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.changes)
+
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
         refuse_unknown_input(list(self.changes), inputs)
         end = start + duration
@@ -149,6 +158,10 @@ class Signal(Command):
             if not points or not np.isfinite(points).all():
                 raise ParameterError(f"the signal of '{name}' must be finite points (time, value); it is {points}.")
             _refuse_disorder("signal", "times", name, [time for time, _ in points])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.points)
 
     @classmethod
     def recorded(cls, recording: Recording, columns: Mapping[str, str]) -> Signal:
@@ -226,6 +239,10 @@ class Periodic(Command):
     def __post_init__(self) -> None:
         if not 0 < self.period < np.inf:
             raise ParameterError(f"Periodic.period is {self.period!r} s; it must be positive and finite.")
+
+    @property
+    def names(self) -> tuple[str, ...] | None:
+        return self.inner.names
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
         once, end = self.inner.segments(inputs, 0.0, self.period), start + duration

@@ -12,8 +12,8 @@ from ..command import Command, Segments
 from ..errors import ParameterError, suggestion
 from ..method import INTERRUPTED, Explicit, Method
 from ..program import System
-from ..simulate import chosen_method, output_times, refuse_beyond_range
 from ..start import number_of
+from ..terms import chosen_method, output_times, refuse_beyond_range
 from .precision import Double, Precision
 from .result import NOT_STARTED, Batch
 from .side_by_side import blocks, refuse_single

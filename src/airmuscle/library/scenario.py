@@ -35,7 +35,8 @@ from ..method import Method, Rodas4
 from ..muscle import Muscle
 from ..plant import Plant
 from ..recording import Recording
-from ..simulate import refuse_beyond_range, simulate
+from ..simulate import simulate
+from ..terms import refuse_beyond_range
 from .build import build
 from .catalogue import load, parsed
 from .command_table import command_from
