@@ -85,12 +85,15 @@ def refuse_no_command(given: object) -> None:
         raise ParameterError(f"the command is {given!r}; give a Schedule, a Signal or another Command.")
 
 
-def refuse_unknown_input(given: Sequence[str], inputs: Sequence[str]) -> None:
+NO_INPUT = "the plant has no input"
+
+
+def refuse_unknown_input(given: Sequence[str], inputs: Sequence[str], lacks: str = NO_INPUT) -> None:
     """Raise ParameterError, with the nearest name, for a name that is no input of the plant."""
     for name in given:
         if name not in inputs:
             known = ", ".join(inputs) or "none"
-            raise ParameterError(f"the plant has no input '{name}'; there are {known}.{suggestion(name, inputs)}")
+            raise ParameterError(f"{lacks} '{name}'; there are {known}.{suggestion(name, inputs)}")
 
 
 def _refuse_no_mapping(kind: str, given: object) -> None:

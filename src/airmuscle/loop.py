@@ -98,6 +98,15 @@ class Loop:
                 "once. Shorten the period, or simulate longer."
             )
 
+    def units(self, known: Mapping[str, str]) -> dict[str, str]:
+        """The units of the columns that a recording has because of the loop, from those of the plant's columns."""
+        kinds = (
+            (SETPOINT, self.controller.setpoints),
+            (MEASURED, self.controller.columns),
+            (TOLD, self.controller.inputs),
+        )
+        return {f"{kind}{name}": known.get(name, "") for kind, names in kinds for name in names}
+
     def in_words(self, units: Mapping[str, str]) -> str:
         """Who measures, commands and follows what, and how often; `units` by the names of columns and inputs."""
         with_unit = {name: f"{name} [{unit}]" if unit else name for name, unit in units.items()}
