@@ -227,8 +227,8 @@ def page() -> str:
     )
     parts.append("## Parameters of the models\n")
     parts.append(
-        "The units `u`, `y` and `u/y` of a controller follow from where it stands: `u` is the unit of the input that it "
-        "commands, `y` that of the column that it measures.\n"
+        "The units `u`, `y` and `u/y` of a controller follow from where it stands: `u` is the unit of the input that "
+        "it commands, `y` that of the column that it measures.\n"
     )
     for name in model_names():
         declared = (

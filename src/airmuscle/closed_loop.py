@@ -126,7 +126,7 @@ def _carried(closed: Sampling, memory: LoopMemory, state: Array) -> _Done:
         begin = segments.ends[-2] if segments.ends.size > 1 else edges[k]
         had = segments.values[-1] + segments.slopes[-1] * (edges[k + 1] - begin)
         time, state, last = edges[k + 1], course.state, memory
-    return _Done(pieces, status, time, state, last._replace(had=tuple(had.tolist())))
+    return _Done(pieces, status, time, state, last._replace(time=time, had=tuple(had.tolist())))
 
 
 def _sampled(
@@ -148,7 +148,8 @@ def _sampled(
         ) from None
     if not all(map(math.isfinite, told)):
         return memory, NO_COMMAND
-    return LoopMemory(inner, memory.origin, memory.taken + 1, tuple(columns.values()), told, (), memory.drivers), 0
+    seen = tuple(columns.values())
+    return memory._replace(controller=inner, taken=memory.taken + 1, seen=seen, told=told), 0
 
 
 def _piece(closed: Sampling, memory: LoopMemory, state: Array, begin: float, k: int) -> tuple[_Piece, LoopMemory]:

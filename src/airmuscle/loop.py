@@ -20,11 +20,12 @@ TOLD, SETPOINT, MEASURED = "told.", "setpoint.", "measured."
 
 
 class LoopMemory(NamedTuple):
-    """A loop between two samples: the controller's memory, when the loop began [s], the samples taken since, what was
-    measured and commanded at the last, the inputs that the plant had until now, and the memories of the drivers."""
+    """A loop at one moment: the controller's memory, when the loop began and which moment it is [s], the samples taken
+    so far, what was measured and commanded at the last, the inputs that the plant had, and the drivers' memories."""
 
     controller: Any
     origin: float
+    time: float
     taken: int
     seen: tuple[float, ...]
     told: tuple[float, ...]
@@ -77,7 +78,7 @@ class Loop:
         drivers = Driven(self.beside, self.drivers).init(start)
         told = (0.0,) * len(self.controller.inputs)
         return LoopMemory(
-            self.controller.init(), start, 0, (math.nan,) * len(self.controller.columns), told, (), drivers
+            self.controller.init(), start, start, 0, (math.nan,) * len(self.controller.columns), told, (), drivers
         )
 
     def refuse_misfit(self, columns: Sequence[str], inputs: Sequence[str]) -> None:

@@ -98,7 +98,7 @@ def sampling(
     course = beside.cut_at(starts, start)
     course.values[:, places] = course.slopes[:, places] = 0.0
     firsts = np.append(np.searchsorted(starts, edges[:-1]), starts.size)
-    times = output_times(output, start, duration, course.ends)
+    times = output_times(output, start, duration, np.append(start, course.ends))
     setpoint = _snapped(loop.setpoint.segments(loop.controller.setpoints, start, duration), edges, near)
     cuts = np.searchsorted(times, edges, side="right")
     return Sampling(
@@ -116,10 +116,10 @@ def _edges(period: float, memory: LoopMemory, start: float, end: float) -> tuple
             "a shorter time."
         )
     instants = memory.origin + period * (memory.taken + np.arange(max(math.ceil(count), 0) + 1))
-    if not start - near <= instants[0] <= start + period + near:
+    if abs(start - memory.time) > near:
         raise ParameterError(
-            f"the memory of the loop is due at {instants[0]:g} s, and the run begins at {start:g} s. Give the time at "
-            "which the memory was returned."
+            f"the memory of the loop is of {memory.time:.10g} s, and the run begins at {start:.10g} s. Give the time "
+            "that was returned with it."
         )
     within = instants[(instants > start + near) & (instants < end - near)]
     return np.concatenate([[start], within, [end]]), bool(instants[0] <= start + near)
