@@ -83,13 +83,8 @@ class Loop:
 
     def refuse_misfit(self, columns: Sequence[str], inputs: Sequence[str]) -> None:
         """Raise ParameterError, with the nearest name, for what a plant with these columns and inputs does not have."""
-        for name in self.controller.columns:
-            if name not in columns:
-                raise ParameterError(
-                    f"{type(self.controller).__name__} measures '{name}', which the plant does not have; there are "
-                    f"{', '.join(columns)}.{suggestion(name, columns)}"
-                )
-        refuse_unknown_input((*self.controller.inputs, *(self.beside.names or ()), *self.drivers), inputs)
+        refuse_absent(self.controller, columns, inputs)
+        refuse_unknown_input((*(self.beside.names or ()), *self.drivers), inputs)
 
     def refuse_longer(self, duration: float) -> None:
         """Raise ParameterError where a run of `duration` [s] ends before the second sample."""
@@ -130,6 +125,17 @@ class Loop:
         }
         command = Beside(Schedule(changes), self.beside)
         return Driven(command, self.drivers) if self.drivers else command
+
+
+def refuse_absent(controller: Controller, columns: Sequence[str], inputs: Sequence[str]) -> None:
+    """Raise ParameterError, with the nearest name, for what a plant with these columns and inputs does not have."""
+    for name in controller.columns:
+        if name not in columns:
+            raise ParameterError(
+                f"{type(controller).__name__} measures '{name}', which the plant does not have; there are "
+                f"{', '.join(columns)}.{suggestion(name, columns)}"
+            )
+    refuse_unknown_input(controller.inputs, inputs)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -22,9 +22,9 @@ from typing import Any
 
 from ..command import Command
 from ..controller import RELATIVE, Controller, relative_unit
-from ..declare import parameters
-from ..errors import ParameterError, suggestion
-from ..loop import Loop
+from ..declare import Parameter, parameters
+from ..errors import ParameterError
+from ..loop import Loop, refuse_absent
 from ..plant import Plant
 from ..recorded import units_of
 from ..variables import Input
@@ -50,7 +50,7 @@ def loop_from(table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], 
     at, given = place.inside("controller"), table["controller"]
     if not isinstance(given, Mapping):
         raise ParameterError(f'{at} is {given!r}; write model = "PID", its parameters, period and setpoint under it.')
-    controller = _controller({k: v for k, v in given.items() if k not in KEYS}, plant, units, at)
+    controller = _controller({k: v for k, v in given.items() if k not in KEYS}, plant.inputs, units, at)
     for key, example in (("period", 'period = "10 ms"'), ("setpoint", f"[{at.table}.setpoint]")):
         if key not in given:
             raise ParameterError(f"{at}: '{key}' is missing; write {example}.")
@@ -65,45 +65,32 @@ def loop_from(table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], 
     return loop
 
 
-def _controller(
-    table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], place: Place
-) -> Controller:  # fmt: skip
-    """The controller; its numbers in units that follow from what it measures and commands become SI here."""
+def _controller(table: Mapping[str, Any], inputs: Sequence[str], units: Mapping[str, str], place: Place) -> Controller:
+    """The controller. Built twice: what it measures and commands says in which units its other numbers are."""
+    relative: dict[str, Parameter] = {}
     if isinstance(table.get("model"), str):
         cls = model_class(table["model"], f"{place}, model")
         if not issubclass(cls, Controller):
             known = [n for n in model_names() if issubclass(model_class(n, ""), Controller)]
             raise ParameterError(f"{place}: {cls.__name__} is no controller; there are {', '.join(known)}.")
-        y, u = _units_beside(table, plant, units, place)
         relative = {p.name: p for p in parameters(cls) if p.unit in RELATIVE and p.name in table}
-        table = dict(table)
-        for name, p in relative.items():
-            unit, about = relative_unit(p.unit, y, u), f" ({p.symbol}, {p.meaning})"
-            table[name] = number(table[name], unit, f"{place}, {name}", about)
-    found: Controller = checked(build(table, place), Controller, place)
+    draft: Controller = checked(build({**table, **dict.fromkeys(relative, 1.0)}, place), Controller, place)
+    with said_at(place):
+        refuse_absent(draft, [name for name in units if name not in inputs], inputs)
+    if relative and len({units[name] for name in draft.inputs}) > 1:
+        raise ParameterError(f"{place}: {' and '.join(draft.inputs)} have different units; name inputs of one kind.")
+    numbers = {
+        name: number(table[name], _unit(p, draft, units), f"{place}, {name}", f" ({p.symbol}, {p.meaning})")
+        for name, p in relative.items()
+    }
+    found: Controller = build({**table, **numbers}, place)
     return found
 
 
-def _units_beside(
-    table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], place: Place
-) -> tuple[str, str]:  # fmt: skip
-    """The units of the measured column and of the commanded input; "1" where none is known."""
-    measured, commanded = table.get("measured"), table.get("commanded")
-    sides = [i for key, i in commanded.items() if key != "model"] if isinstance(commanded, Mapping) else [commanded]
-    inputs = [i for i in sides if isinstance(i, str)]
-    columns = [name for name in units if name not in plant.inputs]
-    of_measured = ("measured", "column", [measured], columns)
-    for key, kind, given, known in (of_measured, ("commanded", "input", inputs, plant.inputs)):
-        for name in given:
-            if isinstance(name, str) and name not in known:
-                raise ParameterError(
-                    f"{place}, {key}: the plant has no {kind} '{name}'; there are {', '.join(known) or 'none'}."
-                    f"{suggestion(name, known)}"
-                )
-    different = {units[name] for name in inputs}
-    if len(different) > 1:
-        raise ParameterError(f"{place}, commanded: {' and '.join(inputs)} have different units; name two of one kind.")
-    return units.get(measured, "") if isinstance(measured, str) else "", "".join(different)
+def _unit(declared: Parameter, controller: Controller, units: Mapping[str, str]) -> str:
+    """The unit of a controller's parameter where it stands; "1" takes the place of one that is not known."""
+    y, u = (units.get(names[0]) or "1" for names in (controller.columns, controller.inputs))
+    return relative_unit(declared.unit, y, u)
 
 
 def _setpoint(given: Any, controller: Controller, units: Mapping[str, str], place: Place) -> Command:
@@ -120,9 +107,8 @@ def numbers_of(
     table: Mapping[str, Any], loop: Loop, units: Mapping[str, str]
 ) -> Iterator[tuple[tuple[str | int, ...], str]]:
     """Where in the table [command.controller] numbers stand or may stand, and the unit of each, for studies."""
-    y, u = units.get(loop.controller.columns[0]) or "1", units.get(loop.controller.inputs[0]) or "1"
     for p in parameters(loop.controller):
-        yield (p.name,), relative_unit(p.unit, y, u)
+        yield (p.name,), _unit(p, loop.controller, units)
     yield ("period",), "s"
     for name, rows in table["setpoint"].items():
         for i in range(len(rows)) if isinstance(rows, list) else ():
