@@ -181,18 +181,21 @@ def test_what_jumps_with_its_input_is_measured_before_it_jumps():
         x = a * x + (1 - a) * u
 
 
-def test_a_set_point_that_changes_at_a_sampling_instant_is_seen_there():
-    """3 x 0.1 is more than 0.3, and 0.7 less than 7 x 0.1: rounding must not cost a period."""
-    for at in range(1, 100):
-        loop = Loop(
-            PID("x", "u", 1.0), 0.1, Schedule({"x": ((at / 10, 1.0),)}), beside=Schedule({"w": ((at / 10, 1.0),)})
-        )
-        run = simulate(Lag(), loop, duration=10.0, start={"x": 0.0}, output=10.0)
+@pytest.mark.parametrize(("period", "places"), [(0.1, 1), (0.07, 2), (0.019, 3)])
+def test_a_set_point_that_changes_at_a_sampling_instant_is_seen_there(period, places):
+    """3 x 0.1 is more than 0.3, and 6 x 0.019 less than 0.114: rounding must not cost a period, either way."""
+    off = set()
+    for k in range(1, 60):
+        at = round(k * period, places)
+        off.add(float(np.sign(k * period - at)))
+        wanted, beside = Schedule({"x": ((at, 1.0),)}), Schedule({"w": ((at, 1.0),)})
+        loop = Loop(PID("x", "u", 1.0), period, wanted, beside)
+        run = simulate(Lag(), loop, duration=60 * period, start={"x": 0.0}, output=60 * period)
         first = int(np.flatnonzero(run["told.u"])[0])
-        assert run["time"][first] == pytest.approx(at / 10, abs=1e-9)
-        assert run["w"][first] == 1.0
-        assert run["w"][first - 1] == 0.0
+        assert run["time"][first] == pytest.approx(at, abs=1e-9)
+        assert (run["w"][first - 1], run["w"][first], run["setpoint.x"][first]) == (0.0, 1.0, 1.0)
         assert np.diff(run["time"]).min() > 1e-9, "no piece of 1e-17 s"
+    assert off >= ({0.0, 1.0} if period == 0.1 else {0.0, -1.0} if period == 0.019 else {0.0})
 
 
 # Ranges and drivers
@@ -369,6 +372,13 @@ def test_a_command_that_is_no_number_ends_the_run_there(given):
     assert not caught.value.interrupted
 
 
+def test_a_loop_that_fails_at_its_first_sample_has_no_rows_and_a_reason():
+    with pytest.raises(SimulationError, match=r"ended at 0 of 1 s because the controller gave a command") as caught:
+        simulate(lifting(), Loop(Wild(0, {"fill": np.nan}), 0.02, PRESSURE), duration=1.0)
+    assert len(caught.value.recording) == 0
+    assert "told.fill" in caught.value.recording
+
+
 @pytest.mark.parametrize("given", [{}, {"fil": 1.0}, {"fill": "open"}, None])
 def test_a_controller_that_gives_no_command_is_named(given):
     with pytest.raises(ParameterError, match=r"Wild commands .*; it must give a number for each of fill"):
@@ -403,7 +413,7 @@ def test_a_loop_that_is_interrupted_within_a_piece_goes_on_from_the_sample_befor
     part = run_loop(plant, loop, duration=1.0, complete=False)
     monkeypatch.undo()
     assert "interrupted" in part.recording.notes[-1]
-    assert part.time == 20 * TICK
+    assert (part.time, part.memory.time, part.memory.taken) == (20 * TICK, 20 * TICK, 20)
     rest = run_loop(plant, loop, duration=1.0 - part.time, start=part.state, start_time=part.time, memory=part.memory)
     assert (rest.state, rest.memory) == (whole.state, whole.memory)
 
