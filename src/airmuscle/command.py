@@ -34,7 +34,7 @@ class Segments:
     def inputs_at(self, times: Array, start: float) -> Array:
         """The inputs (N, m) at times (N,); at an instant those that begin there."""
         starts = self.starts(start)
-        index = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, self.ends.size - 1)
+        index = np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
         return np.asarray(self.values[index] + (times - starts[index])[:, None] * self.slopes[index])
 
     def starts(self, start: float) -> Array:

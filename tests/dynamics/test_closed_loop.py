@@ -33,6 +33,7 @@ from airmuscle.mechanism import HangingMass, Held, Isometric
 from airmuscle.method import DormandPrince8, Rodas4, RungeKutta4
 from airmuscle.plant import Plant
 from airmuscle.program import StateVariable
+from airmuscle.program.prepared import prepared
 from airmuscle.reference import cite
 from airmuscle.simulate import simulate
 
@@ -416,6 +417,34 @@ def test_a_loop_that_is_interrupted_within_a_piece_goes_on_from_the_sample_befor
     assert (part.time, part.memory.time, part.memory.taken) == (20 * TICK, 20 * TICK, 20)
     rest = run_loop(plant, loop, duration=1.0 - part.time, start=part.state, start_time=part.time, memory=part.memory)
     assert (rest.state, rest.memory) == (whole.state, whole.memory)
+
+
+# What is made once
+
+
+def test_what_does_not_change_is_made_once(monkeypatch):
+    """Twice the samples ask for the plant's states, its program and the method's workspace as often as once."""
+    counted: dict[str, int] = {}
+
+    def counting(name, function):
+        def counts(*given):
+            counted[name] = counted.get(name, 0) + 1
+            return function(*given)
+
+        return counts
+
+    plant, start = lifting(), lifting().state_at(pressure=1e5)
+    simulate(plant, Loop(VALVES, TICK, PRESSURE), duration=0.1, start=start)  # compiles
+    monkeypatch.setattr(Plant, "states", property(counting("states", Plant.states.fget)))
+    monkeypatch.setattr(Rodas4, "_kernel", counting("kernel", Rodas4._kernel))
+    monkeypatch.setattr("airmuscle.program.prepared.prepared", counting("prepared", prepared))
+    found = []
+    for duration in (0.5, 1.0):
+        counted.clear()
+        simulate(plant, Loop(VALVES, TICK, PRESSURE), duration=duration, start=start)
+        found.append(dict(counted))
+    assert found[0] == found[1]
+    assert found[0]["kernel"] == found[0]["prepared"] == 1
 
 
 # What is recorded, and what is refused
