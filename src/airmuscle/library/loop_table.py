@@ -38,8 +38,10 @@ KEYS = ("period", "setpoint")
 
 
 def units_around(plant: Plant, start: Mapping[str, float]) -> dict[str, str]:
-    """The units of everything that a run of a plant has in columns; '' where none is known."""
-    return units_of(plant, list(plant.outputs(start, dict.fromkeys(plant.inputs, 0.0))))
+    """The units of the states, outputs and inputs that a run of a plant has in columns; '' where none is known."""
+    outputs = list(plant.outputs(start, dict.fromkeys(plant.inputs, 0.0)))
+    units = units_of(plant, outputs)
+    return {name: units[name] for name in (*(s.name for s in plant.states), *outputs, *plant.inputs)}
 
 
 def loop_from(table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], place: Place) -> Loop:
