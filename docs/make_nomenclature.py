@@ -185,7 +185,14 @@ ARGUMENTS = {
     "functions": "functions of time by input",
     "drivers": "what stands between the command and the opening of an input",
     "signal": "course of one input in time",
-    "memory": "what a driver still has under way",
+    "memory": "what a driver still has under way, or a controller remembers",
+    "measurement": "what a controller is given at a sampling instant",
+    "measured": "state or output that a controller measures",
+    "commanded": "input that a controller commands, or two of them, by Split",
+    "positive": "input that a command above zero goes to",
+    "negative": "input that a command below zero goes to",
+    "told": "course of all inputs before any driver",
+    "lacks": "how the message about an unknown name begins",
 }
 """Arguments of public functions that are neither a declared parameter nor a measurable quantity."""
 
@@ -219,6 +226,10 @@ def page() -> str:
         )
     )
     parts.append("## Parameters of the models\n")
+    parts.append(
+        "The units `u`, `y` and `u/y` of a controller follow from where it stands: `u` is the unit of the input that "
+        "it commands, `y` that of the column that it measures.\n"
+    )
     for name in model_names():
         declared = (
             parameters(model_class(name, "nomenclature"))

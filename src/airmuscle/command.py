@@ -34,7 +34,7 @@ class Segments:
     def inputs_at(self, times: Array, start: float) -> Array:
         """The inputs (N, m) at times (N,); at an instant those that begin there."""
         starts = self.starts(start)
-        index = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, self.ends.size - 1)
+        index = np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
         return np.asarray(self.values[index] + (times - starts[index])[:, None] * self.slopes[index])
 
     def starts(self, start: float) -> Array:
@@ -73,6 +73,11 @@ class Command(abc.ABC):
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
         """The command for these inputs from `start` on, cut so that every input is linear within a segment."""
 
+    @property
+    def names(self) -> tuple[str, ...] | None:
+        """The inputs that it speaks of; None where it does not say."""
+        return None
+
 
 def refuse_no_command(given: object) -> None:
     """Raise ParameterError for what is no Command, as a dictionary is."""
@@ -80,12 +85,15 @@ def refuse_no_command(given: object) -> None:
         raise ParameterError(f"the command is {given!r}; give a Schedule, a Signal or another Command.")
 
 
-def refuse_unknown_input(given: Sequence[str], inputs: Sequence[str]) -> None:
+NO_INPUT = "the plant has no input"
+
+
+def refuse_unknown_input(given: Sequence[str], inputs: Sequence[str], lacks: str = NO_INPUT) -> None:
     """Raise ParameterError, with the nearest name, for a name that is no input of the plant."""
     for name in given:
         if name not in inputs:
             known = ", ".join(inputs) or "none"
-            raise ParameterError(f"the plant has no input '{name}'; there are {known}.{suggestion(name, inputs)}")
+            raise ParameterError(f"{lacks} '{name}'; there are {known}.{suggestion(name, inputs)}")
 
 
 def _refuse_no_mapping(kind: str, given: object) -> None:
@@ -124,6 +132,10 @@ class Schedule(Command):
                 raise ParameterError(f"the schedule of '{name}' holds a number that is not finite: {changes}.")
             _refuse_disorder("schedule", "instants", name, [time for time, _ in changes])
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.changes)
+
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
         refuse_unknown_input(list(self.changes), inputs)
         end = start + duration
@@ -149,6 +161,10 @@ class Signal(Command):
             if not points or not np.isfinite(points).all():
                 raise ParameterError(f"the signal of '{name}' must be finite points (time, value); it is {points}.")
             _refuse_disorder("signal", "times", name, [time for time, _ in points])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.points)
 
     @classmethod
     def recorded(cls, recording: Recording, columns: Mapping[str, str]) -> Signal:
@@ -226,6 +242,10 @@ class Periodic(Command):
     def __post_init__(self) -> None:
         if not 0 < self.period < np.inf:
             raise ParameterError(f"Periodic.period is {self.period!r} s; it must be positive and finite.")
+
+    @property
+    def names(self) -> tuple[str, ...] | None:
+        return self.inner.names
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
         once, end = self.inner.segments(inputs, 0.0, self.period), start + duration

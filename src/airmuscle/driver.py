@@ -167,7 +167,8 @@ class PWM(Driver):
                 "allowed. Simulate a shorter time, or the mean of the pulses."
             )
         starts = memory.origin + (memory.begun + np.arange(max(math.ceil(count) + 1, 0))) / self.frequency
-        return np.asarray(np.maximum(starts[starts < end], start))
+        # one that begins where rounding alone keeps it before the end belongs to what is commanded from there on
+        return np.asarray(np.maximum(starts[starts < end - 4 * np.spacing(abs(end))], start))
 
 
 def _switchings(signal: Segments, start: float, coil: float) -> tuple[Array, Array]:
@@ -206,6 +207,10 @@ class Driven(Command):
                     )
 
     @property
+    def names(self) -> tuple[str, ...] | None:
+        return self.inner.names
+
+    @property
     def chains(self) -> dict[str, tuple[Driver, ...]]:
         """The drivers of each input, in the order of the signal."""
         return {name: given if isinstance(given, tuple) else (given,) for name, given in self.drivers.items()}
@@ -219,22 +224,28 @@ class Driven(Command):
     ) -> tuple[Segments, dict[str, tuple[Any, ...]]]:
         """The command from `start` on for `duration` [s], and the memories then: give them to the next step."""
         refuse_unknown_input(list(self.drivers), inputs)
-        told = self.inner.segments(inputs, start, duration)
+        return self.passed(memory, self.inner.segments(inputs, start, duration), inputs, start)
+
+    def passed(
+        self, memory: Mapping[str, tuple[Any, ...]], told: Segments, inputs: Sequence[str], start: float
+    ) -> tuple[Segments, dict[str, tuple[Any, ...]]]:
+        """What the drivers make of a course of all inputs that is told from `start` on, and the memories at its end."""
         columns, later = {}, {}
         for name, chain in self.chains.items():
-            signal, memories = _column(told, inputs.index(name)), []
+            signal, memories = column(told, inputs.index(name)), []
             _refuse_beyond(name, signal, start)
             for driver, remembered in zip(chain, memory[name], strict=True):
                 signal, now = driver.step(remembered, signal, start)
                 memories.append(now)
             columns[inputs.index(name)], later[name] = signal, tuple(memories)
-        return _together(told, columns, start), later
+        return together(told, columns, start), later
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
         return self.step(self.init(start), inputs, start, duration)[0]
 
 
-def _column(segments: Segments, i: int) -> Segments:
+def column(segments: Segments, i: int) -> Segments:
+    """The course of one input alone."""
     return Segments(segments.ends, segments.values[:, i : i + 1], segments.slopes[:, i : i + 1])
 
 
@@ -249,11 +260,11 @@ def _refuse_beyond(name: str, signal: Segments, start: float) -> None:
             )
 
 
-def _together(told: Segments, columns: Mapping[int, Segments], start: float) -> Segments:
+def together(told: Segments, columns: Mapping[int, Segments], start: float) -> Segments:
     """One course of all inputs, those in `columns` replaced, cut wherever any of them is."""
     if not columns:
         return told
-    courses = [columns.get(i) or _column(told, i) for i in range(told.values.shape[1])]
+    courses = [columns.get(i) or column(told, i) for i in range(told.values.shape[1])]
     starts = np.unique(np.concatenate([np.array([start]), *(course.starts(start) for course in courses)]))
     cut = [course.cut_at(starts, start) for course in courses]
     ends = np.append(starts[1:], told.ends[-1])

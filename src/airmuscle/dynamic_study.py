@@ -51,7 +51,7 @@ from .method import Method
 from .plant import Plant
 from .recording import Recording, read
 from .recording.columns import quantity_of
-from .simulate import refuse_beyond_range
+from .terms import refuse_beyond_range
 
 _TABLES = ("title", "plant", "command", "observed", "fit", "record")
 _FIT = ("free", "own", "start_time", "start", "starts", "seed", "method", "bounds")

@@ -14,7 +14,7 @@ from .equilibrium import given_inputs
 from .errors import AirmuscleError, ParameterError, suggestion
 from .plant import Plant
 from .program import System
-from .recording.columns import quantity_of
+from .recorded import units_of
 from .start import refuse_impossible, state_vector
 from .stiffness import Stiffness, stiffness
 
@@ -158,16 +158,6 @@ def _inputs(plant: System, inputs: Mapping[str, float]) -> dict[str, float]:
         if name not in plant.inputs:
             raise ParameterError(f"the system has no input '{name}'; there are {', '.join(plant.inputs) or 'none'}.")
     return {name: float(inputs.get(name, 0.0)) for name in plant.inputs}
-
-
-def units_of(plant: System, outputs: Sequence[str]) -> dict[str, str]:
-    """The unit of every state, input and output; '' where none is known."""
-    units = {name: getattr(quantity_of(name), "unit", "") for name in outputs}
-    units |= dict.fromkeys(plant.inputs, "")
-    if isinstance(plant, Plant):
-        units |= {i.name: i.unit for i in plant.commands}
-        units |= {c.acceleration: f"{c.unit}/s^2" for c in plant.mechanism.coordinates}
-    return units | {s.name: s.unit for s in plant.states}
 
 
 def _places(kind: str, wanted: Sequence[str] | None, known: tuple[str, ...]) -> list[int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import dataclasses
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -24,10 +25,13 @@ REASONS = {
     4: "it took more steps than allowed",
     5: "it was interrupted",
     7: "there was less air than none",
+    8: "the controller gave a command that is not finite",
 }
-PAUSED, NOT_FINITE, TOO_MANY, INTERRUPTED, LESS_THAN_NONE = 1, 3, 4, 5, 7
+PAUSED, NOT_FINITE, TOO_MANY, INTERRUPTED, LESS_THAN_NONE, NO_COMMAND = 1, 3, 4, 5, 7, 8
 BUDGET = 100_000
 """Steps between two looks at whether the user wants to stop."""
+MOST_STEPS = 50_000_000
+"""Steps of one run, unless told otherwise."""
 
 
 class Course(NamedTuple):
@@ -42,6 +46,31 @@ class Course(NamedTuple):
     rejected: int
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Stepper:
+    """A method at one system: the kernel, its leading and trailing arguments, and its workspace. For one thread."""
+
+    kernel: Any
+    leading: tuple[Any, ...]
+    trailing: tuple[Any, ...]
+    work: Array
+
+    def run(self, segments: Segments, start: float, state: Array, times: Array, most_steps: int = MOST_STEPS) -> Course:
+        """As Method.run."""
+        y, rows = np.array(state, dtype=float), np.empty((times.size, state.size))
+        rows.fill(np.nan)
+        clock, count = np.array([start, 0.0, start]), np.zeros(4, dtype=np.int64)
+        status, middle = PAUSED, (y, segments.ends, segments.values, segments.slopes, times, rows)
+        try:
+            while status == PAUSED:
+                status = self.kernel(*self.leading, *middle, *self.trailing, clock, count, BUDGET, self.work)
+                if status == PAUSED and count[2] >= most_steps:
+                    status = TOO_MANY
+        except KeyboardInterrupt:
+            status = INTERRUPTED
+        return Course(rows, int(count[1]), float(clock[0]), y, int(status), int(count[2]), int(count[3]))
+
+
 class Method(abc.ABC):
     """A numerical method for ordinary differential equations."""
 
@@ -49,16 +78,8 @@ class Method(abc.ABC):
     def _kernel(self, prepared: Prepared) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
         """The kernel, its leading and its trailing arguments, and the length of its workspace."""
 
-    def run(
-        self,
-        prepared: Prepared,
-        segments: Segments,
-        start: float,
-        state: Array,
-        times: Array,
-        most_steps: int = 50_000_000,
-    ) -> Course:
-        """Carry `state` (n,) from `start` through the segments; rows (N, n) at `times` (N,), which must rise."""
+    def stepper(self, prepared: Prepared) -> Stepper:
+        """The method at this system, for those who call it often: what does not change is made once."""
         from .engine.once import announce_compilation
 
         try:
@@ -71,17 +92,14 @@ class Method(abc.ABC):
                 "written to. Name one that can be in the environment variable NUMBA_CACHE_DIR."
             ) from None
         announce_compilation(kernel)
-        y, rows = np.array(state, dtype=float), np.full((times.size, state.size), np.nan)
-        clock, count, work = np.array([start, 0.0, start]), np.zeros(4, dtype=np.int64), np.zeros(max(size, 1))
-        status, middle = PAUSED, (y, segments.ends, segments.values, segments.slopes, times, rows)
-        try:
-            while status == PAUSED:
-                status = kernel(*leading, *middle, *trailing, clock, count, BUDGET, work)
-                if status == PAUSED and count[2] >= most_steps:
-                    status = TOO_MANY
-        except KeyboardInterrupt:
-            status = INTERRUPTED
-        return Course(rows, int(count[1]), float(clock[0]), y, int(status), int(count[2]), int(count[3]))
+        return Stepper(kernel, leading, trailing, np.zeros(max(size, 1)))
+
+    def run(
+        self, prepared: Prepared, segments: Segments, start: float, state: Array, times: Array,
+        most_steps: int = MOST_STEPS,
+    ) -> Course:  # fmt: skip
+        """Carry `state` (n,) from `start` through the segments; rows (N, n) at `times` (N,), which must rise."""
+        return self.stepper(prepared).run(segments, start, state, times, most_steps)
 
 
 @model

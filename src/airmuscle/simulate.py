@@ -2,36 +2,27 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from .closed_loop import run_loop
 from .command import Command, Schedule, Segments, refuse_no_command
-from .equilibrium import equilibrium
 from .errors import ParameterError, SimulationError
-from .method import INTERRUPTED, LESS_THAN_NONE, NOT_FINITE, REASONS, Course, Method, Rodas4
-from .muscle import SeriesSpring
+from .loop import Loop
+from .method import LESS_THAN_NONE, Method
 from .plant import Plant
 from .program import System
+from .recorded import ended, problem, recorded
 from .recording import Recording
 from .start import less_than_none, number_of, refuse_impossible, state_vector
-
-if TYPE_CHECKING:
-    from .program.prepared import Prepared
-
-Array = npt.NDArray[np.float64]
-COARSEST = 0.01
-"""Output is at least this fine [s] unless asked otherwise."""
-MOST_ROWS = 10_000_000
-"""Rows of a recording that fit a usual memory."""
+from .terms import chosen_method, output_times, refuse_beyond_range, rest_of, run_length
 
 
 def simulate(
     plant: System,
-    command: Command,
+    command: Command | Loop,
     *,
     duration: float,
     start: Mapping[str, float] | None = None,
@@ -43,6 +34,8 @@ def simulate(
     """Run a plant under a command for `duration` [s], and return its states, outputs and inputs as a Recording.
 
     plant     any System: a Plant, or one's own
+    command   in time, a Schedule say; or a Loop, whose controller looks at the plant (see run_loop, which also says how
+              such a run is taken up again)
     start     state by name; by default a Plant's equilibrium at ambient pressure
     method    Rodas4(rtol=1e-6) unless given
     output    spacing [s] or instants [s] of the rows; by default 1/1000 of the run, 10 ms at the coarsest. The
@@ -52,16 +45,17 @@ def simulate(
 
     The result does not depend on `output`. Raises ParameterError for an input or state that the plant lacks.
     """
+    if isinstance(command, Loop):
+        return run_loop(
+            plant, command, duration=duration, start=start, start_time=start_time, method=method, output=output,
+            complete=complete,
+        ).recording  # fmt: skip
     refuse_no_command(command)
-    duration, start_time = number_of("simulate: duration", duration), number_of("simulate: start_time", start_time)
-    if not (np.isfinite(duration) and duration > 0):
-        raise ParameterError(f"simulate: duration is {duration!r} s; it must be positive and finite.")
-    if not start_time + duration > start_time:
-        raise ParameterError(f"simulate: start_time is {start_time!r} s; {duration!r} s after it no time has passed.")
+    duration, start_time = run_length(duration, start_time)
     from .program.prepared import prepared  # CasADi, which describing a plant does not need
 
     if start is None:
-        start = _rest(plant)
+        start = rest_of(plant)
     method = chosen_method(method)
     ready = prepared(plant)
     segments = command.segments(plant.inputs, start_time, duration)
@@ -72,15 +66,8 @@ def simulate(
     if isinstance(plant, Plant):
         refuse_impossible(plant, start)
     course = method.run(ready, segments, start_time, state, times)
-    results, inputs = _results(ready, course, segments, times, start_time)
-    course = _stopped_where_impossible(plant, course, results, times)
-    recording = _recorded(ready, course, results, inputs, times, method)
-    if course.status != 0:
-        problem = _problem(plant, course, start_time + duration)
-        recording = dataclasses.replace(recording, notes=(*recording.notes, problem))
-        if complete:
-            raise SimulationError(problem, recording, interrupted=course.status == INTERRUPTED)
-    return recording
+    recording, course = recorded(ready, course, segments, times, start_time, method)
+    return ended(plant, recording, course, start_time + duration, complete)
 
 
 def advance(
@@ -120,168 +107,5 @@ def advance(
     if course.status == 0 and less_than_none(plant, course.state).any():
         course = course._replace(status=LESS_THAN_NONE)
     if course.status != 0:
-        raise SimulationError(_problem(plant, course, start_time + dt))
+        raise SimulationError(problem(plant, course, start_time + dt))
     return {s.name: float(v) for s, v in zip(plant.states, course.state, strict=True)}
-
-
-def output_times(output: float | npt.ArrayLike | None, start: float, duration: float, instants: Array) -> Array:
-    """The instants [s] at which a run is recorded, in rising order, the command's instants among them."""
-    end = start + duration
-    if output is None:
-        output = min(duration / 1000, COARSEST)
-    if not np.ndim(output):
-        output = number_of("simulate: output", output)
-        if not 0 < output < np.inf:
-            raise ParameterError(f"simulate: an output spacing of {output!r} s is not positive and finite.")
-        if duration / output > MOST_ROWS:
-            raise ParameterError(
-                f"simulate: an output spacing of {output!r} s makes {duration / output:.3g} rows of a run of "
-                f"{duration:g} s; {MOST_ROWS} are allowed. The result does not depend on it: choose a wider one."
-            )
-        grid = start + output * np.arange(int(np.floor(duration / output * (1 + 1e-12))) + 1)
-    else:
-        grid = _instants(output)
-        if grid.size and not (grid[0] >= start and grid[-1] <= end):
-            raise ParameterError(f"simulate: output instants must lie within {start:g} to {end:g} s.")
-    behind = np.searchsorted(instants, grid)  # two neighbours of each: a table of all pairs would not fit the memory
-    before, after = instants[np.maximum(behind - 1, 0)], instants[np.minimum(behind, instants.size - 1)]
-    apart = np.minimum(np.abs(grid - before), np.abs(grid - after)) > 1e-9 * duration
-    return np.unique(np.concatenate([grid[apart], instants]))
-
-
-def _instants(given: Any) -> Array:
-    """Instants [s] in rising order, from a list of them."""
-    try:
-        found = np.array(given, dtype=float)
-    except (TypeError, ValueError):
-        found = np.empty((0, 0))
-    if found.ndim != 1:
-        raise ParameterError(f"simulate: output is {given!r}; give a spacing [s] or a list of instants [s].")
-    return np.sort(found)
-
-
-def chosen_method(method: Method | None) -> Method:
-    """The method that is given, or the default. Raises ParameterError for what is none, as a name is."""
-    if method is None:
-        return Rodas4()
-    if not isinstance(method, Method):
-        raise ParameterError(f"the method is {method!r}; give Rodas4(), RungeKutta4(step) or DormandPrince8(step).")
-    return method
-
-
-def refuse_beyond_range(plant: System, segments: Segments, start: float) -> None:
-    """Raise ParameterError where a Plant is commanded beyond what its inputs allow; other systems' are theirs."""
-    if not isinstance(plant, Plant):
-        return
-    lengths = np.diff(segments.ends, prepend=start)[:, None]
-    least, greatest = (np.array([getattr(i, end) for i in plant.commands]) for end in ("least", "greatest"))
-    slack = 1e-9 * (greatest - least)
-    for values in (segments.values, segments.values + segments.slopes * lengths):
-        beyond = (values < least - slack) | (values > greatest + slack)
-        if beyond.any():
-            row, column = np.argwhere(beyond)[0]
-            given = plant.commands[column]
-            unit = "" if given.unit == "1" else f" {given.unit}"
-            raise ParameterError(
-                f"the input '{given.name}' is {values[row, column]:g}{unit} before {segments.ends[row]:g} s; allowed "
-                f"are {given.least:g} to {given.greatest:g}{unit} ({given.meaning})."
-            )
-
-
-def _rest(plant: System) -> Mapping[str, float]:
-    if isinstance(plant, Plant):
-        return equilibrium(plant, pressure=0.0)
-    raise ParameterError(f"simulate: give the start of {type(plant).__name__}, a value for each state.")
-
-
-def _results(ready: Prepared, course: Course, segments: Segments, times: Array, start: float) -> tuple[Array, Array]:
-    """Outputs (N, K) and inputs (N, m) at the rows that were reached."""
-    from .engine.evaluate import evaluate
-    from .engine.once import announce_compilation
-
-    states = np.ascontiguousarray(course.rows[: course.reached])
-    inputs = np.ascontiguousarray(segments.inputs_at(times[: course.reached], start))
-    results = np.empty((course.reached, ready.sizes.outputs))
-    announce_compilation(evaluate)
-    evaluate(ready.address["outputs"], ready.held, states, inputs, results)
-    return results, inputs
-
-
-def _stopped_where_impossible(plant: System, course: Course, results: Array, times: Array) -> Course:
-    """The course up to the first row that cannot be: a fixed step can end in numbers, and yet far off."""
-    not_finite = np.asarray(~np.isfinite(results).all(axis=1))
-    bad = np.flatnonzero(not_finite | less_than_none(plant, course.rows[: course.reached]).any(axis=1))
-    if not bad.size:
-        return course
-    row = int(bad[0])
-    status = NOT_FINITE if not_finite[row] else LESS_THAN_NONE
-    return course._replace(reached=row, time=float(times[row]), state=course.rows[row], status=status)
-
-
-def _recorded(
-    ready: Prepared, course: Course, results: Array, inputs: Array, times: Array, method: Method
-) -> Recording:
-    plant, reached = ready.system, course.reached
-    states, results, inputs = course.rows[:reached], results[:reached], inputs[:reached]
-    columns: dict[str, Any] = {"time": times[:reached]}
-    columns |= {s.name: states[:, i] for i, s in enumerate(plant.states)}
-    columns |= {name: results[:, i] for i, name in enumerate(ready.output_names)}
-    columns |= {name: inputs[:, i] for i, name in enumerate(plant.inputs)}
-    notes: list[str] = [f"simulated by {method}: {course.steps} steps, {course.rejected} rejected"]
-    constants: dict[str, float | str] = {}
-    if isinstance(plant, Plant):
-        constants = {"ambient": plant.ambient.pressure}
-        if len(plant.muscles) == 1:
-            constants["resting_length"] = plant.muscles[0].geometry.resting_length
-        notes += [f"gas: {plant.gas}", friction_in_words(plant), *outside_box(plant, columns)]
-    return Recording(columns, "simulation", constants, tuple(notes))
-
-
-def friction_in_words(plant: Plant) -> str:
-    """What friction a plant's muscles have; the default is none, which a reader should know."""
-    if not any(m.friction.states for m in plant.muscles):
-        return "friction: off"
-    words = [f"{m.name} {m.friction if m.friction.states else 'none'}" for m in plant.muscles]
-    return f"friction: {', '.join(words) if len(words) > 1 else plant.muscles[0].friction}"
-
-
-def outside_box(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
-    """When and how far a run left the box in which a muscle's characteristic has data, or the reach of a geometry."""
-    found = []
-    for prefix, muscle in zip(plant.prefixes, plant.muscles, strict=True):
-        of_muscle = []
-        box = muscle.box or getattr(muscle.contractile, "box", None)
-        if box is not None:
-            left, doubt = f"{muscle.name} was outside the box of its characteristic", "nothing was measured there"
-            of_muscle += [("pressure", box.pressure, left, doubt), ("contraction", box.contraction, left, doubt)]
-        if not isinstance(muscle.series, SeriesSpring):  # a series spring stretches beyond what the muscle does
-            left, doubt = f"{muscle.name} was beyond the reach of its geometry", "no muscle can do this"
-            of_muscle.append(("contraction", muscle.geometry.contraction_reach, left, doubt))
-        for name, bounds, left, doubt in of_muscle:
-            found += _beyond(columns["time"], columns[f"{prefix}{name}"], name, bounds, left, doubt)
-    return found
-
-
-def _beyond(time: Array, values: Array, name: str, bounds: tuple[float, float], left: str, doubt: str) -> list[str]:
-    """A note where a column of pressure or contraction leaves its bounds."""
-    (low, high), (scale, unit) = bounds, (1e3, "kPa") if name == "pressure" else (0.01, "%")
-    beyond = np.maximum(low - values, values - high)
-    if not (beyond > 1e-9 * (high - low)).any():
-        return []
-    worst, share = int(np.argmax(beyond)), float(np.mean(beyond > 0))
-    return [
-        f"{left} in {name} ({low / scale:.4g} to {high / scale:.4g} {unit}) in {share:.0%} of the rows, by at most "
-        f"{beyond[worst] / scale:.4g} {unit} at {time[worst]:.4g} s; {doubt}"
-    ]
-
-
-def _problem(plant: System, course: Course, end: float) -> str:
-    state = ", ".join(f"{s.name} {v:.6g} {s.unit}" for s, v in zip(plant.states, course.state, strict=True))
-    remedy = {
-        4: "Raise the tolerance, lengthen a fixed step, or look for a valve that chatters.",
-        5: "Nothing is lost; what was computed is in the recording.",
-    }.get(course.status, "Look at the last state: a parameter may be far from physical, or a fixed step too long.")
-    return (
-        f"the run ended at {course.time:.6g} of {end:.6g} s because {REASONS[course.status]}, after {course.steps} "
-        f"steps, at {state}. {remedy}"
-    )

@@ -13,8 +13,8 @@ from ..errors import ColumnError, suggestion
 from ..method import REASONS
 from ..plant import Plant
 from ..program import System
+from ..recorded import friction_in_words, outside_box
 from ..recording import Recording
-from ..simulate import friction_in_words, outside_box
 from .variations import Variations
 
 Array = npt.NDArray[np.float64]

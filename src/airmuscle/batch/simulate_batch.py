@@ -10,10 +10,11 @@ import numpy.typing as npt
 
 from ..command import Command, Segments
 from ..errors import ParameterError, suggestion
+from ..loop import Loop
 from ..method import INTERRUPTED, Explicit, Method
 from ..program import System
-from ..simulate import chosen_method, output_times, refuse_beyond_range
 from ..start import number_of
+from ..terms import chosen_method, output_times, refuse_beyond_range
 from .precision import Double, Precision
 from .result import NOT_STARTED, Batch
 from .side_by_side import blocks, refuse_single
@@ -59,6 +60,7 @@ def simulate_batch(
     Raises ParameterError where a path, value, start, command or column cannot be; the row is named. An interrupted
     batch (Ctrl-C) is returned with what was done, the rest having the status of a run that was interrupted.
     """
+    _refuse_loop(command)
     duration = number_of("simulate_batch: duration", duration)
     start_time = number_of("simulate_batch: start_time", start_time)
     _refuse_nonsense(duration, start_time, cores)
@@ -82,6 +84,14 @@ def simulate_batch(
     except BaseException:
         store.abandoned()
         raise
+
+
+def _refuse_loop(command: object) -> None:
+    if any(isinstance(one, Loop) for one in (command if isinstance(command, Sequence) else [command])):
+        raise ParameterError(
+            "simulate_batch: a Loop is no command known beforehand: its controller looks at each plant as it goes. Use "
+            "run_loop for each plant, or a study, `airmuscle sweep`, of a scenario with a controller."
+        )
 
 
 def _refuse_nonsense(duration: float, start_time: float, cores: int | None) -> None:

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..command import Command, Periodic, Schedule, Signal, refuse_unknown_input
+from ..command import NO_INPUT, Command, Periodic, Schedule, Signal, refuse_unknown_input
 from ..driver import Driven, Driver, OnOff
 from ..errors import ColumnError, ParameterError
 from ..variables import Input
@@ -28,13 +28,18 @@ KEYS = ("model", "period", "file", "columns", "drivers")
 Points = tuple[tuple[float, float], ...]
 
 
-def command_from(table: Mapping[str, Any], commands: Sequence[Input], place: Place) -> Command:
-    """The command that the table describes. Raises ParameterError, UnitError, UnknownName, FileError or ColumnError."""
+def command_from(table: Mapping[str, Any], commands: Sequence[Input], place: Place, lacks: str = NO_INPUT) -> Command:
+    """The command that the table describes. Raises ParameterError, UnitError, UnknownName, FileError or ColumnError;
+    `lacks` begins the message about a name that is not among the commands."""
+    if "controller" in table:
+        raise ParameterError(
+            f"{place}: a controller stands in a scenario only; give what was commanded, as rows or a file."
+        )
     units = {given.name: given.unit for given in commands}
     inputs = tuple(units)
     rows = {key: value for key, value in table.items() if key not in KEYS}
     with said_at(place):
-        refuse_unknown_input(list(rows), inputs)
+        refuse_unknown_input(list(rows), inputs, lacks)
     points = _recorded(table, units, place)
     for key, given in rows.items():
         if key in points:
@@ -46,7 +51,7 @@ def command_from(table: Mapping[str, Any], commands: Sequence[Input], place: Pla
         length = finite(table["period"], "s", f"{place}, period")
         with said_at(place):
             command = Periodic(command, length)
-    drivers = _drivers(table.get("drivers", {}), inputs, place.inside("drivers"))
+    drivers = drivers_from(table.get("drivers", {}), inputs, place.inside("drivers"))
     return Driven(command, drivers) if drivers else command
 
 
@@ -99,7 +104,8 @@ def _recorded(table: Mapping[str, Any], units: Mapping[str, str], place: Place) 
         return {name: tuple(points) for name, points in signal.points.items()}
 
 
-def _drivers(table: Any, inputs: Sequence[str], place: Place) -> dict[str, Driver | tuple[Driver, ...]]:
+def drivers_from(table: Any, inputs: Sequence[str], place: Place) -> dict[str, Driver | tuple[Driver, ...]]:
+    """The drivers of the inputs that the table [command.drivers] names."""
     if not isinstance(table, Mapping):
         raise ParameterError(f'{place} is {table!r}; write [{place.table}] and fill = {{ model = "OnOff" }} under it.')
     with said_at(place):

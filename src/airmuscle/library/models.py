@@ -95,7 +95,10 @@ _MODULES: dict[str, str] = {
     "SpringLoad": "mechanism",
     "Stopped": "mechanism",
     "StoppedJoint": "mechanism",
-    # commands and methods
+    # commands, controllers and methods
+    "PID": "control.pid",
+    "Split": "control.split",
+    "TwoPoint": "control.two_point",
     "Schedule": "command",
     "Signal": "command",
     "OnOff": "driver",

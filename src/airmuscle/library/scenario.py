@@ -6,7 +6,7 @@
     gas = "Isothermal"                          optional; polytropic otherwise
     [plant.circuit]                             model = "FillDischarge" with supply, fill and discharge
     [plant.mechanism]                           model = "HangingMass", mass = "5 kg"
-    [command]                                   see command_table.py
+    [command]                                   see command_table.py; with a controller, loop_table.py
     fill = [["5 s", 1], ["15 s", 0]]            every input of the plant: instants, and the value from then on
     [run]
     duration = "25 s"
@@ -22,24 +22,28 @@ Components are tables with `model` and their parameters; later components need n
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import NoneType
 from typing import Any
 
 from ..characteristic.base import ForceLaw
 from ..command import Command
+from ..driver import Driven
 from ..equilibrium import equilibrium
 from ..errors import ParameterError, suggestion
+from ..loop import Loop
 from ..method import Method, Rodas4
 from ..muscle import Muscle
 from ..plant import Plant
 from ..recording import Recording
-from ..simulate import refuse_beyond_range, simulate
+from ..simulate import simulate
+from ..terms import refuse_beyond_range
 from .build import build
 from .catalogue import load, parsed
 from .command_table import command_from
 from .entry import Entry
+from .loop_table import loop_from, units_around
 from .place import Place, checked, finite, refuse_unknown, said_at, text
 
 TABLES = ("title", "plant", "command", "run", "output")
@@ -53,7 +57,7 @@ class Scenario:
 
     title: str
     plant: Plant
-    command: Command
+    command: Command | Loop
     duration: float
     start: dict[str, float]
     start_time: float = 0.0
@@ -99,10 +103,12 @@ def scenario_from(tables: Mapping[str, Any], place: Place, plant: Plant | None =
         raise ParameterError(f"{at}: 'duration' is missing; write it like duration = \"25 s\".")
     duration, start_time = _length(run, "duration", at), finite(run.get("start_time", 0.0), "s", f"{at}, start_time")
     table = _table(tables.get("command", {}), "command", place)
-    command = command_from(table, plant.commands, place.inside("command"))
-    with said_at(place.inside("command")):
-        refuse_beyond_range(plant, command.segments(plant.inputs, start_time, duration), start_time)
     start = _start(run.get("start", {"pressure": 0.0}), plant, at.inside("start"))
+    command = _command(table, plant, start, duration, place.inside("command"))
+    shown = Driven(command.beside, command.drivers) if isinstance(command, Loop) else command
+    with said_at(place.inside("command")):
+        refuse_beyond_range(plant, shown.segments(plant.inputs, start_time, duration), start_time)
+    known = list(units_of_run(plant, start, command))
     return Scenario(
         title=text(tables, "title", place, needed=False) or Path(place.file).stem,
         plant=plant,
@@ -112,7 +118,7 @@ def scenario_from(tables: Mapping[str, Any], place: Place, plant: Plant | None =
         start_time=start_time,
         output=_length(run, "output", at) if "output" in run else None,
         method=_object(run["method"], Method, at.inside("method")) if "method" in run else Rodas4(),
-        columns=_columns(_table(tables.get("output", {}), "output", place), plant, start, place.inside("output")),
+        columns=_columns(_table(tables.get("output", {}), "output", place), known, place.inside("output")),
     )
 
 
@@ -121,6 +127,23 @@ def _table(given: Any, key: str, place: Place) -> Mapping[str, Any]:
         what = "is missing" if given is None else f"is {given!r}, no table; write [{key}] and its keys under it"
         raise ParameterError(f"{place}: the table [{key}] {what}.")
     return given
+
+
+def _command(
+    table: Mapping[str, Any], plant: Plant, start: Mapping[str, float], duration: float, place: Place
+) -> Command | Loop:
+    if "controller" not in table:
+        return command_from(table, plant.commands, place)
+    loop = loop_from(table, plant, units_around(plant, start), place)
+    with said_at(place.inside("controller")):
+        loop.refuse_longer(duration)
+    return loop
+
+
+def units_of_run(plant: Plant, start: Mapping[str, float], command: Command | Loop) -> dict[str, str]:
+    """The units of all columns that a run has; '' where none is known."""
+    units = {"time": "s"} | units_around(plant, start)
+    return units | (command.units(units) if isinstance(command, Loop) else {})
 
 
 def _length(table: Mapping[str, Any], key: str, place: Place) -> float:
@@ -191,12 +214,11 @@ def _start(given: Any, plant: Plant, place: Place) -> dict[str, float]:
         return plant.state_at(pressure=pressure, **values) if values else equilibrium(plant, pressure=pressure)
 
 
-def _columns(table: Mapping[str, Any], plant: Plant, start: Mapping[str, float], place: Place) -> tuple[str, ...]:
+def _columns(table: Mapping[str, Any], known: Sequence[str], place: Place) -> tuple[str, ...]:
     refuse_unknown(table, OUTPUT, place)
     given = table.get("columns", [])
     if not isinstance(given, list) or not all(isinstance(name, str) for name in given):
         raise ParameterError(f'{place}, columns is {given!r}; write columns = ["pressure", "force"].')
-    known = ["time", *start, *plant.outputs(start, dict.fromkeys(plant.inputs, 0.0)), *plant.inputs]
     for name in given:
         if name not in known:
             raise ParameterError(

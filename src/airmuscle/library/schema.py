@@ -16,13 +16,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..circuit.orifice import Orifice
+from ..controller import RELATIVE, Controller
 from ..declare import Parameter, parameters
 from ..driver import Driver
 from ..method import Method
 from ..muscle import Muscle
 from ..plant import Plant
 from ..reference import Reference
-from . import command_table, read, scenario
+from . import command_table, loop_table, read, scenario
 from .models import model_class, model_names
 from .valve_catalogue import PATHS
 
@@ -138,7 +139,7 @@ class _Models:
         """One parameter, with its meaning, unit and bounds, or one part of a model."""
         if declared is None:
             return self.part(hint)
-        number = _quantity(declared.unit, *declared.bounds)
+        number = _quantity("" if declared.unit in RELATIVE else declared.unit, *declared.bounds)
         if typing.get_origin(hint) is tuple:
             column = _table({"file": _TEXT, "column": _TEXT}, ("file", "column"))
             number = {"anyOf": [{"type": "array", "items": number}, column]}
@@ -189,7 +190,23 @@ def _command(known: _Models) -> Schema:
         "columns": {"type": "object", "additionalProperties": _TEXT},
         "drivers": {"type": "object", "additionalProperties": chain},
     }
-    return {"type": "object", "properties": _only(keys, command_table.KEYS), "additionalProperties": rows}
+    known_keys = _only(keys, command_table.KEYS)
+    plain_keys = {key: value for key, value in known_keys.items() if key != "drivers"}
+    plain = {"type": "object", "properties": plain_keys, "additionalProperties": rows}
+    return {**plain, "properties": {**known_keys, "controller": _controller(known, plain)}}
+
+
+def _controller(known: _Models, setpoint: Schema) -> Schema:
+    """A controller with its parameters, and beside them how often it looks and what it is to follow."""
+    keys = {"period": _quantity("s", low=0.0), "setpoint": setpoint}
+    tables = []
+    for name in model_names():
+        cls = model_class(name, "schema")
+        if issubclass(cls, Controller):
+            table = known.table(cls)
+            table["properties"] |= _only(keys, loop_table.KEYS)
+            tables.append({**table, "required": [*table["required"], *loop_table.KEYS]})
+    return {"anyOf": tables}
 
 
 def _run(known: _Models) -> Schema:

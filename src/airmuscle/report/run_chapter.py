@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
-import numpy as np
-
-from ..command import Command, Periodic, Schedule, Segments, Signal
+from ..command import Command, Periodic, Schedule, Signal
 from ..driver import Driven
 from ..figures import BLACK, BLUE, legend_below, new_figure
 from ..library.scenario import Scenario
+from ..loop import MEASURED, SETPOINT, TOLD, Loop
 from ..recording import Recording
 from ..reference import cite
 from .chapter import Chapter, Plot
+from .loop_chapter import controller_table, corners, loop_plot
 from .parameters import parameter_table
 
 SHOWN = ("pressure", "contraction", "force", "friction", "position", "angle", "speed", "angular_speed")
 """Columns that the figure draws, in this order; the file holds all."""
 MOST_PIECES = 300
 """Pieces of a command that a figure tells apart; of a longer one it shows the beginning."""
+MOST_HELD = 50_000
+"""Pieces that a figure draws where no driver makes pulses, which it need not tell apart."""
 MOST_CHANGES = 6
 """Changes of an input that are spelt out."""
 
@@ -27,7 +28,9 @@ MOST_CHANGES = 6
 def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
     """The chapter of a run, whole or as far as it came."""
     notes = "\n\n".join(_sentence(note) for note in recording.notes)
-    plots = [Plot("run", f"{scenario.title}, simulated.", recording.plot(*_shown(recording)))]
+    loop = scenario.command if isinstance(scenario.command, Loop) else None
+    plots = [loop_plot(scenario, loop, recording)] if loop else []
+    plots.append(Plot("run", f"{scenario.title}, simulated.", recording.plot(*_shown(recording))))
     if scenario.plant.inputs:
         plots.append(_inputs(scenario, recording))
     return Chapter(
@@ -35,8 +38,11 @@ def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
         title=scenario.title,
         summary=f"{_length(scenario, recording)} The recording is recording.csv.\n\n{notes}",
         plots=tuple(plots),
-        tables=(parameter_table(scenario.plant, "parameters", "Parameters of the plant"),),
-        references=tuple(cite(scenario.plant)),
+        tables=(
+            parameter_table(scenario.plant, "parameters", "Parameters of the plant"),
+            *((controller_table(scenario, loop),) if loop else ()),
+        ),
+        references=tuple(cite((scenario.plant, loop))),
         chosen=_settings(scenario),
     )
 
@@ -53,17 +59,20 @@ def _length(scenario: Scenario, recording: Recording) -> str:
 
 
 def _shown(recording: Recording) -> list[str]:
-    return [name for kind in SHOWN for name in recording if name.rpartition(".")[2] == kind]
+    own = [name for name in recording if not name.startswith((SETPOINT, MEASURED, TOLD))]
+    return [name for kind in SHOWN for name in own if name.rpartition(".")[2] == kind]
 
 
 def _inputs(scenario: Scenario, recording: Recording) -> Plot:
     """Every input as the plant had it, with its jumps, and behind it what a driver was told."""
     command, inputs = scenario.command, scenario.plant.inputs
+    if isinstance(command, Loop):
+        command = command.replayed(recording)
     units = {given.name: "" if given.unit == "1" else f"\n[{given.unit}]" for given in scenario.plant.commands}
     start, reached = scenario.start_time, float(recording["time"][-1])
     end = reached if reached > start else start + scenario.duration
     had = command.segments(inputs, start, end - start)
-    shortened = had.ends.size > MOST_PIECES
+    shortened = had.ends.size > (MOST_PIECES if isinstance(command, Driven) else MOST_HELD)
     if shortened:
         had = command.segments(inputs, start, float(had.ends[MOST_PIECES - 1]) - start)
     told = command.inner.segments(inputs, start, float(had.ends[-1]) - start) if isinstance(command, Driven) else None
@@ -72,8 +81,8 @@ def _inputs(scenario: Scenario, recording: Recording) -> Plot:
     )  # one height for all of one unit: openings are compared
     for i, (name, axis) in enumerate(zip(inputs, axes[:, 0], strict=True)):
         if told is not None:
-            axis.plot(*_corners(told, start, i), color=BLACK, linestyle="--", linewidth=0.9, label="command")
-        axis.plot(*_corners(had, start, i), color=BLUE, label="what the plant had")
+            axis.plot(*corners(told, start, i), color=BLACK, linestyle="--", linewidth=0.9, label="command")
+        axis.plot(*corners(had, start, i), color=BLUE, label="what the plant had")
         axis.set_ylabel(f"{name}{units[name]}")
     axes[-1, 0].set_xlabel("time [s]")
     figure.align_ylabels()
@@ -82,14 +91,6 @@ def _inputs(scenario: Scenario, recording: Recording) -> Plot:
     part = f"; the first {MOST_PIECES} pieces" if shortened else ""
     behind = "; dashed, what the drivers were told" if told is not None else ""
     return Plot("inputs", f"Inputs of the plant{part}{behind}.", figure)
-
-
-def _corners(segments: Segments, start: float, i: int) -> tuple[Any, Any]:
-    """Times and values at both ends of every piece, so that a jump is drawn upright."""
-    starts = segments.starts(start)
-    first = segments.values[:, i]
-    last = first + segments.slopes[:, i] * (segments.ends - starts)
-    return np.column_stack([starts, segments.ends]).ravel(), np.column_stack([first, last]).ravel()
 
 
 def _settings(scenario: Scenario) -> tuple[tuple[str, str, str], ...]:
@@ -101,8 +102,13 @@ def _settings(scenario: Scenario) -> tuple[tuple[str, str, str], ...]:
     )
 
 
-def in_words(command: Command) -> str:
+def in_words(command: Command | Loop) -> str:
     """A command in a sentence, however long its tables are."""
+    if isinstance(command, Loop):
+        controller = command.controller
+        looks = f"every {command.period:g} s {type(controller).__name__} commands {', '.join(controller.inputs)}"
+        others = Driven(command.beside, command.drivers) if command.drivers else command.beside
+        return f"{looks}; set point: {in_words(command.setpoint)}; beside: {in_words(others)}"
     if isinstance(command, Driven):
         chains = (f"{name} by {', '.join(map(str, chain))}" for name, chain in command.chains.items())
         return f"{in_words(command.inner)}; driven: {'; '.join(chains)}"

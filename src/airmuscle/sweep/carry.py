@@ -10,7 +10,8 @@ import numpy.typing as npt
 from ..errors import AirmuscleError, SimulationError
 from ..library.scenario import Scenario
 from ..recording import Recording
-from ..simulate import output_times, simulate
+from ..simulate import simulate
+from ..terms import output_times
 
 Array = npt.NDArray[np.float64]
 REFUSALS = (AirmuscleError, ArithmeticError, ValueError)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
-NOT_COMPUTING = ("cli", "report", "reproduce", "studio", "export", "identify", "control")
+NOT_COMPUTING = ("cli", "report", "reproduce", "studio", "export", "identify")
 """Parts of the program on which no run depends."""
 PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "casadi")
 

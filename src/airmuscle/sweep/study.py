@@ -30,9 +30,7 @@ import numpy.typing as npt
 from ..errors import ParameterError, suggestion
 from ..library.catalogue import parsed
 from ..library.place import Place, refuse_unknown, said_at, text
-from ..library.scenario import Scenario, load_scenario, scenario_from
-from ..plant import Plant
-from ..recording.columns import quantity_of
+from ..library.scenario import Scenario, load_scenario, scenario_from, units_of_run
 from .choice import chosen, whole
 from .design import DESIGNS, Design
 from .fingerprint import fingerprint
@@ -107,11 +105,7 @@ class Study:
 
 def columns_of(scenario: Scenario) -> dict[str, str]:
     """The units of all columns that a run has."""
-    plant: Plant = scenario.plant
-    zeros = dict.fromkeys(plant.inputs, 0.0)
-    units = {"time": "s"} | dict.fromkeys(plant.outputs(scenario.start, zeros), "")
-    units |= {name: known.unit for name in units if (known := quantity_of(name))}
-    return units | {s.name: s.unit for s in plant.states} | {i.name: i.unit for i in plant.commands}
+    return units_of_run(scenario.plant, scenario.start, scenario.command)
 
 
 def load_study(path: str | Path) -> Study:

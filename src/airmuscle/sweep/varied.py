@@ -16,9 +16,11 @@ from typing import Any
 
 from ..declare import flatten, leaves, parameters, with_parameters
 from ..errors import ParameterError, suggestion
+from ..library.loop_table import numbers_of
 from ..library.models import model_class
 from ..library.place import Place
-from ..library.scenario import Scenario, scenario_from
+from ..library.scenario import Scenario, scenario_from, units_of_run
+from ..loop import Loop
 from ..plant import Plant
 
 Keys = tuple[str | int, ...]
@@ -44,9 +46,9 @@ class Source:
 
     def numbers(self) -> dict[str, Number]:
         """Everything that can vary, by path."""
-        plant = self.scenario.plant
+        plant, told = self.scenario.plant, self.tables.get("command", {})
         found = [Number(leaf.path, leaf.declared.unit, leaf.declared.bounds, i) for i, leaf in enumerate(leaves(plant))]
-        for keys, unit in (*_of_command(self.tables.get("command", {}), plant), *_of_run(self.tables["run"], plant)):
+        for keys, unit in (*_of_command(told, self.scenario), *_of_run(self.tables["run"], plant)):
             found.append(Number(_spelt(keys), unit, (-math.inf, math.inf), keys))
         return {number.path: number for number in found}
 
@@ -72,10 +74,12 @@ class Source:
         return scenario_from(tables, place, with_parameters(scenario.plant, leaf_values))
 
 
-def _of_command(table: Mapping[str, Any], plant: Plant) -> Iterator[tuple[Keys, str]]:
-    units = {given.name: given.unit for given in plant.commands}
+def _of_command(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:
+    units = units_of_run(scenario.plant, scenario.start, scenario.command)
     for name, given in table.items():
-        if name == "period":
+        if isinstance(scenario.command, Loop) and name == "controller":
+            yield from ((("command", name, *keys), unit) for keys, unit in numbers_of(given, scenario.command, units))
+        elif name == "period":
             yield ("command", name), "s"
         elif isinstance(given, list):
             for i, _ in enumerate(given):

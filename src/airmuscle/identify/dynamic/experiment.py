@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ... import declare
-from ...command import Command
+from ...command import Command, refuse_no_command
 from ...errors import ParameterError, suggestion
 from ...program import System
 from ...recording import Recording
@@ -29,6 +29,9 @@ class Experiment:
     start: Start
     start_time: float = 0.0
     plant: System | None = None
+
+    def __post_init__(self) -> None:
+        refuse_no_command(self.command)
 
 
 @dataclasses.dataclass(frozen=True)

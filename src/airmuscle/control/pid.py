@@ -1,0 +1,105 @@
+"""PID in the standard form, with filtered derivative, weighted set point, anti-windup and a start without a jump."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, NamedTuple
+
+from ..controller import Controller, Measurement
+from ..declare import model, parameter
+from ..reference import Reference
+from .split import Commanded, commands, inputs_of, range_of
+
+ASTROM_HAGGLUND1995 = Reference(
+    key="astrom-hagglund-1995",
+    authors="Åström, K. J., Hägglund, T.",
+    title="PID Controllers: Theory, Design, and Tuning",
+    where="2nd edition, Instrument Society of America, Research Triangle Park, chapter 3",
+    year=1995,
+    note="standard form, filter of the derivative, weights of the set point, back-calculation, differences in time",
+)
+
+
+class PIDMemory(NamedTuple):
+    """A PID controller between two samples: whether it has begun, its integral and derivative parts [u], and the
+    weighted error of the derivative at the last sample [y]."""
+
+    begun: bool
+    integral: float
+    derivative: float
+    weighted: float
+
+
+@model
+class PID(Controller):
+    """u = K (b r - y) + I + D,   I' = K/T_i (r - y),   (T_d/N) D' + D = K T_d (c r - y)',   standard (ISA) form.
+
+    r set point and y measurement, in the unit of the measured column; u command, in that of the commanded input. At
+    the samples t_k, h apart, I goes by forward and D by backward differences, e = r - y:
+
+        D_k     = T_d/(T_d + N h) D_(k-1) + K T_d N/(T_d + N h) ((c r - y)_k - (c r - y)_(k-1))
+        v_k     = K (b r_k - y_k) + I_k + D_k,      u_k = v_k cut off at the range of the input
+        I_(k+1) = I_k + K h/T_i e_k + min(h/T_t, 1) (u_k - v_k)
+
+    The last term is anti-windup by back-calculation: while u is cut off, I follows with the time constant T_t. Where
+    T_t is 0 it is sqrt(T_i T_d), or T_i without derivative action. The start is bumpless: I_0 is such that the first
+    command is u_0, and D_0 = 0. Without integral action (T_i = 0) u_0 is a constant bias. A gain below zero is for
+    an input that lowers what is measured.
+    Reference: Åström and Hägglund (1995), chapter 3.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (ASTROM_HAGGLUND1995,)
+
+    measured: str
+    commanded: Commanded
+    gain: float = parameter("u/y", "K", "proportional gain")
+    integral_time: float = parameter("s", "T_i", "integral time; 0: no integral", bounds=(0.0, 1e6), default=0.0)
+    derivative_time: float = parameter("s", "T_d", "derivative time; 0: no derivative", bounds=(0.0, 1e6), default=0.0)
+    derivative_limit: float = parameter(
+        "1", "N", "greatest gain of the derivative, in K", bounds=(1.0, 1e3), default=10.0
+    )
+    setpoint_weight: float = parameter(
+        "1", "b", "of the set point in the proportional part", bounds=(0.0, 1.0), default=1.0
+    )
+    derivative_weight: float = parameter("1", "c", "of the set point in the derivative", bounds=(0.0, 1.0), default=0.0)
+    tracking_time: float = parameter("s", "T_t", "of the anti-windup; 0: by the rule", bounds=(0.0, 1e6), default=0.0)
+    first: float = parameter("u", "u_0", "first command; without integral action the bias", default=0.0)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        return (self.measured,)
+
+    @property
+    def setpoints(self) -> tuple[str, ...]:
+        return (self.measured,)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return inputs_of(self.commanded)
+
+    def init(self) -> PIDMemory:
+        return PIDMemory(begun=False, integral=0.0, derivative=0.0, weighted=0.0)
+
+    def step(self, memory: PIDMemory, measurement: Measurement, dt: float) -> tuple[dict[str, float], PIDMemory]:
+        setpoint, measured = measurement.setpoints[self.measured], measurement.columns[self.measured]
+        proportional = self.gain * (self.setpoint_weight * setpoint - measured)
+        weighted = self.derivative_weight * setpoint - measured
+        if memory.begun:
+            integral = memory.integral
+            held = self.derivative_time + self.derivative_limit * dt
+            pushed = self.gain * self.derivative_limit * (weighted - memory.weighted)
+            derivative = self.derivative_time / held * (memory.derivative + pushed)
+        else:
+            integral = self.first - proportional if self.integral_time > 0 else self.first
+            derivative = 0.0
+        wanted = proportional + integral + derivative
+        least, greatest = range_of(self.commanded, measurement.ranges)
+        given = min(max(wanted, least), greatest)
+        if self.integral_time > 0:
+            integral += self.gain * dt / self.integral_time * (setpoint - measured)
+            integral += min(dt / self._tracking(), 1.0) * (given - wanted)
+        return commands(self.commanded, given), PIDMemory(True, integral, derivative, weighted)
+
+    def _tracking(self) -> float:
+        """The time constant [s] of the anti-windup."""
+        return self.tracking_time or math.sqrt(self.integral_time * self.derivative_time) or self.integral_time

@@ -1,0 +1,61 @@
+"""What a report shows of a loop: set points beside measurements, and the controller's numbers with their units."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from ..command import Segments
+from ..controller import relative_unit
+from ..figures import BLACK, BLUE, legend_below, new_figure
+from ..library.scenario import Scenario, units_of_run
+from ..loop import Loop
+from ..recording import Recording
+from ..recording.plot import scale
+from .chapter import Plot, Table
+from .parameters import parameter_table
+
+
+def loop_plot(scenario: Scenario, loop: Loop, recording: Recording) -> Plot:
+    """Every set point as it was given, with its jumps, and the column that is to follow it."""
+    names = list(dict.fromkeys((*loop.controller.setpoints, *loop.controller.columns)))
+    units = units_of_run(scenario.plant, scenario.start, loop)
+    start, time = scenario.start_time, recording["time"]
+    end = float(time[-1]) if time[-1] > start else start + scenario.duration
+    given = loop.setpoint.segments(loop.controller.setpoints, start, end - start)
+    figure, axes = new_figure(len(names), 1, height=0.9 + 1.9 * len(names), sharex=True, squeeze=False)
+    for name, axis in zip(names, axes[:, 0], strict=True):
+        factor, shown = scale(name)
+        unit = shown or units.get(name, "")
+        if name in recording:
+            axis.plot(time, recording[name] * factor, color=BLUE, label="measured")
+        if name in loop.controller.setpoints:
+            across, along = corners(given, start, loop.controller.setpoints.index(name))
+            axis.plot(across, along * factor, color=BLACK, linestyle="--", linewidth=0.9, label="set point")
+        axis.set_ylabel(f"{name}\n[{unit}]" if unit else name)
+    axes[-1, 0].set_xlabel("time [s]")
+    figure.align_ylabels()
+    legend_below(figure, axes[0, 0])
+    return Plot("loop", f"Set point and measurement; the controller looks every {loop.period:g} s.", figure)
+
+
+def corners(segments: Segments, start: float, i: int) -> tuple[Any, Any]:
+    """Times and values at both ends of every piece, so that a jump is drawn upright."""
+    starts = segments.starts(start)
+    first = segments.values[:, i]
+    last = first + segments.slopes[:, i] * (segments.ends - starts)
+    return np.column_stack([starts, segments.ends]).ravel(), np.column_stack([first, last]).ravel()
+
+
+def controller_table(scenario: Scenario, loop: Loop) -> Table:
+    """The numbers of a controller, in the units that follow from what it measures and commands."""
+    units = units_of_run(scenario.plant, scenario.start, loop)
+    y, u = (units.get(names[0]) or "1" for names in (loop.controller.columns, loop.controller.inputs))
+    table = parameter_table(
+        loop.controller, "controller", f"Parameters of the controller, {type(loop.controller).__name__}"
+    )
+    resolved = [relative_unit(str(unit), y, u) for unit in table.columns["unit"]]
+    shown: list[Any] = ["" if unit == "1" else unit for unit in resolved]
+    return dataclasses.replace(table, columns={**table.columns, "unit": shown})

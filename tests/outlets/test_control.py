@@ -1,0 +1,380 @@
+"""A controller in a file is the loop that it describes: its numbers in any unit that fits where it stands, its set point
+from rows or a data file. What does not fit is refused with file, table, key, value, and what is allowed.
+
+The code of docs/control.md runs, its table is read, schema, report and studies know it.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from airmuscle.cli.app import app
+from airmuscle.command import REST, Periodic, Schedule, Signal
+from airmuscle.control import PID, Split, TwoPoint
+from airmuscle.driver import PWM, Driven, OnOff
+from airmuscle.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownName
+from airmuscle.library.scenario import load_scenario
+from airmuscle.library.schema import scenario_schema
+from airmuscle.loop import Loop
+from airmuscle.report.run_chapter import in_words, run_chapter
+from airmuscle.sweep.study import load_study
+
+ROOT = Path(__file__).parents[2]
+EXAMPLE = ROOT / "examples" / "pressure_loop.toml"
+PAGE = (ROOT / "docs" / "control.md").read_text(encoding="utf-8")
+(TABLE,) = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
+
+VALVE = '{ model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }'
+PLANT = f"""
+[plant]
+muscle = {{ library = "dmsp-20-300", damper = {{ model = "LinearDamper", damping = 300 }} }}
+[plant.circuit]
+model = "FillDischarge"
+supply = {{ model = "Supply", pressure = "5 bar" }}
+fill = {VALVE}
+discharge = {VALVE}
+[plant.mechanism]
+model = "HangingMass"
+mass = "5 kg"
+[run]
+duration = "300 ms"
+start = {{ pressure = "1 bar" }}
+"""
+SETPOINT = 'pressure = [["0 s", "1 bar"], ["100 ms", "2 bar"]]'
+GOOD = f"""{PLANT}
+[command]
+[command.controller]
+model = "PID"
+measured = "pressure"
+commanded = "fill"
+gain = "1.5 1/bar"
+integral_time = "300 ms"
+period = "5 ms"
+[command.controller.setpoint]
+{SETPOINT}
+"""
+
+
+def written(folder: Path, *changes: tuple[str, str], text: str = GOOD) -> Path:
+    for was, becomes in changes:
+        assert was in text, was
+        text = text.replace(was, becomes, 1)
+    path = folder / "scenario.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+# What is right
+
+
+def test_the_code_of_the_page_runs():
+    found: dict[str, object] = {}
+    for block in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL):
+        exec(compile(block, "control.md", "exec"), found)
+    for run in (found["run"], found["other"]):
+        assert run["pressure"][-1] == pytest.approx(3e5, rel=0.05)
+
+
+def test_the_table_of_the_page_is_a_loop(tmp_path: Path):
+    held = PLANT.replace(
+        'model = "HangingMass"\nmass = "5 kg"', 'model = "Held"\ninner = { model = "HangingMass", mass = 5 }'
+    )
+    scenario = load_scenario(written(tmp_path, text=f"{held}{TABLE}"))
+    pid = PID("position", Split("fill", "discharge"), 40.0, 1.0, 0.05)
+    wanted, beside = Schedule({"position": ((0.0, 0.0), (0.2, 0.02))}), Schedule({"held": ((0.0, 1.0), (0.1, 0.0))})
+    assert scenario.command == Loop(pid, 5e-3, wanted, beside, {"fill": PWM(200.0), "discharge": PWM(200.0)})
+    run = scenario.simulate()
+    assert np.ptp(run["position"][run["time"] <= 0.1]) < 1e-12
+    assert run["position"][-1] > run["position"][0] + 1e-3
+
+
+@pytest.mark.parametrize(
+    ("gain", "value"), [('"1.5 1/bar"', 1.5e-5), ('"15 1/MPa"', 1.5e-5), ('"0.2 %/kPa"', 2e-6), ("1.5e-5", 1.5e-5)]
+)
+def test_a_gain_has_any_unit_that_fits(tmp_path: Path, gain: str, value: float):
+    scenario = load_scenario(written(tmp_path, ('"1.5 1/bar"', gain)))
+    assert scenario.command.controller.gain == pytest.approx(value, rel=1e-12)
+
+
+def regulated(commanded: str = '"setpoint"', gain: str = '"0.5 bar/bar"') -> str:
+    regulator = 'model = "ProportionalRegulator"\nlag = { model = "Follower", frequency = 20 }'
+    text = GOOD.replace('model = "FillDischarge"', regulator).replace('"fill"', commanded)
+    return text.replace('"1.5 1/bar"', gain)
+
+
+def test_units_follow_from_column_and_input(tmp_path: Path):
+    text = regulated().replace("[command.controller.setpoint]", 'first = "1.2 bar"\n[command.controller.setpoint]')
+    controller = load_scenario(written(tmp_path, text=text)).command.controller
+    assert (controller.gain, controller.first) == (0.5, 1.2e5)
+    height = ('measured = "pressure"', 'measured = "position"'), (SETPOINT, 'position = [[0, "10 mm"]]')
+    controller = load_scenario(written(tmp_path, *height, text=regulated(gain='"20 kPa/mm"'))).command.controller
+    assert controller.gain == pytest.approx(2e7)
+    two = load_scenario(
+        written(tmp_path, ('model = "PID"', 'model = "TwoPoint"'), ('gain = "1.5 1/bar"\nintegral_time = "300 ms"', 'hysteresis = "20 kPa"'))
+    )  # fmt: skip
+    assert two.command.controller == TwoPoint("pressure", "fill", 2e4)
+
+
+def test_a_set_point_is_a_command_of_any_kind(tmp_path: Path):
+    (tmp_path / "wanted.csv").write_text("time [ms],pressure [kPa],other [bar]\n0,100,1\n200,300,2\n", encoding="utf-8")
+    corners = ((0.0, 1e5), (0.2, 3e5))
+    for rows, expected in (
+        ('model = "Signal"\npressure = [[0, "1 bar"], ["0.2 s", 3e5]]', Signal({"pressure": corners})),
+        ('file = "wanted.csv"', Signal({"pressure": corners})),
+        ('file = "wanted.csv"\nmodel = "Schedule"\nperiod = "0.3 s"', Periodic(Schedule({"pressure": corners}), 0.3)),
+        ('file = "wanted.csv"\ncolumns = { pressure = "other" }', Signal({"pressure": ((0.0, 1e5), (0.2, 2e5))})),
+    ):
+        assert load_scenario(written(tmp_path, (SETPOINT, rows))).command.setpoint == expected
+
+
+def test_drivers_and_inputs_beside_stand_where_they_always_do(tmp_path: Path):
+    beside = 'discharge = [["0.1 s", 0.5]]\ndrivers = { fill = [{ model = "PWM", frequency = 100 }, "OnOff"] }\n'
+    command = load_scenario(written(tmp_path, ("[command]\n", f"[command]\n{beside}"))).command
+    assert command.beside == Schedule({"discharge": ((0.1, 0.5),)})
+    assert command.drivers == {"fill": (PWM(100.0), OnOff())}
+    assert load_scenario(written(tmp_path)).command.beside == REST
+
+
+def test_the_columns_of_a_loop_may_be_asked_for(tmp_path: Path):
+    asked = ("[run]", '[output]\ncolumns = ["setpoint.pressure", "told.fill"]\n[run]')
+    scenario = load_scenario(written(tmp_path, asked))
+    assert list(scenario.chosen(scenario.simulate())) == ["time", "setpoint.pressure", "told.fill"]
+
+
+# What is wrong
+
+PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "Split", positive = "{}", negative = "{}" }}')
+
+
+@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+@pytest.mark.parametrize(
+    ("was", "becomes", "kind", "message"),
+    [
+        ('measured = "pressure"', 'measured = "presure"', ParameterError, r"toml, \[command.controller\]: PID measures 'presure', which .*Did you mean 'pressure'\?"),
+        ('measured = "pressure"', 'measured = "fill"', ParameterError, r"PID measures 'fill', which the plant does not have; there are"),
+        ('measured = "pressure"', "measured = 3", ParameterError, r"\[command.controller\]: measured is 3; text is wanted"),
+        ('measured = "pressure"\n', "", ParameterError, r"\[command.controller\]: PID needs 'measured' \(text\); it is missing"),
+        ('commanded = "fill"', 'commanded = "fil"', ParameterError, r"\[command.controller\]: the plant has no input 'fil'; there are fill, discharge. Did you mean 'fill'\?"),
+        ('commanded = "fill"', "commanded = 3", ParameterError, r"commanded is 3; text or a Split is wanted"),
+        ('commanded = "fill"', PID_TABLE[1].format("fill", "vent"), ParameterError, r"\[command.controller\]: the plant has no input 'vent'"),
+        ('commanded = "fill"', PID_TABLE[1].format("fill", "fill"), ParameterError, r"Split: both sides are 'fill'"),
+        ('"1.5 1/bar"', '"1.5 1/mm"', UnitError, r"\[command.controller\], gain: unit '1/mm' cannot become '1/Pa'"),
+        ('"1.5 1/bar"', '"1.5"', UnitError, r"gain: '1.5' carries no unit; write it like '1.5 1/Pa'"),
+        ('"1.5 1/bar"', "nan", ParameterError, r"\[command.controller\]: PID.gain .* is nan; it must be finite"),
+        ('"1.5 1/bar"', "inf", ParameterError, r"PID.gain .* is inf; it must be finite"),
+        ('"1.5 1/bar"', "true", ParameterError, r"gain is True; it must be a number in 1/Pa"),
+        ("integral_time", "integral_tim", ParameterError, r"PID has no parameter 'integral_tim'; .*mean 'integral_time'\?"),
+        ('"300 ms"\nperiod', '"-3 ms"\nperiod', ParameterError, r"PID.integral_time .* is -0.003 s; allowed are 0 to"),
+        ('period = "5 ms"', 'period = "0 ms"', ParameterError, r"\[command.controller\]: Loop.period is 0.0 s; it must be positive"),
+        ('period = "5 ms"', "period = -1", ParameterError, r"Loop.period is -1.0 s"),
+        ('period = "5 ms"', "period = nan", ParameterError, r"\[command.controller\], period is nan; it must be finite"),
+        ('period = "5 ms"', 'period = "5 bar"', UnitError, r"period: unit 'bar' cannot become 's'"),
+        ('period = "5 ms"', 'period = "1 s"', ParameterError, r"\[command.controller\]: the controller looks every 1 s, and the run lasts 0.3 s"),
+        ('period = "5 ms"\n', "", ParameterError, r"\[command.controller\]: 'period' is missing; write period = \"10 ms\""),
+        ("[command.controller.setpoint]", "[plant.setpoint]", ParameterError, r"Plant has no parameter 'setpoint'"),
+        (f"[command.controller.setpoint]\n{SETPOINT}", "", ParameterError, r"'setpoint' is missing; write \[command.controller.setpoint\]"),
+        (SETPOINT, "", ParameterError, r"Loop.setpoint names nothing; PID follows pressure"),
+        (SETPOINT, 'presure = [[0, 1]]', ParameterError, r"\[command.controller.setpoint\]: the controller has no set point 'presure'; there are pressure.*Did you mean"),
+        (SETPOINT, 'pressure = [[0, "1 mm"]]', UnitError, r"setpoint\], pressure: unit 'mm' cannot become 'Pa'"),
+        (SETPOINT, 'pressure = [[0, nan]]', ParameterError, r"setpoint\], pressure is nan; it must be finite"),
+        (SETPOINT, 'pressure = 3', ParameterError, r"setpoint\], pressure is 3; write instants and values"),
+        (SETPOINT, f'{SETPOINT}\ndrivers = {{ pressure = "OnOff" }}', ParameterError, r"a set point has no drivers; write \[command.drivers\]"),
+        (SETPOINT, f'{SETPOINT}\ncontroller = 3', ParameterError, r"a controller stands in a scenario only"),
+        (SETPOINT, 'file = "none.csv"', AirmuscleError, r"none.csv"),
+        ('model = "PID"', 'model = "Valve"', ParameterError, r"\[command.controller\]: Valve is no controller; there are PID, TwoPoint"),
+        ('model = "PID"', 'model = "PDI"', UnknownName, r"no model 'PDI'"),
+        ('model = "PID"\n', "", ParameterError, r"\[command.controller\]: no model is named"),
+        ("[command]\n", '[command]\nfill = [["0.1 s", 1]]\n', ParameterError, r"'fill' is commanded by the controller, and beside it too"),
+        ("[command]\n", '[command]\ndischarge = [["0.1 s", 2]]\n', ParameterError, r"\[command\]: the input 'discharge' is 2 before"),
+        ("[command]\n", '[command]\ndrivers = { vent = "OnOff" }\n', ParameterError, r"\[command.drivers\]: the plant has no input 'vent'"),
+    ],
+)  # fmt: skip
+def test_a_loop_that_cannot_be_is_refused(tmp_path: Path, was: str, becomes: str, kind: type, message: str):
+    with pytest.raises(kind, match=message):
+        load_scenario(written(tmp_path, (was, becomes)))
+
+
+def test_what_is_no_table_of_a_controller_is_refused(tmp_path: Path):
+    i = GOOD.index("[command.controller]")
+    for given in ("3", '"PID"'):
+        with pytest.raises(ParameterError, match=r'\[command.controller\] is .*; write model = "PID", its parameters'):
+            load_scenario(written(tmp_path, text=f"{GOOD[:i]}controller = {given}"))
+    flat = f'{GOOD[:i]}controller = {{ model = "PID", measured = "pressure", commanded = "fill", gain = 1, period = 1e-3, setpoint = 3 }}'
+    with pytest.raises(ParameterError, match=r'\[command.controller.setpoint\] is 3; write pressure = \[\["0 s"'):
+        load_scenario(written(tmp_path, text=flat))
+
+
+def test_two_inputs_of_one_command_are_of_one_kind(tmp_path: Path):
+    text = regulated('{ model = "Split", positive = "setpoint", negative = "held" }')
+    text = text.replace(
+        'model = "HangingMass"\nmass = "5 kg"', 'model = "Held"\ninner = { model = "HangingMass", mass = 5 }'
+    )
+    with pytest.raises(ParameterError, match="setpoint and held have different units; name inputs of one kind"):
+        load_scenario(written(tmp_path, text=text))
+
+
+def test_a_column_that_a_set_point_follows_is_there(tmp_path: Path):
+    (tmp_path / "wanted.csv").write_text("time [s],valve\n0,1\n1,2\n", encoding="utf-8")
+    with pytest.raises(ColumnError, match=r"wanted.csv has no column called like an input \(pressure\)"):
+        load_scenario(written(tmp_path, (SETPOINT, 'file = "wanted.csv"')))
+
+
+def test_a_record_has_no_controller(tmp_path: Path):
+    from airmuscle.library.command_table import command_from
+    from airmuscle.library.place import Place
+
+    with pytest.raises(
+        ParameterError, match=r"record, \[command\]: a controller stands in a scenario only; give what was"
+    ):
+        command_from({"controller": {}}, (), Place("record", "command", tmp_path))
+
+
+# Schema, report, program, study
+
+
+def judged(tables: dict[str, object]) -> list[str]:
+    """What a scenario has against the schema."""
+    jsonschema = pytest.importorskip("jsonschema")
+    return [e.message for e in jsonschema.Draft202012Validator(scenario_schema()).iter_errors(tables)]
+
+
+@pytest.mark.parametrize("text", [GOOD, regulated(), f"{PLANT}{TABLE}", EXAMPLE.read_text(encoding="utf-8")])
+def test_the_schema_takes_what_the_program_takes(text: str):
+    assert judged(tomllib.loads(text)) == []
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes"),
+    [
+        ('model = "PID"', 'model = "PDI"'),
+        ('period = "5 ms"\n', ""),
+        ('period = "5 ms"', "period = -1"),
+        ('measured = "pressure"\n', ""),
+        ("integral_time", "integral_tim"),
+        ('"300 ms"\nperiod', '"300 ms"\nsetpoint_weight = 3\nperiod'),
+        ('"1.5 1/bar"', '"1,5 1/bar"'),
+        ('"1.5 1/bar"', "true"),
+        (SETPOINT, "pressure = 3"),
+        (SETPOINT, f'{SETPOINT}\ndrivers = {{ pressure = "OnOff" }}'),
+        (f"[command.controller.setpoint]\n{SETPOINT}", ""),
+    ],
+)
+def test_what_the_schema_refuses_the_program_refuses(tmp_path: Path, was: str, becomes: str):
+    path = written(tmp_path, (was, becomes))
+    assert judged(tomllib.loads(path.read_text(encoding="utf-8")))
+    with pytest.raises(AirmuscleError):
+        load_scenario(path)
+
+
+def test_the_schema_knows_every_controller():
+    tables = scenario_schema()["properties"]["command"]["properties"]["controller"]["anyOf"]
+    assert [table["properties"]["model"]["const"] for table in tables] == ["PID", "TwoPoint"]
+    assert tables[0]["properties"]["gain"]["description"] == "K [u/y]: proportional gain"
+
+
+def test_the_report_shows_set_point_and_measurement_with_units():
+    scenario = load_scenario(EXAMPLE)
+    run = scenario.simulate()
+    chapter = run_chapter(scenario, run)
+    loop, whole, inputs = chapter.plots
+    lines = {line.get_label(): line.get_xydata() for line in loop.figure.axes[0].lines}
+    assert lines["set point"].tolist() == [[0, 100], [1, 100], [1, 300], [3, 300], [3, 150], [5, 150]]
+    assert np.array_equal(lines["measured"][:, 1], run["pressure"] * 1e-3)
+    assert loop.figure.axes[0].get_ylabel() == "pressure\n[kPa]"
+    assert all("setpoint" not in axis.get_ylabel() for axis in whole.figure.axes)
+    had = {line.get_label(): line.get_xydata() for line in inputs.figure.axes[0].lines}
+    assert set(had) == {"command", "what the plant had"}
+    assert inputs.caption.endswith("dashed, what the drivers were told.")
+    table = chapter.tables[1]
+    assert table.title == "Parameters of the controller, PID"
+    assert dict(zip(table.columns["parameter"], table.columns["unit"], strict=True))["gain"] == "1/Pa"
+    assert "astrom-hagglund-1995" in [r.key for r in chapter.references]
+    settings = {name: value for name, value, _ in chapter.chosen}
+    assert settings["command"].startswith(
+        "every 0.02 s PID commands fill, discharge; set point: pressure 100000 from 0 s,"
+    )
+
+
+def test_a_loop_without_drivers_is_drawn_to_its_end(tmp_path: Path):
+    scenario = load_scenario(written(tmp_path, ('period = "5 ms"', 'period = "0.5 ms"')))
+    run = scenario.simulate()
+    plot = run_chapter(scenario, run).plots[-1]
+    (had,) = [line.get_xydata() for line in plot.figure.axes[0].lines]
+    assert plot.caption == "Inputs of the plant."
+    assert had[-1, 0] == 0.3
+    assert in_words(scenario.command).endswith("; beside: none")
+    assert not isinstance(scenario.command.replayed(run), Driven)
+
+
+def test_a_run_that_ends_early_is_reported(tmp_path: Path):
+    """RungeKutta4 with steps far too long for the valves."""
+    changes = ("3e-9, critical_ratio = 0.3 }\ndischarge", "9e-6, critical_ratio = 0.3 }\ndischarge"), (
+        'duration = "300 ms"', 'duration = "300 ms"\nmethod = { model = "RungeKutta4", step = "5 ms" }')  # fmt: skip
+    done = CliRunner().invoke(app, ["simulate", str(written(tmp_path, *changes)), "--out", str(tmp_path / "run")])
+    assert done.exit_code == 1
+    assert "ended early" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    assert (tmp_path / "run" / "figures" / "loop.png").exists()
+
+
+def test_the_program_runs_the_example(tmp_path: Path):
+    done = CliRunner().invoke(app, ["simulate", str(EXAMPLE), "--out", str(tmp_path / "run"), "--json"])
+    assert done.exit_code == 0, done.output
+    shown = json.loads(done.stdout)
+    assert shown["range"]["setpoint.pressure"]["column"] == "setpoint.pressure [Pa]"
+    assert shown["range"]["pressure"]["last"] == pytest.approx(1.5e5, rel=0.05)
+    with (tmp_path / "run" / "recording.csv").open(encoding="utf-8") as file:
+        heading = next(row for row in csv.reader(file) if row[0] == "time [s]")
+    assert {"measured.pressure [Pa]", "told.discharge [1]"} <= set(heading)
+
+
+def test_the_program_of_the_example_runs(tmp_path: Path):
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "examples" / "A4_control.py")], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert "it is the same run: True" in done.stdout
+    assert (tmp_path / "control.png").stat().st_size > 10_000
+
+
+STUDY = """
+title = "gains"
+scenario = "scenario.toml"
+[vary]
+"command.controller.gain" = ["0.5 1/bar", "2 1/bar"]
+"command.controller.setpoint.pressure[1][1]" = ["1.5 bar", "2 bar"]
+[design]
+model = "Grid"
+[outcome]
+last = { model = "Final", column = "setpoint.pressure" }
+told = { model = "Maximum", column = "told.fill" }
+"""
+
+
+def test_a_study_varies_the_numbers_of_a_controller(tmp_path: Path):
+    written(tmp_path)
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    study = load_study(tmp_path / "study.toml")
+    found = [study.scenario(i) for i in range(4)]
+    assert [s.command.controller.gain for s in found] == pytest.approx([5e-6, 5e-6, 2e-5, 2e-5])
+    assert [s.command.setpoint.changes["pressure"][1][1] for s in found] == [1.5e5, 2e5, 1.5e5, 2e5]
+    done = CliRunner().invoke(app, ["sweep", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    (tmp_path / "study.toml").write_text(STUDY.replace("controller.gain", "controller.gian"), encoding="utf-8")
+    with pytest.raises(AirmuscleError, match=r"command.controller.gian.*Did you mean 'command.controller.gain'"):
+        load_study(tmp_path / "study.toml")
+
+
+def test_a_study_depends_on_the_controllers_program():
+    from airmuscle.sweep.fingerprint import NOT_COMPUTING
+
+    assert "control" not in NOT_COMPUTING
