@@ -29,9 +29,9 @@ TEXT = (
     "otherwise."
 )
 WHY = (
-    "ode8 computes both valves and the tangent beyond the box in 13 stages, the callbacks skip them in the 4 stages of "
-    "RK4; MuJoCo's own work, most of its time with one muscle, hardly grows with the muscles, so that with six of them "
-    "the stages decide. Its error at this step is as small as that of ode8; RungeKutta4 and Rodas4 stand beside"
+    "ode8 has 13 stages, RK4 has 4; MuJoCo's own work, most of its time with one muscle, hardly grows with the "
+    "muscles, so that with more of them the stages decide. Its error at this step is as small as that of ode8; "
+    "RungeKutta4, which is MuJoCo's method, and Rodas4 stand beside"
 )
 BODY = """<mujoco><option timestep="{step!r}" integrator="RK4" gravity="0 0 {gravity!r}"><flag contact="disable"
 constraint="disable"/></option><worldbody><body><joint name="lift" type="slide" axis="0 0 1"/>

@@ -36,11 +36,12 @@ SERIES = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7, 3e-8)
 WANTED = 1e-7
 """Greatest error of displacement [m] that the bar allows."""
 WHY = (
-    "the opponent branches past shut valves, choked flow and the tangent beyond the box, so that an evaluation costs "
-    "Python 2 to 5 us, LSODA needs 1100 to 5400 of them, and most of the time is that of `solve_ivp` itself. Rodas4 "
-    "takes 500 to 1000 steps of 0.4 to 0.7 us each, with all branches computed; a stage is one chain of dependent "
-    "operations, and that is what bounds it: the whole step printed as one function, without a call or a loop, was "
-    "tried and is 5 % quicker for 3 states, 5 % slower for 6 and 2 % slower for 10, and takes twice as long to compile"
+    "the opponent branches past shut valves, choked flow and the tangent beyond the box, so that an evaluation "
+    "costs Python 2 to 5 us, LSODA needs 1100 to 5400 of them, and most of the time is that of `solve_ivp` "
+    "itself. Rodas4 takes 450 to 900 steps of 0.4 to 0.7 us each; a stage is one chain of dependent operations, "
+    "and that is what bounds it: stages of one muscle that need not wait for each other take a third of the time. "
+    "The whole step printed as one function, without a call or a loop, was tried and is 5 % quicker for 3 states, "
+    "5 % slower for 6 and 2 % slower for 10, and takes twice as long to compile"
 )
 
 
