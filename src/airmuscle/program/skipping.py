@@ -67,10 +67,10 @@ def _cases(body: Sequence[Instruction], comparisons: _Comparisons, level: Callab
     conditions: dict[Operand, None] = {}
     for line in body:
         levels[line.result] = max(of(a) for a in line.arguments)
-        if levels[line.result] < VARYING:
-            continue
         if line.operation == casadi.OP_MUL:
             commands.update((a, None) for a in line.arguments if of(a) == COMMANDED)
+        if levels[line.result] < VARYING:
+            continue
         if line.operation == casadi.OP_SUB:
             clamps += comparisons.inside(line)
         if line.operation in _EXTREMES and ZERO in line.arguments:
