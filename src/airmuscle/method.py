@@ -59,10 +59,8 @@ class Method(abc.ABC):
         most_steps: int = 50_000_000,
     ) -> Course:
         """Carry `state` (n,) from `start` through the segments; rows (N, n) at `times` (N,), which must rise."""
-        from .engine.once import announce_compilation
-
         try:
-            kernel, leading, trailing, size = self._kernel(prepared)
+            return self._course(prepared, segments, start, state, times, most_steps)
         except RuntimeError as error:
             if "cannot cache" not in str(error):
                 raise
@@ -70,7 +68,11 @@ class Method(abc.ABC):
                 "there is no folder to keep compiled code in: neither the program's own nor the user's cache can be "
                 "written to. Name one that can be in the environment variable NUMBA_CACHE_DIR."
             ) from None
-        announce_compilation(kernel)
+
+    def _course(
+        self, prepared: Prepared, segments: Segments, start: float, state: Array, times: Array, most_steps: int
+    ) -> Course:
+        kernel, leading, trailing, size = self._kernel(prepared)
         y, rows = np.array(state, dtype=float), np.full((times.size, state.size), np.nan)
         clock, count, work = np.array([start, 0.0, start]), np.zeros(4, dtype=np.int64), np.zeros(max(size, 1))
         status, middle = PAUSED, (y, segments.ends, segments.values, segments.slopes, times, rows)
@@ -91,7 +93,7 @@ class Rodas4(Method):
     rtol: float = parameter("1", "rtol", "relative tolerance of a step", bounds=(1e-13, 0.1), default=1e-6)
 
     def _kernel(self, prepared: Prepared) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
-        from .engine.rodas4 import rodas4
+        from .engine.kernel import rodas4
 
         sizes, at = prepared.sizes, prepared.address
         addresses = (at["stage"], at["jac"], at["factor"], at["solve"], at["drift"], sizes.jacobian, sizes.factors)
@@ -109,7 +111,7 @@ class Explicit(Method):
         """Rows of the tableau below its first, and the weights."""
 
     def _kernel(self, prepared: Prepared) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
-        from .engine.fixed_step import fixed_step
+        from .engine.kernel import fixed_step
 
         address, held = prepared.program.step(*self.tableau(), prepared.parameters)
         return fixed_step, (address, held), (self.step,), prepared.sizes.states + 2 * prepared.sizes.inputs
