@@ -42,7 +42,7 @@ def entry(function: str, kinds: Sequence[str]) -> str:
         passed += [f"i64 %x{slot}.{part}{i}" for part in ("shape", "strides") for i in range(int(kind[1:]))]
         fit = f"%fit{slot}"
     lines = [
-        *("%status = alloca i64", "store i64 0, ptr %status", *looks, f"br i1 {fit}, label %fits, label %refused"),
+        *("%status = alloca i64", *looks, f"br i1 {fit}, label %fits, label %refused"),
         *("fits:", *reads, f'call i32 @"{function}"({", ".join(passed)})'),
         *("%found = load i64, ptr %status", "ret i64 %found", "refused:", f"ret i64 {REFUSED}"),
     ]

@@ -71,7 +71,7 @@ class Kernel:
         if kinds is None or not array_layout.as_known():
             return
         with _compiling:
-            if self._loaded is not None or self._only_numba:
+            if self._loaded is not None:
                 return
             code = kept.found(self.name, kinds)
             if code is None:
