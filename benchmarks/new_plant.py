@@ -72,10 +72,11 @@ def cache_counts() -> tuple[int, ...]:
 
 
 def process(arguments: list[str], cache: str | None = None) -> str:
-    """What Python prints in a process of its own, with this folder as the kernels' cache."""
+    """What Python prints in a process of its own, with this folder as the kernels' cache; it may keep bytecode."""
     here = pathlib.Path(__file__).parent
     path = os.pathsep.join([str(here), str(here.parent / "src"), os.environ.get("PYTHONPATH", "")])
-    environment = {**os.environ, "PYTHONPATH": path} | ({"NUMBA_CACHE_DIR": cache} if cache else {})
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    environment = {**kept, "PYTHONPATH": path} | ({"NUMBA_CACHE_DIR": cache} if cache else {})
     done = subprocess.run(
         [sys.executable, *arguments], env=environment, check=True, capture_output=True, cwd=here, text=True
     )

@@ -4,13 +4,17 @@ Nouns are frozen models, verbs are functions. Everything inside is SI, pressure 
 (L0 - L)/L0, pulling is positive. Laws stand in `airmuscle.characteristic`, units in `airmuscle.units`.
 """
 
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from . import characteristic, geometry, units
 from .circuit import Circuit, FillDischarge, Supply, Valve
 from .command import Schedule, Signal
 from .equilibrium import equilibrium
 from .errors import AirmuscleError
 from .gas import Ambient, Isothermal, Polytropic
-from .identify import Fit, fit
 from .library.catalogue import load, measured, names, save
 from .mechanism import HangingMass, Held, Isometric, Mechanism
 from .method import DormandPrince8, Rodas4, RungeKutta4
@@ -19,6 +23,10 @@ from .plant import Plant
 from .recording import Recording, read, read_csv, write_csv
 from .reference import Reference, cite
 from .simulate import advance, simulate
+
+if TYPE_CHECKING:
+    from .identify.fit import fit
+    from .identify.result import Fit
 
 __version__ = "0.1.0"
 
@@ -63,3 +71,15 @@ __all__ = [
     "units",
     "write_csv",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Identification, which a simulation does not need, is imported when it is first asked for."""
+    if name not in ("Fit", "fit", "identify"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    identify = importlib.import_module(".identify", __name__)
+    return identify if name == "identify" else getattr(identify, name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -68,6 +68,13 @@ class Stepper:
                     status = TOO_MANY
         except KeyboardInterrupt:
             status = INTERRUPTED
+        except RuntimeError as error:
+            if "cannot cache" not in str(error):
+                raise
+            raise FileError(
+                "there is no folder to keep compiled code in: neither the program's own nor the user's cache can be "
+                "written to. Name one that can be in the environment variable NUMBA_CACHE_DIR."
+            ) from None
         return Course(rows, int(count[1]), float(clock[0]), y, int(status), int(count[2]), int(count[3]))
 
 
@@ -80,18 +87,7 @@ class Method(abc.ABC):
 
     def stepper(self, prepared: Prepared) -> Stepper:
         """The method at this system, for those who call it often: what does not change is made once."""
-        from .engine.once import announce_compilation
-
-        try:
-            kernel, leading, trailing, size = self._kernel(prepared)
-        except RuntimeError as error:
-            if "cannot cache" not in str(error):
-                raise
-            raise FileError(
-                "there is no folder to keep compiled code in: neither the program's own nor the user's cache can be "
-                "written to. Name one that can be in the environment variable NUMBA_CACHE_DIR."
-            ) from None
-        announce_compilation(kernel)
+        kernel, leading, trailing, size = self._kernel(prepared)
         return Stepper(kernel, leading, trailing, np.zeros(max(size, 1)))
 
     def run(
@@ -109,7 +105,7 @@ class Rodas4(Method):
     rtol: float = parameter("1", "rtol", "relative tolerance of a step", bounds=(1e-13, 0.1), default=1e-6)
 
     def _kernel(self, prepared: Prepared) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
-        from .engine.rodas4 import rodas4
+        from .engine.kernel import rodas4
 
         sizes, at = prepared.sizes, prepared.address
         addresses = (at["stage"], at["jac"], at["factor"], at["solve"], at["drift"], sizes.jacobian, sizes.factors)
@@ -127,7 +123,7 @@ class Explicit(Method):
         """Rows of the tableau below its first, and the weights."""
 
     def _kernel(self, prepared: Prepared) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
-        from .engine.fixed_step import fixed_step
+        from .engine.kernel import fixed_step
 
         address, held = prepared.program.step(*self.tableau(), prepared.parameters)
         return fixed_step, (address, held), (self.step,), prepared.sizes.states + 2 * prepared.sizes.inputs

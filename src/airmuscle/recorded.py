@@ -27,13 +27,11 @@ Array = npt.NDArray[np.float64]
 
 def _results(ready: Prepared, course: Course, segments: Segments, times: Array, start: float) -> tuple[Array, Array]:
     """Outputs (N, K) and inputs (N, m) at the rows that were reached."""
-    from .engine.evaluate import evaluate
-    from .engine.once import announce_compilation
+    from .engine.kernel import evaluate
 
     states = np.ascontiguousarray(course.rows[: course.reached])
     inputs = np.ascontiguousarray(segments.inputs_at(times[: course.reached], start))
     results = np.empty((course.reached, ready.sizes.outputs))
-    announce_compilation(evaluate)
     evaluate(ready.address["outputs"], ready.held, states, inputs, results)
     return results, inputs
 

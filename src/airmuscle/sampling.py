@@ -141,10 +141,8 @@ def _looking(ready: Prepared, loop: Loop) -> Callable[[Array, Array], dict[str, 
     if all(name in states for name in names):
         places = [(name, states.index(name)) for name in names]
         return lambda state, had: {name: float(state[i]) for name, i in places}
-    from .engine.evaluate import evaluate
-    from .engine.once import announce_compilation
+    from .engine.kernel import evaluate
 
-    announce_compilation(evaluate)
     known, results = columns_of(ready), np.empty((1, ready.sizes.outputs))
     wanted, outputs = [(name, known.index(name)) for name in names], ready.address["outputs"]
 

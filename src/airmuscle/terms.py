@@ -60,7 +60,9 @@ def with_instants(grid: npt.NDArray[Any], instants: Array, duration: float) -> A
     behind = np.searchsorted(instants, grid)  # two neighbours of each: a table of all pairs would not fit the memory
     before, after = instants[np.maximum(behind - 1, 0)], instants[np.minimum(behind, instants.size - 1)]
     apart = np.minimum(np.abs(grid - before), np.abs(grid - after)) > 1e-9 * duration
-    return np.unique(np.concatenate([grid[apart], instants]))
+    merged: Array = np.sort(np.concatenate([grid[apart], instants]))  # np.unique would start numpy.ma
+    new: npt.NDArray[np.bool_] = np.diff(merged, prepend=-np.inf) > 0
+    return merged[new]
 
 
 def _instants(given: Any) -> Array:

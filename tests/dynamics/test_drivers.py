@@ -274,6 +274,7 @@ def test_rows_too_near_an_instant_give_way_to_it():
         0.0, 0.1, 0.2, 0.25, 0.9, 1.0,
     ]  # fmt: skip
     assert output_times([], 0.0, 1.0, instants).tolist() == instants.tolist()
+    assert output_times([0.5, 0.5, 0.0, 0.5, 0.0], 0.0, 1.0, np.array([1.0])).tolist() == [0.0, 0.5, 1.0]
 
 
 # What is wrong is said

@@ -69,7 +69,7 @@ class Task:
         return course._replace(reached=row, time=time, state=rows[row], status=LESS_THAN_NONE)
 
     def _put(self, index: int, one: Prepared, course: Course) -> None:
-        from ..engine.evaluate import evaluate
+        from ..engine.kernel import evaluate
 
         reached = course.reached
         states = np.ascontiguousarray(course.rows[:reached])

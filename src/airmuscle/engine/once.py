@@ -10,7 +10,7 @@ _announced: set[Any] = set()
 
 
 def announce_compilation(kernel: Any) -> None:
-    """Say on stderr that a kernel is about to be compiled, if this machine has not compiled it before."""
+    """Say on stderr that numba is about to compile a kernel, if this machine has not compiled it before."""
     if kernel in _announced:
         return
     _announced.add(kernel)
@@ -19,4 +19,9 @@ def announce_compilation(kernel: Any) -> None:
     cache = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
     index = getattr(cache, "_index_path", None)
     if index is None or not pathlib.Path(index).exists():
-        print(f"compiling {kernel.__name__}, once on this machine (some seconds) ...", file=sys.stderr, flush=True)
+        announce(kernel.__name__)
+
+
+def announce(name: str) -> None:
+    """Say on stderr that a kernel is about to be compiled."""
+    print(f"compiling {name}, once on this machine (some seconds) ...", file=sys.stderr, flush=True)

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..program.derivatives import derivatives
 from .static import Static
 
 MARGIN = 1e-9
@@ -20,6 +19,8 @@ def is_stable(static: Static, state: Mapping[str, float]) -> bool:
     volume, m = m_0 V/V_0; with given masses it stays as it is, at its temperature. Friction is left out, as it would
     hold any place.
     """
+    from ..program.derivatives import derivatives  # CasADi, which describing a plant does not need
+
     plant = static.plant
     air, friction = set[str](), set[str]()
     for prefix, muscle in zip(plant.prefixes, plant.muscles, strict=True):

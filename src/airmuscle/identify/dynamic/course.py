@@ -98,7 +98,7 @@ class Course:
         return outputs[:, :count], slopes
 
     def _outputs(self, values: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-        from ...engine.evaluate import evaluate
+        from ...engine.kernel import evaluate
 
         state, slopes = self.start(values)
         clock = self._clock(self.start_time(values))

@@ -1,0 +1,57 @@
+"""A process starts with what it needs and no more: heavy modules are imported where they are used.
+
+A first result must come within 0.7 s (benchmarks/startup.py); what is counted here does not depend on the machine.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+import airmuscle as am
+
+HEAVY = {"numba", "scipy", "pandas", "pint", "matplotlib", "jinja2", "rich", "typer", "yaml", "jax"}
+SIMULATION = """
+import airmuscle as am
+valve = am.Valve(conductance=1e-9, critical_ratio=0.4)
+plant = am.Plant(am.load("dmsp-20-300").muscle, am.FillDischarge(am.Supply(6e5), valve, valve), am.HangingMass(10.0))
+am.simulate(plant, am.Schedule({"fill": ((0.5, 1),)}), duration=2.0, method=METHOD)
+"""
+STARTS = {
+    "import airmuscle": ("import airmuscle", {*HEAVY, "casadi", "llvmlite", "numpy.ma", "airmuscle.identify"}),
+    "simulate": (
+        SIMULATION.replace("METHOD", "am.Rodas4()"),
+        {*HEAVY, "numpy.ma", "airmuscle.identify", "airmuscle.engine.rodas4"},
+    ),
+    "simulate, fixed steps": (SIMULATION.replace("METHOD", "am.RungeKutta4(1e-3)"), {*HEAVY, "airmuscle.identify"}),
+    "airmuscle solve": (
+        "from airmuscle.cli.app import app\n"
+        "app(['solve', 'chou-hannaford', '--pressure', '3 bar', '--force', '100 N'], standalone_mode=False)",
+        (HEAVY | {"llvmlite", "airmuscle.identify"}) - {"typer", "rich"},
+    ),
+}
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_a_process_starts_without_what_it_does_not_need(start):
+    code, absent = STARTS[start]
+    for _ in range(2):  # by the second the kernels are kept
+        done = subprocess.run(
+            [sys.executable, "-c", f"{code}\nimport sys; print(*sys.modules)"],
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+        assert done.returncode == 0, done.stderr
+    assert absent & set(done.stdout.splitlines()[-1].split()) == set()
+
+
+def test_what_is_imported_late_is_there_for_who_asks():
+    assert am.fit is sys.modules["airmuscle.identify"].fit
+    assert am.Fit is sys.modules["airmuscle.identify"].Fit
+    assert am.identify is sys.modules["airmuscle.identify"]
+    assert {"fit", "Fit"} <= set(dir(am))
+    with pytest.raises(AttributeError, match="module 'airmuscle' has no attribute 'fitt'"):
+        am.fitt  # noqa: B018

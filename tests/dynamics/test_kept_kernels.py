@@ -1,0 +1,277 @@
+"""The machine code of a kernel that is kept on the machine is the kernel: bit for bit what numba computes with it, for
+arrays of every kind; code of other sources, cut short, or for another processor is never run; and what cannot do
+without numba is left to it."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import math
+
+import llvmlite.binding as llvm
+import numba
+import numpy as np
+import pytest
+from filling import runs
+
+from airmuscle.command import Schedule
+from airmuscle.engine import array_layout, kept
+from airmuscle.engine import kernel as kernels
+from airmuscle.engine.entry import REFUSED
+from airmuscle.engine.kernel import Kernel
+from airmuscle.engine.object_code import made
+from airmuscle.method import DormandPrince8, Rodas4
+from airmuscle.program.prepared import prepared
+from airmuscle.simulate import simulate
+
+CASE = runs()[3]
+READY = prepared(CASE.system)
+kept_found = kept.found
+ROWS = 7
+
+
+def arguments(rows=ROWS):
+    """What `evaluate` is given for some rows; the last array is room for its results."""
+    seeds = np.random.default_rng(1)
+    states = CASE.vector * seeds.uniform(0.9, 1.1, (rows, CASE.vector.size))
+    inputs = seeds.uniform(0.0, 1.0, (rows, len(CASE.system.inputs)))
+    return READY.address["outputs"], READY.held, states, inputs, np.zeros((rows, READY.sizes.outputs))
+
+
+def expected():
+    given = arguments()
+    Kernel("evaluate").numba(*given)
+    return given[-1]
+
+
+@pytest.fixture
+def empty(tmp_path, monkeypatch):
+    """An empty folder for machine code."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+@pytest.fixture
+def without_numba(monkeypatch):
+    """A kernel that calls numba fails."""
+
+    def refuse(self, given):
+        raise AssertionError(f"{self.name} was given to numba")
+
+    monkeypatch.setattr(Kernel, "_by_numba", refuse)
+
+
+def files(folder):
+    return sorted(path for path in folder.rglob("*") if path.is_file())
+
+
+@pytest.mark.parametrize("method", [Rodas4(1e-6), DormandPrince8(1e-3)], ids=["rodas4", "fixed_step"])
+def test_a_run_is_bit_for_bit_that_of_numba(method, monkeypatch):
+    ramps = Schedule({"fill": ((0.5, 1.0), (1.5, 0.0)), "discharge": ((2.0, 0.7),)})
+
+    def run():
+        return simulate(CASE.system, ramps, duration=3.0, start=CASE.start, method=method)
+
+    by_code = run()
+    monkeypatch.setattr(Kernel, "__call__", lambda self, *given: self.numba(*given))
+    by_numba = run()
+    assert by_code.notes == by_numba.notes
+    assert all(np.array_equal(by_code[name], by_numba[name]) for name in by_numba.columns)
+
+
+def test_made_once_it_is_found_again(empty, without_numba, capsys):
+    for words in ("compiling evaluate, once on this machine (some seconds) ...\n", ""):
+        given = arguments()
+        Kernel("evaluate")(*given)
+        assert np.array_equal(given[-1], expected())
+        assert capsys.readouterr().err == words
+        assert len(files(empty)) == 1
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        np.asfortranarray,
+        lambda a: np.repeat(a, 2, axis=1)[:, ::2],
+        lambda a: a[::-1].copy()[::-1],
+        lambda a: np.frombuffer(a.tobytes()).reshape(a.shape),
+        lambda a: a.astype(np.float32),
+        lambda a: a.astype(int),
+    ],
+    ids=["by columns", "every second", "backwards", "read-only", "single", "whole"],
+)
+def test_arrays_of_another_kind_are_left_to_numba(other, monkeypatch):
+    kernel, seen = Kernel("evaluate"), []
+    kernel(*arguments())
+    monkeypatch.setattr(Kernel, "_by_numba", lambda self, given: seen.append(given))
+    for position in (1, 2, 3):
+        given = list(arguments())
+        given[position] = other(given[position]) if given[position].ndim > 1 else given[position][::-1]
+        kernel(*given)
+        assert not given[-1].any()
+    assert len(seen) == 3
+
+
+def test_so_are_other_dimensions_and_numbers(monkeypatch):
+    kernel, seen = Kernel("evaluate"), []
+    kernel(*arguments())
+    monkeypatch.setattr(Kernel, "_by_numba", lambda self, given: seen.append(given))
+    address, held, states, inputs, results = arguments()
+    kernel(address, held, states.ravel(), inputs, results)
+    kernel(address, held[:, None], states, inputs, results)
+    kernel(float(address), held, states, inputs, results)
+    kernel(np.int64(address), held, states, inputs, results)
+    assert len(seen) == 4
+    assert not results.any()
+
+
+def test_the_first_call_may_be_of_another_kind(empty):
+    kernel, given = Kernel("evaluate"), list(arguments())
+    given[2].flags.writeable = False
+    kernel(*given)
+    assert np.array_equal(given[-1], expected())
+    assert files(empty) == []
+    kernel(*arguments())
+    assert len(files(empty)) == 1
+
+
+def test_no_row_is_no_work(without_numba):
+    assert Kernel("evaluate")(*arguments(0)) == 0
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda content: content[:-1],
+        lambda content: content[:40],
+        lambda content: b"",
+        lambda content: content[:100] + bytes([content[100] ^ 1]) + content[101:],
+        lambda content: bytes([content[0] ^ 1]) + content[1:],
+    ],
+    ids=["cut short", "without code", "empty", "one bit", "of other sources"],
+)
+def test_a_spoilt_file_is_made_anew(spoil, empty, without_numba, capsys):
+    Kernel("evaluate")(*arguments())
+    (file,) = files(empty)
+    file.write_bytes(spoil(file.read_bytes()))
+    capsys.readouterr()
+    given = arguments()
+    Kernel("evaluate")(*given)
+    assert "compiling evaluate" in capsys.readouterr().err
+    assert np.array_equal(given[-1], expected())
+    Kernel("evaluate")(*arguments())
+    assert capsys.readouterr().err == ""
+
+
+def test_other_sources_and_versions_have_another_origin(monkeypatch, tmp_path):
+    origin = kept._origin.__wrapped__()
+    assert kept._origin.__wrapped__() == origin
+    (tmp_path / "kernel.py").write_text("x = 1\n", encoding="utf-8")
+    monkeypatch.setattr(kept, "_HERE", tmp_path)
+    elsewhere = kept._origin.__wrapped__()
+    (tmp_path / "kernel.py").write_text("x = 2\n", encoding="utf-8")
+    changed = kept._origin.__wrapped__()
+    monkeypatch.setattr(kept.importlib.util, "find_spec", lambda name: None)
+    assert len({origin, elsewhere, changed, kept._origin.__wrapped__()}) == 4
+
+
+def test_each_processor_and_each_kind_has_its_own_file(monkeypatch):
+    mine = kept._file("evaluate", ("q", "d1"))
+    assert kept._file("evaluate", ("q", "d2")) != mine
+    monkeypatch.setattr(llvm, "get_host_cpu_name", lambda: "another")
+    assert kept._file("evaluate", ("q", "d1")) != mine
+
+
+def test_a_folder_that_cannot_be_written_to_is_passed_over(tmp_path, monkeypatch):
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder", encoding="utf-8")
+    monkeypatch.setattr(kept, "_folders", lambda: iter((blocked / "in it", tmp_path / "good")))
+    assert kept.keep("evaluate", ("q",), b"code") == b"code"
+    assert kept.found("evaluate", ("q",)) == b"code"
+    assert {path.parent for path in files(tmp_path)} == {tmp_path, tmp_path / "good"}
+    monkeypatch.setattr(kept, "_folders", lambda: iter((blocked / "in it",)))
+    assert kept.keep("evaluate", ("q",), b"code") == b"code"
+    assert kept.found("evaluate", ("q",)) is None
+
+
+@numba.njit(error_model="numpy")
+def plain(x, y):
+    for i in range(x.shape[0]):
+        y[i] = math.sqrt(x[i])
+    return x.shape[0]
+
+
+@numba.njit(error_model="numpy")
+def allocates(x, y):
+    y[:] = np.sort(x)
+    return x.shape[0]
+
+
+@numba.njit(error_model="numpy")
+def raises(x, y):
+    if x[0] > y[0]:
+        raise ValueError
+    return x.shape[0]
+
+
+@numba.njit(error_model="numpy")
+def calls_a_library(x, y):
+    y[0] = math.lgamma(x[0])
+    return x.shape[0]
+
+
+@numba.njit(error_model="numpy")
+def returns_a_float(x, y):
+    return x[0] + y[0]
+
+
+def test_only_what_does_without_numba_is_made_machine_code():
+    given = (np.ones(3), np.zeros(3))
+    assert made(plain, ("d1", "d1"), given)
+    assert made(plain, ("d1", "d2"), given) == b""  # as if numba took arguments apart otherwise
+    for kernel in (allocates, raises, calls_a_library, returns_a_float):
+        assert made(kernel, ("d1", "d1"), given) == b""
+
+
+def test_a_kernel_that_needs_numba_is_tried_once_on_a_machine(empty, monkeypatch):
+    """`root` reshapes its workspace, which numba's own library does."""
+    n, seen, looked = 2, [], []
+    given = (1, *(np.zeros(n) for _ in range(5)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n * n + n))
+    monkeypatch.setattr(Kernel, "_by_numba", lambda self, given: seen.append(self.name))
+    monkeypatch.setattr(kernels.kept, "found", lambda *asked: looked.append(asked) or kept_found(*asked))
+    for kernel in (Kernel("root"), Kernel("root")):
+        kernel(*given)
+        kernel(*given)
+    assert seen == ["root"] * 4
+    assert len(looked) == 2
+    assert [file.stat().st_size for file in files(empty)] == [64]  # no code: the next process need not try
+
+
+def test_arrays_laid_out_otherwise_are_left_to_numba(monkeypatch):
+    assert array_layout.as_known.__wrapped__()
+    for name in ("DATA", "DIMENSIONS", "SHAPE", "STRIDES", "DTYPE", "FLAGS"):
+        with monkeypatch.context() as patched:
+            patched.setattr(array_layout, name, getattr(array_layout, name) - 8)
+            assert not array_layout.as_known.__wrapped__()
+    monkeypatch.setattr(array_layout, "as_known", lambda: False)
+    seen = []
+    monkeypatch.setattr(Kernel, "_by_numba", lambda self, given: seen.append(self.name))
+    Kernel("evaluate")(*arguments())
+    assert seen == ["evaluate"]
+
+
+def test_threads_that_ask_at_once_get_one_machine_code(empty, without_numba, monkeypatch):
+    kernel, right, looked = Kernel("evaluate"), expected(), []
+    monkeypatch.setattr(kernels.kept, "found", lambda *asked: looked.append(asked) or kept_found(*asked))
+
+    def found(_):
+        given = arguments()
+        kernel(*given)
+        return given[-1]
+
+    with concurrent.futures.ThreadPoolExecutor(8) as pool:
+        assert all(np.array_equal(results, right) for results in pool.map(found, range(64)))
+    assert len(looked) == 1
+
+
+def test_no_status_of_a_kernel_is_a_refusal():
+    assert REFUSED < -(1 << 61)
