@@ -76,7 +76,7 @@ class Method(abc.ABC):
         status, middle = PAUSED, (y, segments.ends, segments.values, segments.slopes, times, rows)
         try:
             while status == PAUSED:
-                status = kernel(*leading, *middle, *trailing, clock, count, BUDGET, work)
+                status = kernel(*leading, *middle, *trailing, clock, count, min(BUDGET, most_steps - count[2]), work)
                 if status == PAUSED and count[2] >= most_steps:
                     status = TOO_MANY
         except KeyboardInterrupt:
