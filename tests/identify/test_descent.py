@@ -143,6 +143,21 @@ def test_nor_do_jumps_of_the_place_where_it_is_least(seed):
     assert len(asked) <= 15
 
 
+def test_a_place_much_worse_than_promised_is_not_taken_for_a_jump():
+    """The last step of the search, which promises less than a millionth, finds twice the residuals."""
+    asked = []
+
+    def residuals(x):
+        asked.append(x)
+        errors, slopes = decay(x)
+        return errors * (2 if len(asked) == 5 else 1), slopes
+
+    found, cost, ended = descended(residuals, np.array([0.8, 3.0]), *FREE, 200)
+    assert ended
+    assert len(asked) > 5
+    assert cost == pytest.approx(float(decay(found)[0] @ decay(found)[0]), rel=1e-9)
+
+
 def test_slopes_too_steep_to_be_squared_end_the_search():
     with np.errstate(all="ignore"):
         assert descended(lambda x: (np.ones(2), np.full((2, 2), 1e200)), np.ones(2), *FREE, 50).ended
