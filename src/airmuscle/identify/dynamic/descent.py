@@ -42,6 +42,24 @@ class Descent(NamedTuple):
     ended: bool
 
 
+class _Squares(NamedTuple):
+    """A sum of squares, the normal matrix and half the gradient."""
+
+    cost: float
+    normal: Array
+    gradient: Array
+
+
+def _squared(found: tuple[Array, Array] | None) -> _Squares | None:
+    """None also where residuals or slopes are not finite, or too large to be squared."""
+    if found is None:
+        return None
+    r, j = found
+    with np.errstate(over="ignore", invalid="ignore"):
+        squares = _Squares(float(r @ r), j.T @ j, j.T @ r)
+    return squares if squares.cost < np.inf and np.isfinite(squares.normal).all() else None
+
+
 class Search:
     """A descent from `begin`, which can be left where it stands and taken up again.
 
@@ -52,41 +70,39 @@ class Search:
         self._residuals, self._low, self._high = residuals, low, high
         self._scale, self._damping, self._growth = np.zeros(begin.size), FIRST_DAMPING, 2.0
         self._refused, self._promised, self._asked = np.full(begin.size, np.nan), np.inf, 1
-        self.x, self.cost = np.clip(begin, low, high), np.inf
-        found = residuals(self.x)
+        self.x = np.clip(begin, low, high)
+        found = _squared(residuals(self.x))
         self.ended = found is None
-        if found is not None:
-            self._take(self.x, *found)
+        self._take(self.x, found or _Squares(np.inf, np.zeros((begin.size, begin.size)), np.zeros(begin.size)))
 
     def run(self, most: int) -> None:
         """Search until the end, or until residuals were asked for `most` times in all."""
         while not self.ended and self._asked < most:
             self._step()
 
-    def _take(self, x: Array, r: Array, j: Array) -> None:
-        self.x, self.cost = x, float(r @ r)
-        self._normal, self._gradient = j.T @ j, j.T @ r
+    def _take(self, x: Array, found: _Squares) -> None:
+        self.x, (self.cost, self._normal, self._gradient) = x, found
         self._scale = np.maximum(self._scale, np.sqrt(self._normal.diagonal()))
 
     def _step(self) -> None:
         step, promised = self._planned()
-        while not self._done(step, promised) and (not promised > 0 or (step == self._refused).all()):
+        while not (done := self._done(step, promised)) and (not promised > 0 or (step == self._refused).all()):
             self._damp(step)
             step, promised = self._planned()
-        self.ended = self._done(step, promised)
-        if not self.ended:
+        self.ended = done
+        if not done:
             self._try(step, promised)
 
     def _try(self, step: Array, promised: float) -> None:
         """Take a step, or refuse it."""
-        tried, self._asked = self._residuals(self.x + step), self._asked + 1
-        new = float(tried[0] @ tried[0]) if tried is not None else np.inf
+        tried, self._asked = _squared(self._residuals(self.x + step)), self._asked + 1
+        new = np.inf if tried is None else tried.cost
         near = promised <= NOISE / 10 * self.cost and self._damping < 1 and new <= (1 + NOISE) * self.cost
         if near and new >= self.cost and promised > self._promised / 2:
             self.ended = True
         elif tried is not None and (near or new < self.cost):
             ratio = (self.cost - new) / promised if new < self.cost else 1.0
-            self._take(self.x + step, *tried)
+            self._take(self.x + step, tried)
             self._damping = max(self._damping * max(1 / 3, 1 - (2 * ratio - 1) ** 3), LEAST_DAMPING)
             self._growth, self._promised = 2.0, promised
         else:
@@ -106,9 +122,10 @@ class Search:
 
     def _done(self, step: Array, promised: float) -> bool:
         """Whether a step is none any more, promises too little, or the damping is beyond all bounds."""
-        small = np.linalg.norm(self._scale * step) <= ENOUGH * np.linalg.norm(self._scale * self.x)
-        enough = 0 <= promised <= ENOUGH * self.cost and self._damping < 1
-        return bool(small) or enough or not self._damping < MOST_DAMPING
+        if (0 <= promised <= ENOUGH * self.cost and self._damping < 1) or not self._damping < MOST_DAMPING:
+            return True
+        far, at = self._scale * step, self._scale * self.x
+        return bool(far @ far <= ENOUGH**2 * (at @ at))
 
     @property
     def found(self) -> Descent:
@@ -126,14 +143,17 @@ def descended(residuals: Residuals, begin: Array, low: Array, high: Array, most:
 def step_within(normal: Array, gradient: Array, damping: Array, x: Array, low: Array, high: Array) -> Array:
     """The damped step; unknowns that it would carry beyond a bound go to that bound, and the others are found anew."""
     loose = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
-    step = np.zeros(x.size)
+    step, matrix = np.zeros(x.size), normal + np.diag(damping)
     while loose.any():
-        matrix, right = normal + np.diag(damping), -gradient - normal @ np.where(loose, 0.0, step)
-        step[loose] = np.linalg.solve(matrix[loose][:, loose], right[loose])
-        ends = np.clip(x + step, low, high)
-        beyond = loose & (ends != x + step)
+        if loose.all():
+            step[:] = np.linalg.solve(matrix, -gradient)
+        else:
+            right, free = gradient + normal @ np.where(loose, 0.0, step), np.flatnonzero(loose)
+            step[free] = np.linalg.solve(matrix[free[:, None], free], -right[free])
+        ahead = x + step
+        beyond = loose & ((ahead < low) | (ahead > high))
         if not beyond.any():
             break
-        step[beyond] = (ends - x)[beyond]
+        step[beyond] = (np.clip(ahead, low, high) - x)[beyond]
         loose &= ~beyond
     return step
