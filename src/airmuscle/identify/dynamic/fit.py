@@ -16,7 +16,7 @@ from ...method import Method, Rodas4
 from ...program import System
 from ..result import Estimate
 from .course import MOST_STEPS, Course, observations, stacked
-from .descent import Search
+from .descent import Search, descended
 from .experiment import Experiment, Own, Shared, Unknown, unknowns
 from .identifiable import Identifiability, identifiable
 from .result import DynamicFit
@@ -65,15 +65,19 @@ class Problem:
 
     def solve(self, scaled: Array, held: Sequence[int] = (), most: int = MOST) -> tuple[Array, float]:
         """The least squares from a start, some unknowns held: unknowns and sum of squares, infinite where it fails."""
-        search, whole = self.search(scaled, held), scaled.copy()
-        search.run(most)
-        whole[[k for k in range(scaled.size) if k not in held]] = search.x
-        return whole, search.cost
+        loose, whole = [k for k in range(scaled.size) if k not in held], scaled.copy()
+        found = descended(*self._asked(scaled, loose), most)
+        whole[loose] = found.x
+        return whole, found.cost
 
-    def search(self, scaled: Array, held: Sequence[int] = ()) -> Search:
-        """The search from a start over the unknowns that are not held."""
-        loose, (low, high) = [k for k in range(scaled.size) if k not in held], self.bounds
-        return Search(_Guarded(self, scaled, loose), scaled[loose], low[loose], high[loose])
+    def search(self, scaled: Array) -> Search:
+        """The search from a start, which can be left and taken up again."""
+        return Search(*self._asked(scaled, range(scaled.size)))
+
+    def _asked(self, scaled: Array, loose: Sequence[int]) -> tuple[_Guarded, Array, Array, Array]:
+        """Residuals over the loose unknowns, their start and their bounds."""
+        (low, high), places = self.bounds, list(loose)
+        return _Guarded(self, scaled, places), scaled[places], low[places], high[places]
 
 
 class _Guarded:
