@@ -22,7 +22,7 @@ STARTS = 100
 HEADING = ("variant", "seconds for 100 starts", "evaluations a start", "starts at the best optimum, of those measured")
 TEXT = (
     "The record of the section before; the plant's own values and 99 starts a factor of three around them. The library "
-    "is `fit_dynamic` with Rodas4(1e-6), its result with standard deviations included; a start that after 30 runs "
+    "is `fit_dynamic` with Rodas4(1e-6), its result with standard deviations included; a start that after 20 runs "
     "is a thousand times worse than the best is left. "
     "SciPy's `least_squares` (trf, the same bounds, scaled by its Jacobian) takes differences of `solve_ivp` with "
     "LSODA and rates written by hand in Python, whose start at rest is found by hand too; as SciPy has it, and with a "

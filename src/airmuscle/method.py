@@ -63,7 +63,8 @@ class Stepper:
         status, middle = PAUSED, (y, segments.ends, segments.values, segments.slopes, times, rows)
         try:
             while status == PAUSED:
-                status = self.kernel(*self.leading, *middle, *self.trailing, clock, count, BUDGET, self.work)
+                budget = min(BUDGET, most_steps - int(count[2]))
+                status = self.kernel(*self.leading, *middle, *self.trailing, clock, count, budget, self.work)
                 if status == PAUSED and count[2] >= most_steps:
                     status = TOO_MANY
         except KeyboardInterrupt:

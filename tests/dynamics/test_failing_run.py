@@ -14,9 +14,11 @@ from airmuscle.errors import AirmuscleError, SimulationError
 from airmuscle.gas import Isothermal
 from airmuscle.linearise import linearise
 from airmuscle.mechanism import HangingMass, Held, InSeries, Stopped
-from airmuscle.method import LESS_THAN_NONE, RungeKutta4
+from airmuscle.method import LESS_THAN_NONE, TOO_MANY, Rodas4, RungeKutta4
 from airmuscle.plant import Plant
+from airmuscle.program.prepared import prepared
 from airmuscle.simulate import advance, simulate
+from airmuscle.start import state_vector
 from airmuscle.stiffness import stiffness
 
 HUGE = Valve(9e-6, 0.3)
@@ -206,3 +208,16 @@ def test_a_run_says_where_no_muscle_can_be():
     assert "no muscle can do this" in note
     calm = simulate(plant, Schedule({}), duration=0.1, start=STATE)
     assert not [note for note in calm.notes if "reach" in note]
+
+
+@pytest.mark.parametrize("method", [Rodas4(), RungeKutta4(1e-4)], ids=str)
+def test_no_more_steps_are_taken_than_allowed(method):
+    plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), HangingMass(10.0))
+    start = state_vector(plant, plant.state_at(pressure=1e5))
+    segments, times = FILL.segments(plant.inputs, 0.0, 1.0), np.linspace(0.0, 1.0, 11)
+    whole = method.run(prepared(plant), segments, 0.0, start, times)
+    assert whole.status == 0
+    left = method.run(prepared(plant), segments, 0.0, start, times, whole.steps - 1)
+    assert (left.status, left.steps) == (TOO_MANY, whole.steps - 1)
+    enough = method.run(prepared(plant), segments, 0.0, start, times, whole.steps)
+    np.testing.assert_array_equal(enough.rows, whole.rows)

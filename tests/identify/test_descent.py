@@ -92,6 +92,89 @@ def test_no_more_is_asked_than_allowed():
     assert len(asked) == 5
 
 
+def test_what_hardly_matters_does_not_keep_the_others_from_going():
+    """A step of a hundred times its size for the one unknown, of half its size for the others."""
+    t, asked = np.linspace(0.0, 1.0, 30), []
+    columns = np.column_stack([np.ones_like(t), t, 1e-4 * t**2])
+
+    def residuals(x):
+        asked.append(x)
+        return columns @ (x - np.array([1.5, 0.5, 100.0])), columns
+
+    found, _, ended = descended(residuals, np.ones(3), np.zeros(3), np.full(3, np.inf), 60)
+    assert ended
+    np.testing.assert_allclose(asked[1][:2], [1.5, 0.5], atol=0.02)
+    assert asked[1][2] <= 1.71
+    np.testing.assert_allclose(found, [1.5, 0.5, 100.0], rtol=1e-4)
+
+
+def _place(x, seed):
+    """The same random numbers wherever the same place is asked again."""
+    return np.random.default_rng([seed, *np.abs(x).view(np.uint64)])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_jumps_of_the_sum_do_not_hinder_its_end(seed):
+    """Runs of adaptive steps: the sum jumps by a millionth from place to place, while the slopes are right."""
+    asked = []
+
+    def jumping(x):
+        errors, slopes = decay(x)
+        asked.append(x)
+        return errors * (1 + 1e-6 * _place(x, seed).uniform(-1, 1)), slopes
+
+    found, _, ended = descended(jumping, np.array([0.8, 3.0]), *FREE, 200)
+    assert ended
+    assert len(asked) <= 6
+    np.testing.assert_allclose(found, descended(decay, np.array([0.8, 3.0]), *FREE, 200).x, atol=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_nor_do_jumps_of_the_place_where_it_is_least(seed):
+    """Every step promises some 1e-9 of the sum, and none keeps it."""
+    asked = []
+
+    def jumping(x):
+        errors, slopes = decay(x)
+        asked.append(x)
+        return errors + slopes @ (3e-6 * _place(x, seed).uniform(-1, 1, 2)), slopes
+
+    assert descended(jumping, np.array([0.8, 3.0]), *FREE, 200).ended
+    assert len(asked) <= 15
+
+
+def test_a_place_much_worse_than_promised_is_not_taken_for_a_jump():
+    """The last step of the search, which promises less than a millionth, finds twice the residuals."""
+    asked = []
+
+    def residuals(x):
+        asked.append(x)
+        errors, slopes = decay(x)
+        return errors * (2 if len(asked) == 5 else 1), slopes
+
+    found, cost, ended = descended(residuals, np.array([0.8, 3.0]), *FREE, 200)
+    assert ended
+    assert len(asked) > 5
+    assert cost == pytest.approx(float(decay(found)[0] @ decay(found)[0]), rel=1e-9)
+
+
+def test_slopes_too_steep_to_be_squared_end_the_search():
+    with np.errstate(all="ignore"):
+        assert descended(lambda x: (np.ones(2), np.full((2, 2), 1e200)), np.ones(2), *FREE, 50).ended
+
+
+def test_what_was_refused_is_not_asked_again():
+    """Both unknowns stop at how far they may go, whatever the damping: a place that cannot be run is asked once."""
+    asked = []
+
+    def residuals(x):
+        asked.append(tuple(x))
+        return (x - 50.0, np.eye(2)) if (x < 1.6).all() else None
+
+    assert not descended(residuals, np.ones(2), *FREE, 12).ended
+    assert len(set(asked)) == len(asked) == 12
+
+
 def test_a_step_onto_a_bound_is_the_best_within_it():
     """Of a quadratic of three unknowns: what a bound stops stands on it, and the others have no slope there."""
     rng = np.random.default_rng(3)

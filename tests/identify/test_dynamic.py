@@ -399,6 +399,38 @@ def test_starts_on_several_cores_give_what_one_after_another_gives(monkeypatch):
     np.testing.assert_array_equal(found[0].values, found[1].values)
 
 
+def test_a_start_left_after_a_first_look_goes_on_as_if_it_had_not_been(monkeypatch):
+    plant, free = rigid_plant(), ("circuit.fill.conductance", "circuit.supply.pressure")
+    question = {"free": free, "observed": {"pressure": 300.0}, "starts": 5}
+    whole = fit_dynamic(plant, [rigid_fill(plant)], **question)
+    monkeypatch.setattr("airmuscle.identify.dynamic.fit.FIRST_LOOK", 3)
+    monkeypatch.setattr("airmuscle.identify.dynamic.fit.HOPELESS", np.inf)
+    np.testing.assert_array_equal(fit_dynamic(plant, [rigid_fill(plant)], **question).costs, whole.costs)
+    monkeypatch.setattr("airmuscle.identify.dynamic.fit.HOPELESS", 1.0)
+    left = fit_dynamic(plant, [rigid_fill(plant)], **question)
+    assert left.costs[-1] > 10 * whole.costs[-1]
+    assert left.costs[0] == pytest.approx(whole.costs[0], rel=1e-6)
+
+
+def test_a_run_of_far_more_steps_than_the_best_is_not_waited_for(monkeypatch):
+    """The first run may take what it takes; where any further one takes too many steps the search stays where it is."""
+    plant, path, allowed = rigid_plant(), "circuit.fill.conductance", []
+    guess, record, whole = changed(plant, circuit__fill__conductance=1.3), rigid_fill(plant), Rodas4.run
+
+    def noted(*arguments):
+        allowed.append(arguments[-1])
+        return whole(*arguments)
+
+    monkeypatch.setattr(Rodas4, "run", noted)
+    found = fit_dynamic(guess, [record], free=(path,), observed={"pressure": 300.0})
+    assert found[path].value == pytest.approx(truth(plant, path), rel=0.01)
+    assert allowed == [1_000_000, *[10_000] * (len(allowed) - 2), 1_000_000]  # the last is that of the result
+    monkeypatch.setattr("airmuscle.identify.dynamic.fit.FEW_STEPS", 10)
+    monkeypatch.setattr("airmuscle.identify.dynamic.fit.MANY", 0.5)
+    stays = fit_dynamic(guess, [record], free=(path,), observed={"pressure": 300.0})
+    assert stays[path].value == truth(guess, path)
+
+
 def test_an_interrupted_run_ends_the_fit(monkeypatch):
     """A start whose run is interrupted is not one that failed."""
     plant, record = rigid_plant(), rigid_fill(rigid_plant())

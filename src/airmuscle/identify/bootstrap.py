@@ -66,7 +66,8 @@ def bootstrap(
 
     `recordings` are those that were fitted; `by` says what is drawn: Runs(), Levels(...) or Specimens(), without it
     the first of which there are three. Rows that are cut off take part as far as the fit itself contradicts them.
-    Laws linear in their parameters are refitted all at once; for others `progress` is called with the part done.
+    Laws linear in their parameters are refitted all at once; others one by one from where the fit came to, and
+    `progress` is called with the part done.
     Raises IdentificationError.
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
@@ -144,7 +145,7 @@ def _one_by_one(fit: Fit, which: Places, drawn: Array, progress: Callable[[float
             weights=fit.problem.weights[kept] * np.sqrt(times[kept]),
         )
         try:
-            found[i] = solve(problem, fit.loss).values
+            found[i] = solve(problem, fit.loss, fit.values).values
         except (IdentificationError, np.linalg.LinAlgError):
             continue
     return found

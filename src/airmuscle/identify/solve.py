@@ -14,8 +14,10 @@ from .one_sided import least_squares_of, measured_alone_determine
 from .problem import Problem
 from .separable import linear_leaves, projected_start
 
-STEPS = 500
-"""Iterations after which a fit gives up; none that was seen needed a fifth of them."""
+SEARCHES = (("trf", 100), ("dogbox", 500), ("trf", 500))
+"""Methods of a fit, each after its iterations where the one before did not settle; the last gives up (chosen).
+
+The first creeps along a bound, which the second steps onto; where it does not creep, none that was seen needed 100."""
 _FINE = 1e-14
 _OFFSET = 1e-3
 """Relative offset at which parameters count as found, that of Bates and Watts."""
@@ -31,10 +33,13 @@ class Solution(NamedTuple):
     slopes: Array
 
 
-def solve(problem: Problem, loss: Loss) -> Solution:
-    """The free parameters that make the loss least. Raises IdentificationError where the search fails."""
+def solve(problem: Problem, loss: Loss, start: Array | None = None) -> Solution:
+    """The free parameters that make the loss least. Raises IdentificationError where the search fails.
+
+    It begins at `start`, which a refit knows; without it, at the best of several places where the law allows that.
+    """
     if not is_linear(problem):
-        return _solve_iterating(problem, loss, projected_start(problem))
+        return _solve_iterating(problem, loss, projected_start(problem) if start is None else start)
     found = _solve_linear(problem)
     if isinstance(loss, LeastSquares):
         return found
@@ -102,14 +107,16 @@ def _solve_iterating(problem: Problem, loss: Loss, start: Array) -> Solution:
         "ftol": _FINE,
         "xtol": _FINE,
         "gtol": None,
-        "max_nfev": STEPS,
     }
-    result = least_squares(errors, start / scale, **options)
-    if result.status <= 0 and not _is_least(result):  # it creeps along a bound, which the other method steps onto
-        result = least_squares(errors, result.x, method="dogbox", **options)
-    if result.status <= 0 and not _is_least(result):
+    scaled = start / scale
+    for method, most in SEARCHES:
+        result = least_squares(errors, scaled, method=method, max_nfev=most, **options)
+        scaled = result.x
+        if result.status > 0 or _is_least(result):
+            break
+    else:
         raise _no_end(problem)
-    values = np.clip(result.x * scale, low, high)
+    values = np.clip(scaled * scale, low, high)
     return Solution(values, problem.modelled(values), problem.slopes(values))
 
 
@@ -141,7 +148,8 @@ def _refuse_non_finite(problem: Problem, start: Array) -> None:
 
 
 def _no_end(problem: Problem) -> IdentificationError:
+    steps = sum(most for _, most in SEARCHES)
     return IdentificationError(
-        f"{problem.data.origin}: the fit of {type(problem.law).__name__} did not settle in {STEPS} steps. Start from "
+        f"{problem.data.origin}: the fit of {type(problem.law).__name__} did not settle in {steps} steps. Start from "
         "values nearer to the muscle, hold some parameters with fixed=, or choose a law with fewer."
     )

@@ -6,7 +6,7 @@ import ctypes
 import dataclasses
 import functools
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,7 @@ class Program:
         self.output_names = self._form.output_names
         self._engine = compiled(text)
         self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
+        self._prepare = _preparing(self._engine)
         self._steps: dict[Any, tuple[Any, int]] = {}
         self._compiling = threading.Lock()  # of two threads that ask for a step, one makes it: an engine must not go
 
@@ -48,7 +49,7 @@ class Program:
 
     def held(self, parameters: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """What the functions need of a set of parameters, computed once."""
-        return _handed(self._engine, parameters, self.sizes.held)
+        return self._prepare(parameters, self.sizes.held)
 
     def step(
         self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...], parameters: npt.NDArray[np.float64]
@@ -59,7 +60,7 @@ class Program:
                 text, held = self._printed_step(a, b)
                 self._steps[a, b] = compiled(text), held
         engine, held = self._steps[a, b]
-        return int(engine.get_function_address("step")), _handed(engine, parameters, held)
+        return int(engine.get_function_address("step")), _preparing(engine)(parameters, held)
 
     def _printed_step(self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...]) -> tuple[str, int]:
         if isinstance(self._form, tangent.Moved):
@@ -82,10 +83,16 @@ class Program:
 _PREPARE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 
 
-def _handed(engine: Any, parameters: npt.NDArray[np.float64], size: int) -> npt.NDArray[np.float64]:
-    handed = np.zeros(max(size, 1))
-    _PREPARE(engine.get_function_address("prepare"))(parameters.ctypes.data, handed.ctypes.data)
-    return handed
+def _preparing(engine: Any) -> Callable[[npt.NDArray[np.float64], int], npt.NDArray[np.float64]]:
+    """What a set of parameters leaves for functions of this machine code, so many numbers."""
+    function = _PREPARE(engine.get_function_address("prepare"))
+
+    def prepare(parameters: npt.NDArray[np.float64], size: int) -> npt.NDArray[np.float64]:
+        handed = np.zeros(max(size, 1))
+        function(parameters.ctypes.data, handed.ctypes.data)
+        return handed
+
+    return prepare
 
 
 _programs: dict[Any, Program] = {}

@@ -20,6 +20,10 @@ from .start import conditions, solved
 Array = npt.NDArray[np.float64]
 
 
+MOST_STEPS = 1_000_000
+"""Steps after which a run is given up."""
+
+
 class Course:
     """The model of one record, compiled once with its sensitivities; `unknowns` are all of the fit."""
 
@@ -43,7 +47,8 @@ class Course:
         self.ready = prepared(_sensitive(self.plant, groups, scales, self.names, experiment))
         self._nominal = self.ready.nominal()
         place = {leaf.path: i for i, leaf in enumerate(declare.leaves(self.plant))}
-        self._moved = [[place[path] for path in unknowns[k].paths] for k in self.mine]
+        moved = [(place[path], k) for k in self.mine for path in unknowns[k].paths]
+        self._moved = np.array([i for i, _ in moved], dtype=int), np.array([k for _, k in moved], dtype=int)
         self._leaves = declare.flatten(self.plant)
         self._conditions = conditions(self.plant, experiment.start)
         self._known = np.array(list(experiment.start.known.values()), dtype=float)
@@ -58,8 +63,8 @@ class Course:
     def leaves(self, values: Array) -> Array:
         """The plant's leaves with the unknowns at `values`."""
         found = self._leaves.copy()
-        for k, places in zip(self.mine, self._moved, strict=True):
-            found[places] = values[k]
+        places, unknowns = self._moved
+        found[places] = values[unknowns]
         return found
 
     def start(self, values: Array) -> tuple[Array, Array]:
@@ -80,24 +85,24 @@ class Course:
         shifts = [values[k] for k in self.mine if isinstance(self.unknowns[k].what, StartTime)]
         return float(shifts[0]) if shifts else self.experiment.start_time
 
-    def evaluate(self, values: Array) -> tuple[Array, Array]:
-        """What the model gives at the record's rows (N, Q), and its derivatives by all unknowns (N, Q, P).
+    def evaluate(self, values: Array, most_steps: int = MOST_STEPS) -> Modelled:
+        """What the model gives at the record's rows.
 
         Raises IdentificationError where the run fails or its start does not exist.
         """
-        outputs, before = self._outputs(values)
+        outputs, before, steps = self._outputs(values, most_steps)
         count, columns = len(self.names), self.ready.sizes.outputs // len(self.names) - 2
         by_column = outputs[:, count:-count].reshape(-1, count, columns)
         if len(self.columns) == len(self.unknowns):
-            return outputs[:, :count], by_column
+            return Modelled(outputs[:, :count], by_column, steps)
         slopes = np.zeros((*self.measured.shape, len(self.unknowns)))
         slopes[:, :, self.columns] = by_column[:, :, : len(self.columns)]
         for k in self.mine:
             if isinstance(self.unknowns[k].what, StartTime):
                 slopes[:, :, k] = np.where(before[:, None], 0.0, -outputs[:, -count:])
-        return outputs[:, :count], slopes
+        return Modelled(outputs[:, :count], slopes, steps)
 
-    def _outputs(self, values: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
+    def _outputs(self, values: Array, most_steps: int) -> tuple[Array, npt.NDArray[np.bool_], int]:
         from ...engine.kernel import evaluate
 
         state, slopes = self.start(values)
@@ -109,7 +114,7 @@ class Course:
         full[: state.size] = state
         if self.columns:
             full[state.size :] = slopes.ravel()
-        course = self.method.run(ready, clock.segments, 0.0, full, clock.times, most_steps=1_000_000)
+        course = self.method.run(ready, clock.segments, 0.0, full, clock.times, most_steps)
         if course.status == INTERRUPTED:
             raise KeyboardInterrupt
         if course.status != 0:
@@ -118,7 +123,7 @@ class Course:
             )
         results = np.empty((clock.times.size, ready.sizes.outputs))
         evaluate(ready.address["outputs"], ready.held, course.rows, clock.inputs, results)
-        return results, clock.before
+        return results, clock.before, course.steps
 
     def _clock(self, begin: float) -> _Clock:
         """The record seen from where the run begins; the last one is kept, as most fits ask for one alone."""
@@ -130,6 +135,14 @@ class Course:
             under = np.ascontiguousarray(segments.inputs_at(times, 0.0))
             self._last_clock = known = _Clock(begin, times, clock < 0, segments, under)
         return known
+
+
+class Modelled(NamedTuple):
+    """What the model gives at the rows (N, Q), its derivatives by all unknowns (N, Q, P), and the steps of the run."""
+
+    values: Array
+    slopes: Array
+    steps: int
 
 
 class _Clock(NamedTuple):
@@ -167,19 +180,22 @@ def _sensitive(
         raise ParameterError(f"{experiment.recording.origin}: {error}") from None
 
 
-def stacked(courses: Sequence[Course], values: Array, deviations: Array, scales: Array) -> tuple[Array, Array]:
+def stacked(
+    courses: Sequence[Course], values: Array, deviations: Array, scales: Array, most_steps: int = MOST_STEPS
+) -> tuple[Array, Array, int]:
     """Residuals (R,) in standard deviations, model less measured, rows without a reading left out.
 
-    And their slopes (R, P) by the unknowns in units of their scales.
+    And their slopes (R, P) by the unknowns in units of their scales, and the steps of the longest run.
     """
-    errors, slopes = [], []
+    errors, slopes, longest = [], [], 0
     for course in courses:
-        modelled, by = course.evaluate(values)
+        modelled, by, steps = course.evaluate(values, most_steps)
         error, by = (modelled - course.measured) / deviations, by * (scales / deviations[:, None])
-        whole = course.whole
+        whole, longest = course.whole, max(longest, steps)
         errors.append(error.ravel() if whole else error[course.kept])
         slopes.append(by.reshape(-1, scales.size) if whole else by[course.kept])
-    return (errors[0], slopes[0]) if len(errors) == 1 else (np.concatenate(errors), np.concatenate(slopes))
+    joined = (errors[0], slopes[0]) if len(errors) == 1 else (np.concatenate(errors), np.concatenate(slopes))
+    return *joined, longest
 
 
 def observations(courses: Sequence[Course]) -> Any:

@@ -67,7 +67,7 @@ class DynamicFit:
     def modelled(self, record: int = 0) -> Recording:
         """What the fitted plant gives at the rows of one record."""
         course = self.problem.courses[record]
-        values, _ = course.evaluate(self.values)
+        values = course.evaluate(self.values).values
         columns = {name: values[:, i] for i, name in enumerate(course.names)}
         return Recording({"time": course.times, **columns}, f"fit to {course.experiment.recording.origin}")
 
