@@ -32,6 +32,12 @@ class Variations:
         found[self.places] = self.values[index]
         return found
 
+    def table(self, indices: npt.NDArray[np.intp]) -> Array:
+        """All leaves (R, P) of some of the systems."""
+        found = np.repeat(declare.flatten(self.system)[None, :], indices.size, axis=0)
+        found[:, self.places] = self.values[indices]
+        return found
+
     def one(self, index: int) -> System:
         """One of the systems."""
         return declare.rebuild(self.system, self.parameters(index).tolist())
