@@ -26,7 +26,7 @@ class Table(Protocol):
 
 
 def balances(plants: Table, x: Array, f: Array) -> tuple[Rows, Array]:
-    """Every place of balance and the row of its plant, by row and place, from accelerations f (N, K) at rising x (N, K).
+    """Every place of balance and the row of its plant, by row and place, from accelerations f (N, K) at rising x.
 
     They are where f is 0, of a stretch in balance its two ends; one between every two places of different sign; and a
     pair where f comes near zero, crosses it and comes back.
@@ -88,7 +88,8 @@ class _Search(NamedTuple):
     last: Array
 
     def of(self, kept: Rows) -> _Search:
-        return _Search(*(part[kept] for part in self))
+        """Some of the rows."""
+        return _Search(self.rows[kept], *(part[kept] for part in self[1:]))
 
     def middle(self) -> Array:
         """Where a straight line between the ends crosses zero; half way where rounding would leave the ends."""
@@ -126,7 +127,8 @@ def _pairs(plants: Table, rows: Rows, x: Array, sign: Array) -> list[tuple[Rows,
     turn = _across(plants.of(rows).accelerations, x[0], x[2], sign)
     there = np.isfinite(turn)
     rows, x, turn = rows[there], x[:, there], turn[there]
-    return [_roots(plants, rows, *ends, np.full(rows.size, np.inf)) for ends in ((x[0], turn), (turn, x[2]))]
+    most = np.full(rows.size, np.inf)
+    return [_roots(plants, rows, low, high, most) for low, high in ((x[0], turn), (turn, x[2]))]
 
 
 def _across(function: Callable[[Array], Array], low: Array, high: Array, sign: Array) -> Array:

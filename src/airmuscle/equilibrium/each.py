@@ -69,8 +69,8 @@ def _rests(plants: SideBySide) -> Found:
     states = there.states(x[:, None])[:, 0]
     searched[rows[~np.isfinite(states).all(axis=1)]] = False
     stable = are_stable(plants.ready, plants.parameters[rows], states, plants.inputs)
-    nearness = sum(eps[:, 0] ** 2 for eps in there.contractions(x[:, None]))
-    order = np.lexsort((nearness, rows))  # of rests as near as each other the first
+    contracted = sum((eps[:, 0] ** 2 for eps in there.contractions(x[:, None])), np.zeros(rows.size))
+    order = np.lexsort((contracted, rows))  # of rests as near as each other the first
     order = order[(stable & searched[rows])[order]]
     first = np.diff(rows[order], prepend=-1) > 0
     found.states[rows[order][first]] = states[order][first]

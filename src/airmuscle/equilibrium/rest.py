@@ -66,7 +66,9 @@ def equilibrium(
     static = Static(plant, pressure, air_mass, inputs)
     if not static.shut:
         inputs_here = np.array(list(static.inputs.values()))
-        (state,), (searched,) = equilibrium_of_each(static.ready, static.ready.parameters[None], static.air, inputs_here)
+        (state,), (searched,) = equilibrium_of_each(
+            static.ready, static.ready.parameters[None], static.air, inputs_here
+        )
         if np.isfinite(state).all():
             return dict(zip(static.names, state.tolist(), strict=True))
         if searched:

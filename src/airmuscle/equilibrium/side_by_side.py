@@ -42,9 +42,7 @@ class SideBySide:
     columns: Plant
 
     @classmethod
-    def of_plants(
-        cls, ready: Prepared, parameters: Array, pressures: tuple[float, ...], inputs: Array
-    ) -> SideBySide:
+    def of_plants(cls, ready: Prepared, parameters: Array, pressures: tuple[float, ...], inputs: Array) -> SideBySide:
         """The plants that have these parameters (N, P)."""
         held = np.array([ready.program.held(row) for row in np.ascontiguousarray(parameters)])
         plant = ready.system

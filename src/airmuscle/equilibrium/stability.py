@@ -51,7 +51,7 @@ def are_stable(
             held = [i for i, n in enumerate(names) if n in air and n.startswith(prefix)]
             pushed = np.einsum("rij,rj->ri", by_state[:, free][:, :, held], states[:, held])
             matrix = matrix + pushed[:, :, None] * growth[:, None, :]
-    stable = np.isfinite(matrix).all(axis=(1, 2))
+    stable = np.array(np.isfinite(matrix).all(axis=(1, 2)))
     found = np.linalg.eigvals(matrix[stable])
     stable[stable] = found.real.max(axis=1) <= MARGIN * np.abs(found).max(axis=1)
     return stable

@@ -52,9 +52,7 @@ def _unbalance(muscle: Muscle) -> Callable[[Value, Value, Value], tuple[Array, A
     return without_slope
 
 
-def last_pulling(
-    function: Callable[[Array], tuple[Array, Array]], low: Array, high: Array, start: Array
-) -> Array:
+def last_pulling(function: Callable[[Array], tuple[Array, Array]], low: Array, high: Array, start: Array) -> Array:
     """The greatest x between `low` and `high` at which a falling function, given with its slope, is not below zero.
 
     Newton's method from `start` inside the bracket, which is halved where a step would leave it or is more than half of
