@@ -66,11 +66,12 @@ def _evaluated(thing: Any, method: str, arguments: tuple[Any, ...]) -> tuple[lis
 
 def _at(function: Any, parameters: Sequence[Any], arguments: Sequence[Any]) -> tuple[list[Any], tuple[int, ...]]:
     """What a traced function gives at numbers or arrays, and their shape; parameters may be arrays too, as of many."""
-    many = any(isinstance(value, np.ndarray) for value in parameters)
+    many = any(isinstance(value, np.ndarray) and value.size > 1 for value in parameters)
     broadcast = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (*arguments, *(parameters if many else ()))))
     rows = [x.reshape(1, -1) for x in broadcast]
     count = len(arguments)
-    vector = np.vstack(rows[count:]) if many else np.array(parameters, dtype=float)
+    numbers = [value.item() if isinstance(value, np.ndarray) else value for value in parameters if not many]
+    vector = np.vstack(rows[count:]) if many else np.array(numbers, dtype=float)
     return [r.full() for r in function(*rows[:count], vector)], broadcast[0].shape
 
 

@@ -11,6 +11,9 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.intp]
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+JUMP = 1e-6
+"""What may be left at a root, as a share of the places around (of which rounding is the same share of all places); a
+function that has more there changes its sign by a jump."""
 CLOSE = 1e-13
 """Step that ends a search for a root, as a share of the way that it began with: what is left is far less."""
 
@@ -39,21 +42,23 @@ def balances(plants: Table, x: Array, f: Array) -> tuple[Rows, Array]:
     rows, i = np.nonzero(exact)
     found = [(rows, x[rows, i])]
     rows, i = np.nonzero(crossing)
-    found.append(_roots(plants, rows, x[rows, i], x[rows, i + 1], np.maximum(*np.abs([f[rows, i], f[rows, i + 1]]))))
+    found.append(_roots(plants, rows, x[rows, i], x[rows, i + 1], _size(f, rows, i, 1)))
     rows, i = np.nonzero(nearing)
-    found += _pairs(plants, rows, np.stack([x[rows, i + k] for k in range(3)]), np.sign(f[rows, i + 1]))
+    around = np.stack([x[rows, i + k] for k in range(3)])
+    found += _pairs(plants, rows, around, np.sign(f[rows, i + 1]), _size(f, rows, i, 2))
     row, place = (np.concatenate(parts) for parts in zip(*found, strict=True))
     order = np.lexsort((place, row))
     return row[order], place[order]
 
 
-def _roots(plants: Table, rows: Rows, low: Array, high: Array, most: Array) -> tuple[Rows, Array]:
-    """The roots between places of different sign; a pole, beyond `most` of both ends, changes the sign without one."""
+def _roots(plants: Table, rows: Rows, low: Array, high: Array, size: Array) -> tuple[Rows, Array]:
+    """The roots between places of different sign, at which little is left of its `size`; where it passes through
+    infinity there is none."""
     if not rows.size:
         return rows, low
     there = plants.of(rows)
     root = between(there, low, high)
-    kept = np.abs(there.accelerations(root)) <= most
+    kept = np.abs(there.accelerations(root)) <= JUMP * size
     return rows[kept], root[kept]
 
 
@@ -120,15 +125,22 @@ def _nears_zero(f: Array) -> npt.NDArray[np.bool_]:
     return np.asarray(one_sign & (b <= np.minimum(a, c)) & (b < np.maximum(a, c)))
 
 
-def _pairs(plants: Table, rows: Rows, x: Array, sign: Array) -> list[tuple[Rows, Array]]:
-    """The two roots between three places (3, R), where the function crosses zero there and comes back."""
+def _size(f: Array, rows: Rows, i: Rows, way: int) -> Array:
+    """How large |f| is at places i and i + way, or by rounding."""
+    if not rows.size:
+        return np.empty(0)
+    rounding = JUMP * np.nanmedian(np.abs(f), axis=1)[rows]
+    return np.maximum(np.maximum(np.abs(f[rows, i]), np.abs(f[rows, i + way])), rounding)
+
+
+def _pairs(plants: Table, rows: Rows, x: Array, sign: Array, size: Array) -> list[tuple[Rows, Array]]:
+    """The two roots between three places x (3, R), where the function crosses zero there and comes back."""
     if not rows.size:
         return []
     turn = _across(plants.of(rows).accelerations, x[0], x[2], sign)
     there = np.isfinite(turn)
-    rows, x, turn = rows[there], x[:, there], turn[there]
-    most = np.full(rows.size, np.inf)
-    return [_roots(plants, rows, low, high, most) for low, high in ((x[0], turn), (turn, x[2]))]
+    rows, x, turn, size = rows[there], x[:, there], turn[there], size[there]
+    return [_roots(plants, rows, low, high, size) for low, high in ((x[0], turn), (turn, x[2]))]
 
 
 def _across(function: Callable[[Array], Array], low: Array, high: Array, sign: Array) -> Array:

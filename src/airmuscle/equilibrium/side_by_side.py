@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +31,7 @@ class SideBySide:
     held        (N, c) what the compiled functions need of them
     pressures   gauge pressure [Pa] of each muscle, the same in all plants
     inputs      (m,) the same for all
-    columns     the plant with an array (N, 1) in place of every leaf that differs
+    columns     the plant with an array (N, 1) in place of every leaf
     """
 
     ready: Prepared
@@ -123,11 +123,7 @@ class SideBySide:
 
 
 def _columns(plant: Plant, parameters: Array) -> Plant:
-    """The plant with a number for every leaf that all plants share, and an array (N, 1) for one that differs."""
-    if not len(parameters):
-        return plant
-    same = (parameters == parameters[0]).all(axis=0)
-    leaves: list[Any] = [
-        float(column[0]) if alike else column[:, None].copy() for column, alike in zip(parameters.T, same, strict=True)
-    ]
-    return declare.rebuild(plant, leaves)
+    """The plant with an array (N, 1) for every leaf, also of one plant: so it rests where it would beside others, to
+    the last digit, which a power of numbers would not be.
+    """
+    return declare.rebuild(plant, [column[:, None].copy() for column in parameters.T])
