@@ -12,8 +12,8 @@ Array = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.intp]
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 JUMP = 1e-6
-"""What may be left at a root, as a share of the places around (of which rounding is the same share of all places); a
-function that has more there changes its sign by a jump."""
+"""What may be left at a root, as a share of the middle one of all places; a function that has more there changes its
+sign by a jump."""
 CLOSE = 1e-13
 """Step that ends a search for a root, as a share of the way that it began with: what is left is far less."""
 
@@ -42,23 +42,25 @@ def balances(plants: Table, x: Array, f: Array) -> tuple[Rows, Array]:
     rows, i = np.nonzero(exact)
     found = [(rows, x[rows, i])]
     rows, i = np.nonzero(crossing)
-    found.append(_roots(plants, rows, x[rows, i], x[rows, i + 1], _size(f, rows, i, 1)))
+    found.append(_roots(plants, f, rows, x[rows, i], x[rows, i + 1]))
     rows, i = np.nonzero(nearing)
     around = np.stack([x[rows, i + k] for k in range(3)])
-    found += _pairs(plants, rows, around, np.sign(f[rows, i + 1]), _size(f, rows, i, 2))
+    found += _pairs(plants, f, rows, around, np.sign(f[rows, i + 1]))
     row, place = (np.concatenate(parts) for parts in zip(*found, strict=True))
     order = np.lexsort((place, row))
     return row[order], place[order]
 
 
-def _roots(plants: Table, rows: Rows, low: Array, high: Array, size: Array) -> tuple[Rows, Array]:
-    """The roots between places of different sign, at which little is left of its `size`; where it passes through
-    infinity there is none."""
+def _roots(plants: Table, f: Array, rows: Rows, low: Array, high: Array) -> tuple[Rows, Array]:
+    """The roots between places of different sign; where the function passes through infinity there is none."""
     if not rows.size:
         return rows, low
     there = plants.of(rows)
     root = between(there, low, high)
-    kept = np.abs(there.accelerations(root)) <= JUMP * size
+    left, size = np.abs(there.accelerations(root)), np.abs(f)[rows]
+    kept = left <= JUMP * np.nanmin(size, axis=1)
+    doubtful = np.flatnonzero(~kept)
+    kept[doubtful] = left[doubtful] <= JUMP * np.nanmedian(size[doubtful], axis=1)
     return rows[kept], root[kept]
 
 
@@ -97,10 +99,10 @@ class _Search(NamedTuple):
         return _Search(self.rows[kept], *(part[kept] for part in self[1:]))
 
     def middle(self) -> Array:
-        """Where a straight line between the ends crosses zero; half way where rounding would leave the ends."""
+        """Where a straight line between the ends crosses zero; an end itself where the root is no further than rounding."""
         with np.errstate(all="ignore"):
             crossing = self.low + (self.high - self.low) * self.at_low / (self.at_low - self.at_high)
-        return np.where((self.low < crossing) & (crossing < self.high), crossing, 0.5 * (self.low + self.high))
+        return np.where(np.isfinite(crossing), np.clip(crossing, self.low, self.high), 0.5 * (self.low + self.high))
 
     def narrowed(self, middle: Array, at: Array) -> _Search:
         """The part of each that holds the root; an end that stays twice counts for half."""
@@ -125,22 +127,14 @@ def _nears_zero(f: Array) -> npt.NDArray[np.bool_]:
     return np.asarray(one_sign & (b <= np.minimum(a, c)) & (b < np.maximum(a, c)))
 
 
-def _size(f: Array, rows: Rows, i: Rows, way: int) -> Array:
-    """How large |f| is at places i and i + way, or by rounding."""
-    if not rows.size:
-        return np.empty(0)
-    rounding = JUMP * np.nanmedian(np.abs(f), axis=1)[rows]
-    return np.maximum(np.maximum(np.abs(f[rows, i]), np.abs(f[rows, i + way])), rounding)
-
-
-def _pairs(plants: Table, rows: Rows, x: Array, sign: Array, size: Array) -> list[tuple[Rows, Array]]:
+def _pairs(plants: Table, f: Array, rows: Rows, x: Array, sign: Array) -> list[tuple[Rows, Array]]:
     """The two roots between three places x (3, R), where the function crosses zero there and comes back."""
     if not rows.size:
         return []
     turn = _across(plants.of(rows).accelerations, x[0], x[2], sign)
     there = np.isfinite(turn)
-    rows, x, turn, size = rows[there], x[:, there], turn[there], size[there]
-    return [_roots(plants, rows, low, high, size) for low, high in ((x[0], turn), (turn, x[2]))]
+    rows, x, turn = rows[there], x[:, there], turn[there]
+    return [_roots(plants, f, rows, low, high) for low, high in ((x[0], turn), (turn, x[2]))]
 
 
 def _across(function: Callable[[Array], Array], low: Array, high: Array, sign: Array) -> Array:
