@@ -250,13 +250,17 @@ def test_a_plant_without_an_equilibrium_is_reported():
 def test_plants_that_differ_in_their_circuit_alone_share_the_search_for_rest(monkeypatch):
     from airmuscle.batch import starts
 
-    asked = []
-    search = starts.equilibrium
+    asked, search = [], starts.equilibrium_of_each
     monkeypatch.setattr(
-        starts, "equilibrium", lambda plant, pressure: asked.append(1) or search(plant, pressure=pressure)
+        starts,
+        "equilibrium_of_each",
+        lambda ready, table, *more: asked.append(len(table)) or search(ready, table, *more),
     )
-    simulate_batch(plain(), around({"circuit.fill.conductance": 5e-9}, 6), REST, duration=0.1, method=FAST)
-    assert len(asked) == 1
+    varied = around({"circuit.fill.conductance": 5e-9}, 6)
+    simulate_batch(plain(), varied, REST, duration=0.1, method=FAST)
+    assert asked == [1]
+    simulate_batch(plain(), {**varied, "mechanism.mass": [4, 5, 4, 4, 6, 5]}, REST, duration=0.1, method=FAST)
+    assert asked == [1, 3]
 
 
 @pytest.mark.parametrize(

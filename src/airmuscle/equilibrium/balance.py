@@ -99,7 +99,7 @@ class _Search(NamedTuple):
         return _Search(self.rows[kept], *(part[kept] for part in self[1:]))
 
     def middle(self) -> Array:
-        """Where a straight line between the ends crosses zero; an end itself where the root is no further than rounding."""
+        """Where a straight line between the ends crosses zero; an end itself where the root is within its rounding."""
         with np.errstate(all="ignore"):
             crossing = self.low + (self.high - self.low) * self.at_low / (self.at_low - self.at_high)
         return np.where(np.isfinite(crossing), np.clip(crossing, self.low, self.high), 0.5 * (self.low + self.high))

@@ -90,5 +90,6 @@ def _candidates(plants: SideBySide) -> tuple[npt.NDArray[np.intp], Array, npt.ND
     looked = ~np.isnan(x)
     plain = allowed & looked.any(axis=1) & (np.isfinite(f) | ~looked).all(axis=1) & ((f != 0.0) & looked).any(axis=1)
     rows = np.flatnonzero(plain)
-    found, place = balances(plants.of(rows), x[rows], f[rows])
+    those = plants if plain.all() else plants.of(rows)
+    found, place = balances(those, x[rows], f[rows])
     return rows[found], place, plain

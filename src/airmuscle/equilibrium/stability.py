@@ -43,13 +43,13 @@ def are_stable(
     free = [i for i, n in enumerate(names) if n in moving]
     if not free:
         return np.ones(len(states), dtype=bool)
-    by_state, volumes, growths = _slopes(ready, parameters, states, inputs)
-    matrix = by_state[:, free][:, :, free]
+    by_state, volumes, growths = _slopes(ready, free, parameters, states, inputs)
+    matrix = by_state[:, :, free]
     if not shut:
         for k, prefix in enumerate(plant.prefixes):
             growth = growths[:, k, free] / volumes[:, k, None]
             held = [i for i, n in enumerate(names) if n in air and n.startswith(prefix)]
-            pushed = np.einsum("rij,rj->ri", by_state[:, free][:, :, held], states[:, held])
+            pushed = np.einsum("rij,rj->ri", by_state[:, :, held], states[:, held])
             matrix = matrix + pushed[:, :, None] * growth[:, None, :]
     stable = np.array(np.isfinite(matrix).all(axis=(1, 2)))
     found = np.linalg.eigvals(matrix[stable])
@@ -68,17 +68,19 @@ def _kinds(plant: Plant) -> tuple[set[str], set[str]]:
     return air, moving - friction
 
 
-def _slopes(ready: Prepared, parameters: Array, states: Array, inputs: Array) -> tuple[Array, Array, Array]:
-    """Rates by states (R, n, n), the volume of every muscle (R, k), and these by states (R, k, n)."""
+def _slopes(
+    ready: Prepared, free: list[int], parameters: Array, states: Array, inputs: Array
+) -> tuple[Array, Array, Array]:
+    """Rates of f free states by all (R, f, n), the volume of every muscle (R, k), and these by states (R, k, n)."""
     count, size = states.shape
-    results = _function(ready)(states.T, np.repeat(inputs[:, None], count, axis=1), parameters.T)
+    results = _function(ready, free)(states.T, np.repeat(inputs[:, None], count, axis=1), parameters.T)
     by_state, volumes, growths = (r.full() for r in results)
     stacked = [part.reshape(-1, count, size).transpose(1, 0, 2) for part in (by_state, growths)]
     return stacked[0], volumes.T, stacked[1]
 
 
-def _function(ready: Prepared) -> Any:
-    """(x, u, p) -> (df/dx, V, dV/dx), differentiated once for a structure."""
+def _function(ready: Prepared, free: list[int]) -> Any:
+    """(x, u, p) -> (df/dx of what is free, V, dV/dx), differentiated once for a structure, which says what is free."""
     program, plant = ready.program, ready.system
     assert isinstance(plant, Plant)
     if program not in _functions:
@@ -86,6 +88,6 @@ def _function(ready: Prepared) -> Any:
 
         t = program.traced
         volumes = casadi.vertcat(*(t.o[ready.output_names.index(f"{prefix}volume")] for prefix in plant.prefixes))
-        wanted = [casadi.jacobian(t.f, t.x), volumes, casadi.jacobian(volumes, t.x)]
+        wanted = [casadi.jacobian(t.f[free], t.x), volumes, casadi.jacobian(volumes, t.x)]
         _functions[program] = casadi.Function("motion", [t.x, t.u, t.p], casadi.cse(wanted))
     return _functions[program]
