@@ -20,6 +20,9 @@ from airmuscle.command import REST
 from airmuscle.contact import HuntCrossley
 from airmuscle.declare import model, parameter
 from airmuscle.equilibrium import equilibria, equilibrium, equilibrium_of_each
+from airmuscle.equilibrium.one_coordinate import grid
+from airmuscle.equilibrium.reach import grids
+from airmuscle.equilibrium.side_by_side import SideBySide
 from airmuscle.equilibrium.static import Static
 from airmuscle.errors import AirmuscleError, NoEquilibrium, ParameterError
 from airmuscle.gas import Ambient, Polytropic
@@ -242,6 +245,18 @@ def test_a_pole_is_no_rest():
     assert as_alone(plant, varied(plant, 3), 1e5)[1].searched.all()
 
 
+@pytest.mark.parametrize("name", ["lever", "two muscles on a lever", "joint with stops", "mass on a spring"])
+def test_they_are_looked_at_in_the_same_places(name):
+    """Ends of the reach and all, whether contractions are straight lines over the coordinate or not."""
+    plant = PLANTS[name]
+    table = varied(plant, 4)
+    ready = prepared(plant)
+    each = SideBySide.of_plants(ready, table, (0.0,) * len(plant.muscles), np.zeros(len(plant.inputs)))
+    for row, x in zip(table, grids(each), strict=True):
+        alone = grid(Static(declare.with_parameters(plant, row.tolist()), 0.0, None))
+        np.testing.assert_allclose(x[np.isfinite(x)], alone, rtol=0.0, atol=1e-15)
+
+
 # What is asked alone
 
 
@@ -279,13 +294,15 @@ def test_a_plant_beyond_its_reach_or_in_a_vacuum_is_asked_alone_and_its_neighbou
     table = np.repeat(declare.flatten(plant)[None, :], 3, axis=0)
     table[1, paths.index("mechanism.contraction")] = -0.2
     assert found(plant, table, 1e5).searched.tolist() == [True, False, True]
-    table = np.repeat(declare.flatten(plant)[None, :], 2, axis=0)
-    table[0, paths.index("ambient.pressure")] = 5e4
-    of_each = found(plant, table, -6e4)
-    assert of_each.searched.tolist() == [False, True]
-    assert np.isfinite(of_each.states).all(axis=1).tolist() == [False, True]
-    with pytest.raises(ParameterError, match="below absolute zero"):
-        equilibrium(replace(plant, ambient=Ambient(5e4)), pressure=-6e4)
+    for one in (plant, pulled(SpringLoad(5.0, 2000.0, 1.0, -200.0))):
+        paths = [leaf.path for leaf in declare.leaves(one)]
+        table = np.repeat(declare.flatten(one)[None, :], 2, axis=0)
+        table[0, paths.index("ambient.pressure")] = 5e4
+        of_each = found(one, table, -6e4)
+        assert of_each.searched.tolist() == [False, True]
+        assert np.isnan(of_each.states[0]).all()
+        with pytest.raises(ParameterError, match="below absolute zero"):
+            equilibrium(replace(one, ambient=Ambient(5e4)), pressure=-6e4)
 
 
 def test_an_input_that_one_of_them_refuses_is_asked_alone():

@@ -13,6 +13,7 @@ from airmuscle import declare, trace
 from airmuscle.characteristic import VirtualWork
 from airmuscle.contact import HuntCrossley
 from airmuscle.muscle import CubicSpring, EndStop, LinearSpring, SeriesSpring
+from airmuscle.muscle.settle import last_pulling
 
 STOP = EndStop(0.1, HuntCrossley(1e9, 0.5))
 
@@ -85,6 +86,29 @@ def test_inside_it_settles_in_a_few_looks(monkeypatch):
                 muscle.settled(p, contraction)
                 flat = muscle.spring == LinearSpring(0.0) and p == 0.0  # no slope leads to the end of a stretch at zero
                 assert len(looks) <= (70 if flat else 20)
+
+
+def test_a_search_that_newtons_method_only_creeps_to_is_halved():
+    """Of -(x - a)^9 every step of Newton's leaves eight ninths of the way, of which 300 would be needed."""
+    looks = []
+
+    def function(x):
+        looks.append(1)
+        return -((x - 0.3) ** 9), -9.0 * (x - 0.3) ** 8
+
+    zero = np.array([0.0, -0.2])
+    found = last_pulling(function, zero, zero + 1.0, zero)
+    np.testing.assert_allclose(found, 0.3, rtol=0.0, atol=1e-13)
+    assert len(looks) < 120
+
+
+def test_of_a_stretch_at_zero_the_far_end_is_meant():
+    def function(x):
+        return np.maximum(0.1 - x, 0.0) - np.maximum(x - 0.2, 0.0), -1.0 * ((x < 0.1) | (x > 0.2))
+
+    for start in (0.0, 0.15, 0.5):
+        found = last_pulling(function, np.array([0.0]), np.array([0.5]), np.array([start]))
+        np.testing.assert_allclose(found, 0.2, rtol=0.0, atol=1e-14)
 
 
 def test_a_table_of_muscles_settles_as_each_of_them():
