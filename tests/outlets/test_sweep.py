@@ -222,6 +222,14 @@ def test_where_the_runs_of_a_chunk_begin_is_found_at_once_and_is_what_each_finds
     assert len({rest["air_mass"] for rest in rests}) == 22
 
 
+def test_a_number_may_follow_any_that_varies(folder: Path):
+    content = (folder / "study.toml").read_text(encoding="utf-8")
+    follow = '[follow]\n"circuit.fill.critical_ratio" = "mechanism.contraction"\n[design]'
+    (folder / "study.toml").write_text(content.replace("[design]", follow), encoding="utf-8")
+    study = load_study(folder / "study.toml")
+    assert study.scenario(5).plant.circuit.fill.critical_ratio == study.values[5, 1]
+
+
 def test_a_start_that_varies_or_is_no_rest_is_found_run_by_run(folder: Path):
     edited(
         folder, '"mechanism.contraction" =', '"run.start.pressure" = { model = "Uniform", low = 0, high = 1e5 }\n"x" ='
