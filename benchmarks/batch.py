@@ -20,8 +20,11 @@ from ode8 import compilers
 
 from airmuscle import declare
 from airmuscle.batch import Double, Precision, Single, simulate_batch
+from airmuscle.batch.starts import resting_starts
 from airmuscle.batch.threads import cores_here
+from airmuscle.batch.variations import variations_of
 from airmuscle.command import Schedule
+from airmuscle.equilibrium import equilibrium
 from airmuscle.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE
 from airmuscle.method import RungeKutta4
 from airmuscle.plant import Plant
@@ -35,6 +38,8 @@ WIDEST = "-mprefer-vector-width=512"
 SPREAD = 0.05
 COMMAND = Schedule({"fill": ((0.5, 1.0), (2.0, 0.0)), "discharge": ((3.0, 1.0), (4.0, 0.0))})
 SWITCHED = (0.5, 2.0, 3.0, 4.0)
+FEW = 20
+"""Plants that are asked one by one where they rest."""
 GROWTH = (1, 100, 1000, 10_000, 100_000)
 HEADING = ("variant", "plants", "cores", "median", "least", "million plant-steps a second")
 TEXT = (
@@ -43,7 +48,8 @@ TEXT = (
     "everything that depends on parameters alone computed before; `simulate_batch` is timed whole, with the check "
     f"of every parameter. Of NumPy, which uses one core, {SHORT:g} s are run and counted as 5 s. The C has no "
     "branch; the library goes around shut valves and the tangent of a box not left, where that holds for all "
-    "plants of a register row, as it does here."
+    "plants of a register row, as it does here. All these start at one state; where each of the plants rests "
+    "at ambient pressure is what a batch without a start asks first."
 )
 WHY = (
     "both sides are bound by the same multiplications, roots and quotients; the library skips shut valves and a "
@@ -191,6 +197,32 @@ def growth() -> list[tuple[str, ...]]:
     return rows
 
 
+def rests(count: int, rounds: int) -> tuple[list[tuple[str, ...]], Bar]:
+    """Where each plant rests at ambient pressure, as `simulate_batch` asks where no start is given, and one by one."""
+    plant = hanging()
+    different = variations_of(plant, varied(plant, count), None)
+    few = range(min(FEW, count))
+
+    def together() -> Array:
+        return resting_starts(different, lambda done: None)[0]
+
+    def alone() -> Array:
+        return np.array([list(equilibrium(different.one(i), pressure=0.0).values()) for i in few])
+
+    refuse_other_ends({"alone": alone().T, "together": together()[: len(few)].T}, "together", runs()[3].nominal)
+    times = interleaved({"together": together, "alone": alone}, rounds)
+    each, size = times["together"].median / count, f"{len(few)}"
+    rows = [
+        ("where each rests, all at once", f"{count}", "1", *map(of_time, _ends(times["together"])), ""),
+        ("where each rests, one by one", size, "1", *map(of_time, _ends(times["alone"])), ""),
+    ]
+    return rows, Bar("where a plant rests, found with the others", each * 1e6, 50.0, "us")
+
+
+def _ends(times: Times) -> tuple[float, float]:
+    return times.median, times.least
+
+
 def _row(name: str, count: int, cores: int, times: Times, seconds: float, factor: float = 1.0) -> tuple[str, ...]:
     speed = count * seconds * factor / STEP / (times.median * factor) / 1e6
     shortened = f" ({seconds:g} s simulated)" if seconds != DURATION else ""
@@ -229,8 +261,10 @@ def section(rounds: int = 5, count: int = PLANTS, seconds: float = DURATION) -> 
     refuse_other_ends({"NumPy": slow["NumPy"](), "lanes": slow["short"]()}, "lanes", runs()[3].nominal)
     rows = [_row(name, count, timed[name][0], t, seconds) for name, t in times.items()]
     rows.append(_row("vectorised NumPy", count, 1, by_numpy["NumPy"], short))
+    of_rests, quick = rests(count, rounds)
+    rows += of_rests
     scaled = Times(tuple(t * seconds / short for t in by_numpy["NumPy"].rounds))
-    bars = _bars(times, scaled)
+    bars = (*_bars(times, scaled), quick)
     if (count, seconds) == (PLANTS, DURATION):
         rows += growth()
         rows.append(("memory for 100 000 plants, beyond that for 16", "100000", "1", memory(), "", ""))

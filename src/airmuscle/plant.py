@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from .circuit import Circuit, Response
@@ -244,25 +244,47 @@ class Plant:
         for name in values:
             if name not in free:
                 raise ParameterError(f"Plant: no coordinate '{name}'; there are {', '.join(free) or 'none'}.")
-        state = {n: 0.0 for c in self.mechanism.coordinates for n in (c.name, c.speed)} | values
+        state: dict[str, Value] = {n: 0.0 for c in self.mechanism.coordinates for n in (c.name, c.speed)} | values
         contractions = self.mechanism.contractions(state, self.resting_lengths)
-        airs = []
-        for muscle, prefix, p, eps in zip(self.muscles, self.prefixes, pressures, contractions, strict=True):
+        for muscle, p, eps in zip(self.muscles, pressures, contractions, strict=True):
             refuse_vacuum(p, self.ambient)
             muscle.geometry.refuse_out_of_reach(eps)
-            own = {**muscle.settled(p, eps), **within(prefix, values)}
-            volume = muscle.volume(muscle.inner_contraction(eps, own), own)
+        state, volumes = self.settled_muscles(pressures, state)
+        for muscle, p, volume in zip(self.muscles, pressures, volumes, strict=True):
             if not volume > 0.0:
                 raise ParameterError(
                     f"Plant: {muscle.name} encloses {volume:g} m3 at {p:g} Pa; its wall gives too much."
                 )
+        state = self.filled(pressures, volumes, state)
+        return {name: float(state[name]) for name in order}
+
+    def settled_muscles(
+        self, pressures: Sequence[Value], state: Mapping[str, Value]
+    ) -> tuple[dict[str, Value], list[Value]]:
+        """The muscles' own states added to `state`, settled at these gauge pressures [Pa] unless they are there, and
+        the volume [m3] of each. Nothing is refused; values and parameters of the plant may be arrays that broadcast.
+        """
+        found, volumes = dict(state), []
+        contractions = self.mechanism.contractions(state, self.resting_lengths)
+        for muscle, prefix, p, eps in zip(self.muscles, self.prefixes, pressures, contractions, strict=True):
+            own = {**muscle.settled(p, eps), **within(prefix, state)}
+            volumes.append(muscle.volume(muscle.inner_contraction(eps, own), own))
+            found = {**outside(prefix, own), **found}
+        return found, volumes
+
+    def filled(
+        self, pressures: Sequence[Value], volumes: Sequence[Value], state: Mapping[str, Value]
+    ) -> dict[str, Value]:
+        """The state with air at these gauge pressures [Pa] in muscles of these volumes [m3], and circuits settled."""
+        found, airs = dict(state), []
+        for prefix, p, volume in zip(self.prefixes, pressures, volumes, strict=True):
             content = self.gas.content(absolute(p, self.ambient), volume, self.ambient)
             airs.append(self.gas.air(content, volume, self.ambient))
-            state = {**outside(prefix, {**content, **own}), **state}
+            found |= outside(prefix, content)
         shares = [tuple(airs)] if len(self.circuits) < len(airs) else [(air,) for air in airs]
         for (prefix, circuit), share in zip(self._circuits(), shares, strict=True):
-            state = {**outside(prefix, circuit.settled(share, self.ambient)), **state}
-        return {name: float(state[name]) for name in order}
+            found = {**outside(prefix, circuit.settled(share, self.ambient)), **found}
+        return found
 
 
 def _of_muscle(prefix: str, muscle: Muscle, states: tuple[StateVariable, ...]) -> list[StateVariable]:

@@ -17,7 +17,7 @@ from .loop import Loop, LoopMemory
 from .method import Method, Stepper
 from .plant import Plant
 from .program import System
-from .start import least_state
+from .start import least_states
 from .terms import output_times, refuse_beyond_range
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def sampling(
     cuts = np.searchsorted(times, edges, side="right")
     return Sampling(
         loop, method.stepper(ready), driven, inputs, places, ranges_of(plant, loop), _looking(ready, loop), course,
-        firsts.tolist(), setpoint, start, edges, sampled, times, [0, *cuts[1:].tolist()], least_state(plant),
+        firsts.tolist(), setpoint, start, edges, sampled, times, [0, *cuts[1:].tolist()], least_states(plant),
     )  # fmt: skip
 
 

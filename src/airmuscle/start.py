@@ -57,14 +57,13 @@ def number_of(what: str, value: Any) -> float:
 
 def less_than_none(system: System, values: Array) -> npt.NDArray[np.bool_]:
     """For states (..., n) of a Plant, where there is less air than none: a step was far too long for its valves."""
-    return np.asarray(values < least_state(system))
+    return np.asarray(values < least_states(system))
 
 
-def least_state(system: System) -> Array:
-    """The least that each state (n,) may be: no less air than none, and minus infinity for all else."""
-    if not isinstance(system, Plant):
-        return np.full(len(system.states), -np.inf)
-    return np.array([-ROUNDING * s.nominal if s.name.endswith(_OF_AIR) else -np.inf for s in system.states])
+def least_states(system: System) -> Array:
+    """What each state (n,) of a Plant may be at least, lest there be less air than none; elsewhere minus infinity."""
+    of_air = _OF_AIR if isinstance(system, Plant) else ()
+    return np.array([-ROUNDING * s.nominal if s.name.endswith(of_air) else -np.inf for s in system.states])
 
 
 def refuse_impossible(plant: Plant, state: Mapping[str, float]) -> None:

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from . import declare, ops
 from .errors import TraceError
 
+Array = npt.NDArray[np.float64]
 _functions: dict[Any, Any] = {}
 
 
@@ -58,10 +59,20 @@ def _function(thing: Any, method: str, count: int) -> Any:
 
 
 def _evaluated(thing: Any, method: str, arguments: tuple[Any, ...]) -> tuple[list[Any], tuple[int, ...], int]:
-    broadcast = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in arguments))
+    function = _function(thing, method, len(arguments))
+    results, shape = _at(function, [leaf.value for leaf in declare.leaves(thing)], arguments)
+    return results, shape, math.prod(shape)
+
+
+def _at(function: Any, parameters: Sequence[Any], arguments: Sequence[Any]) -> tuple[list[Any], tuple[int, ...]]:
+    """What a traced function gives at numbers or arrays, and their shape; parameters may be arrays too, as of many."""
+    many = any(isinstance(value, np.ndarray) and value.size > 1 for value in parameters)
+    broadcast = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (*arguments, *(parameters if many else ()))))
     rows = [x.reshape(1, -1) for x in broadcast]
-    results = _function(thing, method, len(arguments))(*rows, declare.flatten(thing))
-    return [np.asarray(r) for r in results], broadcast[0].shape, rows[0].size
+    count = len(arguments)
+    numbers = [value.item() if isinstance(value, np.ndarray) else value for value in parameters if not many]
+    vector = np.vstack(rows[count:]) if many else np.array(numbers, dtype=float)
+    return [r.full() for r in function(*rows[:count], vector)], broadcast[0].shape
 
 
 def slope(thing: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
@@ -122,6 +133,40 @@ def pulled_back(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], wei
 
     x, values = _symbolic_values(function, len(at))
     return _put_in(casadi.jtimes(values, x, casadi.vertcat(*weights), True), x, at, ops.is_symbol(*at, *weights))
+
+
+def with_slope(thing: Any, method: str, count: int, wrt: int = 0) -> Callable[..., tuple[Any, Any]]:
+    """`thing.method` of `count` arguments together with its exact derivative by number `wrt`, for a search.
+
+    The function takes numbers, or arrays that broadcast, and gives numbers or arrays of their shape. The parameters of
+    `thing` may be arrays too.
+    """
+    import casadi
+
+    key = (declare.structure(thing), method, count, wrt)
+    if key not in _functions:
+        model, symbols = symbolic(thing)
+        x = [casadi.SX.sym(f"x{i}") for i in range(count)]
+        value = casadi.SX(getattr(model, method)(*x))
+        refuse_non_finite(value, f"{type(thing).__name__}.{method}")
+        _functions[key] = casadi.Function("law", [*x, symbols], casadi.cse([value, casadi.jacobian(value, x[wrt])]))
+    function, parameters = _functions[key], [leaf.value for leaf in declare.leaves(thing)]
+    if any(isinstance(value, np.ndarray) for value in parameters):
+        return lambda *arguments: _valued(function, parameters, arguments)
+    vector = casadi.DM(np.array(parameters, dtype=float))
+
+    def both(*arguments: Any) -> tuple[Any, Any]:
+        if any(isinstance(x, np.ndarray) for x in arguments):
+            return _valued(function, parameters, arguments)
+        value, derivative = function(*arguments, vector)
+        return float(value), float(derivative)
+
+    return both
+
+
+def _valued(function: Any, parameters: Sequence[Any], arguments: Sequence[Any]) -> tuple[Any, Any]:
+    (value, derivative), shape = _at(function, parameters, arguments)
+    return value.reshape(shape), derivative.reshape(shape)
 
 
 def _is_jax(*operands: Any) -> bool:

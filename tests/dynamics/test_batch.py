@@ -73,7 +73,7 @@ def greatest_difference(found: Batch, index, run):
     worst = 0.0
     for name, column in found.columns.items():
         size = max(sizes.get(name, 0.0), np.abs(run[name]).max(), 1e-300)
-        worst = max(worst, np.abs(column[index] - run[name][rows]).max() / size)
+        worst = np.maximum(worst, np.abs(column[index] - run[name][rows]).max() / size)  # not a number stays one
     return worst
 
 
@@ -250,13 +250,17 @@ def test_a_plant_without_an_equilibrium_is_reported():
 def test_plants_that_differ_in_their_circuit_alone_share_the_search_for_rest(monkeypatch):
     from airmuscle.batch import starts
 
-    asked = []
-    search = starts.equilibrium
+    asked, search = [], starts.equilibrium_of_each
     monkeypatch.setattr(
-        starts, "equilibrium", lambda plant, pressure: asked.append(1) or search(plant, pressure=pressure)
+        starts,
+        "equilibrium_of_each",
+        lambda ready, table, *more: asked.append(len(table)) or search(ready, table, *more),
     )
-    simulate_batch(plain(), around({"circuit.fill.conductance": 5e-9}, 6), REST, duration=0.1, method=FAST)
-    assert len(asked) == 1
+    varied = around({"circuit.fill.conductance": 5e-9}, 6)
+    simulate_batch(plain(), varied, REST, duration=0.1, method=FAST)
+    assert asked == [1]
+    simulate_batch(plain(), {**varied, "mechanism.mass": [4, 5, 4, 4, 6, 5]}, REST, duration=0.1, method=FAST)
+    assert asked == [1, 3]
 
 
 @pytest.mark.parametrize(
@@ -284,6 +288,21 @@ def test_parameters_that_do_not_go_together_name_the_row():
     assert any(leaf.path == next(iter(varied)) for leaf in declare.leaves(law))
     with pytest.raises(ParameterError, match=r"variations, row 2: "):
         simulate_batch(law, varied, PULSE, duration=0.1, method=FAST)
+
+
+def test_so_do_those_of_a_model_whose_numbers_stand_in_a_list():
+    @model
+    class Rising(Functions):
+        weights: tuple[float, ...] = parameter("1", "w_i", "weights that rise", default=(1.0, 2.0))
+
+        def check(self):
+            if not self.weights[0] < self.weights[1]:
+                raise ParameterError(f"Rising: {self.weights[0]:g} is not below {self.weights[1]:g}.")
+
+    with pytest.raises(ParameterError, match=r"variations, row 1: Rising: 3 is not below 2"):
+        simulate_batch(
+            Rising(), {"weights[0]": [1.0, 3.0]}, REST, duration=0.1, start={"x": 0.0, "y": 0.0}, method=FAST
+        )
 
 
 @model

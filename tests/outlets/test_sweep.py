@@ -214,6 +214,34 @@ def test_a_run_is_what_simulate_gives(folder: Path):
     assert scenario.plant.mechanism.contraction == result.study.values[5, 1]
 
 
+def test_where_the_runs_of_a_chunk_begin_is_found_at_once_and_is_what_each_finds_alone(folder: Path):
+    study = load_study(folder / "study.toml")
+    rests = study.rests(range(22))
+    assert [rest == study.scenario(run).start for run, rest in enumerate(rests)] == [True] * 22
+    assert study.scenario(3, rests[3]).start == rests[3]
+    assert len({rest["air_mass"] for rest in rests}) == 22
+
+
+def test_a_number_may_follow_any_that_varies(folder: Path):
+    content = (folder / "study.toml").read_text(encoding="utf-8")
+    follow = '[follow]\n"circuit.fill.critical_ratio" = "mechanism.contraction"\n[design]'
+    (folder / "study.toml").write_text(content.replace("[design]", follow), encoding="utf-8")
+    study = load_study(folder / "study.toml")
+    assert study.scenario(5).plant.circuit.fill.critical_ratio == study.values[5, 1]
+
+
+def test_a_start_that_varies_or_is_no_rest_is_found_run_by_run(folder: Path):
+    edited(
+        folder, '"mechanism.contraction" =', '"run.start.pressure" = { model = "Uniform", low = 0, high = 1e5 }\n"x" ='
+    )
+    text = (folder / "study.toml").read_text(encoding="utf-8")
+    (folder / "study.toml").write_text(re.sub(r'"x" = .*\n', "", text), encoding="utf-8")
+    study = load_study(folder / "study.toml")
+    assert study.rests(range(4)) == [None] * 4
+    assert len({study.scenario(run).start["air_mass"] for run in range(4)}) == 4
+    assert not run(folder).failed.size
+
+
 # What is computed anew
 
 

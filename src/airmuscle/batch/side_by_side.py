@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from ..errors import ParameterError
 from ..method import Explicit
-from ..start import less_than_none
 from .precision import Precision
 from .task import Task
 from .threads import Queue
@@ -51,18 +50,14 @@ class Table:
     """The segments of all plants, one after the other, and where those of each stand; equal commands share theirs."""
 
     def __init__(self, task: Task) -> None:
-        places: dict[int, tuple[int, int]] = {}
-        different = []
-        for segments in task.segments:
-            if id(segments) not in places:
-                end = places[next(reversed(places))][1] if places else 0
-                places[id(segments)] = end, end + segments.ends.size
-                different.append(segments)
+        of_object = {id(segments): segments for segments in task.segments}
+        different, number = list(of_object.values()), {key: i for i, key in enumerate(of_object)}
         self.ends = np.concatenate([s.ends for s in different])
         self.values = np.ascontiguousarray(np.concatenate([s.values for s in different]))
         self.slopes = np.ascontiguousarray(np.concatenate([s.slopes for s in different]))
-        bounds = np.array([places[id(segments)] for segments in task.segments], dtype=np.int64)
-        self.first, self.last = bounds[:, 0].copy(), bounds[:, 1].copy()
+        ends = np.cumsum([s.ends.size for s in different])
+        mine = np.array([number[key] for key in map(id, task.segments)])
+        self.first, self.last = np.append(0, ends)[mine], ends[mine]
 
 
 def blocks(
@@ -106,8 +101,8 @@ def _run(task: Task, table: Table, room: Block, plants: npt.NDArray[np.intp], st
         column[plants] = room.rows[j, : plants.size]
     task.final[plants] = room.final[: plants.size]
     task.status[plants], task.reached[plants] = room.status[: plants.size], task.times.size
-    airless = less_than_none(task.ready.system, task.final[plants]).any(axis=1)
-    for index in plants[(room.status[: plants.size] != 0) | airless]:
+    failed = (room.status[: plants.size] != 0) | (room.final[: plants.size] < task.least).any(axis=1)
+    for index in plants[failed]:
         _explain(task, int(index), room.kind)
 
 

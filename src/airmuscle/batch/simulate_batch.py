@@ -120,7 +120,7 @@ def _segments(
 ) -> tuple[Segments, ...]:
     """The segments of every plant's command; the same object where it is the same command."""
     known: dict[int, Segments] = {}
-    commands = [command] * count if isinstance(command, Command) else list(command)
+    commands = [command] if isinstance(command, Command) else list(command)
     for row, one in enumerate(commands):
         if id(one) in known:
             continue
@@ -133,7 +133,8 @@ def _segments(
         except ParameterError as error:
             where = "" if isinstance(command, Command) else f"commands, row {row}: "
             raise ParameterError(f"{where}{error}") from None
-    return tuple(known[id(one)] for one in commands)
+    found = tuple(known[id(one)] for one in commands)
+    return found * count if isinstance(command, Command) else found
 
 
 def _starts(

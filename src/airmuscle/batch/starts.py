@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ..equilibrium import equilibrium
+from ..equilibrium import equilibrium, equilibrium_of_each, given_inputs
+from ..equilibrium.each import block_of
 from ..errors import ParameterError, PhysicsError, suggestion
 from ..plant import Plant
 from ..program import System
@@ -55,26 +56,44 @@ def given_starts(system: System, start: Mapping[str, npt.ArrayLike], count: int)
 def resting_starts(variations: Variations, advanced: Callable[[int], None]) -> tuple[Array, dict[int, str]]:
     """The equilibrium at ambient pressure of every plant (N, n), and why there is none where there is none.
 
-    A circuit does not matter to it, so plants that differ in nothing else share it. `advanced` is told how many are
-    done.
+    A circuit without states does not matter to it, so plants that differ in nothing else share it. `advanced` is told
+    how many are done.
     """
+    from ..program.prepared import prepared  # CasADi, which describing a plant does not need
+
     plant = variations.system
     if not isinstance(plant, Plant):
         raise ParameterError(f"simulate_batch: give the start of {type(plant).__name__}, a value for each state.")
-    matters = [i for i, path in enumerate(variations.paths) if not path.startswith("circuit")]
-    names, known = [s.name for s in plant.states], dict[bytes, Array | str]()
-    states, reasons = np.full((len(variations.values), len(names)), np.nan), {}
-    for row, values in enumerate(variations.values):
-        key = values[matters].tobytes()
-        if key not in known:
-            known[key] = _rest(variations.one(row), names)
-        found = known[key]
-        if isinstance(found, str):
-            reasons[row] = found
-        else:
-            states[row] = found
-        advanced(row + 1)
-    return states, reasons
+    given_inputs(plant, None)  # refused where an input cannot be 0
+    rows, shared = _different(plant, variations)
+    ready, pressures = prepared(plant), (0.0,) * len(plant.muscles)
+    inputs, names = np.zeros(len(plant.inputs)), [s.name for s in plant.states]
+    states, reasons = np.full((rows.size, len(names)), np.nan), dict[int, str]()
+    each = block_of(len(names))
+    for begin in range(0, rows.size, each):
+        part = rows[begin : begin + each]
+        found = equilibrium_of_each(ready, variations.table(part), pressures, inputs)
+        states[begin : begin + each] = found.states
+        for i in np.flatnonzero(~np.isfinite(found.states).all(axis=1)):
+            state = _rest(variations.one(int(part[i])), names)
+            if isinstance(state, str):
+                reasons[begin + int(i)] = state
+            else:
+                states[begin + i] = state
+            advanced(begin + int(i))
+        advanced(begin + part.size)
+    return states[shared], {row: reasons[i] for row, i in enumerate(shared.tolist()) if i in reasons}
+
+
+def _different(plant: Plant, variations: Variations) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """The first of all plants that share a rest, and for each plant (N,) which of these it shares it with."""
+    stateless = not any(circuit.states(plant.ambient) for circuit in plant.circuits)
+    matters = [i for i, path in enumerate(variations.paths) if not (stateless and path.startswith("circuit"))]
+    known: dict[bytes, int] = {}
+    table = np.ascontiguousarray(variations.values[:, matters])
+    shared = [known.setdefault(row.tobytes(), len(known)) for row in table]
+    first = np.unique(np.array(shared, dtype=np.intp), return_index=True)[1]
+    return first, np.array(shared, dtype=np.intp)
 
 
 def _rest(plant: System, names: list[str]) -> Array | str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy.typing as npt
 from ..command import Segments
 from ..method import INTERRUPTED, LESS_THAN_NONE, REASONS, Course, Method
 from ..program.prepared import Prepared
-from ..start import less_than_none
+from ..start import least_states
 from .variations import Variations
 
 Array = npt.NDArray[np.float64]
@@ -40,17 +41,21 @@ class Task:
     reasons: dict[int, str]
     nominal: Array
 
-    @property
+    @functools.cached_property
     def names(self) -> tuple[str, ...]:
         """Everything that can be kept: states, then outputs, then inputs."""
         system = self.ready.system
         return (*(s.name for s in system.states), *self.ready.output_names, *system.inputs)
 
-    @property
+    @functools.cached_property
     def chosen(self) -> npt.NDArray[np.int64]:
-        """Where the columns to be kept stand among `names`."""
-        names = self.names
-        return np.array([names.index(name) for name in self.columns], dtype=np.int64)
+        """Where the columns to be kept, which must be known by now, stand among `names`."""
+        return np.array([self.names.index(name) for name in self.columns], dtype=np.int64)
+
+    @functools.cached_property
+    def least(self) -> Array:
+        """What each state (n,) may be at least."""
+        return least_states(self.ready.system)
 
     def alone(self, index: int) -> None:
         """Run one plant by itself, exactly as `simulate` would, and put its rows and its end in place."""
@@ -61,7 +66,7 @@ class Task:
     def _stopped_without_air(self, course: Course) -> Course:
         """The course up to the first row with less air than none, as `simulate` ends it."""
         rows = np.vstack([course.rows[: course.reached], course.state])
-        bad = np.flatnonzero(less_than_none(self.ready.system, rows).any(axis=1))
+        bad = np.flatnonzero((rows < self.least).any(axis=1))
         if not bad.size:
             return course
         row = int(bad[0])

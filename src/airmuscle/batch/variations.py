@@ -32,6 +32,12 @@ class Variations:
         found[self.places] = self.values[index]
         return found
 
+    def table(self, indices: npt.NDArray[np.intp]) -> Array:
+        """All leaves (R, P) of some of the systems."""
+        found = np.repeat(declare.flatten(self.system)[None, :], indices.size, axis=0)
+        found[:, self.places] = self.values[indices]
+        return found
+
     def one(self, index: int) -> System:
         """One of the systems."""
         return declare.rebuild(self.system, self.parameters(index).tolist())
@@ -58,14 +64,14 @@ class Variations:
     def refuse_inconsistent(self) -> None:
         """Raise ParameterError, naming the row, where parameters of a model do not go together."""
         for part in _checking(self._as_columns()):
-            of_row = _rows_of(part)
-            if of_row is None:
+            if not _has_column(part):
                 continue
             try:
                 part.check()
             except (TypeError, ValueError, AirmuscleError):  # rows differ, or one of them is refused: row by row
+                of_row = _rows_of(part)
                 for row in range(len(self.values)):
-                    _refuse_row(row, of_row(row))
+                    _refuse_row(row, part if of_row is None else of_row(row))
 
 
 class _Column(np.ndarray):
@@ -95,6 +101,15 @@ def _checking(thing: Any) -> Iterator[Any]:
             yield thing
         for field in dataclasses.fields(thing):
             yield from _checking(getattr(thing, field.name))
+
+
+def _has_column(thing: Any) -> bool:
+    """Whether there is a column anywhere inside a model."""
+    if isinstance(thing, tuple):
+        return any(_has_column(item) for item in thing)
+    if dataclasses.is_dataclass(thing):
+        return any(_has_column(getattr(thing, field.name)) for field in dataclasses.fields(thing))
+    return isinstance(thing, np.ndarray)
 
 
 def _rows_of(thing: Any) -> Callable[[int], Any] | None:

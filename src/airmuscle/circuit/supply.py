@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 from collections.abc import Mapping
 
+from .. import ops
 from ..declare import model, parameter
 from ..errors import ParameterError
 from ..gas import Air, Ambient, Flow, Gas, Isothermal, absolute
@@ -122,7 +123,7 @@ class RegulatedSupply(Source):
 
     def settled(self, ambient: Ambient) -> dict[str, Value]:
         before = self.supply.settled(ambient)
-        pressure = min(absolute(self.pressure, ambient), self.supply.air(before, ambient).pressure)
+        pressure = ops.minimum(absolute(self.pressure, ambient), self.supply.air(before, ambient).pressure)
         return {**self.gas.content(pressure, self.volume, ambient), **outside("supply.", before)}
 
     def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:

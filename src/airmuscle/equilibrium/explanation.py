@@ -12,12 +12,12 @@ from .static import Array, Static
 def explanation(static: Static) -> str:
     """The forces at both ends of the reach; with several coordinates where the plant is nearest to balance."""
     if len(static.coordinates) == 1:
-        reach = [x for x in grid(static) if np.isfinite(static.accelerations(static.place([x]))).all()]
-        if not reach:
+        x = grid(static)
+        ends = [end for way in (x, x[::-1]) if (end := _first_possible(static, way)) is not None]
+        if not ends:
             return f"{type(static.plant.mechanism).__name__} finds no rest: no place can hold the given air."
-        ends = reach[0], reach[-1]
         lines = [_line(static, np.array([x])) for x in ends]
-        load = _needed(static, float(ends[0]))
+        load = _needed(static, ends[0])
     else:
         tried = list(starts(static))
         sizes = np.array([np.abs(static.accelerations(static.place(x))).max() for x in tried])
@@ -26,6 +26,11 @@ def explanation(static: Static) -> str:
         f"{type(static.plant.mechanism).__name__} finds no rest: " + "; ".join(lines) + f".{load} "
         "Change the load, the pressure or the parallel spring."
     )
+
+
+def _first_possible(static: Static, places: Array) -> float | None:
+    """The first of these coordinates at which a pressure holds the air."""
+    return next((float(x) for x in places if np.isfinite(static.accelerations(static.place([x]))).all()), None)
 
 
 def _line(static: Static, x: Array) -> str:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
+import numpy as np
+
 from ..errors import NoEquilibrium
 from ..plant import Plant
+from .each import equilibrium_of_each
 from .explanation import explanation
 from .one_coordinate import places
 from .several_coordinates import places_of_several
@@ -61,6 +64,15 @@ def equilibrium(
     where no stable rest is found.
     """
     static = Static(plant, pressure, air_mass, inputs)
+    if not static.shut:
+        inputs_here = np.array(list(static.inputs.values()))
+        (state,), (searched,) = equilibrium_of_each(
+            static.ready, static.ready.parameters[None], static.air, inputs_here
+        )
+        if np.isfinite(state).all():
+            return dict(zip(static.names, state.tolist(), strict=True))
+        if searched:
+            raise NoEquilibrium(explanation(static))
     stable = [rest.state for rest in _equilibria(static) if rest.stable]
     if not stable:
         raise NoEquilibrium(explanation(static))

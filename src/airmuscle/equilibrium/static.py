@@ -9,10 +9,12 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from .. import ops
 from ..command import refuse_unknown_input
 from ..errors import NoEquilibrium, ParameterError
 from ..gas import absolute, gauge
 from ..muscle import Muscle
+from ..ops import Value
 from ..plant import Plant
 
 Array = npt.NDArray[np.float64]
@@ -43,7 +45,7 @@ class Static:
         self.ready = prepared(plant)
         self.lengths = [float(length) for length in plant.resting_lengths]
         self._before = (0.0,) * len(self.air)  # pressures of the place before: the next are near
-        self.reach = [_reach(m) for m in plant.muscles]
+        self.reach = [reach_of(m) for m in plant.muscles]
 
     def place(self, x: Sequence[float] | Array) -> dict[str, float]:
         """Coordinates by name from a vector."""
@@ -114,9 +116,10 @@ def given_inputs(plant: Plant, inputs: Mapping[str, float] | None) -> dict[str, 
     return {name: float(given.get(name, 0.0)) for name in plant.inputs}
 
 
-def _reach(muscle: Muscle) -> tuple[float, float]:
+def reach_of(muscle: Muscle) -> tuple[Value, Value]:
+    """The contractions [1] between which a rest of a muscle is looked for."""
     low, high = muscle.geometry.contraction_reach
-    low = max(low, STRETCHED)
+    low = ops.maximum(low, STRETCHED)
     margin = 1e-9 * (high - low)
     return low + margin, high - margin
 

@@ -24,7 +24,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import NoneType
+from types import MappingProxyType, NoneType
 from typing import Any
 
 from ..characteristic.base import ForceLaw
@@ -49,6 +49,8 @@ from .place import Place, checked, finite, refuse_unknown, said_at, text
 TABLES = ("title", "plant", "command", "run", "output")
 RUN = ("duration", "start_time", "output", "start", "method")
 OUTPUT = ("columns",)
+AMBIENT: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
+"""A run begins at rest at ambient pressure unless it says otherwise."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,8 +93,11 @@ def load_scenario(path: str | Path) -> Scenario:
     return scenario_from(parsed(file), Place(str(file), "", file.parent))
 
 
-def scenario_from(tables: Mapping[str, Any], place: Place, plant: Plant | None = None) -> Scenario:
-    """The scenario that the tables of a file describe; a `plant` that is given stands for the table [plant]."""
+def scenario_from(
+    tables: Mapping[str, Any], place: Place, plant: Plant | None = None, rest: dict[str, float] | None = None
+) -> Scenario:
+    """The scenario that the tables of a file describe; a `plant` that is given stands for the table [plant], and a
+    `rest` for the equilibrium that the run begins at."""
     refuse_unknown(tables, TABLES, place)
     for key in ("plant", "run"):
         _table(tables.get(key), key, place)
@@ -103,7 +108,7 @@ def scenario_from(tables: Mapping[str, Any], place: Place, plant: Plant | None =
         raise ParameterError(f"{at}: 'duration' is missing; write it like duration = \"25 s\".")
     duration, start_time = _length(run, "duration", at), finite(run.get("start_time", 0.0), "s", f"{at}, start_time")
     table = _table(tables.get("command", {}), "command", place)
-    start = _start(run.get("start", {"pressure": 0.0}), plant, at.inside("start"))
+    start = _start(run.get("start", AMBIENT), plant, at.inside("start"), rest)
     command = _command(table, plant, start, duration, place.inside("command"))
     shown = Driven(command.beside, command.drivers) if isinstance(command, Loop) else command
     with said_at(place.inside("command")):
@@ -200,7 +205,15 @@ def _parts(entry: Entry, replaced: Mapping[str, Any], place: Place) -> dict[str,
     return left
 
 
-def _start(given: Any, plant: Plant, place: Place) -> dict[str, float]:
+def pressure_of_rest(tables: Mapping[str, Any], place: Place) -> float | None:
+    """Gauge pressure [Pa] in the muscles where a run begins at rest; None where it begins at another state."""
+    given = tables["run"].get("start", AMBIENT)
+    if not isinstance(given, Mapping) or set(given) - {"pressure"}:
+        return None
+    return finite(given.get("pressure", 0.0), "Pa", f"{place.inside('run').inside('start')}, pressure")
+
+
+def _start(given: Any, plant: Plant, place: Place, rest: dict[str, float] | None) -> dict[str, float]:
     if not isinstance(given, Mapping):
         raise ParameterError(f'{place} is {given!r}; write start = {{ pressure = "0 bar" }}.')
     coordinates = {
@@ -211,7 +224,9 @@ def _start(given: Any, plant: Plant, place: Place) -> dict[str, float]:
     values = {key: finite(value, kinds[key], f"{place}, {key}") for key, value in given.items()}
     pressure = values.pop("pressure", 0.0)
     with said_at(place):
-        return plant.state_at(pressure=pressure, **values) if values else equilibrium(plant, pressure=pressure)
+        if values:
+            return plant.state_at(pressure=pressure, **values)
+        return equilibrium(plant, pressure=pressure) if rest is None else rest
 
 
 def _columns(table: Mapping[str, Any], known: Sequence[str], place: Place) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ from ..variables import StateVariable
 from .creep import CreepElements
 from .damper import Damper, LinearDamper
 from .series import RigidSeries, Series, SeriesSpring
+from .settle import settled_inside
 from .spring import LinearSpring, Spring
 from .stop import NoStop, Stop
 from .wall import RigidWall, Wall
@@ -103,30 +104,20 @@ class Muscle:
         compliant = (inner,) if isinstance(self.series, SeriesSpring) else ()
         return (*self.friction.states, *self.creep.states, *self.wall.states, *compliant)
 
-    def settled(self, pressure: float, contraction: float) -> dict[str, Value]:
+    def settled(self, pressure: Value, contraction: Value) -> dict[str, Value]:
         """Its states at rest at a gauge pressure [Pa] and contraction [1], as if it had never moved."""
-        found = {state.name: 0.0 for state in (*self.friction.states, *self.creep.states)}
+        found: dict[str, Value] = {state.name: 0.0 for state in (*self.friction.states, *self.creep.states)}
         found |= self.wall.settled(pressure)
         if isinstance(self.series, SeriesSpring):
-            found[INNER] = self._settled_inner(pressure, contraction, self.series)
+            found[INNER] = settled_inside(self, pressure, contraction)
         return found
 
-    def _settled_inner(self, pressure: float, contraction: float, series: SeriesSpring) -> float:
-        """Where the contractile part pulls as much as the series spring holds; by bisection, as both are monotone.
-
-        Where it pushes itself apart and the spring hangs slack, it is the place at which it no longer does.
-        """
-        length = self.geometry.resting_length
-
-        def excess(inner: float) -> float:
-            return float(self.static(pressure, inner) - series.force((inner - contraction) * length))
-
-        here, (least, most) = excess(contraction), self.geometry.contraction_reach
-        low, high = contraction, contraction + max(here, 0.0) / (series.stiffness * length)
-        low, high = (min(least, contraction), contraction) if here < 0.0 else (low, min(high, max(most, contraction)))
-        while low < (middle := (low + high) / 2) < high:
-            low, high = (middle, high) if excess(middle) >= 0 else (low, middle)
-        return low
+    def unbalance_inside(self, pressure: Value, inner_contraction: Value, contraction: Value) -> Value:
+        """Pull of the contractile part at standstill less that of its series spring [N], which falls with the first's
+        contraction [1]; 0 at rest."""
+        assert isinstance(self.series, SeriesSpring)
+        stretch = (inner_contraction - contraction) * self.geometry.resting_length
+        return self.static(pressure, inner_contraction) - self.series.force(stretch)
 
     def inner_contraction(self, contraction: Value, state: Mapping[str, Value] = RELAXED) -> Value:
         """Contraction [1] of the contractile part, where the fittings stand at `contraction`."""

@@ -80,10 +80,10 @@ def computed(study: Study, index: int) -> Chunk:
         np.array([""] * len(rows), dtype=object),
     )
     scenarios: dict[int, Scenario] = {}
-    for place, run in enumerate(rows):
+    for place, (run, rest) in enumerate(zip(rows, study.rests(rows), strict=True)):
         refuse_stopped()
         try:
-            scenarios[place] = study.scenario(run)
+            scenarios[place] = study.scenario(run, rest)
         except REFUSALS as error:
             found.reasons[place] = reason(error)
     for place, run_or_reason in zip(scenarios, carried(list(scenarios.values()), instants(study)), strict=True):

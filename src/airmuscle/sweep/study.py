@@ -20,7 +20,7 @@ contraction = { model = "Final", column = "contraction" }
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -90,11 +90,23 @@ class Study:
         """The numbers of the chunks."""
         return range(-(-len(self) // self.chunk))
 
-    def scenario(self, run: int) -> Scenario:
+    @property
+    def changing(self) -> tuple[Number, ...]:
+        """All numbers that are not the same in every run."""
+        return (*self.numbers, *(number for number, _ in self.follow))
+
+    def changes(self, runs: Sequence[int]) -> npt.NDArray[np.float64]:
+        """The values of these numbers in some runs (R, d)."""
+        values = self.values[runs]
+        return np.hstack([values, values[:, [i for _, i in self.follow]]])
+
+    def rests(self, runs: Sequence[int]) -> list[dict[str, float] | None]:
+        """Where each of these runs begins, as `scenario` takes it; found for all at once."""
+        return self.source.rests(self.changing, self.changes(runs))
+
+    def scenario(self, run: int, rest: dict[str, float] | None = None) -> Scenario:
         """One of the runs. Raises ParameterError or PhysicsError where its values are not possible together."""
-        values = self.values[run]
-        numbers = (*self.numbers, *(number for number, _ in self.follow))
-        return self.source.changed(numbers, [*values, *(values[i] for _, i in self.follow)])
+        return self.source.changed(self.changing, self.changes([run])[0].tolist(), rest)
 
     def mark(self) -> str:
         """The fingerprint of all that the results depend on, but for the program."""

@@ -14,15 +14,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from ..declare import flatten, leaves, parameters, with_parameters
+from ..equilibrium import equilibrium_of_each
 from ..errors import ParameterError, suggestion
 from ..library.loop_table import numbers_of
 from ..library.models import model_class
 from ..library.place import Place
-from ..library.scenario import Scenario, scenario_from, units_of_run
+from ..library.scenario import Scenario, pressure_of_rest, scenario_from, units_of_run
 from ..loop import Loop
 from ..plant import Plant
 
+Array = npt.NDArray[np.float64]
 Keys = tuple[str | int, ...]
 
 
@@ -60,8 +65,29 @@ class Source:
             raise ParameterError(f"{where}: the scenario has no number '{path}'.{near}")
         return known[path]
 
-    def changed(self, numbers: Sequence[Number], values: Sequence[float]) -> Scenario:
-        """The scenario with other values, checked as if they stood in its file; the start is found anew."""
+    def rests(self, numbers: Sequence[Number], values: Array) -> list[dict[str, float] | None]:
+        """Where each of several runs with other values (R, d) begins, found for all at once; None for one that is to be
+        asked alone. Values are not checked."""
+        from ..program.prepared import prepared  # CasADi, which reading a study does not need
+
+        plant, alone = self.scenario.plant, [None] * len(values)
+        pressure = pressure_of_rest(self.tables, self.place)
+        if pressure is None or any(not isinstance(n.at, int) and n.at[:2] == ("run", "start") for n in numbers):
+            return list(alone)
+        leaves_of_each = np.repeat(flatten(plant)[None, :], len(values), axis=0)
+        for number, column in zip(numbers, values.T, strict=True):
+            if isinstance(number.at, int):
+                leaves_of_each[:, number.at] = column
+        pressures, inputs = (pressure,) * len(plant.muscles), np.zeros(len(plant.inputs))
+        found = equilibrium_of_each(prepared(plant), leaves_of_each, pressures, inputs).states
+        names = [s.name for s in plant.states]
+        return [dict(zip(names, x, strict=True)) if np.isfinite(x).all() else None for x in found.tolist()]
+
+    def changed(
+        self, numbers: Sequence[Number], values: Sequence[float], rest: dict[str, float] | None = None
+    ) -> Scenario:
+        """The scenario with other values, checked as if they stood in its file; the start is found anew unless it is
+        given as `rests` finds it."""
         scenario, tables = self.scenario, self.tables
         leaf_values = flatten(scenario.plant).tolist()
         for number, value in zip(numbers, values, strict=True):
@@ -71,7 +97,7 @@ class Source:
                 tables = _with(tables, number.at, float(value))
         # a reason must read the same on every machine, so it names the file without its folder
         place = dataclasses.replace(self.place, file=Path(self.place.file).name)
-        return scenario_from(tables, place, with_parameters(scenario.plant, leaf_values))
+        return scenario_from(tables, place, with_parameters(scenario.plant, leaf_values), rest)
 
 
 def _of_command(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:
