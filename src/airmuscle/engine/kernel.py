@@ -108,3 +108,4 @@ def _in_memory(code: bytes, kinds: tuple[str, ...], arguments: tuple[Any, ...]) 
 
 
 rodas4, fixed_step, evaluate = Kernel("rodas4"), Kernel("fixed_step"), Kernel("evaluate")
+rates_of_each = Kernel("rates_of_each")

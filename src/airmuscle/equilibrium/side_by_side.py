@@ -112,10 +112,8 @@ class SideBySide:
 
     def accelerations(self, x: Array) -> Array:
         """Acceleration of the coordinate from rest at places (N,) or (N, K); not a number where a plant cannot be."""
-        from ..engine.once import announce_compilation
-        from .many_rates import rates_of_each  # the compiler, which a single look at a plant does not need
+        from ..engine.kernel import rates_of_each
 
-        announce_compilation(rates_of_each)
         states = self.states(x.reshape(len(x), -1))
         rates = np.empty_like(states)
         rates_of_each(self.ready.address["rhs"], self.held, self.inputs, states, rates)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numba
 
-from ..engine.address import invoke, pointer
+from .address import invoke, pointer
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
