@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from .command import Segments
 from .declare import model, parameter
-from .errors import FileError
 
 if TYPE_CHECKING:
     from .program.prepared import Prepared
@@ -69,13 +68,6 @@ class Stepper:
                     status = TOO_MANY
         except KeyboardInterrupt:
             status = INTERRUPTED
-        except RuntimeError as error:
-            if "cannot cache" not in str(error):
-                raise
-            raise FileError(
-                "there is no folder to keep compiled code in: neither the program's own nor the user's cache can be "
-                "written to. Name one that can be in the environment variable NUMBA_CACHE_DIR."
-            ) from None
         return Course(rows, int(count[1]), float(clock[0]), y, int(status), int(count[2]), int(count[3]))
 
 

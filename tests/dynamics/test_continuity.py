@@ -31,6 +31,7 @@ JUMP = 1e-6
 NOT_IN_A_PLANT = {
     "commands, what drives valves by them, and methods": (
         "Schedule", "Signal", "OnOff", "PWM", "Rodas4", "DormandPrince8", "RungeKutta4"),
+    "controllers, which look at a plant from outside": ("PID", "TwoPoint", "Split"),
     "laws solved for pressure or contraction, where as_force_law stands in, and their readings": (
         "BorzikovaDirect", "BorzikovaExponential", "Hunt2017", "Saga2007", "AlongArc", "AlongAxis",
         "EvenSpread", "GivenSum", "SumOverHalf", "SumPastHalf",

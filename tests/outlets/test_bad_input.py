@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from airmuscle.circuit import FillDischarge, Supply, Valve
 from airmuscle.cli.app import app
 from airmuscle.command import Schedule, Signal
 from airmuscle.declare import model, parameter
+from airmuscle.engine.kernel import Kernel
 from airmuscle.equilibrium import equilibrium
 from airmuscle.errors import FileError, NoSolution, ParameterError, UnitError
 from airmuscle.library.catalogue import names, parsed
@@ -441,9 +443,10 @@ def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch
 
 
 def test_without_a_place_for_compiled_code_the_remedy_is_named(plant: Plant, monkeypatch: pytest.MonkeyPatch):
-    def kernel(self: RungeKutta4, prepared: Any) -> tuple[Any, ...]:
+    def absent(name: str, package: str) -> Any:
         raise RuntimeError("cannot cache function 'rodas4': no locator available for file 'rodas4.py'")
 
-    monkeypatch.setattr(RungeKutta4, "_kernel", kernel)
+    monkeypatch.setattr("airmuscle.engine.kernel.importlib", SimpleNamespace(import_module=absent))
+    monkeypatch.setattr(Kernel, "__call__", lambda kernel, *arguments: kernel._by_numba(arguments))
     with pytest.raises(FileError, match=r"no folder to keep compiled code in.* environment variable NUMBA_CACHE_DIR"):
         simulate(plant, Schedule({}), duration=1.0, method=RungeKutta4(1e-3))

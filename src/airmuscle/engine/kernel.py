@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..errors import FileError
 from . import array_layout, kept
 from .entry import DTYPES, REFUSED
 from .once import announce, announce_compilation
@@ -62,8 +63,19 @@ class Kernel:
 
     @property
     def numba(self) -> Any:
-        """The kernel as it is written, which numba compiles for whatever it is called with."""
-        return getattr(importlib.import_module(f".{self.name}", __package__), self.name)
+        """The kernel as it is written, which numba compiles for whatever it is called with.
+
+        Raises FileError where there is no folder to keep it in.
+        """
+        try:
+            return getattr(importlib.import_module(f".{self.name}", __package__), self.name)
+        except RuntimeError as error:
+            if "cannot cache" not in str(error):
+                raise
+            raise FileError(
+                "there is no folder to keep compiled code in: neither the program's own nor the user's cache can be "
+                "written to. Name one that can be in the environment variable NUMBA_CACHE_DIR."
+            ) from None
 
     def _load(self, arguments: tuple[Any, ...]) -> None:
         """Find or make the machine code for arguments of these kinds; where there is none, numba is left."""
