@@ -26,6 +26,8 @@ REASONS = {
     7: "there was less air than none",
 }
 PAUSED, NOT_FINITE, TOO_MANY, INTERRUPTED, LESS_THAN_NONE = 1, 3, 4, 5, 7
+MOST_STEPS = 50_000_000
+"""Steps of one run, some minutes of work."""
 BUDGET = 100_000
 """Steps between two looks at whether the user wants to stop."""
 
@@ -56,7 +58,7 @@ class Method(abc.ABC):
         start: float,
         state: Array,
         times: Array,
-        most_steps: int = 50_000_000,
+        most_steps: int = MOST_STEPS,
     ) -> Course:
         """Carry `state` (n,) from `start` through the segments; rows (N, n) at `times` (N,), which must rise."""
         from .engine.once import announce_compilation

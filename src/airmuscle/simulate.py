@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .command import Command, Schedule, Segments, refuse_no_command
+from .declare import number_of
 from .equilibrium import equilibrium
 from .errors import ParameterError, SimulationError
 from .method import INTERRUPTED, LESS_THAN_NONE, NOT_FINITE, REASONS, Course, Method, Rodas4
@@ -17,7 +18,7 @@ from .muscle import SeriesSpring
 from .plant import Plant
 from .program import System
 from .recording import Recording
-from .start import less_than_none, number_of, refuse_impossible, state_vector
+from .start import less_than_none, refuse_impossible, refuse_no_system, state_vector
 
 if TYPE_CHECKING:
     from .program.prepared import Prepared
@@ -52,12 +53,9 @@ def simulate(
 
     The result does not depend on `output`. Raises ParameterError for an input or state that the plant lacks.
     """
+    refuse_no_system("simulate", plant)
     refuse_no_command(command)
-    duration, start_time = number_of("simulate: duration", duration), number_of("simulate: start_time", start_time)
-    if not (np.isfinite(duration) and duration > 0):
-        raise ParameterError(f"simulate: duration is {duration!r} s; it must be positive and finite.")
-    if not start_time + duration > start_time:
-        raise ParameterError(f"simulate: start_time is {start_time!r} s; {duration!r} s after it no time has passed.")
+    start_time, duration = _span(start_time, duration)
     from .program.prepared import prepared  # CasADi, which describing a plant does not need
 
     if start is None:
@@ -83,6 +81,16 @@ def simulate(
     return recording
 
 
+def _span(start_time: float, duration: float) -> tuple[float, float]:
+    """When a run begins and how long it lasts [s]. Raises ParameterError where no time would pass."""
+    duration, start_time = number_of("simulate: duration", duration), number_of("simulate: start_time", start_time)
+    if not (np.isfinite(duration) and duration > 0):
+        raise ParameterError(f"simulate: duration is {duration!r} s; it must be positive and finite.")
+    if not start_time + duration > start_time:
+        raise ParameterError(f"simulate: start_time is {start_time!r} s; {duration!r} s after it no time has passed.")
+    return start_time, duration
+
+
 def advance(
     plant: System,
     state: Mapping[str, float],
@@ -100,7 +108,8 @@ def advance(
     """
     from .program.prepared import prepared
 
-    dt = number_of("advance: dt", dt)
+    refuse_no_system("advance", plant)
+    dt, start_time = number_of("advance: dt", dt), number_of("advance: start_time", start_time)
     if not 0 < dt < np.inf:
         raise ParameterError(f"advance: dt is {dt!r} s; it must be positive and finite.")
     if isinstance(inputs, Segments):

@@ -74,7 +74,7 @@ class Batch:
 
     def _place(self, index: int) -> int:
         """The number of a plant, counted from the end where it is negative."""
-        if not -len(self) <= index < len(self):
+        if not isinstance(index, int | np.integer) or not -len(self) <= index < len(self):
             raise ColumnError(f"batch: there is no plant {index}; there are 0 to {len(self) - 1}.")
         return int(index) % len(self)
 
