@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from .circuit import Circuit, Response
 from .circuit.supply import refuse_shared
-from .declare import model, refuse_misplaced
+from .declare import model, number_of, refuse_misplaced
 from .errors import ParameterError, TraceError
 from .gas import Air, Ambient, Flow, Gas, Polytropic, absolute, gauge, refuse_vacuum
 from .mechanism import Mechanism
@@ -59,12 +60,16 @@ class Plant:
         parts += [("muscle", m, Muscle) for m in self.muscles] + [("circuit", c, Circuit) for c in self.circuits]
         for field, part, kind in parts:
             if not isinstance(part, kind):
-                raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {str(part)[:80]}.")
+                hint = f" It has one: give its .{field}." if hasattr(part, field) else ""
+                hint = " Several stand in a tuple, (first, second)." if isinstance(part, list) else hint
+                raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {str(part)[:80]}.{hint}")
         self._refuse_not_closed_form()
         refuse_misplaced((self.muscles, self.circuits, self.mechanism))
         for circuit in self.circuits:
             refuse_shared(f"Plant: its {type(circuit).__name__}", circuit.supply)
         names = [m.name for m in self.muscles]
+        if not names:
+            raise ParameterError("Plant: it has no muscle; give one, or a tuple of them.")
         ports = sum(c.ports for c in self.circuits)
         if ports != len(names):
             raise ParameterError(f"Plant: its circuits feed {ports} muscles; {len(names)} are given.")
@@ -234,7 +239,11 @@ class Plant:
         for a pressure below absolute zero, another number of pressures than muscles, an unknown name, or a wall that
         takes all volume away.
         """
-        pressures = pressure if isinstance(pressure, tuple) else (pressure,) * len(self.muscles)
+        given = pressure if isinstance(pressure, tuple) else (pressure,) * len(self.muscles)
+        pressures = [number_of("Plant: the pressure of a state", p) for p in given]
+        values = {name: number_of(f"Plant: the {name} of a state", value) for name, value in values.items()}
+        if not all(math.isfinite(value) for value in (*pressures, *values.values())):
+            raise ParameterError(f"Plant: a state must be finite; given are {pressures} Pa and {values}.")
         if len(pressures) != len(self.muscles):
             raise ParameterError(f"Plant: {len(pressures)} pressures are given for {len(self.muscles)} muscles.")
         air = {f"{p}{s.name}" for p, m in zip(self.prefixes, self.muscles, strict=True)
