@@ -211,10 +211,19 @@ def test_ctrl_c_that_python_loses_is_remembered(monkeypatch):
             with pytest.raises(KeyboardInterrupt):
                 look()
 
+    def interrupted_import():
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        raise ImportError("initialization failed")
+
     try:
         with pytest.raises(KeyboardInterrupt):
             working()
         look()  # forgotten once the block has raised it
+        with pytest.raises(KeyboardInterrupt), remembered():
+            interrupted_import()
+        with pytest.raises(ImportError), remembered():
+            raise ImportError
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     finally:
         signal.signal(signal.SIGINT, before)

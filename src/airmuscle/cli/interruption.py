@@ -16,8 +16,8 @@ def remembered() -> Iterator[None]:
     """Within the block Ctrl-C raises KeyboardInterrupt as ever; if that is lost, `look` and the block's end raise it.
 
     Python throws away what is raised in a destructor or in the callback of a weak reference, of which imports have
-    many. Where Ctrl-C is ignored, as by a job that a shell runs in the background, or somebody else listens to it, it
-    stays so.
+    many, and a compiled module whose import is interrupted fails as an ImportError. Where Ctrl-C is ignored, as by a
+    job that a shell runs in the background, or somebody else listens to it, it stays so.
     """
     ours = threading.current_thread() is threading.main_thread()
     if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -28,6 +28,9 @@ def remembered() -> Iterator[None]:
     try:
         yield
         look()
+    except Exception:
+        look()
+        raise
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
         _pressed.clear()
