@@ -121,6 +121,14 @@ def number_of(what: str, value: Any) -> float:
         raise ParameterError(f"{what} is {value!r}; it must be one number, in SI units.") from None
 
 
+def finite_number(what: str, value: Any) -> float:
+    """The finite number that is given. Raises ParameterError for anything else."""
+    number = number_of(what, value)
+    if not math.isfinite(number):
+        raise ParameterError(f"{what} is {value!r}; it must be finite.")
+    return number
+
+
 @dataclasses.dataclass(frozen=True)
 class Leaf:
     """One number inside a model: its dotted path, its value and what is declared about it."""

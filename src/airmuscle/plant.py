@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from .circuit import Circuit, Response
+from .circuit.ports import by_muscle, by_port
 from .circuit.supply import refuse_shared
-from .declare import model, number_of, refuse_misplaced
+from .declare import finite_number, model, refuse_misplaced
 from .errors import ParameterError, TraceError
 from .gas import Air, Ambient, Flow, Gas, Polytropic, absolute, gauge, refuse_vacuum
 from .mechanism import Mechanism
@@ -45,7 +46,7 @@ class Plant:
 
     `muscle` is one or a tuple. `circuit` is a tuple with one for each muscle, or a single one that feeds them all.
     With one muscle the names are plain (`air_mass`, `pressure`, `bristle`); with several they carry its name
-    (`left.pressure`, `left.bristle`). What belongs to a circuit in a tuple carries the name of its muscle.
+    (`left.pressure`), as does what belongs to a circuit in a tuple, or to a muscle's tube in a circuit for all.
     """
 
     muscle: Muscle | tuple[Muscle, ...]
@@ -55,13 +56,13 @@ class Plant:
     ambient: Ambient = Ambient()
 
     def check(self) -> None:
-        kinds = {"mechanism": Mechanism, "gas": Gas, "ambient": Ambient}
-        parts = [(field, getattr(self, field), kind) for field, kind in kinds.items()]
+        parts: list[Any] = [("mechanism", self.mechanism, Mechanism), ("gas", self.gas, Gas)]
+        parts += [("ambient", self.ambient, Ambient)]
         parts += [("muscle", m, Muscle) for m in self.muscles] + [("circuit", c, Circuit) for c in self.circuits]
         for field, part, kind in parts:
             if not isinstance(part, kind):
-                hint = f" It has one: give its .{field}." if hasattr(part, field) else ""
-                hint = " Several stand in a tuple, (first, second)." if isinstance(part, list) else hint
+                hint = " Several stand in a tuple." if isinstance(part, list) else ""
+                hint = f" It has one: give its .{field}." if hasattr(part, field) else hint
                 raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {str(part)[:80]}.{hint}")
         self._refuse_not_closed_form()
         refuse_misplaced((self.muscles, self.circuits, self.mechanism))
@@ -93,10 +94,9 @@ class Plant:
                     )
 
     def _refuse_twice(self) -> None:
-        names = [s.name for s in self.states] + [i.name for i in self.commands]
-        for name in names:
-            if names.count(name) > 1:
-                raise ParameterError(f"Plant: two of its parts use the name '{name}'; rename one of them.")
+        names = [*(s.name for s in self.states), *self.inputs]
+        for name in (n for n in names if names.count(n) > 1):
+            raise ParameterError(f"Plant: two of its parts use the name '{name}'; rename one of them.")
 
     @property
     def muscles(self) -> tuple[Muscle, ...]:
@@ -116,7 +116,11 @@ class Plant:
     @property
     def circuit_prefixes(self) -> tuple[str, ...]:
         """What the names of each circuit's quantities begin with."""
-        return self.prefixes if len(self.circuits) == len(self.muscles) else ("",)
+        return ("",) if self._shared else self.prefixes
+
+    @property
+    def _shared(self) -> bool:
+        return len(self.circuits) < len(self.muscles)
 
     @property
     def resting_lengths(self) -> list[Value]:
@@ -135,7 +139,8 @@ class Plant:
         for c in self.mechanism.coordinates:
             moving.append(StateVariable(c.name, c.unit, c.nominal, f"{c.name} of the load"))
             moving.append(StateVariable(c.speed, f"{c.unit}/s", c.nominal_speed, f"{c.speed} of the load"))
-        circuits = [s for p, c in self._circuits() for s in renamed(p, c.states(self.ambient))]
+        own = [(prefix, s) for prefix, circuit in self._circuits() for s in circuit.states(self.ambient)]
+        circuits = [replace(s, name=name) for prefix, s in own for name in self._outside(prefix, {s.name: s})]
         return (*air, *moving, *inner, *circuits)
 
     @property
@@ -150,6 +155,17 @@ class Plant:
 
     def _circuits(self) -> Iterator[tuple[str, Circuit]]:
         return zip(self.circuit_prefixes, self.circuits, strict=True)
+
+    def _shares(self, airs: list[Air]) -> list[tuple[Air, ...]]:
+        return [tuple(airs)] if self._shared else [(air,) for air in airs]
+
+    def _outside(self, prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
+        """What a circuit calls by its own names, by the plant's."""
+        return by_muscle(self.prefixes, values) if self._shared else outside(prefix, values)
+
+    def _within(self, prefix: str, values: Mapping[str, Value]) -> Mapping[str, Value]:
+        """What the plant calls by its names, by a circuit's own."""
+        return by_port(self.prefixes, values) if self._shared else within(prefix, values)
 
     def ports(self, state: Mapping[str, Value]) -> tuple[Port, ...]:
         """Every muscle at a state."""
@@ -180,10 +196,9 @@ class Plant:
         self, ports: tuple[Port, ...], state: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> tuple[Response, ...]:
         """What every circuit does."""
-        airs = [port.air for port in ports]
-        shares = [tuple(airs)] if len(self.circuits) < len(ports) else [(air,) for air in airs]
+        shares = self._shares([port.air for port in ports])
         return tuple(
-            circuit.respond(share, within(prefix, state), within(prefix, inputs), self.ambient)
+            circuit.respond(share, self._within(prefix, state), within(prefix, inputs), self.ambient)
             for (prefix, circuit), share in zip(self._circuits(), shares, strict=True)
         )
 
@@ -199,7 +214,7 @@ class Plant:
         for c in self.mechanism.coordinates:
             rates |= {c.name: state[c.speed], c.speed: accelerations[c.name]}
         for (prefix, _), response in zip(self._circuits(), done, strict=True):
-            rates |= outside(prefix, response.rates)
+            rates |= self._outside(prefix, response.rates)
         return rates
 
     def _accelerations(
@@ -225,7 +240,7 @@ class Plant:
             if "internal_energy" in port.states:
                 found[f"{prefix}temperature"] = port.air.temperature
         for (prefix, _), response in zip(self._circuits(), done, strict=True):
-            found |= outside(prefix, response.outputs)
+            found |= self._outside(prefix, response.outputs)
         accelerations = self._accelerations(state, ports, inputs)
         for c in self.mechanism.coordinates:
             found[c.acceleration] = accelerations[c.name]
@@ -240,10 +255,8 @@ class Plant:
         takes all volume away.
         """
         given = pressure if isinstance(pressure, tuple) else (pressure,) * len(self.muscles)
-        pressures = [number_of("Plant: the pressure of a state", p) for p in given]
-        values = {name: number_of(f"Plant: the {name} of a state", value) for name, value in values.items()}
-        if not all(math.isfinite(value) for value in (*pressures, *values.values())):
-            raise ParameterError(f"Plant: a state must be finite; given are {pressures} Pa and {values}.")
+        pressures = [finite_number("Plant: the pressure of a state", p) for p in given]
+        values = {name: finite_number(f"Plant: the {name} of a state", value) for name, value in values.items()}
         if len(pressures) != len(self.muscles):
             raise ParameterError(f"Plant: {len(pressures)} pressures are given for {len(self.muscles)} muscles.")
         air = {f"{p}{s.name}" for p, m in zip(self.prefixes, self.muscles, strict=True)
@@ -268,9 +281,8 @@ class Plant:
             content = self.gas.content(absolute(p, self.ambient), volume, self.ambient)
             airs.append(self.gas.air(content, volume, self.ambient))
             state = {**outside(prefix, {**content, **own}), **state}
-        shares = [tuple(airs)] if len(self.circuits) < len(airs) else [(air,) for air in airs]
-        for (prefix, circuit), share in zip(self._circuits(), shares, strict=True):
-            state = {**outside(prefix, circuit.settled(share, self.ambient)), **state}
+        for (prefix, circuit), share in zip(self._circuits(), self._shares(airs), strict=True):
+            state = {**self._outside(prefix, circuit.settled(share, self.ambient)), **state}
         return {name: float(state[name]) for name in order}
 
 

@@ -231,6 +231,24 @@ def test_with_heat_it_is_too_but_that_air_that_leaves_a_muscle_flows_at_its_own_
     assert directions == {True, False}
 
 
+def test_the_tubes_of_one_circuit_for_all_are_called_by_their_muscles():
+    """Each tube belongs to a muscle, whose name it carries as it does where every muscle has a circuit of its own."""
+    valve = ProportionalValve(Supply(6e5), VALVE, VALVE, Follower(80.0), muscles=2)
+    plant = Plant((LEFT, RIGHT), Line(valve, Tube(VALVE, 1e-5, 2)), JOINT, Isothermal())
+    of_tubes = [s.name for s in plant.states if "tube" in s.name]
+    assert of_tubes == [f"{side}.tube{i}.air_mass" for side in ("left", "right") for i in (1, 2)]
+    start = plant.state_at(pressure=(2e5, 3e5))
+    assert start["left.tube1.air_mass"] / start["right.tube1.air_mass"] == pytest.approx(301.325 / 401.325)
+    run = simulate(plant, Schedule({"command": ((0.0, 1.0),)}), duration=0.02, start=start)
+    assert run["left.tube1.pressure"][-1] > run["left.tube2.pressure"][-1] > run["left.pressure"][-1] > 2e5
+    assert run["right.tube1.pressure"][-1] < run["right.tube2.pressure"][-1] < run["right.pressure"][-1]
+
+
+def test_two_tubes_of_one_name_are_refused():
+    with pytest.raises(ParameterError, match=r"two of its parts use the name 'left.tube.air_mass'"):
+        pair(JOINT, Isothermal(), Line(Line(ThreePosition(Supply(6e5), VALVE, VALVE), TUBE), TUBE))
+
+
 def test_one_five_port_valve_turns_a_joint_to_either_side():
     """Its command fills one muscle and discharges the other; changed over, the joint mirrors its motion."""
     valve = ProportionalValve(Supply(6e5), Valve(2.6e-9, 0.433), Valve(2.6e-9, 0.433), Follower(80.0), 0.05, muscles=2)

@@ -11,13 +11,15 @@ from ..variables import StateVariable, outside, renamed, within
 from .around import Around
 from .circuit import Circuit, Response
 from .conduit import Conduit
+from .ports import port
 
 
 @model
 class Line(Around):
     """A tube between a circuit's valves and each of its muscles.
 
-    `tube.pressure` is that in the tube; with several pieces `tube1.pressure`, ... from the valve on.
+    `tube.pressure` is that in the tube; with several pieces `tube1.pressure`, ... from the valve on. Where one circuit
+    feeds several muscles, a plant calls each tube by its muscle, `left.tube.pressure`.
     """
 
     circuit: Circuit
@@ -26,7 +28,7 @@ class Line(Around):
     @property
     def names(self) -> tuple[str, ...]:
         """What the names of each muscle's tube begin with."""
-        return ("",) if self.ports == 1 else tuple(f"{i}." for i in range(1, self.ports + 1))
+        return ("",) if self.ports == 1 else tuple(port(i) for i in range(1, self.ports + 1))
 
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         of_tube = self.tube.states(ambient)
