@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from .command import Command, Schedule, Segments, refuse_no_command
 from .declare import number_of
+from .doubt import beyond_laws
 from .equilibrium import equilibrium
 from .errors import ParameterError, SimulationError
 from .method import INTERRUPTED, LESS_THAN_NONE, NOT_FINITE, REASONS, Course, Method, Rodas4
@@ -243,6 +244,7 @@ def _recorded(
         if len(plant.muscles) == 1:
             constants["resting_length"] = plant.muscles[0].geometry.resting_length
         notes += [f"gas: {plant.gas}", friction_in_words(plant), *outside_box(plant, columns)]
+        notes += beyond_laws(plant, columns) if reached else []
     return Recording(columns, "simulation", constants, tuple(notes))
 
 

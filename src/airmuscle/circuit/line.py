@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from ..declare import model
 from ..gas import Air, Ambient, gauge
@@ -38,6 +39,12 @@ class Line(Around):
         found = self.circuit.own_settled(airs, ambient)
         for name, air in zip(self.names, airs, strict=True):
             found |= outside(name, self.tube.settled(air, ambient))
+        return found
+
+    def doubts(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+        found = self.circuit.doubts(columns, ambient)
+        for name in self.names:
+            found |= outside(name, self.tube.doubts(within(name, columns), ambient))
         return found
 
     def draw(
