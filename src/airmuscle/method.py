@@ -24,8 +24,9 @@ REASONS = {
     4: "it took more steps than allowed",
     5: "it was interrupted",
     7: "there was less air than none",
+    8: "a muscle enclosed nothing",
 }
-PAUSED, NOT_FINITE, TOO_MANY, INTERRUPTED, LESS_THAN_NONE = 1, 3, 4, 5, 7
+PAUSED, NOT_FINITE, TOO_MANY, INTERRUPTED, LESS_THAN_NONE, NO_VOLUME = 1, 3, 4, 5, 7, 8
 MOST_STEPS = 50_000_000
 """Steps of one run, some minutes of work."""
 BUDGET = 100_000

@@ -11,11 +11,11 @@ import numpy.typing as npt
 
 from .command import Command, Schedule, Segments, refuse_no_command
 from .declare import number_of
-from .doubt import beyond_laws
+from .doubt import at_end_of_reach, beyond_laws, stopped_where_impossible
 from .equilibrium import equilibrium
 from .errors import ParameterError, SimulationError
-from .method import INTERRUPTED, LESS_THAN_NONE, NOT_FINITE, REASONS, Course, Method, Rodas4
-from .muscle import SeriesSpring
+from .method import INTERRUPTED, LESS_THAN_NONE, REASONS, Course, Method, Rodas4
+from .muscle import INNER, SeriesSpring
 from .plant import Plant
 from .program import System
 from .recording import Recording
@@ -72,7 +72,7 @@ def simulate(
         refuse_impossible(plant, start)
     course = method.run(ready, segments, start_time, state, times)
     results, inputs = _results(ready, course, segments, times, start_time)
-    course = _stopped_where_impossible(plant, course, results, times)
+    course = stopped_where_impossible(ready, course, results, times)
     recording = _recorded(ready, course, results, inputs, times, method)
     if course.status != 0:
         problem = _problem(plant, course, start_time + duration)
@@ -217,17 +217,6 @@ def _results(ready: Prepared, course: Course, segments: Segments, times: Array, 
     return results, inputs
 
 
-def _stopped_where_impossible(plant: System, course: Course, results: Array, times: Array) -> Course:
-    """The course up to the first row that cannot be: a fixed step can end in numbers, and yet far off."""
-    not_finite = np.asarray(~np.isfinite(results).all(axis=1))
-    bad = np.flatnonzero(not_finite | less_than_none(plant, course.rows[: course.reached]).any(axis=1))
-    if not bad.size:
-        return course
-    row = int(bad[0])
-    status = NOT_FINITE if not_finite[row] else LESS_THAN_NONE
-    return course._replace(reached=row, time=float(times[row]), state=course.rows[row], status=status)
-
-
 def _recorded(
     ready: Prepared, course: Course, results: Array, inputs: Array, times: Array, method: Method
 ) -> Recording:
@@ -265,9 +254,10 @@ def outside_box(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
         if box is not None:
             left, doubt = f"{muscle.name} was outside the box of its characteristic", "nothing was measured there"
             of_muscle += [("pressure", box.pressure, left, doubt), ("contraction", box.contraction, left, doubt)]
-        if not isinstance(muscle.series, SeriesSpring):  # a series spring stretches beyond what the muscle does
+        own = INNER if isinstance(muscle.series, SeriesSpring) else "contraction"
+        if f"{prefix}{own}" in columns:  # of a batch that may not be kept
             left, doubt = f"{muscle.name} was beyond the reach of its geometry", "no muscle can do this"
-            of_muscle.append(("contraction", muscle.geometry.contraction_reach, left, doubt))
+            of_muscle.append((own, muscle.geometry.contraction_reach, left, doubt))
         for name, bounds, left, doubt in of_muscle:
             found += _beyond(columns["time"], columns[f"{prefix}{name}"], name, bounds, left, doubt)
     return found
@@ -276,8 +266,7 @@ def outside_box(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
 def _beyond(time: Array, values: Array, name: str, bounds: tuple[float, float], left: str, doubt: str) -> list[str]:
     """A note where a column of pressure or contraction leaves its bounds."""
     (low, high), (scale, unit) = bounds, (1e3, "kPa") if name == "pressure" else (0.01, "%")
-    beyond = np.maximum(low - values, values - high)
-    if not (beyond > 1e-9 * (high - low)).any():
+    if not ((beyond := np.maximum(low - values, values - high)) > 1e-9 * (high - low)).any():
         return []
     worst, share = int(np.argmax(beyond)), float(np.mean(beyond > 0))
     return [
@@ -292,6 +281,8 @@ def _problem(plant: System, course: Course, end: float) -> str:
         4: "Raise the tolerance, lengthen a fixed step, or look for a valve that chatters.",
         5: "Nothing is lost; what was computed is in the recording.",
     }.get(course.status, "Look at the last state: a parameter may be far from physical, or a fixed step too long.")
+    if isinstance(plant, Plant) and course.status != INTERRUPTED:
+        remedy = at_end_of_reach(plant, course.state) or remedy
     return (
         f"the run ended at {course.time:.6g} of {end:.6g} s because {REASONS[course.status]}, after {course.steps} "
         f"steps, at {state}. {remedy}"
