@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from .declare import number_of
 from .errors import ParameterError, suggestion
 
 if TYPE_CHECKING:
@@ -96,15 +97,15 @@ def refuse_unknown_input(given: Sequence[str], inputs: Sequence[str], lacks: str
             raise ParameterError(f"{lacks} '{name}'; there are {known}.{suggestion(name, inputs)}")
 
 
-def _refuse_no_mapping(kind: str, given: object) -> None:
+def _refuse_no_mapping(kind: str, given: object, example: str = "((5, 1), (15, 0))") -> None:
     if not isinstance(given, Mapping):
-        raise ParameterError(f"a {kind} is {given!r}; name the inputs: {{'fill': ((5, 1), (15, 0))}}.")
+        raise ParameterError(f"a {kind} is {given!r}; name the inputs: {{'fill': {example}}}.")
 
 
 def _pairs(kind: str, name: str, given: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     try:
-        return [(0.0 + time, 0.0 + value) for time, value in given]
-    except (TypeError, ValueError):
+        return [(number_of("a time", time), number_of("a value", value)) for time, value in given]
+    except (TypeError, ValueError, ParameterError):
         raise ParameterError(
             f"the {kind} of '{name}' is {given!r}; write pairs of time [s] and value, ((5, 1), (15, 0))."
         ) from None
@@ -172,6 +173,11 @@ class Signal(Command):
 
         `Signal.recorded(read_csv("bench.csv"), {"fill": "fill"})`; the values are those of the recording, in SI.
         """
+        from .recording import Recording
+
+        if not isinstance(recording, Recording):
+            raise ParameterError(f"Signal.recorded: {recording!r} is no Recording; give what read_csv or read returns.")
+        _refuse_no_mapping("recorded signal", columns, "'column'")
         times = recording["time"].tolist()
         return cls({name: tuple(zip(times, recording[c].tolist(), strict=True)) for name, c in columns.items()})
 
@@ -184,8 +190,12 @@ class Signal(Command):
 
         Each line is held against its function at a quarter, a half and three quarters of it, and none is longer than
         1/64 of the duration (chosen); what a function does between those points is not seen. Raises ParameterError for
-        a function that 100 000 points do not follow, and for one that jumps: give that one as a Schedule.
+        a function that 100 000 points do not follow, for one that jumps (give that one as a Schedule), and for one that
+        does not return a finite number.
         """
+        _refuse_no_mapping("sampled signal", functions, "lambda t: 0.5")
+        duration, start = number_of("Signal.sampled: duration", duration), number_of("Signal.sampled: start", start)
+        error = number_of("Signal.sampled: error", error)
         return cls({name: _followed(name, f, start, start + duration, error) for name, f in functions.items()})
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
@@ -212,11 +222,11 @@ def _followed(
             "duration above 0."
         )
     times = np.linspace(start, end, COARSEST + 1)
-    values = np.array([function(t) for t in times.tolist()], dtype=float)
+    values = _values(name, function, times)
     while True:
         lengths = np.diff(times)
         between = times[:-1] + np.array([[0.25], [0.5], [0.75]]) * lengths
-        found = np.array([[function(t) for t in row] for row in between.tolist()], dtype=float)
+        found = _values(name, function, between.ravel()).reshape(between.shape)
         away = np.abs(found - np.interp(between, times, values)).max(axis=0)
         at = np.flatnonzero(away > error)
         if at.size == 0:
@@ -227,6 +237,18 @@ def _followed(
                 f"{away.max():g} at {times[np.argmax(away)]:g} s. Allow a larger error; give what jumps as a Schedule."
             )
         times, values = np.insert(times, at + 1, between[1, at]), np.insert(values, at + 1, found[1, at])
+
+
+def _values(name: str, function: Callable[[float], float], times: Array) -> Array:
+    """A function of time at times (N,). Raises ParameterError where it gives no finite number."""
+    if not callable(function):
+        raise ParameterError(f"the signal of '{name}' is {function!r}; give a function of time [s].")
+    values = np.empty(times.size)
+    for i, time in enumerate(times.tolist()):
+        values[i] = number_of(f"the signal of '{name}' at {time:g} s", function(time))
+        if not np.isfinite(values[i]):
+            raise ParameterError(f"the signal of '{name}' is {values[i]} at {time:g} s; it must be finite.")
+    return values
 
 
 @dataclasses.dataclass(frozen=True)
@@ -240,7 +262,8 @@ class Periodic(Command):
     period: float
 
     def __post_init__(self) -> None:
-        if not 0 < self.period < np.inf:
+        refuse_no_command(self.inner)
+        if not 0 < number_of("Periodic.period", self.period) < np.inf:
             raise ParameterError(f"Periodic.period is {self.period!r} s; it must be positive and finite.")
 
     @property

@@ -79,10 +79,11 @@ def _validate(thing: Any) -> None:
     lists = {f.name for f in dataclasses.fields(thing) if "tuple" in str(f.type)}
     for declared in parameters(thing):
         value = getattr(thing, declared.name)
-        if declared.name not in lists and isinstance(value, tuple | list | np.ndarray):
+        if isinstance(value, tuple | list | np.ndarray) != (declared.name in lists):
+            due = "several numbers, (1.0, 2.0)" if declared.name in lists else "one number"
             raise ParameterError(
                 f"{type(thing).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is {value!r}; "
-                "it must be one number."
+                f"it must be {due}."
             )
         object.__setattr__(thing, declared.name, _checked(type(thing).__name__, declared, value))
     if hasattr(thing, "check"):
@@ -110,6 +111,22 @@ def _checked(owner: str, declared: Parameter, value: Any) -> Any:
 def _per_cent(value: float, high: float) -> str:
     """A question, where a ratio above its bound makes sense as per cent."""
     return f" Is it in per cent? As a ratio it is {value / 100:g}." if 0 < value / 100 <= high <= 1 < value else ""
+
+
+def number_of(what: str, value: Any) -> float:
+    """The number that is given. Raises ParameterError for anything else, as text with a unit is."""
+    try:
+        return float(0.0 + value)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{what} is {value!r}; it must be one number, in SI units.") from None
+
+
+def finite_number(what: str, value: Any) -> float:
+    """The finite number that is given. Raises ParameterError for anything else."""
+    number = number_of(what, value)
+    if not math.isfinite(number):
+        raise ParameterError(f"{what} is {value!r}; it must be finite.")
+    return number
 
 
 @dataclasses.dataclass(frozen=True)

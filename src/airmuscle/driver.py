@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .command import Command, Segments, refuse_unknown_input
+from .command import Command, Segments, refuse_no_command, refuse_unknown_input
 from .declare import INFINITY, model, parameter
 from .errors import ParameterError
 
@@ -199,6 +199,9 @@ class Driven(Command):
     drivers: Mapping[str, Driver | tuple[Driver, ...]]
 
     def __post_init__(self) -> None:
+        refuse_no_command(self.inner)
+        if not isinstance(self.drivers, Mapping):
+            raise ParameterError(f"the drivers are {self.drivers!r}; name the inputs: {{'fill': OnOff(...)}}.")
         for name, chain in self.chains.items():
             for driver in chain:
                 if not isinstance(driver, Driver):

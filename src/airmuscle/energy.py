@@ -8,7 +8,8 @@ from typing import Any
 from .declare import model
 from .muscle import Muscle, SeriesSpring
 from .ops import Value
-from .plant import Plant, Port, total_air
+from .plant import Plant, total_air
+from .port import Port
 from .variables import StateVariable
 
 _METERS = (

@@ -95,5 +95,5 @@ class SimulationError(AirmuscleError):
 
 def suggestion(name: str, known: Iterable[str]) -> str:
     """A closing sentence for messages about unknown names: the nearest known one, or nothing."""
-    near = difflib.get_close_matches(name, list(known), n=1)
+    near = difflib.get_close_matches(str(name), list(known), n=1)
     return f" Did you mean '{near[0]}'?" if near else ""

@@ -25,8 +25,9 @@ REASONS = {
     5: "it was interrupted",
     7: "there was less air than none",
     8: "the controller gave a command that is not finite",
+    9: "a muscle enclosed nothing",
 }
-PAUSED, NOT_FINITE, TOO_MANY, INTERRUPTED, LESS_THAN_NONE, NO_COMMAND = 1, 3, 4, 5, 7, 8
+PAUSED, NOT_FINITE, TOO_MANY, INTERRUPTED, LESS_THAN_NONE, NO_COMMAND, NO_VOLUME = 1, 3, 4, 5, 7, 8, 9
 BUDGET = 100_000
 """Steps between two looks at whether the user wants to stop."""
 MOST_STEPS = 50_000_000

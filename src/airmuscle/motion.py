@@ -33,7 +33,10 @@ def follow(times: npt.ArrayLike, positions: npt.ArrayLike, *, from_rest: bool = 
     the last two pieces are one cubic each, which needs four points. Begin the run at times[0].
     Raises ParameterError for fewer than two points, points that are not finite, or times that do not rise.
     """
-    t, y = np.asarray(times, dtype=float), np.asarray(positions, dtype=float)
+    try:
+        t, y = np.asarray(times, dtype=float), np.asarray(positions, dtype=float)
+    except (TypeError, ValueError):
+        raise ParameterError(f"follow: {times!r} and {positions!r} are not times [s] and positions [m].") from None
     least = 2 if from_rest else 4
     if t.ndim != 1 or t.shape != y.shape or t.size < least:
         raise ParameterError(

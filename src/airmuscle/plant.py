@@ -3,39 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 from .circuit import Circuit, Response
+from .circuit.ports import by_muscle, by_port
 from .circuit.supply import refuse_shared
-from .declare import model, refuse_misplaced
+from .declare import finite_number, model, refuse_misplaced
 from .errors import ParameterError, TraceError
-from .gas import Air, Ambient, Flow, Gas, Polytropic, absolute, gauge, refuse_vacuum
+from .gas import Air, Ambient, Flow, Gas, Polytropic, absolute, refuse_vacuum
 from .mechanism import Mechanism
 from .muscle import Muscle
 from .ops import Value
+from .port import Port, port_of
 from .program import StateVariable
 from .variables import Input, outside, renamed, within
-
-
-class Port(NamedTuple):
-    """One muscle at one moment: contraction [1], shortening speed [m/s], volume [m3], pressures [Pa], forces [N].
-
-    `inner_contraction` and `inner_speed` are those of the contractile part, which differ from the fittings' beside a
-    series spring. `states` are the muscle's own and those of its air, by their own names; `rates` those of the former.
-    """
-
-    contraction: Value
-    speed: Value
-    volume: Value
-    air: Air
-    pressure: Value
-    tension: Value
-    friction: Value
-    inner_contraction: Value
-    inner_speed: Value
-    volume_rate: Value
-    states: Mapping[str, Value]
-    rates: Mapping[str, Value]
 
 
 @model
@@ -44,7 +26,7 @@ class Plant:
 
     `muscle` is one or a tuple. `circuit` is a tuple with one for each muscle, or a single one that feeds them all.
     With one muscle the names are plain (`air_mass`, `pressure`, `bristle`); with several they carry its name
-    (`left.pressure`, `left.bristle`). What belongs to a circuit in a tuple carries the name of its muscle.
+    (`left.pressure`), as does what belongs to a circuit in a tuple, or to a muscle's tube in a circuit for all.
     """
 
     muscle: Muscle | tuple[Muscle, ...]
@@ -54,17 +36,21 @@ class Plant:
     ambient: Ambient = Ambient()
 
     def check(self) -> None:
-        kinds = {"mechanism": Mechanism, "gas": Gas, "ambient": Ambient}
-        parts = [(field, getattr(self, field), kind) for field, kind in kinds.items()]
+        parts: list[Any] = [("mechanism", self.mechanism, Mechanism), ("gas", self.gas, Gas)]
+        parts += [("ambient", self.ambient, Ambient)]
         parts += [("muscle", m, Muscle) for m in self.muscles] + [("circuit", c, Circuit) for c in self.circuits]
         for field, part, kind in parts:
             if not isinstance(part, kind):
-                raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {str(part)[:80]}.")
+                hint = " Several stand in a tuple." if isinstance(part, list) else ""
+                hint = f" It has one: give its .{field}." if hasattr(part, field) else hint
+                raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {str(part)[:80]}.{hint}")
         self._refuse_not_closed_form()
         refuse_misplaced((self.muscles, self.circuits, self.mechanism))
         for circuit in self.circuits:
             refuse_shared(f"Plant: its {type(circuit).__name__}", circuit.supply)
         names = [m.name for m in self.muscles]
+        if not names:
+            raise ParameterError("Plant: it has no muscle; give one, or a tuple of them.")
         ports = sum(c.ports for c in self.circuits)
         if ports != len(names):
             raise ParameterError(f"Plant: its circuits feed {ports} muscles; {len(names)} are given.")
@@ -88,10 +74,9 @@ class Plant:
                     )
 
     def _refuse_twice(self) -> None:
-        names = [s.name for s in self.states] + [i.name for i in self.commands]
-        for name in names:
-            if names.count(name) > 1:
-                raise ParameterError(f"Plant: two of its parts use the name '{name}'; rename one of them.")
+        names = [*(s.name for s in self.states), *self.inputs]
+        for name in (n for n in names if names.count(n) > 1):
+            raise ParameterError(f"Plant: two of its parts use the name '{name}'; rename one of them.")
 
     @property
     def muscles(self) -> tuple[Muscle, ...]:
@@ -111,7 +96,11 @@ class Plant:
     @property
     def circuit_prefixes(self) -> tuple[str, ...]:
         """What the names of each circuit's quantities begin with."""
-        return self.prefixes if len(self.circuits) == len(self.muscles) else ("",)
+        return ("",) if self._shared else self.prefixes
+
+    @property
+    def _shared(self) -> bool:
+        return len(self.circuits) < len(self.muscles)
 
     @property
     def resting_lengths(self) -> list[Value]:
@@ -130,7 +119,8 @@ class Plant:
         for c in self.mechanism.coordinates:
             moving.append(StateVariable(c.name, c.unit, c.nominal, f"{c.name} of the load"))
             moving.append(StateVariable(c.speed, f"{c.unit}/s", c.nominal_speed, f"{c.speed} of the load"))
-        circuits = [s for p, c in self._circuits() for s in renamed(p, c.states(self.ambient))]
+        own = [(prefix, s) for prefix, circuit in self._circuits() for s in circuit.states(self.ambient)]
+        circuits = [replace(s, name=name) for prefix, s in own for name in self._outside(prefix, {s.name: s})]
         return (*air, *moving, *inner, *circuits)
 
     @property
@@ -146,39 +136,35 @@ class Plant:
     def _circuits(self) -> Iterator[tuple[str, Circuit]]:
         return zip(self.circuit_prefixes, self.circuits, strict=True)
 
+    def _shares(self, airs: list[Air]) -> list[tuple[Air, ...]]:
+        return [tuple(airs)] if self._shared else [(air,) for air in airs]
+
+    def _outside(self, prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
+        """What a circuit calls by its own names, by the plant's."""
+        return by_muscle(self.prefixes, values) if self._shared else outside(prefix, values)
+
+    def _within(self, prefix: str, values: Mapping[str, Value]) -> Mapping[str, Value]:
+        """What the plant calls by its names, by a circuit's own."""
+        return by_port(self.prefixes, values) if self._shared else within(prefix, values)
+
     def ports(self, state: Mapping[str, Value]) -> tuple[Port, ...]:
         """Every muscle at a state."""
         contractions = self.mechanism.contractions(state, self.resting_lengths)
         speeds = self.mechanism.contraction_speeds(state, state, self.resting_lengths)
         return tuple(
-            self._port(muscle, within(prefix, state), contraction, speed)
+            port_of(muscle, within(prefix, state), contraction, speed, self.gas, self.ambient)
             for muscle, prefix, contraction, speed in zip(
                 self.muscles, self.prefixes, contractions, speeds, strict=True
             )
         )
 
-    def _port(self, muscle: Muscle, state: Mapping[str, Value], contraction: Value, speed: Value) -> Port:
-        inner = muscle.inner_contraction(contraction, state)
-        volume = muscle.volume(inner, state)
-        air = self.gas.air(state, volume, self.ambient)
-        pressure = gauge(air.pressure, self.ambient)
-        pull = muscle.pull(pressure, inner, contraction, speed, state)
-        rates = muscle.rates(state, pressure, pull.speed)
-        growth = muscle.geometry.volume_growth(inner) * pull.speed / muscle.geometry.resting_length
-        growth = sum((rates[s.name] for s in muscle.wall.states), growth)
-        return Port(
-            contraction, speed, volume, air, pressure, pull.tension, pull.friction, inner, pull.speed, growth, state,
-            rates,
-        )  # fmt: skip
-
     def responses(
         self, ports: tuple[Port, ...], state: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> tuple[Response, ...]:
         """What every circuit does."""
-        airs = [port.air for port in ports]
-        shares = [tuple(airs)] if len(self.circuits) < len(ports) else [(air,) for air in airs]
+        shares = self._shares([port.air for port in ports])
         return tuple(
-            circuit.respond(share, within(prefix, state), within(prefix, inputs), self.ambient)
+            circuit.respond(share, self._within(prefix, state), within(prefix, inputs), self.ambient)
             for (prefix, circuit), share in zip(self._circuits(), shares, strict=True)
         )
 
@@ -194,7 +180,7 @@ class Plant:
         for c in self.mechanism.coordinates:
             rates |= {c.name: state[c.speed], c.speed: accelerations[c.name]}
         for (prefix, _), response in zip(self._circuits(), done, strict=True):
-            rates |= outside(prefix, response.rates)
+            rates |= self._outside(prefix, response.rates)
         return rates
 
     def _accelerations(
@@ -220,7 +206,7 @@ class Plant:
             if "internal_energy" in port.states:
                 found[f"{prefix}temperature"] = port.air.temperature
         for (prefix, _), response in zip(self._circuits(), done, strict=True):
-            found |= outside(prefix, response.outputs)
+            found |= self._outside(prefix, response.outputs)
         accelerations = self._accelerations(state, ports, inputs)
         for c in self.mechanism.coordinates:
             found[c.acceleration] = accelerations[c.name]
@@ -234,7 +220,9 @@ class Plant:
         for a pressure below absolute zero, another number of pressures than muscles, an unknown name, or a wall that
         takes all volume away.
         """
-        pressures = pressure if isinstance(pressure, tuple) else (pressure,) * len(self.muscles)
+        given = pressure if isinstance(pressure, tuple) else (pressure,) * len(self.muscles)
+        pressures = [finite_number("Plant: the pressure of a state", p) for p in given]
+        values = {name: finite_number(f"Plant: the {name} of a state", value) for name, value in values.items()}
         if len(pressures) != len(self.muscles):
             raise ParameterError(f"Plant: {len(pressures)} pressures are given for {len(self.muscles)} muscles.")
         air = {f"{p}{s.name}" for p, m in zip(self.prefixes, self.muscles, strict=True)
@@ -281,9 +269,8 @@ class Plant:
             content = self.gas.content(absolute(p, self.ambient), volume, self.ambient)
             airs.append(self.gas.air(content, volume, self.ambient))
             found |= outside(prefix, content)
-        shares = [tuple(airs)] if len(self.circuits) < len(airs) else [(air,) for air in airs]
-        for (prefix, circuit), share in zip(self._circuits(), shares, strict=True):
-            found = {**outside(prefix, circuit.settled(share, self.ambient)), **found}
+        for (prefix, circuit), share in zip(self._circuits(), self._shares(airs), strict=True):
+            found = {**self._outside(prefix, circuit.settled(share, self.ambient)), **found}
         return found
 
 

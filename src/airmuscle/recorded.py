@@ -10,14 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from .command import Segments
+from .doubt import at_end_of_reach, beyond_laws, stopped_where_impossible
 from .errors import SimulationError
-from .method import INTERRUPTED, LESS_THAN_NONE, NOT_FINITE, REASONS, Course, Method
-from .muscle import SeriesSpring
+from .method import INTERRUPTED, REASONS, Course, Method
+from .muscle import INNER, SeriesSpring
 from .plant import Plant
 from .program import System
 from .recording import Recording
 from .recording.columns import quantity_of
-from .start import less_than_none
 
 if TYPE_CHECKING:
     from .program.prepared import Prepared
@@ -36,24 +36,13 @@ def _results(ready: Prepared, course: Course, segments: Segments, times: Array, 
     return results, inputs
 
 
-def _stopped_where_impossible(plant: System, course: Course, results: Array, times: Array) -> Course:
-    """The course up to the first row that cannot be: a fixed step can end in numbers, and yet far off."""
-    not_finite = np.asarray(~np.isfinite(results).all(axis=1))
-    bad = np.flatnonzero(not_finite | less_than_none(plant, course.rows[: course.reached]).any(axis=1))
-    if not bad.size:
-        return course
-    row = int(bad[0])
-    status = NOT_FINITE if not_finite[row] else LESS_THAN_NONE
-    return course._replace(reached=row, time=float(times[row]), state=course.rows[row], status=status)
-
-
 def recorded(
     ready: Prepared, course: Course, segments: Segments, times: Array, start: float, method: Method
 ) -> tuple[Recording, Course]:
     """The rows that were reached, up to the first that cannot be, and the course up to there."""
     plant = ready.system
     results, inputs = _results(ready, course, segments, times, start)
-    course = _stopped_where_impossible(plant, course, results, times)
+    course = stopped_where_impossible(ready, course, results, times)
     reached = course.reached
     states, results, inputs = course.rows[:reached], results[:reached], inputs[:reached]
     columns: dict[str, Any] = {"time": times[:reached]}
@@ -67,6 +56,7 @@ def recorded(
         if len(plant.muscles) == 1:
             constants["resting_length"] = plant.muscles[0].geometry.resting_length
         notes += [f"gas: {plant.gas}", friction_in_words(plant), *outside_box(plant, columns)]
+        notes += beyond_laws(plant, columns) if reached else []
     return Recording(columns, "simulation", constants, tuple(notes)), course
 
 
@@ -87,9 +77,10 @@ def outside_box(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
         if box is not None:
             left, doubt = f"{muscle.name} was outside the box of its characteristic", "nothing was measured there"
             of_muscle += [("pressure", box.pressure, left, doubt), ("contraction", box.contraction, left, doubt)]
-        if not isinstance(muscle.series, SeriesSpring):  # a series spring stretches beyond what the muscle does
+        own = INNER if isinstance(muscle.series, SeriesSpring) else "contraction"
+        if f"{prefix}{own}" in columns:  # of a batch that may not be kept
             left, doubt = f"{muscle.name} was beyond the reach of its geometry", "no muscle can do this"
-            of_muscle.append(("contraction", muscle.geometry.contraction_reach, left, doubt))
+            of_muscle.append((own, muscle.geometry.contraction_reach, left, doubt))
         for name, bounds, left, doubt in of_muscle:
             found += _beyond(columns["time"], columns[f"{prefix}{name}"], name, bounds, left, doubt)
     return found
@@ -127,6 +118,8 @@ def problem(plant: System, course: Course, end: float) -> str:
         5: "Nothing is lost; what was computed is in the recording.",
         8: "Look at what the controller measured last, and at its parameters.",
     }.get(course.status, "Look at the last state: a parameter may be far from physical, or a fixed step too long.")
+    if isinstance(plant, Plant) and course.status != INTERRUPTED:
+        remedy = at_end_of_reach(plant, course.state) or remedy
     return (
         f"the run ended at {course.time:.6g} of {end:.6g} s because {REASONS[course.status]}, after {course.steps} "
         f"steps, at {state}. {remedy}"

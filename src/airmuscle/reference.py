@@ -6,6 +6,8 @@ import dataclasses
 from collections.abc import Iterator
 from typing import Any
 
+from .errors import ParameterError
+
 
 @dataclasses.dataclass(frozen=True)
 class Reference:
@@ -43,7 +45,10 @@ def _walk(thing: Any) -> Iterator[Reference]:
 def cite(thing: Any) -> list[Reference]:
     """Every source used by `thing`, found by walking its fields, each once, sorted by key.
 
-    `thing` is any noun of airmuscle: a law, a muscle, a plant, a fit, a library entry, or a tuple of them.
+    `thing` is any noun of airmuscle: a law, a muscle, a plant, a fit, a library entry, or a tuple of them. Raises
+    ParameterError for anything else, as a name is.
     """
+    if not (dataclasses.is_dataclass(thing) or isinstance(thing, tuple | list) or hasattr(thing, "references")):
+        raise ParameterError(f"cite: {thing!r} is no model; load an entry by its name: cite(load('dmsp-20-300')).")
     found = {reference.key: reference for reference in _walk(thing)}
     return [found[key] for key in sorted(found)]

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from .closed_loop import run_loop
 from .command import Command, Schedule, Segments, refuse_no_command
+from .declare import number_of
 from .errors import ParameterError, SimulationError
 from .loop import Loop
 from .method import LESS_THAN_NONE, Method
@@ -16,7 +17,7 @@ from .plant import Plant
 from .program import System
 from .recorded import ended, problem, recorded
 from .recording import Recording
-from .start import less_than_none, number_of, refuse_impossible, state_vector
+from .start import less_than_none, refuse_impossible, refuse_no_system, state_vector
 from .terms import chosen_method, output_times, refuse_beyond_range, rest_of, run_length
 
 
@@ -45,6 +46,7 @@ def simulate(
 
     The result does not depend on `output`. Raises ParameterError for an input or state that the plant lacks.
     """
+    refuse_no_system("simulate", plant)
     if isinstance(command, Loop):
         return run_loop(
             plant, command, duration=duration, start=start, start_time=start_time, method=method, output=output,
@@ -87,7 +89,8 @@ def advance(
     """
     from .program.prepared import prepared
 
-    dt = number_of("advance: dt", dt)
+    refuse_no_system("advance", plant)
+    dt, start_time = number_of("advance: dt", dt), number_of("advance: start_time", start_time)
     if not 0 < dt < np.inf:
         raise ParameterError(f"advance: dt is {dt!r} s; it must be positive and finite.")
     if isinstance(inputs, Segments):

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from .declare import number_of
 from .errors import ParameterError, suggestion
 from .plant import Plant
 from .program import System
@@ -17,6 +17,12 @@ Array = npt.NDArray[np.float64]
 ROUNDING = 1e-3
 """Share of its nominal size by which a tolerance may carry air below zero (chosen)."""
 _OF_AIR = ("air_mass", "internal_energy")
+
+
+def refuse_no_system(what: str, given: object) -> None:
+    """Raise ParameterError for what has no states, inputs, rates and outputs, as a muscle or a class."""
+    if isinstance(given, type) or not all(hasattr(given, name) for name in ("states", "inputs", "rates", "outputs")):
+        raise ParameterError(f"{what}: {str(given)[:80]} is no plant; give Plant(muscle, circuit, mechanism).")
 
 
 def state_vector(system: System, state: Mapping[str, float]) -> Array:
@@ -45,14 +51,6 @@ def state_vector(system: System, state: Mapping[str, float]) -> Array:
             "plant.state_at(pressure=...)."
         )
     return values
-
-
-def number_of(what: str, value: Any) -> float:
-    """The number that is given. Raises ParameterError for anything else, as text with a unit is."""
-    try:
-        return float(0.0 + value)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{what} is {value!r}; it must be one number, in SI units.") from None
 
 
 def less_than_none(system: System, values: Array) -> npt.NDArray[np.bool_]:

@@ -10,7 +10,8 @@ from . import trace
 from .gas import STILL, gauge
 from .muscle import Muscle, SeriesSpring
 from .ops import Value
-from .plant import Plant, Port
+from .plant import Plant
+from .port import Port
 from .start import refuse_impossible, state_vector
 
 

@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from .command import Segments
+from .declare import number_of
 from .equilibrium import equilibrium
 from .errors import ParameterError
 from .method import Method, Rodas4
 from .plant import Plant
 from .program import System
-from .start import number_of
 
 Array = npt.NDArray[np.float64]
 COARSEST = 0.01

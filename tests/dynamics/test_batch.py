@@ -18,7 +18,8 @@ from airmuscle.batch import Batch, Single, simulate_batch, threads, variations
 from airmuscle.circuit import FillDischarge, Supply, Valve
 from airmuscle.command import REST, Schedule, Signal
 from airmuscle.declare import model, parameter
-from airmuscle.errors import ColumnError, FileError, ParameterError
+from airmuscle.errors import ColumnError, FileError, OutOfReach, ParameterError
+from airmuscle.gas import Isothermal
 from airmuscle.mechanism import HangingMass
 from airmuscle.method import DormandPrince8, Explicit, Rodas4, RungeKutta4
 from airmuscle.plant import Plant
@@ -239,6 +240,26 @@ def test_a_plant_that_fails_does_not_stop_the_others():
     assert "2 did not get to the end" in repr(found)
 
 
+@pytest.mark.parametrize("keep", [None, ("position",)], ids=["all", "not the air"])
+def test_air_below_none_on_the_way_is_seen_in_a_lane_as_alone(keep):
+    """A pulse of a valve far too large for the step takes more air than there is; by the end it has come back."""
+    isothermal = dataclasses.replace(plain(), gas=Isothermal())
+    start = isothermal.state_at(pressure=5e5, position=0.002)
+    pulse = Schedule({"discharge": ((0.02, 1), (0.022, 0)), "fill": ((0.03, 1),)})
+    given = {"duration": 0.3, "start": start, "method": FAST, "output": 1e-3}
+    found = simulate_batch(
+        isothermal, {"circuit.discharge.conductance": [1e-6, 2.8e-6, 5e-6]}, pulse, keep=keep, **given
+    )
+    assert found.status.tolist() == [0, 7, 7]
+    for index in (1, 2):
+        alone = simulate(found.plant(index), pulse, complete=False, **given)
+        assert "ended at 0.021 of 0.3 s because there was less air than none" in found.reason(index)
+        assert "ended at 0.021 of 0.3 s because there was less air than none" in alone.notes[-1]
+        assert found.reached[index] == len(alone)
+        assert np.isnan(found["position"][index, len(alone) :]).all()
+    assert keep is None or tuple(found.columns) == keep
+
+
 def test_a_plant_without_an_equilibrium_is_reported():
     found = simulate_batch(plain(), {"mechanism.mass": [4.0, 1e5, 5.0]}, REST, duration=0.1, method=FAST)
     assert list(found.failed) == [1]
@@ -340,7 +361,7 @@ def test_a_number_too_large_for_single_precision_is_reported():
     start = {"x": [1.0, 3e38]}
     found = simulate_batch(Growing(), {}, REST, duration=1.0, start=start, method=FAST, precision=Single())
     assert list(found.failed) == [1]
-    assert found.reason(1) == "the run is not finite in single precision, though not in double"
+    assert found.reason(1) == "a rate or an output is not finite in single precision, though not in double"
     assert np.isnan(found["x"][1]).all()
 
 
@@ -363,6 +384,20 @@ def test_everything_else_that_cannot_be_is_refused(tmp_path):
     refused("the plant has no state 'sped'", start={**start, "sped": 0.0})
     refused("the start lacks speed", start={k: v for k, v in start.items() if k != "speed"})
     refused("duration is -1 s", duration=-1)
+    refused(r"1e\+06 s in steps of 0.001 s are 1e\+09 steps .* more steps than allowed, 5e\+07", duration=1e6)
+    refused("start, row 0: Braid cannot take a contraction of", OutOfReach, start={**start, "position": [1.0, 0.0]})
+    refused("start, row 1: Braid cannot take a contraction of", OutOfReach, start={**start, "position": [0.0, -1.0]})
+    lengths = {"mechanism.mass": [9.0, 10.0], "muscle.geometry.resting_length": [0.3, 0.02]}
+    refused("start, row 1: Braid cannot take", OutOfReach, variations=lengths, start={**start, "position": -0.02})
+    refused("start: it is 'rest'; give for each state a number", start="rest")
+    refused("keep: it is 3; name columns", keep=3)
+    refused(r"keep: no column '3'", keep=[3])
+    refused("into: it is 5; name a folder", into=5)
+    refused("precision: it is 'single'; give Double", precision="single")
+    refused("precision: it is <class .*Single'>; give Double", precision=Single)
+    refused("cores is 'all'; it must be a whole number", cores="all")
+    with pytest.raises(ParameterError, match=r"simulate_batch: Muscle.* is no plant; give Plant"):
+        simulate_batch(chosen_muscle(), {}, PULSE, duration=0.1, start=start)
     refused("cores is 0; it must be a whole number from 1 on", cores=0)
     (tmp_path / "there").mkdir()
     refused("there: it exists already", FileError, into=tmp_path / "there")

@@ -73,7 +73,7 @@ def test_a_function_that_no_lines_follow_is_refused():
             ParameterError, match=r"'fill' is not followed to .* points: it differs by .* as a Schedule"
         ):
             Signal.sampled({"fill": function}, duration=1.0, error=error)
-    with pytest.raises(ParameterError, match=r"'fill' must be finite points"):
+    with pytest.raises(ParameterError, match=r"'fill' is nan at 0 s; it must be finite"):
         Signal.sampled({"fill": lambda t: math.nan}, duration=1.0)
     for wrong in ({"error": 0.0}, {"duration": 0.0}, {"duration": math.inf}):
         with pytest.raises(ParameterError, match="an error above 0 is needed, and a duration above 0"):

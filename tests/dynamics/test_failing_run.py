@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from joints import chosen_muscle
@@ -11,12 +13,14 @@ from airmuscle.circuit import FillDischarge, Leaking, Line, Manifold, Shared, Su
 from airmuscle.command import Schedule, Segments
 from airmuscle.contact import HuntCrossley
 from airmuscle.errors import AirmuscleError, SimulationError
-from airmuscle.gas import Isothermal
+from airmuscle.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.linearise import linearise
 from airmuscle.mechanism import HangingMass, Held, InSeries, Stopped
 from airmuscle.method import LESS_THAN_NONE, TOO_MANY, Rodas4, RungeKutta4
+from airmuscle.muscle import LinearDamper, SeriesSpring
 from airmuscle.plant import Plant
 from airmuscle.program.prepared import prepared
+from airmuscle.recorded import outside_box
 from airmuscle.simulate import advance, simulate
 from airmuscle.start import state_vector
 from airmuscle.stiffness import stiffness
@@ -41,6 +45,21 @@ def test_a_fixed_step_that_is_too_long_is_not_called_a_result():
     kept = simulate(plant, FILL, duration=1.0, start=start, method=RungeKutta4(0.01), complete=False)
     assert len(kept) == len(part)
     assert "not finite" in kept.notes[-1]
+
+
+@pytest.mark.parametrize("mechanism", [HangingMass(60.0), InSeries(HangingMass(50.0), (0.3,))], ids=["one", "two"])
+@pytest.mark.parametrize("gas", [Isothermal(), Polytropic(1.2), EnergyBalance(0.2)], ids=repr)
+def test_a_load_that_tears_a_muscle_out_of_its_reach_is_named_as_the_cause(mechanism, gas):
+    """A braid stretched until its threads lie along it encloses nothing; a stop is what keeps a load from doing so."""
+    muscles = tuple(replace(chosen_muscle(), name=name) for name in ("upper", "lower"))[: mechanism.muscles or 1]
+    plant = Plant(muscles, (FillDischarge(Supply(5e5), VALVE, HUGE),) * len(muscles), mechanism, gas)
+    empty = Schedule({name: ((0.0, 1.0),) for name in plant.inputs if name.endswith("discharge")})
+    with pytest.raises(SimulationError, match=r"upper had come to a contraction of -10.*put Stopped around") as caught:
+        simulate(plant, empty, duration=2.0, start=plant.state_at(pressure=0.0))
+    assert len(caught.value.recording) > 1
+    if len(muscles) == 1:
+        held = replace(plant, mechanism=Stopped(mechanism, -0.015, 0.05, HuntCrossley(1e8)))
+        assert simulate(held, empty, duration=2.0, start=held.state_at(pressure=0.0))["time"][-1] == 2.0
 
 
 def isothermal(valve=VALVE):
@@ -201,11 +220,19 @@ def test_the_response_at_a_pole_is_infinite():
 
 
 def test_a_run_says_where_no_muscle_can_be():
-    """A load thrown up far beyond the muscle's own length is no muscle any more; the numbers alone do not say so."""
+    """A load thrown up far beyond the muscle's own length is no muscle any more; isothermal numbers would go on."""
     plant = isothermal()
-    run = simulate(plant, Schedule({}), duration=0.1, start={**STATE, "speed": 100.0})
-    (note,) = [note for note in run.notes if "was beyond the reach of its geometry in contraction" in note]
-    assert "no muscle can do this" in note
+    thrown = r"because a muscle enclosed nothing.* contraction of 10\d\.\d+%, where its geometry ends"
+    with pytest.raises(SimulationError, match=thrown) as caught:
+        simulate(plant, Schedule({}), duration=0.1, start={**STATE, "speed": 100.0})
+    assert (caught.value.recording["volume"] > 0).all()
+    assert 1 < len(caught.value.recording) < 101
+    columns = {"time": np.array([0.0, 1.0]), "pressure": np.zeros(2), "contraction": np.array([0.0, -0.2])}
+    (note,) = [note for note in outside_box(plant, columns) if "was beyond the reach of its geometry in" in note]
+    assert note.endswith("by at most 9.664 % at 1 s; no muscle can do this")
+    series = replace(plant, muscle=replace(plant.muscle, damper=LinearDamper(50.0), series=SeriesSpring(3e4)))
+    (note,) = outside_box(series, columns | {"inner_contraction": np.array([-0.2, 0.0])})
+    assert "in inner_contraction" in note
     calm = simulate(plant, Schedule({}), duration=0.1, start=STATE)
     assert not [note for note in calm.notes if "reach" in note]
 

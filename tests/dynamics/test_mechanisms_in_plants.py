@@ -12,10 +12,13 @@ from joints import HEAT_CAPACITY, chosen_muscle, joint, joint_start
 
 from airmuscle.circuit import (
     ClosedChamber,
+    DistributedTube,
     FillDischarge,
     Follower,
     Line,
+    Manifold,
     ProportionalValve,
+    Shared,
     Supply,
     ThreePosition,
     Tube,
@@ -229,6 +232,49 @@ def test_with_heat_it_is_too_but_that_air_that_leaves_a_muscle_flows_at_its_own_
             more = (factor - 1) * flow * (HEAT_CAPACITY + GAS_CONSTANT) * temperature
             assert found[f"{side}.internal_energy"] == pytest.approx(expected[f"{side}.energy"] + more, rel=1e-9)
     assert directions == {True, False}
+
+
+def test_the_tubes_of_one_circuit_for_all_are_called_by_their_muscles():
+    """Each tube belongs to a muscle, whose name it carries as it does where every muscle has a circuit of its own."""
+    valve = ProportionalValve(Supply(6e5), VALVE, VALVE, Follower(80.0), muscles=2)
+    plant = Plant((LEFT, RIGHT), Line(valve, Tube(VALVE, 1e-5, 2)), JOINT, Isothermal())
+    of_tubes = [s.name for s in plant.states if "tube" in s.name]
+    assert of_tubes == [f"{side}.tube{i}.air_mass" for side in ("left", "right") for i in (1, 2)]
+    start = plant.state_at(pressure=(2e5, 3e5))
+    assert start["left.tube1.air_mass"] / start["right.tube1.air_mass"] == pytest.approx(301.325 / 401.325)
+    run = simulate(plant, Schedule({"command": ((0.0, 1.0),)}), duration=0.02, start=start)
+    assert run["left.tube1.pressure"][-1] > run["left.tube2.pressure"][-1] > run["left.pressure"][-1] > 2e5
+    assert run["right.tube1.pressure"][-1] < run["right.tube2.pressure"][-1] < run["right.pressure"][-1]
+
+
+@pytest.mark.parametrize("nested", [False, True], ids=["one circuit", "manifold"])
+def test_a_run_says_where_air_ran_too_fast_for_a_distributed_tube(nested):
+    """A wide valve before a long narrow tube into an empty muscle: beyond a third of the speed of sound, in one."""
+    tube, wide, narrow = DistributedTube(0.5, 2e-3, 3), Valve(1e-7, 0.4), Valve(1e-10, 0.4)
+    feeds = [Line(FillDischarge(Shared() if nested else Supply(6e5), v, v), tube) for v in (wide, narrow)]
+    circuit = Manifold(Supply(6e5), tuple(feeds), ("left", "right")) if nested else tuple(feeds)
+    plant = Plant((LEFT, RIGHT), circuit, JOINT, Isothermal())
+    command = Schedule({"left.fill": ((0.0, 1.0),), "right.fill": ((0.0, 1.0),)})
+    found = simulate(plant, command, duration=0.02, start=plant.state_at(pressure=0.0), method=Rodas4(1e-5))
+    doubts = [note for note in found.notes if "times the speed of sound" in note]
+    assert {note.partition(":")[0] for note in doubts} <= {f"left.tube{i}" for i in (1, 2, 3)}
+    speeds = {
+        i: found[f"left.tube{i}.flow"]
+        * GAS_CONSTANT
+        * 293.15
+        / (tube.area * (found[f"left.tube{i}.pressure"] + 101325))
+        for i in (1, 2, 3)
+    }
+    greatest = {i: float(abs(speed).max() / np.sqrt(GAS_CONSTANT * 293.15)) for i, speed in speeds.items()}
+    assert len(doubts) == sum(share > 1 / 3 for share in greatest.values()) > 0
+    assert f"air ran at up to {greatest[3]:.2g} times the speed of sound" in doubts[-1]
+    still = simulate(plant, REST, duration=0.02, start=plant.state_at(pressure=0.0))
+    assert not [note for note in still.notes if "times the speed of sound" in note]
+
+
+def test_two_tubes_of_one_name_are_refused():
+    with pytest.raises(ParameterError, match=r"two of its parts use the name 'left.tube.air_mass'"):
+        pair(JOINT, Isothermal(), Line(Line(ThreePosition(Supply(6e5), VALVE, VALVE), TUBE), TUBE))
 
 
 def test_one_five_port_valve_turns_a_joint_to_either_side():

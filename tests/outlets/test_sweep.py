@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import multiprocessing
 import os
 import re
 import shutil
@@ -24,6 +25,7 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
+from airmuscle.cli.interruption import look, remembered
 from airmuscle.errors import AirmuscleError, FileError, InputError, SimulationError
 from airmuscle.library.scenario import load_scenario
 from airmuscle.report.write import save_table
@@ -124,10 +126,21 @@ def command(folder: Path, *options: str) -> list[str]:
     ]
 
 
+HEARING = """
+import runpy, signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
+runpy.run_module("airmuscle", run_name="__main__", alter_sys=True)
+"""
+
+
 def started(folder: Path, chunks: int, *options: str) -> subprocess.Popen:
-    """A study that has kept as many chunks and is still running."""
+    """A study that has kept as many chunks and is still running; Ctrl-C reaches it as it does from a terminal."""
     process = subprocess.Popen(
-        command(folder, *options), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        [sys.executable, "-c", HEARING, *command(folder, *options)[3:]],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
     )
     end = time.monotonic() + 120
     while len(list((folder / "out" / "chunks").glob("*.npz"))) < chunks:
@@ -168,6 +181,52 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(folder: Path, workers: 
     (kept,) = re.findall(r"(\d+) of 2000 runs are kept", said)
     assert int(kept) == 4 * len(list((folder / "out" / "chunks").glob("*.npz")))
     assert not (folder / "out" / "results.csv").exists()
+
+
+def test_ctrl_c_while_workers_begin_is_no_traceback_of_theirs():
+    with processes(2) as executor:
+        tasks = [executor.submit(os.getpid) for _ in range(2)]
+        for _ in range(40):
+            for child in multiprocessing.active_children():
+                os.kill(child.pid, signal.SIGINT)
+            time.sleep(0.01)
+        assert len({task.result() for task in tasks}) in {1, 2}
+
+
+def test_ctrl_c_that_python_loses_is_remembered(monkeypatch):
+    lost = []
+    monkeypatch.setattr(sys, "unraisablehook", lost.append)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    class Dying:
+        def __del__(self):
+            signal.raise_signal(signal.SIGINT)
+
+    def working():
+        with remembered():
+            look()
+            thing = Dying()
+            del thing
+            assert [e.exc_type for e in lost] == [KeyboardInterrupt]
+            with pytest.raises(KeyboardInterrupt):
+                look()
+
+    def interrupted_import():
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        raise ImportError("initialization failed")
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            working()
+        look()  # forgotten once the block has raised it
+        with pytest.raises(KeyboardInterrupt), remembered():
+            interrupted_import()
+        with pytest.raises(ImportError), remembered():
+            raise ImportError
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextlib.contextmanager

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..doubt import beyond_laws
 from ..errors import ColumnError, suggestion
 from ..method import REASONS
 from ..plant import Plant
@@ -74,7 +75,7 @@ class Batch:
 
     def _place(self, index: int) -> int:
         """The number of a plant, counted from the end where it is negative."""
-        if not -len(self) <= index < len(self):
+        if not isinstance(index, int | np.integer) or not -len(self) <= index < len(self):
             raise ColumnError(f"batch: there is no plant {index}; there are 0 to {len(self) - 1}.")
         return int(index) % len(self)
 
@@ -94,6 +95,7 @@ class Batch:
             notes += [f"gas: {system.gas}", friction_in_words(system)]
             if all(f"{p}{name}" in columns for p in system.prefixes for name in ("pressure", "contraction")):
                 notes += outside_box(system, columns)
+            notes += beyond_laws(system, columns) if self.reached[index] else []
         if self.status[index]:
             notes.append(self.reason(index))
         return Recording(columns, "simulation", constants, tuple(notes))

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import ParameterError
-from ..method import Explicit
+from ..method import LESS_THAN_NONE, NOT_FINITE, REASONS, Explicit
 from .precision import Precision
 from .task import Task
 from .threads import Queue
@@ -29,10 +29,16 @@ class Block:
         n, m, width = sizes.states, sizes.inputs, number.lanes
         lengths = (sizes.parameters, held, n, n, m, m, m, 1, sizes.outputs)
         self.arrays = aligned(lengths, width, self.kind)
-        self.rows = np.empty((len(task.columns), width, task.times.size), self.kind)
+        self.chosen = np.concatenate([task.chosen, _air(task)])
+        self.rows = np.empty((self.chosen.size, width, task.times.size), self.kind)
         self.final = np.empty((width, n), self.kind)
         self.status = np.empty(width, dtype=np.int64)
         self.width = width
+
+
+def _air(task: Task) -> npt.NDArray[np.int64]:
+    """States that may not be less than none; their rows are judged, and forgotten."""
+    return np.flatnonzero(np.isfinite(task.least)).astype(np.int64)
 
 
 def aligned(lengths: tuple[int, ...], width: int, kind: Any) -> list[npt.NDArray[Any]]:
@@ -92,7 +98,7 @@ def _run(task: Task, table: Table, room: Block, plants: npt.NDArray[np.intp], st
     y[:] = task.starts[lane_of].T
     ended = lanes(
         *room.addresses, *room.arrays, table.ends, table.values, table.slopes, table.first[lane_of],
-        table.last[lane_of], task.begin, method.step, task.times, task.chosen, room.rows, room.final, room.status,
+        table.last[lane_of], task.begin, method.step, task.times, room.chosen, room.rows, room.final, room.status,
         stop,
     )  # fmt: skip
     if ended == INTERRUPTED:
@@ -101,17 +107,21 @@ def _run(task: Task, table: Table, room: Block, plants: npt.NDArray[np.intp], st
         column[plants] = room.rows[j, : plants.size]
     task.final[plants] = room.final[: plants.size]
     task.status[plants], task.reached[plants] = room.status[: plants.size], task.times.size
-    failed = (room.status[: plants.size] != 0) | (room.final[: plants.size] < task.least).any(axis=1)
-    for index in plants[failed]:
-        _explain(task, int(index), room.kind)
+    least = task.least
+    airless: npt.NDArray[np.bool_] = np.any(task.final[plants] < least, axis=1)
+    for rows, i in zip(room.rows[len(task.columns) :], _air(task), strict=True):
+        airless |= np.any(rows[: plants.size] < least[i], axis=1)
+    for index, without_air in zip(plants, airless, strict=True):
+        if without_air or task.status[index]:
+            _explain(task, int(index), room.kind, LESS_THAN_NONE if without_air else NOT_FINITE)
 
 
-def _explain(task: Task, index: int, kind: Any) -> None:
+def _explain(task: Task, index: int, kind: Any, status: int) -> None:
     """A plant that failed in its lane is run again alone, for the rows that it reached, the time and the reason."""
     task.alone(index)
     if task.status[index] == 0:
-        what = "single precision, though not in double" if kind == np.float32 else "its lane, though not alone"
-        task.without(index, 3, f"the run is not finite in {what}")
+        what = "in single precision, though not in double" if kind == np.float32 else "in its lane, though not alone"
+        task.without(index, status, f"{REASONS[status]} {what}")
 
 
 def refuse_single(precision: Precision, task_method: object) -> None:

@@ -9,11 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from ..command import Command, Segments
-from ..errors import ParameterError, suggestion
+from ..declare import number_of
+from ..errors import AirmuscleError, ParameterError, suggestion
 from ..loop import Loop
-from ..method import INTERRUPTED, Explicit, Method
+from ..method import INTERRUPTED, MOST_STEPS, Explicit, Method
+from ..plant import Plant
 from ..program import System
-from ..start import number_of
+from ..start import refuse_impossible, refuse_no_system
 from ..terms import chosen_method, output_times, refuse_beyond_range
 from .precision import Double, Precision
 from .result import NOT_STARTED, Batch
@@ -22,7 +24,7 @@ from .starts import count_of_starts, given_starts, resting_starts
 from .storage import InMemory, OnDisk
 from .task import Task
 from .threads import Queue, cores_here, progress, shared_out
-from .variations import Variations, variations_of
+from .variations import Column, Variations, variations_of
 
 Array = npt.NDArray[np.float64]
 NOT_RUN = -1
@@ -63,8 +65,10 @@ def simulate_batch(
     _refuse_loop(command)
     duration = number_of("simulate_batch: duration", duration)
     start_time = number_of("simulate_batch: start_time", start_time)
-    _refuse_nonsense(duration, start_time, cores)
+    refuse_no_system("simulate_batch", plant)
     method = chosen_method(method)
+    _refuse_nonsense(duration, start_time, method, cores)
+    _refuse_mistyped(start, keep, into, precision)
     refuse_single(precision, method)
     different = variations_of(plant, variations, _count(start, command))
     count = len(different.values)
@@ -94,13 +98,29 @@ def _refuse_loop(command: object) -> None:
         )
 
 
-def _refuse_nonsense(duration: float, start_time: float, cores: int | None) -> None:
+def _refuse_nonsense(duration: float, start_time: float, method: Method, cores: int | None) -> None:
     if not (np.isfinite(duration) and duration > 0 and start_time + duration > start_time):
         raise ParameterError(
             f"simulate_batch: duration is {duration:g} s from {start_time:g} s on; it must be positive and finite."
         )
+    if isinstance(method, Explicit) and duration / method.step > MOST_STEPS:
+        raise ParameterError(
+            f"simulate_batch: {duration:g} s in steps of {method.step:g} s are {duration / method.step:.3g} steps for "
+            f"each plant; that is more steps than allowed, {MOST_STEPS:g}. Lengthen the step, or shorten the run."
+        )
     if cores is not None and (not isinstance(cores, int) or cores < 1):
         raise ParameterError(f"simulate_batch: cores is {cores!r}; it must be a whole number from 1 on.")
+
+
+def _refuse_mistyped(start: object, keep: object, into: object, precision: object) -> None:
+    if start is not None and not isinstance(start, Mapping):
+        raise ParameterError(f"start: it is {start!r}; give for each state a number for all, or a column (N,).")
+    if keep is not None and not isinstance(keep, Sequence):
+        raise ParameterError(f"keep: it is {keep!r}; name columns, ('pressure', 'position').")
+    if into is not None and not isinstance(into, str | Path):
+        raise ParameterError(f"into: it is {into!r}; name a folder.")
+    if not isinstance(precision, Precision):
+        raise ParameterError(f"precision: it is {precision!r}; give Double() or Single().")
 
 
 def _count(start: Mapping[str, npt.ArrayLike] | None, command: Command | Sequence[Command]) -> int | None:
@@ -141,9 +161,27 @@ def _starts(
     different: Variations, start: Mapping[str, npt.ArrayLike] | None, count: int
 ) -> tuple[Array, dict[int, str]]:
     if start is not None:
-        return given_starts(different.system, start, count), {}
+        states = given_starts(different.system, start, count)
+        _refuse_impossible(different, states)
+        return states, {}
     with progress("finding where each plant rests", count) as advanced:
         return resting_starts(different, advanced)
+
+
+def _refuse_impossible(different: Variations, states: Array) -> None:
+    """Refuse states (N, n) that a muscle cannot take, as `simulate` does, with the row."""
+    if not isinstance(different.system, Plant):
+        return
+    names = [s.name for s in different.system.states]
+    try:
+        columns = {name: column.view(Column) for name, column in zip(names, states.T, strict=True)}
+        refuse_impossible(different.as_columns(), columns)
+    except (TypeError, ValueError, AirmuscleError):  # rows differ, or one of them is refused: row by row
+        for row, state in enumerate(states.tolist()):
+            try:
+                refuse_impossible(different.one(row), dict(zip(names, state, strict=True)))  # type: ignore[arg-type]
+            except AirmuscleError as error:
+                raise type(error)(f"start, row {row}: {str(error).removeprefix('the start: ')}") from None
 
 
 def _task(

@@ -49,21 +49,21 @@ class Variations:
             sizes = [np.array([s.nominal for s in self.system.states])] * count
             return np.array(sizes)
         try:
-            columns = [np.broadcast_to(s.nominal, count) for s in self._as_columns().states]
+            columns = [np.broadcast_to(s.nominal, count) for s in self.as_columns().states]
             return np.column_stack([c.astype(float) for c in columns])
         except (TypeError, ValueError, AirmuscleError):  # a system whose `states` takes plain numbers only
             return np.array([[s.nominal for s in self.one(i).states] for i in range(count)])
 
-    def _as_columns(self) -> Any:
+    def as_columns(self) -> Any:
         """The system with a column (N,) in place of every leaf that differs."""
         leaves: list[Any] = declare.flatten(self.system).tolist()
         for place, column in zip(self.places, self.values.T, strict=True):
-            leaves[place] = column.view(_Column)
+            leaves[place] = column.view(Column)
         return declare.rebuild(self.system, leaves)
 
     def refuse_inconsistent(self) -> None:
         """Raise ParameterError, naming the row, where parameters of a model do not go together."""
-        for part in _checking(self._as_columns()):
+        for part in _checking(self.as_columns()):
             if not _has_column(part):
                 continue
             try:
@@ -74,7 +74,7 @@ class Variations:
                     _refuse_row(row, part if of_row is None else of_row(row))
 
 
-class _Column(np.ndarray):
+class Column(np.ndarray):
     """A column that is asked `if`: it answers where all rows agree, so that one answer serves for all of them."""
 
     def __bool__(self) -> bool:

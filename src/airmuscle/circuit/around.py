@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import abc
+from collections.abc import Mapping
+from typing import Any
 
+from ..gas import Ambient
 from ..variables import Input
 from .circuit import Circuit
 from .supply import Source
@@ -21,6 +24,9 @@ class Around(Circuit, abc.ABC):
     @property
     def ports(self) -> int:
         return self.circuit.ports
+
+    def doubts(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+        return self.circuit.doubts(columns, ambient)
 
     @property
     def inputs(self) -> tuple[Input, ...]:

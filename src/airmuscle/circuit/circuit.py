@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import dataclasses
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..gas import STILL, Air, Ambient, Flow
 from ..ops import Value
@@ -61,6 +61,10 @@ class Circuit(abc.ABC):
         ambient: Ambient,
     ) -> Response:  # fmt: skip
         """What it does between this air at its supply and this air in the muscles."""
+
+    def doubts(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+        """Where a run, columns (N,) by its names, went beyond what its laws describe: in words, by part."""
+        return {}
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         """All its states."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..gas import Air, Ambient, Flow
 from ..ops import Value
@@ -40,3 +40,7 @@ class Conduit(abc.ABC):
         self, state: Mapping[str, Value], airs: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
     ) -> tuple[dict[str, Value], Flow]:
         """Rates of its states while `flow` comes in from the valve, and the flow into the muscle."""
+
+    def doubts(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+        """Where a run, columns (N,) by its names, went beyond what its law describes: in words, by piece."""
+        return {}

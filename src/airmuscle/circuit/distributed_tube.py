@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from .. import ops
 from ..declare import model, parameter
@@ -24,6 +24,10 @@ BLASIUS1913 = Reference(
 )
 TURBULENT = (64.0 / 0.3164) ** (4.0 / 3.0)
 """Reynolds number at which Hagen-Poiseuille's and Blasius' friction are equal, 1187."""
+
+
+SWIFT = 1.0 / 3.0
+"""Share of the speed of sound up to which the momentum that the flow carries along may be left out (chosen)."""
 
 
 @model
@@ -99,6 +103,21 @@ class DistributedTube(Conduit):
             rates[f"{name}flow"] = force * self.pieces / self.length - self.friction(mass, density) * mass
             flow = onward
         return rates, flow
+
+    def doubts(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+        """Where its air ran faster than a third of the speed of sound, at the temperature of the surroundings."""
+        still, found = _still(ambient), {}
+        for name in self.names:
+            if not {f"{name}flow", f"{name}pressure"} <= columns.keys():
+                continue
+            density = (columns[f"{name}pressure"] + ambient.pressure) / (GAS_CONSTANT * ambient.temperature)
+            share = (abs(columns[f"{name}flow"]) / (density * self.area * self.gas.sound_speed(still))).max()
+            if share > SWIFT:
+                found[name] = (
+                    f"air ran at up to {share:.2g} times the speed of sound; DistributedTube knows no choking and lets "
+                    "through too much beyond a third of it"
+                )
+        return found
 
     def friction(self, mass_flow: Value, density: Value) -> Value:
         """f [1/s], by which friction slows a mass flow [kg/s] of air of a density [kg/m3]."""

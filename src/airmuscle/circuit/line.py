@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from ..declare import model
 from ..gas import Air, Ambient, gauge
@@ -11,13 +12,15 @@ from ..variables import StateVariable, outside, renamed, within
 from .around import Around
 from .circuit import Circuit, Response
 from .conduit import Conduit
+from .ports import port
 
 
 @model
 class Line(Around):
     """A tube between a circuit's valves and each of its muscles.
 
-    `tube.pressure` is that in the tube; with several pieces `tube1.pressure`, ... from the valve on.
+    `tube.pressure` is that in the tube; with several pieces `tube1.pressure`, ... from the valve on. Where one circuit
+    feeds several muscles, a plant calls each tube by its muscle, `left.tube.pressure`.
     """
 
     circuit: Circuit
@@ -26,7 +29,7 @@ class Line(Around):
     @property
     def names(self) -> tuple[str, ...]:
         """What the names of each muscle's tube begin with."""
-        return ("",) if self.ports == 1 else tuple(f"{i}." for i in range(1, self.ports + 1))
+        return ("",) if self.ports == 1 else tuple(port(i) for i in range(1, self.ports + 1))
 
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         of_tube = self.tube.states(ambient)
@@ -36,6 +39,12 @@ class Line(Around):
         found = self.circuit.own_settled(airs, ambient)
         for name, air in zip(self.names, airs, strict=True):
             found |= outside(name, self.tube.settled(air, ambient))
+        return found
+
+    def doubts(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+        found = self.circuit.doubts(columns, ambient)
+        for name in self.names:
+            found |= outside(name, self.tube.doubts(within(name, columns), ambient))
         return found
 
     def draw(

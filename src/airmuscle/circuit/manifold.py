@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from ..declare import model, refuse_misplaced
 from ..errors import ParameterError
@@ -89,6 +90,12 @@ class Manifold(Circuit):
         for name, branch in self._parts():
             mine, left = tuple(left[: branch.ports]), left[branch.ports :]
             found |= outside(name, branch.own_settled(mine, ambient))
+        return found
+
+    def doubts(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+        found: dict[str, str] = {}
+        for name, branch in self._parts():
+            found |= outside(name, branch.doubts(within(name, columns), ambient))
         return found
 
     def draw(

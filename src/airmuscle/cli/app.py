@@ -19,6 +19,7 @@ from .fit import fit
 from .fit_dynamic import fit_dynamic
 from .hysteresis import hysteresis
 from .inspect import inspect
+from .interruption import remembered
 from .list import list_entries
 from .plan import plan
 from .remedies import in_options
@@ -41,7 +42,8 @@ class Commands(TyperGroup):
             warnings.simplefilter("always", AirmuscleWarning)
             warnings.showwarning = functools.partial(_show_warning, warnings.showwarning)
             try:
-                return super().invoke(ctx)
+                with remembered():
+                    return super().invoke(ctx)
             except AirmuscleError as error:
                 typer.echo(f"error: {in_options(str(error))}", err=True)
                 raise typer.Exit(1) from None

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .interruption import look
 from .options import Folder, Json
 from .terminal import print_json, print_table
 
@@ -101,7 +102,12 @@ def _bar(title: str) -> Iterator[Callable[[int, int], None]]:
     columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(title, total=None)
-        yield lambda done, of: bar.update(task, completed=done, total=of)
+
+        def show(done: int, of: int) -> None:
+            look()
+            bar.update(task, completed=done, total=of)
+
+        yield show
 
 
 def _print(result: StudyResult) -> None:

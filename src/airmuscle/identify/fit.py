@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from .. import declare
 from ..characteristic.base import Characteristic
-from ..errors import IdentificationError
+from ..errors import IdentificationError, ParameterError
 from ..recording import Recording
 from .censoring import Censoring, censoring_of, within_sensor
 from .correlation_index import correlation_index
@@ -49,6 +49,7 @@ def fit(
 
     Raises IdentificationError where the points cannot determine the parameters, and says which.
     """
+    _refuse_mistyped(characteristic, recording)
     data, dropped = _points(recording)
     by_rig = None if sigma is not None else _by_rig(characteristic, recording)
     weights = _weights(data, dropped, sigma if by_rig is None else _by_row(by_rig, recording))
@@ -61,6 +62,15 @@ def fit(
     notes = (*_notes(problem, found, loss, int(np.count_nonzero(dropped))), *_of_rigs(by_rig, problem))
     notes += _narrow(problem, solution, loss)
     return _result(problem, solution, found, loss, int(np.count_nonzero(dropped)), notes)
+
+
+def _refuse_mistyped(characteristic: object, recording: object) -> None:
+    if not isinstance(characteristic, Characteristic):
+        raise ParameterError(f"fit: {str(characteristic)[:80]} is no characteristic, as load(...).characteristic is.")
+    runs = recording if isinstance(recording, Sequence) else [recording]
+    for run in runs:
+        if not isinstance(run, Recording):
+            raise ParameterError(f"fit: {str(run)[:80]} is no Recording, as read, read_csv and simulate return it.")
 
 
 def _points(recording: Recording | Sequence[Recording]) -> tuple[Recording, npt.NDArray[np.bool_]]:

@@ -60,7 +60,7 @@ def measured(name: str) -> Recording:
     """
     from ..recording import read_csv  # pandas, which no entry without data needs
 
-    path = DATA / f"{complete(name, measured_names(), 'data set')}.csv"
+    path = DATA / f"{complete(str(name), measured_names(), 'data set')}.csv"
     recording: Recording = read_csv(path)
     lines = path.read_text(encoding="utf-8").splitlines()
     head = " ".join(line.lstrip("# ") for line in lines if line.startswith("#") and " = " not in line)

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileError
+from ..errors import FileError, ParameterError
 from .entry import OPTIONAL, Check, Entry
 
 
@@ -46,6 +46,10 @@ def scenario_toml(title: str, plant: Any, command: Mapping[str, Any], run: Mappi
 
 def save(entry: Entry, path: str | Path) -> Path:
     """Write an entry to a file that `load` reads back, whole or not at all. Raises FileError."""
+    if not isinstance(entry, Entry):
+        raise ParameterError(f"save: {str(entry)[:80]} is no library entry; build one with Entry, or load and replace.")
+    if not isinstance(path, str | Path):
+        raise FileError(f"save: {path!r} is no path; name a file.")
     path = Path(path)
     unfinished = path.with_name(f"{path.name}.part")
     try:

@@ -5,6 +5,7 @@ from .damper import Damper as Damper
 from .damper import DirectionalDamper as DirectionalDamper
 from .damper import LinearDamper as LinearDamper
 from .damper import PressureDamper as PressureDamper
+from .muscle import INNER as INNER
 from .muscle import Muscle as Muscle
 from .reynolds2003 import Reynolds2003Damper as Reynolds2003Damper
 from .reynolds2003 import Reynolds2003Spring as Reynolds2003Spring

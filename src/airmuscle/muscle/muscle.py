@@ -81,6 +81,10 @@ class Muscle:
             part = getattr(self, field)
             if not isinstance(part, kind):
                 raise ParameterError(f"Muscle: its {field} must be a {kind.__name__}; it is {part!r}.")
+        if not isinstance(self.name, str) or not self.name:
+            raise ParameterError(f"Muscle: its name is {self.name!r}; it must be a word, as 'left'.")
+        if not isinstance(self.box, Box | None):
+            raise ParameterError(f"Muscle: its box must be a Box, or None; it is {self.box!r}.")
         if isinstance(self.series, SeriesSpring):
             self._refuse_beside_series()
 

@@ -17,6 +17,8 @@ _POINT_NUMBER = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 
 def raw_csv(path: str | Path, form: TextForm = TextForm()) -> RawTable:
     """The table in a text file. Raises FileError or ColumnError."""
+    if not isinstance(path, str | Path):
+        raise FileError(f"read_csv: {path!r} is no path; name a file.")
     path = Path(path)
     lines = [(i, line) for i, line in enumerate(re.split(r"\r\n|\n|\r", _text(path)), 1) if holds_something(line)]
     head = head_of(path.name, lines, form)

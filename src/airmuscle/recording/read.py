@@ -80,6 +80,8 @@ def read(
 def files(source: Source) -> list[Path]:
     """The files meant by a path, a glob, a folder or several of these, in the order of their names."""
     if not isinstance(source, str | Path):
+        if not isinstance(source, Iterable):
+            raise FileError(f"read: {source!r} is no path; name a file, a folder, a glob, or several of them.")
         return [path for each in source for path in files(each)]
     path = Path(source)
     if path.is_dir():

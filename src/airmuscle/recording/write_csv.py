@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 from typing import TextIO
 
-from ..errors import FileError
+from ..errors import FileError, ParameterError
 from .recording import Recording, header
 
 _UNITS = {"resting_length": "m", "ambient": "Pa"}
@@ -19,6 +19,10 @@ def write_csv(recording: Recording, path: str | Path) -> Path:
 
     The file appears whole or not at all, and an older one stays until then. Raises FileError.
     """
+    if not isinstance(recording, Recording):
+        raise ParameterError(f"write_csv: {str(recording)[:80]} is no Recording, as simulate and read_csv return it.")
+    if not isinstance(path, str | Path):
+        raise FileError(f"write_csv: {path!r} is no path; name a file.")
     path = Path(path)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:

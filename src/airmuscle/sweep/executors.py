@@ -11,7 +11,7 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from typing import Any
 
 from ..errors import InputError
@@ -36,7 +36,7 @@ def processes(workers: int) -> Iterator[Executor | None]:
         return
     context = multiprocessing.get_context("spawn")  # a copy of a process that has threads may hang
     stop = context.Event()
-    executor = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin, initargs=(stop,))
+    executor = _Pool(workers, mp_context=context, initializer=_begin, initargs=(stop,))
     try:
         yield executor
     except BaseException:
@@ -46,11 +46,38 @@ def processes(workers: int) -> Iterator[Executor | None]:
         executor.shutdown(cancel_futures=True)
 
 
+class _Pool(ProcessPoolExecutor):
+    """Ctrl-C waits while a worker is started, as `submit` does, and until the worker can say that it does not listen.
+
+    A terminal tells all processes: one that is still importing would die with a traceback of its own. And a worker
+    without the thread that tells workers to leave, which `submit` starts after it, would never end.
+    """
+
+    def submit(self, *task: Any, **named: Any) -> Future[Any]:
+        with _undisturbed():
+            return super().submit(*task, **named)
+
+
+@contextlib.contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Ctrl-C waits until the block is left, here and in the processes that begin in it."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _begin(stop: Any) -> None:
-    """A worker leaves Ctrl-C, which reaches it too, to the process that it works for."""
+    """A worker leaves Ctrl-C to the process that it works for."""
     global _stop  # noqa: PLW0603  a worker is told once, when it begins
     _stop = stop
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 def refuse_stopped() -> None:

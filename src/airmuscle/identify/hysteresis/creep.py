@@ -60,17 +60,20 @@ class CreepFit:
     chances: tuple[float, ...]
     """Probability that the first, the second part would do as well by chance (F test)."""
     duration: float
+    unit: str = ""
+    """Of what creeps; empty for a contraction, which is a ratio."""
 
     @property
     def verdict(self) -> str:
         """How many parts the data justify, in words with the numbers."""
-        count = len(self.creep.amplitudes)
+        count, unit = len(self.creep.amplitudes), f" {self.unit}" if self.unit else ""
         parts = ", ".join(
-            f"{a:.3g} with {tau:.3g} s" for a, tau in zip(self.creep.amplitudes, self.creep.time_constants, strict=True)
+            f"{a:.3g}{unit} with {tau:.3g} s"
+            for a, tau in zip(self.creep.amplitudes, self.creep.time_constants, strict=True)
         )
         found = ("no creep", "one time constant", "two time constants")[count]
         rms = ", ".join(f"{value:.3g}" for value in self.rmses)
-        text = f"The data justify {found}{f' ({parts})' if parts else ''}; rms error with none, one, two: {rms}."
+        text = f"The data justify {found}{f' ({parts})' if parts else ''}; rms error with none, one, two: {rms}{unit}."
         if count and max(self.creep.time_constants) > self.duration / 2:
             text += f" The record of {self.duration:.3g} s is too short for the longest: its end is extrapolated."
         return text
@@ -95,7 +98,8 @@ def fit_creep(recording: Recording, quantity: str) -> CreepFit:
     while count < 2 and chances[count] < RARE:
         count += 1
     rmses = tuple(float(np.sqrt(square)) for square in squares)
-    return CreepFit(found[count], rmses[count], rmses, chances, float(time[-1]))
+    unit = "N" if quantity == "force" else ""
+    return CreepFit(found[count], rmses[count], rmses, chances, float(time[-1]), unit)
 
 
 def _plain(values: Array) -> Creep:

@@ -1,0 +1,110 @@
+"""The pages on identification, hysteresis, reading and studies are true: their code runs on data that a plant made."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airmuscle import read
+from airmuscle.command import Schedule
+from airmuscle.friction import MaxwellSlip
+from airmuscle.gas import Polytropic
+from airmuscle.identify.dynamic import Experiment, Start
+from airmuscle.library.catalogue import load
+from airmuscle.recording import Recording, write_csv
+from airmuscle.reproduce.hosovsky_plant import Numbers, hanging
+from airmuscle.reproduce.hosovsky_plant import plant as third_paper
+from airmuscle.simulate import simulate
+
+DOCS = Path(__file__).parents[2] / "docs"
+LAW = load("dmsp-20-300").characteristic
+
+
+def run(page, **given):
+    """What the page's code leaves, typed in one place where `given` is there already."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    found = {"__name__": "__main__", **given}
+    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    assert blocks
+    for block in blocks:
+        exec(compile(block, page, "exec"), found)
+    return found
+
+
+def test_the_code_on_static_identification_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for seed in (1, 2, 3):
+        rng = np.random.default_rng(seed)
+        p, eps = (side.ravel() for side in np.meshgrid(np.linspace(1e5, 6e5, 6), np.linspace(0.02, 0.2, 7)))
+        force = LAW.force(p, eps) + rng.normal(0.0, 1.0, p.size)
+        write_csv(Recording({"pressure": p, "contraction": eps, "force": force}, "bench"), Path(f"run{seed}.csv"))
+    found = run("identification.md")
+    assert found["fit"].model == found["found"].recommended.fit.model
+    assert "recommend" in capsys.readouterr().out.lower()
+    assert len(read(".")) == 3  # the folder that the page on reading reads
+
+
+def test_the_code_on_dynamic_identification_runs(capsys):
+    plant = replace(third_paper(Numbers(), hanging(Numbers())), gas=Polytropic(1.2))
+    command = Schedule({"fill": ((0.1, 1.0), (0.8, 0.0)), "discharge": ((1.0, 1.0),)})
+    exact = simulate(plant, command, duration=1.5, output=0.01)
+    rng = np.random.default_rng(4)
+    noise = {"pressure": 500.0, "position": 5e-5}
+    records = [
+        exact.with_columns(**{name: exact[name] + s * rng.standard_normal(len(exact)) for name, s in noise.items()})
+        for _ in range(2)
+    ]
+    another = Experiment(records[1], command, Start.at_rest(plant, pressure=0.0))
+    found = run("dynamic-identification.md", plant=plant, recording=records[0], command=command, another=another)
+    exponent = found["fit"]["gas.exponent"]
+    assert exponent.value == pytest.approx(1.2, abs=4 * exponent.deviation)
+    assert exponent.deviation < 0.02
+    assert "gas.exponent" in capsys.readouterr().out
+
+
+def loop(seed):
+    """A slow loop of contraction at 300 kPa of a muscle that rubs."""
+    eps = np.concatenate([np.linspace(a, b, 80) for a, b in itertools.pairwise((0.02, 0.14, 0.08, 0.12, 0.02))])
+    rng = np.random.default_rng(seed)
+    slip = MaxwellSlip((2e4, 1e4), (3e-4, 1.2e-3))
+    force = LAW.force(3e5, eps) - slip.replay((eps - eps[0]) * 0.3) + 0.5 * rng.standard_normal(eps.size)
+    columns = {
+        "time": 0.2 * np.arange(eps.size),
+        "pressure": np.full(eps.size, 3e5),
+        "contraction": eps,
+        "force": force,
+    }
+    return Recording(columns, f"loop {seed}", {"resting_length": 0.3})
+
+
+def test_the_code_on_hysteresis_runs(capsys):
+    first, second = loop(1), loop(2)
+    everywhere = np.ones(len(first), dtype=bool)
+    found = run(
+        "hysteresis.md",
+        muscle=load("dmsp-20-300").muscle,
+        run=first,
+        second_run=second,
+        quiet=everywhere,
+        quiet_there=everywhere,
+    )
+    assert isinstance(found["muscle"].friction, MaxwellSlip)
+    assert "justify" in capsys.readouterr().out
+
+
+def test_the_code_on_studies_runs(tmp_path, monkeypatch, capsys):
+    """The study of the examples, with a grid of its own so that it is soon done."""
+    monkeypatch.chdir(tmp_path)
+    examples = DOCS.parent / "examples"
+    (tmp_path / "fill_discharge.toml").write_bytes((examples / "fill_discharge.toml").read_bytes())
+    text = (examples / "valve_study.toml").read_text(encoding="utf-8")
+    (tmp_path / "study.toml").write_text(text.replace("count = 64", "count = 2"), encoding="utf-8")
+    found = run("sweep.md")
+    assert not found["result"].failed.size
+    assert (tmp_path / "out" / "chunks").exists()
+    assert re.match(r"0\.\d+ ", capsys.readouterr().out)
