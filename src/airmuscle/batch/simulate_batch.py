@@ -74,8 +74,7 @@ def simulate_batch(
     count = len(different.values)
     segments = _segments(plant, command, count, start_time, duration)
     end = np.array([start_time + duration])
-    instants = segments[0].ends if isinstance(command, Command) else end
-    times = output_times(output, start_time, duration, instants)
+    times = output_times(output, start_time, duration, segments[0].ends if isinstance(command, Command) else end)
     if keep is not None and len(keep) == 0:
         times = end
     starts, reasons = _starts(different, start, count)
