@@ -126,6 +126,7 @@ def computed(items: Any, leaves: dict[Operand, float]) -> tuple[Values, int]:
 def test_random_code_gives_the_same_with_branches(monkeypatch: pytest.MonkeyPatch) -> None:
     """However little a branch saves; with part of the results early, as the rates of a stage are, or none."""
     monkeypatch.setattr("airmuscle.program.skipping.WORTH", 1)
+    monkeypatch.setattr("airmuscle.program.skipping.WORTH_OF_CHOICES", 1)
     rng, skipped = random.Random(1), 0
     for _ in range(GRAPHS):
         code = drawn(rng)

@@ -15,6 +15,13 @@ SELECT, MAXIMUM, MINIMUM = -1, -2, -3
 """Our own operations: (condition, when true, when false), which CasADi spells with two masks and a sum; and the
 selection of the larger or smaller of two numbers, (a, b), for which processors have one instruction."""
 
+CALLED = frozenset({
+    casadi.OP_EXP, casadi.OP_LOG, casadi.OP_SIN, casadi.OP_COS, casadi.OP_TAN, casadi.OP_ATAN, casadi.OP_SINH,
+    casadi.OP_COSH, casadi.OP_TANH, casadi.OP_ASINH, casadi.OP_ASIN, casadi.OP_ACOS, casadi.OP_LOG1P, casadi.OP_EXPM1,
+    casadi.OP_POW, casadi.OP_CONSTPOW,
+})  # fmt: skip
+"""The operations for which a function of the C library is called."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Instruction:

@@ -7,7 +7,7 @@ import heapq
 from collections.abc import Iterable, Sequence
 
 from ..errors import TraceError
-from .instructions import Code, Instruction, Operand
+from .instructions import CALLED, Code, Instruction, Operand
 
 Gates = tuple[Operand, ...]
 ZERO = ("c", 0.0)
@@ -72,7 +72,9 @@ def _needs(item: Item) -> Iterable[Operand]:
 
 
 def _turns(code: Code, items: Sequence[Item]) -> list[float]:
-    """When each item comes if it can: an instruction where it was, a piece before the first that uses it."""
+    """When each item comes if it can: an instruction where it was, a piece before the first that uses it, and functions
+    of the C library at once, because what is in registers does not outlive their call.
+    """
     place = {line.result: k for k, line in enumerate(code.body)}
     first: dict[Operand, int] = {}
     for k, line in enumerate(code.body):
@@ -81,7 +83,7 @@ def _turns(code: Code, items: Sequence[Item]) -> list[float]:
     turns = []
     for item in items:
         if isinstance(item, Instruction):
-            turns.append(float(place[item.result]))
+            turns.append(-1.0 if item.operation in CALLED else float(place[item.result]))
         else:
             last = place[item.body[-1].result]
             turns.append(min((first.get(result, last) for result, _ in item.instead), default=last) - 0.5)

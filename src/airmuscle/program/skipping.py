@@ -1,7 +1,7 @@
 """What need not be computed where a factor of it is zero: a shut valve's flow, a tangent beyond a box not left.
 
-A *gate* is such a factor: what a command alone decides, how far a number lies outside its clamp, the larger of a
-number and zero, the condition of a choice. With the gate at zero (a clamped number is then itself, and its comparisons
+A *gate* is such a factor: what a command alone decides, how far a number lies outside its clamp, the condition of a
+choice. With the gate at zero (a clamped number is then itself, and its comparisons
 are known) some results are known beforehand, and what only they need is superfluous. These instructions are set apart,
 to be branched around.
 
@@ -21,8 +21,8 @@ from .pieces import Apart, Gates, Item, in_order
 ZERO, ONE = ("c", 0.0), ("c", 1.0)
 STEADY, COMMANDED, VARYING = range(3)
 """What parameters are, what a command decides, and what has to do with states."""
-WORTH = 8
-"""Operations that must be saved for a branch to pay (measured)."""
+WORTH, WORTH_OF_CHOICES = 8, 30
+"""Operations that must be saved for a branch to pay; more where the states decide how often (measured)."""
 _SLOW = {casadi.OP_DIV, casadi.OP_INV, casadi.OP_SQRT}
 _SIMPLE = {
     casadi.OP_ADD, casadi.OP_SUB, casadi.OP_MUL, casadi.OP_NEG, casadi.OP_SQ, casadi.OP_TWICE, casadi.OP_FABS,
@@ -40,6 +40,7 @@ class _Case:
 
     gates: Gates
     facts: Mapping[Operand, Operand] = dataclasses.field(default_factory=dict)
+    worth: int = dataclasses.field(default_factory=lambda: WORTH)
 
 
 def skipping(code: Code, level: Callable[[Operand], int], early: frozenset[Operand] = frozenset()) -> list[Item]:
@@ -55,7 +56,7 @@ def skipping(code: Code, level: Callable[[Operand], int], early: frozenset[Opera
 
 
 def _cases(body: Sequence[Instruction], comparisons: _Comparisons, level: Callable[[Operand], int]) -> Iterable[_Case]:
-    """What may be a gate: commands first, then clamps, the larger of a number and zero, and conditions."""
+    """What may be a gate: commands first, then clamps and conditions."""
     levels: dict[Operand, int] = {}
 
     def of(operand: Operand) -> int:
@@ -63,7 +64,6 @@ def _cases(body: Sequence[Instruction], comparisons: _Comparisons, level: Callab
 
     commands: dict[Operand, None] = {}
     clamps: list[_Case] = []
-    extremes: list[_Case] = []
     conditions: dict[Operand, None] = {}
     for line in body:
         levels[line.result] = max(of(a) for a in line.arguments)
@@ -73,15 +73,14 @@ def _cases(body: Sequence[Instruction], comparisons: _Comparisons, level: Callab
             continue
         if line.operation == casadi.OP_SUB:
             clamps += comparisons.inside(line)
-        if line.operation in _EXTREMES and ZERO in line.arguments:
-            extremes.append(comparisons.hidden(line))
         if line.operation in _CHOICES and line.arguments[0] in levels:
             conditions[line.arguments[0]] = None
-    return [*(_Case((gate,)) for gate in commands), *clamps, *extremes, *(_Case((gate,)) for gate in conditions)]
+    chosen = (_Case((gate,), worth=WORTH_OF_CHOICES) for gate in conditions)
+    return [*(_Case((gate,)) for gate in commands), *clamps, *chosen]
 
 
 class _Comparisons:
-    """What comparisons say of numbers that are clamped, or hidden below zero."""
+    """What comparisons say of numbers that are clamped."""
 
     def __init__(self, body: Sequence[Instruction]) -> None:
         self._line = {line.result: line for line in body}
@@ -123,11 +122,6 @@ class _Comparisons:
                 return [self._of((difference.result,), ordered, facts)]
         return []
 
-    def hidden(self, line: Instruction) -> _Case:
-        """The case of a number whose larger or smaller with zero is zero."""
-        number = line.arguments[line.arguments[0] == ZERO]
-        return self._of((line.result,), [(number, ZERO) if line.operation == MAXIMUM else (ZERO, number)], {})
-
 
 class _Search:
     """Case by case, what is superfluous in it, if that is worth a branch."""
@@ -153,7 +147,7 @@ class _Search:
         needed = {*case.gates, *(operand for operand, value in case.facts.items() if value[0] != "c")}
         ahead = frozenset() if self._early.issuperset(case.gates) else self._early  # what goes ahead cannot wait
         superfluous, instead = self._superfluous(self._known(case), self._kept | needed | ahead)
-        if sum(_cost(self._line[operand]) for operand in superfluous) >= WORTH:
+        if sum(_cost(self._line[operand]) for operand in superfluous) >= case.worth:
             self._kept |= needed
             self.apart.gates.update(dict.fromkeys(superfluous, case.gates))
             self.apart.instead.update(instead)
