@@ -41,7 +41,8 @@ WHY = (
     "itself. Rodas4 takes 450 to 900 steps of 0.4 to 0.7 us each; a stage is one chain of dependent operations, "
     "and that is what bounds it: stages of one muscle that need not wait for each other take a third of the time. "
     "The whole step printed as one function, without a call or a loop, was tried and is 5 % quicker for 3 states, "
-    "5 % slower for 6 and 2 % slower for 10, and takes twice as long to compile"
+    "5 % slower for 6 and 2 % slower for 10, and takes twice as long to compile. At this rtol LSODA errs by "
+    "1.7e-7 m with 3 states and 1.4e-7 m with 6, Rodas4 by 6e-9 and 1e-8"
 )
 
 
