@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import ClassVar, NamedTuple
 
-from ..controller import Controller, Measurement
+from ..controller import Measurement
 from ..declare import model, parameter
 from ..reference import Reference
-from .split import Commanded, commands, inputs_of, range_of
+from .one_column import OneColumn
+from .split import Commanded, commands, range_of
 
 ASTROM_HAGGLUND1995 = Reference(
     key="astrom-hagglund-1995",
@@ -31,7 +32,7 @@ class PIDMemory(NamedTuple):
 
 
 @model
-class PID(Controller):
+class PID(OneColumn):
     """u = K (b r - y) + I + D,   I' = K/T_i (r - y),   (T_d/N) D' + D = K T_d (c r - y)',   standard (ISA) form.
 
     r set point and y measurement, in the unit of the measured column; u command, in that of the commanded input. At
@@ -64,18 +65,6 @@ class PID(Controller):
     derivative_weight: float = parameter("1", "c", "of the set point in the derivative", bounds=(0.0, 1.0), default=0.0)
     tracking_time: float = parameter("s", "T_t", "of the anti-windup; 0: by the rule", bounds=(0.0, 1e6), default=0.0)
     first: float = parameter("u", "u_0", "first command; without integral action the bias", default=0.0)
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        return (self.measured,)
-
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return (self.measured,)
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return inputs_of(self.commanded)
 
     def init(self) -> PIDMemory:
         return PIDMemory(begun=False, integral=0.0, derivative=0.0, weighted=0.0)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from ..controller import Controller, Measurement
+from ..controller import Measurement
 from ..declare import model, parameter
 from ..reference import Reference
+from .one_column import OneColumn
 from .pid import ASTROM_HAGGLUND1995
-from .split import Commanded, commands, inputs_of, range_of
+from .split import Commanded, commands, range_of
 
 
 @model
-class TwoPoint(Controller):
+class TwoPoint(OneColumn):
     """The greatest command from y < r - H/2 on, the least from y > r + H/2 on, and the last one in between.
 
     r set point, y measurement, H width of the hysteresis. For an input that raises what is measured; it begins with
@@ -28,18 +29,6 @@ class TwoPoint(Controller):
     hysteresis: float = parameter(
         "y", "H", "width between switching on and off", bounds=(0.0, float("inf")), default=0.0
     )
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        return (self.measured,)
-
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return (self.measured,)
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return inputs_of(self.commanded)
 
     def init(self) -> bool:
         """Off."""
