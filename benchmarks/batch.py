@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from batch_numpy import rk4
 from filling import Array, hanging, runs
-from measure import Bar, Section, Times, interleaved, of_time, show
+from measure import PEAK, Bar, Section, Times, interleaved, of_time, show
 from ode8 import compilers
 
 from airmuscle import declare
@@ -232,16 +232,15 @@ def _row(name: str, count: int, cores: int, times: Times, seconds: float, factor
 def memory() -> str:
     """The greatest memory of a process that simulates 100 000 plants, above that of one that simulates 16."""
     code = (
-        "import resource, sys; from batch import *; plant = hanging(); n = int(sys.argv[1]); "
-        "in_lanes(plant, varied(plant, n), runs()[3].vector, 0.01, 1); "
-        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+        "import sys; from batch import *; plant = hanging(); n = int(sys.argv[1]); "
+        f"in_lanes(plant, varied(plant, n), runs()[3].vector, 0.01, 1){PEAK}"
     )
     here = pathlib.Path(__file__).parent
     taken = [
-        int(subprocess.run([sys.executable, "-c", code, str(n)], cwd=here, check=True, capture_output=True).stdout)
+        float(subprocess.run([sys.executable, "-c", code, str(n)], cwd=here, check=True, capture_output=True).stdout)
         for n in (16, 100_000)
     ]
-    return f"{(taken[1] - taken[0]) / 1024:.0f} MB"
+    return f"{taken[1] - taken[0]:.0f} MB"
 
 
 def section(rounds: int = 5, count: int = PLANTS, seconds: float = DURATION) -> Section:

@@ -22,6 +22,17 @@ PACKAGES = (
 LEAST = 0.004
 """A variant quicker than this [s] is called several times in a round, so that it is timed warm and beyond the clock."""
 
+PEAK = """
+import pathlib, sys
+status = pathlib.Path("/proc/self/status")
+if status.exists():  # getrusage would count the process that this one was forked from
+    print(next(int(line.split()[1]) for line in status.read_text().splitlines() if line.startswith("VmHWM")) / 1e3)
+else:
+    import resource
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3))
+"""
+"""Python that prints the greatest memory of its own process so far [MB]."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Times:

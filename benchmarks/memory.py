@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
-import sys
 
-from measure import Section, show
+from measure import PEAK, Section, show
 from new_plant import MUSCLES, process
 
 HEADING = ("after", "peak so far [MB]")
@@ -24,9 +23,6 @@ run(0.01)""",
     "the same with 1 000 000 rows": "long = run(25e-6)",
     f"a new plant of {MUSCLES} muscles": "from new_plant import fresh, many_muscles\nplant = fresh(many_muscles())",
 }
-PEAK = "import resource\nprint(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
-UNIT = 1e6 if sys.platform == "darwin" else 1e3
-"""Bytes on a Mac, kilobytes elsewhere."""
 
 
 def section(rounds: int = 1) -> Section:
@@ -34,8 +30,8 @@ def section(rounds: int = 1) -> Section:
     title = "Memory"
     if importlib.util.find_spec("resource") is None:
         return Section(title, "This system does not tell a process what it holds.", HEADING, ())
-    code = "\n".join(f"{task}\n{PEAK}" for task in TASKS.values())
-    peaks = [int(line) / UNIT for line in process(["-c", code]).split()]
+    code = "".join(f"{task}\n{PEAK}" for task in TASKS.values())
+    peaks = [float(line) for line in process(["-c", code]).split()]
     rows = tuple((name, f"{peak:.0f}") for name, peak in zip(TASKS, peaks, strict=True))
     return Section(title, TEXT, HEADING, rows)
 
