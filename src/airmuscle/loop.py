@@ -110,7 +110,9 @@ class Loop:
             ", ".join(with_unit.get(name, name) for name in names)
             for names in (self.controller.columns, self.controller.inputs)
         )
-        return f"every {self.period:g} s {measured} is measured and {commanded} commanded by {self.controller}"
+        return (
+            f"every {self.period:g} s {measured} is measured and {commanded} commanded by {_in_words(self.controller)}"
+        )
 
     def replayed(self, recording: Recording) -> Command:
         """What the controller commanded in a run that was recorded whole, as a command that knows no controller.
@@ -155,3 +157,15 @@ class Beside(Command):
         return together(
             other, {inputs.index(name): column(inner, inputs.index(name)) for name in self.inner.names or ()}, start
         )
+
+
+def _in_words(controller: Controller) -> str:
+    """A controller and its fields; numbers without the last digits, which a change of unit leaves."""
+    told = []
+    fields: tuple[dataclasses.Field[Any], ...] = ()
+    if dataclasses.is_dataclass(controller):
+        fields = dataclasses.fields(controller)
+    for field in fields:
+        value = getattr(controller, field.name)
+        told.append(f"{field.name}={value:.12g}" if isinstance(value, float) else f"{field.name}={value!r}")
+    return f"{type(controller).__name__}({', '.join(told)})"
