@@ -25,7 +25,7 @@ TEXT = (
     f"characteristic, spring and damper; half open. {CALLS} calls in a compiled loop, each at a state that depends on "
     "the call before."
 )
-WHY = "each surface has its tangent beyond the box and its clamp computed in every evaluation, without a branch"
+WHY = "half open, both valves and the surface with its clamp are computed in every evaluation"
 
 
 @numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]

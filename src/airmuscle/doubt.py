@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 NEAR = 1e-3
-"""Part of a geometry's reach by which a muscle that a run ended on may still lie within it."""
+"""Part of a geometry's reach by which a muscle that a run ended on may still lie within it (chosen)."""
 
 
 def stopped_where_impossible(ready: Prepared, course: Course, results: Array, times: Array) -> Course:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
+from bumpy import Bumpy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from joints import chosen_muscle
@@ -16,7 +15,6 @@ from airmuscle import ops
 from airmuscle.circuit import ClosedChamber, FillDischarge, Follower, ProportionalValve, Supply, Valve
 from airmuscle.command import REST, Schedule
 from airmuscle.contact import HuntCrossley
-from airmuscle.declare import model, parameter
 from airmuscle.equilibrium import equilibria, equilibrium
 from airmuscle.equilibrium.one_coordinate import grid
 from airmuscle.equilibrium.static import Static
@@ -25,13 +23,11 @@ from airmuscle.friction import Dahl
 from airmuscle.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.mechanism import (
     AntagonisticJoint,
-    Coordinate,
     HangingMass,
     Held,
     InSeries,
     Isometric,
     Lever,
-    Mechanism,
     Mounted,
     Prescribed,
     SpringLoad,
@@ -153,26 +149,6 @@ def test_muscles_in_series_carry_the_same_load_over_the_sum_of_their_ways():
 
 
 # All of them
-
-
-@model
-class Bumpy(Mechanism):
-    """x'' = (x - middle)^2 - half^2, whatever the muscle does: two rests, 2 half apart."""
-
-    middle: float = parameter("m", "a", "place between the two")
-    half: float = parameter("m", "d", "half of their distance")
-
-    @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        return (Coordinate("position", "speed", "m", 0.01, 0.1),)
-
-    def contractions(self, q: Mapping[str, Any], resting_lengths: Any) -> tuple[Any, ...]:
-        return tuple(q["position"] / length for length in resting_lengths)
-
-    def acceleration(
-        self, q: Mapping[str, Any], v: Mapping[str, Any], pulls: Mapping[str, Any], inputs: Mapping[str, Any]
-    ) -> Mapping[str, Any]:
-        return {"position": (q["position"] - self.middle) ** 2 - self.half**2}
 
 
 @pytest.mark.parametrize("half", [2e-2, 1e-3, 1e-5, 1e-7])

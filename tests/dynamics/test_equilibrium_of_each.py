@@ -3,12 +3,11 @@ none where there is none. What is out of the ordinary is asked alone, and whoeve
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
+from bumpy import Bumpy
 from joints import chosen_muscle
 from plants import BRAID, EXAMPLES, TWO_VALVES, of, pulled
 
@@ -18,7 +17,6 @@ from airmuscle.characteristic import MartensBoblan2017, VirtualWork
 from airmuscle.circuit import ClosedChamber, FillDischarge, Line, ProportionalRegulator, Supply, Tube, Valve
 from airmuscle.command import REST
 from airmuscle.contact import HuntCrossley
-from airmuscle.declare import model, parameter
 from airmuscle.equilibrium import equilibria, equilibrium, equilibrium_of_each
 from airmuscle.equilibrium.one_coordinate import grid
 from airmuscle.equilibrium.reach import grids
@@ -29,12 +27,10 @@ from airmuscle.gas import Ambient, Polytropic
 from airmuscle.geometry import Braid
 from airmuscle.mechanism import (
     AntagonisticJoint,
-    Coordinate,
     HangingMass,
     InSeries,
     Isometric,
     Lever,
-    Mechanism,
     SpringLoad,
     StoppedJoint,
 )
@@ -175,26 +171,6 @@ def test_more_plants_than_go_side_by_side_are_taken_in_blocks(monkeypatch):
 
 
 # Rests that are easily missed
-
-
-@model
-class Bumpy(Mechanism):
-    """x'' = (x - middle)^2 - half^2, whatever the muscle does: the first of two rests is stable."""
-
-    middle: float = parameter("m", "a", "place between the two")
-    half: float = parameter("m", "d", "half of their distance")
-
-    @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        return (Coordinate("position", "speed", "m", 0.01, 0.1),)
-
-    def contractions(self, q: Mapping[str, Any], resting_lengths: Any) -> tuple[Any, ...]:
-        return tuple(q["position"] / length for length in resting_lengths)
-
-    def acceleration(
-        self, q: Mapping[str, Any], v: Mapping[str, Any], pulls: Mapping[str, Any], inputs: Mapping[str, Any]
-    ) -> Mapping[str, Any]:
-        return {"position": (q["position"] - self.middle) ** 2 - self.half**2}
 
 
 def of_mechanism(mechanism, rows):

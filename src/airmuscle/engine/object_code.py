@@ -2,32 +2,21 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from typing import Any
 
 from .entry import entry, parts
+from .native import native
 
 _C_LIBRARY = frozenset({"sqrt", "ceil", "floor", "memset", "memcpy", "memmove"})
 _NOTHING_OF_PYTHON = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-
-
-@functools.cache
-def _target() -> Any:
-    import llvmlite.binding as llvm
-
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    features = llvm.get_host_cpu_features().flatten()
-    target = llvm.Target.from_default_triple()
-    return lambda: target.create_target_machine(cpu=llvm.get_host_cpu_name(), features=features, opt=3)
 
 
 def loaded(code: bytes) -> Any:
     """An engine that holds the machine code; its function is `entry`."""
     import llvmlite.binding as llvm
 
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target()())
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), native(3))
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
     return engine
@@ -64,7 +53,7 @@ def _emitted(text: str, inner: str) -> bytes:
     """Machine code of what `entry` needs of a module; nothing where that is not all in there."""
     import llvmlite.binding as llvm
 
-    module, machine = llvm.parse_assembly(text), _target()()
+    module, machine = llvm.parse_assembly(text), native(3)
     module.get_function(inner).linkage = "internal"
     passes = llvm.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()

@@ -13,9 +13,9 @@ Rows = npt.NDArray[np.intp]
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 JUMP = 1e-6
 """What may be left at a root, as a share of the middle one of all places; a function that has more there changes its
-sign by a jump."""
+sign by a jump (chosen)."""
 CLOSE = 1e-13
-"""Step that ends a search for a root, as a share of the way that it began with: what is left is far less."""
+"""Step that ends a search for a root, as a share of the way that it began with: what is left is far less (chosen)."""
 
 
 class Table(Protocol):
