@@ -18,16 +18,16 @@ from filling import Array, hanging, runs
 from measure import PEAK, Bar, Section, Times, interleaved, of_time, show
 from ode8 import compilers
 
-from airmuscle import declare
-from airmuscle.batch import Double, Precision, Single, simulate_batch
-from airmuscle.batch.starts import resting_starts
-from airmuscle.batch.threads import cores_here
-from airmuscle.batch.variations import variations_of
-from airmuscle.command import Schedule
-from airmuscle.equilibrium import equilibrium
-from airmuscle.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE
-from airmuscle.method import RungeKutta4
-from airmuscle.plant import Plant
+from airmuscle.analysis.equilibrium import equilibrium
+from airmuscle.control.inputs import Schedule
+from airmuscle.core import tree
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE
+from airmuscle.simulation.batch import Double, Precision, Single, simulate_batch
+from airmuscle.simulation.batch.initial_states import resting_starts
+from airmuscle.simulation.batch.thread_pool import cores_here
+from airmuscle.simulation.batch.variations import variations_of
+from airmuscle.simulation.integrators import RungeKutta4
 
 STEP, PLANTS, DURATION = 1e-3, 10_000, 5.0
 SHORT = 0.1
@@ -62,7 +62,7 @@ def varied(plant: Plant, count: int) -> dict[str, Array]:
     """Every parameter of the plant within SPREAD of its value and its bounds, by its path."""
     rng = np.random.default_rng(5)
     found = {}
-    for leaf in declare.leaves(plant):
+    for leaf in tree.leaves(plant):
         values = leaf.value * (1 + SPREAD * rng.uniform(-1, 1, count))
         found[leaf.path] = np.clip(values, *leaf.declared.bounds)
     return found
@@ -172,7 +172,7 @@ def variants(folder: pathlib.Path, count: int, seconds: float) -> dict[str, tupl
     """What is timed: the number of cores, and the call."""
     plant, start = hanging(), runs()[3].vector
     parameters = varied(plant, count)
-    table = constants(declare.rebuild(plant, list(parameters.values())), count)
+    table = constants(tree.rebuild(plant, list(parameters.values())), count)
     found: dict[str, tuple[int, Callable[[], Array]]] = {}
     libraries = compiled(folder)
     for cores in sorted({1, min(2, cores_here())}):
@@ -253,7 +253,7 @@ def section(rounds: int = 5, count: int = PLANTS, seconds: float = DURATION) -> 
         refuse_other_ends(ends, "simulate_batch", runs()[3].nominal)
         times = interleaved({name: call for name, (_, call) in timed.items()}, rounds)
         parameters = varied(plant, count)
-        table = constants(declare.rebuild(plant, list(parameters.values())), count)
+        table = constants(tree.rebuild(plant, list(parameters.values())), count)
         slow = {"NumPy": lambda: in_numpy(table, start, short)}
         slow |= {"short": lambda: in_lanes(plant, parameters, start, short, 1)}
         by_numpy = interleaved(slow, max(2, rounds // 2))

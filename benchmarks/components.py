@@ -13,20 +13,20 @@ from joints import HEAT_CAPACITY, Joint, JointWithHeat
 from measure import Bar, Section, interleaved, of_time, show
 from rodas4 import kernel
 
-from airmuscle import ops
-from airmuscle.circuit import Circuit, FillDischarge, Line, ProportionalValve, Response, Supply, Tube, Valve
-from airmuscle.circuit.fill_discharge import surroundings
-from airmuscle.circuit.proportional import Follower
-from airmuscle.circuit.through import through
-from airmuscle.command import Schedule
-from airmuscle.declare import model, parameter
-from airmuscle.gas import GAS_CONSTANT, Air, Ambient, EnergyBalance, Isothermal
+from airmuscle.compile.program import Prepared, prepared
+from airmuscle.control.inputs import Schedule
+from airmuscle.core import ops
+from airmuscle.core.model import model, parameter
+from airmuscle.core.ops import Value
+from airmuscle.core.variables import Input, StateVariable
 from airmuscle.mechanism.base import Coordinate, Mechanism
-from airmuscle.method import Rodas4
-from airmuscle.ops import Value
-from airmuscle.plant import Plant
-from airmuscle.program.prepared import Prepared, prepared
-from airmuscle.variables import Input, StateVariable
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import Circuit, FillDischarge, Line, ProportionalValve, Response, Supply, Tube, Valve
+from airmuscle.pneumatics.fill_discharge import surroundings
+from airmuscle.pneumatics.flow import through
+from airmuscle.pneumatics.gas import GAS_CONSTANT, Air, Ambient, EnergyBalance, Isothermal
+from airmuscle.pneumatics.proportional import Follower
+from airmuscle.simulation.integrators import Rodas4
 
 RTOL = 1e-6
 SIDE_NAMES = ("left", "right")

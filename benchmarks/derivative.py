@@ -12,11 +12,11 @@ from filling import BRAID, Array
 from measure import Bar, Section, interleaved, of_time, show
 from new_plant import MUSCLES, many_muscles
 
+from airmuscle.analysis.equilibrium import equilibrium
 from airmuscle.characteristic import ChouHannaford1996
-from airmuscle.engine.address import invoke, pointer
-from airmuscle.equilibrium import equilibrium
-from airmuscle.plant import Plant
-from airmuscle.program.prepared import Prepared, prepared
+from airmuscle.compile.kernels.calls import invoke, pointer
+from airmuscle.compile.program import Prepared, prepared
+from airmuscle.plant.plant import Plant
 
 HEADING = ("what", "median", "least", "a muscle")
 CALLS = 10_000

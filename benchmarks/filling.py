@@ -15,17 +15,17 @@ import numpy as np
 import numpy.typing as npt
 from joints import joint, joint_start
 
-from airmuscle import ops
+from airmuscle.analysis.equilibrium import equilibrium
 from airmuscle.characteristic.contractile_surface import ContractileSurface
-from airmuscle.circuit import FillDischarge, Supply, Valve
-from airmuscle.command import Schedule, Segments
-from airmuscle.equilibrium import equilibrium
-from airmuscle.gas import Ambient, Isothermal
+from airmuscle.compile import System
+from airmuscle.control.inputs import Schedule, Segments
+from airmuscle.core import ops
 from airmuscle.geometry.braid import Braid
 from airmuscle.mechanism import HangingMass
 from airmuscle.muscle import LinearSpring, Muscle, PressureDamper
-from airmuscle.plant import Plant
-from airmuscle.program import System
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.pneumatics.gas import Ambient, Isothermal
 
 Array = npt.NDArray[np.float64]
 DURATION = 25.0

@@ -10,11 +10,11 @@ from filling import DURATION, SPACING, Array, Run, lifts, runs
 from measure import Section, interleaved, of_time, show
 from new_plant import fresh
 
-from airmuscle.command import Schedule, Segments
-from airmuscle.driver import PWM, Driven
-from airmuscle.method import Rodas4
-from airmuscle.plant import Plant
-from airmuscle.program.prepared import prepared
+from airmuscle.compile.program import prepared
+from airmuscle.control.driver import PWM, Driven
+from airmuscle.control.inputs import Schedule, Segments
+from airmuscle.plant.plant import Plant
+from airmuscle.simulation.integrators import Rodas4
 
 TOLERANCES = tuple(10.0**-k for k in range(3, 11))
 MUSCLES = (1, 2, 4, 6, 12, 24)

@@ -11,12 +11,12 @@ from measure import Bar, Section, Times, of_time, show
 from scalar_rates import hill
 from sensitivities import DURATION, FREE, SENSORS, case
 
-from airmuscle import declare
-from airmuscle.gas import GAS_CONSTANT
+from airmuscle.core import tree
 from airmuscle.identify.dynamic import fit_dynamic
 from airmuscle.identify.dynamic.fit import spread
-from airmuscle.method import Rodas4
-from airmuscle.plant import Plant
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics.gas import GAS_CONSTANT
+from airmuscle.simulation.integrators import Rodas4
 
 STARTS = 100
 HEADING = ("variant", "seconds for 100 starts", "evaluations a start", "starts at the best optimum, of those measured")
@@ -89,7 +89,7 @@ def fitted(opponent: Opponent, start: Array) -> tuple[float, float, int]:
     from scipy.optimize import least_squares
 
     plant, recording = case().plant, case().experiment.recording
-    leaves, problem = list(declare.leaves(plant)), case().problem(Rodas4())
+    leaves, problem = list(tree.leaves(plant)), case().problem(Rodas4())
     places = [[leaf.path for leaf in leaves].index(path) for path in FREE]
     measured = np.column_stack([recording[name] for name in SENSORS])
     count = 0
@@ -100,7 +100,7 @@ def fitted(opponent: Opponent, start: Array) -> tuple[float, float, int]:
         numbers = [leaf.value for leaf in leaves]
         for place, value in zip(places, scaled * problem.scales, strict=True):
             numbers[place] = float(value)
-        return ((modelled(declare.rebuild(plant, numbers), opponent) - measured) / list(SENSORS.values())).ravel()
+        return ((modelled(tree.rebuild(plant, numbers), opponent) - measured) / list(SENSORS.values())).ravel()
 
     begun = time.perf_counter()
     found = least_squares(residual, start, "2-point", problem.bounds, x_scale="jac", diff_step=opponent.step)

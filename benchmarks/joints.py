@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from airmuscle import ops
 from airmuscle.characteristic.clamped import Clamped
 from airmuscle.characteristic.virtual_work import VirtualWork
-from airmuscle.circuit import Supply, Valve
-from airmuscle.declare import model, parameter
-from airmuscle.gas import GAS_CONSTANT, Ambient, absolute, gauge
+from airmuscle.compile import StateVariable
+from airmuscle.core import ops
+from airmuscle.core.model import model, parameter
 from airmuscle.geometry.braid import Braid
 from airmuscle.muscle import LinearDamper, LinearSpring, Muscle
-from airmuscle.program import StateVariable
+from airmuscle.pneumatics import Supply, Valve
+from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, absolute, gauge
 
 HEAT_CAPACITY = GAS_CONSTANT / 0.4
 """Specific heat of air at constant volume [J/(kg K)], for a ratio of heats of 1.4."""

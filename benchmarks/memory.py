@@ -17,7 +17,7 @@ TASKS = {
     "import airmuscle": "import airmuscle",
     "a run of 25 s, three states, 2501 rows": """
 from filling import hanging, FILL_DISCHARGE
-from airmuscle.simulate import simulate
+from airmuscle import simulate
 run = lambda output: simulate(hanging(), FILL_DISCHARGE, duration=25.0, output=output)
 run(0.01)""",
     "the same with 1 000 000 rows": "long = run(25e-6)",

@@ -16,9 +16,9 @@ from measure import Bar, Section, interleaved, of_time, show
 from ode8 import FLAGS, SOURCE, STEP, build, compilers, constants
 from rodas4 import kernel
 
-from airmuscle.method import DormandPrince8, Method, Rodas4, RungeKutta4
-from airmuscle.plant import Plant
-from airmuscle.program.prepared import prepared
+from airmuscle.compile.program import prepared
+from airmuscle.plant.plant import Plant
+from airmuscle.simulation.integrators import DormandPrince8, Method, Rodas4, RungeKutta4
 
 CALLBACKS = pathlib.Path(__file__).with_name("mujoco_callbacks.c")
 HEADING = ("muscles", "variant", "median", "least", "times ode8", "greatest error [m]")

@@ -14,12 +14,12 @@ from typing import Any
 from filling import hanging, runs
 from measure import Bar, Section, interleaved, of_time, show
 
-from airmuscle import trace
+from airmuscle.compile import System
+from airmuscle.compile.program import Program, prepared
+from airmuscle.core import autodiff
 from airmuscle.mechanism import HangingMass
-from airmuscle.method import DormandPrince8
-from airmuscle.plant import Plant
-from airmuscle.program import System
-from airmuscle.program.prepared import Program, prepared
+from airmuscle.plant.plant import Plant
+from airmuscle.simulation.integrators import DormandPrince8
 
 HEADING = ("what", "median", "least")
 TEXT = (
@@ -42,7 +42,7 @@ simulate(run.system, run.command, duration=0.1, start=run.start)
 
 def fresh(system: System) -> Program:
     """The program of a system as if its laws had never been traced."""
-    trace._functions.clear()
+    autodiff._functions.clear()
     return Program(system)
 
 

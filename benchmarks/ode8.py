@@ -15,13 +15,13 @@ from filling import SPACING, Array, Run, lifts, stretch_factor
 from measure import Bar, Section, Times, interleaved, of_time, show
 from rodas4 import kernel
 
-from airmuscle.circuit import FillDischarge
-from airmuscle.command import Segments
-from airmuscle.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Ambient, absolute
-from airmuscle.method import DormandPrince8, Rodas4
+from airmuscle.compile.program import prepared
+from airmuscle.control.inputs import Segments
 from airmuscle.muscle import Muscle
-from airmuscle.plant import Plant
-from airmuscle.program.prepared import prepared
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge
+from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Ambient, absolute
+from airmuscle.simulation.integrators import DormandPrince8, Rodas4
 
 STEP = 1e-4
 SOURCE = pathlib.Path(__file__).with_name("fill_discharge.c")

@@ -18,8 +18,8 @@ import numpy as np
 from filling import SPACING, Array, Run
 from rodas4 import by_hand
 
-from airmuscle.engine.address import invoke, pointer
-from airmuscle.program.prepared import Prepared
+from airmuscle.compile.kernels.calls import invoke, pointer
+from airmuscle.compile.program import Prepared
 
 Solver = Callable[[float], Callable[[], Array]]
 MOST_STEPS = 1_000_000

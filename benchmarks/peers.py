@@ -22,8 +22,8 @@ from peer_solvers import (
 )
 from rodas4 import WANTED, kernel, loosest
 
-from airmuscle.method import Rodas4
-from airmuscle.program.prepared import Prepared, prepared
+from airmuscle.compile.program import Prepared, prepared
+from airmuscle.simulation.integrators import Rodas4
 
 HEADING = ("states", "variant", "rtol", "median", "least", "times Rodas4", "greatest error [m]")
 TEXT = (

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from airmuscle.errors import IdentificationError
+from airmuscle.core.errors import IdentificationError
 from airmuscle.identify import Blocks, Specimens, compare, fit
 from airmuscle.identify.candidates import Candidate, standard_candidates, surface
 from airmuscle.identify.compare import errors_in_force

@@ -12,14 +12,14 @@ import time
 
 import numpy as np
 
-from airmuscle.circuit import FillDischarge, Line, Supply, Tube, Valve
-from airmuscle.command import Schedule
-from airmuscle.gas import Gas, Isothermal, Polytropic
+from airmuscle.control.inputs import Schedule
 from airmuscle.geometry import Vessel
 from airmuscle.identify.dynamic import DynamicFit, Experiment, Start, StartTime, StartValue, fit_dynamic, where_sensed
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle, SwellingWall
-from airmuscle.plant import Plant
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Line, Supply, Tube, Valve
+from airmuscle.pneumatics.gas import Gas, Isothermal, Polytropic
 from airmuscle.recording import Recording, read_csv
 
 SENSOR = 500.0

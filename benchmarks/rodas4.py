@@ -12,10 +12,10 @@ from measure import Bar, Section, Times, interleaved, of_time, show
 from scalar_rates import Rates, hill, six_states, ten_states
 from several_rates import several
 
-from airmuscle.engine.address import invoke, pointer
-from airmuscle.method import Rodas4
-from airmuscle.program.prepared import Prepared, prepared
-from airmuscle.simulate import simulate
+from airmuscle.compile.kernels.calls import invoke, pointer
+from airmuscle.compile.program import Prepared, prepared
+from airmuscle.simulation.integrators import Rodas4
+from airmuscle.simulation.simulate import simulate
 
 RTOL = 1e-6
 BY_HAND: dict[int, Callable[[Any], Callable[[Sequence[float]], Rates]]] = {

@@ -14,9 +14,9 @@ from filling import stretch_factor
 from joints import HEAT_CAPACITY, Joint, JointWithHeat
 
 from airmuscle.characteristic.contractile_surface import ContractileSurface
-from airmuscle.circuit import Valve
-from airmuscle.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, absolute
-from airmuscle.plant import Plant
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import Valve
+from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, absolute
 
 Rates = Callable[[float, Any], list[float]]
 Scalar = Callable[[float, float], float]

@@ -12,19 +12,19 @@ import numpy as np
 from filling import Array, hanging
 from measure import Bar, Section, interleaved, of_time, show
 
-from airmuscle import declare
-from airmuscle.command import Schedule, Segments
-from airmuscle.engine.evaluate import evaluate
+from airmuscle.compile.functions import traced
+from airmuscle.compile.ir.instructions import MAXIMUM, MINIMUM, SELECT, Code, Operand, instructions
+from airmuscle.compile.kernels.evaluate import evaluate
+from airmuscle.compile.program import prepared
+from airmuscle.control.inputs import Schedule, Segments
+from airmuscle.core import tree
 from airmuscle.identify.dynamic import Experiment, Start
 from airmuscle.identify.dynamic.course import Course
 from airmuscle.identify.dynamic.experiment import unknowns
-from airmuscle.identify.dynamic.fit import Problem
-from airmuscle.method import Method, Rodas4, RungeKutta4
-from airmuscle.plant import Plant
-from airmuscle.program.instructions import MAXIMUM, MINIMUM, SELECT, Code, Operand, instructions
-from airmuscle.program.prepared import prepared
-from airmuscle.program.printed import traced
-from airmuscle.simulate import simulate
+from airmuscle.identify.dynamic.problem import Problem
+from airmuscle.plant.plant import Plant
+from airmuscle.simulation.integrators import Method, Rodas4, RungeKutta4
+from airmuscle.simulation.simulate import simulate
 
 FREE = (
     "circuit.fill.conductance",
@@ -138,7 +138,7 @@ def with_jax(form: str) -> Callable[[], tuple[Array, Array]]:
 
     jax.config.update("jax_enable_x64", True)
     stacked = form == FORMS[1]
-    plant, leaves = case().plant, list(declare.leaves(case().plant))
+    plant, leaves = case().plant, list(tree.leaves(case().plant))
     places = [[leaf.path for leaf in leaves].index(path) for path in FREE]
     values = np.array([leaves[place].value for place in places])
     start, by_start = case().problem(RungeKutta4(STEP)).courses[0].start(values)

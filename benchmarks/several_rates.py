@@ -8,10 +8,10 @@ from typing import Any
 from filling import stretch_factor
 from scalar_rates import Rates, beyond_box, valve_flow
 
-from airmuscle.circuit import FillDischarge
-from airmuscle.gas import GAS_CONSTANT, Ambient, absolute
 from airmuscle.muscle import Muscle
-from airmuscle.plant import Plant
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge
+from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, absolute
 
 OneMuscle = Callable[[float, float, float, float, float], tuple[float, float]]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from airmuscle.declare import parameters
+from airmuscle.core.model import parameters
 from airmuscle.library.models import model_class, model_names
 from airmuscle.recording import QUANTITIES
 

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 
 from airmuscle.characteristic import VirtualWork
-from airmuscle.circuit import DistributedTube, FillDischarge, Line, Supply, Tube, Valve
-from airmuscle.command import Schedule
-from airmuscle.figures import DASHES, LINES, MARKERS, new_figure, save
-from airmuscle.gas import Air, Isothermal
+from airmuscle.control.inputs import Schedule
+from airmuscle.core.plotting import DASHES, LINES, MARKERS, new_figure, save
 from airmuscle.geometry import Braid
 from airmuscle.mechanism import Isometric
-from airmuscle.method import Rodas4
 from airmuscle.muscle import Muscle
-from airmuscle.plant import Plant
-from airmuscle.simulate import simulate
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import DistributedTube, FillDischarge, Line, Supply, Tube, Valve
+from airmuscle.pneumatics.gas import Air, Isothermal
+from airmuscle.simulation.integrators import Rodas4
+from airmuscle.simulation.simulate import simulate
 
 PICTURE = Path(__file__).parent / "images" / "tubes.png"
 DIAMETER, PRESSURE = 4e-3, 6e5

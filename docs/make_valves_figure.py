@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from airmuscle.circuit import CheckValve, IndexedValve, Orifice, Valve, in_series
-from airmuscle.figures import DASHES, LINES, new_figure, save
-from airmuscle.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
+from airmuscle.core.plotting import DASHES, LINES, new_figure, save
+from airmuscle.pneumatics import CheckValve, IndexedValve, Orifice, Valve, in_series
+from airmuscle.pneumatics.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
 
 PICTURE = Path(__file__).with_name("images") / "valves.png"
 UPSTREAM = 700e3

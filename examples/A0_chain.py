@@ -6,7 +6,7 @@ python examples/A0_chain.py        writes chain.png where it is run
 import numpy as np
 
 import airmuscle as am
-from airmuscle.figures import LINES, new_figure, save
+from airmuscle.core.plotting import LINES, new_figure, save
 from airmuscle.units import bar, kPa
 
 bench = am.measured("dmsp-20-300")

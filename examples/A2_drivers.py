@@ -6,8 +6,8 @@ python examples/A2_drivers.py        writes drivers.png where it is run
 import numpy as np
 
 import airmuscle as am
-from airmuscle.driver import PWM, Driven, OnOff
-from airmuscle.figures import BLACK, LINES, legend_outside, new_figure, save
+from airmuscle.control.driver import PWM, Driven, OnOff
+from airmuscle.core.plotting import BLACK, LINES, legend_outside, new_figure, save
 from airmuscle.units import ms
 
 VALVE = OnOff(opening_delay=5 * ms, closing_delay=2 * ms, opening_ramp=10 * ms, closing_ramp=4 * ms)  # chosen

@@ -8,11 +8,11 @@ Dimensions, valve and brake are chosen.
 from dataclasses import replace
 
 import airmuscle as am
-from airmuscle.circuit import Follower, Line, ProportionalValve, Tube
-from airmuscle.driver import Driven, OnOff
-from airmuscle.linearise import linearise
+from airmuscle.analysis.linearise import linearise
+from airmuscle.analysis.stiffness import stiffness
+from airmuscle.control.driver import Driven, OnOff
 from airmuscle.mechanism import AntagonisticJoint
-from airmuscle.stiffness import stiffness
+from airmuscle.pneumatics import Follower, Line, ProportionalValve, Tube
 from airmuscle.units import bar, degree, kPa, mm, ms
 
 muscle = replace(am.load("dmsp-20-300").muscle, damper=am.LinearDamper(200.0))

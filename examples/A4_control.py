@@ -9,12 +9,12 @@ periods are chosen.
 from dataclasses import replace
 
 import airmuscle as am
-from airmuscle.circuit import Follower, ProportionalValve
-from airmuscle.closed_loop import run_loop
 from airmuscle.control import PID, Split, TwoPoint
-from airmuscle.driver import OnOff
-from airmuscle.figures import BLACK, LINES, legend_below, new_figure, save
-from airmuscle.loop import Loop
+from airmuscle.control.driver import OnOff
+from airmuscle.control.loop import Loop
+from airmuscle.core.plotting import BLACK, LINES, legend_below, new_figure, save
+from airmuscle.pneumatics import Follower, ProportionalValve
+from airmuscle.simulation.closed_loop import run_loop
 from airmuscle.units import bar, mm, ms
 
 muscle = replace(am.load("dmsp-20-300").muscle, damper=am.LinearDamper(300.0))

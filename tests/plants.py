@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from joints import chosen_muscle
 
-from airmuscle import circuit, friction, geometry
+from airmuscle import friction, geometry, pneumatics
 from airmuscle.characteristic import (
     CircleVirtualWork,
     Clamped,
@@ -19,9 +19,6 @@ from airmuscle.characteristic import (
     as_force_law,
 )
 from airmuscle.characteristic.box import Box
-from airmuscle.circuit import FillDischarge, Supply, Valve
-from airmuscle.contact import HuntCrossley
-from airmuscle.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.geometry.catenary import Catenary
 from airmuscle.geometry.chebyshev import as_polynomial
 from airmuscle.geometry.parabola import Parabola, TrueArcParabola
@@ -42,6 +39,7 @@ from airmuscle.mechanism import (
     Stopped,
     StoppedJoint,
 )
+from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import (
     CreepElements,
     CubicSpring,
@@ -59,13 +57,15 @@ from airmuscle.muscle import (
     Serres2009Spring,
     SwellingWall,
 )
-from airmuscle.plant import Plant
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 
 VALVE, OTHER = Valve(1e-8, 0.4), Valve(3e-9, 0.2)
 TWO_VALVES = FillDischarge(Supply(5e5), VALVE, OTHER)
 BRAID = geometry.Braid(0.01, 0.4363, 0.2)
 FIBRES = geometry.StraightFibre(0.2, 0.02)
-SPOOL = circuit.Follower(20.0, 0.7)
+SPOOL = pneumatics.Follower(20.0, 0.7)
 STOP = EndStop(0.1, HuntCrossley(1e9))
 SLIPS = ((4e4, 2e4), (2e-4, 8e-4))
 SURFACE = ContractileSurface((300.0, -200.0, 40.0, 10.0, 5.0, 3.0), 0.0, 6e5, 0.0, 0.25, 0.0, 1200.0, 2)
@@ -132,24 +132,24 @@ EXAMPLES = {
     # circuits
     "polytropic": fed(TWO_VALVES, gas=Polytropic(1.3)),
     "heat": fed(TWO_VALVES),
-    "closed": fed(circuit.ClosedChamber()),
+    "closed": fed(pneumatics.ClosedChamber()),
     "held and let go": Plant(chosen_muscle(), TWO_VALVES, Held(HangingMass(10.0))),
     "held for good": Plant(chosen_muscle(), TWO_VALVES, Isometric(0.05), EnergyBalance(0.5)),
     "check valve and cracking pressure": fed(
         FillDischarge(
-            Supply(5e5), circuit.CheckValve(circuit.IndexedValve(1e-8, 0.3, 0.6, 3e4)), circuit.IndexedValve(1e-8, 0.5, 0.4)
+            Supply(5e5), pneumatics.CheckValve(pneumatics.IndexedValve(1e-8, 0.3, 0.6, 3e4)), pneumatics.IndexedValve(1e-8, 0.5, 0.4)
         )
     ),
-    "three positions through a tube": fed(circuit.Line(circuit.ThreePosition(Supply(5e5), VALVE, OTHER),
-                                                       circuit.Tube(circuit.TubeOrifice(1.0, 3e-3), 1e-5, 2))),
-    "tube with inertia": fed(circuit.Line(TWO_VALVES, circuit.DistributedTube(1.0, 2e-3, 2, EnergyBalance(0.1)))),
-    "overlap": fed(circuit.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, 0.2, 2), 2),
-    "underlap": fed(circuit.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, -0.2)),
-    "regulator, leak": fed(circuit.Leaking(circuit.ProportionalRegulator(Supply(5e5), VALVE, VALVE, SPOOL), OTHER)),
+    "three positions through a tube": fed(pneumatics.Line(pneumatics.ThreePosition(Supply(5e5), VALVE, OTHER),
+                                                       pneumatics.Tube(pneumatics.TubeOrifice(1.0, 3e-3), 1e-5, 2))),
+    "tube with inertia": fed(pneumatics.Line(TWO_VALVES, pneumatics.DistributedTube(1.0, 2e-3, 2, EnergyBalance(0.1)))),
+    "overlap": fed(pneumatics.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, 0.2, 2), 2),
+    "underlap": fed(pneumatics.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, -0.2)),
+    "regulator, leak": fed(pneumatics.Leaking(pneumatics.ProportionalRegulator(Supply(5e5), VALVE, VALVE, SPOOL), OTHER)),
     "manifold on tank and regulator": fed(
-        circuit.Manifold(
-            circuit.RegulatedSupply(circuit.Tank(Supply(7e5), OTHER, 1e-3, EnergyBalance(0.1)), VALVE, 4e5),
-            (FillDischarge(circuit.Shared(), VALVE, OTHER), circuit.ThreePosition(circuit.Shared(), VALVE, OTHER)),
+        pneumatics.Manifold(
+            pneumatics.RegulatedSupply(pneumatics.Tank(Supply(7e5), OTHER, 1e-3, EnergyBalance(0.1)), VALVE, 4e5),
+            (FillDischarge(pneumatics.Shared(), VALVE, OTHER), pneumatics.ThreePosition(pneumatics.Shared(), VALVE, OTHER)),
             ("one", "two"),
         ),
         2,

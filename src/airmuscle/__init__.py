@@ -10,19 +10,19 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from . import characteristic, geometry, units
-from .circuit import Circuit, FillDischarge, Supply, Valve
-from .command import Schedule, Signal
-from .equilibrium import equilibrium
-from .errors import AirmuscleError
-from .gas import Ambient, Isothermal, Polytropic
+from .analysis.equilibrium import equilibrium
+from .control.inputs import Schedule, Signal
+from .core.errors import AirmuscleError
+from .core.reference import Reference, cite
 from .library.catalogue import load, measured, names, save
 from .mechanism import HangingMass, Held, Isometric, Mechanism
-from .method import DormandPrince8, Rodas4, RungeKutta4
 from .muscle import LinearDamper, LinearSpring, Muscle
-from .plant import Plant
+from .plant.plant import Plant
+from .pneumatics import Circuit, FillDischarge, Supply, Valve
+from .pneumatics.gas import Ambient, Isothermal, Polytropic
 from .recording import Recording, read, read_csv, write_csv
-from .reference import Reference, cite
-from .simulate import advance, simulate
+from .simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
+from .simulation.simulate import advance, simulate
 
 if TYPE_CHECKING:
     from .identify.fit import fit

@@ -19,10 +19,10 @@ import startup
 import static_fit
 from filling import runs
 
-from airmuscle import declare
-from airmuscle.command import Schedule
-from airmuscle.method import DormandPrince8, Rodas4
-from airmuscle.program.prepared import prepared
+from airmuscle.compile.program import prepared
+from airmuscle.control.inputs import Schedule
+from airmuscle.core import tree
+from airmuscle.simulation.integrators import DormandPrince8, Rodas4
 
 
 @pytest.mark.parametrize("states", [3, 6, 8, 10])
@@ -79,7 +79,7 @@ def test_c_numpy_and_lanes_compute_the_same_batch(tmp_path):
     assert any("C, gcc" in name for name in timed) or not ode8.compilers()
     ends = {name: call() for name, (_, call) in timed.items()}
     parameters = batch.varied(batch.hanging(), 37)
-    table = batch.constants(declare.rebuild(batch.hanging(), list(parameters.values())), 37)
+    table = batch.constants(tree.rebuild(batch.hanging(), list(parameters.values())), 37)
     ends["NumPy"] = batch.in_numpy(table, runs()[3].vector, 0.7)
     batch.refuse_other_ends(ends, "simulate_batch", runs()[3].nominal)
     table[0, 3] *= 1.0001

@@ -20,10 +20,10 @@ import pytest
 import rodas4
 from filling import lifts, runs
 
-from airmuscle.command import Schedule
-from airmuscle.method import DormandPrince8, Rodas4, RungeKutta4
-from airmuscle.plant import Plant
-from airmuscle.program.prepared import prepared
+from airmuscle.compile.program import prepared
+from airmuscle.control.inputs import Schedule
+from airmuscle.plant.plant import Plant
+from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
 
 
 def reference(run):

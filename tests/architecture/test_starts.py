@@ -23,7 +23,7 @@ STARTS = {
     "import airmuscle": ("import airmuscle", {*HEAVY, "casadi", "llvmlite", "numpy.ma", "airmuscle.identify"}),
     "simulate": (
         SIMULATION.replace("METHOD", "am.Rodas4()"),
-        {*HEAVY, "numpy.ma", "airmuscle.identify", "airmuscle.engine.rodas4"},
+        {*HEAVY, "numpy.ma", "airmuscle.identify", "airmuscle.compile.kernels.rodas4"},
     ),
     "simulate, fixed steps": (SIMULATION.replace("METHOD", "am.RungeKutta4(1e-3)"), {*HEAVY, "airmuscle.identify"}),
     "airmuscle solve": (

@@ -13,21 +13,21 @@ import numpy as np
 import pytest
 from joints import chosen_muscle, joint, joint_start
 
-from airmuscle import declare, ops
-from airmuscle.batch import Batch, Single, simulate_batch, threads, variations
-from airmuscle.circuit import FillDischarge, Supply, Valve
-from airmuscle.command import REST, Schedule, Signal
-from airmuscle.declare import model, parameter
-from airmuscle.errors import ColumnError, FileError, OutOfReach, ParameterError
-from airmuscle.gas import Isothermal
+from airmuscle.compile import StateVariable
+from airmuscle.control.inputs import REST, Schedule, Signal
+from airmuscle.core import ops, tree
+from airmuscle.core.errors import ColumnError, FileError, OutOfReach, ParameterError
+from airmuscle.core.model import model, parameter
 from airmuscle.mechanism import HangingMass
-from airmuscle.method import DormandPrince8, Explicit, Rodas4, RungeKutta4
-from airmuscle.plant import Plant
-from airmuscle.program import StateVariable
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.pneumatics.gas import Isothermal
 from airmuscle.reproduce.hosovsky_plant import Numbers, hanging
 from airmuscle.reproduce.hosovsky_plant import plant as third_paper
-from airmuscle.sensitive import Sensitive, sensitivity
-from airmuscle.simulate import simulate
+from airmuscle.simulation.batch import Batch, Single, simulate_batch, thread_pool, variations
+from airmuscle.simulation.integrators import DormandPrince8, Explicit, Rodas4, RungeKutta4
+from airmuscle.simulation.sensitivity import Sensitive, sensitivity
+from airmuscle.simulation.simulate import simulate
 
 PULSE = Schedule({"fill": ((0.0303, 1), (0.2, 0)), "discharge": ((0.31, 1), (0.42, 0))})
 JOINT_PULSE = Schedule({"left.fill": ((0.02, 1), (0.07, 0)), "right.discharge": ((0.0217, 1), (0.07, 0))})
@@ -269,11 +269,11 @@ def test_a_plant_without_an_equilibrium_is_reported():
 
 
 def test_plants_that_differ_in_their_circuit_alone_share_the_search_for_rest(monkeypatch):
-    from airmuscle.batch import starts
+    from airmuscle.simulation.batch import initial_states
 
-    asked, search = [], starts.equilibrium_of_each
+    asked, search = [], initial_states.equilibrium_of_each
     monkeypatch.setattr(
-        starts,
+        initial_states,
         "equilibrium_of_each",
         lambda ready, table, *more: asked.append(len(table)) or search(ready, table, *more),
     )
@@ -306,7 +306,7 @@ def test_variations_that_cannot_be_are_refused(varied, message):
 def test_parameters_that_do_not_go_together_name_the_row():
     law = paper()
     varied = {"muscle.contractile.least_pressure": [-1e4, -1e4, 7e5]}
-    assert any(leaf.path == next(iter(varied)) for leaf in declare.leaves(law))
+    assert any(leaf.path == next(iter(varied)) for leaf in tree.leaves(law))
     with pytest.raises(ParameterError, match=r"variations, row 2: "):
         simulate_batch(law, varied, PULSE, duration=0.1, method=FAST)
 
@@ -453,7 +453,7 @@ def test_a_column_of_a_strange_name_has_a_file(tmp_path):
 
 
 def test_an_error_on_the_way_leaves_nothing_behind(tmp_path, monkeypatch):
-    from airmuscle.batch.task import Task
+    from airmuscle.simulation.batch.job import Task
 
     def fails(self, index):
         raise ZeroDivisionError("of the test")
@@ -471,7 +471,7 @@ def test_an_error_on_the_way_leaves_nothing_behind(tmp_path, monkeypatch):
 @pytest.mark.parametrize("where", ["memory", "disk"])
 def test_an_interruption_keeps_what_is_done(tmp_path, monkeypatch, method, where):
     """The user stops as soon as the first plants are done; the rest says so, and what is there is right."""
-    take, once = threads.Queue._take, threading.Lock()
+    take, once = thread_pool.Queue._take, threading.Lock()
 
     def interrupting(self):
         if self.done >= (1 if isinstance(method, Explicit) else 20) and once.acquire(blocking=False):
@@ -484,7 +484,7 @@ def test_an_interruption_keeps_what_is_done(tmp_path, monkeypatch, method, where
     given = {"duration": 0.05, "start": start, "method": method, "keep": ("pressure",), "cores": 1, "output": 0.01}
     varied = around({"mechanism.mass": 10.0}, count)
     whole = simulate_batch(plain(), varied, PULSE, **given)
-    monkeypatch.setattr(threads.Queue, "_take", interrupting)
+    monkeypatch.setattr(thread_pool.Queue, "_take", interrupting)
     into = {"into": tmp_path / "out"} if where == "disk" else {}
     found = simulate_batch(plain(), varied, PULSE, **given, **into)
     assert found.interrupted
@@ -527,11 +527,11 @@ def test_a_system_whose_states_take_plain_numbers_only_has_its_own_sizes_too():
 
 
 def test_a_bar_is_drawn_on_a_terminal_once_it_takes_long(monkeypatch, capsys):
-    with threads.progress("simulating", 10) as advanced:
+    with thread_pool.progress("simulating", 10) as advanced:
         advanced(5)
     assert capsys.readouterr().err == ""
-    monkeypatch.setattr(threads, "PATIENCE", -1.0)
+    monkeypatch.setattr(thread_pool, "PATIENCE", -1.0)
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
-    with threads.progress("simulating", 10) as advanced:
+    with thread_pool.progress("simulating", 10) as advanced:
         advanced(5)
     assert "simulating" in capsys.readouterr().err

@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle import trace
-from airmuscle.circuit import ClosedChamber, FillDischarge, Supply, Valve
-from airmuscle.command import Schedule
-from airmuscle.energy import Metered
-from airmuscle.equilibrium import equilibria, equilibrium
-from airmuscle.errors import NoEquilibrium, ParameterError
-from airmuscle.gas import Ambient, Isothermal, Polytropic
+from airmuscle.analysis.equilibrium import equilibria, equilibrium
+from airmuscle.control.inputs import Schedule
+from airmuscle.core import autodiff
+from airmuscle.core.errors import NoEquilibrium, ParameterError
 from airmuscle.library.catalogue import load
 from airmuscle.mechanism import HangingMass, Held, Isometric
-from airmuscle.method import DormandPrince8, Rodas4
 from airmuscle.muscle import LinearDamper
-from airmuscle.plant import Plant
-from airmuscle.simulate import simulate
+from airmuscle.plant.energy_balance import Metered
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import ClosedChamber, FillDischarge, Supply, Valve
+from airmuscle.pneumatics.gas import Ambient, Isothermal, Polytropic
+from airmuscle.simulation.integrators import DormandPrince8, Rodas4
+from airmuscle.simulation.simulate import simulate
 
 VALVE = Valve(2.6167e-9, 0.433)
 CIRCUIT = FillDischarge(Supply(548675.0), VALVE, VALVE)
@@ -66,7 +66,7 @@ def test_both_energy_books_close(gas):
 @pytest.mark.parametrize("gas", GASES, ids=repr)
 def test_the_energy_of_the_air_falls_with_volume_by_its_pressure(gas):
     ambient, mass, volume = Ambient(), 3e-4, 8e-5
-    (by_volume,) = trace.directional(lambda x: [gas.energy(mass, x[0], ambient)], [volume], [1.0])
+    (by_volume,) = autodiff.directional(lambda x: [gas.energy(mass, x[0], ambient)], [volume], [1.0])
     assert by_volume == pytest.approx(-gas.pressure(mass, volume, ambient), rel=1e-12)
     assert gas.air_mass(gas.pressure(mass, volume, ambient), volume, ambient) == pytest.approx(mass, rel=1e-14)
 

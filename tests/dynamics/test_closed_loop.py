@@ -18,24 +18,24 @@ from plants import chosen_muscle
 from scipy.linalg import expm
 from scipy.signal import cont2discrete
 
-from airmuscle.circuit import FillDischarge, Follower, ProportionalRegulator, ProportionalValve, Supply, Valve
-from airmuscle.closed_loop import run_loop
-from airmuscle.command import Periodic, Schedule, Signal
+from airmuscle.analysis.linearise import linearise
+from airmuscle.compile import StateVariable
+from airmuscle.compile.program import prepared
 from airmuscle.control import PID, Split, TwoPoint
-from airmuscle.controller import Controller
-from airmuscle.declare import model, parameter
-from airmuscle.driver import PWM, OnOff
-from airmuscle.errors import ParameterError, SimulationError
-from airmuscle.gas import Isothermal
-from airmuscle.linearise import linearise
-from airmuscle.loop import Loop
+from airmuscle.control.controller import Controller
+from airmuscle.control.driver import PWM, OnOff
+from airmuscle.control.inputs import Periodic, Schedule, Signal
+from airmuscle.control.loop import Loop
+from airmuscle.core.errors import ParameterError, SimulationError
+from airmuscle.core.model import model, parameter
+from airmuscle.core.reference import cite
 from airmuscle.mechanism import HangingMass, Held, Isometric
-from airmuscle.method import DormandPrince8, Rodas4, RungeKutta4
-from airmuscle.plant import Plant
-from airmuscle.program import StateVariable
-from airmuscle.program.prepared import prepared
-from airmuscle.reference import cite
-from airmuscle.simulate import simulate
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Follower, ProportionalRegulator, ProportionalValve, Supply, Valve
+from airmuscle.pneumatics.gas import Isothermal
+from airmuscle.simulation.closed_loop import run_loop
+from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
+from airmuscle.simulation.simulate import simulate
 
 VALVE = Valve(2.6e-9, 0.4)
 TICK = 2.0**-6
@@ -400,7 +400,7 @@ def test_a_loop_that_is_interrupted_can_be_taken_up():
 
 
 def test_a_loop_that_is_interrupted_within_a_piece_goes_on_from_the_sample_before(monkeypatch):
-    from airmuscle.method import Stepper
+    from airmuscle.simulation.integrators import Stepper
 
     stepped, run = Stepper.run, iter(range(100))
     loop, plant = Loop(VALVES, TICK, PRESSURE, drivers={"fill": PWM(30.0)}), lifting()
@@ -437,7 +437,7 @@ def test_what_does_not_change_is_made_once(monkeypatch):
     simulate(plant, Loop(VALVES, TICK, PRESSURE), duration=0.1, start=start)  # compiles
     monkeypatch.setattr(Plant, "states", property(counting("states", Plant.states.fget)))
     monkeypatch.setattr(Rodas4, "_kernel", counting("kernel", Rodas4._kernel))
-    monkeypatch.setattr("airmuscle.program.prepared.prepared", counting("prepared", prepared))
+    monkeypatch.setattr("airmuscle.compile.program.prepared", counting("prepared", prepared))
     found = []
     for duration in (0.5, 1.0):
         counted.clear()
@@ -514,9 +514,9 @@ def test_a_memory_belongs_to_its_instant(start_time):
 
 
 def test_a_batch_and_an_experiment_refuse_a_loop():
-    from airmuscle.batch import simulate_batch
     from airmuscle.identify.dynamic.experiment import Experiment
     from airmuscle.identify.dynamic.start import Start
+    from airmuscle.simulation.batch import simulate_batch
 
     loop, plant = Loop(VALVES, 0.1, PRESSURE), lifting()
     for given in (loop, [loop, loop]):

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle import Recording, read_csv
-from airmuscle.command import Periodic, Schedule, Segments, Signal
-from airmuscle.errors import ColumnError, ParameterError
+from airmuscle.control.inputs import Periodic, Schedule, Segments, Signal
+from airmuscle.core.errors import ColumnError, ParameterError
 
 
 def course(command, start: float, duration: float, times: np.ndarray) -> np.ndarray:

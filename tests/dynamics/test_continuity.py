@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 from plants import EXAMPLES, of
 
-from airmuscle import ops
-from airmuscle.contact import HuntCrossley
-from airmuscle.declare import model
+from airmuscle.compile.program import prepared
+from airmuscle.core import ops
+from airmuscle.core.model import model
 from airmuscle.library.models import model_class, model_names
+from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import (
     Damper,
     EndStop,
 )
-from airmuscle.program.prepared import prepared
 
 JUMP = 1e-6
 """What counts as a jump, as a share of a usual rate."""

@@ -12,15 +12,15 @@ import pytest
 from joints import chosen_muscle
 
 from airmuscle.characteristic import VirtualWork
-from airmuscle.circuit import ClosedChamber, DistributedTube, FillDischarge, Line, Supply, Valve
-from airmuscle.command import REST, Schedule, Signal
-from airmuscle.gas import EnergyBalance, Polytropic
+from airmuscle.control.inputs import REST, Schedule, Signal
 from airmuscle.geometry import Braid
 from airmuscle.mechanism import HangingMass
-from airmuscle.method import DormandPrince8, Rodas4, RungeKutta4
 from airmuscle.muscle import CreepElements, CubicSpring, LaggingWall, LinearDamper, Muscle
-from airmuscle.plant import Plant
-from airmuscle.simulate import simulate
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import ClosedChamber, DistributedTube, FillDischarge, Line, Supply, Valve
+from airmuscle.pneumatics.gas import EnergyBalance, Polytropic
+from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
+from airmuscle.simulation.simulate import simulate
 
 BRAID = Braid(0.01, 0.4363, 0.2)
 HEAT = EnergyBalance(0.5)

@@ -28,10 +28,10 @@ from airmuscle import (
     load,
     simulate,
 )
-from airmuscle.command import Schedule, Segments, Signal
-from airmuscle.driver import PWM, Driven, OnOff
-from airmuscle.errors import ParameterError
-from airmuscle.simulate import output_times
+from airmuscle.control.driver import PWM, Driven, OnOff
+from airmuscle.control.inputs import Schedule, Segments, Signal
+from airmuscle.core.errors import ParameterError
+from airmuscle.simulation.simulate import output_times
 
 INPUTS = ("other", "fill")
 TICK = 2.0**-10
@@ -240,7 +240,7 @@ def plant() -> Plant:
     return Plant(muscle, FillDischarge(Supply(5e5), valve, valve), HangingMass(5.0))
 
 
-@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+@pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 def test_ten_thousand_switchings_neither_stall_nor_drift():
     """5000 pulses of either valve: bounded steps, and the pressure of the pulses is that of openings held in the mean."""
     duties = {"fill": ((0.0, 0.3),), "discharge": ((0.0, 0.4),)}

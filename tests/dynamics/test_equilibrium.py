@@ -11,16 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joints import chosen_muscle
 
-from airmuscle import ops
-from airmuscle.circuit import ClosedChamber, FillDischarge, Follower, ProportionalValve, Supply, Valve
-from airmuscle.command import REST, Schedule
-from airmuscle.contact import HuntCrossley
-from airmuscle.equilibrium import equilibria, equilibrium
-from airmuscle.equilibrium.one_coordinate import grid
-from airmuscle.equilibrium.static import Static
-from airmuscle.errors import NoEquilibrium, OutOfReach, ParameterError
+from airmuscle.analysis.equilibrium import equilibria, equilibrium
+from airmuscle.analysis.equilibrium.single_dof import grid
+from airmuscle.analysis.equilibrium.statics import Static
+from airmuscle.compile.program import prepared
+from airmuscle.control.inputs import REST, Schedule
+from airmuscle.core import ops
+from airmuscle.core.errors import NoEquilibrium, OutOfReach, ParameterError
 from airmuscle.friction import Dahl
-from airmuscle.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
@@ -33,10 +31,12 @@ from airmuscle.mechanism import (
     SpringLoad,
     StoppedJoint,
 )
+from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, LaggingWall, SeriesSpring
-from airmuscle.plant import Plant
-from airmuscle.program.prepared import prepared
-from airmuscle.simulate import simulate
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import ClosedChamber, FillDischarge, Follower, ProportionalValve, Supply, Valve
+from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.simulation.simulate import simulate
 
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))
 VALVE = Valve(2.6e-8, 0.433)

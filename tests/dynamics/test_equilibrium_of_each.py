@@ -11,19 +11,16 @@ from bumpy import Bumpy
 from joints import chosen_muscle
 from plants import BRAID, EXAMPLES, TWO_VALVES, of, pulled
 
-from airmuscle import declare, ops
-from airmuscle.batch import simulate_batch
+from airmuscle.analysis.equilibrium import equilibria, equilibrium, equilibrium_of_each
+from airmuscle.analysis.equilibrium.grid import grids
+from airmuscle.analysis.equilibrium.single_dof import grid
+from airmuscle.analysis.equilibrium.statics import Static
+from airmuscle.analysis.equilibrium.vectorised import SideBySide
 from airmuscle.characteristic import MartensBoblan2017, VirtualWork
-from airmuscle.circuit import ClosedChamber, FillDischarge, Line, ProportionalRegulator, Supply, Tube, Valve
-from airmuscle.command import REST
-from airmuscle.contact import HuntCrossley
-from airmuscle.equilibrium import equilibria, equilibrium, equilibrium_of_each
-from airmuscle.equilibrium.one_coordinate import grid
-from airmuscle.equilibrium.reach import grids
-from airmuscle.equilibrium.side_by_side import SideBySide
-from airmuscle.equilibrium.static import Static
-from airmuscle.errors import AirmuscleError, NoEquilibrium, ParameterError
-from airmuscle.gas import Ambient, Polytropic
+from airmuscle.compile.program import prepared
+from airmuscle.control.inputs import REST
+from airmuscle.core import ops, tree
+from airmuscle.core.errors import AirmuscleError, NoEquilibrium, ParameterError
 from airmuscle.geometry import Braid
 from airmuscle.mechanism import (
     AntagonisticJoint,
@@ -34,10 +31,13 @@ from airmuscle.mechanism import (
     SpringLoad,
     StoppedJoint,
 )
-from airmuscle.method import RungeKutta4
+from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import LaggingWall, LinearSpring, SeriesSpring
-from airmuscle.plant import Plant
-from airmuscle.program.prepared import prepared
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import ClosedChamber, FillDischarge, Line, ProportionalRegulator, Supply, Tube, Valve
+from airmuscle.pneumatics.gas import Ambient, Polytropic
+from airmuscle.simulation.batch import simulate_batch
+from airmuscle.simulation.integrators import RungeKutta4
 
 SPREAD = 0.05
 FAST = RungeKutta4(1e-3)
@@ -68,7 +68,7 @@ PLANTS = {name: plant for name, plant in {**EXAMPLES, **OTHERS}.items() if one_w
 def varied(plant, count):
     """All parameters (N, P) of plants around one, each within its bounds."""
     draw, columns = np.random.default_rng(4), []
-    for leaf in declare.leaves(plant):
+    for leaf in tree.leaves(plant):
         values = leaf.value * (1 + SPREAD * draw.uniform(-1, 1, count))
         columns.append(np.clip(values, *leaf.declared.bounds))
     return np.column_stack(columns)
@@ -93,7 +93,7 @@ def as_alone(plant, parameters, pressure):
     """Assert it of every plant; how many have a rest."""
     of_each, count = found(plant, parameters, pressure), 0
     for row, state in zip(parameters, of_each.states, strict=True):
-        one = declare.with_parameters(plant, row.tolist())
+        one = tree.with_parameters(plant, row.tolist())
         expected = one_by_one(one, pressure)
         assert (expected is None) == bool(np.isnan(state).any())
         if expected is not None:
@@ -125,8 +125,8 @@ def test_so_it_does_at_ambient_pressure_and_below(name):
 def test_of_several_rests_each_takes_its_own():
     """With its stops at -0.4 and 0.2 a joint that falls rests at the nearer one, and at either while it is turned."""
     plant = OTHERS["a joint that falls to a stop on either side"]
-    paths = [leaf.path for leaf in declare.leaves(plant)]
-    table = np.repeat(declare.flatten(plant)[None, :], 3, axis=0)
+    paths = [leaf.path for leaf in tree.leaves(plant)]
+    table = np.repeat(tree.flatten(plant)[None, :], 3, axis=0)
     ends = ("mechanism.least", "mechanism.greatest")
     table[1, [paths.index(end) for end in ends]] = -0.2, 0.4
     table[2, [paths.index(end) for end in ends]] = -0.4, 0.39
@@ -154,7 +154,7 @@ def test_neighbours_do_not_matter_to_the_last_digit(name):
     together = found(plant, table, 2e5).states
     for i, row in enumerate(table):
         np.testing.assert_array_equal(found(plant, row[None, :], 2e5).states[0], together[i])
-        alone = equilibrium(declare.with_parameters(plant, row.tolist()), pressure=2e5)
+        alone = equilibrium(tree.with_parameters(plant, row.tolist()), pressure=2e5)
         assert list(alone.values()) == together[i].tolist()
     np.testing.assert_array_equal(found(plant, table[3:7], 2e5).states, together[3:7])
 
@@ -165,7 +165,7 @@ def test_more_plants_than_go_side_by_side_are_taken_in_blocks(monkeypatch):
     plant = JOINT
     table = varied(plant, 7)
     together = found(plant, table, 2e5).states
-    monkeypatch.setattr(sys.modules["airmuscle.equilibrium.each"], "AT_ONCE", 3 * 101 * len(plant.states))
+    monkeypatch.setattr(sys.modules["airmuscle.analysis.equilibrium.many"], "AT_ONCE", 3 * 101 * len(plant.states))
     np.testing.assert_array_equal(found(plant, table, 2e5).states, together)
     assert np.isfinite(together).all()
 
@@ -176,8 +176,8 @@ def test_more_plants_than_go_side_by_side_are_taken_in_blocks(monkeypatch):
 def of_mechanism(mechanism, rows):
     """A plant, and a table of such plants with these parameters of its mechanism."""
     plant = Plant(chosen_muscle(), ClosedChamber(), mechanism)
-    table = np.repeat(declare.flatten(plant)[None, :], len(rows), axis=0)
-    places = [i for i, leaf in enumerate(declare.leaves(plant)) if leaf.path.startswith("mechanism")]
+    table = np.repeat(tree.flatten(plant)[None, :], len(rows), axis=0)
+    places = [i for i, leaf in enumerate(tree.leaves(plant)) if leaf.path.startswith("mechanism")]
     table[:, places] = rows
     return plant, table
 
@@ -229,7 +229,7 @@ def test_they_are_looked_at_in_the_same_places(name):
     ready = prepared(plant)
     each = SideBySide.of_plants(ready, table, (0.0,) * len(plant.muscles), np.zeros(len(plant.inputs)))
     for row, x in zip(table, grids(each), strict=True):
-        alone = grid(Static(declare.with_parameters(plant, row.tolist()), 0.0, None))
+        alone = grid(Static(tree.with_parameters(plant, row.tolist()), 0.0, None))
         np.testing.assert_allclose(x[np.isfinite(x)], alone, rtol=0.0, atol=1e-15)
 
 
@@ -260,19 +260,19 @@ def test_a_law_that_takes_no_arrays_is_asked_alone():
     assert not found(plant, table, 2e5).searched.any()
     usual = found(pulled(SpringLoad(5.0, 2000.0, 1.0, 50.0)), table, 2e5).states
     for row, state in zip(table, usual, strict=True):
-        alone = equilibrium(declare.with_parameters(plant, row.tolist()), pressure=2e5)
+        alone = equilibrium(tree.with_parameters(plant, row.tolist()), pressure=2e5)
         np.testing.assert_allclose(list(alone.values()), state, rtol=1e-11, atol=1e-15)
 
 
 def test_a_plant_beyond_its_reach_or_in_a_vacuum_is_asked_alone_and_its_neighbours_are_not():
     plant = pulled(Isometric(0.05))
-    paths = [leaf.path for leaf in declare.leaves(plant)]
-    table = np.repeat(declare.flatten(plant)[None, :], 3, axis=0)
+    paths = [leaf.path for leaf in tree.leaves(plant)]
+    table = np.repeat(tree.flatten(plant)[None, :], 3, axis=0)
     table[1, paths.index("mechanism.contraction")] = -0.2
     assert found(plant, table, 1e5).searched.tolist() == [True, False, True]
     for one in (plant, pulled(SpringLoad(5.0, 2000.0, 1.0, -200.0))):
-        paths = [leaf.path for leaf in declare.leaves(one)]
-        table = np.repeat(declare.flatten(one)[None, :], 2, axis=0)
+        paths = [leaf.path for leaf in tree.leaves(one)]
+        table = np.repeat(tree.flatten(one)[None, :], 2, axis=0)
         table[0, paths.index("ambient.pressure")] = 5e4
         of_each = found(one, table, -6e4)
         assert of_each.searched.tolist() == [False, True]
@@ -286,8 +286,8 @@ def test_an_input_that_one_of_them_refuses_is_asked_alone():
         Supply(6e5), Valve(1e-8, 0.3), Valve(1e-8, 0.3), EXAMPLES["regulator, leak"].circuit.circuit.lag
     )
     plant = Plant(chosen_muscle(), regulator, Isometric(0.05))
-    paths = [leaf.path for leaf in declare.leaves(plant)]
-    table = np.repeat(declare.flatten(plant)[None, :], 2, axis=0)
+    paths = [leaf.path for leaf in tree.leaves(plant)]
+    table = np.repeat(tree.flatten(plant)[None, :], 2, axis=0)
     table[0, paths.index("circuit.greatest")] = 1e5
     assert found(plant, table, 1e5, np.array([2e5])).searched.tolist() == [False, True]
 
@@ -330,7 +330,7 @@ def test_the_example_of_the_batch_begins_where_it_rests():
     table = varied(replace(plant, mechanism=HangingMass(3.0)), 200)
     of_each = found(plant, table, 0.0)
     assert of_each.searched.all()
-    rates = [prepared(declare.with_parameters(plant, row.tolist())).rates(state, [0.0, 0.0])
+    rates = [prepared(tree.with_parameters(plant, row.tolist())).rates(state, [0.0, 0.0])
              for row, state in zip(table[::20], of_each.states[::20], strict=True)]  # fmt: skip
     assert np.abs(np.array(rates)[:, 1:]).max() < 1e-9
 

@@ -8,22 +8,22 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.batch import simulate_batch
-from airmuscle.circuit import FillDischarge, Leaking, Line, Manifold, Shared, Supply, Tube, Valve
-from airmuscle.command import Schedule, Segments
-from airmuscle.contact import HuntCrossley
-from airmuscle.errors import AirmuscleError, SimulationError
-from airmuscle.gas import EnergyBalance, Isothermal, Polytropic
-from airmuscle.linearise import linearise
+from airmuscle.analysis.linearise import linearise
+from airmuscle.analysis.stiffness import stiffness
+from airmuscle.compile.program import prepared
+from airmuscle.control.inputs import Schedule, Segments
+from airmuscle.core.errors import AirmuscleError, SimulationError
 from airmuscle.mechanism import HangingMass, Held, InSeries, Stopped
-from airmuscle.method import LESS_THAN_NONE, TOO_MANY, Rodas4, RungeKutta4
+from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import LinearDamper, SeriesSpring
-from airmuscle.plant import Plant
-from airmuscle.program.prepared import prepared
-from airmuscle.recorded import outside_box
-from airmuscle.simulate import advance, simulate
-from airmuscle.start import state_vector
-from airmuscle.stiffness import stiffness
+from airmuscle.plant.plant import Plant
+from airmuscle.plant.state import state_vector
+from airmuscle.pneumatics import FillDischarge, Leaking, Line, Manifold, Shared, Supply, Tube, Valve
+from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.simulation.batch import simulate_batch
+from airmuscle.simulation.integrators import LESS_THAN_NONE, TOO_MANY, Rodas4, RungeKutta4
+from airmuscle.simulation.result import outside_box
+from airmuscle.simulation.simulate import advance, simulate
 
 HUGE = Valve(9e-6, 0.3)
 VALVE = Valve(2.6e-9, 0.4)

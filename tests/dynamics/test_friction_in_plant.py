@@ -12,19 +12,19 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.circuit import FillDischarge, Supply, Valve
-from airmuscle.command import Schedule
-from airmuscle.declare import model, parameter
-from airmuscle.energy import Metered
-from airmuscle.equilibrium import equilibrium
-from airmuscle.errors import ParameterError
+from airmuscle.analysis.equilibrium import equilibrium
+from airmuscle.compile.functions import traced
+from airmuscle.control.inputs import Schedule
+from airmuscle.core.errors import ParameterError
+from airmuscle.core.model import model, parameter
 from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
 from airmuscle.mechanism import HangingMass
 from airmuscle.mechanism.base import Coordinate, Mechanism
-from airmuscle.method import DormandPrince8, Rodas4
-from airmuscle.plant import Plant
-from airmuscle.program.printed import traced
-from airmuscle.simulate import simulate
+from airmuscle.plant.energy_balance import Metered
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.simulation.integrators import DormandPrince8, Rodas4
+from airmuscle.simulation.simulate import simulate
 
 VALVE = Valve(3e-10, 0.433)
 CIRCUIT = FillDischarge(Supply(548675.0), VALVE, VALVE)

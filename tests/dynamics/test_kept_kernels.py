@@ -13,15 +13,16 @@ import numpy as np
 import pytest
 from filling import runs
 
-from airmuscle.command import Schedule
-from airmuscle.engine import array_layout, kept
-from airmuscle.engine import kernel as kernels
-from airmuscle.engine.entry import REFUSED
-from airmuscle.engine.kernel import Kernel
-from airmuscle.engine.object_code import made
-from airmuscle.method import DormandPrince8, Rodas4
-from airmuscle.program.prepared import prepared
-from airmuscle.simulate import simulate
+from airmuscle.compile.cache import kernel as kernels
+from airmuscle.compile.cache import numpy_layout as array_layout
+from airmuscle.compile.cache import store as kept
+from airmuscle.compile.cache.entry_point import REFUSED
+from airmuscle.compile.cache.kernel import Kernel
+from airmuscle.compile.cache.object_code import made
+from airmuscle.compile.program import prepared
+from airmuscle.control.inputs import Schedule
+from airmuscle.simulation.integrators import DormandPrince8, Rodas4
+from airmuscle.simulation.simulate import simulate
 
 CASE = runs()[3]
 READY = prepared(CASE.system)
@@ -237,8 +238,8 @@ def test_a_kernel_that_needs_numba_is_tried_once_on_a_machine(empty, monkeypatch
     n, seen, looked = 2, [], []
     given = (1, *(np.zeros(n) for _ in range(5)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n * n + n))
     monkeypatch.setattr(Kernel, "_by_numba", lambda self, given: seen.append(self.name))
-    monkeypatch.setattr(kernels.kept, "found", lambda *asked: looked.append(asked) or kept_found(*asked))
-    for kernel in (Kernel("root"), Kernel("root")):
+    monkeypatch.setattr(kernels.store, "found", lambda *asked: looked.append(asked) or kept_found(*asked))
+    for kernel in (Kernel("root", "newton"), Kernel("root", "newton")):
         kernel(*given)
         kernel(*given)
     assert seen == ["root"] * 4
@@ -261,7 +262,7 @@ def test_arrays_laid_out_otherwise_are_left_to_numba(monkeypatch):
 
 def test_threads_that_ask_at_once_get_one_machine_code(empty, without_numba, monkeypatch):
     kernel, right, looked = Kernel("evaluate"), expected(), []
-    monkeypatch.setattr(kernels.kept, "found", lambda *asked: looked.append(asked) or kept_found(*asked))
+    monkeypatch.setattr(kernels.store, "found", lambda *asked: looked.append(asked) or kept_found(*asked))
 
     def found(_):
         given = arguments()

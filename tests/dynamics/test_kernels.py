@@ -8,17 +8,17 @@ import pytest
 from joints import chosen_muscle, joint, joint_start
 from scipy.integrate import solve_ivp
 
-from airmuscle import ops
-from airmuscle.circuit import FillDischarge, Supply, Valve
-from airmuscle.command import REST, Schedule, Signal
-from airmuscle.declare import model, parameter
-from airmuscle.errors import SimulationError
+from airmuscle.compile import StateVariable
+from airmuscle.compile.program import prepared
+from airmuscle.control.inputs import REST, Schedule, Signal
+from airmuscle.core import ops
+from airmuscle.core.errors import SimulationError
+from airmuscle.core.model import model, parameter
 from airmuscle.mechanism import HangingMass
-from airmuscle.method import DormandPrince8, Rodas4, RungeKutta4
-from airmuscle.plant import Plant
-from airmuscle.program import StateVariable
-from airmuscle.program.prepared import prepared
-from airmuscle.simulate import advance, simulate
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
+from airmuscle.simulation.simulate import advance, simulate
 
 
 def hanging() -> Plant:

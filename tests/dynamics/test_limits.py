@@ -13,7 +13,13 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.circuit import (
+from airmuscle.analysis.equilibrium import equilibrium
+from airmuscle.control.inputs import REST, Schedule
+from airmuscle.friction import Dahl
+from airmuscle.mechanism import AntagonisticJoint, HangingMass, Isometric, SpringLoad, Stopped
+from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.plant.plant import Plant, total_air
+from airmuscle.pneumatics import (
     ClosedChamber,
     FillDischarge,
     Follower,
@@ -26,15 +32,9 @@ from airmuscle.circuit import (
     Tube,
     Valve,
 )
-from airmuscle.command import REST, Schedule
-from airmuscle.contact import HuntCrossley
-from airmuscle.equilibrium import equilibrium
-from airmuscle.friction import Dahl
-from airmuscle.gas import EnergyBalance, Isothermal, Polytropic
-from airmuscle.mechanism import AntagonisticJoint, HangingMass, Isometric, SpringLoad, Stopped
-from airmuscle.method import Rodas4
-from airmuscle.plant import Plant, total_air
-from airmuscle.simulate import simulate
+from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.simulation.integrators import Rodas4
+from airmuscle.simulation.simulate import simulate
 
 GASES = [Isothermal(), Polytropic(1.2), EnergyBalance(0.2), EnergyBalance(0.0)]
 MUSCLE = chosen_muscle()

@@ -9,7 +9,16 @@ import pytest
 from joints import chosen_muscle, joint, joint_start
 from scipy.signal import lsim
 
-from airmuscle.circuit import (
+from airmuscle.analysis.equilibrium import equilibrium
+from airmuscle.analysis.linearise import linearise
+from airmuscle.compile.program import prepared
+from airmuscle.control.inputs import Schedule
+from airmuscle.core.errors import AirmuscleError, ParameterError
+from airmuscle.friction import LuGre
+from airmuscle.mechanism import AntagonisticJoint, HangingMass, SpringLoad
+from airmuscle.muscle import SeriesSpring
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import (
     ClosedChamber,
     FillDischarge,
     Follower,
@@ -20,18 +29,9 @@ from airmuscle.circuit import (
     Tube,
     Valve,
 )
-from airmuscle.command import Schedule
-from airmuscle.equilibrium import equilibrium
-from airmuscle.errors import AirmuscleError, ParameterError
-from airmuscle.friction import LuGre
-from airmuscle.gas import EnergyBalance, Isothermal
-from airmuscle.linearise import linearise
-from airmuscle.mechanism import AntagonisticJoint, HangingMass, SpringLoad
-from airmuscle.method import Rodas4
-from airmuscle.muscle import SeriesSpring
-from airmuscle.plant import Plant
-from airmuscle.program.prepared import prepared
-from airmuscle.simulate import simulate
+from airmuscle.pneumatics.gas import EnergyBalance, Isothermal
+from airmuscle.simulation.integrators import Rodas4
+from airmuscle.simulation.simulate import simulate
 
 VALVE = Valve(2.6e-9, 0.433)
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))

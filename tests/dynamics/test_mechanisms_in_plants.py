@@ -10,26 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joints import HEAT_CAPACITY, chosen_muscle, joint, joint_start
 
-from airmuscle.circuit import (
-    ClosedChamber,
-    DistributedTube,
-    FillDischarge,
-    Follower,
-    Line,
-    Manifold,
-    ProportionalValve,
-    Shared,
-    Supply,
-    ThreePosition,
-    Tube,
-    Valve,
-)
-from airmuscle.command import REST, Schedule, Signal
-from airmuscle.contact import HuntCrossley
-from airmuscle.energy import Metered
-from airmuscle.equilibrium import equilibrium
-from airmuscle.errors import ParameterError
-from airmuscle.gas import GAS_CONSTANT, EnergyBalance, Isothermal, Polytropic
+from airmuscle.analysis.equilibrium import equilibrium
+from airmuscle.compile.program import prepared
+from airmuscle.control.inputs import REST, Schedule, Signal
+from airmuscle.control.trajectory import follow
+from airmuscle.core.errors import ParameterError
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
@@ -43,11 +28,26 @@ from airmuscle.mechanism import (
     Stopped,
     StoppedJoint,
 )
-from airmuscle.method import Rodas4
-from airmuscle.motion import follow
-from airmuscle.plant import Plant
-from airmuscle.program.prepared import prepared
-from airmuscle.simulate import simulate
+from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.plant.energy_balance import Metered
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import (
+    ClosedChamber,
+    DistributedTube,
+    FillDischarge,
+    Follower,
+    Line,
+    Manifold,
+    ProportionalValve,
+    Shared,
+    Supply,
+    ThreePosition,
+    Tube,
+    Valve,
+)
+from airmuscle.pneumatics.gas import GAS_CONSTANT, EnergyBalance, Isothermal, Polytropic
+from airmuscle.simulation.integrators import Rodas4
+from airmuscle.simulation.simulate import simulate
 
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))
 VALVE = Valve(2.6e-8, 0.433)

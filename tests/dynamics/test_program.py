@@ -14,11 +14,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airmuscle import ops, trace
-from airmuscle.declare import model, parameter
-from airmuscle.errors import ParameterError, TraceError
-from airmuscle.program import StateVariable
-from airmuscle.program.prepared import prepared
+from airmuscle.compile import StateVariable
+from airmuscle.compile.program import prepared
+from airmuscle.core import autodiff, ops
+from airmuscle.core.errors import ParameterError, TraceError
+from airmuscle.core.model import model, parameter
 
 FORMULAS = {
     "arithmetic": lambda x, y: (x + 2 * y) * (x - y) / (4 + y * y) - x,
@@ -120,7 +120,7 @@ class Forgetful(Silent):
 
 
 def test_a_constant_that_is_not_finite_names_the_law():
-    with pytest.raises(TraceError, match=r"Silent traced to a constant that is not finite. Use airmuscle.ops"):
+    with pytest.raises(TraceError, match=r"Silent traced to a constant that is not finite. Use airmuscle.core.ops"):
         prepared(Silent())
     with pytest.raises(TraceError, match=r"states are \['x'\], but rates are given for \[\]"):
         prepared(Forgetful())
@@ -136,12 +136,12 @@ def test_slopes_are_exact_and_equal_in_every_world():
         def value(self, x):
             return self.height * ops.sin(x) ** 2
 
-    exact = trace.slope(Wave(), "value", x)
+    exact = autodiff.slope(Wave(), "value", x)
     assert exact == pytest.approx((Wave().value(x + h) - Wave().value(x - h)) / (2 * h), rel=1e-8)
     symbol = casadi.SX.sym("x")
-    inside = casadi.Function("f", [symbol], [trace.slope(Wave(), "value", symbol * 2)])
+    inside = casadi.Function("f", [symbol], [autodiff.slope(Wave(), "value", symbol * 2)])
     assert float(inside(x / 2)) == pytest.approx(exact, rel=1e-14)
-    values, by_parameter = trace.jacobian(Wave(), "value", np.array([0.1, x]))
+    values, by_parameter = autodiff.jacobian(Wave(), "value", np.array([0.1, x]))
     np.testing.assert_allclose(by_parameter[:, 0], values / 2.0)
 
 

@@ -13,7 +13,35 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.circuit import (
+from airmuscle.control.inputs import Schedule
+from airmuscle.friction import Dahl, LuGre, MaxwellSlip, NoFriction
+from airmuscle.mechanism import (
+    AntagonisticJoint,
+    HangingMass,
+    InSeries,
+    Isometric,
+    Isotonic,
+    Lever,
+    Mounted,
+    Pulley,
+    SpringLoad,
+    Stopped,
+)
+from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.muscle import (
+    CreepElements,
+    CubicSpring,
+    DirectionalDamper,
+    EndStop,
+    LaggingWall,
+    LinearDamper,
+    PressureDamper,
+    RigidSeries,
+    SeriesSpring,
+)
+from airmuscle.plant.energy_balance import Metered
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import (
     CheckValve,
     ClosedChamber,
     DistributedTube,
@@ -33,36 +61,8 @@ from airmuscle.circuit import (
     Tube,
     Valve,
 )
-from airmuscle.command import Schedule
-from airmuscle.contact import HuntCrossley
-from airmuscle.energy import Metered
-from airmuscle.friction import Dahl, LuGre, MaxwellSlip, NoFriction
-from airmuscle.gas import EnergyBalance, Isothermal, Polytropic
-from airmuscle.mechanism import (
-    AntagonisticJoint,
-    HangingMass,
-    InSeries,
-    Isometric,
-    Isotonic,
-    Lever,
-    Mounted,
-    Pulley,
-    SpringLoad,
-    Stopped,
-)
-from airmuscle.muscle import (
-    CreepElements,
-    CubicSpring,
-    DirectionalDamper,
-    EndStop,
-    LaggingWall,
-    LinearDamper,
-    PressureDamper,
-    RigidSeries,
-    SeriesSpring,
-)
-from airmuscle.plant import Plant
-from airmuscle.simulate import simulate
+from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.simulation.simulate import simulate
 
 MOST_STEPS = 20_000
 

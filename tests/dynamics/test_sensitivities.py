@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from filling import hanging, runs
 
-from airmuscle import declare, ops
-from airmuscle.command import Schedule, Signal
-from airmuscle.declare import model, parameter
-from airmuscle.errors import ParameterError
-from airmuscle.method import Rodas4, RungeKutta4
-from airmuscle.program import StateVariable
-from airmuscle.program.prepared import prepared
-from airmuscle.sensitive import Sensitive, sensitivity
+from airmuscle.compile import StateVariable
+from airmuscle.compile.program import prepared
+from airmuscle.control.inputs import Schedule, Signal
+from airmuscle.core import ops, tree
+from airmuscle.core.errors import ParameterError
+from airmuscle.core.model import model, parameter
+from airmuscle.simulation.integrators import Rodas4, RungeKutta4
+from airmuscle.simulation.sensitivity import Sensitive, sensitivity
 
 PATHS = (
     "circuit.fill.conductance",
@@ -111,11 +111,11 @@ class Swing:
 
 
 def leaf_values(system):
-    return {leaf.path: leaf.value for leaf in declare.leaves(system)}
+    return {leaf.path: leaf.value for leaf in tree.leaves(system)}
 
 
 def with_leaf(system, path, value):
-    return declare.with_parameters(system, [value if p == path else v for p, v in leaf_values(system).items()])
+    return tree.with_parameters(system, [value if p == path else v for p, v in leaf_values(system).items()])
 
 
 def rows(system, start, times, command, method):
@@ -192,7 +192,7 @@ def assert_the_law(system, state, inputs, relative):
 def test_printed_columns_are_the_law(states, columns):
     """At random points with any valve open, any number of columns, whatever the registers hold."""
     run, rng = runs()[states], np.random.default_rng(states)
-    paths = [leaf.path for leaf in declare.leaves(run.system) if leaf.value and "[" not in leaf.path][:columns]
+    paths = [leaf.path for leaf in tree.leaves(run.system) if leaf.value and "[" not in leaf.path][:columns]
     assert len(paths) == columns
     system = sensitive(run.system, paths)
     for _ in range(20):

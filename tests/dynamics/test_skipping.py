@@ -16,18 +16,19 @@ import numpy as np
 import pytest
 from filling import hanging
 
-from airmuscle import ops
-from airmuscle.batch import simulate_batch
-from airmuscle.circuit import FillDischarge, Supply, ThreePosition, Valve
-from airmuscle.command import Schedule
-from airmuscle.declare import model, parameter
-from airmuscle.method import RungeKutta4
-from airmuscle.plant import Plant
-from airmuscle.program import StateVariable, llvm
-from airmuscle.program.instructions import MAXIMUM, MINIMUM, SELECT, Code, Instruction, Operand
-from airmuscle.program.pieces import Skippable
-from airmuscle.program.prepared import Program, prepared
-from airmuscle.program.skipping import COMMANDED, STEADY, VARYING, skipping
+from airmuscle.compile import StateVariable
+from airmuscle.compile.ir.branches import COMMANDED, STEADY, VARYING, skipping
+from airmuscle.compile.ir.instructions import MAXIMUM, MINIMUM, SELECT, Code, Instruction, Operand
+from airmuscle.compile.ir.scheduling import Skippable
+from airmuscle.compile.llvm import emit
+from airmuscle.compile.program import Program, prepared
+from airmuscle.control.inputs import Schedule
+from airmuscle.core import ops
+from airmuscle.core.model import model, parameter
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Supply, ThreePosition, Valve
+from airmuscle.simulation.batch import simulate_batch
+from airmuscle.simulation.integrators import RungeKutta4
 
 BINARY = (
     casadi.OP_ADD,
@@ -125,8 +126,8 @@ def computed(items: Any, leaves: dict[Operand, float]) -> tuple[Values, int]:
 
 def test_random_code_gives_the_same_with_branches(monkeypatch: pytest.MonkeyPatch) -> None:
     """However little a branch saves; with part of the results early, as the rates of a stage are, or none."""
-    monkeypatch.setattr("airmuscle.program.skipping.WORTH", 1)
-    monkeypatch.setattr("airmuscle.program.skipping.WORTH_OF_CHOICES", 1)
+    monkeypatch.setattr("airmuscle.compile.ir.branches.WORTH", 1)
+    monkeypatch.setattr("airmuscle.compile.ir.branches.WORTH_OF_CHOICES", 1)
     rng, skipped = random.Random(1), 0
     for _ in range(GRAPHS):
         code = drawn(rng)
@@ -155,9 +156,9 @@ def plant(circuit: Any) -> Plant:
 def test_a_shut_valve_and_a_box_not_left_are_skipped() -> None:
     """Of the rates of a plant, more than a third of all operations; with a valve open, its own come back."""
     kept: list[Any] = []
-    real = llvm.skipping
+    real = emit.skipping
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(llvm, "skipping", lambda *a: kept.append((a[0], real(*a))) or kept[-1][1])
+        patch.setattr(emit, "skipping", lambda *a: kept.append((a[0], real(*a))) or kept[-1][1])
         Program(plant(FillDischarge))
     code, items = kept[0]
     skipped = [len(item.body) for item in items if isinstance(item, Skippable)]
@@ -172,7 +173,7 @@ def test_plant_has_the_rates_and_slopes_that_it_has_without_branches(circuit: An
     system = plant(circuit)
     new = prepared(system)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(llvm, "skipping", lambda code, *rest: list(code.body))
+        patch.setattr(emit, "skipping", lambda code, *rest: list(code.body))
         old = Program(system)
     held, sizes = old.held(new.parameters), new.sizes
     names = [s.name for s in system.states]

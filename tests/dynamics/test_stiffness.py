@@ -13,18 +13,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joints import chosen_muscle
 
+from airmuscle.analysis.equilibrium import equilibrium
+from airmuscle.analysis.stiffness import stiffness
 from airmuscle.characteristic.virtual_work import VirtualWork
-from airmuscle.circuit import ClosedChamber
-from airmuscle.equilibrium import equilibrium
-from airmuscle.gas import HEAT_RATIO, EnergyBalance, Isothermal, Polytropic, absolute
+from airmuscle.control.trajectory import follow
 from airmuscle.geometry import Braid
 from airmuscle.mechanism import AntagonisticJoint, HangingMass, InSeries, Isometric, Lever, Prescribed
-from airmuscle.method import Rodas4
-from airmuscle.motion import follow
 from airmuscle.muscle import LinearSpring, Muscle, SeriesSpring
-from airmuscle.plant import Plant
-from airmuscle.simulate import simulate
-from airmuscle.stiffness import stiffness
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import ClosedChamber
+from airmuscle.pneumatics.gas import HEAT_RATIO, EnergyBalance, Isothermal, Polytropic, absolute
+from airmuscle.simulation.integrators import Rodas4
+from airmuscle.simulation.simulate import simulate
 
 BRAID = Braid(0.01, 0.4363, 0.2)
 MUSCLE = Muscle(VirtualWork(BRAID), BRAID, LinearSpring(3000.0))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.energy import Metered
-from airmuscle.errors import AirmuscleWarning, TraceError
+from airmuscle.core.errors import AirmuscleWarning, TraceError
+from airmuscle.plant.energy_balance import Metered
 
 
 @pytest.fixture(scope="module")

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.circuit import DistributedTube, FillDischarge, Line, RegulatedSupply, Supply, Tank, Tube, Valve
-from airmuscle.command import Schedule
-from airmuscle.contact import HuntCrossley
-from airmuscle.driver import Driven, OnOff
-from airmuscle.energy import Metered
+from airmuscle.control.driver import Driven, OnOff
+from airmuscle.control.inputs import Schedule
 from airmuscle.friction import LuGre, MaxwellSlip
-from airmuscle.gas import EnergyBalance
 from airmuscle.mechanism import HangingMass
-from airmuscle.method import Rodas4
+from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, DirectionalDamper, EndStop, LaggingWall, SeriesSpring
-from airmuscle.plant import Plant
-from airmuscle.simulate import simulate
+from airmuscle.plant.energy_balance import Metered
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import DistributedTube, FillDischarge, Line, RegulatedSupply, Supply, Tank, Tube, Valve
+from airmuscle.pneumatics.gas import EnergyBalance
+from airmuscle.simulation.integrators import Rodas4
+from airmuscle.simulation.simulate import simulate
 
 SWITCHINGS = 10_000
 

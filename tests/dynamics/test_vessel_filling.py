@@ -16,15 +16,15 @@ import pytest
 from scipy.integrate import quad
 
 from airmuscle.characteristic.chou_hannaford1996 import ChouHannaford1996
-from airmuscle.circuit import CheckValve, FillDischarge, IndexedValve, Orifice, Supply, Valve
-from airmuscle.command import Schedule
-from airmuscle.gas import GAS_CONSTANT, REFERENCE_DENSITY, Ambient, Isothermal
+from airmuscle.control.inputs import Schedule
 from airmuscle.geometry.braid import Braid
 from airmuscle.mechanism import Isometric
-from airmuscle.method import Rodas4
 from airmuscle.muscle import Muscle
-from airmuscle.plant import Plant
-from airmuscle.simulate import simulate
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import CheckValve, FillDischarge, IndexedValve, Orifice, Supply, Valve
+from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, Ambient, Isothermal
+from airmuscle.simulation.integrators import Rodas4
+from airmuscle.simulation.simulate import simulate
 
 SOURCE, T0, CONDUCTANCE = 7e5, 293.15, 1e-9
 AMBIENT = Ambient(100e3, T0)

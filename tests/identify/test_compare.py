@@ -19,7 +19,7 @@ import airmuscle as am
 from airmuscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.cli.app import app
 from airmuscle.cli.fit_more import part_of
-from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify import Blocks, Candidate, Levels, Runs, Specimens, compare
 from airmuscle.identify.candidates import surface
@@ -203,9 +203,9 @@ def test_the_command_writes_a_muscle_that_loads_back(tmp_path: Path):
     assert printed["recommended"] == printed["ranking"][0]["law"] or "standard error" in printed["reason"]
     entry = am.load(out / "muscle.toml")
     fitted = {p["name"]: p["value"] for p in printed["fit"]["parameters"]}
-    from airmuscle import declare
+    from airmuscle.core import tree
 
-    loaded = {leaf.path: leaf.value for leaf in declare.leaves(entry.characteristic)}
+    loaded = {leaf.path: leaf.value for leaf in tree.leaves(entry.characteristic)}
     assert {name: loaded[name] for name in fitted} == fitted
     names = {path.stem for path in (out / "figures").glob("*.svg")}
     assert {"isobars", "errors", "residuals", "correlations", "left-out"} <= names

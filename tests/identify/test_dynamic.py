@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 from filling import hanging
 
-from airmuscle import declare
-from airmuscle.circuit import FillDischarge, Leaking, Line, Supply, Tube, Valve
-from airmuscle.command import Schedule
-from airmuscle.equilibrium import equilibrium
-from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.analysis.equilibrium import equilibrium
+from airmuscle.control.inputs import Schedule
+from airmuscle.core import tree
+from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.friction import Dahl
-from airmuscle.gas import EnergyBalance, Polytropic
 from airmuscle.geometry import Vessel
 from airmuscle.identify.dynamic import (
     Experiment,
@@ -29,10 +27,12 @@ from airmuscle.identify.dynamic import (
     where_sensed,
 )
 from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.method import INTERRUPTED, Rodas4
 from airmuscle.muscle import Muscle, SwellingWall
-from airmuscle.plant import Plant
-from airmuscle.simulate import simulate
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Leaking, Line, Supply, Tube, Valve
+from airmuscle.pneumatics.gas import EnergyBalance, Polytropic
+from airmuscle.simulation.integrators import INTERRUPTED, Rodas4
+from airmuscle.simulation.simulate import simulate
 
 FILL = Schedule({"fill": ((0.1, 1.0), (1.0, 0.0)), "discharge": ((1.3, 1.0),)})
 SENSORS = {"pressure": 500.0, "position": 5e-5}
@@ -59,14 +59,14 @@ def noisy(recording, seed, **deviations):
 
 
 def changed(plant, **factors):
-    values = {leaf.path: leaf.value for leaf in declare.leaves(plant)}
+    values = {leaf.path: leaf.value for leaf in tree.leaves(plant)}
     for path, factor in factors.items():
         values[path.replace("__", ".")] *= factor
-    return declare.with_parameters(plant, list(values.values()))
+    return tree.with_parameters(plant, list(values.values()))
 
 
 def truth(plant, name):
-    return {leaf.path: leaf.value for leaf in declare.leaves(plant)}[name.partition(" of record")[0]]
+    return {leaf.path: leaf.value for leaf in tree.leaves(plant)}[name.partition(" of record")[0]]
 
 
 def recorded(plant, seed, shift=0.0):
@@ -425,8 +425,8 @@ def test_a_run_of_far_more_steps_than_the_best_is_not_waited_for(monkeypatch):
     found = fit_dynamic(guess, [record], free=(path,), observed={"pressure": 300.0})
     assert found[path].value == pytest.approx(truth(plant, path), rel=0.01)
     assert allowed == [1_000_000, *[10_000] * (len(allowed) - 2), 1_000_000]  # the last is that of the result
-    monkeypatch.setattr("airmuscle.identify.dynamic.fit.FEW_STEPS", 10)
-    monkeypatch.setattr("airmuscle.identify.dynamic.fit.MANY", 0.5)
+    monkeypatch.setattr("airmuscle.identify.dynamic.problem.FEW_STEPS", 10)
+    monkeypatch.setattr("airmuscle.identify.dynamic.problem.MANY", 0.5)
     stays = fit_dynamic(guess, [record], free=(path,), observed={"pressure": 300.0})
     assert stays[path].value == truth(guess, path)
 

@@ -9,9 +9,9 @@ import math
 import numpy as np
 import pytest
 
-from airmuscle import trace
 from airmuscle.characteristic.borzikova import SAM_30X290, BorzikovaExponential
-from airmuscle.errors import IdentificationError
+from airmuscle.core import autodiff
+from airmuscle.core.errors import IdentificationError
 from airmuscle.identify.correlation_index import correlation_index
 from airmuscle.identify.surface.basis import Chebyshev, LoadBox, Monomials, conditioning
 from airmuscle.identify.surface.exponential import SurfaceProblem, linearised, nonlinear
@@ -64,7 +64,7 @@ def test_least_squares_on_k_has_no_slope_left_in_any_coefficient():
     data = other_muscle()
     found = nonlinear(data, 0.3)
     errors = found.model.contraction(data["pressure"], data["force"]) - data["contraction"]
-    _, by_parameters = trace.jacobian(found.model, "contraction", data["pressure"], data["force"])
+    _, by_parameters = autodiff.jacobian(found.model, "contraction", data["pressure"], data["force"])
     by_coefficients = by_parameters[:, :15]
     cosines = errors @ by_coefficients / (np.linalg.norm(errors) * np.linalg.norm(by_coefficients, axis=0))
     assert np.abs(cosines).max() < 1e-7

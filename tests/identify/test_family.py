@@ -18,7 +18,7 @@ from airmuscle.characteristic import (
     LogarithmicLength,
     TonduLopez2000,
 )
-from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify import Candidate, Specimens, compare, fit
 from airmuscle.identify.candidates import standard_candidates, surface

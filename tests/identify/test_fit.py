@@ -18,7 +18,6 @@ from hypothesis import strategies as st
 from scipy.optimize import curve_fit
 
 import airmuscle
-from airmuscle import ops
 from airmuscle.characteristic.base import ContractionLaw, PressureLaw
 from airmuscle.characteristic.clamped import Clamped
 from airmuscle.characteristic.contractile_surface import ContractileSurface, exponents
@@ -26,8 +25,9 @@ from airmuscle.characteristic.martens_boblan2017 import MartensBoblan2017
 from airmuscle.characteristic.saga2007 import LINE_A, Saga2007
 from airmuscle.characteristic.sarosi2012 import Sarosi2012
 from airmuscle.characteristic.tondu_lopez2000 import TonduLopez2000
-from airmuscle.declare import model, parameter
-from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.core import ops
+from airmuscle.core.errors import IdentificationError, ParameterError
+from airmuscle.core.model import model, parameter
 from airmuscle.geometry.braid import Braid
 from airmuscle.geometry.parabola import Parabola
 from airmuscle.geometry.straight_fibre import StraightFibre

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from airmuscle.characteristic.virtual_work import VirtualWork
-from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, PrandtlIshlinskii
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify.hysteresis import Given, OnContraction, OnPressure, PolynomialCurve, candidates, fit_hysteresis

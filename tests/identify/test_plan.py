@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from airmuscle.characteristic.box import Box
 from airmuscle.characteristic.tondu_lopez2000 import TonduLopez2000
 from airmuscle.cli.app import app
-from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify.fit import fit
 from airmuscle.identify.plan import Bench, _exchanged, _greedy, _logarithm, plan, possible_runs

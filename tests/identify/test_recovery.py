@@ -12,12 +12,12 @@ import warnings
 import numpy as np
 import pytest
 
-from airmuscle import declare
 from airmuscle.characteristic import Box
 from airmuscle.characteristic.base import ContractionLaw, ForceLaw
 from airmuscle.characteristic.clamped import Clamped
 from airmuscle.characteristic.tabulated import Tabulated
-from airmuscle.errors import AirmuscleWarning, IdentificationError
+from airmuscle.core import tree
+from airmuscle.core.errors import AirmuscleWarning, IdentificationError
 from airmuscle.identify import UNCENSORED, band, fit
 from airmuscle.identify.problem import direction_of
 from airmuscle.identify.profile import weakly_determined
@@ -41,7 +41,7 @@ def law_of(name: str):
 
 
 def recoverable() -> list[str]:
-    return [n for n in catalogue.names() if any(leaf.declared.fitted for leaf in declare.leaves(law_of(n)[0]))]
+    return [n for n in catalogue.names() if any(leaf.declared.fitted for leaf in tree.leaves(law_of(n)[0]))]
 
 
 def simulated(law, box: Box, seed: int, least: float = -0.02) -> tuple[Recording, Recording, float]:
@@ -71,11 +71,11 @@ def simulated(law, box: Box, seed: int, least: float = -0.02) -> tuple[Recording
 def disturbed(law, fixed: tuple[str, ...]):
     """Start values 2 % away, within bounds."""
     values = []
-    for i, leaf in enumerate(declare.leaves(law)):
+    for i, leaf in enumerate(tree.leaves(law)):
         free = leaf.declared.fitted and leaf.path.partition("[")[0] not in fixed
         value = leaf.value * (1 + 0.02 * (-1) ** i) if free else leaf.value
         values.append(float(np.clip(value, *leaf.declared.bounds)))
-    return declare.with_parameters(law, values)
+    return tree.with_parameters(law, values)
 
 
 @pytest.mark.parametrize("name", recoverable())
@@ -91,7 +91,7 @@ def test_a_law_is_recovered_within_its_bands(name: str):
     held = (stated.low <= truth) & (truth <= stated.high)
     assert held.mean() > 0.97
     assert np.sqrt(np.mean((stated.value - truth) ** 2)) < 0.5 * noise
-    true = {leaf.path: leaf.value for leaf in declare.leaves(inner)}
+    true = {leaf.path: leaf.value for leaf in tree.leaves(inner)}
     loose = weakly_determined(found)
     for estimate in found.estimates:
         if not estimate.on_bound and estimate.name not in loose:

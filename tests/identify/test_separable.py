@@ -15,7 +15,7 @@ import pytest
 import airmuscle
 from airmuscle import read_csv
 from airmuscle.characteristic import ContractileSurface, EffectiveLength, Hunt2017, Sarosi2012
-from airmuscle.errors import IdentificationError
+from airmuscle.core.errors import IdentificationError
 from airmuscle.identify import UNCENSORED, Candidate, Levels, compare, fit
 from airmuscle.identify.candidates import standard_candidates, surface
 from airmuscle.identify.censoring import Censoring

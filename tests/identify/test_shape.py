@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from airmuscle.characteristic import Box, ContractileSurface, Sarosi2012, TonduLopez2000
-from airmuscle.errors import IdentificationError, NoSolution
+from airmuscle.core.errors import IdentificationError, NoSolution
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify import convert, fit, fit_shaped, shape_breaks
 from airmuscle.identify.candidates import surface

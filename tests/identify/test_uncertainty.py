@@ -12,7 +12,7 @@ import pytest
 from scipy.stats import t as student
 
 from airmuscle.characteristic import ContractileSurface, Sarosi2012, TonduLopez2000
-from airmuscle.errors import IdentificationError
+from airmuscle.core.errors import IdentificationError
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify import (
     Huber,

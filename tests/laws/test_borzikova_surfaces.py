@@ -9,9 +9,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle import trace
 from airmuscle.characteristic.borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential
-from airmuscle.errors import NoSolution, OutOfReach, ParameterError
+from airmuscle.core import autodiff
+from airmuscle.core.errors import NoSolution, OutOfReach, ParameterError
 from airmuscle.library.catalogue import load
 
 # Coefficients of the exponent that the three printed curves determine, by Lagrange interpolation in F;
@@ -110,16 +110,16 @@ def test_what_lies_outside_the_box_is_flagged():
 
 def test_outside_the_box_the_exponent_is_its_tangent():
     at_edge = EXPONENTIAL.polynomial(3.5e5, 150.0)
-    slope = trace.slope(EXPONENTIAL, "polynomial", 3.5e5 - 1e-6, 150.0, wrt=0)
+    slope = autodiff.slope(EXPONENTIAL, "polynomial", 3.5e5 - 1e-6, 150.0, wrt=0)
     assert EXPONENTIAL.polynomial(5e5, 150.0) == pytest.approx(at_edge + 1.5e5 * slope, rel=1e-9)
     at_edge = EXPONENTIAL.polynomial(2e5, 260.0)
-    slope = trace.slope(EXPONENTIAL, "polynomial", 2e5, 260.0 - 1e-9, wrt=1)
+    slope = autodiff.slope(EXPONENTIAL, "polynomial", 2e5, 260.0 - 1e-9, wrt=1)
     assert EXPONENTIAL.polynomial(2e5, 500.0) == pytest.approx(at_edge + 240.0 * slope, rel=1e-9)
 
 
 def test_the_law_traces_to_what_it_computes():
     pressure, force = np.linspace(-1e5, 5e5, 30), np.linspace(0.0, 400.0, 30)
-    values, by_parameters = trace.jacobian(EXPONENTIAL, "contraction", pressure, force)
+    values, by_parameters = autodiff.jacobian(EXPONENTIAL, "contraction", pressure, force)
     assert values == pytest.approx(EXPONENTIAL.contraction(pressure, force), abs=1e-14)
     assert by_parameters.shape == (30, 15 + 4 + 1)
 

@@ -14,7 +14,12 @@ import pytest
 import scipy.signal
 from joints import chosen_muscle
 
-from airmuscle.circuit import (
+from airmuscle.control.inputs import REST, Schedule
+from airmuscle.core.errors import ParameterError
+from airmuscle.mechanism import HangingMass, Isometric
+from airmuscle.plant.energy_balance import Metered
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import (
     CheckValve,
     ClosedChamber,
     DistributedTube,
@@ -34,14 +39,9 @@ from airmuscle.circuit import (
     Tube,
     Valve,
 )
-from airmuscle.command import REST, Schedule
-from airmuscle.energy import Metered
-from airmuscle.errors import ParameterError
-from airmuscle.gas import Ambient, EnergyBalance, Isothermal
-from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.method import Rodas4
-from airmuscle.plant import Plant
-from airmuscle.simulate import simulate
+from airmuscle.pneumatics.gas import Ambient, EnergyBalance, Isothermal
+from airmuscle.simulation.integrators import Rodas4
+from airmuscle.simulation.simulate import simulate
 
 AMBIENT = Ambient()
 VALVE, WIDE, NARROW = Valve(1e-8, 0.4), Valve(5e-8, 0.4), Valve(2e-9, 0.3)

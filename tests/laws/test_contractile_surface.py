@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from airmuscle.characteristic import ContractileSurface
 from airmuscle.characteristic.contractile_surface import exponents
-from airmuscle.errors import ParameterError
+from airmuscle.core.errors import ParameterError
 
 BOX = (50e3, 650e3), (0.0, 0.25)
 

@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from airmuscle.control import PID, Split, TwoPoint
-from airmuscle.controller import Measurement, relative_unit
-from airmuscle.declare import leaves
-from airmuscle.errors import ParameterError
-from airmuscle.reference import cite
+from airmuscle.control.controller import Measurement, relative_unit
+from airmuscle.core.errors import ParameterError
+from airmuscle.core.reference import cite
+from airmuscle.core.tree import leaves
 
 WIDE = {"fill": (-math.inf, math.inf)}
 H = 0.01

@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from airmuscle import trace
 from airmuscle.characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from airmuscle.characteristic.box import Box
-from airmuscle.errors import AirmuscleWarning, NoSolution, ParameterError
+from airmuscle.core import autodiff
+from airmuscle.core.errors import AirmuscleWarning, NoSolution, ParameterError
 from airmuscle.library import catalogue
 
 ARGUMENTS = {
@@ -162,7 +162,7 @@ def test_a_traced_law_gives_what_numpy_gives(name: str):
     if not law.traceable:
         pytest.skip("the law says that it is not closed-form")
     own = own_direction(law)
-    traced, _ = trace.jacobian(law, own, *there.given(own))
+    traced, _ = autodiff.jacobian(law, own, *there.given(own))
     np.testing.assert_allclose(traced, getattr(law, own)(*there.given(own)), rtol=1e-12)
 
 

@@ -12,12 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from airmuscle import trace
 from airmuscle.characteristic.circle_virtual_work import CircleVirtualWork
 from airmuscle.characteristic.exact_meridian import ExactMeridian
 from airmuscle.characteristic.rubber import RubberLine
 from airmuscle.characteristic.saga2007 import LINE_A, LINE_B
-from airmuscle.errors import NoSolution, OutOfReach, ParameterError
+from airmuscle.core import autodiff
+from airmuscle.core.errors import NoSolution, OutOfReach, ParameterError
 from airmuscle.geometry.catenary import Catenary
 from airmuscle.geometry.pleated import PleatedTube
 from airmuscle.geometry.straight_fibre import StraightFibre
@@ -212,7 +212,7 @@ def test_the_circle_is_one_potential():
     """F = (p dV/deps - dU/deps)/L0 with the volume and energy of its own geometry, and dF/dp = dV/deps / L0."""
     law = circle(LINE_A, 1)
     contraction, pressure = np.array([1e-3, 0.05, 0.2, 0.38]), 1.5e5
-    growth = trace.slope(law.geometry, "volume", contraction)
+    growth = autodiff.slope(law.geometry, "volume", contraction)
     step = 1e-3 * contraction
     ends = [_stored(law, contraction + n * step) for n in (-2, -1, 1, 2)]
     energy = (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / (12 * step)

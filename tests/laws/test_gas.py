@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 from joints import chosen_muscle
 from scipy.integrate import quad, solve_ivp
 
-from airmuscle import trace
-from airmuscle.circuit import FillDischarge, Supply, Valve
-from airmuscle.command import Schedule
-from airmuscle.gas import (
+from airmuscle.control.inputs import Schedule
+from airmuscle.core import autodiff
+from airmuscle.mechanism import Isometric
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.pneumatics.gas import (
     GAS_CONSTANT,
     HEAT_AT_CONSTANT_PRESSURE,
     HEAT_AT_CONSTANT_VOLUME,
@@ -26,10 +28,8 @@ from airmuscle.gas import (
     Isothermal,
     Polytropic,
 )
-from airmuscle.mechanism import Isometric
-from airmuscle.method import Rodas4
-from airmuscle.plant import Plant
-from airmuscle.simulate import simulate
+from airmuscle.simulation.integrators import Rodas4
+from airmuscle.simulation.simulate import simulate
 
 AMBIENT = Ambient()
 WARM, SUPPLY = AMBIENT.temperature, 650e3
@@ -175,5 +175,5 @@ def test_content_and_air_are_each_others_inverse(gas):
 @pytest.mark.parametrize("gas", PROCESSES, ids=repr)
 def test_the_slope_of_the_stored_energy_is_the_pressure(gas):
     mass, volume = 2e-4, 9e-5
-    (by_volume,) = trace.directional(lambda x: [gas.energy(mass, x[0], AMBIENT)], [volume], [1.0])
+    (by_volume,) = autodiff.directional(lambda x: [gas.energy(mass, x[0], AMBIENT)], [volume], [1.0])
     assert -by_volume == pytest.approx(gas.pressure(mass, volume, AMBIENT), rel=1e-12)

@@ -14,11 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from joints import chosen_muscle
 
-from airmuscle import trace
-from airmuscle.circuit import ClosedChamber
-from airmuscle.contact import HuntCrossley
-from airmuscle.errors import ParameterError
-from airmuscle.gas import Isothermal
+from airmuscle.core import autodiff
+from airmuscle.core.errors import ParameterError
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
@@ -35,7 +32,10 @@ from airmuscle.mechanism import (
     Stopped,
     StoppedJoint,
 )
-from airmuscle.plant import Plant
+from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import ClosedChamber
+from airmuscle.pneumatics.gas import Isothermal
 
 CONTACT = HuntCrossley(1e7, 0.4)
 JOINT = AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12)
@@ -121,7 +121,7 @@ def test_the_power_of_the_pulls_goes_into_energy_or_is_lost(mechanism, count, dr
         return [mechanism.potential_energy(places) + mechanism.kinetic_energy(places, moving)]
 
     along = [v[s] for s in speeds] + [acceleration[n] for n in names]
-    (growth,) = trace.directional(energy, [*q.values(), *v.values()], along)
+    (growth,) = autodiff.directional(energy, [*q.values(), *v.values()], along)
     power = sum(pulls[n] * v[s] for n, s in zip(names, speeds, strict=True))
     lost = mechanism.lost_power(q, v, pulls, inputs)
     scale = abs(power) + abs(lost) + abs(growth) + 1e-3

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.characteristic import ChouHannaford1996
-from airmuscle.gas import GAS_CONSTANT, Ambient, Isothermal, Polytropic, absolute, gauge
 from airmuscle.geometry import Braid
 from airmuscle.muscle import CubicSpring, LinearDamper, LinearSpring, Muscle, PressureDamper
+from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, Isothermal, Polytropic, absolute, gauge
 
 BRAID = Braid(0.01, 0.44, 0.3)
 AMBIENT = Ambient()

@@ -16,15 +16,11 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from airmuscle.characteristic import Reynolds2003, Serres2009
-from airmuscle.circuit import ClosedChamber, FillDischarge, Supply, Valve
-from airmuscle.command import REST, Schedule
-from airmuscle.contact import HuntCrossley
-from airmuscle.energy import Metered
-from airmuscle.errors import ParameterError
+from airmuscle.control.inputs import REST, Schedule
+from airmuscle.core.errors import ParameterError
 from airmuscle.friction import Dahl, LuGre
-from airmuscle.gas import Isothermal
 from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.method import Rodas4
+from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import (
     CreepElements,
     DirectionalDamper,
@@ -39,8 +35,12 @@ from airmuscle.muscle import (
     Serres2009Spring,
     SwellingWall,
 )
-from airmuscle.plant import Plant
-from airmuscle.simulate import simulate
+from airmuscle.plant.energy_balance import Metered
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import ClosedChamber, FillDischarge, Supply, Valve
+from airmuscle.pneumatics.gas import Isothermal
+from airmuscle.simulation.integrators import Rodas4
+from airmuscle.simulation.simulate import simulate
 
 pressures, speeds = st.floats(-1e5, 8e5), st.floats(-2, 2)
 DAMPERS = [

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airmuscle.errors import ColumnError
+from airmuscle.core.errors import ColumnError
 from airmuscle.recording import Recording
 from airmuscle.recording.segment import (
     AT_REST,

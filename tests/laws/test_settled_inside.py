@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle import declare, trace
 from airmuscle.characteristic import VirtualWork
-from airmuscle.contact import HuntCrossley
+from airmuscle.core import autodiff, tree
+from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CubicSpring, EndStop, LinearSpring, SeriesSpring
 from airmuscle.muscle.settle import last_pulling
 
@@ -72,13 +72,13 @@ def test_a_law_that_is_not_closed_form_settles_too():
 
 def test_inside_it_settles_in_a_few_looks(monkeypatch):
     """It took fifty, and a thousand where the spring is slack at no pressure."""
-    looks, traced = [], trace.with_slope
+    looks, traced = [], autodiff.with_slope
 
     def counted(*given, **named):
         function = traced(*given, **named)
         return lambda *arguments: looks.append(1) or function(*arguments)
 
-    monkeypatch.setattr("airmuscle.muscle.settle.trace.with_slope", counted)
+    monkeypatch.setattr("airmuscle.muscle.settle.autodiff.with_slope", counted)
     for muscle in INSIDE.values():
         for p in (0.0, 2e5):
             for contraction in (-0.02, 0.0, 0.05, 0.2):
@@ -114,20 +114,20 @@ def test_of_a_stretch_at_zero_the_far_end_is_meant():
 def test_a_table_of_muscles_settles_as_each_of_them():
     """Parameters may be arrays, one number a muscle."""
     muscle = in_series(stop=STOP)
-    values = declare.flatten(muscle)
+    values = tree.flatten(muscle)
     table = values * (1.0 + 0.03 * np.random.default_rng(2).uniform(-1, 1, (4, values.size)))
-    columns = declare.rebuild(muscle, [column[:, None] for column in table.T])
+    columns = tree.rebuild(muscle, [column[:, None] for column in table.T])
     contractions = np.array([[0.0, 0.05, 0.2]])
     together = columns.settled(2e5, contractions + np.zeros((4, 1)))["inner_contraction"]
     for row, inner in zip(table, together, strict=True):
-        one = declare.with_parameters(muscle, row.tolist())
+        one = tree.with_parameters(muscle, row.tolist())
         expected = [one.settled(2e5, c)["inner_contraction"] for c in contractions[0]]
         np.testing.assert_allclose(inner, expected, rtol=0.0, atol=1e-14)
 
 
 def test_a_value_comes_with_its_exact_slope_for_numbers_arrays_and_tables_of_parameters():
     braid = chosen_muscle().geometry
-    both, x = trace.with_slope(braid, "volume", 1), np.linspace(0.0, 0.3, 7)
+    both, x = autodiff.with_slope(braid, "volume", 1), np.linspace(0.0, 0.3, 7)
     value, slope = both(0.1)
     assert (value, slope) == pytest.approx((braid.volume(0.1), braid.volume_growth(0.1)), rel=1e-14)
     values, slopes = both(x.reshape(7, 1))
@@ -135,8 +135,8 @@ def test_a_value_comes_with_its_exact_slope_for_numbers_arrays_and_tables_of_par
     np.testing.assert_allclose(values[:, 0], braid.volume(x), rtol=1e-14)
     np.testing.assert_allclose(slopes[:, 0], [braid.volume_growth(float(c)) for c in x], rtol=1e-14)
     radii = np.array([[0.01], [0.02]])
-    table = declare.rebuild(braid, [radii, *declare.flatten(braid)[1:].tolist()])
-    values, slopes = trace.with_slope(table, "volume", 1)(x)
+    table = tree.rebuild(braid, [radii, *tree.flatten(braid)[1:].tolist()])
+    values, slopes = autodiff.with_slope(table, "volume", 1)(x)
     np.testing.assert_allclose(values, (radii / 0.01) ** 2 * braid.volume(x), rtol=1e-14)
     np.testing.assert_allclose(slopes, (radii / 0.01) ** 2 * braid.volume_growth(x), rtol=1e-14)
     np.testing.assert_allclose(table.volume_growth(x), slopes, rtol=1e-14)

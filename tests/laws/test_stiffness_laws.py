@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from airmuscle.characteristic import Hunt2017, Reynolds2003, Serres2009
-from airmuscle.errors import ParameterError
+from airmuscle.core.errors import ParameterError
 from airmuscle.library import catalogue
 
 

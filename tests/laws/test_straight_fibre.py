@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
-from airmuscle import trace
-from airmuscle.errors import OutOfReach, ParameterError
+from airmuscle.core import autodiff
+from airmuscle.core.errors import OutOfReach, ParameterError
 from airmuscle.geometry.catenary import Catenary
 from airmuscle.geometry.circular_arc import CircularArc
 from airmuscle.geometry.fibre_sum import EvenSpread, GivenSum, SumOverHalf, SumPastHalf
@@ -172,7 +172,7 @@ def test_the_circles_growth_in_closed_form_is_the_derivative_of_its_integrals():
     shape = tube(CIRCLE)
     z = CIRCLE.angle_squared(contraction)
     growth = CIRCLE.growth_times_angle(z, L0, D0 / 2)
-    assert growth.volume / np.sqrt(z) == pytest.approx(trace.slope(shape, "volume", contraction), rel=1e-12)
+    assert growth.volume / np.sqrt(z) == pytest.approx(autodiff.slope(shape, "volume", contraction), rel=1e-12)
     step = 1e-3 * contraction
     for name in ("arc_excess", "arc_excess_squared"):
         ends = [getattr(shape.segment(contraction + n * step), name) for n in (-2, -1, 1, 2)]

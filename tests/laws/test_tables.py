@@ -12,7 +12,7 @@ from airmuscle.characteristic.as_force_law import as_force_law
 from airmuscle.characteristic.box import Box
 from airmuscle.characteristic.chou_hannaford1996 import ChouHannaford1996
 from airmuscle.characteristic.tabulated import Tabulated
-from airmuscle.errors import AirmuscleWarning, NoSolution, OutOfReach, ParameterError
+from airmuscle.core.errors import AirmuscleWarning, NoSolution, OutOfReach, ParameterError
 from airmuscle.geometry.braid import Braid
 from airmuscle.geometry.tabulated import TabulatedGeometry
 from airmuscle.library import catalogue

@@ -18,9 +18,11 @@ from hypothesis import strategies as st
 from joints import chosen_muscle
 from scipy.optimize import brentq
 
-from airmuscle.circuit import DistributedTube, FillDischarge, Line, Supply, Tube, TubeOrifice, Valve
-from airmuscle.command import Schedule
-from airmuscle.gas import (
+from airmuscle.control.inputs import Schedule
+from airmuscle.mechanism import Isometric
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import DistributedTube, FillDischarge, Line, Supply, Tube, TubeOrifice, Valve
+from airmuscle.pneumatics.gas import (
     GAS_CONSTANT,
     HEAT_AT_CONSTANT_PRESSURE,
     STILL,
@@ -30,10 +32,8 @@ from airmuscle.gas import (
     Isothermal,
     Polytropic,
 )
-from airmuscle.mechanism import Isometric
-from airmuscle.method import Rodas4
-from airmuscle.plant import Plant
-from airmuscle.simulate import simulate
+from airmuscle.simulation.integrators import Rodas4
+from airmuscle.simulation.simulate import simulate
 
 AMBIENT = Ambient()
 WARM = AMBIENT.temperature

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airmuscle import units
-from airmuscle.errors import UnitError
+from airmuscle.core import units
+from airmuscle.core.errors import UnitError
 
 COMMON = {name: entry for name, entry in units._FACTORS.items() if name not in ("", "-", "min")}
 

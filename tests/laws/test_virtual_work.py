@@ -14,12 +14,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from airmuscle.analysis.energy_defect import maxwell_defect, virtual_work_defect
 from airmuscle.characteristic.box import Box
 from airmuscle.characteristic.chou_hannaford1996 import ChouHannaford1996
 from airmuscle.characteristic.tondu_lopez2000 import TonduLopez2000
 from airmuscle.characteristic.virtual_work import VirtualWork
-from airmuscle.check import maxwell_defect, virtual_work_defect
-from airmuscle.errors import NoSolution, TraceError
+from airmuscle.core.errors import NoSolution, TraceError
 from airmuscle.geometry.braid import Braid
 from airmuscle.geometry.chebyshev import as_polynomial
 from airmuscle.geometry.tabulated import TabulatedGeometry

@@ -19,20 +19,21 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle import advance, load, measured, method, read_csv, simulate
-from airmuscle.circuit import FillDischarge, Supply, Valve
+from airmuscle import advance, load, measured, read_csv, simulate
+from airmuscle.analysis.equilibrium import equilibrium
 from airmuscle.cli.app import app
-from airmuscle.command import Schedule, Signal
-from airmuscle.declare import model, parameter
-from airmuscle.engine.kernel import Kernel
-from airmuscle.equilibrium import equilibrium
-from airmuscle.errors import FileError, NoSolution, ParameterError, UnitError
+from airmuscle.compile.cache.kernel import Kernel
+from airmuscle.control.inputs import Schedule, Signal
+from airmuscle.core.errors import FileError, NoSolution, ParameterError, UnitError
+from airmuscle.core.model import model, parameter
+from airmuscle.core.units import ABSOLUTE, conversion, quantity
 from airmuscle.library.catalogue import names, parsed
 from airmuscle.mechanism import HangingMass
-from airmuscle.method import RungeKutta4
-from airmuscle.plant import Plant
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.report.staged import refuse_unwritable, staged
-from airmuscle.units import ABSOLUTE, conversion, quantity
+from airmuscle.simulation import integrators
+from airmuscle.simulation.integrators import RungeKutta4
 
 MUSCLE = "dmsp-20-300"
 HEAD = "pressure [bar],length [mm],force [N]"
@@ -183,7 +184,7 @@ def test_a_request_that_no_muscle_can_meet(tmp_path: Path, given: tuple[str, ...
     assert re.search(message, said), said
 
 
-@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+@pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 @pytest.mark.parametrize("name", names())
 def test_every_entry_answers_or_refuses_in_one_line(name: str):
     """Loads, pressures and contractions far beyond any muscle: a number that JSON can hold, or one line."""
@@ -434,7 +435,7 @@ def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch
         return (Interrupted(first), *others)
 
     monkeypatch.setattr(RungeKutta4, "_kernel", kernel)
-    monkeypatch.setattr(method, "BUDGET", 100)
+    monkeypatch.setattr(integrators, "BUDGET", 100)
     result = CliRunner().invoke(app, ["simulate", str(tmp_path / "run.toml"), "--out", str(tmp_path / "run")])
     assert result.exit_code == 130
     assert result.stderr == f"what was computed until then stands in {tmp_path / 'run'}\ninterrupted\n"
@@ -446,7 +447,7 @@ def test_without_a_place_for_compiled_code_the_remedy_is_named(plant: Plant, mon
     def absent(name: str, package: str) -> Any:
         raise RuntimeError("cannot cache function 'rodas4': no locator available for file 'rodas4.py'")
 
-    monkeypatch.setattr("airmuscle.engine.kernel.importlib", SimpleNamespace(import_module=absent))
+    monkeypatch.setattr("airmuscle.compile.cache.kernel.importlib", SimpleNamespace(import_module=absent))
     monkeypatch.setattr(Kernel, "__call__", lambda kernel, *arguments: kernel._by_numba(arguments))
     with pytest.raises(FileError, match=r"no folder to keep compiled code in.* environment variable NUMBA_CACHE_DIR"):
         simulate(plant, Schedule({}), duration=1.0, method=RungeKutta4(1e-3))

@@ -22,11 +22,11 @@ from typer.testing import CliRunner, Result
 from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.cli.app import app
 from airmuscle.cli.cite import as_bibtex
-from airmuscle.errors import UnknownName
+from airmuscle.core.errors import UnknownName
+from airmuscle.core.reference import Reference
 from airmuscle.library.catalogue import load, names
 from airmuscle.library.valve_catalogue import valve_names
 from airmuscle.recording import read_csv
-from airmuscle.reference import Reference
 from airmuscle.report.chapter import Chapter, Claim, Equal
 from airmuscle.reproduce import run
 
@@ -132,7 +132,7 @@ def test_list_names_every_entry_with_title_kind_and_trust():
     assert all(name in table for name in names())
 
 
-@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+@pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 def test_list_calls_a_muscle_what_can_be_simulated():
     for entry in json.loads(airmuscle("list", "--json").output):
         if entry["kind"].startswith("muscle"):
@@ -233,7 +233,7 @@ def test_the_chart_and_its_data_stand_in_the_folder(tmp_path: Path):
         assert float(row["force at 400 kPa [N]"]) == pytest.approx(float(wanted), abs=1e-9)
 
 
-@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+@pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 @pytest.mark.parametrize("name", names())
 def test_every_entry_has_a_chart(tmp_path: Path, name: str):
     entry = load(name)

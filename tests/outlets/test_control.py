@@ -19,15 +19,15 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.command import REST, Periodic, Schedule, Signal
 from airmuscle.control import PID, Split, TwoPoint
-from airmuscle.driver import PWM, Driven, OnOff
-from airmuscle.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownName
-from airmuscle.library.scenario import load_scenario
-from airmuscle.library.schema import scenario_schema
-from airmuscle.loop import Loop
+from airmuscle.control.driver import PWM, Driven, OnOff
+from airmuscle.control.inputs import REST, Periodic, Schedule, Signal
+from airmuscle.control.loop import Loop
+from airmuscle.core.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownName
 from airmuscle.report.run_chapter import in_words, run_chapter
-from airmuscle.sweep.study import load_study
+from airmuscle.scenario.scenario import load_scenario
+from airmuscle.scenario.schema import scenario_schema
+from airmuscle.study.study import load_study
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "pressure_loop.toml"
@@ -156,7 +156,7 @@ def test_the_columns_of_a_loop_may_be_asked_for(tmp_path: Path):
 PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "Split", positive = "{}", negative = "{}" }}')
 
 
-@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+@pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 @pytest.mark.parametrize(
     ("was", "becomes", "kind", "message"),
     [
@@ -230,8 +230,8 @@ def test_a_column_that_a_set_point_follows_is_there(tmp_path: Path):
 
 
 def test_a_record_has_no_controller(tmp_path: Path):
-    from airmuscle.library.command_table import command_from
     from airmuscle.library.place import Place
+    from airmuscle.scenario.inputs import command_from
 
     with pytest.raises(
         ParameterError, match=r"record, \[command\]: a controller stands in a scenario only; give what was"
@@ -375,6 +375,6 @@ def test_a_study_varies_the_numbers_of_a_controller(tmp_path: Path):
 
 
 def test_a_study_depends_on_the_controllers_program():
-    from airmuscle.sweep.fingerprint import NOT_COMPUTING
+    from airmuscle.study.fingerprint import NOT_COMPUTING
 
     assert "control" not in NOT_COMPUTING

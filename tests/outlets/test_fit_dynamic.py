@@ -14,13 +14,13 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.declare import leaves
-from airmuscle.dynamic_study import load_study
+from airmuscle.core.tree import leaves
 from airmuscle.identify.dynamic import StartTime, StartValue
-from airmuscle.library.scenario import load_scenario
 from airmuscle.mechanism import HangingMass
 from airmuscle.recording import Recording, read_csv
 from airmuscle.recording.write_csv import write_csv
+from airmuscle.scenario.identification import load_study
+from airmuscle.scenario.scenario import load_scenario
 
 PLANT = """
 [plant]

@@ -20,9 +20,9 @@ from airmuscle.identify.hysteresis import OnPressure, find_loops, holds
 from airmuscle.identify.hysteresis.plot import plot_loops
 from airmuscle.library.catalogue import load
 from airmuscle.library.place import Place
-from airmuscle.library.scenario import muscle_from
 from airmuscle.recording import Recording, read
 from airmuscle.recording.write_csv import write_csv
+from airmuscle.scenario.scenario import muscle_from
 
 SLIP = MaxwellSlip((2e4, 1e4, 3e3), (3e-4, 1.2e-3, 5e-3))
 TURNS = (0.02, 0.14, 0.08, 0.12, 0.05, 0.14, 0.02)

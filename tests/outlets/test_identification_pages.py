@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from airmuscle import read
-from airmuscle.command import Schedule
+from airmuscle.control.inputs import Schedule
 from airmuscle.friction import MaxwellSlip
-from airmuscle.gas import Polytropic
 from airmuscle.identify.dynamic import Experiment, Start
 from airmuscle.library.catalogue import load
+from airmuscle.pneumatics.gas import Polytropic
 from airmuscle.recording import Recording, write_csv
 from airmuscle.reproduce.hosovsky_plant import Numbers, hanging
 from airmuscle.reproduce.hosovsky_plant import plant as third_paper
-from airmuscle.simulate import simulate
+from airmuscle.simulation.simulate import simulate
 
 DOCS = Path(__file__).parents[2] / "docs"
 LAW = load("dmsp-20-300").characteristic

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle import declare
-from airmuscle.circuit import FillDischarge, Leaking, Line, Supply, Tank, Tube, Valve
-from airmuscle.contact import HuntCrossley
-from airmuscle.equilibrium import equilibrium
+from airmuscle.analysis.equilibrium import equilibrium
+from airmuscle.core import tree
 from airmuscle.friction import MaxwellSlip
-from airmuscle.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.mechanism import HangingMass
+from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, EndStop, LaggingWall, SeriesSpring
-from airmuscle.plant import Plant
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Leaking, Line, Supply, Tank, Tube, Valve
+from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 
 jax = pytest.importorskip("jax")
 jax.config.update("jax_enable_x64", True)
@@ -72,16 +72,16 @@ def test_outputs_over_many_states_at_once_are_those_of_each(gas):
 def test_a_gradient_by_every_parameter_is_the_difference_quotient():
     plant = plant_of_everything(EnergyBalance(1.0))
     state = equilibrium(plant, pressure=2e5)
-    leaves = declare.flatten(plant)
+    leaves = tree.flatten(plant)
 
     def inflow(values):
-        rates = declare.rebuild(plant, list(values)).rates(as_jax(state), as_jax(INPUTS))
+        rates = tree.rebuild(plant, list(values)).rates(as_jax(state), as_jax(INPUTS))
         return 1e3 * rates["tube1.air_mass"] + rates["speed"]
 
     gradient = np.asarray(jax.jit(jax.grad(inflow))(jnp.asarray(leaves)))
     assert np.isfinite(gradient).all()
     for path in ("circuit.circuit.circuit.fill.conductance", "muscle.series.stiffness", "mechanism.mass"):
-        i = [leaf.path for leaf in declare.leaves(plant)].index(path)
+        i = [leaf.path for leaf in tree.leaves(plant)].index(path)
         step = 1e-6 * leaves[i] * np.eye(leaves.size)[i]
         quotient = (inflow(leaves + step) - inflow(leaves - step)) / (2e-6 * leaves[i])
         assert gradient[i] == pytest.approx(float(quotient), rel=1e-6), path

@@ -14,16 +14,16 @@ import pytest
 
 from airmuscle.characteristic.chou_hannaford1996 import ChouHannaford1996
 from airmuscle.characteristic.clamped import Clamped
-from airmuscle.contact import HuntCrossley
-from airmuscle.errors import AirmuscleError, AirmuscleWarning, FileError, ParameterError, UnitError, UnknownName
+from airmuscle.core.errors import AirmuscleError, AirmuscleWarning, FileError, ParameterError, UnitError, UnknownName
+from airmuscle.core.reference import cite
 from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
 from airmuscle.geometry.braid import Braid
 from airmuscle.library import catalogue
 from airmuscle.library.models import model_class, model_names
 from airmuscle.library.place import Place
-from airmuscle.library.scenario import muscle_from
+from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, EndStop, LinearDamper, LinearSpring, PressureDamper, SwellingWall
-from airmuscle.reference import cite
+from airmuscle.scenario.scenario import muscle_from
 
 GOOD = """
 title = "A muscle of our own"

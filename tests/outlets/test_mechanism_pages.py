@@ -14,7 +14,7 @@ from airmuscle.library.build import build
 from airmuscle.library.models import model_names
 from airmuscle.library.place import Place
 from airmuscle.mechanism import AntagonisticJoint, Mechanism, StoppedJoint
-from airmuscle.sensitive import sensitivity
+from airmuscle.simulation.sensitivity import sensitivity
 
 DOCS = Path(__file__).parents[2] / "docs"
 

@@ -22,9 +22,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle import figures
-from airmuscle.errors import FileError, NoSolution, UnknownName
-from airmuscle.reference import Reference
+from airmuscle.core import plotting
+from airmuscle.core.errors import FileError, NoSolution, UnknownName
+from airmuscle.core.reference import Reference
 from airmuscle.report.chapter import AtLeast, AtMost, Chapter, Claim, Equal, Plot, Table
 from airmuscle.report.html import GREATEST_VECTOR
 from airmuscle.report.staged import refuse_unwritable, staged
@@ -37,11 +37,11 @@ KEYS = {"paper", "claim", "published", "reproduced", "unit", "tolerance", "verdi
 
 
 def a_plot(name: str, points: int = 20) -> Plot:
-    figure, axes = figures.new_figure()
+    figure, axes = plotting.new_figure()
     x = np.linspace(0.0, 30.0, points)
     axes.plot(x, 1000.0 * np.cos(x), label="300 kPa")
     axes.set(xlabel="contraction [%]", ylabel="force [N]")
-    figures.legend_outside(axes)
+    plotting.legend_outside(axes)
     return Plot(name, f"Caption of {name} & more", figure)
 
 
@@ -170,7 +170,7 @@ def test_two_runs_give_the_same_bytes(tmp_path: Path):
 
 
 def test_a_dense_figure_enters_the_page_as_pixels(tmp_path: Path):
-    figure, axes = figures.new_figure()
+    figure, axes = plotting.new_figure()
     scatter = np.random.default_rng(0).normal(size=(2, 12_000))
     axes.plot(*scatter, ".")
     chapter = Chapter("p", "t", "s", plots=(Plot("dense", "Dense", figure),))

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.command import Periodic, Schedule, Signal
-from airmuscle.driver import PWM, Driven
-from airmuscle.library.scenario import load_scenario
+from airmuscle.control.driver import PWM, Driven
+from airmuscle.control.inputs import Periodic, Schedule, Signal
 from airmuscle.report.run_chapter import MOST_PIECES, in_words, run_chapter
+from airmuscle.scenario.scenario import load_scenario
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
 

@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.circuit import ClosedChamber
-from airmuscle.command import Periodic, Schedule, Signal
-from airmuscle.driver import PWM, Driven, OnOff
-from airmuscle.errors import (
+from airmuscle.control.driver import PWM, Driven, OnOff
+from airmuscle.control.inputs import Periodic, Schedule, Signal
+from airmuscle.core.errors import (
     AirmuscleError,
     ColumnError,
     FileError,
@@ -25,16 +24,17 @@ from airmuscle.errors import (
     UnitError,
     UnknownName,
 )
-from airmuscle.gas import Isothermal, Polytropic
 from airmuscle.geometry import Braid
 from airmuscle.library.catalogue import load, save
 from airmuscle.library.entry import Entry
-from airmuscle.library.scenario import load_scenario
 from airmuscle.library.valve_catalogue import load_valve
 from airmuscle.mechanism import HangingMass, Held, Isometric
-from airmuscle.method import DormandPrince8, Rodas4, RungeKutta4
 from airmuscle.muscle import LinearDamper
+from airmuscle.pneumatics import ClosedChamber
+from airmuscle.pneumatics.gas import Isothermal, Polytropic
 from airmuscle.report.run_chapter import _inputs
+from airmuscle.scenario.scenario import load_scenario
+from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
 
 PAGE = (Path(__file__).parents[2] / "docs" / "scenario.md").read_text(encoding="utf-8")
 WHOLE, FITTED, PAIR, DRIVEN, LINE = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
@@ -204,7 +204,7 @@ def test_a_recorded_command_may_be_held_and_rows_may_stand_beside_it(tmp_path: P
         assert command == kind({"fill": fill, "discharge": ((0.1, 1.0),)})
 
 
-@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+@pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 def test_a_driver_may_have_the_delays_of_a_valve_of_the_catalogue(tmp_path: Path):
     response = load_valve("smc-sx91").response
     command = load_scenario(
@@ -286,7 +286,7 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
 # What is wrong is said
 
 
-@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+@pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 @pytest.mark.parametrize(
     ("was", "becomes", "kind", "message"),
     [

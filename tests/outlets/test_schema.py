@@ -16,13 +16,13 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.declare import parameters
-from airmuscle.errors import AirmuscleError
+from airmuscle.core.errors import AirmuscleError
+from airmuscle.core.model import parameters
 from airmuscle.library.catalogue import load, names, to_toml
 from airmuscle.library.models import model_class
 from airmuscle.library.read import entry_from
-from airmuscle.library.scenario import load_scenario
-from airmuscle.library.schema import muscle_schema, scenario_schema
+from airmuscle.scenario.scenario import load_scenario
+from airmuscle.scenario.schema import muscle_schema, scenario_schema
 
 ROOT = Path(__file__).parents[2]
 LIBRARY = sorted((ROOT / "src" / "airmuscle" / "library").glob("*.toml"))
@@ -112,7 +112,7 @@ def test_every_file_of_the_library_passes(path: Path):
     assert judged(tomllib.loads(path.read_text(encoding="utf-8")), MUSCLE) == []
 
 
-@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+@pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 @pytest.mark.parametrize("name", names())
 def test_every_entry_passes_in_the_form_that_fit_and_save_write(name: str):
     assert judged(tomllib.loads(to_toml(load(name))), MUSCLE) == []

@@ -26,15 +26,15 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.cli.interruption import look, remembered
-from airmuscle.errors import AirmuscleError, FileError, InputError, SimulationError
-from airmuscle.library.scenario import load_scenario
+from airmuscle.core.errors import AirmuscleError, FileError, InputError, SimulationError
 from airmuscle.report.write import save_table
-from airmuscle.simulate import simulate
-from airmuscle.sweep import chunk, dask_cluster, fingerprint, load_study, processes, run_study
-from airmuscle.sweep.chapter import study_chapter, write_study
-from airmuscle.sweep.design import DESIGNS
-from airmuscle.sweep.outcome import OUTCOMES
-from airmuscle.sweep.variation import DISTRIBUTIONS, Range
+from airmuscle.scenario.scenario import load_scenario
+from airmuscle.simulation.simulate import simulate
+from airmuscle.study import chunk, dask_cluster, fingerprint, load_study, processes, run_study
+from airmuscle.study.chapter import study_chapter, write_study
+from airmuscle.study.design import DESIGNS
+from airmuscle.study.distributions import DISTRIBUTIONS, Range
+from airmuscle.study.metrics import OUTCOMES
 
 ROOT = Path(__file__).parents[2]
 MUSCLE = """
@@ -455,7 +455,7 @@ def test_what_nobody_foresaw_fails_its_run_alone(folder: Path, monkeypatch: pyte
             raise ZeroDivisionError("by nothing")
         return simulate(*given, **named)
 
-    monkeypatch.setattr("airmuscle.sweep.carry.simulate", failing)
+    monkeypatch.setattr("airmuscle.study.simulate.simulate", failing)
     result = run(folder)
     assert [r for r in result.reasons if r] == ["ZeroDivisionError: by nothing"]
 
@@ -665,7 +665,7 @@ def test_places_that_cannot_be_are_refused(folder: Path):
 
 def test_a_cluster_that_does_not_answer_is_refused(monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("airmuscle.sweep.executors.ANSWER_WITHIN", 0.5)
+    monkeypatch.setattr("airmuscle.study.executors.ANSWER_WITHIN", 0.5)
     for address in ("tcp://127.0.0.1:1", "nonsense://here"):
         with pytest.raises(InputError, match=f"no Dask scheduler answers at '{address}'"), dask_cluster(address):
             pass

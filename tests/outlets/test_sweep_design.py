@@ -14,11 +14,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airmuscle.errors import ParameterError
+from airmuscle.core.errors import ParameterError
 from airmuscle.library.place import Place
-from airmuscle.sweep.choice import difference
-from airmuscle.sweep.design import Grid, LatinHypercube, MonteCarlo, Saltelli, Sobol
-from airmuscle.sweep.variation import (
+from airmuscle.study.design import Grid, LatinHypercube, MonteCarlo, Saltelli, Sobol
+from airmuscle.study.distributions import (
     Levels,
     LogNormal,
     Normal,
@@ -29,6 +28,7 @@ from airmuscle.sweep.variation import (
     Variation,
     variation_from,
 )
+from airmuscle.study.parse import difference
 
 numbers = st.floats(-1e6, 1e6)
 widths = st.floats(1e-3, 1e6)

@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from airmuscle.errors import ParameterError
-from airmuscle.sweep.outcome import (
+from airmuscle.core.errors import ParameterError
+from airmuscle.study.metrics import (
     Course,
     Final,
     Maximum,

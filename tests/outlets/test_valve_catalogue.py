@@ -12,18 +12,18 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.circuit import CheckValve, Valve
 from airmuscle.cli.app import app
-from airmuscle.errors import AirmuscleWarning, FileError, ParameterError, UnitError, UnknownName
+from airmuscle.core.errors import AirmuscleWarning, FileError, ParameterError, UnitError, UnknownName
+from airmuscle.core.reference import cite
 from airmuscle.library.build import build
 from airmuscle.library.find import find
 from airmuscle.library.place import Place
-from airmuscle.library.scenario import load_scenario
 from airmuscle.library.valve_catalogue import load_valve, valve_names
-from airmuscle.reference import cite
+from airmuscle.pneumatics import CheckValve, Valve
 from airmuscle.reproduce.hosovsky_plant import MATRIX
+from airmuscle.scenario.scenario import load_scenario
 
-pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 every_valve = pytest.mark.parametrize("name", valve_names())
 GOOD = """
 title = "A valve of ours"

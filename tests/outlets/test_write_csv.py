@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airmuscle.errors import FileError
+from airmuscle.core.errors import FileError
 from airmuscle.recording import Recording, read_csv
 from airmuscle.recording.columns import QUANTITIES
 from airmuscle.recording.write_csv import write_csv

@@ -12,17 +12,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle import cite, fit, load, measured, method, read, read_csv, save, write_csv
-from airmuscle.circuit import FillDischarge, Supply, Valve, in_parallel, in_series
-from airmuscle.command import Periodic, Schedule, Signal
-from airmuscle.driver import PWM, Driven
-from airmuscle.errors import AirmuscleError, ColumnError, FileError, ParameterError, UnknownName
+from airmuscle import cite, fit, load, measured, read, read_csv, save, write_csv
+from airmuscle.control.driver import PWM, Driven
+from airmuscle.control.inputs import Periodic, Schedule, Signal
+from airmuscle.control.trajectory import follow
+from airmuscle.core.errors import AirmuscleError, ColumnError, FileError, ParameterError, UnknownName
 from airmuscle.mechanism import HangingMass, Mounted
-from airmuscle.motion import follow
 from airmuscle.muscle import LinearDamper, Muscle
-from airmuscle.plant import Plant
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Supply, Valve, in_parallel, in_series
 from airmuscle.recording import Recording
-from airmuscle.simulate import advance, simulate
+from airmuscle.simulation import integrators
+from airmuscle.simulation.simulate import advance, simulate
 
 EDGE = Valve(2.6e-9, 0.433)
 CIRCUIT = FillDischarge(Supply(6e5), EDGE, EDGE)
@@ -92,7 +93,7 @@ CASES = {
     "class simulated": (lambda: simulate(Plant, FILL, duration=0.1), "simulate: <class .* is no plant"),
     "muscle advanced": (lambda: advance(MUSCLE, REST, {}, 0.1), "advance: Muscle.* is no plant; give Plant"),
     "advanced from": (lambda: advance(PLANT, REST, {}, 0.1, start_time="0 s"), "advance: start_time is '0 s'; it must"),
-    "method as class": (lambda: simulate(PLANT, FILL, duration=0.1, method=method.Rodas4), "the method is <class"),
+    "method as class": (lambda: simulate(PLANT, FILL, duration=0.1, method=integrators.Rodas4), "the method is <class"),
     "times as text": (lambda: simulate(PLANT, FILL, duration=0.1, output=["a"]), r"output is \['a'\]; give a spacing"),
     "motion as text": (lambda: follow("a", "b"), "follow: 'a' and 'b' are not times"),
     "sources of a name": (lambda: cite("dmsp-20-300"), r"cite: 'dmsp-20-300' is no model; .*cite\(load\("),

@@ -7,16 +7,15 @@ import dataclasses
 import numpy as np
 import pytest
 
+from airmuscle.analysis.equilibrium import equilibrium
 from airmuscle.characteristic.contractile_surface import ContractileSurface
-from airmuscle.circuit import ClosedChamber, IndexedValve, Tube, Valve
-from airmuscle.command import REST, Signal
-from airmuscle.equilibrium import equilibrium
-from airmuscle.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.control.inputs import REST, Signal
 from airmuscle.identify.fit import fit
 from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.method import DormandPrince8, RungeKutta4
 from airmuscle.muscle import CubicSpring, LaggingWall, LinearDamper, LinearSpring, Muscle
-from airmuscle.plant import Plant
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import ClosedChamber, IndexedValve, Tube, Valve
+from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.recording import Recording
 from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_PRINTED
 from airmuscle.reproduce import hosovsky
@@ -25,7 +24,8 @@ from airmuscle.reproduce import hosovsky_fill as filling
 from airmuscle.reproduce import hosovsky_release as releasing
 from airmuscle.reproduce.hosovsky_plant import MATRIX, Numbers, hanging, latched, plant, surface, surface_fit
 from airmuscle.reproduce.hosovsky_schedule import FILLING
-from airmuscle.simulate import simulate
+from airmuscle.simulation.integrators import DormandPrince8, RungeKutta4
+from airmuscle.simulation.simulate import simulate
 
 NUMBERS = Numbers()
 

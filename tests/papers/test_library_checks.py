@@ -7,9 +7,9 @@ import warnings
 
 import pytest
 
-from airmuscle.check import verify
-from airmuscle.errors import AirmuscleWarning
+from airmuscle.core.errors import AirmuscleWarning
 from airmuscle.library import catalogue
+from airmuscle.library.verify import verify
 
 
 def quietly_loaded(name: str) -> catalogue.Entry:

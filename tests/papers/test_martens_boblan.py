@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airmuscle import ops
 from airmuscle.characteristic.martens_boblan2017 import MartensBoblan2017
+from airmuscle.core import ops
 from airmuscle.library import catalogue
 from airmuscle.units import degree
 

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from airmuscle import trace
 from airmuscle.characteristic.rubber import AlongAxis, RubberLine
 from airmuscle.characteristic.saga2007 import LINE_A, LINE_B, Saga2007
-from airmuscle.declare import flatten, structure
-from airmuscle.errors import NoSolution, OutOfReach, ParameterError
+from airmuscle.core import autodiff
+from airmuscle.core.errors import NoSolution, OutOfReach, ParameterError
+from airmuscle.core.tree import flatten, structure
 from airmuscle.geometry.circular_arc import CircularArc
 from airmuscle.geometry.fibre_sum import EvenSpread, GivenSum, SumPastHalf
 from airmuscle.geometry.parabola import Parabola
@@ -129,7 +129,7 @@ def test_line_b_always_rises_so_that_contraction_returns(contraction, force, q, 
     law = reading(LINE_B, w, q)
     pressure = law.pressure(contraction, force)
     assert law.contraction(pressure, force) == pytest.approx(contraction, rel=1e-9)
-    assert trace.slope(law, "balancing_pressure", contraction, force) > 0
+    assert autodiff.slope(law, "balancing_pressure", contraction, force) > 0
 
 
 @UNHURRIED
@@ -226,7 +226,7 @@ def test_the_quintic_holds_every_root_that_a_search_finds(law, pressure, force):
         assert near.stable == (miss(root * (1 + 1e-5)) > miss(root * (1 - 1e-5)))
     for equilibrium in listed:
         c = equilibrium.contraction
-        scale = abs(trace.slope(law, "balancing_pressure", max(c, 1e-12), force)) * max(c, 1e-12) + pressure
+        scale = abs(autodiff.slope(law, "balancing_pressure", max(c, 1e-12), force)) * max(c, 1e-12) + pressure
         assert abs(miss(c)) < 1e-6 * scale
 
 
@@ -496,7 +496,7 @@ def test_the_chapter_judges_all_seven_claims():
 
 
 @pytest.mark.parametrize("name", ["saga2007", "saga2007-circle", "saga2007-exact"])
-@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+@pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 def test_the_library_holds_the_muscle_of_table_1(name):
     law = load(name).characteristic
     found = law.geometry.resting_length, law.geometry.end_diameter, law.wall_thickness

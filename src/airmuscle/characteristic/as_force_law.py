@@ -6,16 +6,15 @@ import warnings
 from typing import Any
 
 import numpy as np  # noqa: TID251  (the fit works on numbers; the law that it returns is traced)
-import numpy.typing as npt  # noqa: TID251
 
-from ..declare import model, parameter
-from ..errors import AirmuscleWarning, NoSolution, PhysicsError
-from ..ops import Value
+from ..core.arrays import Array
+from ..core.errors import AirmuscleWarning, NoSolution, PhysicsError
+from ..core.model import model, parameter
+from ..core.ops import Value
 from .base import Characteristic, ForceLaw
 from .box import Box
 from .contractile_surface import ContractileSurface, exponents
 
-Array = npt.NDArray[np.float64]
 _UNLIMITED = 1e6
 """Clamp [N] of the surface: beyond any muscle, so that the surface follows the law below zero too."""
 

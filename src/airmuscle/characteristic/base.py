@@ -10,9 +10,9 @@ from __future__ import annotations
 import abc
 from typing import ClassVar, NamedTuple
 
-from .. import trace
-from ..ops import Value
-from ..reference import Reference
+from ..core import autodiff
+from ..core.ops import Value
+from ..core.reference import Reference
 from .solve import first_crossing
 
 NO_PRESSURE = 1e-300
@@ -119,8 +119,8 @@ class ForceLaw(Characteristic):
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         return Slopes(
-            trace.slope(self, "force", pressure, contraction, wrt=0),
-            trace.slope(self, "force", pressure, contraction, wrt=1),
+            autodiff.slope(self, "force", pressure, contraction, wrt=0),
+            autodiff.slope(self, "force", pressure, contraction, wrt=1),
         )
 
     def _no_contraction_here(self, pressure: float, force: float) -> str:
@@ -162,8 +162,8 @@ class ContractionLaw(Characteristic):
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         force = self.force(pressure, contraction)
-        by_pressure = trace.slope(self, "contraction", pressure, force, wrt=0)
-        by_force = trace.slope(self, "contraction", pressure, force, wrt=1)
+        by_pressure = autodiff.slope(self, "contraction", pressure, force, wrt=0)
+        by_force = autodiff.slope(self, "contraction", pressure, force, wrt=1)
         return Slopes(-by_pressure / by_force, 1.0 / by_force)
 
 
@@ -192,6 +192,6 @@ class PressureLaw(Characteristic):
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         force = self.force(pressure, contraction)
-        by_contraction = trace.slope(self, "pressure", contraction, force, wrt=0)
-        by_force = trace.slope(self, "pressure", contraction, force, wrt=1)
+        by_contraction = autodiff.slope(self, "pressure", contraction, force, wrt=0)
+        by_force = autodiff.slope(self, "pressure", contraction, force, wrt=1)
         return Slopes(1.0 / by_force, -by_contraction / by_force)

@@ -11,13 +11,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from .. import ops
-from ..declare import model, parameter
-from ..errors import OutOfReach, ParameterError
-from ..ops import Value
+from ..core import ops
+from ..core.errors import OutOfReach, ParameterError
+from ..core.model import model, parameter
+from ..core.ops import Value
+from ..core.reference import Reference
+from ..core.units import bar, percent
 from ..recording import Recording
-from ..reference import Reference
-from ..units import bar, percent
 from .base import ContractionLaw
 
 BORZIKOVA = Reference(

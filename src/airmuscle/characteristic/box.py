@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ..declare import model, parameter
-from ..errors import ParameterError
-from ..ops import Value
+from ..core.errors import ParameterError
+from ..core.model import model, parameter
+from ..core.ops import Value
 
 PRESSURES = (-101_325.0, 1e8)
 CONTRACTIONS = (-0.5, 1.0)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from .. import ops
-from ..declare import model
+from ..core import ops
+from ..core.model import model
+from ..core.ops import Value
+from ..core.reference import Reference
 from ..geometry.braid import CHOU_HANNAFORD_1996, Braid
-from ..ops import Value
-from ..reference import Reference
 from .base import NO_PRESSURE, ForceLaw
 from .solve import within_reach
 

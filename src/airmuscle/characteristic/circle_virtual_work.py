@@ -5,14 +5,14 @@ from __future__ import annotations
 import functools
 from typing import ClassVar, NamedTuple
 
-from .. import ops
-from ..declare import model, parameter
-from ..errors import ParameterError
+from ..core import ops
+from ..core.errors import ParameterError
+from ..core.model import model, parameter
+from ..core.ops import Value
+from ..core.reference import Reference
 from ..geometry.circular_arc import FERRARESI_2001, CircularArc
 from ..geometry.meridian import SAGA_2007
 from ..geometry.straight_fibre import StraightFibre, refuse_beyond
-from ..ops import Value
-from ..reference import Reference
 from .base import ForceLaw
 from .rubber import RubberLine
 from .solve import first_crossing, within_reach

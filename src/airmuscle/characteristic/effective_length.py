@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from ..declare import model, parameter
-from ..errors import ParameterError
-from ..ops import Value
+from ..core.errors import ParameterError
+from ..core.model import model, parameter
+from ..core.ops import Value
 from .base import ForceLaw
 
 _ROOM = 2.0

@@ -7,13 +7,13 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ..declare import model, parameter
+from ..core.model import model, parameter
+from ..core.ops import Value
+from ..core.reference import Reference
 from ..geometry.circular_arc import CircularArc
 from ..geometry.meridian import SAGA_2007, Profile
 from ..geometry.pleated import DAERDEN_LEFEBER_2001, PleatedTube
 from ..geometry.straight_fibre import refuse_beyond
-from ..ops import Value
-from ..reference import Reference
 from .base import PressureLaw, Slopes
 from .rubber import RubberLine
 from .solve import first_crossing, within_reach

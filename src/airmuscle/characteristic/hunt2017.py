@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from .. import ops
-from ..declare import model, parameter
-from ..errors import ParameterError
-from ..ops import Value
-from ..reference import Reference
+from ..core import ops
+from ..core.errors import ParameterError
+from ..core.model import model, parameter
+from ..core.ops import Value
+from ..core.reference import Reference
 from .base import PressureLaw
 
 HUNT_2017 = Reference(

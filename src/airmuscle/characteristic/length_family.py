@@ -6,9 +6,9 @@ import abc
 import dataclasses
 from typing import Any, Self
 
-from .. import ops
-from ..declare import model, parameter
-from ..ops import Value
+from ..core import ops
+from ..core.model import model, parameter
+from ..core.ops import Value
 from .base import ForceLaw
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from .. import ops
-from ..declare import model, parameter
+from ..core import ops
+from ..core.model import model, parameter
+from ..core.ops import Value
+from ..core.reference import Reference
 from ..geometry.braid import Braid
-from ..ops import Value
-from ..reference import Reference
 from .base import ForceLaw
 
 MARTENS_BOBLAN_2017 = Reference(

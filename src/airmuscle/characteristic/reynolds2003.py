@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from ..declare import model, parameter
-from ..ops import Value
-from ..reference import Reference
+from ..core.model import model, parameter
+from ..core.ops import Value
+from ..core.reference import Reference
 from .base import ForceLaw
 
 REYNOLDS_2003 = Reference(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import abc
 
-from ..declare import model, parameter
+from ..core.model import model, parameter
+from ..core.ops import Value, pi
 from ..geometry.meridian import Segment
-from ..ops import Value, pi
 
 
 @model

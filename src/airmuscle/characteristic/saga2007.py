@@ -5,15 +5,15 @@ from __future__ import annotations
 import functools
 from typing import ClassVar, NamedTuple
 
-from .. import ops, trace
-from ..declare import model, parameter
-from ..errors import ParameterError
+from ..core import autodiff, ops
+from ..core.errors import ParameterError
+from ..core.model import model, parameter
+from ..core.ops import Value
+from ..core.reference import Reference
 from ..geometry.fibre_sum import FibreSum, SumOverHalf
 from ..geometry.meridian import SAGA_2007
 from ..geometry.parabola import Parabola
 from ..geometry.straight_fibre import StraightFibre, refuse_beyond
-from ..ops import Value
-from ..reference import Reference
 from .base import PressureLaw
 from .rubber import AlongAxis, RubberIntegral, RubberLine
 from .solve import first_crossing, within_reach
@@ -194,7 +194,7 @@ class Saga2007(PressureLaw):
 
     def _is_stable(self, contraction: float, force: float) -> bool:
         at = max(contraction, 1e-12)  # the slope is infinite at zero
-        return bool(trace.slope(self, "balancing_pressure", at, force) > 0)
+        return bool(autodiff.slope(self, "balancing_pressure", at, force) > 0)
 
     def _refuse(self, contraction: Value) -> None:
         if not ops.is_symbol(self.wall_thickness):
@@ -242,7 +242,7 @@ def _polished(law: Saga2007, contraction: float, pressure: float, force: float) 
         if not 0.0 < contraction < 1.0:
             break
         miss = law.balancing_pressure(contraction, force) - pressure
-        better = contraction - miss / trace.slope(law, "balancing_pressure", contraction, force)
+        better = contraction - miss / autodiff.slope(law, "balancing_pressure", contraction, force)
         if not 0.0 < better < 1.0 or abs(law.balancing_pressure(better, force) - pressure) >= abs(miss):
             break
         contraction = float(better)

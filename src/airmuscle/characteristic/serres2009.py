@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from .. import ops
-from ..declare import model, parameter
-from ..ops import Value
-from ..reference import Reference
+from ..core import ops
+from ..core.model import model, parameter
+from ..core.ops import Value
+from ..core.reference import Reference
 from .base import ForceLaw
 
 SERRES_2009 = Reference(

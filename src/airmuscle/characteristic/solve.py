@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import NoSolution
+from ..core.errors import NoSolution
 
 INTERVALS = 256
 """Places looked at within a reach; a law that rises and falls again within 1/256 of it is not resolved."""

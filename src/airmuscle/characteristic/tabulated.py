@@ -8,12 +8,12 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from ..declare import model, parameter
-from ..errors import NoSolution, ParameterError
-from ..ops import Value
+from ..core.arrays import Array
+from ..core.errors import NoSolution, ParameterError
+from ..core.model import model, parameter
+from ..core.ops import Value
 from .base import Characteristic, Slopes
 
-Array = npt.NDArray[np.float64]
 _HALVINGS = 60
 """Bisections of a contraction: 2^-60 of the table's width lies below the rounding of its ends."""
 

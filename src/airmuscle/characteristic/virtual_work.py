@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from ..declare import model
-from ..errors import TraceError
+from ..core.errors import TraceError
+from ..core.model import model
+from ..core.ops import Value
+from ..core.reference import Reference
 from ..geometry.base import Geometry
 from ..geometry.braid import CHOU_HANNAFORD_1996
-from ..ops import Value
-from ..reference import Reference
 from .base import ForceLaw, Slopes
 from .solve import within_reach
 

@@ -1,3 +1,7 @@
 """The command line. Heavy modules are imported inside the commands, so that `airmuscle list` starts at once."""
 
-from .app import main as main
+from .app import main
+
+__all__ = [
+    "main",
+]

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from ..errors import AirmuscleError, AirmuscleWarning
+from ..core.errors import AirmuscleError, AirmuscleWarning
 from .cite import cite
 from .convert import convert
 from .fit import fit

@@ -28,7 +28,7 @@ Surroundings = Annotated[
 
 def measured(files: list[Path], unit: list[str] | None, **options: Any) -> list[Recording]:
     """The runs in files, read together so that contradictions show, then the data sets of the library."""
-    from ..errors import ParameterError
+    from ..core.errors import ParameterError
     from ..library.catalogue import measured as data_set
     from ..recording import read
     from .progress import reading_progress

@@ -12,7 +12,7 @@ from .options import Json, Name
 from .terminal import print_json
 
 if TYPE_CHECKING:
-    from ..reference import Reference
+    from ..core.reference import Reference
 
 
 def cite(
@@ -27,7 +27,7 @@ def cite(
       airmuscle cite dmsp-20-300
       airmuscle cite dmsp-20-300 --bibtex >> references.bib
     """
-    from .. import reference
+    from ..core import reference
     from ..library.find import find
 
     if json and bibtex:

@@ -72,9 +72,9 @@ def convert(
 def _box(entry: Entry, given: tuple[str | None, str | None, str | None, str | None]) -> Box:
     """The muscle's box, with the ends that were given put in."""
     from ..characteristic.box import Box
-    from ..errors import ParameterError
+    from ..core.errors import ParameterError
+    from ..core.units import quantity
     from ..report.chart import box_of
-    from ..units import quantity
 
     names = ("least_pressure", "greatest_pressure", "least_contraction", "greatest_contraction")
     own = box_of(entry.characteristic, entry.box)
@@ -118,7 +118,7 @@ def _by_pressure(found: Conversion, box: Box) -> list[dict[str, float]]:
 def _as_data(found: Conversion, box: Box) -> dict[str, Any]:
     import dataclasses
 
-    from ..declare import leaves
+    from ..core.tree import leaves
 
     return {
         "model": type(found.model).__name__,

@@ -8,19 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .bench_files import Files, Length, Surroundings, Units, measured
+from .fit_output import as_data, echo, fitted, write
 from .fit_start import start_of
 from .options import Folder, Json, Map
-from .remedies import in_options
 from .terminal import print_json
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from ..characteristic.base import Characteristic
     from ..identify.result import Fit
-    from ..library.entry import Entry
     from ..recording import Recording
-    from ..report.chapter import Chapter
     from .fit_more import Asked
     from .fit_start import Start
 
@@ -143,14 +139,6 @@ def _one(files: list[Path], recordings: list[Recording], characteristic: str, as
     echo([str(result), *found.lines()], asked.out)
 
 
-def echo(lines: Sequence[str], out: Path) -> None:
-    """What was found, and where it stands."""
-    for line in lines:
-        typer.echo(in_options(line))
-    typer.echo(f"muscle: {out / 'muscle.toml'}")
-    typer.echo(f"report: {out / 'report.html'}")
-
-
 def _identified(start: Start, recordings: list[Recording], asked: Asked) -> Fit:
     from ..identify import UNCENSORED
     from ..identify import fit as identify
@@ -166,64 +154,10 @@ def _identified(start: Start, recordings: list[Recording], asked: Asked) -> Fit:
 
 
 def loss_of(robust: str | None, law: Characteristic) -> Any:
+    from ..core.units import quantity
     from ..identify import Huber, LeastSquares
     from ..identify.problem import direction_of
-    from ..units import quantity
 
     if robust is None:
         return LeastSquares()
     return Huber(quantity(robust, direction_of(law).unit, where="--robust"))
-
-
-def fitted(result: Fit, start: Entry, files: list[Path]) -> Entry:
-    """The fitted muscle with the parts of the one it started from; its checks and trust were of other numbers."""
-    import dataclasses
-
-    summary = dict(result.summary())
-    names = ", ".join(f.name for f in files)
-    note = f"Fitted to {names}: rms error {summary['rms error']}, greatest {summary['greatest error']}."
-    title = f"{type(result.model).__name__} fitted to {', '.join(f.stem for f in files)}"
-    return dataclasses.replace(
-        start, name="muscle", title=title, trust="fitted", note=note, warning="", characteristic=result.model,
-        box=result.box, checks=(),
-    )  # fmt: skip
-
-
-def as_data(result: Fit) -> dict[str, Any]:
-    """A fit as plain data, all numbers SI."""
-    import dataclasses
-
-    return {
-        "model": type(result.model).__name__,
-        "quantity": result.direction.quantity,
-        "unit": result.direction.unit,
-        "parameters": [dataclasses.asdict(estimate) for estimate in result.estimates],
-        "rmse": result.rmse,
-        "greatest_error": dataclasses.asdict(result.greatest_error),
-        "sigma": result.sigma,
-        "r2": result.r2,
-        "correlation_index": result.correlation_index,
-        "rank": result.rank,
-        "condition": result.condition,
-        "rows_used": result.rows_used,
-        "rows_censored": result.rows_censored,
-        "rows_dropped": result.rows_dropped,
-        "valid_for": result.ranges,
-        "notes": list(result.notes),
-    }
-
-
-def write(result: Fit, entry: Entry, recordings: list[Recording], out: Path, chapters: Sequence[Chapter] = ()) -> None:
-    """Muscle and report in one folder, whole or not at all; `chapters` stand before the fit's own."""
-    import dataclasses
-
-    from ..library.catalogue import save
-    from ..report.fit_chapter import fit_chapter
-    from ..report.staged import staged
-    from ..report.write import fill
-
-    with staged(out) as place:
-        save(entry, place / "muscle.toml")
-        notes = tuple(dict.fromkeys(note for run in recordings for note in run.notes))
-        worded = dataclasses.replace(result, notes=tuple(in_options(note) for note in result.notes))
-        fill(place, [*chapters, fit_chapter(worded, entry, notes)], title="Fit")

@@ -23,7 +23,7 @@ def compared(files: list[Path], recordings: list[Recording], characteristic: str
     from ..identify.compare import compare
     from ..report.compare_chapter import compare_chapter
     from ..report.staged import refuse_unwritable
-    from .fit import echo, fitted, write
+    from .fit_output import echo, fitted, write
 
     if asked.uncensored or asked.robust is not None or asked.equal_weights:
         raise typer.BadParameter(
@@ -70,7 +70,7 @@ def _bare(candidate: Candidate) -> Any:
 
 def _as_data(found: Comparison) -> dict[str, Any]:
     """A comparison as plain data, all numbers SI."""
-    from .fit import as_data
+    from .fit_output import as_data
 
     return {
         "recommended": found.recommended.candidate.name,

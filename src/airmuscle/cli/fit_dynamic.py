@@ -13,9 +13,9 @@ from .terminal import print_json
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..dynamic_study import DynamicStudy
     from ..identify.dynamic import DynamicFit
     from ..identify.dynamic.profile import Profile
+    from ..scenario.identification import DynamicStudy
 
 WEAK = "weak"
 """For --profile: all that take part in what the records do not determine."""
@@ -58,8 +58,8 @@ def fit_dynamic(
     """
     import dataclasses
 
-    from ..dynamic_study import load_study
     from ..report.staged import refuse_unwritable
+    from ..scenario.identification import load_study
 
     loaded = load_study(study)
     if starts is not None:

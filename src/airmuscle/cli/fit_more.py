@@ -142,7 +142,7 @@ def part_of(word: str | None) -> LeaveOut | None:
 
 
 def _point(text: str) -> tuple[float, float]:
-    from ..units import quantity
+    from ..core.units import quantity
 
     pressure, sign, contraction = text.partition("=")
     if not sign:
@@ -157,7 +157,7 @@ def _point(text: str) -> tuple[float, float]:
 
 def _shaped(fit: Fit, recordings: Sequence[Recording], free: tuple[tuple[float, float], ...]) -> ShapedFit:
     from ..characteristic import ContractileSurface
-    from ..errors import ParameterError
+    from ..core.errors import ParameterError
     from ..identify import fit_shaped
     from ..recording import Recording
 

@@ -20,7 +20,7 @@ class Start(NamedTuple):
 
 def start_of(name: str, recordings: Sequence[Recording], degree: int, option: str = "--characteristic") -> Start:
     """The library entry to start from, or a bare one around a law that starts from data alone."""
-    from ..errors import ParameterError
+    from ..core.errors import ParameterError
     from ..identify.candidates import standard_candidates
     from ..library.catalogue import load
     from ..library.entry import Entry

@@ -165,7 +165,7 @@ def _judge(fit: HysteresisFit) -> str:
 
 def _as_data(found: LoopFit) -> dict[str, Any]:
     """A loop with its fits as plain data, all numbers SI."""
-    from ..declare import leaves
+    from ..core.tree import leaves
 
     return {
         "origin": found.loop.recording.origin,

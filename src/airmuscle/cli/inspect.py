@@ -89,7 +89,7 @@ def _recordings(files: list[str], told: ColumnMapping, units: dict[str, str]) ->
 def _draw(seen: tuple[Inspection, ...], out: Path) -> None:
     import re
 
-    from ..figures import save
+    from ..core.plotting import save
     from ..report.staged import staged
 
     with staged(out) as place:

@@ -44,10 +44,10 @@ def plan(
       airmuscle plan my/muscle.toml --greatest-pressure "4 bar" --greatest-force "300 N" --runs 4 --out bench
     """
     from ..characteristic.box import Box
+    from ..core.units import quantity
     from ..identify.plan import Bench
     from ..identify.plan import plan as planned
     from ..library.catalogue import load
-    from ..units import quantity
 
     pressures = [quantity(text, "Pa", where="limits of pressure") for text in (least_pressure, greatest_pressure)]
     contractions = [

@@ -38,7 +38,7 @@ def reproduce(
       airmuscle reproduce
       airmuscle reproduce saga hosovsky --out report
     """
-    from ..errors import AirmuscleError
+    from ..core.errors import AirmuscleError
     from ..reproduce.run import reproduce as run
 
     chapters: list[Chapter] = []

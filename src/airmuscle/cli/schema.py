@@ -27,9 +27,9 @@ def schema(
       airmuscle schema --out scenario.schema.json
       airmuscle schema --muscle --out muscle.schema.json
     """
-    from ..library.schema import muscle_schema, scenario_schema
     from ..report.staged import staged
     from ..report.write import as_json
+    from ..scenario.schema import muscle_schema, scenario_schema
 
     text = as_json(muscle_schema() if muscle else scenario_schema())
     if out is None:

@@ -42,7 +42,7 @@ def show(name: Name, json: Json = False) -> None:
 
 def described(entry: Entry | ValveEntry) -> dict[str, Any]:
     """An entry as plain data, all numbers SI."""
-    from ..reference import cite
+    from ..core.reference import cite
 
     parts = {part: getattr(entry, part) for part in PARTS if getattr(entry, part, None) is not None}
     own_geometry = getattr(parts.get("characteristic"), "geometry", None)  # a geometric law has it among its parameters
@@ -74,7 +74,7 @@ def described(entry: Entry | ValveEntry) -> dict[str, Any]:
 
 
 def _parameters(part: str, thing: Any) -> list[dict[str, Any]]:
-    from ..declare import leaves
+    from ..core.tree import leaves
 
     return [
         {

@@ -11,8 +11,8 @@ from .options import Folder, Json
 from .terminal import print_json, print_table
 
 if TYPE_CHECKING:
-    from ..library.scenario import Scenario
     from ..recording import Recording
+    from ..scenario.scenario import Scenario
 
 
 def simulate(
@@ -33,9 +33,9 @@ def simulate(
     Examples:
       airmuscle simulate examples/fill_discharge.toml --out run
     """
-    from ..errors import SimulationError
-    from ..library.scenario import load_scenario
+    from ..core.errors import SimulationError
     from ..report.staged import refuse_unwritable
+    from ..scenario.scenario import load_scenario
 
     loaded = load_scenario(scenario)
     refuse_unwritable(out)

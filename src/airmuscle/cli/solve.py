@@ -68,10 +68,10 @@ def solve(
 
 def _solved(characteristic: Characteristic, texts: dict[str, str | None]) -> Point:
     from ..characteristic.base import ForceLaw
-    from ..errors import NoSolution
-    from ..gas import Ambient, refuse_vacuum
+    from ..core.errors import NoSolution
+    from ..core.units import quantity
+    from ..pneumatics.gas import Ambient, refuse_vacuum
     from ..report.chart import Point, point_text
-    from ..units import quantity
 
     given = {name: quantity(text, UNITS[name], where=f"--{name}") for name, text in texts.items() if text is not None}
     if "pressure" in given:
@@ -89,7 +89,7 @@ def _solved(characteristic: Characteristic, texts: dict[str, str | None]) -> Poi
 
 
 def _refuse_out_of_reach(characteristic: Characteristic, contraction: float) -> None:
-    from ..errors import OutOfReach
+    from ..core.errors import OutOfReach
 
     low, high = characteristic.contraction_reach
     if not low <= contraction <= high:
@@ -103,7 +103,7 @@ def _refuse_out_of_reach(characteristic: Characteristic, contraction: float) -> 
 
 def _stiffness(entry: Entry, point: Point) -> float | None:
     """-dF/deps at constant pressure [N]; None where the law has no single force at this point."""
-    from ..errors import PhysicsError
+    from ..core.errors import PhysicsError
 
     try:
         return float(entry.characteristic.stiffness(point.pressure, point.contraction))
@@ -114,7 +114,7 @@ def _stiffness(entry: Entry, point: Point) -> float | None:
 def _warn(point: Point, box: Box | None) -> None:
     import warnings
 
-    from ..errors import AirmuscleWarning
+    from ..core.errors import AirmuscleWarning
 
     if point.force < 0:
         warnings.warn("a muscle pulls and never pushes: it is slack here.", AirmuscleWarning, stacklevel=2)
@@ -130,7 +130,7 @@ def _warn(point: Point, box: Box | None) -> None:
 
 
 def _resting_length(entry: Entry) -> float | None:
-    from ..declare import leaves
+    from ..core.tree import leaves
 
     parts = (part for part in (entry.geometry, entry.characteristic) if part is not None)
     found = (leaf.value for part in parts for leaf in leaves(part) if leaf.path.endswith("resting_length"))
@@ -171,7 +171,7 @@ def _as_data(entry: Entry, point: Point, box: Box | None, wanted: str) -> dict[s
 
 
 def _write(entry: Entry, point: Point, box: Box | None, out: Path) -> None:
-    from ..figures import save
+    from ..core.plotting import save
     from ..report.chart import chart, isobars, table
     from ..report.staged import staged
     from ..report.write import save_table

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from ..report.chapter import Table
-    from ..sweep import Study, StudyResult
+    from ..study import Study, StudyResult
 
 
 def sweep(
@@ -47,9 +47,9 @@ def sweep(
       airmuscle sweep study.toml --workers 8
       airmuscle sweep study.toml --dask tcp://head-node:8786
     """
-    from ..errors import InputError, SimulationError
-    from ..sweep import load_study
-    from ..sweep.chapter import write_study
+    from ..core.errors import InputError, SimulationError
+    from ..study import load_study
+    from ..study.chapter import write_study
 
     if workers is not None and dask is not None:
         raise InputError("--workers and --dask exclude each other: a Dask cluster has its own workers.")
@@ -68,9 +68,9 @@ def sweep(
 
 def _run(study: Study, out: Path, workers: int | None, dask: str | None) -> StudyResult:
     """The study's result; when it ends early, a line says what is kept and how to go on."""
-    from ..errors import AirmuscleError
-    from ..sweep import run_study
-    from ..sweep.run import runs_kept
+    from ..core.errors import AirmuscleError
+    from ..study import run_study
+    from ..study.run import runs_kept
 
     try:
         with _bar(study.title) as show, _executor(study, workers, dask) as executor:
@@ -85,8 +85,8 @@ def _run(study: Study, out: Path, workers: int | None, dask: str | None) -> Stud
 def _executor(
     study: Study, workers: int | None, dask: str | None
 ) -> contextlib.AbstractContextManager[Executor | None]:
-    from ..sweep import dask_cluster, processes
-    from ..sweep.executors import cores_here
+    from ..study import dask_cluster, processes
+    from ..study.executors import cores_here
 
     if dask is not None:
         return dask_cluster(dask)
@@ -111,7 +111,7 @@ def _bar(title: str) -> Iterator[Callable[[int, int], None]]:
 
 
 def _print(result: StudyResult) -> None:
-    from ..sweep.chapter import reasons_table, sensitivity_table
+    from ..study.chapter import reasons_table, sensitivity_table
 
     study, indices = result.study, result.indices()
     failed = f", {result.failed.size} failed" if result.failed.size else ""

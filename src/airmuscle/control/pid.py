@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import ClassVar, NamedTuple
 
-from ..controller import Measurement
-from ..declare import model, parameter
-from ..reference import Reference
-from .one_column import OneColumn
+from ..core.model import model, parameter
+from ..core.reference import Reference
+from .controller import Measurement
+from .siso import OneColumn
 from .split import Commanded, commands, range_of
 
 ASTROM_HAGGLUND1995 = Reference(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..declare import model
-from ..errors import ParameterError
+from ..core.errors import ParameterError
+from ..core.model import model
 
 
 @model

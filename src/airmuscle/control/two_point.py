@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from ..controller import Measurement
-from ..declare import model, parameter
-from ..reference import Reference
-from .one_column import OneColumn
+from ..core.model import model, parameter
+from ..core.reference import Reference
+from .controller import Measurement
 from .pid import ASTROM_HAGGLUND1995
+from .siso import OneColumn
 from .split import Commanded, commands, range_of
 
 

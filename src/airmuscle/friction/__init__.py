@@ -1,9 +1,18 @@
 """Force with memory, against the motion of a muscle."""
 
-from .base import Friction as Friction
-from .base import NoFriction as NoFriction
-from .bouc_wen import BoucWen as BoucWen
-from .dahl import Dahl as Dahl
-from .lugre import LuGre as LuGre
-from .maxwell_slip import MaxwellSlip as MaxwellSlip
-from .prandtl_ishlinskii import PrandtlIshlinskii as PrandtlIshlinskii
+from .base import Friction, NoFriction
+from .bouc_wen import BoucWen
+from .dahl import Dahl
+from .lugre import LuGre
+from .maxwell_slip import MaxwellSlip
+from .prandtl_ishlinskii import PrandtlIshlinskii
+
+__all__ = [
+    "BoucWen",
+    "Dahl",
+    "Friction",
+    "LuGre",
+    "MaxwellSlip",
+    "NoFriction",
+    "PrandtlIshlinskii",
+]

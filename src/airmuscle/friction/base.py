@@ -6,10 +6,10 @@ import abc
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from ..declare import model
-from ..ops import Value
-from ..reference import Reference
-from ..variables import StateVariable
+from ..core.model import model
+from ..core.ops import Value
+from ..core.reference import Reference
+from ..core.variables import StateVariable
 
 
 class Friction(abc.ABC):

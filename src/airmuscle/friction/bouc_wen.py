@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from .. import ops
-from ..declare import model, parameter
-from ..ops import Value
-from ..reference import Reference
-from ..variables import StateVariable
+from ..core import ops
+from ..core.model import model, parameter
+from ..core.ops import Value
+from ..core.reference import Reference
+from ..core.variables import StateVariable
 from .base import Friction
 from .path import autonomous
 

@@ -11,9 +11,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np  # noqa: TID251  (no symbol comes here)
-import numpy.typing as npt  # noqa: TID251
 
-Array = npt.NDArray[np.float64]
+from ..core.arrays import Array
+
 NODES, LAST = 4801, 24.0
 """Nodes of the curve of `autonomous`, and the -ln((1 - w)/2) at which it ends: 1 - w is 8e-11 there (chosen)."""
 

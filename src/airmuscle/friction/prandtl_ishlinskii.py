@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from .. import ops
-from ..declare import model, parameter
-from ..errors import ParameterError
-from ..ops import Value
-from ..reference import Reference
-from ..variables import StateVariable
+from ..core import ops
+from ..core.errors import ParameterError
+from ..core.model import model, parameter
+from ..core.ops import Value
+from ..core.reference import Reference
+from ..core.variables import StateVariable
 from .base import Friction
 from .maxwell_slip import refuse_uneven, yielding
 from .path import stops

@@ -1,9 +1,19 @@
 """Enclosed volume and outline of a muscle, from its contraction."""
 
-from .base import Geometry as Geometry
-from .braid import Braid as Braid
-from .chebyshev import ChebyshevGeometry as ChebyshevGeometry
-from .pleated import PleatedTube as PleatedTube
-from .straight_fibre import StraightFibre as StraightFibre
-from .tabulated import TabulatedGeometry as TabulatedGeometry
-from .vessel import Vessel as Vessel
+from .base import Geometry
+from .braid import Braid
+from .chebyshev import ChebyshevGeometry
+from .pleated import PleatedTube
+from .straight_fibre import StraightFibre
+from .tabulated import TabulatedGeometry
+from .vessel import Vessel
+
+__all__ = [
+    "Braid",
+    "ChebyshevGeometry",
+    "Geometry",
+    "PleatedTube",
+    "StraightFibre",
+    "TabulatedGeometry",
+    "Vessel",
+]

@@ -8,10 +8,10 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from .. import trace
-from ..errors import OutOfReach
-from ..ops import Value
-from ..reference import Reference
+from ..core import autodiff
+from ..core.errors import OutOfReach
+from ..core.ops import Value
+from ..core.reference import Reference
 
 
 class Geometry(abc.ABC):
@@ -42,7 +42,7 @@ class Geometry(abc.ABC):
 
     def volume_growth(self, contraction: Value) -> Value:
         """dV/deps [m3], exact; virtual work makes p dV/deps / L0 the tension of an ideal muscle."""
-        return trace.slope(self, "volume", contraction)
+        return autodiff.slope(self, "volume", contraction)
 
     def refuse_out_of_reach(self, contraction: Value) -> None:
         """Raise OutOfReach, naming the limits, for any contraction that this geometry cannot take."""

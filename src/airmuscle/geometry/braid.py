@@ -7,10 +7,10 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from .. import ops
-from ..declare import model, parameter
-from ..ops import Value
-from ..reference import Reference
+from ..core import ops
+from ..core.model import model, parameter
+from ..core.ops import Value
+from ..core.reference import Reference
 from .base import Geometry
 
 CHOU_HANNAFORD_1996 = Reference(

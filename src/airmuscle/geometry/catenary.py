@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from .. import ops
-from ..declare import model
-from ..ops import Value
-from .meridian import Array, Meridian, Profile, Segment, volume_of
+from ..core import ops
+from ..core.arrays import Array
+from ..core.model import model
+from ..core.ops import Value
+from .meridian import Meridian, Profile, Segment, volume_of
 from .stumpff import double_arc, stumpff, triple_arc
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from .. import ops
-from ..declare import model, parameter
-from ..errors import ParameterError
-from ..ops import Value
+from ..core import ops
+from ..core.errors import ParameterError
+from ..core.model import model, parameter
+from ..core.ops import Value
 from .base import Geometry
 
 _PLACES = 1001

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import ClassVar, NamedTuple
 
-from .. import ops
-from ..declare import model
-from ..ops import Value
-from ..reference import Reference
-from .meridian import Array, Meridian, Profile, Segment, volume_of
+from ..core import ops
+from ..core.arrays import Array
+from ..core.model import model
+from ..core.ops import Value
+from ..core.reference import Reference
+from .meridian import Meridian, Profile, Segment, volume_of
 from .stumpff import double_arc, stumpff, triple_arc
 
 FERRARESI_2001 = Reference(

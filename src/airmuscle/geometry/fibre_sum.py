@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import abc
 
-from .. import ops
-from ..declare import model, parameter
-from ..ops import Value
+from ..core import ops
+from ..core.model import model, parameter
+from ..core.ops import Value
 
 
 class FibreSum(abc.ABC):

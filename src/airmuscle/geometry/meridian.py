@@ -5,12 +5,10 @@ from __future__ import annotations
 import abc
 from typing import ClassVar, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
-from .. import ops
-from ..ops import Value
-from ..reference import Reference
+from ..core import ops
+from ..core.arrays import Array
+from ..core.ops import Value
+from ..core.reference import Reference
 
 SAGA_2007 = Reference(
     "saga-2007",
@@ -23,7 +21,6 @@ SAGA_2007 = Reference(
 )
 
 
-Array = npt.NDArray[np.float64]
 Profile = tuple[Array, Array]
 
 

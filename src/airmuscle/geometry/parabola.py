@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import ops
-from ..declare import model
-from ..ops import Value
-from .meridian import Array, Meridian, Profile, Segment, volume_of
+from ..core import ops
+from ..core.arrays import Array
+from ..core.model import model
+from ..core.ops import Value
+from .meridian import Meridian, Profile, Segment, volume_of
 
 _NODES, _WEIGHTS = (
     (0.5 * (v + shift)).tolist() for v, shift in zip(np.polynomial.legendre.leggauss(24), (1, 0), strict=True)

@@ -8,10 +8,11 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..declare import model
-from ..ops import Value
-from ..reference import Reference
-from .meridian import Array, Profile, Segment
+from ..core.arrays import Array
+from ..core.model import model
+from ..core.ops import Value
+from ..core.reference import Reference
+from .meridian import Profile, Segment
 from .straight_fibre import FibreTube
 
 DAERDEN_LEFEBER_2001 = Reference(

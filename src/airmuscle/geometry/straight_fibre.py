@@ -6,12 +6,13 @@ import abc
 
 import numpy as np
 
-from ..declare import model, parameter
-from ..errors import OutOfReach, ParameterError
-from ..ops import Value
+from ..core.arrays import Array
+from ..core.errors import OutOfReach, ParameterError
+from ..core.model import model, parameter
+from ..core.ops import Value
 from .base import Geometry
 from .circular_arc import CircularArc
-from .meridian import Array, Meridian, Profile, Segment
+from .meridian import Meridian, Profile, Segment
 
 
 def refuse_beyond(contraction: Value, reach: tuple[float, float], owner: str, why: str = "") -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ..ops import Value
+from ..core.ops import Value
 
 TERMS = 18
 """Terms kept: the first left out is below 1e-18 of the sum for |w| <= 45, all that a meridian asks for."""

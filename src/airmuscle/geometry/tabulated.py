@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from ..declare import model, parameter
-from ..errors import ParameterError
-from ..ops import Value
+from ..core.errors import ParameterError
+from ..core.model import model, parameter
+from ..core.ops import Value
 from .base import Geometry
 
 

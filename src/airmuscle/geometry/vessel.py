@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from ..declare import model, parameter
-from ..ops import Value
+from ..core.model import model, parameter
+from ..core.ops import Value
 from .base import Geometry
 
 

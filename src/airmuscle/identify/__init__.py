@@ -1,32 +1,47 @@
 """Parameters from measurements: `fit` and what it returns, `compare` and what stands around them."""
 
-from .band import Band as Band
-from .band import band as band
-from .bootstrap import Bootstrap as Bootstrap
-from .bootstrap import bootstrap as bootstrap
-from .candidates import Candidate as Candidate
-from .candidates import standard_candidates as standard_candidates
-from .censoring import UNCENSORED as UNCENSORED
-from .censoring import Censoring as Censoring
-from .compare import Comparison as Comparison
-from .compare import compare as compare
-from .convert import Conversion as Conversion
-from .convert import convert as convert
-from .fit import fit as fit
-from .leave_out import Blocks as Blocks
-from .leave_out import LeaveOut as LeaveOut
-from .leave_out import Levels as Levels
-from .leave_out import Runs as Runs
-from .leave_out import Specimens as Specimens
-from .loss import Huber as Huber
-from .loss import LeastSquares as LeastSquares
-from .loss import Loss as Loss
-from .loss import SoftL1 as SoftL1
-from .profile import Profile as Profile
-from .profile import profile as profile
-from .profile import weakly_determined as weakly_determined
-from .result import Estimate as Estimate
-from .result import Fit as Fit
-from .surface.shape import ShapedFit as ShapedFit
-from .surface.shape import fit_shaped as fit_shaped
-from .surface.shape import shape_breaks as shape_breaks
+from .band import Band, band
+from .bootstrap import Bootstrap, bootstrap
+from .candidates import Candidate, standard_candidates
+from .censoring import UNCENSORED, Censoring
+from .compare import Comparison, compare
+from .convert import Conversion, convert
+from .fit import fit
+from .leave_out import Blocks, LeaveOut, Levels, Runs, Specimens
+from .loss import Huber, LeastSquares, Loss, SoftL1
+from .profile import Profile, profile, weakly_determined
+from .result import Estimate, Fit
+from .surface.shape import ShapedFit, fit_shaped, shape_breaks
+
+__all__ = [
+    "UNCENSORED",
+    "Band",
+    "Blocks",
+    "Bootstrap",
+    "Candidate",
+    "Censoring",
+    "Comparison",
+    "Conversion",
+    "Estimate",
+    "Fit",
+    "Huber",
+    "LeastSquares",
+    "LeaveOut",
+    "Levels",
+    "Loss",
+    "Profile",
+    "Runs",
+    "ShapedFit",
+    "SoftL1",
+    "Specimens",
+    "band",
+    "bootstrap",
+    "compare",
+    "convert",
+    "fit",
+    "fit_shaped",
+    "profile",
+    "shape_breaks",
+    "standard_candidates",
+    "weakly_determined",
+]

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import IdentificationError
+from ..core.arrays import Array
+from ..core.errors import IdentificationError
 from ..recording import Recording
-from .loss import Array
 from .problem import RESTING_LENGTH
 from .result import Fit
 

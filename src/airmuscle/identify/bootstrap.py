@@ -9,12 +9,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from .. import declare
 from ..characteristic.base import Characteristic
-from ..errors import IdentificationError
+from ..core import tree
+from ..core.arrays import Array
+from ..core.errors import IdentificationError
 from ..recording import Recording
 from .leave_out import LeaveOut, natural
-from .loss import Array, LeastSquares
+from .loss import LeastSquares
 from .problem import Problem
 from .result import Fit
 from .solve import design, is_linear, solve
@@ -48,7 +49,7 @@ class Bootstrap:
 
     def model(self, refit: int) -> Characteristic:
         """The law of one refit."""
-        law: Characteristic = declare.rebuild(self.fit.problem.law, self.fit.problem.leaf_values(self.values[refit]))
+        law: Characteristic = tree.rebuild(self.fit.problem.law, self.fit.problem.leaf_values(self.values[refit]))
         return law
 
 

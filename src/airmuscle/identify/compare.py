@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from ..characteristic.base import Characteristic
-from ..errors import AirmuscleError, IdentificationError
+from ..core.arrays import Array
+from ..core.errors import AirmuscleError, IdentificationError
 from ..recording import Recording
 from .candidates import Candidate, standard_candidates
 from .fit import fit
 from .force_of import force_of
 from .leave_out import Labels, LeaveOut, natural, parts
-from .loss import Array, LeastSquares, Loss
+from .loss import LeastSquares, Loss
 from .result import Fit
 
 

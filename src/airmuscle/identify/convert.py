@@ -9,11 +9,11 @@ import numpy as np
 
 from ..characteristic.base import Characteristic
 from ..characteristic.box import Box
-from ..errors import IdentificationError, NoSolution
+from ..core.arrays import Array
+from ..core.errors import IdentificationError, NoSolution
 from ..recording import Recording
 from .censoring import UNCENSORED
 from .fit import fit
-from .loss import Array
 
 POINTS = 24
 """Pressures and contractions that the other law is fitted to; one more of each judges it."""

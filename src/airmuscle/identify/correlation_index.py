@@ -8,7 +8,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import IdentificationError
+from ..core.errors import IdentificationError
 
 
 @dataclasses.dataclass(frozen=True)

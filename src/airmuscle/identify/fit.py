@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .. import declare
 from ..characteristic.base import Characteristic
-from ..errors import IdentificationError, ParameterError
+from ..core import tree
+from ..core.arrays import Array
+from ..core.errors import IdentificationError, ParameterError
 from ..recording import Recording
 from .censoring import Censoring, censoring_of, within_sensor
 from .correlation_index import correlation_index
-from .loss import Array, LeastSquares, Loss
+from .loss import LeastSquares, Loss
 from .problem import RESTING_LENGTH, Problem, answers, direction_of, pose
 from .result import Estimate, Extreme, Fit
 from .solve import Solution, solve
@@ -153,7 +154,7 @@ def _result(
     problem: Problem, solution: Solution, found: Statistics, loss: Loss, dropped: int, notes: tuple[str, ...]
 ) -> Fit:
     data, quantity = problem.data, problem.direction.quantity
-    model = declare.with_parameters(problem.law, problem.leaf_values(solution.values))
+    model = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
     clamped = answers(model, quantity, problem.direction.arguments, data)
     measured = problem.sides == 0
     errors = clamped - data[quantity]
@@ -176,7 +177,7 @@ def _result(
         recording=data,
         direction=problem.direction,
         sides=problem.sides,
-        problem=dataclasses.replace(problem, law=model, leaves=tuple(declare.leaves(model))),
+        problem=dataclasses.replace(problem, law=model, leaves=tuple(tree.leaves(model))),
         loss=loss,
         notes=notes,
     )

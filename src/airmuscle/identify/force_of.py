@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..characteristic.base import ContractionLaw, ForceLaw
-from .loss import Array
+from ..core.arrays import Array
 
 LEVELS = 801
 """Forces tried between zero and the ceiling; between two of them the law is taken as straight."""

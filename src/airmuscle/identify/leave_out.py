@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import IdentificationError, ParameterError
+from ..core.errors import IdentificationError, ParameterError
 from ..recording import Recording
 
 Labels = npt.NDArray[np.str_]

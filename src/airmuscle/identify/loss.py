@@ -6,11 +6,9 @@ import abc
 import dataclasses
 
 import numpy as np
-import numpy.typing as npt
 
-from ..errors import ParameterError
-
-Array = npt.NDArray[np.float64]
+from ..core.arrays import Array
+from ..core.errors import ParameterError
 
 
 class Loss(abc.ABC):

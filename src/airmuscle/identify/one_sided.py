@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .loss import Array
+from ..core.arrays import Array
 from .problem import Problem
 
 RANK_TOLERANCE = 1e-10

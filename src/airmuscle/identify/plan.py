@@ -16,13 +16,13 @@ import numpy.typing as npt
 
 from ..characteristic.base import Characteristic
 from ..characteristic.box import Box
-from ..errors import IdentificationError, ParameterError
+from ..core.arrays import Array
+from ..core.errors import IdentificationError, ParameterError
 from ..recording import Recording
 from .censoring import UNCENSORED
 from .dynamic.identifiable import EXACT, Undetermined, identifiable
 from .problem import pose
 
-Array = npt.NDArray[np.float64]
 LEVELS = 13
 """Levels of pressure, and of contraction, among the candidates; chosen."""
 FEWEST = 3

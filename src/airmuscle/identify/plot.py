@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..figures import BLACK, BLUE, RED, new_figure
+from ..core.plotting import BLACK, BLUE, RED, new_figure
 from .result import Fit
 
 _SHOWN = {"force": (1.0, "N"), "contraction": (100.0, "%"), "pressure": (1e-3, "kPa")}

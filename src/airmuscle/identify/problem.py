@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .. import declare, trace
 from ..characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
-from ..declare import Leaf
-from ..errors import IdentificationError, ParameterError, suggestion
+from ..core import autodiff, tree
+from ..core.arrays import Array
+from ..core.errors import IdentificationError, ParameterError, suggestion
+from ..core.tree import Leaf
 from ..recording import Recording
 from ..recording.columns import QUANTITIES
 from .censoring import Censoring
 
-Array = npt.NDArray[np.float64]
 RESTING_LENGTH = "resting_length"
 """Column of the length of muscle by row, in data of several specimens."""
 
@@ -50,8 +50,8 @@ def by_specimen(law: Any, data: Recording) -> list[tuple[Any, npt.NDArray[np.int
 
 def _of_length(law: Any, length: float) -> Any:
     """As `law.of_length`, but unchecked: a search may pass where the law has no meaning."""
-    leaves = declare.leaves(law)
-    return declare.rebuild(law, [length if leaf.path == RESTING_LENGTH else leaf.value for leaf in leaves])
+    leaves = tree.leaves(law)
+    return tree.rebuild(law, [length if leaf.path == RESTING_LENGTH else leaf.value for leaf in leaves])
 
 
 def answers(law: Any, method: str, arguments: tuple[str, str], data: Recording) -> Array:
@@ -121,7 +121,7 @@ class Problem:
 
     def modelled(self, values: Array) -> Array:
         """What the law gives with these parameters; shape (N,)."""
-        law = declare.rebuild(self.law, self.leaf_values(values))
+        law = tree.rebuild(self.law, self.leaf_values(values))
         with np.errstate(all="ignore"):  # what is not finite is refused, or the search steps back from it
             return answers(law, self.direction.method, self.direction.arguments, self.data)
 
@@ -137,11 +137,11 @@ class Problem:
     def slopes(self, values: Array) -> Array:
         """The derivatives of `modelled` by the free parameters, shape (N, P): exact where the law can be traced."""
         if _can_be_traced(self.law):
-            law = declare.rebuild(self.law, self.leaf_values(values))
+            law = tree.rebuild(self.law, self.leaf_values(values))
             found = np.empty((len(self.data), len(self.leaves)))
             for specimen, rows in by_specimen(law, self.data):
                 arguments = (values[rows] for values in self.arguments)
-                found[rows] = trace.jacobian(specimen, self.direction.method, *arguments)[1]
+                found[rows] = autodiff.jacobian(specimen, self.direction.method, *arguments)[1]
             return found[:, list(self.free)]
         return self._differences(values)
 
@@ -164,7 +164,7 @@ def _can_be_traced(thing: Any) -> bool:
     if not dataclasses.is_dataclass(kind):
         return True
     inside = (getattr(thing, field.name) for field in dataclasses.fields(thing))
-    return trace.is_traceable(kind) and all(_can_be_traced(item) for item in inside)
+    return autodiff.is_traceable(kind) and all(_can_be_traced(item) for item in inside)
 
 
 def pose(law: Characteristic, data: Recording, censoring: Censoring, weights: Array, fixed: Collection[str]) -> Problem:
@@ -176,7 +176,7 @@ def pose(law: Characteristic, data: Recording, censoring: Censoring, weights: Ar
         goal = np.where(sides > 0, censoring.least_force, np.where(sides < 0, censoring.greatest_force, goal))
     elif direction is PRESSURE:
         sides = -sides  # where the force is less than stated, the pressure that would hold it is more
-    leaves = tuple(declare.leaves(law))
+    leaves = tuple(tree.leaves(law))
     _refuse_unknown(law, leaves, fixed)
     free = tuple(i for i, leaf in enumerate(leaves) if leaf.declared.fitted and not _is_fixed(leaf, fixed))
     measured = int(np.count_nonzero(sides == 0))

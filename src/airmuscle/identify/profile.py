@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from ..errors import IdentificationError
+from ..core.errors import IdentificationError
 from .loss import LeastSquares
 from .problem import Problem
 from .result import Fit

@@ -11,11 +11,12 @@ import numpy.typing as npt
 
 from ..characteristic.base import Characteristic
 from ..characteristic.box import Box
-from ..errors import ParameterError, suggestion
+from ..core.arrays import Array
+from ..core.errors import ParameterError, suggestion
 from ..recording import Recording
 from .correlation_index import CorrelationIndex
 from .loss import Loss
-from .problem import CONTRACTION, FORCE, Array, Direction, Problem, answers
+from .problem import CONTRACTION, FORCE, Direction, Problem, answers
 
 
 @dataclasses.dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .loss import Array
+from ..core.arrays import Array
 from .one_sided import least_squares_of
 from .problem import Problem
 

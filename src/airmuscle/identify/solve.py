@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..declare import Leaf
-from ..errors import IdentificationError
-from .loss import Array, LeastSquares, Loss
+from ..core.arrays import Array
+from ..core.errors import IdentificationError
+from ..core.tree import Leaf
+from .loss import LeastSquares, Loss
 from .one_sided import least_squares_of, measured_alone_determine
 from .problem import Problem
 from .separable import linear_leaves, projected_start

@@ -7,8 +7,9 @@ import dataclasses
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import IdentificationError
-from .loss import Array, Loss
+from ..core.arrays import Array
+from ..core.errors import IdentificationError
+from .loss import Loss
 from .one_sided import RANK_TOLERANCE, measured_rank
 from .problem import Problem
 from .solve import Solution

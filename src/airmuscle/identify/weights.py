@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import ColumnError
+from ..core.arrays import Array
+from ..core.errors import ColumnError
 from ..recording import Recording
 from ..recording.segment import sensors
-from .loss import Array
 
 APART = 2.0
 """Ratio of neighbouring deviations from which on two sensors differ (chosen: one sensor's estimates scatter less)."""

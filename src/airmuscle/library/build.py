@@ -15,8 +15,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..declare import Parameter, field_or_suggestion, parameters
-from ..errors import ParameterError
+from ..core.errors import ParameterError
+from ..core.model import Parameter, field_or_suggestion, parameters
 from .models import model_class
 from .place import Place, number, refuse_unknown, said_at, text
 

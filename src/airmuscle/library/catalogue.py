@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import AirmuscleWarning, FileError, UnknownName, suggestion
+from ..core.errors import AirmuscleWarning, FileError, UnknownName, suggestion
 from .entry import Check, Entry
 from .read import entry_from
 from .write import save, to_toml

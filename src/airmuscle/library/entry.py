@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from ..characteristic.base import Characteristic, ForceLaw
 from ..characteristic.box import Box
-from ..errors import UnknownName
+from ..core.errors import UnknownName
+from ..core.reference import Reference
 from ..geometry.base import Geometry
-from ..reference import Reference
 
 if TYPE_CHECKING:
     from ..friction.base import Friction

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from .. import units
-from ..errors import AirmuscleError, ParameterError, suggestion
+from ..core import units
+from ..core.errors import AirmuscleError, ParameterError, suggestion
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,11 +8,11 @@ from typing import Any
 
 from ..characteristic.base import Characteristic
 from ..characteristic.box import Box
-from ..errors import ParameterError, suggestion
+from ..core.errors import ParameterError, suggestion
+from ..core.reference import Reference
 from ..friction.base import Friction
 from ..geometry.base import Geometry
 from ..muscle import CreepElements, Damper, Series, Spring, Stop, Wall
-from ..reference import Reference
 from .build import build
 from .entry import Check, Entry
 from .place import Place, checked, finite, refuse_unknown, text

@@ -20,12 +20,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..circuit.orifice import Orifice
-from ..declare import model, parameter, parameters
-from ..errors import AirmuscleWarning, ParameterError, UnknownName, suggestion
-from ..gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
-from ..reference import Reference
-from ..units import ABSOLUTE
+from ..core.errors import AirmuscleWarning, ParameterError, UnknownName, suggestion
+from ..core.model import model, parameter, parameters
+from ..core.reference import Reference
+from ..core.units import ABSOLUTE
+from ..pneumatics.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
+from ..pneumatics.orifice import Orifice
 from .build import build
 from .catalogue import complete, parsed
 from .entry import Check

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileError, ParameterError
+from ..core.errors import FileError, ParameterError
 from .entry import OPTIONAL, Check, Entry
 
 

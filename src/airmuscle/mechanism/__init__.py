@@ -1,18 +1,35 @@
 """What a muscle pulls at."""
 
-from .antagonistic_joint import AntagonisticJoint as AntagonisticJoint
-from .base import Coordinate as Coordinate
-from .base import Mechanism as Mechanism
-from .hanging_mass import HangingMass as HangingMass
-from .held import Held as Held
-from .in_series import InSeries as InSeries
-from .isometric import Isometric as Isometric
-from .isotonic import Isotonic as Isotonic
-from .lever import Lever as Lever
-from .mounted import Mounted as Mounted
-from .prescribed import Prescribed as Prescribed
-from .pulley import Pulley as Pulley
-from .spring_load import SpringLoad as SpringLoad
-from .stopped import Stopped as Stopped
-from .stopped import StoppedJoint as StoppedJoint
-from .wrapper import Wrapper as Wrapper
+from .antagonistic_joint import AntagonisticJoint
+from .base import Coordinate, Mechanism
+from .hanging_mass import HangingMass
+from .held import Held
+from .in_series import InSeries
+from .isometric import Isometric
+from .isotonic import Isotonic
+from .lever import Lever
+from .mounted import Mounted
+from .prescribed import Prescribed
+from .pulley import Pulley
+from .spring_load import SpringLoad
+from .stopped import Stopped, StoppedJoint
+from .wrapper import Wrapper
+
+__all__ = [
+    "AntagonisticJoint",
+    "Coordinate",
+    "HangingMass",
+    "Held",
+    "InSeries",
+    "Isometric",
+    "Isotonic",
+    "Lever",
+    "Mechanism",
+    "Mounted",
+    "Prescribed",
+    "Pulley",
+    "SpringLoad",
+    "Stopped",
+    "StoppedJoint",
+    "Wrapper",
+]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from .. import ops
-from ..declare import model, parameter
-from ..ops import Value
+from ..core import ops
+from ..core.model import model, parameter
+from ..core.ops import Value
 from .base import Coordinate, Mechanism
 
 

@@ -6,9 +6,9 @@ import abc
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-from .. import trace
-from ..ops import Value
-from ..variables import Input
+from ..core import autodiff
+from ..core.ops import Value
+from ..core.variables import Input
 
 INFINITY = float("inf")
 
@@ -64,7 +64,7 @@ class Mechanism(abc.ABC):
         names = [c.name for c in self.coordinates]
         if not names:
             return tuple(0.0 for _ in resting_lengths)
-        rates = trace.directional(
+        rates = autodiff.directional(
             lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths),
             [q[name] for name in names],
             [v[c.speed] for c in self.coordinates],
@@ -81,7 +81,7 @@ class Mechanism(abc.ABC):
         names = [c.name for c in self.coordinates]
         if not names:
             return {}
-        found = trace.pulled_back(
+        found = autodiff.pulled_back(
             lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths),
             [q[name] for name in names],
             [tension * length for tension, length in zip(tensions, resting_lengths, strict=True)],

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..declare import model
-from ..ops import Value
-from ..variables import Input
+from ..core.model import model
+from ..core.ops import Value
+from ..core.variables import Input
 from .base import Mechanism
 from .wrapper import Wrapper
 

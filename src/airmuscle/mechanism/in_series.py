@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..declare import model, parameter, refuse_misplaced
-from ..errors import ParameterError
-from ..ops import Value
+from ..core.errors import ParameterError
+from ..core.model import model, parameter, refuse_misplaced
+from ..core.ops import Value
 from .base import Coordinate, Mechanism
 from .hanging_mass import STANDARD_GRAVITY
 from .wrapper import Wrapper

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..declare import model, parameter
-from ..ops import Value
+from ..core.model import model, parameter
+from ..core.ops import Value
 from .base import Coordinate, Mechanism
 
 

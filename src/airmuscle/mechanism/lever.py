@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from .. import ops
-from ..declare import model, parameter
-from ..errors import ParameterError
-from ..ops import Value
+from ..core import ops
+from ..core.errors import ParameterError
+from ..core.model import model, parameter
+from ..core.ops import Value
 from .base import Coordinate, Mechanism
 from .hanging_mass import STANDARD_GRAVITY
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..declare import model, parameter
-from ..errors import ParameterError
-from ..ops import Value
+from ..core.errors import ParameterError
+from ..core.model import model, parameter
+from ..core.ops import Value
 from .base import Mechanism
 from .wrapper import Wrapper
 

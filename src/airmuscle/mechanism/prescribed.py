@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..declare import model
-from ..ops import Value
-from ..variables import Input
+from ..core.model import model
+from ..core.ops import Value
+from ..core.variables import Input
 from .base import Coordinate, Mechanism
 
 
@@ -15,7 +15,7 @@ class Prescribed(Mechanism):
     """y'' = a(t), whatever the muscles pull; the drive takes up the work F y'.
 
     y position from where the muscle has its resting length, a the input. Inputs are linear between instants, so that
-    y can follow any cubic spline exactly: `airmuscle.motion.follow` gives its accelerations and its start.
+    y can follow any cubic spline exactly: `airmuscle.control.trajectory.follow` gives its accelerations and its start.
     """
 
     @property

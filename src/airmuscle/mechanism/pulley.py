@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..declare import model, parameter
-from ..ops import Value
+from ..core.model import model, parameter
+from ..core.ops import Value
 from .hanging_mass import STANDARD_GRAVITY
 from .translation import Translation
 

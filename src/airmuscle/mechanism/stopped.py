@@ -6,12 +6,12 @@ import abc
 from collections.abc import Mapping
 from typing import ClassVar
 
-from .. import ops
-from ..contact import HuntCrossley
-from ..declare import model, parameter, refuse_misplaced
-from ..errors import ParameterError
-from ..ops import Value
+from ..core import ops
+from ..core.errors import ParameterError
+from ..core.model import model, parameter, refuse_misplaced
+from ..core.ops import Value
 from .base import Coordinate, Mechanism
+from .contact import HuntCrossley
 from .wrapper import Wrapper
 
 

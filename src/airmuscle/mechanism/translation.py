@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 from collections.abc import Mapping, Sequence
 
-from ..ops import Value
+from ..core.ops import Value
 from .base import Coordinate, Mechanism
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..ops import Value
-from ..variables import Input
+from ..core.ops import Value
+from ..core.variables import Input
 from .base import Coordinate, Mechanism
 
 

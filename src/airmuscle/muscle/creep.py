@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..declare import model, parameter
-from ..errors import ParameterError
-from ..ops import Value
-from ..variables import StateVariable
+from ..core.errors import ParameterError
+from ..core.model import model, parameter
+from ..core.ops import Value
+from ..core.variables import StateVariable
 
 
 @model

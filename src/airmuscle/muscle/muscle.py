@@ -6,18 +6,18 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import ClassVar, NamedTuple
 
-from .. import ops, trace
 from ..characteristic.base import Characteristic, ForceLaw
 from ..characteristic.box import Box
 from ..characteristic.contractile_surface import HOSOVSKY_HILL
 from ..characteristic.virtual_work import VirtualWork
-from ..declare import model
-from ..errors import ParameterError
+from ..core import autodiff, ops
+from ..core.errors import ParameterError
+from ..core.model import model
+from ..core.ops import Value
+from ..core.reference import Reference
+from ..core.variables import StateVariable
 from ..friction.base import Friction, NoFriction
 from ..geometry.base import Geometry
-from ..ops import Value
-from ..reference import Reference
-from ..variables import StateVariable
 from .creep import CreepElements
 from .damper import Damper, LinearDamper
 from .series import RigidSeries, Series, SeriesSpring
@@ -202,4 +202,4 @@ class Muscle:
         With shut valves the pressure rises as the muscle is pulled, and it is stiffer: module `stiffness`. Friction is
         left out: its bristles add theirs until they slide.
         """
-        return -trace.slope(self, "static", pressure, contraction, wrt=1)
+        return -autodiff.slope(self, "static", pressure, contraction, wrt=1)

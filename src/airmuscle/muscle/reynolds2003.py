@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from .. import ops
 from ..characteristic.reynolds2003 import REYNOLDS_2003
-from ..declare import model, parameter
-from ..ops import Value
-from ..reference import Reference
+from ..core import ops
+from ..core.model import model, parameter
+from ..core.ops import Value
+from ..core.reference import Reference
 from .damper import Damper
 from .spring import Spring
 

@@ -6,15 +6,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from .. import trace
-from ..ops import Value
+from ..core import autodiff
+from ..core.arrays import Array
+from ..core.ops import Value
 
 if TYPE_CHECKING:
     from .muscle import Muscle
 
-Array = npt.NDArray[np.float64]
 CLOSE = 1e-15
 """Contractions that differ by less than this are one (chosen, a few roundings)."""
 MOST = 200
@@ -43,7 +42,7 @@ def _unbalance(muscle: Muscle) -> Callable[[Value, Value, Value], tuple[Array, A
     """What is out of balance inside and its slope by the inner contraction, which is not known of a law that is not
     closed-form."""
     if muscle.contractile.traceable and muscle.geometry.traceable:
-        return trace.with_slope(muscle, "unbalance_inside", 3, wrt=1)
+        return autodiff.with_slope(muscle, "unbalance_inside", 3, wrt=1)
 
     def without_slope(pressure: Value, inner: Value, contraction: Value) -> tuple[Array, Array]:
         value = np.asarray(muscle.unbalance_inside(pressure, inner, contraction), dtype=float)

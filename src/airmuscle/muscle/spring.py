@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import abc
 
-from ..declare import model, parameter
-from ..ops import Value
+from ..core.model import model, parameter
+from ..core.ops import Value
 
 
 class Spring(abc.ABC):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import abc
 
-from .. import ops
-from ..contact import HuntCrossley
-from ..declare import model, parameter
-from ..ops import Value
+from ..core import ops
+from ..core.model import model, parameter
+from ..core.ops import Value
+from ..mechanism.contact import HuntCrossley
 
 
 class Stop(abc.ABC):

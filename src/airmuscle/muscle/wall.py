@@ -5,10 +5,10 @@ from __future__ import annotations
 import abc
 from collections.abc import Mapping
 
-from .. import ops
-from ..declare import model, parameter
-from ..ops import Value
-from ..variables import StateVariable
+from ..core import ops
+from ..core.model import model, parameter
+from ..core.ops import Value
+from ..core.variables import StateVariable
 
 
 class Wall:

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ..errors import AirmuscleWarning, UnitError
-from ..units import conversion
+from ..core.errors import AirmuscleWarning, UnitError
+from ..core.units import conversion
 from .columns import quantity_of
 from .recording import Recording
 

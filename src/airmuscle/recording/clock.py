@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .recording import Array
+from ..core.arrays import Array
 
 _GERMAN = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[ T](.+)")
 _CLOCK = re.compile(r"(\d{1,3}):(\d{2}):(\d{2}(?:\.\d+)?)")

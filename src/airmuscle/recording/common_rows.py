@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ColumnError
+from ..core.arrays import Array
+from ..core.errors import ColumnError
 from .heading import known_name
-from .recording import Array
 from .table import Cells, RawTable
 
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ColumnError
-from ..units import conversion, quantity
-from .recording import Array
+from ..core.arrays import Array
+from ..core.errors import ColumnError
+from ..core.units import conversion, quantity
 from .table import RawTable
 
 UNITS = {"resting_length": "m", "ambient": "Pa"}

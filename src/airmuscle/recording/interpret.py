@@ -10,14 +10,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..errors import ColumnError, UnitError, suggestion
-from ..units import AMBIENT_PRESSURE, Conversion, conversion
+from ..core.arrays import Array
+from ..core.errors import ColumnError, UnitError, suggestion
+from ..core.units import AMBIENT_PRESSURE, Conversion, conversion
 from .clock import seconds_from_clock
 from .columns import QUANTITIES
 from .constants import constant_of_column, stated_constants
 from .heading import SPELLINGS, Heading, known_name, read_heading
 from .plausible import refuse_implausible
-from .recording import Array, Recording
+from .recording import Recording
 from .table import Cells, RawTable
 
 STANDARD_GRAVITY = 9.80665

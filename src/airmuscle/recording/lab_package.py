@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..errors import AirmuscleError, FileError
+from ..core.errors import AirmuscleError, FileError
 
 Read = TypeVar("Read")
 

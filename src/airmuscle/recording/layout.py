@@ -6,8 +6,8 @@ import json
 import re
 from collections.abc import Sequence
 
-from ..errors import ColumnError, UnitError
-from ..units import conversion
+from ..core.errors import ColumnError, UnitError
+from ..core.units import conversion
 from .heading import read_heading
 
 _REMARK = re.compile(r"[#%]\s*(?P<name>[A-Za-z_]\w*)(?:\s*\[(?P<unit>[^\]]*)\])?\s*[=:]\s*(?P<value>.+)")

@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import ColumnError, FileError, ParameterError, suggestion
+from ..core.errors import ColumnError, FileError, ParameterError, suggestion
 from .columns import QUANTITIES
 from .constants import constant_name
 from .heading import read_heading

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..errors import ColumnError
-from .recording import Array
+from ..core.arrays import Array
+from ..core.errors import ColumnError
 from .table import RawTable
 
 CONTRACTIONS = (-0.5, 1.0)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..figures import LINES, new_figure
+from ..core.plotting import LINES, new_figure
 from .columns import quantity_of
 from .recording import Recording
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import ColumnError, FileError
+from ..core.errors import ColumnError, FileError
 from .table import Cells, RawTable
 from .text_form import Head, Lines, TextForm, cells_of, encoding_of, head_of, holds_something, is_comment
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ColumnError, FileError, suggestion
+from ..core.errors import ColumnError, FileError, suggestion
 from .lab_package import lab_package, opened
 from .layout import are_headings, refuse_headless, remark, unit_row
 from .table import Cells, RawTable

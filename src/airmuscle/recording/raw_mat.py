@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ColumnError, FileError, suggestion
+from ..core.errors import ColumnError, FileError, suggestion
 from .common_rows import Channel, common_rows
 from .lab_package import lab_package, opened
 from .table import RawTable

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileError, suggestion
+from ..core.arrays import Array
+from ..core.errors import FileError, suggestion
 from .common_rows import Channel, common_rows
 from .lab_package import lab_package, opened
-from .recording import Array
 from .table import RawTable
 
 

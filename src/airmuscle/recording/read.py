@@ -6,7 +6,7 @@ import glob
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from ..errors import FileError
+from ..core.errors import FileError
 from .agreement import refuse_contradiction
 from .interpret import interpret
 from .large_csv import Progress, is_large, large_csv

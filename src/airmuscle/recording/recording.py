@@ -7,17 +7,15 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ..errors import ColumnError, suggestion
-from ..units import conversion
+from ..core.arrays import Array
+from ..core.errors import ColumnError, suggestion
+from ..core.units import conversion
 from .columns import quantity_of
 from .heading import stated_unit
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

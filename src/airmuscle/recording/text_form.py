@@ -7,7 +7,7 @@ import csv
 import dataclasses
 from collections.abc import Mapping
 
-from ..errors import FileError, ParameterError
+from ..core.errors import FileError, ParameterError
 from .layout import are_headings, refuse_headless, remark, unit_row
 
 Lines = list[tuple[int, str]]

@@ -9,7 +9,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import ParameterError
+from ..core.errors import ParameterError
 from .table import Cells, RawTable
 
 

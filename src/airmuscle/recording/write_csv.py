@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 from typing import TextIO
 
-from ..errors import FileError, ParameterError
+from ..core.errors import FileError, ParameterError
 from .recording import Recording, header
 
 _UNITS = {"resting_length": "m", "ambient": "Pa"}

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .. import figures
-from ..errors import IdentificationError
+from ..core import plotting
+from ..core.errors import IdentificationError
 from ..recording import Recording
 from .chapter import Plot
 from .levels import levels_of
@@ -42,7 +42,7 @@ def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
 
     answer, roles = fit.direction.quantity, _ROLES[fit.direction.quantity]
     levels = levels_of(fit.recording[roles.held], MOST)
-    figure, (left, right) = figures.new_figure(1, 2, width=7.4, height=3.7)
+    figure, (left, right) = plotting.new_figure(1, 2, width=7.4, height=3.7)
     (factor, unit), (across, across_unit) = _DRAWN[answer], _DRAWN[roles.along]
     for i, level in enumerate(levels):
         points = _along(fit, roles, float(level))
@@ -50,10 +50,10 @@ def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
             law, reading = (band(fit, points, level=LEVEL, reading=r) for r in (False, True))
         except IdentificationError:
             return None
-        colour = figures.LINES[i % len(figures.LINES)]
+        colour = plotting.LINES[i % len(plotting.LINES)]
         x = across * np.where(law.value < 0 if answer == "force" else False, np.nan, points[roles.along])
         scale, word = _DRAWN[roles.held]
-        style = {"color": colour, "linestyle": figures.DASHES[i % 5]}
+        style = {"color": colour, "linestyle": plotting.DASHES[i % 5]}
         left.plot(x, factor * law.value, label=f"{scale * level:.4g} {word}", **style)
         left.fill_between(x, factor * reading.low, factor * reading.high, color=colour, alpha=0.15, linewidth=0)
         left.fill_between(x, factor * law.low, factor * law.high, color=colour, alpha=0.35, linewidth=0)
@@ -62,7 +62,7 @@ def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
     _points(left, fit, roles, factor, across)
     left.set(xlabel=f"{roles.along} [{across_unit}]", ylabel=f"{answer} [{unit}]")
     right.set(xlabel=f"{roles.along} [{across_unit}]", ylabel=f"half width of the band [{unit}]", ylim=(0.0, None))
-    figures.legend_below(figure, left, columns=MOST + 1)
+    plotting.legend_below(figure, left, columns=MOST + 1)
     return Plot(name, _CAPTION, figure)
 
 
@@ -84,7 +84,7 @@ def _along(fit: Fit, roles: _Roles, level: float) -> Recording:
 
 def _points(axes: Any, fit: Fit, roles: _Roles, factor: float, across: float) -> None:
     measured = fit.recording.rows(fit.sides == 0)
-    style = {"marker": ".", "linestyle": "none", "markersize": 2, "color": figures.BLACK, "alpha": 0.35}
+    style = {"marker": ".", "linestyle": "none", "markersize": 2, "color": plotting.BLACK, "alpha": 0.35}
     axes.plot(across * measured[roles.along], factor * measured[fit.direction.quantity], label="measured", **style)
     values = factor * measured[fit.direction.quantity]
     margin = 0.08 * float(np.ptp(values)) or 1.0

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..reference import Reference
+from ..core.reference import Reference
 
 HOLDS, DIFFERS, NOT_PRINTED = "holds", "differs", "not printed"
 

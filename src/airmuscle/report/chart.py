@@ -8,17 +8,16 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from .. import figures
 from ..characteristic.base import Characteristic, ContractionLaw
 from ..characteristic.box import Box
-from ..errors import PhysicsError
+from ..core import plotting
+from ..core.arrays import Array
+from ..core.errors import PhysicsError
 from ..recording import Recording
 from .chapter import Plot, Table
 
-Array = npt.NDArray[np.float64]
-DASHES = figures.DASHES[:5]
+DASHES = plotting.DASHES[:5]
 """Those that stay apart on neighbouring curves."""
 SAME_PRESSURE = 0.005
 """Part of the greatest pressure by which a measured point may miss an isobar and still be drawn with it (chosen)."""
@@ -86,7 +85,7 @@ def chart(
 
     `measured` points are drawn with the curve of their pressure.
     """
-    figure, axes = figures.new_figure()
+    figure, axes = plotting.new_figure()
     _draw_isobars(axes, curves, point, measured)
     if box is not None:
         _shade_outside(axes, box, curves)
@@ -99,7 +98,7 @@ def chart(
         ylim=(0.0, 1.06 * _greatest_force(curves, point, measured)),
     )
     axes.set_title(textwrap.fill(title, 60), fontsize=9)
-    figures.legend_outside(axes, title="gauge pressure")
+    plotting.legend_outside(axes, title="gauge pressure")
     caption = f"{title}: force over contraction at constant gauge pressure."
     if point is not None:
         caption += f" Working point: {point_text(point)}."
@@ -124,7 +123,7 @@ def _draw_isobars(axes: Any, curves: Isobars, point: Point | None, measured: Rec
         dashes: Any = DASHES[i % len(DASHES)]
         if measured is not None:
             near = np.abs(measured["pressure"] - pressure) <= SAME_PRESSURE * curves.pressures.max()
-            marker = {"marker": figures.MARKERS[i % len(figures.MARKERS)], "markersize": 4}
+            marker = {"marker": plotting.MARKERS[i % len(plotting.MARKERS)], "markersize": 4}
             at = {"linestyle": "none", "color": shades[i], "clip_on": False, "zorder": 3}
             axes.plot(100 * measured["contraction"][near], measured["force"][near], **marker, **at)
             axes.plot([], [], linestyle="-", linewidth=1.4, **marker, **style)  # line and marker in the legend
@@ -163,7 +162,7 @@ def _mark(axes: Any, characteristic: Characteristic, curves: Isobars, point: Poi
     axes.plot(
         100 * curves.contractions,
         _until_slack(own),
-        color=figures.RED,
+        color=plotting.RED,
         linewidth=2.0,
         label=f"{point.pressure / 1e3:.6g} kPa (given)",
         zorder=3,
@@ -174,7 +173,7 @@ def _mark(axes: Any, characteristic: Characteristic, curves: Isobars, point: Poi
         marker="o",
         markersize=7,
         markerfacecolor="white",
-        markeredgecolor=figures.RED,
+        markeredgecolor=plotting.RED,
         markeredgewidth=1.8,
         linestyle="none",
         label=f"working point\n{point.contraction:.2%}, {point.force:.4g} N",

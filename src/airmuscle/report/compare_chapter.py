@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..figures import BLUE, LINES, MARKERS, legend_outside, new_figure
+from ..core.plotting import BLUE, LINES, MARKERS, legend_outside, new_figure
 from .chapter import Chapter, Plot, Table
 
 if TYPE_CHECKING:

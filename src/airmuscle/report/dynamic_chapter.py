@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..figures import BLACK, BLUE, RED, legend_below, new_figure
+from ..core.plotting import BLACK, BLUE, RED, legend_below, new_figure
+from ..core.reference import cite
 from ..recording.plot import scale
 from ..recording.recording import header
-from ..reference import cite
 from .chapter import Chapter, Plot, Table
 from .uncertainty_chapter import NORMAL
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ..reference import cite
+from ..core.reference import cite
 from .band_plot import band_plot
 from .chapter import Chapter, Plot, Table
 from .chart import chart, isobars

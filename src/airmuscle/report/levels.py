@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from ..core.arrays import Array
 from .chart import SAME_PRESSURE
-
-Array = npt.NDArray[np.float64]
 
 
 def levels_of(values: Array, most: int) -> Array:

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ..command import Segments
-from ..controller import relative_unit
-from ..figures import BLACK, BLUE, legend_below, new_figure
-from ..library.scenario import Scenario, units_of_run
-from ..loop import Loop
+from ..control.controller import relative_unit
+from ..control.inputs import Segments
+from ..control.loop import Loop
+from ..core.plotting import BLACK, BLUE, legend_below, new_figure
 from ..recording import Recording
 from ..recording.plot import scale
+from ..scenario.scenario import Scenario, units_of_run
 from .chapter import Plot, Table
 from .parameters import parameter_table
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..declare import leaves
+from ..core.tree import leaves
 from .chapter import Table
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..command import Command, Periodic, Schedule, Signal
-from ..driver import Driven
-from ..figures import BLACK, BLUE, legend_below, new_figure
-from ..library.scenario import Scenario
-from ..loop import MEASURED, SETPOINT, TOLD, Loop
+from ..control.driver import Driven
+from ..control.inputs import Command, Periodic, Schedule, Signal
+from ..control.loop import MEASURED, SETPOINT, TOLD, Loop
+from ..core.plotting import BLACK, BLUE, legend_below, new_figure
+from ..core.reference import cite
 from ..recording import Recording
-from ..reference import cite
+from ..scenario.scenario import Scenario
 from .chapter import Chapter, Plot
 from .loop_chapter import controller_table, corners, loop_plot
 from .parameters import parameter_table

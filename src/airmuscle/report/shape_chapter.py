@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..figures import DASHES, LINES, legend_outside, new_figure
+from ..core.plotting import DASHES, LINES, legend_outside, new_figure
 from .chapter import Chapter, Plot, Table
 from .levels import levels_of
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..figures import BLACK, BLUE, RED, legend_below, new_figure
+from ..core.plotting import BLACK, BLUE, RED, legend_below, new_figure
 from .chapter import Chapter, Plot, Table
 
 if TYPE_CHECKING:

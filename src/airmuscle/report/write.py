@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from .. import figures
-from ..errors import FileError
+from ..core import plotting
+from ..core.errors import FileError
 from .chapter import Chapter, Table
 from .html import page
 from .staged import staged
@@ -57,7 +57,7 @@ def save_figure(figure: Any, stem: Path) -> None:
     """Write `stem`.svg and `stem`.png."""
     stem.parent.mkdir(parents=True, exist_ok=True)
     for suffix in ("svg", "png"):
-        figures.save(figure, stem.with_name(f"{stem.name}.{suffix}"))
+        plotting.save(figure, stem.with_name(f"{stem.name}.{suffix}"))
 
 
 def save_table(table: Table, path: Path) -> None:

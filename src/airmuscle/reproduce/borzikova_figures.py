@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from .. import trace
 from ..characteristic.base import ContractionLaw
 from ..characteristic.borzikova import PlaneCurves
-from ..figures import BLACK, BLUE, DASHES, LINES, MARKERS, ORANGE, RED, legend_outside, new_figure
+from ..core import autodiff
+from ..core.plotting import BLACK, BLUE, DASHES, LINES, MARKERS, ORANGE, RED, legend_outside, new_figure
+from ..core.units import bar
 from ..identify.surface.basis import LoadBox
 from ..report.chapter import Plot
-from ..units import bar
 from .borzikova_surfaces import EXPONENTIAL, MISPRINT_MENDED, MONOTONE, REPAIRED
 
 PRESSURE, FORCE, CONTRACTION = "gauge pressure [bar]", "force [N]", "contraction [%]"
@@ -148,7 +148,7 @@ def impossible_places(laws: Mapping[str, ContractionLaw]) -> Plot:
         pressure, force = LoadBox.of_law(law).grid(201, 201)
         contraction = 100 * np.asarray(law.contraction(pressure, force))
         for argument, sign, colour in ((1, 1.0, RED), (0, -1.0, BLUE)):
-            slope = sign * trace.slope(law, "contraction", pressure, force, wrt=argument)
+            slope = sign * autodiff.slope(law, "contraction", pressure, force, wrt=argument)
             if (slope > 0).any():
                 axes.contourf(pressure / bar, force, slope, [0.0, np.inf], colors=[colour], alpha=0.3)
         lines = axes.contour(pressure / bar, force, contraction, levels, colors=BLACK, linewidths=0.7)

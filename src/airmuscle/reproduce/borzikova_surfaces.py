@@ -9,7 +9,7 @@ import numpy as np
 
 from ..characteristic.base import ContractionLaw
 from ..characteristic.borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential, PlaneCurves
-from ..errors import AirmuscleWarning
+from ..core.errors import AirmuscleWarning
 from ..identify.correlation_index import CorrelationIndex, correlation_index
 from ..identify.surface.basis import LoadBox
 from ..identify.surface.monotone import monotone

@@ -9,12 +9,12 @@ import numpy as np
 
 from ..characteristic.base import ContractionLaw
 from ..characteristic.borzikova import PlaneCurves
+from ..core.units import bar, percent
 from ..identify.surface.basis import Basis, Chebyshev, LoadBox, Monomials, conditioning
 from ..identify.surface.exponential import SurfaceFit, linearised, nonlinear
 from ..identify.surface.monotone import monotonicity_breaks
 from ..recording import Recording
 from ..report.chapter import Table
-from ..units import bar, percent
 from .borzikova_surfaces import (
     EXPONENTIAL,
     MONOTONE,

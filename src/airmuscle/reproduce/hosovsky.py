@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.energy_defect import maxwell_defect
 from ..characteristic.base import Characteristic
 from ..characteristic.contractile_surface import exponents
-from ..check import maxwell_defect
-from ..figures import LINES, legend_outside, new_figure
+from ..core.plotting import LINES, legend_outside, new_figure
+from ..core.reference import cite
 from ..geometry.base import Geometry
 from ..identify import Fit
 from ..identify.one_sided import measured_rank
 from ..library import catalogue
-from ..reference import cite
 from ..report.chapter import Chapter, Claim, Equal, Plot, Table
 from . import hosovsky_causes as causing
 from . import hosovsky_fill as filling

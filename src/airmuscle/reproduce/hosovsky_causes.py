@@ -11,23 +11,22 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ..circuit import Conduit, DistributedTube, IndexedValve, Orifice, Tube, Valve
-from ..figures import DASHES, LINES, new_figure
-from ..gas import EnergyBalance, Gas, Polytropic
-from ..method import Rodas4
+from ..core.arrays import Array
+from ..core.plotting import DASHES, LINES, new_figure
 from ..muscle import CubicSpring, LaggingWall, LinearSpring, Spring, Wall
-from ..plant import Plant
+from ..plant.plant import Plant
+from ..pneumatics import Conduit, DistributedTube, IndexedValve, Orifice, Tube, Valve
+from ..pneumatics.gas import EnergyBalance, Gas, Polytropic
 from ..recording import Recording
 from ..report.chapter import Plot, Table
-from ..simulate import simulate
+from ..simulation.integrators import Rodas4
+from ..simulation.simulate import simulate
 from .hosovsky_plant import MATRIX, Chosen, Numbers, hanging, plant
 from .hosovsky_schedule import DISCHARGING, DURATION, FILLING, SCHEDULE
 
 SPACING = 4e-3
 """Between two rows [s]."""
-Array = npt.NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True)

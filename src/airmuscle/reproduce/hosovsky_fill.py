@@ -6,13 +6,13 @@ import dataclasses
 
 import numpy as np
 
-from ..circuit import Valve
-from ..figures import BLACK, LINES, new_figure
-from ..method import DormandPrince8, Method, Rodas4
-from ..plant import Plant
+from ..core.plotting import BLACK, LINES, new_figure
+from ..plant.plant import Plant
+from ..pneumatics import Valve
 from ..recording import Recording
 from ..report.chapter import AtMost, Claim, Equal, Plot
-from ..simulate import simulate
+from ..simulation.integrators import DormandPrince8, Method, Rodas4
+from ..simulation.simulate import simulate
 from .hosovsky_plant import MATRIX, PAPER, Numbers, hanging, plant
 from .hosovsky_schedule import DISCHARGING, DURATION, FILLING, SCHEDULE
 

@@ -6,15 +6,15 @@ import dataclasses
 import functools
 
 from ..characteristic.contractile_surface import ContractileSurface
-from ..circuit import Conduit, FillDischarge, Line, Orifice, Supply, Valve
-from ..gas import Ambient, Gas, Isothermal
+from ..core.reference import CHOSEN, Reference
 from ..geometry.braid import Braid
 from ..identify import Fit, fit
 from ..library import catalogue
 from ..mechanism import HangingMass, Held, Mechanism
 from ..muscle import LinearDamper, LinearSpring, Muscle, RigidWall, Spring, Wall
-from ..plant import Plant
-from ..reference import CHOSEN, Reference
+from ..plant.plant import Plant
+from ..pneumatics import Conduit, FillDischarge, Line, Orifice, Supply, Valve
+from ..pneumatics.gas import Ambient, Gas, Isothermal
 
 PAPER = "hosovsky"
 MAPS = ("dmsp-20-300", "festo-tool-dmsp-20")

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..command import Schedule
-from ..figures import DASHES, LINES, legend_below, new_figure
-from ..method import Rodas4
+from ..control.inputs import Schedule
+from ..core.plotting import DASHES, LINES, legend_below, new_figure
 from ..recording import Recording
 from ..report.chapter import AtLeast, AtMost, Claim, Plot, Table
-from ..simulate import simulate
+from ..simulation.integrators import Rodas4
+from ..simulation.simulate import simulate
 from .hosovsky_plant import MAPS, PAPER, Numbers, latched, plant
 
 RELEASED_AT, DURATION = 0.5, 6.0

@@ -12,7 +12,7 @@ import numpy as np
 from ..characteristic.base import Characteristic
 from ..characteristic.exact_meridian import ExactMeridian
 from ..characteristic.saga2007 import RUBBER_TEST_STRAIN, Saga2007
-from ..errors import NoSolution
+from ..core.errors import NoSolution
 from ..report.chapter import AtLeast, AtMost, Claim, Equal, Printed
 from .saga2007_muscle import (
     DEFAULT,

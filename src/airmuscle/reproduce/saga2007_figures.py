@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..characteristic.saga2007 import RUBBER_TEST_STRAIN, Saga2007
-from ..figures import BLACK, DASHES, LINES, legend_outside, new_figure
+from ..core.plotting import BLACK, DASHES, LINES, legend_outside, new_figure
 from ..report.chapter import Plot
 from .saga2007_claims import FIG_2
 from .saga2007_muscle import DEFAULT, READINGS, circle, exact, pressure_along, reading, with_rings

@@ -12,7 +12,7 @@ from ..characteristic.circle_virtual_work import CircleVirtualWork
 from ..characteristic.exact_meridian import ExactMeridian
 from ..characteristic.rubber import AlongArc, RubberLine
 from ..characteristic.saga2007 import LINE_A, LINE_B, Saga2007
-from ..errors import NoSolution
+from ..core.errors import NoSolution
 from ..geometry.fibre_sum import EvenSpread
 from ..geometry.parabola import Parabola
 from ..geometry.pleated import PleatedTube

@@ -10,22 +10,20 @@ import functools
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from .. import trace
 from ..characteristic.rubber import AlongArc, RubberIntegral, RubberLine
-from ..declare import model
+from ..core import autodiff
+from ..core.arrays import Array
+from ..core.model import model
+from ..core.ops import Value
 from ..geometry.catenary import Catenary
 from ..geometry.circular_arc import CircularArc
 from ..geometry.meridian import Segment
 from ..geometry.parabola import Parabola, TrueArcParabola
 from ..geometry.pleated import PleatedTube
 from ..geometry.straight_fibre import FibreTube, StraightFibre
-from ..ops import Value
 from ..report.chapter import Table
 from .saga2007_muscle import DIAMETER, LENGTH, LINES, WALL, exact
-
-Array = npt.NDArray[np.float64]
 
 OUTLINES: dict[str, FibreTube] = {
     "parabola (3)": StraightFibre(LENGTH, DIAMETER, meridian=Parabola()),
@@ -63,7 +61,7 @@ class Stored:
 def _energy_growth(tube: FibreTube, rubber: RubberLine, contraction: Array) -> Array:
     """dU/deps [J] of one segment; the exact outline, which has no formula, by differences."""
     if isinstance(tube, StraightFibre):
-        return np.asarray(trace.slope(Stored(tube, rubber), "energy", contraction))
+        return np.asarray(autodiff.slope(Stored(tube, rubber), "energy", contraction))
 
     if not (rubber.slope or rubber.intercept):
         return np.zeros_like(contraction)

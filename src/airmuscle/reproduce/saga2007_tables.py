@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from .. import trace
 from ..characteristic.saga2007 import RUBBER_TEST_STRAIN, Saga2007
+from ..core import autodiff
 from ..report.chapter import Table
 from . import saga2007_pairs
 from .saga2007_claims import FIG_2
@@ -110,7 +110,7 @@ def virtual_work(law: Saga2007, pressure: float, contraction: Any) -> Any:
     """(p dV/deps - dU/deps)/L_0 [N] with the volume and the rubber's energy of the law's own outline."""
     tube = law.geometry
     stored = saga2007_pairs.Stored(tube, law.rubber)
-    per_segment = trace.slope(stored, "energy", contraction)
+    per_segment = autodiff.slope(stored, "energy", contraction)
     return (pressure * tube.volume_growth(contraction) - tube.segments * per_segment) / LENGTH
 
 

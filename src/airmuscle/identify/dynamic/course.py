@@ -8,17 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ... import declare
-from ...command import Segments
-from ...errors import IdentificationError, ParameterError
-from ...method import INTERRUPTED, Method
-from ...program import System
-from ...sensitive import Sensitive
+from ...compile import System
+from ...control.inputs import Segments
+from ...core import tree
+from ...core.arrays import Array
+from ...core.errors import IdentificationError, ParameterError
+from ...simulation.integrators import INTERRUPTED, Method
+from ...simulation.sensitivity import Sensitive
 from .experiment import Experiment, StartTime, StartValue, Unknown
 from .start import conditions, solved
-
-Array = npt.NDArray[np.float64]
-
 
 MOST_STEPS = 1_000_000
 """Steps after which a run is given up."""
@@ -31,7 +29,7 @@ class Course:
         self, plant: System, experiment: Experiment, number: int, unknowns: Sequence[Unknown],
         observed: Mapping[str, float], method: Method,
     ) -> None:  # fmt: skip
-        from ...program.prepared import prepared  # CasADi, which describing a fit does not need
+        from ...compile.program import prepared  # CasADi, which describing a fit does not need
 
         self.plant, self.experiment, self.method = experiment.plant or plant, experiment, method
         self.unknowns = unknowns
@@ -46,10 +44,10 @@ class Course:
         scales = tuple(unknowns[k].scale for k in self.columns) or (1.0,)
         self.ready = prepared(_sensitive(self.plant, groups, scales, self.names, experiment))
         self._nominal = self.ready.nominal()
-        place = {leaf.path: i for i, leaf in enumerate(declare.leaves(self.plant))}
+        place = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.plant))}
         moved = [(place[path], k) for k in self.mine for path in unknowns[k].paths]
         self._moved = np.array([i for i, _ in moved], dtype=int), np.array([k for _, k in moved], dtype=int)
-        self._leaves = declare.flatten(self.plant)
+        self._leaves = tree.flatten(self.plant)
         self._conditions = conditions(self.plant, experiment.start)
         self._known = np.array(list(experiment.start.known.values()), dtype=float)
         self._own_values = [(j, i) for j, k in enumerate(self.columns) for i in _place_known(unknowns[k], experiment)]
@@ -103,7 +101,7 @@ class Course:
         return Modelled(outputs[:, :count], slopes, steps)
 
     def _outputs(self, values: Array, most_steps: int) -> tuple[Array, npt.NDArray[np.bool_], int]:
-        from ...engine.kernel import evaluate
+        from ...compile.cache.kernel import evaluate
 
         state, slopes = self.start(values)
         clock = self._clock(self.start_time(values))

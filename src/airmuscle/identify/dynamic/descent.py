@@ -17,9 +17,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from ...core.arrays import Array
+
 Residuals = Callable[[Array], tuple[Array, Array] | None]
 """Residuals (R,) and slopes (R, P) at unknowns (P,); None where they cannot be had."""
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-12, 1e30

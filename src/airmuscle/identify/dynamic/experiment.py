@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ... import declare
-from ...command import Command, refuse_no_command
-from ...errors import ParameterError, suggestion
-from ...program import System
+from ...compile import System
+from ...control.inputs import Command, refuse_no_command
+from ...core import tree
+from ...core.errors import ParameterError, suggestion
 from ...recording import Recording
 from ...recording.recording import header
 from .start import Start
@@ -123,7 +123,7 @@ def unknowns(
 
 def _leaf(plant: System, what: Shared, record: int | None, bounds: Mapping[str, tuple[float, float]]) -> Unknown:
     paths = (what,) if isinstance(what, str) else what
-    leaves = {leaf.path: leaf for leaf in declare.leaves(plant)}
+    leaves = {leaf.path: leaf for leaf in tree.leaves(plant)}
     for path in paths:
         if path not in leaves:
             known = [p for p in leaves if "[" not in p]

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from ...core.arrays import Array
 
 OPEN = 0.5
 """A combination whose standard deviation exceeds this fraction of its size counts as not determined; chosen."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-import numpy.typing as npt
 
+from ...core.arrays import Array
 from .result import DynamicFit
 
-Array = npt.NDArray[np.float64]
 NORMAL_95 = 1.96
 """Root of the growth of the sum of squares, in variances of the residuals, at the ends of a 95 % interval."""
 REACH = 4.0

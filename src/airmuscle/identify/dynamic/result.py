@@ -6,21 +6,19 @@ import dataclasses
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ... import declare
-from ...errors import ParameterError, suggestion
-from ...program import System
+from ...compile import System
+from ...core import tree
+from ...core.arrays import Array
+from ...core.errors import ParameterError, suggestion
 from ...recording import Recording
 from ..result import Estimate
 from .experiment import Unknown
 from .identifiable import Identifiability
 
 if TYPE_CHECKING:
-    from .fit import Problem
+    from .problem import Problem
     from .profile import Profile
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -62,7 +60,7 @@ class DynamicFit:
     def plant(self, record: int = 0) -> System:
         """The plant of one record with what was found put in."""
         course = self.problem.courses[record]
-        return declare.with_parameters(course.plant, [float(v) for v in course.leaves(self.values)])
+        return tree.with_parameters(course.plant, [float(v) for v in course.leaves(self.values)])
 
     def modelled(self, record: int = 0) -> Recording:
         """What the fitted plant gives at the rows of one record."""

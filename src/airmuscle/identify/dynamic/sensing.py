@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from ...errors import IdentificationError
+from ...core.errors import IdentificationError
 from .result import DynamicFit
 
 NOTABLE = 0.02

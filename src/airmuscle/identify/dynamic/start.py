@@ -7,18 +7,17 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ... import declare, trace
-from ...equilibrium import equilibrium
-from ...errors import IdentificationError, ParameterError, suggestion
-from ...plant import Plant
-from ...program import System
+from ...analysis.equilibrium import equilibrium
+from ...compile import System
+from ...core import autodiff, tree
+from ...core.arrays import Array
+from ...core.errors import IdentificationError, ParameterError, suggestion
+from ...plant.plant import Plant
 
 if TYPE_CHECKING:
-    from ...program.function import Function
+    from ...compile.function import Function
 
-Array = npt.NDArray[np.float64]
 NUDGE = 100.0
 """A little more gauge pressure [Pa], by which states that settle with it are found."""
 _WHY = {
@@ -104,11 +103,11 @@ def conditions(system: System, start: Start) -> Function:
     """The function (state, leaves) -> (values known and rates to vanish, their slopes by state, by leaf)."""
     import casadi
 
-    from ...program.function import Function
+    from ...compile.function import Function
 
-    key = (declare.structure(system), tuple(start.known), start.still, start.equal)
+    key = (tree.structure(system), tuple(start.known), start.still, start.equal)
     if key not in _conditions:
-        model, p = trace.symbolic(system)
+        model, p = autodiff.symbolic(system)
         x = casadi.SX.sym("x", len(system.states))
         state = {s.name: x[i] for i, s in enumerate(system.states)}
         shut = dict.fromkeys(system.inputs, 0.0)
@@ -133,8 +132,8 @@ def solved(
     `function` is that of `conditions`, made once for a structure.
     Raises IdentificationError where no state meets the conditions.
     """
-    from ...engine.once import announce_compilation
-    from ...engine.root import root
+    from ...compile.cache.announce import announce_compilation
+    from ...compile.kernels.newton import root
 
     announce_compilation(root)
     n, x, target = guess.size, guess.copy(), np.concatenate([known, np.zeros(len(start.still) + len(start.equal))])

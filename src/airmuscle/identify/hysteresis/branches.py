@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..loss import Array
+from ...core.arrays import Array
 
 PLACES = 24
 """Places along the path at which branches are compared (chosen)."""

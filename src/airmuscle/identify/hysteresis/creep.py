@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ...declare import model, parameter
-from ...errors import IdentificationError, ParameterError
+from ...core.arrays import Array
+from ...core.errors import IdentificationError, ParameterError
+from ...core.model import model, parameter
 from ...recording import Recording
-from ..loss import Array
 from .evidence import effective_rows, f_test
 from .result import RARE
 

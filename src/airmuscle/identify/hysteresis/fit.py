@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ... import declare
 from ...characteristic.base import Characteristic
-from ...declare import Leaf, model, parameter
-from ...errors import IdentificationError
+from ...core import tree
+from ...core.arrays import Array
+from ...core.errors import IdentificationError
+from ...core.model import model, parameter
+from ...core.tree import Leaf
 from ...friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, PrandtlIshlinskii
 from ...recording import Recording
 from ...recording.segment import ways_along
-from ..loss import Array
 from .result import MILLIMETRES, Axis, Course, HysteresisFit, judged
 
 Mask = npt.NDArray[np.bool_]
@@ -138,7 +139,7 @@ def fit_hysteresis(
     Raises IdentificationError where there are too few rows or the path does not move.
     """
     run = course(recording, static, slide, chosen)
-    free = [leaf for leaf in declare.leaves(friction) if leaf.declared.fitted]
+    free = [leaf for leaf in tree.leaves(friction) if leaf.declared.fitted]
     if run.rows.sum() <= len(free) + run.columns.shape[1] + 2 or not np.ptp(run.path) > 0:
         raise IdentificationError(
             f"{recording.origin}: {int(run.rows.sum())} chosen rows along a path of {np.ptp(run.path):.3g} m cannot "
@@ -179,7 +180,7 @@ def _searched(friction: Friction, run: Course) -> Friction:
     """Least squares over the free parameters; the static curve is solved for at every step."""
     from scipy.optimize import least_squares
 
-    all_leaves = list(declare.leaves(friction))
+    all_leaves = list(tree.leaves(friction))
     free = [i for i, leaf in enumerate(all_leaves) if leaf.declared.fitted]
     scales = [_Scale.of(all_leaves[i]) for i in free]
 
@@ -187,12 +188,12 @@ def _searched(friction: Friction, run: Course) -> Friction:
         values = [leaf.value for leaf in all_leaves]
         for i, scale, coordinate in zip(free, scales, x, strict=True):
             values[i] = scale.value(float(coordinate))
-        return declare.rebuild(friction, values)
+        return tree.rebuild(friction, values)
 
     start = [s.start for s in scales]
     bounds = ([s.low for s in scales], [s.high for s in scales])
     solved = least_squares(lambda x: run.remainder(law(x)), start, bounds=bounds, x_scale=1.0, max_nfev=60)
-    return declare.with_parameters(friction, [leaf.value for leaf in declare.leaves(law(solved.x))])
+    return tree.with_parameters(friction, [leaf.value for leaf in tree.leaves(law(solved.x))])
 
 
 @dataclasses.dataclass(frozen=True)

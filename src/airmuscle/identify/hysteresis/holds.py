@@ -7,12 +7,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...core.arrays import Array
 from ...recording import Recording
 from ...recording.segment import Stretch, plateaus
 from ...recording.segment.runs import BAND
 from ...recording.segment.sensor import noise_of
 from ...recording.segment.stretch import level_stretches
-from ..loss import Array
 
 FEWEST = 12
 """Rows that a fit of creep needs."""

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from ...characteristic.base import Characteristic
-from ...errors import IdentificationError
+from ...core.errors import IdentificationError
 from ...recording import Recording
 from ...recording.segment import ISOBARIC, ISOMETRIC, Run, Sensor, quasi_static, runs, sensors, ways_along
 from ...recording.segment.runs import BAND, STROKE

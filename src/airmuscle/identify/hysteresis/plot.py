@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...figures import DASHES, LINES, legend_below, new_figure
+from ...core.arrays import Array
+from ...core.plotting import DASHES, LINES, legend_below, new_figure
 from ...friction import Friction
-from ..loss import Array
 from .result import MILLIMETRES, Axis
 
 if TYPE_CHECKING:

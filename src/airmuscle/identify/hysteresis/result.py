@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...declare import leaves
+from ...core.arrays import Array
+from ...core.tree import leaves
 from ...friction import Friction
-from ..loss import Array
 from . import branches
 from .evidence import aicc, effective_rows, f_test
 

@@ -8,14 +8,12 @@ import functools
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numpy.polynomial import chebyshev, polynomial
 
 from ...characteristic.base import Characteristic
+from ...core.arrays import Array
+from ...core.units import bar
 from ...recording import Recording
-from ...units import bar
-
-Array = npt.NDArray[np.float64]
 
 
 class LoadBox(NamedTuple):

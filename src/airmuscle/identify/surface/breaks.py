@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ... import trace
-from ..loss import Array
+from ...core import autodiff
+from ...core.arrays import Array
 
 Range = tuple[float, float]
 _LEVEL = 1e-9
@@ -59,7 +59,7 @@ def breaks_of(law: Any, rules: Sequence[Rule], pressure: Array, across: Array) -
     """The places on a grid, both shape (N, M), where exact slopes break one of the rules, largest first."""
     found: list[Break] = []
     for rule in rules:
-        against = rule.sign * np.asarray(trace.slope(law, rule.quantity, pressure, across, wrt=rule.argument))
+        against = rule.sign * np.asarray(autodiff.slope(law, rule.quantity, pressure, across, wrt=rule.argument))
         felt = np.where(against > _LEVEL * np.abs(against).max(), against, 0.0)
         found += _places(rule, felt, pressure, across)
     return tuple(sorted(found, key=lambda b: -b.share))

@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...errors import IdentificationError
-from ..loss import Array
+from ...core.arrays import Array
+from ...core.errors import IdentificationError
 
 
 def enclosure(columns: Callable[[Array], Array], size: int, cells: int) -> Array:

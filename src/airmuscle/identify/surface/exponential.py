@@ -12,10 +12,11 @@ import dataclasses
 import numpy as np
 
 from ...characteristic.borzikova import BorzikovaExponential
-from ...errors import IdentificationError
+from ...core.arrays import Array
+from ...core.errors import IdentificationError
 from ...recording import Recording
 from ..correlation_index import CorrelationIndex, correlation_index
-from .basis import Array, Chebyshev, Conditioning, LoadBox
+from .basis import Chebyshev, Conditioning, LoadBox
 
 
 @dataclasses.dataclass(frozen=True)

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from ...characteristic.base import ContractionLaw
-from ...errors import IdentificationError
+from ...core.arrays import Array
+from ...core.errors import IdentificationError
 from ...recording import Recording
-from .basis import Array, LoadBox
+from .basis import LoadBox
 from .breaks import Break, Rule, breaks_of
 from .enclosure import constrained, enclosure
 from .exponential import SurfaceFit, SurfaceProblem

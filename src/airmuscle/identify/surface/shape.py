@@ -15,10 +15,10 @@ from numpy.polynomial import polynomial
 from ...characteristic.base import ForceLaw
 from ...characteristic.box import Box
 from ...characteristic.contractile_surface import ContractileSurface, exponents
-from ...errors import IdentificationError
+from ...core.arrays import Array
+from ...core.errors import IdentificationError
 from ...recording import Recording
 from ..fit import fit
-from ..loss import Array
 from ..result import Fit
 from .breaks import Break, Rule, breaks_of
 from .enclosure import constrained, enclosure

@@ -1,29 +1,42 @@
 """What a recording consists of: runs, branches, plateaus, transients, glitches, and what its sensors can tell."""
 
-from .branches import Branch as Branch
-from .branches import branches as branches
-from .branches import directions as directions
-from .branches import ways_along as ways_along
-from .findings import Finding as Finding
-from .findings import refuse_unswept as refuse_unswept
-from .inspection import Inspection as Inspection
-from .inspection import inspect as inspect
-from .inspection import inspect_all as inspect_all
-from .outliers import Outlier as Outlier
-from .outliers import outliers as outliers
-from .plateaus import Plateau as Plateau
-from .plateaus import plateau_points as plateau_points
-from .plateaus import plateaus as plateaus
-from .quasi_static import quasi_static as quasi_static
-from .runs import AT_REST as AT_REST
-from .runs import FREE as FREE
-from .runs import ISOBARIC as ISOBARIC
-from .runs import ISOMETRIC as ISOMETRIC
-from .runs import ISOTONIC as ISOTONIC
-from .runs import Run as Run
-from .runs import runs as runs
-from .sampling import Sampling as Sampling
-from .sampling import sampling as sampling
-from .sensor import Sensor as Sensor
-from .sensor import sensors as sensors
-from .stretch import Stretch as Stretch
+from .branches import Branch, branches, directions, ways_along
+from .findings import Finding, refuse_unswept
+from .inspection import Inspection, inspect, inspect_all
+from .outliers import Outlier, outliers
+from .plateaus import Plateau, plateau_points, plateaus
+from .quasi_static import quasi_static
+from .runs import AT_REST, FREE, ISOBARIC, ISOMETRIC, ISOTONIC, Run, runs
+from .sampling import Sampling, sampling
+from .sensor import Sensor, sensors
+from .stretch import Stretch
+
+__all__ = [
+    "AT_REST",
+    "FREE",
+    "ISOBARIC",
+    "ISOMETRIC",
+    "ISOTONIC",
+    "Branch",
+    "Finding",
+    "Inspection",
+    "Outlier",
+    "Plateau",
+    "Run",
+    "Sampling",
+    "Sensor",
+    "Stretch",
+    "branches",
+    "directions",
+    "inspect",
+    "inspect_all",
+    "outliers",
+    "plateau_points",
+    "plateaus",
+    "quasi_static",
+    "refuse_unswept",
+    "runs",
+    "sampling",
+    "sensors",
+    "ways_along",
+]

@@ -14,7 +14,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..recording import Array, Recording
+from ...core.arrays import Array
+from ..recording import Recording
 from .sampling import row_count
 from .sensor import Sensor
 from .stretch import Stretch, running_median

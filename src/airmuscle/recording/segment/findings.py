@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ...errors import ColumnError
+from ...core.errors import ColumnError
 from ..columns import quantity_of
 from ..recording import Recording
 from .quasi_static import quasi_static

@@ -11,7 +11,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ..recording import Array, Recording
+from ...core.arrays import Array
+from ..recording import Recording
 from .sensor import Sensor, sensors
 
 DEVIATIONS = 8.0

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..recording import Array, Recording
+from ...core.arrays import Array
+from ..recording import Recording
 from .quasi_static import CHANGE, quasi_static
 from .sampling import row_count
 from .sensor import Sensor, sensors

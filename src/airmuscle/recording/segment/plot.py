@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...figures import BLUE, GREEN, ORANGE, PURPLE, RED, legend_below, new_figure
+from ...core.plotting import BLUE, GREEN, ORANGE, PURPLE, RED, legend_below, new_figure
 from ..plot import scale
 from .inspection import Inspection
 from .sensor import Sensor

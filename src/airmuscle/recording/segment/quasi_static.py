@@ -11,7 +11,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..recording import Array, Recording
+from ...core.arrays import Array
+from ..recording import Recording
 from .sampling import row_count
 from .sensor import Sensor, sensors
 from .stretch import Mask

@@ -13,7 +13,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..recording import Array, Recording
+from ...core.arrays import Array
+from ..recording import Recording
 from .sensor import Sensor, sensors
 from .stretch import Stretch, level_stretches
 

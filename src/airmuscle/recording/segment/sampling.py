@@ -7,7 +7,8 @@ import dataclasses
 import numpy as np
 import numpy.typing as npt
 
-from ..recording import Array, Recording
+from ...core.arrays import Array
+from ..recording import Recording
 
 LONG = 5.0
 """A step in time is a gap where it is this many times the usual one (chosen)."""

@@ -13,8 +13,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ...core.arrays import Array
 from ..columns import quantity_of
-from ..recording import Array, Recording
+from ..recording import Recording
 from .stretch import Mask, true_stretches
 
 FEWEST_VALUES = 15

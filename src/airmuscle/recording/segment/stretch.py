@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from ..recording import Array
+from ...core.arrays import Array
 
 Mask = npt.NDArray[np.bool_]
 

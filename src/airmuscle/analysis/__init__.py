@@ -1,0 +1,1 @@
+"""Analysis of a plant: equilibria and their stability, stiffness, linearisation, energy consistency."""

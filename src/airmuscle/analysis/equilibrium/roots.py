@@ -1,0 +1,158 @@
+"""Where the coordinates of many plants are in balance, each between the places at which it was looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+
+Rows = npt.NDArray[np.intp]
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+JUMP = 1e-6
+"""What may be left at a root, as a share of the middle one of all places; a function that has more there changes its
+sign by a jump (chosen)."""
+CLOSE = 1e-13
+"""Step that ends a search for a root, as a share of the way that it began with: what is left is far less (chosen)."""
+
+
+class Table(Protocol):
+    """Plants with one coordinate, each a row."""
+
+    def of(self, rows: Rows) -> Table:
+        """Some of them, which may be repeated."""
+
+    def accelerations(self, x: Array) -> Array:
+        """Acceleration of the coordinate from rest, at one place of each (N,) or at several (N, K)."""
+
+
+def balances(plants: Table, x: Array, f: Array) -> tuple[Rows, Array]:
+    """Every place of balance and the row of its plant, by row and place, from accelerations f (N, K) at rising x.
+
+    They are where f is 0, of a stretch in balance its two ends; one between every two places of different sign; and a
+    pair where f comes near zero, crosses it and comes back.
+    """
+    with np.errstate(invalid="ignore", over="ignore"):
+        zero = np.pad(f == 0.0, ((0, 0), (1, 1)))
+        exact = zero[:, 1:-1] & ~(zero[:, :-2] & zero[:, 2:])
+        crossing = f[:, :-1] * f[:, 1:] < 0.0
+        nearing = _nears_zero(f)
+    rows, i = np.nonzero(exact)
+    found = [(rows, x[rows, i])]
+    rows, i = np.nonzero(crossing)
+    found.append(_roots(plants, f, rows, x[rows, i], x[rows, i + 1]))
+    rows, i = np.nonzero(nearing)
+    around = np.stack([x[rows, i + k] for k in range(3)])
+    found += _pairs(plants, f, rows, around, np.sign(f[rows, i + 1]))
+    row, place = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    order = np.lexsort((place, row))
+    return row[order], place[order]
+
+
+def _roots(plants: Table, f: Array, rows: Rows, low: Array, high: Array) -> tuple[Rows, Array]:
+    """The roots between places of different sign; where the function passes through infinity there is none."""
+    if not rows.size:
+        return rows, low
+    there = plants.of(rows)
+    root = between(there, low, high)
+    left, size = np.abs(there.accelerations(root)), np.abs(f)[rows]
+    kept = left <= JUMP * np.nanmin(size, axis=1)
+    doubtful = np.flatnonzero(~kept)
+    kept[doubtful] = left[doubtful] <= JUMP * np.nanmedian(size[doubtful], axis=1)
+    return rows[kept], root[kept]
+
+
+def between(plants: Table, low: Array, high: Array) -> Array:
+    """The roots between places (R,) of different sign: false position, the end that stays halved (Illinois)."""
+    search = _Search(np.arange(low.size), low, high, plants.accelerations(low), plants.accelerations(high), low)
+    close = np.maximum(CLOSE * (high - low), np.spacing(np.maximum(np.abs(low), np.abs(high))))
+    found, ended = low.copy(), np.zeros(low.size, dtype=bool)
+    for _ in range(200):
+        middle = search.middle()
+        at = plants.accelerations(middle)
+        found[search.rows] = np.where(ended, found[search.rows], middle)
+        inside = (search.low < middle) & (middle < search.high)
+        ended |= (at == 0.0) | (np.abs(middle - search.last) <= close[search.rows]) | ~inside
+        if ended.all():
+            break
+        search = search.narrowed(middle, at)
+        if 2 * ended.sum() > ended.size:  # the few that take longest need not keep the others waiting
+            kept = np.flatnonzero(~ended)
+            plants, search, ended = plants.of(kept), search.of(kept), ended[kept]
+    return found
+
+
+class _Search(NamedTuple):
+    """A search between two ends, for every row: the function there, and the place looked at last."""
+
+    rows: Rows
+    low: Array
+    high: Array
+    at_low: Array
+    at_high: Array
+    last: Array
+
+    def of(self, kept: Rows) -> _Search:
+        """Some of the rows."""
+        return _Search(self.rows[kept], *(part[kept] for part in self[1:]))
+
+    def middle(self) -> Array:
+        """Where a straight line between the ends crosses zero; an end itself where the root is within its rounding."""
+        with np.errstate(all="ignore"):
+            crossing = self.low + (self.high - self.low) * self.at_low / (self.at_low - self.at_high)
+        return np.where(np.isfinite(crossing), np.clip(crossing, self.low, self.high), 0.5 * (self.low + self.high))
+
+    def narrowed(self, middle: Array, at: Array) -> _Search:
+        """The part of each that holds the root; an end that stays twice counts for half."""
+        as_low = at * self.at_low > 0.0
+        at_low = self.at_low * np.where(self.last >= self.high, 0.5, 1.0)
+        at_high = self.at_high * np.where(self.last <= self.low, 0.5, 1.0)
+        return _Search(
+            self.rows,
+            np.where(as_low, middle, self.low),
+            np.where(as_low, self.high, middle),
+            np.where(as_low, at, at_low),
+            np.where(as_low, at_high, at),
+            middle,
+        )
+
+
+def _nears_zero(f: Array) -> npt.NDArray[np.bool_]:
+    """Whether the middle of three neighbours of one sign is nearest to zero, for all of them (N, K - 2)."""
+    a, b, c = (f[:, k : k + max(f.shape[1] - 2, 0)] for k in range(3))
+    one_sign = (np.sign(a) == np.sign(b)) & (np.sign(b) == np.sign(c)) & (b != 0.0)
+    a, b, c = np.abs(a), np.abs(b), np.abs(c)
+    return np.asarray(one_sign & (b <= np.minimum(a, c)) & (b < np.maximum(a, c)))
+
+
+def _pairs(plants: Table, f: Array, rows: Rows, x: Array, sign: Array) -> list[tuple[Rows, Array]]:
+    """The two roots between three places x (3, R), where the function crosses zero there and comes back."""
+    if not rows.size:
+        return []
+    turn = _across(plants.of(rows).accelerations, x[0], x[2], sign)
+    there = np.isfinite(turn)
+    rows, x, turn = rows[there], x[:, there], turn[there]
+    return [_roots(plants, f, rows, low, high) for low, high in ((x[0], turn), (turn, x[2]))]
+
+
+def _across(function: Callable[[Array], Array], low: Array, high: Array, sign: Array) -> Array:
+    """A place between two at which the function has the other sign, by golden section; not a number where none is."""
+    inner = np.stack([high - GOLDEN * (high - low), low + GOLDEN * (high - low)])
+    values = np.stack([sign * function(v) for v in inner])
+    turn = np.full(low.shape, np.nan)
+    for _ in range(50):
+        least = np.where(values[1] < values[0], inner[1], inner[0])
+        turn = np.where(np.isnan(turn) & (values.min(axis=0) < 0.0), least, turn)
+        if np.isfinite(turn).all():
+            break
+        left = values[0] < values[1]
+        low, high = np.where(left, low, inner[0]), np.where(left, inner[1], high)
+        kept, of_kept = np.where(left, inner[0], inner[1]), np.where(left, values[0], values[1])
+        asked = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
+        at = sign * function(asked)
+        inner = np.stack([np.where(left, asked, kept), np.where(left, kept, asked)])
+        values = np.stack([np.where(left, at, of_kept), np.where(left, of_kept, at)])
+    return turn

@@ -1,0 +1,93 @@
+"""Whether a plant returns to a rest after a small push."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...plant.plant import Plant
+from .statics import Static
+
+if TYPE_CHECKING:
+    from ...compile.program import Prepared, Program  # CasADi, which describing a plant does not need
+
+MARGIN = 1e-9
+"""Greatest real part of an eigenvalue, as a share of the greatest eigenvalue, that counts as none."""
+_functions: weakref.WeakKeyDictionary[Program, Any] = weakref.WeakKeyDictionary()
+
+
+def is_stable(static: Static, state: Mapping[str, float]) -> bool:
+    """Whether no eigenvalue of the motion has a positive real part; see `are_stable`."""
+    x = np.array([[state[n] for n in static.names]])
+    inputs = np.array(list(static.inputs.values()))
+    return bool(are_stable(static.ready, static.ready.parameters[None, :], x, inputs, shut=static.shut)[0])
+
+
+def are_stable(
+    ready: Prepared, parameters: Array, states: Array, inputs: Array, *, shut: bool = False
+) -> npt.NDArray[np.bool_]:
+    """Whether no eigenvalue of the motion has a positive real part, for plants with parameters (R, P) at states (R, n).
+
+    The motion is that of coordinates, series springs, creep and walls. With given pressures the air follows the
+    volume, m = m_0 V/V_0; `shut` in, it stays as it is, at its temperature. Friction is left out, as it would hold any
+    place. Where the motion has no finite slopes nothing is stable.
+    """
+    plant, names = ready.system, [s.name for s in ready.system.states]
+    assert isinstance(plant, Plant)
+    air, moving = _kinds(plant)
+    free = [i for i, n in enumerate(names) if n in moving]
+    if not free:
+        return np.ones(len(states), dtype=bool)
+    by_state, volumes, growths = _slopes(ready, free, parameters, states, inputs)
+    matrix = by_state[:, :, free]
+    if not shut:
+        for k, prefix in enumerate(plant.prefixes):
+            growth = growths[:, k, free] / volumes[:, k, None]
+            held = [i for i, n in enumerate(names) if n in air and n.startswith(prefix)]
+            pushed = np.einsum("rij,rj->ri", by_state[:, :, held], states[:, held])
+            matrix = matrix + pushed[:, :, None] * growth[:, None, :]
+    stable = np.array(np.isfinite(matrix).all(axis=(1, 2)))
+    found = np.linalg.eigvals(matrix[stable])
+    stable[stable] = found.real.max(axis=1) <= MARGIN * np.abs(found).max(axis=1)
+    return stable
+
+
+def _kinds(plant: Plant) -> tuple[set[str], set[str]]:
+    """The states of the muscles' air, and those that move."""
+    air, friction = set[str](), set[str]()
+    for prefix, muscle in zip(plant.prefixes, plant.muscles, strict=True):
+        air |= {prefix + s.name for s in plant.gas.states(muscle.geometry.volume(0.05), plant.ambient)}
+        friction |= {prefix + s.name for s in muscle.friction.states}
+    moving = {n for c in plant.mechanism.coordinates for n in (c.name, c.speed)}
+    moving |= {p + s.name for p, m in zip(plant.prefixes, plant.muscles, strict=True) for s in m.states}
+    return air, moving - friction
+
+
+def _slopes(
+    ready: Prepared, free: list[int], parameters: Array, states: Array, inputs: Array
+) -> tuple[Array, Array, Array]:
+    """Rates of f free states by all (R, f, n), the volume of every muscle (R, k), and these by states (R, k, n)."""
+    count, size = states.shape
+    results = _function(ready, free)(states.T, np.repeat(inputs[:, None], count, axis=1), parameters.T)
+    by_state, volumes, growths = (r.full() for r in results)
+    stacked = [part.reshape(-1, count, size).transpose(1, 0, 2) for part in (by_state, growths)]
+    return stacked[0], volumes.T, stacked[1]
+
+
+def _function(ready: Prepared, free: list[int]) -> Any:
+    """(x, u, p) -> (df/dx of what is free, V, dV/dx), differentiated once for a structure, which says what is free."""
+    program, plant = ready.program, ready.system
+    assert isinstance(plant, Plant)
+    if program not in _functions:
+        import casadi
+
+        t = program.traced
+        volumes = casadi.vertcat(*(t.o[ready.output_names.index(f"{prefix}volume")] for prefix in plant.prefixes))
+        wanted = [casadi.jacobian(t.f[free], t.x), volumes, casadi.jacobian(volumes, t.x)]
+        _functions[program] = casadi.Function("motion", [t.x, t.u, t.p], casadi.cse(wanted))
+    return _functions[program]

@@ -1,0 +1,1 @@
+"""Cache of compiled kernels: machine code kept as files, loaded without numba."""

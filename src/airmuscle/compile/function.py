@@ -1,0 +1,24 @@
+"""Expressions as a compiled function of arrays, for kernels that are not about steps in time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi
+
+from .functions import Printer
+from .llvm.jit import compiled
+
+
+class Function:
+    """CasADi expressions of vectors, compiled: `address` is that of a function of the inputs' and outputs' arrays.
+
+    A matrix is written row by row. The machine code lives as long as this object.
+    """
+
+    def __init__(self, inputs: dict[str, Any], outputs: dict[str, Any]) -> None:
+        rows = {name: casadi.densify(casadi.vec(casadi.SX(value).T)) for name, value in outputs.items()}
+        printer = Printer()
+        printer.add("function", inputs, rows)
+        self._engine = compiled(printer.module())
+        self.address = int(self._engine.get_function_address("function"))

@@ -1,0 +1,104 @@
+"""The functions of a system for many plants side by side: the same instructions over rows of numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .functions import PARAMETERS, Printer, Traced
+from .ir.instructions import Code, Operand
+from .llvm import emit, vector_math
+from .llvm.emit import FLAGS, Block
+from .llvm.types import Number
+
+POINT = ("x", "u", PARAMETERS)
+"""The arguments that rates and outputs depend on."""
+AT_ONCE = 64
+"""Bytes of one value in the step: the widest register (measured; values of two do not fit the registers)."""
+
+
+def lanes_module(t: Traced, a: Sequence[Sequence[float]], b: Sequence[float], number: Number) -> tuple[str, int]:
+    """One whole step of an explicit Runge-Kutta method, and the outputs, for one plant a lane; how long `c` must be.
+
+    step(x, u, c, w, h, y)   as the step of one plant; h is an array too, as each plant has its own
+    outputs(x, u, c, o)      what a row of each plant shows
+    prepare(p, c)            what both need of the parameters
+    """
+    printer = Printer(number)
+    point = dict(zip(POINT, (t.x, t.u, t.p), strict=True))
+    code, held = printer.without_parameters(point, {"f": t.f})
+    step = _Step(t, code, held, number)
+    text = step.printed(a, b)
+    printer.add("outputs", point, {"o": t.o})
+    needed = {(name, number): count for name, count in printer.needed.items()}
+    needed |= {(name, step.number): count for name, count in step.block.needed.items()}
+    parts = [vector_math.definition(name, count, kind) for (name, kind), count in needed.items()]
+    module = [vector_math.declarations({number, step.number}), *parts, text, printer.module()]
+    return "\n".join(module), printer.held
+
+
+class _Step:
+    """The step of as many lanes as a register holds, called for one group of lanes after the other.
+
+    All groups run the same code, so that a plant's result does not depend on its lane; while one waits for a root or
+    a quotient, the processor is at the next. Every stage reads `c` through an argument of its own: LLVM, which cannot
+    know that they are equal, reads what it needs where it needs it, instead of keeping all of `c` from the first stage
+    on, for which there are no registers.
+    """
+
+    def __init__(self, t: Traced, code: Code, held: dict[Operand, int], number: Number) -> None:
+        self.number = Number(number.bits, min(number.lanes, AT_ONCE * 8 // number.bits))
+        self.groups = number.lanes // self.number.lanes
+        self.states, self.inputs = t.x.shape[0], t.u.shape[0]
+        self.items, self.outputs, self.held = emit.with_gates(code, POINT, held), code.outputs, held
+        self.block = Block((), self.number)
+
+    def printed(self, a: Sequence[Sequence[float]], b: Sequence[float]) -> str:
+        """The text of the step, and of its stages for one group."""
+        slopes: list[list[str]] = []
+        for stage, row in enumerate([(), *a]):
+            slopes.append(self._rates(stage, row, slopes))
+        for i in range(self.states):
+            self.block.store("y", i * self.groups, self._moved(i, b, slopes))
+        copies = [f"c{stage}" for stage in range(len(slopes))]
+        names = ["x", "u", *copies, "w", "h", "y"]
+        stages = emit.function("stages", names, self.block, "nounwind noinline").replace("define", "define internal", 1)
+        outer = Block((), self.number)
+        for group in range(self.groups):
+            arrays = {n: outer.put(f"getelementptr inbounds i8, ptr %{n}, i64 {group * AT_ONCE}") for n in "xucwhy"}
+            given = ", ".join(f"ptr {arrays['c' if name in copies else name]}" for name in names)
+            outer.lines.append(f"  call void @stages({given})")
+        return stages + emit.function("step", list("xucwhy"), outer)
+
+    def _rates(self, stage: int, row: Sequence[float], slopes: Sequence[Sequence[str]]) -> list[str]:
+        """The rates of one stage."""
+        given: dict[Operand, str] = {("in", 0, i): self._moved(i, row, slopes) for i in range(self.states)}
+        for i in range(self.inputs):
+            given["in", 1, i] = self._input(i, sum(row))
+        for operand, place in self.held.items():
+            given[operand] = self._load(f"c{stage}", place)
+        values = emit.run(self.block, self.items, (), {}, given)
+        found = {i: emit.value_of(self.block, operand, (), {}, values) for _, i, operand in self.outputs}
+        return [found[i] for i in range(self.states)]
+
+    def _load(self, array: str, index: int) -> str:
+        return self.block.load(array, index * self.groups)
+
+    def _moved(self, i: int, row: Sequence[float], slopes: Sequence[Sequence[str]]) -> str:
+        """x + h (a1 k1 + a2 k2 + ...)."""
+        x, total = self._load("x", i), ""
+        for weight, k in zip(row, slopes, strict=True):
+            if weight:
+                term = self._combined("fmul", self.block.constant(weight), k[i])
+                total = self._combined("fadd", total, term) if total else term
+        return self._combined("fadd", x, self._combined("fmul", self._load("h", 0), total)) if total else x
+
+    def _input(self, i: int, node: float) -> str:
+        """u + c h w."""
+        u = self._load("u", i)
+        if not node:
+            return u
+        way = self._combined("fmul", self.block.constant(node), self._load("h", 0))
+        return self._combined("fadd", u, self._combined("fmul", way, self._load("w", i)))
+
+    def _combined(self, operation: str, a: str, b: str) -> str:
+        return self.block.put(f"{operation} {FLAGS} {self.number.text} {a}, {b}")

@@ -1,0 +1,1 @@
+"""Instruction lists: recording from CasADi, elimination, sparse LU, branches, scheduling."""

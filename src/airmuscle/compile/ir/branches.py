@@ -1,0 +1,231 @@
+"""Sparsity from zero factors: branches that need not be evaluated.
+
+A *gate* is such a factor: what a command alone decides, how far a number lies outside its clamp, the condition of a
+choice. With the gate at zero (a clamped number is then itself, and its comparisons
+are known) some results are known beforehand, and what only they need is superfluous. These instructions are set apart,
+to be branched around.
+
+Both ways give the same numbers, unless what is skipped is not finite: zero times that would be NaN, and here is zero.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import casadi
+
+from .instructions import MAXIMUM, MINIMUM, SELECT, Code, Instruction, Operand
+from .scheduling import Apart, Gates, Item, in_order
+
+ZERO, ONE = ("c", 0.0), ("c", 1.0)
+STEADY, COMMANDED, VARYING = range(3)
+"""What parameters are, what a command decides, and what has to do with states."""
+WORTH, WORTH_OF_CHOICES = 8, 30
+"""Operations that must be saved for a branch to pay; more where the states decide how often (measured)."""
+_SLOW = {casadi.OP_DIV, casadi.OP_INV, casadi.OP_SQRT}
+_SIMPLE = {
+    casadi.OP_ADD, casadi.OP_SUB, casadi.OP_MUL, casadi.OP_NEG, casadi.OP_SQ, casadi.OP_TWICE, casadi.OP_FABS,
+    casadi.OP_LE, casadi.OP_LT, casadi.OP_EQ, casadi.OP_NE, casadi.OP_NOT, casadi.OP_AND, casadi.OP_OR,
+    casadi.OP_IF_ELSE_ZERO, casadi.OP_ASSIGN, casadi.OP_FMIN, casadi.OP_FMAX, SELECT, MAXIMUM, MINIMUM,
+}  # fmt: skip
+_KEEP_ZERO = (casadi.OP_NEG, casadi.OP_SQ, casadi.OP_TWICE, casadi.OP_FABS, casadi.OP_SQRT, casadi.OP_ASSIGN)
+_CHOICES = (casadi.OP_IF_ELSE_ZERO, SELECT)
+_EXTREMES = (MAXIMUM, MINIMUM)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Case:
+    """Gates, and what is known of other results where all of them are zero."""
+
+    gates: Gates
+    facts: Mapping[Operand, Operand] = dataclasses.field(default_factory=dict)
+    worth: int = dataclasses.field(default_factory=lambda: WORTH)
+
+
+def skipping(code: Code, level: Callable[[Operand], int], early: frozenset[Operand] = frozenset()) -> list[Item]:
+    """The instructions of code in an order that it can be run in, those that a zero makes superfluous set apart.
+
+    `level` says what an input is: STEADY, COMMANDED, or VARYING. What depends on a command, and on nothing that
+    varies, may be a gate. What is `early` shares no piece with the rest, so that it can go ahead.
+    """
+    search = _Search(code, early)
+    for case in _cases(code.body, _Comparisons(code.body), level):
+        search.set_apart(case)
+    return in_order(code, search.apart, early)
+
+
+def _cases(body: Sequence[Instruction], comparisons: _Comparisons, level: Callable[[Operand], int]) -> Iterable[_Case]:
+    """What may be a gate: commands first, then clamps and conditions."""
+    levels: dict[Operand, int] = {}
+
+    def of(operand: Operand) -> int:
+        return levels[operand] if operand in levels else STEADY if operand[0] == "c" else level(operand)
+
+    commands: dict[Operand, None] = {}
+    clamps: list[_Case] = []
+    conditions: dict[Operand, None] = {}
+    for line in body:
+        levels[line.result] = max(of(a) for a in line.arguments)
+        if line.operation == casadi.OP_MUL:
+            commands.update((a, None) for a in line.arguments if of(a) == COMMANDED)
+        if levels[line.result] < VARYING:
+            continue
+        if line.operation == casadi.OP_SUB:
+            clamps += comparisons.inside(line)
+        if line.operation in _CHOICES and line.arguments[0] in levels:
+            conditions[line.arguments[0]] = None
+    chosen = (_Case((gate,), worth=WORTH_OF_CHOICES) for gate in conditions)
+    return [*(_Case((gate,)) for gate in commands), *clamps, *chosen]
+
+
+class _Comparisons:
+    """What comparisons say of numbers that are clamped."""
+
+    def __init__(self, body: Sequence[Instruction]) -> None:
+        self._line = {line.result: line for line in body}
+        self._not_above = {line.arguments: line.result for line in body if line.operation == casadi.OP_LE}
+        self._below = {line.arguments: line.result for line in body if line.operation == casadi.OP_LT}
+
+    def _of(self, gates: Gates, ordered: Iterable[tuple[Operand, Operand]], facts: dict[Operand, Operand]) -> _Case:
+        """With the gates at zero each `low` is not above its `high`.
+
+        Whether high is not above low is not settled by that, where they are equal: such a comparison is a gate too.
+        """
+        further: dict[Operand, Operand] = {}
+        for low, high in ordered:
+            if (low, high) in self._not_above:
+                facts[self._not_above[low, high]] = ONE
+            if (high, low) in self._below:
+                facts[self._below[high, low]] = ZERO
+            if (high, low) in self._not_above:
+                further[self._not_above[high, low]] = ZERO
+        return _Case((*gates, *further), facts | further)
+
+    def inside(self, difference: Instruction) -> list[_Case]:
+        """The case of a number within its clamp, if what is subtracted are these two."""
+        for number, clamped in (difference.arguments, difference.arguments[::-1]):
+            facts: dict[Operand, Operand] = {}
+            ordered: list[tuple[Operand, Operand]] = []
+            while clamped != number and number[0] != "c":
+                line = self._line.get(clamped)
+                if line is None or line.operation not in _EXTREMES:
+                    break
+                near = [number] if number in line.arguments else [a for a in line.arguments if a in self._line]
+                if not near:
+                    break
+                inner = near[0]
+                bound = line.arguments[line.arguments[0] == inner]
+                ordered.append((bound, inner) if line.operation == MAXIMUM else (inner, bound))
+                facts[clamped], clamped = number, inner
+            if facts and clamped == number:
+                return [self._of((difference.result,), ordered, facts)]
+        return []
+
+
+class _Search:
+    """Case by case, what is superfluous in it, if that is worth a branch."""
+
+    def __init__(self, code: Code, early: frozenset[Operand]) -> None:
+        self.apart = Apart({}, {})
+        self._early = early
+        self._line = {line.result: line for line in code.body}
+        self._users: dict[Operand, list[Instruction]] = {}
+        for line in code.body:
+            for operand in dict.fromkeys(line.arguments):
+                self._users.setdefault(operand, []).append(line)
+        self._outputs = {operand for _, _, operand in code.outputs}
+        self._kept: set[Operand] = set()
+
+    def set_apart(self, case: _Case) -> None:
+        """Set apart what is superfluous where the gates are zero.
+
+        Gates themselves are never set apart, nor the clamps that they are made of.
+        """
+        if any(gate in self.apart.gates for gate in case.gates):
+            return
+        needed = {*case.gates, *(operand for operand, value in case.facts.items() if value[0] != "c")}
+        ahead = frozenset() if self._early.issuperset(case.gates) else self._early  # what goes ahead cannot wait
+        superfluous, instead = self._superfluous(self._known(case), self._kept | needed | ahead)
+        if sum(_cost(self._line[operand]) for operand in superfluous) >= case.worth:
+            self._kept |= needed
+            self.apart.gates.update(dict.fromkeys(superfluous, case.gates))
+            self.apart.instead.update(instead)
+
+    def _known(self, case: _Case) -> dict[Operand, Operand]:
+        """Results that are a constant, or that of another instruction, in this case."""
+        known = {**dict.fromkeys(case.gates, ZERO), **case.facts}
+        waiting = [line for operand in known for line in self._users.get(operand, ())]
+        while waiting:
+            line = waiting.pop()
+            if line.result not in known and line.result not in self.apart.gates:
+                value = _value(line.operation, [known.get(a, a) for a in line.arguments])
+                if value is not None:
+                    known[line.result] = value
+                    waiting += self._users.get(line.result, ())
+        return known
+
+    def _superfluous(
+        self, known: Mapping[Operand, Operand], kept: set[Operand]
+    ) -> tuple[set[Operand], dict[Operand, Operand]]:
+        """Results that need not be computed, given what is known; and what those are that others still ask for.
+
+        What is `kept` is computed in any case.
+        """
+        times: dict[Operand, int] = {}
+
+        def asked(operand: Operand, more: int = 0) -> int:
+            """How often a result is asked for by what is not superfluous."""
+            if operand not in times:
+                times[operand] = len(self._users.get(operand, ())) + (operand in kept) + (operand in self._outputs)
+            times[operand] += more
+            return times[operand]
+
+        named = {o: v for o, v in known.items() if o not in kept and self._worth_naming(o, v)}
+        for value in named.values():
+            asked(value, 1)
+        superfluous: set[Operand] = set()
+        waiting = list(named)
+        while waiting:
+            operand = waiting.pop()
+            if operand in superfluous or operand not in self._line or operand in self.apart.gates:
+                continue
+            superfluous.add(operand)
+            for argument in dict.fromkeys(self._line[operand].arguments):
+                if not asked(argument, -1):
+                    waiting.append(argument)
+                    if argument in named and not asked(named[argument], -1):
+                        waiting.append(named[argument])
+        return superfluous, {o: v for o, v in named.items() if asked(o)}
+
+    def _worth_naming(self, operand: Operand, value: Operand) -> bool:
+        """Whether it helps to know a result: a sum that is one of its parts is better computed."""
+        if operand not in self._line or operand in self.apart.gates:
+            return False
+        return value[0] == "c" or self._line[operand].operation == SELECT
+
+
+def _cost(line: Instruction) -> int:
+    return 1 if line.operation in _SIMPLE else 8 if line.operation in _SLOW else 20
+
+
+def _value(operation: int, x: Sequence[Operand]) -> Operand | None:
+    """What an operation gives if that is a constant or one of its operands whatever the others are; else None."""
+    zero, one = ZERO in x, ONE in x
+    if operation in (casadi.OP_MUL, casadi.OP_AND):
+        return ZERO if zero else x[x[0] == ONE] if one else None
+    if operation == casadi.OP_ADD:
+        return x[x[0] == ZERO] if zero else None
+    if operation == casadi.OP_SUB:
+        return ZERO if x[0] == x[1] else x[0] if x[1] == ZERO else None
+    if operation == casadi.OP_DIV or operation in _KEEP_ZERO:
+        return ZERO if x[0] == ZERO else None
+    if operation == casadi.OP_NOT:
+        return {ZERO: ONE, ONE: ZERO}.get(x[0])
+    if operation == casadi.OP_IF_ELSE_ZERO:
+        return ZERO if zero else x[1] if x[0] == ONE else None
+    if operation == SELECT:
+        return x[2] if x[0] == ZERO else x[1] if x[0] == ONE or x[1] == x[2] else None
+    if operation in _EXTREMES:
+        return x[0] if x[0] == x[1] else None
+    return None

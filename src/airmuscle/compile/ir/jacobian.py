@@ -1,0 +1,214 @@
+"""Exact derivatives of a list of instructions, by elimination on its graph.
+
+Every instruction is a vertex, every dependence an edge that carries a local partial derivative. A vertex v between
+p and s is eliminated by c_sp += c_sv c_vp; at the end edges lead from the inputs to the results alone. Always the
+vertex with the fewest products goes next (Markowitz), which needs fewer operations than forward or reverse mode.
+
+Reference: Griewank, A., Walther, A., Evaluating Derivatives, 2nd ed., SIAM 2008, chapters 9 and 10.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterable, Sequence
+
+import casadi
+
+from ...core.errors import TraceError
+from .instructions import SELECT, Instruction, Operand
+
+Row = dict[Operand, Operand]
+"""The derivatives of one result by the inputs that it depends on."""
+ZERO, ONE, LESS, TWO, HALF = (("c", value) for value in (0.0, 1.0, -1.0, 2.0, 0.5))
+_COMMUTE = (casadi.OP_ADD, casadi.OP_MUL)
+_CONDITIONS = (casadi.OP_LE, casadi.OP_LT, casadi.OP_EQ, casadi.OP_NE, casadi.OP_NOT, casadi.OP_AND, casadi.OP_OR)
+
+
+class Tape:
+    """Instructions under construction; what is computed once is not computed again, nor are trivial products."""
+
+    def __init__(self, body: Iterable[Instruction]) -> None:
+        self.body = list(body)
+        self._known: dict[tuple[int, tuple[Operand, ...]], Operand] = {}
+        self._masks: set[Operand] = set()
+        for line in self.body:
+            self._note(line)
+
+    def _note(self, line: Instruction) -> None:
+        self._known[line.operation, line.arguments] = line.result
+        product = line.operation == casadi.OP_IF_ELSE_ZERO and line.arguments[1] in self._masks
+        if line.operation in _CONDITIONS or product:
+            self._masks.add(line.result)
+
+    def take(self, longer: Tape) -> None:
+        """Go on from where another one that began as this stands."""
+        self.body, self._known, self._masks = longer.body, longer._known, longer._masks
+
+    def put(self, operation: int, *arguments: Operand) -> Operand:
+        """The result of an operation, which is appended unless it is known."""
+        if operation in _COMMUTE and (operation, arguments[::-1]) in self._known:
+            arguments = arguments[::-1]
+        if (operation, arguments) not in self._known:
+            result = ("t", "d", len(self.body))
+            self.body.append(Instruction(operation, result, arguments))
+            self._note(self.body[-1])
+        return self._known[operation, arguments]
+
+    def add(self, a: Operand, b: Operand) -> Operand:
+        """a + b."""
+        return a if b == ZERO else b if a == ZERO else self.put(casadi.OP_ADD, a, b)
+
+    def negative(self, a: Operand) -> Operand:
+        """-a."""
+        return ("c", -a[1]) if a[0] == "c" else self.put(casadi.OP_NEG, a)
+
+    def times(self, a: Operand, b: Operand) -> Operand:
+        """a b; where one is a condition, the other or zero, so that an infinite slope not taken does no harm."""
+        if b[0] == "c" or (a[0] != "c" and b in self._masks):
+            a, b = b, a
+        if a[0] == b[0] == "c":
+            return ("c", a[1] * b[1])
+        if a in (ZERO, ONE, LESS):
+            return ZERO if a == ZERO else b if a == ONE else self.negative(b)
+        return self.put(casadi.OP_IF_ELSE_ZERO if a in self._masks else casadi.OP_MUL, a, b)
+
+    def inverse(self, a: Operand) -> Operand:
+        """1/a."""
+        return self.put(casadi.OP_INV, a)
+
+
+Rule = Callable[[Tape, tuple[Operand, ...], Operand], tuple[Operand, ...]]
+
+
+def _power(t: Tape, x: tuple[Operand, ...], r: Operand) -> tuple[Operand, ...]:
+    base, exponent = x
+    less = ("c", exponent[1] - 1.0) if exponent[0] == "c" else t.add(exponent, LESS)
+    by_base = t.times(exponent, t.put(casadi.OP_POW, base, less))
+    return by_base, ZERO if exponent[0] == "c" else t.times(r, t.put(casadi.OP_LOG, base))
+
+
+def _root_of_one_more(t: Tape, x: Operand, sign: Operand, shift: Operand) -> Operand:
+    """1/sqrt(shift + sign x^2)."""
+    square = t.times(sign, t.put(casadi.OP_SQ, x))
+    return t.inverse(t.put(casadi.OP_SQRT, t.add(shift, square)))
+
+
+def _chosen(t: Tape, first: Operand) -> tuple[Operand, ...]:
+    return first, t.put(casadi.OP_NOT, first)
+
+
+_RULES: dict[int, Rule] = {
+    casadi.OP_ADD: lambda t, x, r: (ONE, ONE),
+    casadi.OP_SUB: lambda t, x, r: (ONE, LESS),
+    casadi.OP_MUL: lambda t, x, r: (x[1], x[0]),
+    casadi.OP_DIV: lambda t, x, r: (t.inverse(x[1]), t.negative(t.times(r, t.inverse(x[1])))),
+    casadi.OP_NEG: lambda t, x, r: (LESS,),
+    casadi.OP_SQ: lambda t, x, r: (t.put(casadi.OP_TWICE, x[0]),),
+    casadi.OP_TWICE: lambda t, x, r: (TWO,),
+    casadi.OP_INV: lambda t, x, r: (t.negative(t.put(casadi.OP_SQ, r)),),
+    casadi.OP_SQRT: lambda t, x, r: (t.times(HALF, t.inverse(r)),),
+    casadi.OP_FABS: lambda t, x, r: (t.put(casadi.OP_SIGN, x[0]),),
+    casadi.OP_EXP: lambda t, x, r: (r,),
+    casadi.OP_LOG: lambda t, x, r: (t.inverse(x[0]),),
+    casadi.OP_SIN: lambda t, x, r: (t.put(casadi.OP_COS, x[0]),),
+    casadi.OP_COS: lambda t, x, r: (t.negative(t.put(casadi.OP_SIN, x[0])),),
+    casadi.OP_TAN: lambda t, x, r: (t.add(ONE, t.put(casadi.OP_SQ, r)),),
+    casadi.OP_ATAN: lambda t, x, r: (t.inverse(t.add(ONE, t.put(casadi.OP_SQ, x[0]))),),
+    casadi.OP_SINH: lambda t, x, r: (t.put(casadi.OP_COSH, x[0]),),
+    casadi.OP_COSH: lambda t, x, r: (t.put(casadi.OP_SINH, x[0]),),
+    casadi.OP_TANH: lambda t, x, r: (t.add(ONE, t.negative(t.put(casadi.OP_SQ, r))),),
+    casadi.OP_ASINH: lambda t, x, r: (_root_of_one_more(t, x[0], ONE, ONE),),
+    casadi.OP_ASIN: lambda t, x, r: (_root_of_one_more(t, x[0], LESS, ONE),),
+    casadi.OP_ACOS: lambda t, x, r: (t.negative(_root_of_one_more(t, x[0], LESS, ONE)),),
+    casadi.OP_LOG1P: lambda t, x, r: (t.inverse(t.add(ONE, x[0])),),
+    casadi.OP_EXPM1: lambda t, x, r: (t.add(ONE, r),),
+    casadi.OP_POW: _power,
+    casadi.OP_CONSTPOW: _power,
+    casadi.OP_FMAX: lambda t, x, r: _chosen(t, t.put(casadi.OP_LE, x[1], x[0])),
+    casadi.OP_FMIN: lambda t, x, r: _chosen(t, t.put(casadi.OP_LE, x[0], x[1])),
+    casadi.OP_IF_ELSE_ZERO: lambda t, x, r: (ZERO, x[0]),
+    SELECT: lambda t, x, r: (ZERO, x[0], t.put(casadi.OP_NOT, x[0])),
+    casadi.OP_ASSIGN: lambda t, x, r: (ONE,),
+    **{operation: lambda t, x, r: (ZERO,) * len(x) for operation in (*_CONDITIONS, casadi.OP_SIGN)},
+}  # fmt: skip
+
+
+def derivatives(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand]) -> list[Row]:
+    """The derivatives of results by inputs, whose instructions are appended to the tape.
+
+    Vertices that are alike in cost go in the order of the instructions or against it, whichever needs fewer operations.
+    Raises TraceError for an operation that has no rule.
+    """
+    tries = [Tape(tape.body), Tape(tape.body)]
+    found = [_eliminated(one, results, inputs, sign) for one, sign in zip(tries, (1, -1), strict=True)]
+    best = min((0, 1), key=lambda i: len(tries[i].body))
+    tape.take(tries[best])
+    return found[best]
+
+
+def _eliminated(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand], sign: int) -> list[Row]:
+    into, out = _graph(tape, set(results), set(inputs))
+    ends = {("end", i): r for i, r in enumerate(results)}
+    for end, result in ends.items():
+        if result in into or result in set(inputs):
+            into[end] = {result: ONE}
+            out.setdefault(result, set()).add(end)
+    order = {line.result: sign * number for number, line in enumerate(tape.body)}
+
+    def entry(vertex: Operand) -> tuple[int, int, Operand]:
+        return len(into[vertex]) * len(out.get(vertex, ())), order[vertex], vertex
+
+    queue = [entry(v) for v in into if v not in ends]
+    heapq.heapify(queue)
+    while queue:
+        found = heapq.heappop(queue)
+        vertex = found[2]
+        if vertex in into and found == entry(vertex):
+            for changed in _eliminate(tape, into, out, vertex):
+                if changed in order and changed in into:
+                    heapq.heappush(queue, entry(changed))
+    return [into.get(end, {}) for end in ends]
+
+
+def _graph(
+    tape: Tape, results: set[Operand], inputs: set[Operand]
+) -> tuple[dict[Operand, Row], dict[Operand, set[Operand]]]:
+    """Edges into every vertex that depends on an input and reaches a result, and where each one's edges lead."""
+    moved, needed = set(inputs), set(results)
+    lines = list(tape.body)
+    for line in lines:
+        if any(a in moved for a in line.arguments):
+            moved.add(line.result)
+    into: dict[Operand, Row] = {}
+    out: dict[Operand, set[Operand]] = {}
+    for line in reversed(lines):
+        if line.result not in needed or line.result not in moved:
+            continue
+        needed.update(line.arguments)
+        if line.operation not in _RULES:
+            raise TraceError(
+                f"CasADi operation {line.operation} has no derivative; write the law over airmuscle.core.ops."
+            )
+        row: Row = {}
+        partials = _RULES[line.operation](tape, line.arguments, line.result)
+        for argument, partial in zip(line.arguments, partials, strict=True):
+            if argument in moved and partial != ZERO:
+                row[argument] = tape.add(row.get(argument, ZERO), partial)
+        if row:
+            into[line.result] = row
+            for argument in row:
+                out.setdefault(argument, set()).add(line.result)
+    return into, out
+
+
+def _eliminate(tape: Tape, into: dict[Operand, Row], out: dict[Operand, set[Operand]], vertex: Operand) -> set[Operand]:
+    """Take a vertex out; the vertices whose edges changed."""
+    row, targets = into.pop(vertex), sorted(out.pop(vertex, ()), key=str)
+    for source in row:
+        out[source].discard(vertex)
+    for target in targets:
+        factor = into[target].pop(vertex)
+        for source, partial in row.items():
+            into[target][source] = tape.add(into[target].get(source, ZERO), tape.times(factor, partial))
+            out[source].add(target)
+    return {*row, *targets}

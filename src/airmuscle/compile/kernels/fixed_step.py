@@ -1,0 +1,86 @@
+"""Fixed steps of a printed one-step method; the last step of a segment is shortened so that its end is met exactly.
+
+A row that falls between two steps is reached by a step of its own, which the run does not continue from:
+the solution never depends on where it is looked at.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+
+from .calls import invoke, pointer
+
+DONE, PAUSED, STEP_TOO_SMALL, NOT_FINITE = 0, 1, 2, 3
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
+def fixed_step(
+    step: Any, c: Any, y: Any, ends: Any, values: Any, slopes: Any, times: Any, rows: Any,
+    length: Any, clock: Any, count: Any, budget: Any, work: Any,
+) -> Any:  # fmt: skip
+    """Advance `y` (n,) through the segments by steps of `length`, and write the states at `times` into `rows`.
+
+    step(x, u, c, w, h, y)  address of the printed step; `c` what it needs of the parameters
+    ends, values, slopes, clock, count, budget  as in `rodas4`; clock[1] counts the steps of the current segment
+    work  (n + 2 m,): the caller owns it, because an array that a kernel makes and then knows by address alone is
+          freed before its last use
+    """
+    n = y.shape[0]
+    m = values.shape[1]
+    new, u, w = work[:n], work[n : n + m], work[n + m : n + 2 * m]
+    at_y, at_u, at_c, at_w, at_new = pointer(y), pointer(u), pointer(c), pointer(w), pointer(new)
+    t, start = clock[0], clock[2]
+    segment, row = count[0], count[1]
+    taken = 0
+    status = DONE
+    while row < times.shape[0] and times[row] <= t:
+        for i in range(n):
+            rows[row, i] = y[i]
+        row += 1
+    while segment < ends.shape[0]:
+        end = ends[segment]
+        for i in range(m):
+            w[i] = slopes[segment, i]
+        total = int(np.ceil((end - start) / length - 1e-6))
+        done = int(clock[1])
+        while done < total:
+            if taken >= budget:
+                status = PAUSED
+                break
+            for i in range(m):
+                u[i] = values[segment, i] + (t - start) * w[i]
+            reached = end if done + 1 == total else start + (done + 1) * length
+            while row < times.shape[0] and times[row] < reached - 1e-9 * length:
+                invoke(step, (at_y, at_u, at_c, at_w, times[row] - t, at_new))
+                for i in range(n):
+                    rows[row, i] = new[i]
+                row += 1
+            h = length if done + 1 < total else end - t
+            invoke(step, (at_y, at_u, at_c, at_w, h, at_new))
+            total_size = 0.0
+            for i in range(n):
+                y[i] = new[i]
+                total_size += abs(new[i])
+            if not total_size < 1e300:
+                status = NOT_FINITE
+                break
+            t = reached
+            done += 1
+            taken += 1
+            while row < times.shape[0] and times[row] <= reached + 1e-9 * length:
+                for i in range(n):
+                    rows[row, i] = y[i]
+                row += 1
+        if status != DONE:
+            clock[1] = done
+            break
+        segment += 1
+        start = t
+        clock[1] = 0.0
+    clock[0], clock[2] = t, start
+    count[0], count[1] = segment, row
+    count[2] += taken
+    return status

@@ -1,0 +1,70 @@
+"""Newton's method on a printed function g(x, p) = target of as many equations as unknowns."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+
+from .calls import invoke, pointer
+
+FOUND, SINGULAR, NOT_FINITE, TOO_MANY = 0, 1, 2, 3
+MOST, FAR, NEAR = 50, 10.0, 1e-11
+"""Iterations; the longest step and the step that ends the search, both in sizes of the unknowns."""
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def root(function: Any, p: Any, target: Any, sizes: Any, x: Any, values: Any, by_x: Any, by_p: Any, work: Any) -> Any:
+    """Move `x` (n,) to the root; `values` (n,), `by_x` (n, n) and `by_p` (n, m) hold what the function gave last.
+
+    function(x, p, values, by_x, by_p)  its address
+    work  (n n + n,): the caller owns it
+    Returns a status code; work[0] is the last step in sizes.
+    """
+    n = x.shape[0]
+    a, b = work[: n * n].reshape(n, n), work[n * n :]
+    status = TOO_MANY
+    for _ in range(MOST):
+        invoke(function, (pointer(x), pointer(p), pointer(values), pointer(by_x), pointer(by_p)))
+        for i in range(n):
+            greatest = 0.0
+            for k in range(n):
+                a[i, k] = by_x[i, k] * sizes[k]
+                greatest = max(greatest, abs(a[i, k]))
+            scale = 1.0 / greatest if greatest > 0.0 else 1.0
+            b[i] = (target[i] - values[i]) * scale
+            for k in range(n):
+                a[i, k] *= scale
+        for column in range(n):
+            pivot = column
+            for i in range(column + 1, n):
+                if abs(a[i, column]) > abs(a[pivot, column]):
+                    pivot = i
+            if not abs(a[pivot, column]) > 1e-14:  # also where it is not a number
+                return SINGULAR
+            for k in range(n):
+                a[column, k], a[pivot, k] = a[pivot, k], a[column, k]
+            b[column], b[pivot] = b[pivot], b[column]
+            for i in range(column + 1, n):
+                share = a[i, column] / a[column, column]
+                for k in range(column, n):
+                    a[i, k] -= share * a[column, k]
+                b[i] -= share * b[column]
+        step = 0.0
+        for i in range(n - 1, -1, -1):
+            for k in range(i + 1, n):
+                b[i] -= a[i, k] * b[k]
+            b[i] /= a[i, i]
+            step = max(step, abs(b[i]))
+        if not step < 1e300:
+            return NOT_FINITE
+        share = min(1.0, FAR / max(step, 1e-300))
+        large = 1.0
+        for i in range(n):
+            x[i] += share * sizes[i] * b[i]
+            large = max(large, abs(x[i] / sizes[i]))
+        if step < NEAR * large:
+            status = FOUND
+            break
+    work[0] = step
+    return status

@@ -1,0 +1,1 @@
+"""LLVM text from instruction lists, and its compilation in memory."""

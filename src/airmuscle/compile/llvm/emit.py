@@ -1,0 +1,282 @@
+"""Instructions printed as LLVM IR: straight lines, and branches around what may be skipped."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+
+import casadi
+
+from ...core.errors import TraceError
+from ..ir.branches import COMMANDED, STEADY, VARYING, skipping
+from ..ir.instructions import MAXIMUM, MINIMUM, SELECT, Code, Instruction, Operand
+from ..ir.scheduling import Item, Skippable
+from .types import DOUBLE, Number
+
+FLAGS = "nsz arcp contract reassoc afn"
+"""Fast arithmetic that keeps NaN and infinity: a failed step must still show (never nnan, ninf)."""
+
+LEVEL = {"u": COMMANDED, "w": STEADY, "h": STEADY}
+"""Which arguments do not vary with the states: inputs, their slopes, and the step."""
+
+_BINARY = {casadi.OP_ADD: "fadd", casadi.OP_SUB: "fsub", casadi.OP_MUL: "fmul", casadi.OP_DIV: "fdiv"}
+_INTRINSICS = {casadi.OP_SQRT: "sqrt", casadi.OP_FABS: "fabs"}
+_CALLS = {
+    casadi.OP_EXP: "exp", casadi.OP_LOG: "log", casadi.OP_SIN: "sin", casadi.OP_COS: "cos", casadi.OP_TAN: "tan",
+    casadi.OP_ATAN: "atan", casadi.OP_SINH: "sinh", casadi.OP_COSH: "cosh", casadi.OP_TANH: "tanh",
+    casadi.OP_ASINH: "asinh", casadi.OP_ASIN: "asin", casadi.OP_ACOS: "acos", casadi.OP_LOG1P: "log1p",
+    casadi.OP_EXPM1: "expm1",
+}  # fmt: skip
+_COMPARISONS = {casadi.OP_LE: "ole", casadi.OP_LT: "olt", casadi.OP_EQ: "oeq", casadi.OP_NE: "une"}
+_OF_ONE = (*sorted(_CALLS.values()), *(DOUBLE.intrinsic(name) for name in _INTRINSICS.values()))
+DECLARED = "".join(f"declare double @{name}(double)\n" for name in _OF_ONE) + "declare double @pow(double, double)\n"
+"""Functions that printed ones may call, as LLVM wants to know them."""
+
+
+class Block:
+    """The lines of one LLVM function under construction; what is computed once is not computed again.
+
+    Every value is a `number`. In lanes, functions that LLVM has not are called by the names in `needed`, which
+    `elementary` prints.
+    """
+
+    def __init__(self, scalars: Sequence[str] = (), number: Number = DOUBLE) -> None:
+        self.lines: list[str] = []
+        self.scalars = frozenset(scalars)
+        self.number = number
+        self.needed: dict[str, int] = {}
+        self._known: dict[str, str] = {}
+        self._named = 0
+        self._constants: dict[str, float] = {}
+
+    def put(self, expression: str) -> str:
+        """The name of the value of `expression`, which is computed unless it is known."""
+        if expression not in self._known:
+            self._known[expression] = self._name()
+            self.lines.append(f"  {self._known[expression]} = {expression}")
+        return self._known[expression]
+
+    def _name(self) -> str:
+        self._named += 1
+        return f"%v{self._named}"
+
+    def constant(self, value: float) -> str:
+        """A constant; in lanes the same in all of them, which LLVM sees through."""
+        number = self.number
+        found = number.literal(value)
+        if number.lanes > 1:
+            first = self.put(f"insertelement {number.text} poison, {number.element} {found}, i32 0")
+            places = f"<{number.lanes} x i32> zeroinitializer"
+            found = self.put(f"shufflevector {number.text} {first}, {number.text} poison, {places}")
+        self._constants[found] = value
+        return found
+
+    def load(self, array: str, index: int) -> str:
+        """The value of an array element, or of a scalar argument."""
+        if array in self.scalars:
+            return f"%{array}"
+        place = self.put(f"getelementptr inbounds {self.number.text}, ptr %{array}, i64 {index}")
+        return self.put(f"load {self.number.text}, ptr {place}, align {self.number.alignment}")
+
+    def store(self, array: str, index: int, value: str) -> None:
+        """Write a value into an array element."""
+        place = self.put(f"getelementptr inbounds {self.number.text}, ptr %{array}, i64 {index}")
+        self.lines.append(f"  store {self.number.text} {value}, ptr {place}, align {self.number.alignment}")
+
+    def choose(self, comparison: str, a: str, b: str, when_true: str, when_false: str) -> str:
+        """`when_true` where `a comparison b`, else `when_false`."""
+        number = self.number
+        test = self.put(f"fcmp {comparison} {number.text} {a}, {b}")
+        return self.put(f"select {number.mask} {test}, {number.text} {when_true}, {number.text} {when_false}")
+
+    def call(self, function: str, x: Sequence[str]) -> str:
+        """A function of the C library, or what stands for it in lanes."""
+        number = self.number
+        arguments = ", ".join(f"{number.text} {a}" for a in x)
+        if number == DOUBLE:
+            return self.put(f"call {FLAGS} double @{function}({arguments})")
+        self.needed[function] = len(x)
+        return self.put(f"call {number.text} @{number.function(function)}({arguments})")
+
+    def intrinsic(self, name: str, x: Sequence[str], flags: str = FLAGS) -> str:
+        """A function that LLVM has."""
+        arguments = ", ".join(f"{self.number.text} {a}" for a in x)
+        return self.put(f"call {flags} {self.number.text} @{self.number.intrinsic(name)}({arguments})")
+
+    def power(self, base: str, exponent: str) -> str:
+        """base**exponent; in lanes whole and half constants are products, as LLVM makes them of one number."""
+        value = self._constants.get(exponent)
+        if self.number == DOUBLE or value is None or abs(value) > 16 or not (2 * value).is_integer():
+            return self.call("pow", (base, exponent))
+        found, square, left = self.constant(1.0), base, int(abs(value))
+        while left:
+            if left % 2:
+                found = self.put(f"fmul {FLAGS} {self.number.text} {found}, {square}")
+            square, left = self.put(f"fmul {FLAGS} {self.number.text} {square}, {square}"), left // 2
+        if abs(value) % 1:
+            found = self.put(f"fmul {FLAGS} {self.number.text} {found}, {self.intrinsic('sqrt', (base,))}")
+        return found if value >= 0 else self.put(f"fdiv {FLAGS} {self.number.text} {self.constant(1.0)}, {found}")
+
+    def unless_zero(
+        self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
+    ) -> dict[Operand, str]:
+        """What `compute` appends and returns where one of `gates` is not zero, and elsewhere `instead`.
+
+        In lanes it is computed if any of them needs it; a lane that does not has what it has alone.
+        """
+        number, here = self.number, self._name()[1:]
+        self.lines += [f"  br label %{here}.if", f"{here}.if:"]
+        tests = [self.put(f"fcmp une {number.text} {gate}, {self.constant(0.0)}") for gate in gates]
+        test = functools.reduce(lambda a, b: self.put(f"or {number.mask} {a}, {b}"), tests)
+        any_lane = test
+        if number.lanes > 1:
+            bits = self.put(f"bitcast {number.mask} {test} to i{number.lanes}")
+            any_lane = self.put(f"icmp ne i{number.lanes} {bits}, 0")
+        self.lines += [f"  br i1 {any_lane}, label %{here}.then, label %{here}.end", f"{here}.then:"]
+        outside, self._known = self._known, dict(self._known)  # what is computed in here is not known out there
+        found = compute()
+        if number.lanes > 1:
+            for operand, value in instead.items():
+                found[operand] = self.put(
+                    f"select {number.mask} {test}, {number.text} {found[operand]}, {number.text} {value}"
+                )
+        self._known = outside
+        self.lines += [f"  br label %{here}.end", f"{here}.end:"]
+        joined = {}
+        for operand, value in instead.items():
+            joined[operand] = self._name()
+            ways = f"[ {value}, %{here}.if ], [ {found[operand]}, %{here}.then ]"
+            self.lines.append(f"  {joined[operand]} = phi {number.text} {ways}")
+        return joined
+
+    def operate(self, operation: int, x: Sequence[str]) -> str:
+        """The printed form of one CasADi operation on values; raises TraceError for one that is not known."""
+        kind, one, zero = self.number.text, self.constant(1.0), self.constant(0.0)
+        if operation in _BINARY:
+            return self.put(f"{_BINARY[operation]} {FLAGS} {kind} {x[0]}, {x[1]}")
+        if operation in _INTRINSICS:
+            return self.intrinsic(_INTRINSICS[operation], x[:1])
+        if operation in _CALLS:
+            return self.call(_CALLS[operation], x[:1])
+        if operation in _COMPARISONS:
+            return self.choose(_COMPARISONS[operation], x[0], x[1], one, zero)
+        simple = {
+            casadi.OP_NEG: lambda: self.put(f"fneg {FLAGS} {kind} {x[0]}"),
+            casadi.OP_SQ: lambda: self.put(f"fmul {FLAGS} {kind} {x[0]}, {x[0]}"),
+            casadi.OP_TWICE: lambda: self.put(f"fadd {FLAGS} {kind} {x[0]}, {x[0]}"),
+            casadi.OP_INV: lambda: self.put(f"fdiv {FLAGS} {kind} {one}, {x[0]}"),
+            casadi.OP_POW: lambda: self.power(x[0], x[1]),
+            casadi.OP_CONSTPOW: lambda: self.power(x[0], x[1]),
+            casadi.OP_NOT: lambda: self.choose("oeq", x[0], zero, one, zero),
+            casadi.OP_AND: lambda: self.put(f"fmul {kind} {x[0]}, {x[1]}"),
+            casadi.OP_OR: lambda: self.choose("une", self.put(f"fadd {kind} {x[0]}, {x[1]}"), zero, one, zero),
+            casadi.OP_FMIN: lambda: self.choose("olt", x[0], x[1], x[0], x[1]),
+            casadi.OP_FMAX: lambda: self.choose("ogt", x[0], x[1], x[0], x[1]),
+            # strict: of two equal numbers either is the larger, and this is what the processor's instruction does
+            MINIMUM: lambda: self.choose("olt", x[0], x[1], x[0], x[1]),
+            MAXIMUM: lambda: self.choose("ogt", x[0], x[1], x[0], x[1]),
+            casadi.OP_IF_ELSE_ZERO: lambda: self.choose("une", x[0], zero, x[1], zero),
+            casadi.OP_SIGN: lambda: self.choose(
+                "ogt", x[0], zero, one, self.choose("olt", x[0], zero, self.constant(-1.0), zero)
+            ),
+            SELECT: lambda: self.choose("une", x[0], zero, x[1], x[2]),
+            casadi.OP_ASSIGN: lambda: x[0],
+        }  # fmt: skip
+        if operation not in simple:
+            raise TraceError(
+                f"CasADi operation {operation} has no printed form; write the law over airmuscle.core.ops."
+            )
+        return simple[operation]()
+
+
+def computed(
+    block: Block, code: Code, inputs: Sequence[str], held: Mapping[Operand, int], given: Mapping[Operand, str]
+) -> dict[tuple[int, int], str]:
+    """Append code to a block: `inputs` name the arrays, `held` says what stands in `c`, `given` what is known.
+
+    Returns the names of the results by output and index.
+    """
+    values = run(block, with_gates(code, inputs, held), inputs, held, given)
+    return {(o, i): value_of(block, operand, inputs, held, values) for o, i, operand in code.outputs}
+
+
+def with_gates(
+    code: Code, inputs: Sequence[str], held: Mapping[Operand, int], early: frozenset[Operand] = frozenset()
+) -> list[Item]:
+    """The instructions of code, those set apart that a zero factor or a number within its clamp makes superfluous."""
+
+    def level(operand: Operand) -> int:
+        return STEADY if operand in held else LEVEL.get(inputs[operand[1]], VARYING)
+
+    return skipping(code, level, early)
+
+
+def run(
+    block: Block,
+    body: Sequence[Item],
+    inputs: Sequence[str],
+    held: Mapping[Operand, int],
+    given: Mapping[Operand, str] | None = None,
+) -> dict[Operand, str]:
+    """Append instructions to a block; the names of their results, and of the operands `given` beforehand."""
+    values = dict(given or {})
+    for line in body:
+        append(block, line, inputs, held, values)
+    return values
+
+
+def append(
+    block: Block, line: Item, inputs: Sequence[str], held: Mapping[Operand, int], values: dict[Operand, str]
+) -> None:
+    """Append one instruction, or some that may be skipped, and add the names of results to `values`."""
+    if isinstance(line, Skippable):
+        instead = {operand: value_of(block, value, inputs, held, values) for operand, value in line.instead}
+        gates = [value_of(block, gate, inputs, held, values) for gate in line.gates]
+        values |= block.unless_zero(gates, lambda: run(block, line.body, inputs, held, values), instead)
+        return
+    arguments = [value_of(block, a, inputs, held, values) for a in line.arguments]
+    values[line.result] = block.operate(line.operation, arguments)
+
+
+def value_of(
+    block: Block, operand: Operand, inputs: Sequence[str], held: Mapping[Operand, int], values: Mapping[Operand, str]
+) -> str:
+    """The name of an operand's value, which is loaded if it stands in an array."""
+    if operand in values:
+        return values[operand]
+    if operand in held:
+        return block.load("c", held[operand])
+    if operand[0] == "c":
+        return block.constant(float(operand[1]))
+    return block.load(inputs[operand[1]], operand[2])
+
+
+def hand_over(
+    block: Block, once: Sequence[Instruction], handed: Sequence[Operand], inputs: Sequence[str], places: dict[str, int]
+) -> dict[Operand, int]:
+    """Append the parameters-only part of a function, and say where in `c` its results stand.
+
+    `places` are the values that stand there already: functions that need the same value share its place.
+    """
+    values = run(block, once, inputs, {})
+    held = {}
+    for operand in handed:
+        value = value_of(block, operand, inputs, {}, values)
+        if value not in places:
+            places[value] = len(places)
+            block.store("c", places[value], value)
+        held[operand] = places[value]
+    return held
+
+
+def function(name: str, arguments: Sequence[str], block: Block, attributes: str = "nounwind") -> str:
+    """The LLVM text of a function that returns nothing; arrays are pointers that do not overlap."""
+    signature = ", ".join(f"double %{a}" if a in block.scalars else f"ptr noalias nocapture %{a}" for a in arguments)
+    return f"define void @{name}({signature}) {attributes} {{\n" + "\n".join(block.lines) + "\n  ret void\n}\n"
+
+
+def function_of_values(name: str, arguments: Sequence[str], block: Block, number: Number, value: str) -> str:
+    """The LLVM text of a function within a module, which takes and returns values."""
+    signature = ", ".join(f"{number.text} {a}" for a in arguments)
+    head = f"define internal {number.text} @{name}({signature}) nounwind {{\n"
+    return head + "\n".join(block.lines) + f"\n  ret {number.text} {value}\n}}\n"

@@ -1,0 +1,267 @@
+"""Exponential, logarithm, power, sine and cosine in lanes, and every other function of the C library lane by lane.
+
+A call of the C library would take the lanes one after the other; these are written in operations that take all of them
+at once. Greatest error against extended precision, in units of the last place: exp 0.85, log 0.51, pow 1.0, sin and cos
+0.81 (tests/dynamics/test_lanes.py), over the whole range, with zero, infinity and NaN as in IEEE 754; angles beyond
+LARGEST_ANGLE are left to the C library. In single precision they are computed in double and rounded once.
+
+References: range reduction and the exact product by the parts of ln 2 after Tang, P. T. P., ACM TOMS 15(2), 1989;
+sum and product with their rounding error after Dekker, T. J., Numerische Mathematik 18, 1971.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+
+from .emit import Block, function_of_values
+from .types import Number
+
+LN2_HIGH, LN2_LOW = 0.693147180559890330187, 5.497923018708371e-14
+"""ln 2 in two parts; the first ends in zeros, so that its product with an exponent is exact."""
+QUARTER_HIGH, QUARTER_LOW, QUARTER_LEAST = math.pi / 2, 6.123233995736766e-17, -1.4973849048591698e-33
+"""A quarter of a turn in three parts."""
+LARGEST_ANGLE = 1e6
+"""Radians up to which these parts are enough."""
+TWO_THIRDS_LOW = 2.0**-53 / 3
+"""2/3 less the double next to it."""
+ROUNDER = 1.5 * 2.0**52
+"""Added to a whole number of moderate size, this leaves the number in the last bits of the sum."""
+LEAST_NORMAL = 2.0**-1022
+
+
+class _Exact(Block):
+    """Arithmetic in double lanes that is done as written: nothing reordered, no NaN or zero assumed away."""
+
+    def __init__(self, lanes: int) -> None:
+        super().__init__((), Number(64, lanes))
+
+    def add(self, a: str, b: str) -> str:
+        return self.put(f"fadd {self.number.text} {a}, {b}")
+
+    def subtract(self, a: str, b: str) -> str:
+        return self.put(f"fsub {self.number.text} {a}, {b}")
+
+    def times(self, a: str, b: str) -> str:
+        return self.put(f"fmul {self.number.text} {a}, {b}")
+
+    def over(self, a: str, b: str) -> str:
+        return self.put(f"fdiv {self.number.text} {a}, {b}")
+
+    def fused(self, a: str, b: str, c: str) -> str:
+        """a b + c, rounded once."""
+        return self.intrinsic("fma", (a, b, c), "")
+
+    def negative(self, a: str) -> str:
+        return self.put(f"fneg {self.number.text} {a}")
+
+    def rounded(self, a: str) -> str:
+        return self.intrinsic("rint", (a,), "")
+
+    def size_of(self, a: str) -> str:
+        return self.intrinsic("fabs", (a,), "")
+
+    def polynomial(self, x: str, coefficients: Sequence[float]) -> str:
+        """c0 + x (c1 + x (c2 + ...))."""
+        total = self.constant(coefficients[-1])
+        for c in reversed(coefficients[:-1]):
+            total = self.fused(total, x, self.constant(c))
+        return total
+
+    def bits(self, a: str) -> str:
+        return self.put(f"bitcast {self.number.text} {a} to {self.number.whole}")
+
+    def from_bits(self, a: str) -> str:
+        return self.put(f"bitcast {self.number.whole} {a} to {self.number.text}")
+
+    def on_bits(self, operation: str, a: str, b: float | str) -> str:
+        """A whole-number operation with a constant, which is given as the double of the same bits, or with a value."""
+        other = self.bits(self.constant(b)) if isinstance(b, float) else b
+        return self.put(f"{operation} {self.number.whole} {a}, {other}")
+
+    def shifted(self, operation: str, a: str) -> str:
+        """Shift by the 52 bits of a mantissa."""
+        return self.on_bits(operation, a, 52 * 5e-324)
+
+    def power_of_two(self, n: str) -> str:
+        """2**n for a whole number n from -1022 to 1023."""
+        low = self.shifted("shl", self.bits(self.add(n, self.constant(ROUNDER))))
+        return self.from_bits(self.on_bits("add", low, 1.0))
+
+    def sum_of(self, large: str, small: str) -> tuple[str, str]:
+        """large + small and its rounding error."""
+        total = self.add(large, small)
+        return total, self.subtract(small, self.subtract(total, large))
+
+    def sum_of_any(self, a: str, b: str) -> tuple[str, str]:
+        """a + b and its rounding error, whichever is the larger."""
+        total = self.add(a, b)
+        of_b = self.subtract(total, a)
+        return total, self.add(self.subtract(a, self.subtract(total, of_b)), self.subtract(b, of_b))
+
+    def exponential(self, x: str, low: str | None = None) -> str:
+        """e**(x + low), low being about a rounding of x: 2**n e**r with |r| <= ln 2 / 2, by Taylor's sum."""
+        x = self.choose("ogt", x, self.constant(720.0), self.constant(720.0), x)
+        x = self.choose("olt", x, self.constant(-760.0), self.constant(-760.0), x)
+        n = self.rounded(self.times(x, self.constant(1 / math.log(2))))
+        back = self.negative(n)
+        r = self.fused(back, self.constant(LN2_HIGH), x)
+        rest = self.times(back, self.constant(LN2_LOW))
+        r, lost = self.sum_of(r, rest if low is None else self.add(rest, low))
+        tail = self.polynomial(r, [1 / math.factorial(i) for i in range(2, 14)])
+        value = self.add(self.constant(1.0), self.add(r, self.fused(self.times(r, r), tail, lost)))
+        half = self.rounded(self.times(n, self.constant(0.5)))
+        return self.times(self.times(value, self.power_of_two(half)), self.power_of_two(self.subtract(n, half)))
+
+    def logarithm(self, x: str) -> tuple[str, str]:
+        """ln x in two parts: x = 2**n m with m from sqrt(1/2) to sqrt(2), ln m = 2 artanh((m - 1)/(m + 1))."""
+        scaled = self.times(x, self.constant(2.0**54))
+        bits = self.bits(self.choose("olt", x, self.constant(LEAST_NORMAL), scaled, x))
+        offset = self.choose("olt", x, self.constant(LEAST_NORMAL), self.constant(-54.0), self.constant(0.0))
+        exponent = self.shifted("ashr", self.on_bits("sub", bits, math.sqrt(0.5)))
+        m = self.from_bits(self.on_bits("sub", bits, self.shifted("shl", exponent)))
+        n = self.subtract(self.from_bits(self.on_bits("add", exponent, ROUNDER)), self.constant(ROUNDER))
+        n = self.add(n, offset)
+        one = self.constant(1.0)
+        above, below = self.subtract(m, one), self.add(m, one)
+        lost = self.subtract(m, self.subtract(below, one))
+        s = self.over(above, below)
+        left = self.fused(self.negative(s), below, above)
+        left = self.over(self.fused(self.negative(s), lost, left), below)
+        n_high, n_low = (self.times(n, self.constant(part)) for part in (LN2_HIGH, LN2_LOW))
+        high, error = self.sum_of(n_high, self.add(s, s))
+        cube, rest = self._after_the_first(s, left)
+        high, more = self.sum_of(high, cube)
+        low = self.add(self.add(n_low, self.add(left, left)), self.add(self.add(error, more), rest))
+        return self._at_the_ends(x, *self.sum_of(high, low))
+
+    def _after_the_first(self, s: str, lost: str) -> tuple[str, str]:
+        """2 artanh(s + lost) - 2 (s + lost): 2/3 s**3 in two parts, the second with all that follows."""
+        z = self.times(s, s)
+        z_lost = self.fused(self.add(s, s), lost, self.fused(s, s, self.negative(z)))
+        third = self.times(s, z)
+        third_lost = self.fused(s, z, self.negative(third))
+        third_lost = self.add(third_lost, self.fused(s, z_lost, self.times(lost, z)))
+        share, share_lost = self.constant(2 / 3), self.constant(TWO_THIRDS_LOW)
+        cube = self.times(share, third)
+        cube_lost = self.fused(share, third_lost, self.fused(share, third, self.negative(cube)))
+        cube_lost = self.fused(share_lost, third, cube_lost)
+        tail = self.polynomial(z, [2 / (2 * i + 5) for i in range(11)])
+        return cube, self.fused(self.times(third, z), tail, cube_lost)
+
+    def _at_the_ends(self, x: str, high: str, low: str) -> tuple[str, str]:
+        """The logarithm of 0, of infinity and of what has none."""
+        zero, infinity = self.constant(0.0), self.constant(math.inf)
+        high = self.choose("olt", x, infinity, high, x)
+        high = self.choose("oeq", x, zero, self.constant(-math.inf), high)
+        high = self.choose("olt", x, zero, self.constant(math.nan), high)
+        return high, self.choose("olt", self.size_of(high), infinity, low, zero)
+
+    def power_by_logarithm(self, x: str, y: str) -> str:
+        """x**y = e**(y ln|x|), with the sign and the exceptions of IEEE 754."""
+        zero, one, infinity = self.constant(0.0), self.constant(1.0), self.constant(math.inf)
+        size = self.size_of(x)
+        high, low = self.logarithm(size)
+        product = self.times(y, high)
+        lost = self.fused(y, low, self.fused(y, high, self.negative(product)))
+        lost = self.choose("olt", self.size_of(product), self.constant(1e3), lost, zero)
+        value = self.exponential(product, lost)
+        value = self.choose("oeq", size, one, self.choose("ord", y, y, one, y), value)
+        half = self.times(y, self.constant(0.5))
+        whole = self.choose("oeq", self.rounded(y), y, one, zero)
+        even = self.choose("oeq", self.rounded(half), half, one, zero)
+        signed = self.intrinsic("copysign", (value, x), "")
+        value = self.choose("ogt", whole, even, signed, value)
+        undefined = self.choose("oeq", whole, one, value, self.constant(math.nan))
+        value = self.choose("olt", x, zero, self.choose("olt", size, infinity, undefined, value), value)
+        value = self.choose("oeq", y, zero, one, value)
+        return self.choose("oeq", x, one, one, value)
+
+    def sine(self, x: str, quarters: float) -> str:
+        """sin(x + quarters pi/2) for |x| up to LARGEST_ANGLE: less the nearest quarter turn, then Taylor's sums."""
+        n = self.rounded(self.times(x, self.constant(2 / math.pi)))
+        back = self.negative(n)
+        nearly = self.fused(back, self.constant(QUARTER_HIGH), x)
+        low = self.times(back, self.constant(QUARTER_LOW))
+        lost = self.fused(back, self.constant(QUARTER_LOW), self.negative(low))
+        r, error = self.sum_of_any(nearly, low)
+        lost = self.add(error, self.fused(back, self.constant(QUARTER_LEAST), lost))
+        z = self.times(r, r)
+        odd = self.polynomial(z, [(-1) ** i / math.factorial(2 * i + 1) for i in range(1, 9)])
+        even = self.polynomial(z, [(-1) ** i / math.factorial(2 * i) for i in range(2, 9)])
+        sine = self.add(r, self.fused(self.times(z, r), odd, lost))
+        half = self.times(z, self.constant(0.5))
+        near, one = self.subtract(self.constant(1.0), half), self.constant(1.0)
+        left = self.subtract(self.subtract(one, near), half)
+        cosine = self.add(near, self.fused(self.times(z, z), even, self.subtract(left, self.times(r, lost))))
+        turn = self.bits(self.add(self.add(n, self.constant(quarters)), self.constant(ROUNDER)))
+        which = self.put(f"trunc {self.number.whole} {turn} to {self.number.mask}")
+        found = self.put(f"select {self.number.mask} {which}, {self.number.text} {cosine}, {self.number.text} {sine}")
+        sign = self.on_bits("shl", self.on_bits("and", turn, 2 * 5e-324), 62 * 5e-324)
+        return self.from_bits(self.on_bits("xor", self.bits(found), sign))
+
+    def unless_large(self, x: str, otherwise: str) -> None:
+        """Return what the function `otherwise` gives where any lane is beyond LARGEST_ANGLE, infinite or NaN."""
+        number = self.number
+        large = self.put(f"fcmp ugt {number.text} {self.size_of(x)}, {self.constant(LARGEST_ANGLE)}")
+        some = self.put(f"call i1 @llvm.vector.reduce.or.v{number.lanes}i1({number.mask} {large})")
+        self.lines += [
+            f"  br i1 {some}, label %large, label %usual",
+            "large:",
+            f"  %large.value = call {number.text} @{otherwise}({number.text} {x})",
+            f"  ret {number.text} %large.value",
+            "usual:",
+        ]
+
+
+def definition(name: str, count: int, number: Number) -> str:
+    """The LLVM text of a function of the C library, of one or two arguments, in lanes."""
+    double = Number(64, number.lanes)
+    if number != double:
+        return _in_double(name, count, number, double)
+    block, arguments = _Exact(number.lanes), [f"%{a}" for a in "xy"[:count]]
+    before = ""
+    if name == "exp":
+        value = block.exponential("%x")
+    elif name == "log":
+        value = block.add(*block.logarithm("%x"))
+    elif name == "pow":
+        value = block.power_by_logarithm("%x", "%y")
+    elif name in ("sin", "cos"):
+        each = f"each.{number.function(name)}"
+        before = _lane_by_lane(name, each, arguments, number)
+        block.unless_large("%x", each)
+        value = block.sine("%x", 1.0 if name == "cos" else 0.0)
+    else:
+        return _lane_by_lane(name, number.function(name), arguments, number)
+    return before + function_of_values(number.function(name), arguments, block, number, value)
+
+
+def _in_double(name: str, count: int, number: Number, double: Number) -> str:
+    """A function of shorter numbers by that of doubles, which is printed with it."""
+    block, arguments = _Exact(number.lanes), [f"%{a}" for a in "xy"[:count]]
+    wide = [block.put(f"fpext {number.text} {a} to {double.text}") for a in arguments]
+    given = ", ".join(f"{double.text} {a}" for a in wide)
+    value = block.put(f"call {double.text} @{double.function(name)}({given})")
+    value = block.put(f"fptrunc {double.text} {value} to {number.text}")
+    return definition(name, count, double) + function_of_values(number.function(name), arguments, block, number, value)
+
+
+def _lane_by_lane(name: str, as_name: str, arguments: Sequence[str], number: Number) -> str:
+    block, found = Block((), number), "poison"
+    for i in range(number.lanes):
+        given = [block.put(f"extractelement {number.text} {a}, i32 {i}") for a in arguments]
+        value = block.put(f"call double @{name}({', '.join(f'double {a}' for a in given)})")
+        found = block.put(f"insertelement {number.text} {found}, double {value}, i32 {i}")
+    return function_of_values(as_name, arguments, block, number, found)
+
+
+def declarations(numbers: Collection[Number]) -> str:
+    """LLVM's own functions that the printer and this file call, on these numbers and on as many doubles."""
+    text = ""
+    for kind in sorted({*numbers, *(Number(64, number.lanes) for number in numbers)}, key=lambda k: (k.bits, k.lanes)):
+        for name, count in (("sqrt", 1), ("fabs", 1), ("rint", 1), ("copysign", 2), ("fma", 3)):
+            text += f"declare {kind.text} @{kind.intrinsic(name)}({', '.join([kind.text] * count)})\n"
+        if kind.bits == 64:
+            text += f"declare i1 @llvm.vector.reduce.or.v{kind.lanes}i1({kind.mask})\n"
+    return text

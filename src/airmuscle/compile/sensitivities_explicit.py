@@ -1,0 +1,104 @@
+"""A whole step of an explicit method, and its derivatives along columns, as one function."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .functions import PARAMETERS, Printer
+from .ir.instructions import Code, Instruction, Operand, finished
+from .ir.scheduling import Item
+from .llvm import emit
+from .llvm.vectors import Value, loaded
+from .sensitivities import POINT, Along, Moved, Values, stored
+
+
+class _Stage:
+    """One stage: the rates, then their derivatives, printed instruction by instruction.
+
+    The rates of a stage are one long chain of operations that wait for each other. A processor sees some hundred
+    instructions at a time, so that the derivatives of the stage before are mixed in, which wait for nothing.
+    """
+
+    def __init__(
+        self, rates: Values, along: Along, printer: Printer, block: emit.Block, given: dict[Operand, str]
+    ) -> None:
+        self.rates, self.along, self.block, self.values = rates, along, block, given
+        wanted = tuple((0, i, operand) for i, operand in enumerate([*rates.results, *along.parts]))
+        code, self.held = printer.set_apart(finished(Code(tuple(rates.tape.body), wanted)), POINT)
+        needed = set(rates.results)
+        for line in reversed(code.body):
+            if line.result in needed:
+                needed.update(line.arguments)
+        self.first: list[Item] = []
+        self.second: list[Item] = []
+        for item in emit.with_gates(code, POINT, self.held, frozenset(needed)):
+            early = (item if isinstance(item, Instruction) else item.body[0]).result in needed
+            (self.first if early else self.second).append(item)
+
+    def print_rates(self, before: _Stage | None) -> None:
+        """The rates of this stage, and in between the derivatives of the one before."""
+        done, ahead = 0, 0 if before is None else len(before.second)
+        for number, line in enumerate(self.first, 1):
+            emit.append(self.block, line, POINT, self.held, self.values)
+            if before is not None:
+                upto = ahead * number // len(self.first)
+                before.print_derivatives(done, upto)
+                done = upto
+        if before is not None:
+            before.print_derivatives(done, ahead)
+
+    def print_derivatives(self, begin: int = 0, end: int | None = None) -> None:
+        """The derivatives of this stage, or some of their instructions."""
+        for line in self.second[begin:end]:
+            emit.append(self.block, line, POINT, self.held, self.values)
+
+    def _value(self, operand: Operand) -> Value:
+        return Value(self.block, emit.value_of(self.block, operand, POINT, self.held, self.values))
+
+    def slopes(self) -> list[Value]:
+        """The rates."""
+        return [self._value(operand) for operand in self.rates.results]
+
+    def columns(self, s: Sequence[Value]) -> list[Value]:
+        """The derivatives of the rates along the columns, from the rows of S."""
+        return self.along.rows({operand: self._value(operand) for operand in self.along.parts}, s)
+
+
+def _after(row: Sequence[float], begin: Sequence[Value], slopes: Sequence[Sequence[Value]], h: Value) -> list[Value]:
+    """States, or S, after the stages so far, each with its weight."""
+    found = list(begin)
+    for weight, slope in zip(row, slopes, strict=True):
+        if weight:
+            found = [value + d * _times(h, weight) for value, d in zip(found, slope, strict=True)]
+    return found
+
+
+def _times(h: Value, weight: float) -> Value:
+    return h * Value(h.block, h.block.constant(weight))
+
+
+def explicit_module(t: Moved, a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[str, int]:
+    """One whole step, as in `printed.explicit_module`: step(x, u, c, w, h, y), and how long `c` must be."""
+    rates = Values(t, t.inner.f)
+    along = rates.along(rates.results)
+    printer, block = Printer(), emit.Block(["h"])
+    h, states, s = Value(block, "%h"), [loaded(block, "x", i) for i in range(t.size)], t.rows(block, "x")
+    slopes: list[list[Value]] = []
+    columns: list[list[Value]] = []
+    rows, before = [(), *a], None
+    for number, row in enumerate(rows):
+        given = {("in", POINT.index("x"), i): x.name for i, x in enumerate(_after(row, states, slopes, h))}
+        for i in range(t.inner.u.numel()):
+            u = loaded(block, "u", i) + loaded(block, "w", i) * _times(h, sum(row))
+            given["in", POINT.index("u"), i] = u.name
+        stage = _Stage(rates, along, printer, block, given)
+        stage.print_rates(before)
+        slopes.append(stage.slopes())
+        if before is not None:
+            columns.append(before.columns(_after(rows[number - 1], s, columns, h)))
+        before = stage
+    stage.print_derivatives()
+    columns.append(stage.columns(_after(rows[-1], s, columns, h)))
+    stored(_after(b, states, slopes, h) + _after(b, s, columns, h), "y")
+    printer.end("step", ["x", "u", PARAMETERS, "w", "h", "y"], block)
+    return printer.module(), printer.held

@@ -1,0 +1,30 @@
+"""Foundations: parameters and models, parameter trees, operators over numbers and symbols, errors, references, units."""
+
+from . import ops
+from .arrays import Array
+from .model import Parameter, model, parameter, parameters
+from .reference import Reference, cite
+from .system import Differentiated, System
+from .tree import Leaf, flatten, leaves, rebuild, structure, with_parameters
+from .variables import Input, StateVariable
+
+__all__ = [
+    "Array",
+    "Differentiated",
+    "Input",
+    "Leaf",
+    "Parameter",
+    "Reference",
+    "StateVariable",
+    "System",
+    "cite",
+    "flatten",
+    "leaves",
+    "model",
+    "ops",
+    "parameter",
+    "parameters",
+    "rebuild",
+    "structure",
+    "with_parameters",
+]

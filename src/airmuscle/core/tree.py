@@ -1,0 +1,103 @@
+"""Parameter trees: leaves, flatten and unflatten of frozen models (pytrees)."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from .model import Parameter, parameters
+
+T = TypeVar("T")
+
+
+@dataclasses.dataclass(frozen=True)
+class Leaf:
+    """One number inside a model: its dotted path, its value and what is declared about it."""
+
+    path: str
+    value: Any
+    declared: Parameter
+
+
+def leaves(thing: Any, path: str = "") -> Iterator[Leaf]:
+    """Every declared number of a model and of the models inside it, in a fixed order."""
+    if isinstance(thing, tuple):
+        for i, item in enumerate(thing):
+            yield from leaves(item, f"{path}[{i}]")
+    elif dataclasses.is_dataclass(thing) and not isinstance(thing, type):
+        declared = {p.name: p for p in parameters(thing)}
+        for field in dataclasses.fields(thing):
+            value = getattr(thing, field.name)
+            inner = f"{path}.{field.name}" if path else field.name
+            if field.name not in declared:
+                yield from leaves(value, inner)
+            elif isinstance(value, tuple):
+                yield from (Leaf(f"{inner}[{i}]", v, declared[field.name]) for i, v in enumerate(value))
+            else:
+                yield Leaf(inner, value, declared[field.name])
+
+
+def flatten(thing: Any) -> npt.NDArray[np.float64]:
+    """The values of all leaves as one vector, in the order of `leaves`."""
+    return np.array([leaf.value for leaf in leaves(thing)], dtype=np.float64)
+
+
+def structure(thing: Any) -> Any:
+    """A hashable description of everything about a model but the values of its parameters."""
+    if isinstance(thing, tuple):
+        return tuple(structure(item) for item in thing)
+    if not dataclasses.is_dataclass(thing) or isinstance(thing, type):
+        return thing
+    declared = {p.name for p in parameters(thing)}
+    fields = []
+    for field in dataclasses.fields(thing):
+        value = getattr(thing, field.name)
+        size = len(value) if isinstance(value, tuple) else 1
+        fields.append((field.name, size) if field.name in declared else (field.name, structure(value)))
+    return (type(thing), *fields)
+
+
+def rebuild(thing: T, values: Sequence[Any]) -> T:
+    """The same model with other leaf values, in the order of `leaves`; symbols are put in unchecked."""
+    feed = iter(values)
+    rebuilt: T = _rebuild(thing, feed)
+    return rebuilt
+
+
+def _rebuild(thing: Any, feed: Iterator[Any]) -> Any:
+    if isinstance(thing, tuple):
+        return tuple(_rebuild(item, feed) for item in thing)
+    if not dataclasses.is_dataclass(thing) or isinstance(thing, type):
+        return thing
+    declared = {p.name for p in parameters(thing)}
+    new = object.__new__(type(thing))
+    for field in dataclasses.fields(thing):
+        value = getattr(thing, field.name)
+        if field.name not in declared:
+            value = _rebuild(value, feed)
+        elif isinstance(value, tuple):
+            value = tuple(next(feed) for _ in value)
+        else:
+            value = next(feed)
+        object.__setattr__(new, field.name, value)
+    return new
+
+
+def with_parameters(thing: T, values: Sequence[float]) -> T:
+    """The same model with other leaf values, checked as if it were newly made."""
+    checked: T = _revalidated(rebuild(thing, [float(v) for v in values]))
+    return checked
+
+
+def _revalidated(thing: Any) -> Any:
+    if isinstance(thing, tuple):
+        return tuple(_revalidated(item) for item in thing)
+    if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
+        return dataclasses.replace(
+            thing, **{f.name: _revalidated(getattr(thing, f.name)) for f in dataclasses.fields(thing)}
+        )
+    return thing

@@ -1,0 +1,90 @@
+"""DynamicProblem: residuals of all records over the unknowns, and their least squares."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import AirmuscleError
+from .course import MOST_STEPS, Course, stacked
+from .descent import Search, descended
+from .experiment import Unknown
+
+MOST = 200
+"""Runs after which any start is left where it stands."""
+
+
+FEW_STEPS, MANY = 10_000, 20
+"""A run is left after so many steps, or so many times those of its search's best run where that is more; chosen."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Problem:
+    """Residuals over unknowns in units of their scales."""
+
+    courses: tuple[Course, ...]
+    unknowns: tuple[Unknown, ...]
+    deviations: Array
+
+    @functools.cached_property
+    def scales(self) -> Array:
+        """The size of a change of each unknown."""
+        return np.array([u.scale for u in self.unknowns])
+
+    @functools.cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds in units of the scales."""
+        low, high = np.array([u.low for u in self.unknowns]), np.array([u.high for u in self.unknowns])
+        return low / self.scales, high / self.scales
+
+    def residuals(self, scaled: Array) -> tuple[Array, Array]:
+        """Residuals (R,) in sensor deviations and their slopes (R, P) by the scaled unknowns."""
+        errors, slopes, _ = self.run(scaled)
+        return errors, slopes
+
+    def run(self, scaled: Array, most_steps: int = MOST_STEPS) -> tuple[Array, Array, int]:
+        """The same, and the steps of the longest run, which fails beyond `most_steps`."""
+        return stacked(self.courses, scaled * self.scales, self.deviations, self.scales, most_steps)
+
+    def solve(self, scaled: Array, held: Sequence[int] = (), most: int = MOST) -> tuple[Array, float]:
+        """The least squares from a start, some unknowns held: unknowns and sum of squares, infinite where it fails."""
+        loose, whole = [k for k in range(scaled.size) if k not in held], scaled.copy()
+        found = descended(*self._asked(scaled, loose), most)
+        whole[loose] = found.x
+        return whole, found.cost
+
+    def search(self, scaled: Array) -> Search:
+        """The search from a start, which can be left and taken up again."""
+        return Search(*self._asked(scaled, range(scaled.size)))
+
+    def _asked(self, scaled: Array, loose: Sequence[int]) -> tuple[_Guarded, Array, Array, Array]:
+        """Residuals over the loose unknowns, their start and their bounds."""
+        (low, high), places = self.bounds, list(loose)
+        return _Guarded(self, scaled, places), scaled[places], low[places], high[places]
+
+
+class _Guarded:
+    """Residuals of a problem over some of its unknowns, None where they cannot be had.
+
+    Nor where a run takes far more steps than the best one so far, which comes of plants far from anything physical.
+    """
+
+    def __init__(self, problem: Problem, scaled: Array, loose: Sequence[int]) -> None:
+        self._problem, self._scaled, self._loose = problem, scaled, loose
+        self._least, self._most_steps = np.inf, MOST_STEPS
+
+    def __call__(self, x: Array) -> tuple[Array, Array] | None:
+        problem, at = self._problem, self._scaled.copy()
+        at[self._loose] = x
+        try:
+            errors, slopes, steps = problem.run(at, self._most_steps)
+        except AirmuscleError:
+            return None
+        cost = float(errors @ errors)
+        if cost < self._least:
+            self._least, self._most_steps = cost, min(MOST_STEPS, max(FEW_STEPS, MANY * steps))
+        return errors, slopes if len(self._loose) == at.size else slopes[:, self._loose]

@@ -1,0 +1,49 @@
+"""A muscle as a plant sees it: what its air and its pull are at one moment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from ..core.ops import Value
+from ..muscle import Muscle
+from ..pneumatics.gas import Air, Ambient, Gas, gauge
+
+
+class Port(NamedTuple):
+    """One muscle at one moment: contraction [1], shortening speed [m/s], volume [m3], pressures [Pa], forces [N].
+
+    `inner_contraction` and `inner_speed` are those of the contractile part, which differ from the fittings' beside a
+    series spring. `states` are the muscle's own and those of its air, by their own names; `rates` those of the former.
+    """
+
+    contraction: Value
+    speed: Value
+    volume: Value
+    air: Air
+    pressure: Value
+    tension: Value
+    friction: Value
+    inner_contraction: Value
+    inner_speed: Value
+    volume_rate: Value
+    states: Mapping[str, Value]
+    rates: Mapping[str, Value]
+
+
+def port_of(
+    muscle: Muscle, state: Mapping[str, Value], contraction: Value, speed: Value, gas: Gas, ambient: Ambient
+) -> Port:
+    """A muscle with its own state and that of its air, at a contraction and a shortening speed of its fittings."""
+    inner = muscle.inner_contraction(contraction, state)
+    volume = muscle.volume(inner, state)
+    air = gas.air(state, volume, ambient)
+    pressure = gauge(air.pressure, ambient)
+    pull = muscle.pull(pressure, inner, contraction, speed, state)
+    rates = muscle.rates(state, pressure, pull.speed)
+    growth = muscle.geometry.volume_growth(inner) * pull.speed / muscle.geometry.resting_length
+    growth = sum((rates[s.name] for s in muscle.wall.states), growth)
+    return Port(
+        contraction, speed, volume, air, pressure, pull.tension, pull.friction, inner, pull.speed, growth, state,
+        rates,
+    )  # fmt: skip

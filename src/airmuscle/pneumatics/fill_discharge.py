@@ -1,0 +1,80 @@
+"""On/off valves that fill a muscle and let it out; a muscle shut off for good."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ..core import ops
+from ..core.model import model
+from ..core.ops import Value
+from ..core.variables import Input
+from .circuit import Circuit, Response
+from .flow import through
+from .gas import STILL, Air, Ambient
+from .orifice import Orifice
+from .supply import Source, Supply
+
+
+def surroundings(ambient: Ambient) -> Air:
+    """The air around the plant."""
+    return Air(ambient.pressure, ambient.temperature)
+
+
+@model
+class FillDischarge(Circuit):
+    """Two on/off valves: one from the supply, one to the surroundings."""
+
+    supply: Source
+    fill: Orifice
+    discharge: Orifice
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        return (Input("fill"), Input("discharge"))
+
+    def draw(
+        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        ambient: Ambient,
+    ) -> Response:  # fmt: skip
+        incoming = through(self.fill, inlet, airs[0], inputs["fill"])
+        outgoing = through(self.discharge, airs[0], surroundings(ambient), inputs["discharge"])
+        return Response((incoming - outgoing,), incoming, outgoing)
+
+
+@model
+class ThreePosition(Circuit):
+    """A 3/3 valve with closed centre: one input, `valve`; 1 fills, 0 shuts, -1 discharges, less is part of the area."""
+
+    supply: Source
+    fill: Orifice
+    discharge: Orifice
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        return (Input("valve", "1", -1.0, 1.0, "1 fill, 0 shut, -1 discharge"),)
+
+    def draw(
+        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        ambient: Ambient,
+    ) -> Response:  # fmt: skip
+        place = inputs["valve"]
+        incoming = through(self.fill, inlet, airs[0], ops.maximum(place, 0.0))
+        outgoing = through(self.discharge, airs[0], surroundings(ambient), ops.maximum(-place, 0.0))
+        return Response((incoming - outgoing,), incoming, outgoing)
+
+
+@model
+class ClosedChamber(Circuit):
+    """No connection at all: the air mass stays what it is."""
+
+    supply: Source = Supply(0.0)
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        return ()
+
+    def draw(
+        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        ambient: Ambient,
+    ) -> Response:  # fmt: skip
+        return Response((STILL,))

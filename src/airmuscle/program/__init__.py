@@ -1,9 +1,0 @@
-"""From a system over `ops` to machine code: trace, differentiate, print, compile. Nothing here solves anything.
-
-`program.prepared` holds the way in; it is not imported here, because it brings CasADi, which a description of a
-system does not need.
-"""
-
-from ..variables import StateVariable as StateVariable
-from .system import Differentiated as Differentiated
-from .system import System as System

@@ -1,0 +1,250 @@
+"""A simulation written down as a file: [plant], [command], [run] and [output].
+
+    [plant]
+    muscle = "dmsp-20-300"                      a library name or a muscle file; or a table [plant.muscle] with
+                                                library = "dmsp-20-300" and what replaces its parts, or all parts
+    gas = "Isothermal"                          optional; polytropic otherwise
+    [plant.circuit]                             model = "FillDischarge" with supply, fill and discharge
+    [plant.mechanism]                           model = "HangingMass", mass = "5 kg"
+    [command]                                   see command_table.py; with a controller, loop_table.py
+    fill = [["5 s", 1], ["15 s", 0]]            every input of the plant: instants, and the value from then on
+    [run]
+    duration = "25 s"
+    output = "10 ms"                            optional
+    start = { pressure = "0 bar" }              optional: rest at this pressure; or a state, position = "10 mm"
+    method = { model = "Rodas4", rtol = 1e-8 }  optional
+    [output]
+    columns = ["pressure", "force"]             optional: what the file of the run holds beside the time; or all
+
+Components are tables with `model` and their parameters; later components need no new grammar.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType, NoneType
+from typing import Any
+
+from ..analysis.equilibrium import equilibrium
+from ..characteristic.base import ForceLaw
+from ..control.driver import Driven
+from ..control.inputs import Command
+from ..control.loop import Loop
+from ..core.errors import ParameterError, suggestion
+from ..library.build import build
+from ..library.catalogue import load, parsed
+from ..library.entry import Entry
+from ..library.place import Place, checked, finite, refuse_unknown, said_at, text
+from ..muscle import Muscle
+from ..plant.plant import Plant
+from ..recording import Recording
+from ..simulation.arguments import refuse_beyond_range
+from ..simulation.integrators import Method, Rodas4
+from ..simulation.simulate import simulate
+from .controller import loop_from, units_around
+from .inputs import command_from
+
+TABLES = ("title", "plant", "command", "run", "output")
+RUN = ("duration", "start_time", "output", "start", "method")
+OUTPUT = ("columns",)
+AMBIENT: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
+"""A run begins at rest at ambient pressure unless it says otherwise."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Scenario:
+    """A plant, what it is commanded, and how long it runs; all numbers SI."""
+
+    title: str
+    plant: Plant
+    command: Command | Loop
+    duration: float
+    start: dict[str, float]
+    start_time: float = 0.0
+    output: float | None = None
+    method: Method = dataclasses.field(default_factory=Rodas4)
+    columns: tuple[str, ...] = ()
+    """What the file of the run holds beside the time; empty: everything."""
+
+    def simulate(self, *, complete: bool = True) -> Recording:
+        """The run as a Recording; see `airmuscle.simulate`."""
+        return simulate(
+            self.plant,
+            self.command,
+            duration=self.duration,
+            start=self.start,
+            start_time=self.start_time,
+            method=self.method,
+            output=self.output,
+            complete=complete,
+        )
+
+    def chosen(self, recording: Recording) -> Recording:
+        """The recording with the columns that the scenario asks for."""
+        kept = {name: recording[name] for name in recording if not self.columns or name in ("time", *self.columns)}
+        return dataclasses.replace(recording, columns=kept)
+
+
+def load_scenario(path: str | Path) -> Scenario:
+    """The scenario in a file. Raises FileError, ParameterError, UnitError or UnknownName, saying where."""
+    file = Path(path)
+    return scenario_from(parsed(file), Place(str(file), "", file.parent))
+
+
+def scenario_from(
+    tables: Mapping[str, Any], place: Place, plant: Plant | None = None, rest: dict[str, float] | None = None
+) -> Scenario:
+    """The scenario that the tables of a file describe; a `plant` that is given stands for the table [plant], and a
+    `rest` for the equilibrium that the run begins at."""
+    refuse_unknown(tables, TABLES, place)
+    for key in ("plant", "run"):
+        _table(tables.get(key), key, place)
+    plant = plant or _plant(tables["plant"], place.inside("plant"))
+    run, at = tables["run"], place.inside("run")
+    refuse_unknown(run, RUN, at)
+    if "duration" not in run:
+        raise ParameterError(f"{at}: 'duration' is missing; write it like duration = \"25 s\".")
+    duration, start_time = _length(run, "duration", at), finite(run.get("start_time", 0.0), "s", f"{at}, start_time")
+    table = _table(tables.get("command", {}), "command", place)
+    start = _start(run.get("start", AMBIENT), plant, at.inside("start"), rest)
+    command = _command(table, plant, start, duration, place.inside("command"))
+    shown = Driven(command.beside, command.drivers) if isinstance(command, Loop) else command
+    with said_at(place.inside("command")):
+        refuse_beyond_range(plant, shown.segments(plant.inputs, start_time, duration), start_time)
+    known = list(units_of_run(plant, start, command))
+    return Scenario(
+        title=text(tables, "title", place, needed=False) or Path(place.file).stem,
+        plant=plant,
+        command=command,
+        duration=duration,
+        start=start,
+        start_time=start_time,
+        output=_length(run, "output", at) if "output" in run else None,
+        method=_object(run["method"], Method, at.inside("method")) if "method" in run else Rodas4(),
+        columns=_columns(_table(tables.get("output", {}), "output", place), known, place.inside("output")),
+    )
+
+
+def _table(given: Any, key: str, place: Place) -> Mapping[str, Any]:
+    if not isinstance(given, Mapping):
+        what = "is missing" if given is None else f"is {given!r}, no table; write [{key}] and its keys under it"
+        raise ParameterError(f"{place}: the table [{key}] {what}.")
+    return given
+
+
+def _command(
+    table: Mapping[str, Any], plant: Plant, start: Mapping[str, float], duration: float, place: Place
+) -> Command | Loop:
+    if "controller" not in table:
+        return command_from(table, plant.commands, place)
+    loop = loop_from(table, plant, units_around(plant, start), place)
+    with said_at(place.inside("controller")):
+        loop.refuse_longer(duration)
+    return loop
+
+
+def units_of_run(plant: Plant, start: Mapping[str, float], command: Command | Loop) -> dict[str, str]:
+    """The units of all columns that a run has; '' where none is known."""
+    units = {"time": "s"} | units_around(plant, start)
+    return units | (command.units(units) if isinstance(command, Loop) else {})
+
+
+def _length(table: Mapping[str, Any], key: str, place: Place) -> float:
+    """A length of time [s]."""
+    found = finite(table[key], "s", f"{place}, {key}")
+    if not found > 0:
+        raise ParameterError(f"{place}, {key} is {table[key]!r}; it must be greater than zero.")
+    return found
+
+
+def _plant(table: Mapping[str, Any], place: Place) -> Plant:
+    muscles = table.get("muscle")
+    if muscles is None:
+        raise ParameterError(f"{place}: 'muscle' is missing; name a library entry, a file, or write [plant.muscle].")
+    found: Any
+    if isinstance(muscles, list):
+        found = tuple(_muscle(m, place.inside(f"muscle[{i}]")) for i, m in enumerate(muscles))
+    else:
+        found = _muscle(muscles, place.inside("muscle"))
+    rest = {"model": "Plant", **{key: value for key, value in table.items() if key != "muscle"}}
+    plant: Plant = checked(build(rest, place, {"muscle": found}), Plant, place)
+    return plant
+
+
+def _muscle(given: Any, place: Place) -> Any:
+    if isinstance(given, Mapping):
+        rest = {"model": "Muscle", **given}
+        base = rest.pop("library", None)
+        return build(rest, place, {} if base is None else _parts(_entry(base, place.inside("library")), rest, place))
+    entry = _entry(given, place)
+    with said_at(place):
+        return entry.muscle
+
+
+def _entry(given: Any, place: Place) -> Entry:
+    if not isinstance(given, str):
+        raise ParameterError(f"{place} is {given!r}; name a library entry or a muscle file.")
+    with said_at(place):
+        return load(place.folder / given if given.endswith(".toml") else given)
+
+
+def _parts(entry: Entry, replaced: Mapping[str, Any], place: Place) -> dict[str, Any]:
+    """The parts of an entry that a table leaves as they are; what it lacks, such as a geometry, the table may give."""
+    names = [f.name for f in dataclasses.fields(Muscle) if f.name not in ("contractile", "name")]
+    parts = {"contractile": entry.characteristic, **{name: getattr(entry, name, None) for name in names}}
+    if "contractile" in replaced:
+        del parts["box"]  # it tells where the law that is replaced was measured
+    left = {name: part for name, part in parts.items() if part is not None and name not in replaced}
+    if not isinstance(left.get("contractile"), ForceLaw | NoneType):
+        raise ParameterError(
+            f"{place}: {entry.name} is {type(entry.characteristic).__name__}, which is not solved for the force; "
+            "a plant needs a ForceLaw. In Python, as_force_law(law, box) makes one."
+        )
+    return left
+
+
+def pressure_of_rest(tables: Mapping[str, Any], place: Place) -> float | None:
+    """Gauge pressure [Pa] in the muscles where a run begins at rest; None where it begins at another state."""
+    given = tables["run"].get("start", AMBIENT)
+    if not isinstance(given, Mapping) or set(given) - {"pressure"}:
+        return None
+    return finite(given.get("pressure", 0.0), "Pa", f"{place.inside('run').inside('start')}, pressure")
+
+
+def _start(given: Any, plant: Plant, place: Place, rest: dict[str, float] | None) -> dict[str, float]:
+    if not isinstance(given, Mapping):
+        raise ParameterError(f'{place} is {given!r}; write start = {{ pressure = "0 bar" }}.')
+    coordinates = {
+        name: unit for c in plant.mechanism.coordinates for name, unit in ((c.name, c.unit), (c.speed, f"{c.unit}/s"))
+    }
+    kinds = {"pressure": "Pa", **coordinates}
+    refuse_unknown(given, tuple(kinds), place)
+    values = {key: finite(value, kinds[key], f"{place}, {key}") for key, value in given.items()}
+    pressure = values.pop("pressure", 0.0)
+    with said_at(place):
+        if values:
+            return plant.state_at(pressure=pressure, **values)
+        return equilibrium(plant, pressure=pressure) if rest is None else rest
+
+
+def _columns(table: Mapping[str, Any], known: Sequence[str], place: Place) -> tuple[str, ...]:
+    refuse_unknown(table, OUTPUT, place)
+    given = table.get("columns", [])
+    if not isinstance(given, list) or not all(isinstance(name, str) for name in given):
+        raise ParameterError(f'{place}, columns is {given!r}; write columns = ["pressure", "force"].')
+    for name in given:
+        if name not in known:
+            raise ParameterError(
+                f"{place}: the run has no column '{name}'; there are {', '.join(known)}.{suggestion(name, known)}"
+            )
+    return tuple(given)
+
+
+def _object(given: Any, kind: type[Any], place: Place) -> Any:
+    return checked(build({"model": given} if isinstance(given, str) else given, place), kind, place)
+
+
+plant_from, muscle_from = _plant, _muscle
+"""The grammar of a plant and of a muscle, for other files that hold them."""

@@ -1,0 +1,13 @@
+"""Thousands of plants at once: other parameters, other starts, other commands, one pass over all cores."""
+
+from .precision import Double, Precision, Single
+from .result import Batch
+from .simulate_batch import simulate_batch
+
+__all__ = [
+    "Batch",
+    "Double",
+    "Precision",
+    "Single",
+    "simulate_batch",
+]

@@ -1,0 +1,130 @@
+"""A chunk: some runs of a study, what came of them, and the file that keeps it.
+
+The name of the file is the fingerprint of all that its contents depend on. So a chunk that is there need not be
+computed again, whatever became of the study in between; one whose inputs changed is not found, and computed anew.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from ..core.arrays import Array
+from ..core.errors import FileError
+from ..recording import Recording
+from ..scenario.scenario import Scenario
+from .executors import refuse_stopped
+from .fingerprint import fingerprint, program
+from .simulate import REFUSALS, carried, reason
+from .study import Study, load_study
+
+_loaded: dict[tuple[str, str], Study] = {}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Chunk:
+    """Outcomes of n runs: `numbers` (n, k), `courses` by name (n, T), and why a run failed (n,), empty if not."""
+
+    numbers: Array
+    courses: Mapping[str, Array]
+    reasons: npt.NDArray[np.str_]
+
+
+def identity(study: Study) -> str:
+    """The fingerprint of a study together with the program that runs it."""
+    return fingerprint(program(), study.mark(), study.values)
+
+
+def name_of(study: Study, index: int) -> str:
+    """The name of the file that keeps a chunk."""
+    rows = study.rows(index)
+    return f"{fingerprint(program(), study.mark(), study.values[rows.start : rows.stop])}.npz"
+
+
+def remember(study: Study) -> str:
+    """Let this process take the study as it is when it runs chunks of it; its identity."""
+    mark = identity(study)
+    _loaded[str(study.path.resolve()), mark] = study
+    return mark
+
+
+def run_chunk(path: str, mark: str, index: int) -> Chunk:
+    """Run one chunk of the study in a file, on whatever machine; the plants are built there.
+
+    Raises FileError where the file describes another study here than `mark` names.
+    """
+    if (path, mark) not in _loaded:
+        study = load_study(path)
+        if identity(study) != mark:
+            raise FileError(
+                f"{path}: a worker reads another study than the one that was started. Either it was edited meanwhile, "
+                "or the worker has another version of airmuscle, of what it needs, or of the files that it names."
+            )
+        _loaded[path, mark] = study
+    return computed(_loaded[path, mark], index)
+
+
+def computed(study: Study, index: int) -> Chunk:
+    """The outcomes of one chunk; a run that fails leaves NaN and its reason."""
+    rows = study.rows(index)
+    found = Chunk(
+        np.full((len(rows), len(study.scalars)), np.nan),
+        {name: np.full((len(rows), course.instants.size), np.nan) for name, course in study.courses.items()},
+        np.array([""] * len(rows), dtype=object),
+    )
+    scenarios: dict[int, Scenario] = {}
+    for place, (run, rest) in enumerate(zip(rows, study.rests(rows), strict=True)):
+        refuse_stopped()
+        try:
+            scenarios[place] = study.scenario(run, rest)
+        except REFUSALS as error:
+            found.reasons[place] = reason(error)
+    for place, run_or_reason in zip(scenarios, carried(list(scenarios.values()), instants(study)), strict=True):
+        refuse_stopped()
+        if isinstance(run_or_reason, str):
+            found.reasons[place] = run_or_reason
+        else:
+            _keep(study, run_or_reason, found, place)
+    return dataclasses.replace(found, reasons=found.reasons.astype(str))
+
+
+def instants(study: Study) -> Array:
+    """All instants [s] that the outcomes of a study look at."""
+    return np.unique(np.concatenate([outcome.instants for outcome in study.outcomes.values()]))
+
+
+def _keep(study: Study, recording: Recording, found: Chunk, place: int) -> None:
+    time = recording["time"]
+    found.numbers[place] = [o.number(time, recording[o.column]) for o in study.scalars.values()]
+    for name, course in study.courses.items():
+        found.courses[name][place] = course.rows(time, recording[course.column])
+
+
+def write(chunk: Chunk, path: Path) -> None:
+    """Write a chunk to its file, which appears whole or not at all."""
+    handle, unfinished = tempfile.mkstemp(dir=path.parent, prefix=".unfinished-")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            courses = {f"course:{name}": rows for name, rows in chunk.courses.items()}
+            np.savez(file, numbers=chunk.numbers, reasons=chunk.reasons, **courses)  # type: ignore[arg-type]
+        os.replace(unfinished, path)
+    except BaseException:
+        Path(unfinished).unlink(missing_ok=True)
+        raise
+
+
+def read(path: Path) -> Chunk | None:
+    """The chunk that a file keeps; None where there is none, or the file is damaged."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            courses = {n.removeprefix("course:"): file[n] for n in file.files if n.startswith("course:")}
+            return Chunk(file["numbers"], courses, file["reasons"])
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None

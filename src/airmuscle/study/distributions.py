@@ -1,0 +1,239 @@
+"""What a number of a plant may be: one of several levels, or distributed."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.arrays import Array
+from ..core.errors import ParameterError
+from ..library.place import Place, finite
+from .parse import chosen, difference, key, quantity, ratio, whole
+
+LEAST_SHARE = 1e-6
+"""Part of a distribution that a truncation must leave, so that its ends stay exact to ten digits."""
+
+
+class Variation(abc.ABC):
+    """The values that one number takes, from the least to the greatest."""
+
+    @abc.abstractmethod
+    def at(self, shares: Array) -> Array:
+        """The values (N,) that these shares (N,) of all, in (0, 1), lie below."""
+
+    @property
+    @abc.abstractmethod
+    def ends(self) -> tuple[float, float]:
+        """The least and the greatest value; infinite where there is none."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Levels(Variation):
+    """Given values, each as likely as any other. In a file: a list."""
+
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        _refuse_not_finite(self, *self.values)
+        if not self.values:
+            raise ParameterError("Levels: the list is empty; give at least one value.")
+
+    def at(self, shares: Array) -> Array:
+        index = np.floor(shares * len(self.values)).astype(int)
+        values: Array = np.array(self.values)[np.minimum(index, len(self.values) - 1)]
+        return values
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        return min(self.values), max(self.values)
+
+
+@dataclasses.dataclass(frozen=True)
+class Range:
+    """Levels at equal distances, both ends among them."""
+
+    low: float = key(quantity, "first value")
+    high: float = key(quantity, "last value")
+    count: int = key(whole, "number of values")
+
+    def __post_init__(self) -> None:
+        _refuse_not_finite(self, self.low, self.high)
+        if not 2 <= self.count <= 1_000_000 or self.low == self.high:
+            raise ParameterError(
+                f"Range: {self.count} values from {self.low:g} to {self.high:g}; it takes two different ends, and 2 to "
+                "1000000 values."
+            )
+
+    @property
+    def levels(self) -> Levels:
+        """The values themselves."""
+        return Levels(tuple(np.linspace(self.low, self.high, self.count).tolist()))
+
+
+class Distribution(Variation):
+    """A continuous distribution, computed by scipy.stats."""
+
+    @abc.abstractmethod
+    def law(self) -> Any:
+        """The frozen distribution of scipy.stats."""
+
+    def at(self, shares: Array) -> Array:
+        return np.asarray(self.law().ppf(shares), dtype=float)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        low, high = self.law().support()
+        return float(low), float(high)
+
+
+@dataclasses.dataclass(frozen=True)
+class Uniform(Distribution):
+    """Every value between two ends is as likely as any other."""
+
+    low: float = key(quantity, "least value")
+    high: float = key(quantity, "greatest value")
+
+    def __post_init__(self) -> None:
+        _refuse_not_finite(self, self.low, self.high)
+        _refuse_disorder(self, ("low", self.low), ("high", self.high))
+
+    def law(self) -> Any:
+        from scipy import stats
+
+        return stats.uniform(self.low, self.high - self.low)
+
+
+@dataclasses.dataclass(frozen=True)
+class Normal(Distribution):
+    """The normal distribution; it has no ends, so put it in Truncated where values beyond some bound are impossible."""
+
+    mean: float = key(quantity, "mean")
+    deviation: float = key(difference, "standard deviation")
+
+    def __post_init__(self) -> None:
+        _refuse_not_finite(self, self.mean, self.deviation)
+        _refuse_not_positive(self, "deviation", self.deviation)
+
+    def law(self) -> Any:
+        from scipy import stats
+
+        return stats.norm(self.mean, self.deviation)
+
+
+@dataclasses.dataclass(frozen=True)
+class LogNormal(Distribution):
+    """A value whose natural logarithm is normal: half of all lie below the median."""
+
+    median: float = key(quantity, "median")
+    log_deviation: float = key(ratio, "standard deviation of the natural logarithm; about the relative one")
+
+    def __post_init__(self) -> None:
+        _refuse_not_finite(self, self.median, self.log_deviation)
+        _refuse_not_positive(self, "median", self.median)
+        _refuse_not_positive(self, "log_deviation", self.log_deviation)
+
+    def law(self) -> Any:
+        from scipy import stats
+
+        return stats.lognorm(self.log_deviation, scale=self.median)
+
+
+@dataclasses.dataclass(frozen=True)
+class Triangular(Distribution):
+    """Likeliest at the mode, and ever less so towards the ends."""
+
+    low: float = key(quantity, "least value")
+    mode: float = key(quantity, "likeliest value")
+    high: float = key(quantity, "greatest value")
+
+    def __post_init__(self) -> None:
+        _refuse_not_finite(self, self.low, self.mode, self.high)
+        _refuse_disorder(self, ("low", self.low), ("high", self.high))
+        if not self.low <= self.mode <= self.high:
+            raise ParameterError(f"Triangular: mode {self.mode:g} must lie within {self.low:g} to {self.high:g}.")
+
+    def law(self) -> Any:
+        from scipy import stats
+
+        return stats.triang((self.mode - self.low) / (self.high - self.low), self.low, self.high - self.low)
+
+
+def _inner(value: Any, unit: str, where: str) -> Distribution:
+    found: Distribution = chosen(value, DISTRIBUTIONS[:-1], Place(where, "", Path()), unit)
+    return found
+
+
+@dataclasses.dataclass(frozen=True)
+class Truncated(Variation):
+    """Another distribution without what lies beyond two ends."""
+
+    inner: Distribution = key(_inner, "the distribution that is cut, a table with a model")
+    low: float = key(quantity, "least value")
+    high: float = key(quantity, "greatest value")
+
+    def __post_init__(self) -> None:
+        _refuse_not_finite(self, self.low, self.high)
+        _refuse_disorder(self, ("low", self.low), ("high", self.high))
+        if not isinstance(self.inner, Distribution):
+            raise ParameterError(f"Truncated: {self.inner!r} is no distribution that can be cut.")
+        below, above = self._shares()
+        if above - below < LEAST_SHARE:
+            raise ParameterError(
+                f"Truncated: only {above - below:.2g} of {self.inner} lies within {self.low:g} to {self.high:g}; at "
+                f"least {LEAST_SHARE:g} must."
+            )
+
+    def _shares(self) -> tuple[float, float]:
+        below, above = self.inner.law().cdf([self.low, self.high])
+        return float(below), float(above)
+
+    def at(self, shares: Array) -> Array:
+        below, above = self._shares()
+        return np.clip(self.inner.at(below + shares * (above - below)), self.low, self.high)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        low, high = self.inner.ends
+        return max(low, self.low), min(high, self.high)
+
+
+DISTRIBUTIONS = (Uniform, Normal, LogNormal, Triangular, Truncated)
+
+
+def variation_from(given: Any, unit: str, place: Place) -> Variation:
+    """The variation that a list or a table of a study describes."""
+    if isinstance(given, list):
+        if not given:
+            raise ParameterError(f"{place}: the list is empty; give at least one value.")
+        return Levels(tuple(finite(value, unit, f"{place}[{i}]") for i, value in enumerate(given)))
+    if not isinstance(given, Mapping):
+        raise ParameterError(
+            f'{place} is {given!r}; write a list of values, or a distribution like {{ model = "Uniform", low = ..., '
+            "high = ... }."
+        )
+    found = chosen(given, (Range, *DISTRIBUTIONS), place, unit)
+    return found.levels if isinstance(found, Range) else found
+
+
+def _refuse_not_finite(thing: Any, *values: float) -> None:
+    if not all(math.isfinite(value) for value in values):
+        raise ParameterError(f"{thing}: every number must be finite.")
+
+
+def _refuse_not_positive(thing: Any, name: str, value: float) -> None:
+    if not value > 0:
+        raise ParameterError(f"{type(thing).__name__}: {name} is {value:g}; it must be greater than zero.")
+
+
+def _refuse_disorder(thing: Any, first: tuple[str, float], second: tuple[str, float]) -> None:
+    if not first[1] < second[1]:
+        raise ParameterError(
+            f"{type(thing).__name__}: {first[0]} is {first[1]:g} and {second[0]} {second[1]:g}; {first[0]} must be the "
+            "smaller one."
+        )
