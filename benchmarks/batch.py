@@ -18,7 +18,7 @@ from filling import Array, hanging, runs
 from measure import PEAK, Bar, Section, Times, interleaved, of_time, show
 from ode8 import compilers
 
-from airmuscle.analysis.equilibrium import equilibrium
+from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.control.inputs import Schedule
 from airmuscle.core import tree
 from airmuscle.plant.plant import Plant
@@ -47,7 +47,7 @@ TEXT = (
     "1e-3 s over 5 s, the end of each kept. The C computes the same equations in blocks of 8, 16 or 32 lanes, "
     "everything that depends on parameters alone computed before; `simulate_batch` is timed whole, with the check "
     f"of every parameter. Of NumPy, which uses one core, {SHORT:g} s are run and counted as 5 s. The C has no "
-    "branch; the library goes around shut valves and the tangent of a box not left, where that holds for all "
+    "branch; the library goes around shut valves and the tangent of a validity range not left, where that holds for all "
     "plants of a register row, as it does here. All these start at one state; where each of the plants rests "
     "at ambient pressure is what a batch without a start asks first."
 )
@@ -73,7 +73,7 @@ def constants(plant: Any, count: int) -> Array:
     muscle, circuit, load, ambient = plant.muscles[0], plant.circuits[0], plant.mechanism, plant.ambient
     law, (k, c) = muscle.contractile, _stretch(muscle.geometry)
     scale = REFERENCE_DENSITY * np.sqrt(REFERENCE_TEMPERATURE / ambient.temperature)
-    box = (law.least_contraction, law.greatest_contraction), (law.least_pressure, law.greatest_pressure)
+    validity_range = (law.min_contraction, law.max_contraction), (law.min_pressure, law.max_pressure)
     valves = [
         x
         for v in (circuit.fill, circuit.discharge)
@@ -81,8 +81,8 @@ def constants(plant: Any, count: int) -> Array:
     ]
     rows = [1 / load.mass, load.gravity, 1 / muscle.geometry.resting_length, k, c * c]
     rows += [GAS_CONSTANT * ambient.temperature, ambient.pressure, circuit.supply.pressure + ambient.pressure, *valves]
-    rows += [x for low, high in box for x in (low, 2 / (high - low))]
-    rows += [law.least_force, law.greatest_force, muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth]
+    rows += [x for low, high in validity_range for x in (low, 2 / (high - low))]
+    rows += [law.min_force, law.max_force, muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth]
     return np.array([np.broadcast_to(row, count) for row in (*rows, *law.coefficients)])
 
 
@@ -172,7 +172,7 @@ def variants(folder: pathlib.Path, count: int, seconds: float) -> dict[str, tupl
     """What is timed: the number of cores, and the call."""
     plant, start = hanging(), runs()[3].vector
     parameters = varied(plant, count)
-    table = constants(tree.rebuild(plant, list(parameters.values())), count)
+    table = constants(tree.unflatten(plant, list(parameters.values())), count)
     found: dict[str, tuple[int, Callable[[], Array]]] = {}
     libraries = compiled(folder)
     for cores in sorted({1, min(2, cores_here())}):
@@ -207,7 +207,7 @@ def rests(count: int, rounds: int) -> tuple[list[tuple[str, ...]], Bar]:
         return resting_starts(different, lambda done: None)[0]
 
     def alone() -> Array:
-        return np.array([list(equilibrium(different.one(i), pressure=0.0).values()) for i in few])
+        return np.array([list(find_equilibrium(different.one(i), pressure=0.0).values()) for i in few])
 
     refuse_other_ends({"alone": alone().T, "together": together()[: len(few)].T}, "together", runs()[3].nominal)
     times = interleaved({"together": together, "alone": alone}, rounds)
@@ -253,7 +253,7 @@ def section(rounds: int = 5, count: int = PLANTS, seconds: float = DURATION) -> 
         refuse_other_ends(ends, "simulate_batch", runs()[3].nominal)
         times = interleaved({name: call for name, (_, call) in timed.items()}, rounds)
         parameters = varied(plant, count)
-        table = constants(tree.rebuild(plant, list(parameters.values())), count)
+        table = constants(tree.unflatten(plant, list(parameters.values())), count)
         slow = {"NumPy": lambda: in_numpy(table, start, short)}
         slow |= {"short": lambda: in_lanes(plant, parameters, start, short, 1)}
         by_numpy = interleaved(slow, max(2, rounds // 2))

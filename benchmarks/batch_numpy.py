@@ -47,7 +47,7 @@ def flow(valve: Array, up: Array, down: Array) -> Array:
 
 
 def surface(a: Array, x: Array, q: Array) -> Array:
-    """The polynomial of degree five, continued by its tangent beyond its box."""
+    """The polynomial of degree five, continued by its tangent beyond its validity range."""
     xi, qi = np.clip(x, -1.0, 1.0), np.clip(q, -1.0, 1.0)
     r0 = a[0] + xi * (a[1] + xi * (a[2] + xi * (a[3] + xi * (a[4] + xi * a[5]))))
     r1 = a[6] + xi * (a[7] + xi * (a[8] + xi * (a[9] + xi * a[10])))

@@ -7,10 +7,10 @@ from measure import Bar, Section, interleaved, of_time, show
 from static_fit import matrix, points
 
 from airmuscle.characteristic.contractile_surface import ContractileSurface
-from airmuscle.identify.bootstrap import bootstrap
+from airmuscle.identify.bootstrapping import bootstrap
 from airmuscle.identify.censoring import UNCENSORED
-from airmuscle.identify.fit import fit
-from airmuscle.identify.leave_out import Runs
+from airmuscle.identify.cross_validation import RunSplit
+from airmuscle.identify.static_fit import fit
 from airmuscle.recording import Recording
 
 REFITS = 1000
@@ -26,7 +26,7 @@ TEXT = (
 def by_library(runs: list[Recording]) -> np.ndarray:
     """Coefficients of every refit; the fit itself is not counted as saved."""
     found = fit(ContractileSurface.blank(), runs, censoring=UNCENSORED)
-    return bootstrap(found, runs, refits=REFITS, by=Runs(), seed=0).values
+    return bootstrap(found, runs, refits=REFITS, by=RunSplit(), seed=0).values
 
 
 def by_scipy(columns: np.ndarray, force: np.ndarray) -> np.ndarray:

@@ -13,19 +13,19 @@ from joints import HEAT_CAPACITY, Joint, JointWithHeat
 from measure import Bar, Section, interleaved, of_time, show
 from rodas4 import kernel
 
-from airmuscle.compile.program import Prepared, prepared
+from airmuscle.compile.program import CompiledSystem, compile_system
 from airmuscle.control.inputs import Schedule
 from airmuscle.core import ops
-from airmuscle.core.model import model, parameter
+from airmuscle.core.declaration import model, parameter
 from airmuscle.core.ops import Value
 from airmuscle.core.variables import Input, StateVariable
 from airmuscle.mechanism.base import Coordinate, Mechanism
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import Circuit, FillDischarge, Line, ProportionalValve, Response, Supply, Tube, Valve
+from airmuscle.pneumatics import Circuit, CircuitFlows, FillDischarge, ProportionalValve, Supply, Tube, Valve, WithTubes
 from airmuscle.pneumatics.fill_discharge import surroundings
-from airmuscle.pneumatics.flow import through
+from airmuscle.pneumatics.flow import orifice_flow
 from airmuscle.pneumatics.gas import GAS_CONSTANT, Air, Ambient, EnergyBalance, Isothermal
-from airmuscle.pneumatics.proportional import Follower
+from airmuscle.pneumatics.proportional import SecondOrderLag
 from airmuscle.simulation.integrators import Rodas4
 
 RTOL = 1e-6
@@ -33,7 +33,7 @@ SIDE_NAMES = ("left", "right")
 HEADING = ("states", "plant", "derivative", "25 s", "least", "steps", "one step", "times written out")
 TEXT = (
     "The joints of `joints.py`, whose equations are written out, beside plants of the library's components: muscles, "
-    "`Line` with `Tube`, `Isothermal` or `EnergyBalance`, with a mechanism and for ten states a valve with a lagging "
+    "`WithTubes` with `Tube`, `Isothermal` or `EnergyBalance`, with a mechanism and for ten states a valve with a lagging "
     "spool that are made here. Both have the same rates to rounding, which is checked; their steps differ a little, "
     "because a plant takes other nominal sizes. The ratio is that of one derivative, the least of its times on both "
     "sides: a neighbour on the same core doubles some 50 ns. `ProportionalValve` has a spool of second order, so that "
@@ -85,15 +85,15 @@ class LaggedValve(Circuit):
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         return (StateVariable("spool", "1", 1.0, "place of the spool"),)
 
-    def draw(
+    def supplied_flow(
         self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
-    ) -> Response:  # fmt: skip
+    ) -> CircuitFlows:  # fmt: skip
         spool = state["spool"]
-        incoming = through(self.valve, inlet, airs[0], ops.maximum(spool, 0.0))
-        outgoing = through(self.valve, airs[0], surroundings(ambient), ops.maximum(-spool, 0.0))
+        incoming = orifice_flow(self.valve, inlet, airs[0], ops.maximum(spool, 0.0))
+        outgoing = orifice_flow(self.valve, airs[0], surroundings(ambient), ops.maximum(-spool, 0.0))
         moving = (inputs["fill"] - inputs["discharge"] - spool) / self.lag
-        return Response((incoming - outgoing,), incoming, outgoing, {"spool": moving})
+        return CircuitFlows((incoming - outgoing,), incoming, outgoing, {"spool": moving})
 
 
 @model
@@ -115,17 +115,17 @@ def of_components(system: Joint) -> Plant:
     mechanism = Antagonists(system.inertia, system.radius, system.friction, system.load, system.offset)
     tube = Tube(system.tube, system.tube_volume)
     if isinstance(system, JointWithHeat):
-        line = Line(LaggedValve(system.supply, system.valve, system.spool_lag), tube)
+        line = WithTubes(LaggedValve(system.supply, system.valve, system.spool_lag), tube)
         return Plant(muscles, (line, line), mechanism, EnergyBalance(system.heat_transfer), system.ambient)
-    line = Line(FillDischarge(system.supply, system.valve, system.valve), tube)
+    line = WithTubes(FillDischarge(system.supply, system.valve, system.valve), tube)
     return Plant(muscles, (line, line), mechanism, Isothermal(), system.ambient)
 
 
 def with_proportional_valves(system: JointWithHeat) -> Plant:
     """The joint with heat, a 5/3 proportional valve for each muscle: twelve states."""
-    plant, spool = of_components(system), Follower(1.0 / (2.0 * ops.pi * system.spool_lag))
+    plant, spool = of_components(system), SecondOrderLag(1.0 / (2.0 * ops.pi * system.spool_lag))
     valve = ProportionalValve(system.supply, system.valve, system.valve, spool)
-    return dataclasses.replace(plant, circuit=(Line(valve, plant.circuits[0].tube),) * 2)
+    return dataclasses.replace(plant, circuit=(WithTubes(valve, plant.circuits[0].tube),) * 2)
 
 
 def as_written(name: str) -> str:
@@ -133,7 +133,7 @@ def as_written(name: str) -> str:
     return name.replace("internal_energy", "energy").replace("tube.air_mass", "tube_mass")
 
 
-def refuse_other_rates(written: Prepared, put_together: Prepared, start: Mapping[str, float]) -> float:
+def refuse_other_rates(written: CompiledSystem, put_together: CompiledSystem, start: Mapping[str, float]) -> float:
     """The greatest difference of the two sets of rates, relative to each rate's greatest; raises above 1e-12."""
     rng, names = np.random.default_rng(1), [s.name for s in written.system.states]
     order = [names.index(as_written(s.name)) for s in put_together.system.states]
@@ -163,7 +163,7 @@ def _run(plant: Plant, written: Run, command: Schedule = JOINT_PULSES) -> Run:
 
 
 def pairs() -> tuple[tuple[Run, Run | None], ...]:
-    """Runs of plants of components, each with the same written out, where it is."""
+    """RunSplit of plants of components, each with the same written out, where it is."""
     six, ten = runs()[6], runs()[10]
     heated = JointWithUpstreamHeat(**{f.name: getattr(ten.system, f.name) for f in dataclasses.fields(ten.system)})
     return (
@@ -176,7 +176,7 @@ def pairs() -> tuple[tuple[Run, Run | None], ...]:
 def measure(put_together: Run, written: Run | None, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tuple[Bar, ...]]:
     """Rows and the bar of one pair."""
     both = {"of components": put_together} | ({"written out": written} if written else {})
-    ready = {name: prepared(run.system) for name, run in both.items()}
+    ready = {name: compile_system(run.system) for name, run in both.items()}
     if written:
         refuse_other_rates(ready["written out"], ready["of components"], written.start)
     derivatives = interleaved({n: calls(ready[n], run.start) for n, run in both.items()}, rounds)

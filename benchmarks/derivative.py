@@ -12,10 +12,10 @@ from filling import BRAID, Array
 from measure import Bar, Section, interleaved, of_time, show
 from new_plant import MUSCLES, many_muscles
 
-from airmuscle.analysis.equilibrium import equilibrium
+from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.characteristic import ChouHannaford1996
 from airmuscle.compile.kernels.calls import invoke, pointer
-from airmuscle.compile.program import Prepared, prepared
+from airmuscle.compile.program import CompiledSystem, compile_system
 from airmuscle.plant.plant import Plant
 
 HEADING = ("what", "median", "least", "a muscle")
@@ -37,13 +37,13 @@ def _calls(function: Any, x: Any, u: Any, c: Any, f: Any, count: Any) -> None:
             x[i] += 1e-30 * f[i]
 
 
-def calls(ready: Prepared, start: Mapping[str, float], count: int = CALLS) -> Callable[[], Array]:
+def calls(ready: CompiledSystem, start: Mapping[str, float], count: int = CALLS) -> Callable[[], Array]:
     """So many evaluations of the derivative, one after the other; what the last one gave."""
     x = np.array([start[s.name] for s in ready.system.states])
     u, f = np.full(max(ready.sizes.inputs, 1), 0.5), np.empty(x.size)
 
     def call() -> Array:
-        _calls(ready.address["rhs"], x, u, ready.held, f, count)
+        _calls(ready.address["rhs"], x, u, ready.precomputed, f, count)
         return f
 
     return call
@@ -60,7 +60,7 @@ def section(rounds: int = 15) -> Section:
     """Both arms."""
     plants = {"with a surface of 21 coefficients": many_muscles(), "after Chou and Hannaford": plain_muscles()}
     variants = {
-        f"{MUSCLES} muscles {name}": calls(prepared(plant), dict(equilibrium(plant, pressure=1e5)))
+        f"{MUSCLES} muscles {name}": calls(compile_system(plant), dict(find_equilibrium(plant, pressure=1e5)))
         for name, plant in plants.items()
     }
     times = interleaved(variants, rounds)

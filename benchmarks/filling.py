@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 from joints import joint, joint_start
 
-from airmuscle.analysis.equilibrium import equilibrium
+from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.compile import System
-from airmuscle.control.inputs import Schedule, Segments
+from airmuscle.control.inputs import PiecewiseLinear, Schedule
 from airmuscle.core import ops
 from airmuscle.geometry.braid import Braid
 from airmuscle.mechanism import HangingMass
@@ -57,8 +57,8 @@ def measured_force(pressure: Array, contraction: Array) -> Array:
 
 @functools.cache
 def surface() -> ContractileSurface:
-    """The polynomial of degree five nearest to `measured_force` on a grid over its box."""
-    blank = ContractileSurface.blank().with_box(*BOX)
+    """The polynomial of degree five nearest to `measured_force` on a grid over its validity range."""
+    blank = ContractileSurface.blank().with_validity_range(*BOX)
     p, eps = (grid.ravel() for grid in np.meshgrid(*(np.linspace(*ends, 41) for ends in BOX)))
     columns = np.column_stack([np.asarray(c) for c in blank.basis(p, eps)])
     found = np.linalg.lstsq(columns, measured_force(p, eps))[0]
@@ -109,7 +109,7 @@ class Run:
         return np.array([s.nominal for s in self.system.states])
 
     @property
-    def segments(self) -> Segments:
+    def segments(self) -> PiecewiseLinear:
         return self.command.segments(self.system.inputs, 0.0, DURATION)
 
     @property
@@ -127,7 +127,7 @@ class Run:
 def lifts(muscles: int) -> Run:
     """The run of so many muscles on one mass."""
     plant = hanging(muscles)
-    return Run(plant, dict(equilibrium(plant, pressure=0.0)), filled_in_turn(plant), "position", 1.0)
+    return Run(plant, dict(find_equilibrium(plant, pressure=0.0)), filled_in_turn(plant), "position", 1.0)
 
 
 @functools.cache

@@ -10,9 +10,9 @@ from filling import DURATION, SPACING, Array, Run, lifts, runs
 from measure import Section, interleaved, of_time, show
 from new_plant import fresh
 
-from airmuscle.compile.program import prepared
-from airmuscle.control.driver import PWM, Driven
-from airmuscle.control.inputs import Schedule, Segments
+from airmuscle.compile.program import compile_system
+from airmuscle.control.driver import PWM, WithDrivers
+from airmuscle.control.inputs import PiecewiseLinear, Schedule
 from airmuscle.plant.plant import Plant
 from airmuscle.simulation.integrators import Rodas4
 
@@ -44,13 +44,13 @@ class Case:
     plant: str
     at: str
     run: Run
-    segments: Segments
+    segments: PiecewiseLinear
     duration: float
     rtol: float = 1e-6
 
     def kernel(self, rtol: float | None = None) -> Callable[[], Array]:
         """The run; at another tolerance for the reference."""
-        ready, method, state = prepared(self.run.system), Rodas4(rtol or self.rtol), self.run.vector
+        ready, method, state = compile_system(self.run.system), Rodas4(rtol or self.rtol), self.run.vector
         times = np.linspace(0.0, self.duration, round(self.duration / SPACING) + 1)
         return lambda: method.run(ready, self.segments, 0.0, state, times)
 
@@ -90,11 +90,11 @@ def by_muscles(rounds: int) -> list[Row]:
     return rows_of(cases, rounds, {name: time.least for name, time in compiling.items()})
 
 
-def pulsed(plant: Plant, frequency: float) -> Driven:
+def pulsed(plant: Plant, frequency: float) -> WithDrivers:
     """Every muscle is filled for three tenths of a period and discharged for one, after half of the run the reverse."""
     more, less = ((0.0, 0.3), (PULSED / 2, 0.1)), ((0.0, 0.1), (PULSED / 2, 0.3))
     told = {f"{p}{name}": duty for p in plant.prefixes for name, duty in (("fill", more), ("discharge", less))}
-    return Driven(Schedule(told), {name: PWM(frequency) for name in told})
+    return WithDrivers(Schedule(told), {name: PWM(frequency) for name in told})
 
 
 def by_frequency(rounds: int) -> list[Row]:
@@ -103,7 +103,7 @@ def by_frequency(rounds: int) -> list[Row]:
     for muscles, words in ((1, "1 muscle"), (6, "6 muscles")):
         run = lifts(muscles)
 
-        def driven(frequency: float, run: Run = run) -> Segments:
+        def driven(frequency: float, run: Run = run) -> PiecewiseLinear:
             return pulsed(run.system, frequency).segments(run.system.inputs, 0.0, PULSED)
 
         cases = [Case("carrier", words, f"{f:g} Hz", run, driven(f), PULSED) for f in FREQUENCIES]

@@ -100,7 +100,7 @@ def fitted(opponent: Opponent, start: Array) -> tuple[float, float, int]:
         numbers = [leaf.value for leaf in leaves]
         for place, value in zip(places, scaled * problem.scales, strict=True):
             numbers[place] = float(value)
-        return ((modelled(tree.rebuild(plant, numbers), opponent) - measured) / list(SENSORS.values())).ravel()
+        return ((modelled(tree.unflatten(plant, numbers), opponent) - measured) / list(SENSORS.values())).ravel()
 
     begun = time.perf_counter()
     found = least_squares(residual, start, "2-point", problem.bounds, x_scale="jac", diff_step=opponent.step)

@@ -13,7 +13,7 @@ from airmuscle.characteristic.clamped import Clamped
 from airmuscle.characteristic.virtual_work import VirtualWork
 from airmuscle.compile import StateVariable
 from airmuscle.core import ops
-from airmuscle.core.model import model, parameter
+from airmuscle.core.declaration import model, parameter
 from airmuscle.geometry.braid import Braid
 from airmuscle.muscle import LinearDamper, LinearSpring, Muscle
 from airmuscle.pneumatics import Supply, Valve

@@ -16,16 +16,16 @@ from measure import Bar, Section, interleaved, of_time, show
 from ode8 import FLAGS, SOURCE, STEP, build, compilers, constants
 from rodas4 import kernel
 
-from airmuscle.compile.program import prepared
+from airmuscle.compile.program import compile_system
 from airmuscle.plant.plant import Plant
-from airmuscle.simulation.integrators import DormandPrince8, Method, Rodas4, RungeKutta4
+from airmuscle.simulation.integrators import DormandPrince8, Integrator, Rodas4, RungeKutta4
 
 CALLBACKS = pathlib.Path(__file__).with_name("mujoco_callbacks.c")
 HEADING = ("muscles", "variant", "median", "least", "times ode8", "greatest error [m]")
 TEXT = (
     "A mass on a vertical slide without collisions; a muscle is an actuator whose activation is its air. `mj_step` is "
     "told to take all steps between two rows in one call. Its callbacks are C that skips shut valves and the tangent "
-    "beyond the box. RungeKutta4 is the method that MuJoCo has, too; Rodas4 is what the library takes unless told "
+    "beyond the validity range. RungeKutta4 is the method that MuJoCo has, too; Rodas4 is what the library takes unless told "
     "otherwise."
 )
 WHY = (
@@ -100,12 +100,12 @@ def in_mujoco(run: Run, library: ctypes.CDLL, step: float = STEP) -> Callable[[]
 def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tuple[Bar, ...]]:
     """Rows and the bar of so many muscles on one mass."""
     run = lifts(muscles)
-    ready = prepared(run.system)
+    ready = compile_system(run.system)
     reference = kernel(run, ready, Rodas4(1e-11))()
     segments, times, state = run.segments, run.times, run.vector
     ours, theirs = "DormandPrince8(1e-4), kernel", "MuJoCo RK4(1e-4), C callbacks"
 
-    def by(method: Method) -> Callable[[], Array]:
+    def by(method: Integrator) -> Callable[[], Array]:
         return lambda: method.run(ready, segments, 0.0, state, times).rows
 
     variants = {ours: by(DormandPrince8(STEP))}

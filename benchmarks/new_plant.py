@@ -15,7 +15,7 @@ from filling import hanging, runs
 from measure import Bar, Section, interleaved, of_time, show
 
 from airmuscle.compile import System
-from airmuscle.compile.program import Program, prepared
+from airmuscle.compile.program import Program, compile_system
 from airmuscle.core import autodiff
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
@@ -49,7 +49,7 @@ def fresh(system: System) -> Program:
 def with_step(system: System) -> Any:
     """A fresh program and its printed step of ode8, 13 stages in one function."""
     program = fresh(system)
-    return program.step(*DormandPrince8(1e-4).tableau(), prepared(system).parameters)
+    return program.step(*DormandPrince8(1e-4).tableau(), compile_system(system).parameters)
 
 
 def many_muscles() -> Plant:
@@ -87,12 +87,12 @@ def section(rounds: int = 5) -> Section:
     """All of it."""
     systems = {size: run.system for size, run in runs().items()}
     heavier, big = dataclasses.replace(hanging(), mechanism=HangingMass(6.0)), many_muscles()
-    prepared(systems[3])
+    compile_system(systems[3])
     variants: dict[str, Callable[[], Any]] = {
         f"new plant, {n} states": lambda s=s: fresh(s) for n, s in systems.items()
     }
     variants["new plant, 3 states, and its step of ode8"] = lambda: with_step(systems[3])
-    variants["another parameter set of a known plant"] = lambda: prepared(heavier)
+    variants["another parameter set of a known plant"] = lambda: compile_system(heavier)
     times = interleaved(variants, rounds)
     times |= interleaved({f"new plant, {MUSCLES} muscles on one mass, 26 states": lambda: fresh(big)}, 2)
     counts = cache_counts()

@@ -15,8 +15,8 @@ from filling import SPACING, Array, Run, lifts, stretch_factor
 from measure import Bar, Section, Times, interleaved, of_time, show
 from rodas4 import kernel
 
-from airmuscle.compile.program import prepared
-from airmuscle.control.inputs import Segments
+from airmuscle.compile.program import compile_system
+from airmuscle.control.inputs import PiecewiseLinear
 from airmuscle.muscle import Muscle
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge
@@ -31,7 +31,7 @@ HEADING = ("muscles", "variant", "median", "least", "times the best branch-free 
 TEXT = (
     "One, two and six muscles on one mass, 2501 rows. The C computes both valves and the surface with its tangent "
     "in every stage, without a branch, and inlines a whole step; the best of its compilers and flags counts. The "
-    "library branches around shut valves and the tangent of a box not left; the C that does so too stands beside "
+    "library branches around shut valves and the tangent of a validity range not left; the C that does so too stands beside "
     "it. The reference is Rodas4 at rtol 1e-11."
 )
 
@@ -58,19 +58,19 @@ def _constants(muscle: Muscle, circuit: FillDischarge, ambient: Ambient) -> list
     law, valve = muscle.contractile, circuit.fill
     k, c = stretch_factor(muscle.geometry)
     scale = REFERENCE_DENSITY * np.sqrt(REFERENCE_TEMPERATURE / ambient.temperature)
-    box = (law.least_contraction, law.greatest_contraction), (law.least_pressure, law.greatest_pressure)
-    scaling = [x for low, high in box for x in (low, 2 / (high - low))]
+    validity_range = (law.min_contraction, law.max_contraction), (law.min_pressure, law.max_pressure)
+    scaling = [x for low, high in validity_range for x in (low, 2 / (high - low))]
     return [
         *(1 / muscle.geometry.resting_length, k, c * c, GAS_CONSTANT * ambient.temperature),
         *(ambient.pressure, absolute(circuit.supply.pressure, ambient)),
         *(scale * v.conductance for v in (circuit.fill, circuit.discharge)),
         *(valve.critical_ratio, 1 / (1 - valve.critical_ratio), float(valve.laminar_slope())),
-        *(*scaling, law.least_force, law.greatest_force),
+        *(*scaling, law.min_force, law.max_force),
         *(muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth, *law.coefficients),
     ]
 
 
-def in_c(run: Run, library: ctypes.CDLL, segments: Segments | None = None) -> Callable[[], Array]:
+def in_c(run: Run, library: ctypes.CDLL, segments: PiecewiseLinear | None = None) -> Callable[[], Array]:
     """The run, or other segments of it, by a compiled C library."""
     segments = segments or run.segments
     plant, start, inputs = constants(run.system), run.vector, np.ascontiguousarray(segments.values)
@@ -119,7 +119,7 @@ def build(flags: list[str], source: pathlib.Path, target: pathlib.Path, linked: 
 def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tuple[Bar, ...]]:
     """Rows and the bar of so many muscles in one plant."""
     run = lifts(muscles)
-    ready = prepared(run.system)
+    ready = compile_system(run.system)
     reference = kernel(run, ready, Rodas4(1e-11))()
     method, segments, times, state = DormandPrince8(STEP), run.segments, run.times, run.vector
     ours = "DormandPrince8(1e-4), kernel"

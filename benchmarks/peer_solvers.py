@@ -19,7 +19,7 @@ from filling import SPACING, Array, Run
 from rodas4 import by_hand
 
 from airmuscle.compile.kernels.calls import invoke, pointer
-from airmuscle.compile.program import Prepared
+from airmuscle.compile.program import CompiledSystem
 
 Solver = Callable[[float], Callable[[], Array]]
 MOST_STEPS = 1_000_000
@@ -40,7 +40,7 @@ def rates_into(y: Any, u: Any, c: Any, function: Any, f: Any) -> None:
     invoke(function, (pointer(y), pointer(u), pointer(c), pointer(f)))
 
 
-def sundae_by_hand(run: Run, ready: Prepared) -> Solver:
+def sundae_by_hand(run: Run, ready: CompiledSystem) -> Solver:
     """scikit-sundae's CVODE (BDF, dense) with the rates written by hand in scalar Python."""
     under = by_hand(run)
 
@@ -55,9 +55,9 @@ def sundae_by_hand(run: Run, ready: Prepared) -> Solver:
     return _sundae(run, function)
 
 
-def sundae_compiled(run: Run, ready: Prepared) -> Solver:
+def sundae_compiled(run: Run, ready: CompiledSystem) -> Solver:
     """scikit-sundae's CVODE with compiled rates: it calls them from Python all the same, there is no other way in."""
-    address, held = ready.address["rhs"], ready.held
+    address, held = ready.address["rhs"], ready.precomputed
 
     def function(openings: Array) -> Callable[[float, Array, Array], None]:
         def into(t: float, y: Array, yp: Array) -> None:
@@ -89,7 +89,7 @@ def _sundae(run: Run, function: Callable[[Array], Callable[[float, Array, Array]
     return at
 
 
-def casadi_cvodes(run: Run, ready: Prepared, **options: Any) -> Solver:
+def casadi_cvodes(run: Run, ready: CompiledSystem, **options: Any) -> Solver:
     """CasADi's CVODES on the expressions that our machine code is printed from, constants folded, states scaled by
     their nominal sizes, with its own exact Jacobian."""
     import casadi
@@ -119,7 +119,7 @@ def casadi_cvodes(run: Run, ready: Prepared, **options: Any) -> Solver:
     return at
 
 
-def casadi_cvodes_jit(run: Run, ready: Prepared) -> Solver:
+def casadi_cvodes_jit(run: Run, ready: CompiledSystem) -> Solver:
     """The same with its functions compiled by gcc, which CasADi does in the folder that the process is in."""
     flags = {"flags": ["-O3", "-march=native"], "compiler": "gcc", "verbose": False}
     solver = casadi_cvodes(run, ready, jit=True, compiler="shell", jit_options=flags)
@@ -131,7 +131,7 @@ def casadi_cvodes_jit(run: Run, ready: Prepared) -> Solver:
     return at
 
 
-def diffrax_kvaerno5(run: Run, ready: Prepared) -> Solver:
+def diffrax_kvaerno5(run: Run, ready: CompiledSystem) -> Solver:
     """diffrax' Kvaerno5 on the library's laws with JAX arrays, jitted, forward only.
 
     A solve for each segment: with `jump_ts` the step of a long rest meets the opening of a valve, and the solver is
@@ -180,7 +180,7 @@ def diffrax_kvaerno5(run: Run, ready: Prepared) -> Solver:
     return at
 
 
-def control_response(run: Run, ready: Prepared) -> Solver:
+def control_response(run: Run, ready: CompiledSystem) -> Solver:
     """python-control's input_output_response, which is solve_ivp's LSODA behind an interpolation of the inputs; the
     rates written by hand, a system for each set of openings so that they need not look at their inputs."""
     import control

@@ -22,7 +22,7 @@ from peer_solvers import (
 )
 from rodas4 import WANTED, kernel, loosest
 
-from airmuscle.compile.program import Prepared, prepared
+from airmuscle.compile.program import CompiledSystem, compile_system
 from airmuscle.simulation.integrators import Rodas4
 
 HEADING = ("states", "variant", "rtol", "median", "least", "times Rodas4", "greatest error [m]")
@@ -45,13 +45,13 @@ class Peer:
     name: str
     module: str
     package: str
-    solver: Callable[[Run, Prepared], Solver]
+    solver: Callable[[Run, CompiledSystem], Solver]
     least: float | None = None
     """How many times longer it is wanted to take, at least."""
     why: str = ""
     but: int = 0
     """The states of a plant that it is spared."""
-    series_of: Callable[[Run, Prepared], Solver] | None = None
+    series_of: Callable[[Run, CompiledSystem], Solver] | None = None
     """What finds its tolerance, where it would take long to make it for each of the series."""
 
     @property
@@ -78,7 +78,7 @@ PEERS = (
 )
 
 
-def fitting(peer: Peer, run: Run, ready: Prepared, reference: Array) -> tuple[float, Callable[[], Array]]:
+def fitting(peer: Peer, run: Run, ready: CompiledSystem, reference: Array) -> tuple[float, Callable[[], Array]]:
     """Its loosest rtol that serves, and the call at this rtol."""
     solver = peer.solver(run, ready)
     trial = peer.series_of(run, ready) if peer.series_of else solver
@@ -89,7 +89,7 @@ def fitting(peer: Peer, run: Run, ready: Prepared, reference: Array) -> tuple[fl
 def measure(states: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tuple[Bar, ...]]:
     """Rows and bars of one plant."""
     run = runs()[states]
-    ready = prepared(run.system)
+    ready = compile_system(run.system)
     reference = kernel(run, ready, Rodas4(1e-11))()
     ours = loosest(run, lambda rtol: kernel(run, ready, Rodas4(rtol))(), reference)
     tolerances, calls = {"Rodas4, kernel": ours}, {"Rodas4, kernel": kernel(run, ready, Rodas4(ours))}

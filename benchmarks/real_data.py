@@ -19,9 +19,9 @@ import numpy as np
 import pandas as pd
 
 from airmuscle.core.errors import IdentificationError
-from airmuscle.identify import Blocks, Specimens, compare, fit
+from airmuscle.identify import BlockSplit, SpecimenSplit, compare, fit
 from airmuscle.identify.candidates import Candidate, standard_candidates, surface
-from airmuscle.identify.compare import errors_in_force
+from airmuscle.identify.model_selection import errors_in_force
 from airmuscle.recording import Recording
 
 NAME = re.compile(r"_cut(\d+)cm_held([\d.]+)cm_test(\d+)\.csv$")
@@ -117,7 +117,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     train, test = repeats(parser.parse_args().folder)
     specimens = sorted({str(run.constants["specimen"]) for run in train})
-    for how in (Blocks(), Specimens()):
+    for how in (BlockSplit(), SpecimenSplit()):
         print(compare(train, leave_out=how).reason, flush=True)
     least = floor(train, test)
     print(f"\nrms error in force [N]; fitted to repeat 8 ({sum(map(len, train))} rows), judged on repeat 9")

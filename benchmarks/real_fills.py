@@ -14,11 +14,19 @@ import numpy as np
 
 from airmuscle.control.inputs import Schedule
 from airmuscle.geometry import Vessel
-from airmuscle.identify.dynamic import DynamicFit, Experiment, Start, StartTime, StartValue, fit_dynamic, where_sensed
+from airmuscle.identify.dynamic import (
+    DynamicFit,
+    Experiment,
+    InitialConditions,
+    StartTime,
+    StartValue,
+    fit_dynamic,
+    where_sensed,
+)
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle, SwellingWall
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Line, Supply, Tube, Valve
+from airmuscle.pneumatics import FillDischarge, Supply, Tube, Valve, WithTubes
 from airmuscle.pneumatics.gas import Gas, Isothermal, Polytropic
 from airmuscle.recording import Recording, read_csv
 
@@ -53,7 +61,7 @@ class Model:
     @property
     def valves(self) -> str:
         """What the paths of the valves begin with."""
-        return "circuit.circuit." if isinstance(self.plant.circuit, Line) else "circuit."
+        return "circuit.circuit." if isinstance(self.plant.circuit, WithTubes) else "circuit."
 
     def own(self, wall: bool) -> tuple[str | StartTime | StartValue, ...]:
         """What every record has for itself; with the start of its wall, if asked."""
@@ -70,7 +78,7 @@ def plant(gas: Gas, growth: float, lag: float, line: bool) -> Plant:
     """An unloaded muscle of unknown length behind a valve, and a line if asked."""
     muscle = dataclasses.replace(Muscle.ideal(Vessel(REST_VOLUME)), wall=SwellingWall(growth, 150e3, 5e4, lag))
     valves = FillDischarge(Supply(625e3), Valve(5e-10, 0.4), Valve(0.0, 0.3))
-    circuit = Line(valves, Tube(Valve(1.3e-9, 0.3), 2e-5, gas=gas)) if line else valves
+    circuit = WithTubes(valves, Tube(Valve(1.3e-9, 0.3), 2e-5, gas=gas)) if line else valves
     return Plant(muscle, circuit, Isometric(0.0), gas)
 
 
@@ -105,10 +113,10 @@ def experiment(start_plant: Plant, found: Recording, wall: bool = False) -> Expe
     """The fill as an experiment that begins at the first row that leaves the start."""
     pressure, first = found["pressure"], float(np.median(found["pressure"][:2]))
     begin = float(found["time"][max(int(np.argmax(pressure > first + 5e3)) - 1, 0)])
-    start = Start.held(start_plant, first)
+    start = InitialConditions.held(start_plant, first)
     if wall:  # known, so that it can be an unknown of its own
         known = {**start.known, "wall_volume": start.guess["wall_volume"]}
-        still = tuple(name for name in start.still if name != "wall_volume")
+        still = tuple(name for name in start.stationary if name != "wall_volume")
         start = dataclasses.replace(start, known=known, still=still)
     return Experiment(found, OPEN, start, begin)
 

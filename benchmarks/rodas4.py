@@ -13,7 +13,7 @@ from scalar_rates import Rates, hill, six_states, ten_states
 from several_rates import several
 
 from airmuscle.compile.kernels.calls import invoke, pointer
-from airmuscle.compile.program import Prepared, prepared
+from airmuscle.compile.program import CompiledSystem, compile_system
 from airmuscle.simulation.integrators import Rodas4
 from airmuscle.simulation.simulate import simulate
 
@@ -36,7 +36,7 @@ SERIES = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7, 3e-8)
 WANTED = 1e-7
 """Greatest error of displacement [m] that the bar allows."""
 WHY = (
-    "the opponent branches past shut valves, choked flow and the tangent beyond the box, so that an evaluation "
+    "the opponent branches past shut valves, choked flow and the tangent beyond the validity range, so that an evaluation "
     "costs Python 2 to 5 us, LSODA needs 1100 to 5400 of them, and most of the time is that of `solve_ivp` "
     "itself. Rodas4 takes 450 to 900 steps of 0.4 to 0.7 us each; a stage is one chain of dependent operations, "
     "and that is what bounds it: stages of one muscle that need not wait for each other take a third of the time. "
@@ -60,9 +60,9 @@ def by_hand(run: Run) -> Callable[[Array], Any]:
     return lambda openings: (under(openings.tolist()), ())
 
 
-def by_machine(ready: Prepared) -> Callable[[Array], Any]:
+def by_machine(ready: CompiledSystem) -> Callable[[Array], Any]:
     """Openings -> the compiled rates and what they are called with."""
-    return lambda openings: (compiled_rates, (openings, ready.held, ready.address["rhs"]))
+    return lambda openings: (compiled_rates, (openings, ready.precomputed, ready.address["rhs"]))
 
 
 def lsoda(run: Run, rates: Callable[[Array], Any], rtol: float = RTOL) -> Array:
@@ -93,7 +93,7 @@ def odeint_lsoda(run: Run, rates: Callable[[Array], Any], rtol: float = RTOL) ->
     return np.concatenate(rows)
 
 
-def kernel(run: Run, ready: Prepared, method: Rodas4 | None = None) -> Callable[[], Array]:
+def kernel(run: Run, ready: CompiledSystem, method: Rodas4 | None = None) -> Callable[[], Array]:
     """The prepared plant through the kernel alone."""
     method, segments, times, state = method or Rodas4(RTOL), run.segments, run.times, run.vector
     return lambda: method.run(ready, segments, 0.0, state, times).rows
@@ -104,7 +104,7 @@ def whole(run: Run) -> Callable[[], Any]:
     return lambda: simulate(run.system, run.command, duration=DURATION, start=run.start, output=SPACING)
 
 
-def refuse_other_equations(run: Run, ready: Prepared) -> float:
+def refuse_other_equations(run: Run, ready: CompiledSystem) -> float:
     """The greatest difference of the two sets of rates, relative to each rate's greatest; raises above 1e-12."""
     rng, visited = np.random.default_rng(1), kernel(run, ready)()
     difference, size = np.zeros(visited.shape[1]), np.zeros(visited.shape[1])
@@ -124,7 +124,7 @@ def refuse_other_equations(run: Run, ready: Prepared) -> float:
 def measure(states: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tuple[Bar, ...]]:
     """Rows and bars of one plant."""
     run = runs()[states]
-    ready = prepared(run.system)
+    ready = compile_system(run.system)
     agree = refuse_other_equations(run, ready)
     hand, machine = by_hand(run), by_machine(ready)
     reference = kernel(run, ready, Rodas4(1e-11))()
@@ -175,7 +175,7 @@ def loosest(run: Run, solve: Callable[[float], Array], reference: Array) -> floa
 
 
 def at_equal_precision(
-    run: Run, ready: Prepared, reference: Array, rounds: int
+    run: Run, ready: CompiledSystem, reference: Array, rounds: int
 ) -> tuple[tuple[tuple[str, ...], ...], float]:
     """Rows and the ratio of both methods where each just keeps the error wanted."""
     hand, size = by_hand(run), len(run.system.states)

@@ -1,6 +1,6 @@
 """The same equations written out by hand in scalar Python, as a user would for SciPy: the opponent of the kernels.
 
-Everything constant is computed beforehand and bound as a local; shut valves, the tangent outside the box and the
+Everything constant is computed beforehand and bound as a local; shut valves, the tangent outside the validity range and the
 root of a choked valve are skipped. Nothing of the library is called while a run goes on.
 """
 
@@ -42,7 +42,7 @@ def valve_flow(valve: Valve, temperature: float) -> Scalar:
 
 
 def beyond_box(law: ContractileSurface) -> Scalar:
-    """The surface beyond its box, in its scaled arguments: the value at the edge and the slopes there."""
+    """The surface beyond its validity range, in its scaled arguments: the value at the edge and the slopes there."""
     (a00, a10, a20, a30, a40, a50, a01, a11, a21, a31, a41, a02, a12, a22, a32, a03, a13, a23, a04, a14, a05) = (
         law.coefficients
     )
@@ -79,9 +79,9 @@ def hill(plant: Plant) -> Callable[[Sequence[float]], Rates]:
     fill_flow, discharge_flow = (valve_flow(v, ambient.temperature) for v in (circuit.fill, circuit.discharge))
     stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth
     inverse_mass, gravity, per_length, cc = 1.0 / load.mass, load.gravity, 1.0 / length, c * c
-    low_x, scale_x = law.least_contraction, 2.0 / (law.greatest_contraction - law.least_contraction)
-    low_q, scale_q = law.least_pressure, 2.0 / (law.greatest_pressure - law.least_pressure)
-    least, greatest, tangent = law.least_force, law.greatest_force, beyond_box(law)
+    low_x, scale_x = law.min_contraction, 2.0 / (law.max_contraction - law.min_contraction)
+    low_q, scale_q = law.min_pressure, 2.0 / (law.max_pressure - law.min_pressure)
+    least, greatest, tangent = law.min_force, law.max_force, beyond_box(law)
     (a00, a10, a20, a30, a40, a50, a01, a11, a21, a31, a41, a02, a12, a22, a32, a03, a13, a23, a04, a14, a05) = (
         law.coefficients
     )
@@ -125,7 +125,7 @@ def _force(system: Joint) -> Callable[[float, float, float], float]:
     length, clamp = muscle.geometry.resting_length, muscle.contractile
     k, c = stretch_factor(muscle.geometry)
     area, ccc, stiffness = -k / length, 3.0 * c * c, muscle.spring.stiffness * length
-    damping, least, greatest = muscle.damper.damping, clamp.least_force, clamp.greatest_force
+    damping, least, greatest = muscle.damper.damping, clamp.min_force, clamp.max_force
 
     def force(gauge: float, contraction: float, speed: float) -> float:
         s = 1.0 - contraction

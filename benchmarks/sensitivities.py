@@ -12,18 +12,18 @@ import numpy as np
 from filling import Array, hanging
 from measure import Bar, Section, interleaved, of_time, show
 
-from airmuscle.compile.functions import traced
+from airmuscle.compile.functions import trace_system
 from airmuscle.compile.ir.instructions import MAXIMUM, MINIMUM, SELECT, Code, Operand, instructions
 from airmuscle.compile.kernels.evaluate import evaluate
-from airmuscle.compile.program import prepared
-from airmuscle.control.inputs import Schedule, Segments
+from airmuscle.compile.program import compile_system
+from airmuscle.control.inputs import PiecewiseLinear, Schedule
 from airmuscle.core import tree
-from airmuscle.identify.dynamic import Experiment, Start
-from airmuscle.identify.dynamic.course import Course
+from airmuscle.identify.dynamic import Experiment, InitialConditions
 from airmuscle.identify.dynamic.experiment import unknowns
-from airmuscle.identify.dynamic.problem import Problem
+from airmuscle.identify.dynamic.problem import DynamicFitProblem
+from airmuscle.identify.dynamic.record_model import RecordModel
 from airmuscle.plant.plant import Plant
-from airmuscle.simulation.integrators import Method, Rodas4, RungeKutta4
+from airmuscle.simulation.integrators import Integrator, Rodas4, RungeKutta4
 from airmuscle.simulation.simulate import simulate
 
 FREE = (
@@ -40,13 +40,13 @@ SENSORS = {"pressure": 1e3, "position": 1e-4}
 """Standard deviations of the noise [Pa, m]; chosen."""
 DURATION, SPACING, STEP = 5.0, 0.01, 1e-3
 COMMAND = Schedule({"fill": ((0.5, 1.0), (2.5, 0.0)), "discharge": ((3.0, 1.0), (4.5, 0.0))})
-METHODS: dict[str, Method] = {"RungeKutta4(1e-3)": RungeKutta4(STEP), "Rodas4(1e-6)": Rodas4()}
+METHODS: dict[str, Integrator] = {"RungeKutta4(1e-3)": RungeKutta4(STEP), "Rodas4(1e-6)": Rodas4()}
 OWN = "RungeKutta4(1e-3), residual and Jacobian"
 FORMS = ("a tuple", "an array")
 HEADING = ("method", "variant", "median", "least", "simulations of its kind", "greatest difference of the Jacobian")
 WHY = (
     "a simulation skips shut valves and tangents, which makes it a fifth quicker (0.59 to 0.48 ms); residual and "
-    "Jacobian gain an eighth (1.1 to 0.97 ms), since the derivatives by the ends of a box need the tangents' slopes"
+    "Jacobian gain an eighth (1.1 to 0.97 ms), since the derivatives by the ends of a validity range need the tangents' slopes"
 )
 TEXT = (
     "The plant of three states filled and discharged within 5 s; 501 rows of pressure and position; eight parameters. "
@@ -64,13 +64,13 @@ class Case(NamedTuple):
     plant: Plant
     experiment: Experiment
 
-    def problem(self, method: Method) -> Problem:
+    def problem(self, method: Integrator) -> DynamicFitProblem:
         wanted = unknowns(self.plant, [self.experiment], FREE, (), {})
-        course = Course(self.plant, self.experiment, 0, wanted, SENSORS, method)
-        return Problem((course,), wanted, np.array(list(SENSORS.values())))
+        course = RecordModel(self.plant, self.experiment, 0, wanted, SENSORS, method)
+        return DynamicFitProblem((course,), wanted, np.array(list(SENSORS.values())))
 
     @property
-    def segments(self) -> Segments:
+    def segments(self) -> PiecewiseLinear:
         return COMMAND.segments(self.plant.inputs, 0.0, DURATION)
 
 
@@ -80,25 +80,25 @@ def case() -> Case:
     plant, rng = hanging(), np.random.default_rng(1)
     run = simulate(plant, COMMAND, duration=DURATION, output=SPACING)
     noisy = {name: run[name] + size * rng.standard_normal(len(run)) for name, size in SENSORS.items()}
-    return Case(plant, Experiment(run.with_columns(**noisy), COMMAND, Start.at_rest(plant, 0.0)))
+    return Case(plant, Experiment(run.with_columns(**noisy), COMMAND, InitialConditions.at_rest(plant, 0.0)))
 
 
-def simulation(method: Method) -> Callable[[], Array]:
+def simulation(method: Integrator) -> Callable[[], Array]:
     """The kernel, and all outputs at the rows."""
-    ready, segments = prepared(case().plant), case().segments
+    ready, segments = compile_system(case().plant), case().segments
     times = case().experiment.recording["time"]
     start = np.array([case().experiment.start.guess[s.name] for s in case().plant.states])
     under, results = np.ascontiguousarray(segments.inputs_at(times, 0.0)), np.empty((times.size, ready.sizes.outputs))
 
     def run() -> Array:
         rows = method.run(ready, segments, 0.0, start, times).rows
-        evaluate(ready.address["outputs"], ready.held, rows, under, results)
+        evaluate(ready.address["outputs"], ready.precomputed, rows, under, results)
         return results
 
     return run
 
 
-def jacobian(method: Method) -> Callable[[], tuple[Array, Array]]:
+def jacobian(method: Integrator) -> Callable[[], tuple[Array, Array]]:
     """Residual (R,) and Jacobian (R, 8) by the parameters in units of their values."""
     problem = case().problem(method)
     at = np.array([u.value for u in problem.unknowns]) / problem.scales
@@ -142,7 +142,7 @@ def with_jax(form: str) -> Callable[[], tuple[Array, Array]]:
     places = [[leaf.path for leaf in leaves].index(path) for path in FREE]
     values = np.array([leaves[place].value for place in places])
     start, by_start = case().problem(RungeKutta4(STEP)).courses[0].start(values)
-    t, names = traced(plant), [s.name for s in plant.states]
+    t, names = trace_system(plant), [s.name for s in plant.states]
     outputs = list(t.output_names)
     seen = [t.o[outputs.index(name)] if name in outputs else t.x[names.index(name)] for name in SENSORS]
     rates = instructions([t.x, t.u, t.p], [t.f])

@@ -24,9 +24,9 @@ def one_muscle(muscle: Muscle, circuit: FillDischarge, ambient: Ambient) -> OneM
     source = absolute(circuit.supply.pressure, ambient)
     fill_flow, discharge_flow = (valve_flow(v, ambient.temperature) for v in (circuit.fill, circuit.discharge))
     stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth
-    low_x, scale_x = law.least_contraction, 2.0 / (law.greatest_contraction - law.least_contraction)
-    low_q, scale_q = law.least_pressure, 2.0 / (law.greatest_pressure - law.least_pressure)
-    least, greatest, tangent = law.least_force, law.greatest_force, beyond_box(law)
+    low_x, scale_x = law.min_contraction, 2.0 / (law.max_contraction - law.min_contraction)
+    low_q, scale_q = law.min_pressure, 2.0 / (law.max_pressure - law.min_pressure)
+    least, greatest, tangent = law.min_force, law.max_force, beyond_box(law)
     (a00, a10, a20, a30, a40, a50, a01, a11, a21, a31, a41, a02, a12, a22, a32, a03, a13, a23, a04, a14, a05) = (
         law.coefficients
     )

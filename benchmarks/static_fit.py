@@ -8,7 +8,7 @@ from measure import Bar, Section, interleaved, of_time, show
 
 from airmuscle.characteristic.contractile_surface import ContractileSurface, exponents
 from airmuscle.identify.censoring import UNCENSORED
-from airmuscle.identify.fit import fit
+from airmuscle.identify.static_fit import fit
 from airmuscle.recording import Recording
 
 POINTS = 1000
@@ -24,7 +24,7 @@ TEXT = (
 
 
 def points() -> Recording:
-    """Noisy forces at random points of the box."""
+    """Noisy forces at random points of the validity range."""
     rng = np.random.default_rng(5)
     p, eps = (rng.uniform(*ends, POINTS) for ends in BOX)
     force = measured_force(p, eps) + NOISE * rng.standard_normal(POINTS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from airmuscle.core.model import parameters
+from airmuscle.core.declaration import parameters
 from airmuscle.library.models import model_class, model_names
 from airmuscle.recording import QUANTITIES
 
@@ -163,11 +163,11 @@ ARGUMENTS = {
     "segment": "one segment between two rings, its integrals",
     "sides": "which rows are cut off below or above",
     "sigma": "standard deviation of one reading",
-    "stands_for": "the law that a stand-in replaces",
-    "box": "rectangle of pressure and contraction",
+    "surrogate_of": "the law that a stand-in replaces",
+    "validity_range": "rectangle of pressure and contraction",
     "by": "what a bootstrap draws",
     "candidates": "laws to be compared",
-    "cells": "parts of the box by pressure and contraction",
+    "cells": "parts of the validity range by pressure and contraction",
     "change": "law of what changes with length",
     "free": "points of free contraction",
     "leave_out": "what a cross-validation leaves out at once",

@@ -14,7 +14,7 @@ from airmuscle.geometry import Braid
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import DistributedTube, FillDischarge, Line, Supply, Tube, Valve
+from airmuscle.pneumatics import DistributedTube, FillDischarge, Supply, Tube, Valve, WithTubes
 from airmuscle.pneumatics.gas import Air, Isothermal
 from airmuscle.simulation.integrators import Rodas4
 from airmuscle.simulation.simulate import simulate
@@ -32,7 +32,7 @@ def fill(tube: Tube | DistributedTube, conductance: float, duration: float = 0.6
     """A muscle of 20 mm and 300 mm, held at 10 %, filled from 6 bar through a valve and a tube."""
     braid = Braid(0.010, 0.426, 0.300)
     valve = Valve(conductance, 0.433)
-    circuit = Line(FillDischarge(Supply(PRESSURE), valve, valve), tube)
+    circuit = WithTubes(FillDischarge(Supply(PRESSURE), valve, valve), tube)
     plant = Plant(Muscle(VirtualWork(braid), braid), circuit, Isometric(0.1), Isothermal())
     start = plant.state_at(pressure=0.0)
     opened = Schedule({"fill": ((0.0, 1.0),)})

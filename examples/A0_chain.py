@@ -9,8 +9,8 @@ import airmuscle as am
 from airmuscle.core.plotting import LINES, new_figure, save
 from airmuscle.units import bar, kPa
 
-bench = am.measured("dmsp-20-300")
-found = am.fit(am.characteristic.ContractileSurface.blank(5, greatest_force=1e5), bench)
+bench = am.load_data("dmsp-20-300")
+found = am.fit(am.characteristic.ContractileSurface.blank(5, max_force=1e5), bench)
 print(found)
 
 braid = am.geometry.Braid(radius=0.010, braid_angle=0.426, resting_length=0.300)

@@ -6,11 +6,11 @@ python examples/A2_drivers.py        writes drivers.png where it is run
 import numpy as np
 
 import airmuscle as am
-from airmuscle.control.driver import PWM, Driven, OnOff
+from airmuscle.control.driver import PWM, SolenoidDriver, WithDrivers
 from airmuscle.core.plotting import BLACK, LINES, legend_outside, new_figure, save
 from airmuscle.units import ms
 
-VALVE = OnOff(opening_delay=5 * ms, closing_delay=2 * ms, opening_ramp=10 * ms, closing_ramp=4 * ms)  # chosen
+VALVE = SolenoidDriver(opening_delay=5 * ms, closing_delay=2 * ms, opening_ramp=10 * ms, closing_ramp=4 * ms)  # chosen
 
 
 def course(command, duration, rows=4000):
@@ -21,7 +21,7 @@ def course(command, duration, rows=4000):
 
 def mean(duty, carrier):
     """The mean opening over the last of 20 periods."""
-    command = Driven(am.Schedule({"fill": ((0, duty),)}), {"fill": (carrier, VALVE)})
+    command = WithDrivers(am.Schedule({"fill": ((0, duty),)}), {"fill": (carrier, VALVE)})
     memory = command.init(0.0)
     period = 1 / carrier.frequency
     _, memory = command.step(memory, ("fill",), 0.0, 19 * period)
@@ -31,12 +31,12 @@ def mean(duty, carrier):
 
 
 figure, (left, right) = new_figure(1, 2, width=9.0, height=3.4, width_ratios=(1.5, 1))
-signal = am.Signal({"fill": ((0.0, 0.05), (0.4, 0.6))})
+signal = am.SampledSignal({"fill": ((0.0, 0.05), (0.4, 0.6))})
 carrier = PWM(frequency=25.0, smallest_pulse=3 * ms)
 for command, style in (
     (signal, {"color": BLACK, "linestyle": "--", "label": "command"}),
-    (Driven(signal, {"fill": carrier}), {"color": LINES[4], "linewidth": 0.9, "label": "coil"}),
-    (Driven(signal, {"fill": (carrier, VALVE)}), {"color": LINES[0], "label": "opening"}),
+    (WithDrivers(signal, {"fill": carrier}), {"color": LINES[4], "linewidth": 0.9, "label": "coil"}),
+    (WithDrivers(signal, {"fill": (carrier, VALVE)}), {"color": LINES[0], "label": "opening"}),
 ):
     times, values = course(command, 0.4)
     left.plot(times / ms, values, **style)

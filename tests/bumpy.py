@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from airmuscle.core.model import model, parameter
+from airmuscle.core.declaration import model, parameter
 from airmuscle.mechanism.base import Coordinate, Mechanism
 
 

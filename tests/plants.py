@@ -16,9 +16,9 @@ from airmuscle.characteristic import (
     LogarithmicLength,
     RubberLine,
     VirtualWork,
-    as_force_law,
 )
-from airmuscle.characteristic.box import Box
+from airmuscle.characteristic import as_force_law
+from airmuscle.characteristic.validity_range import ValidityRange
 from airmuscle.geometry.catenary import Catenary
 from airmuscle.geometry.chebyshev import as_polynomial
 from airmuscle.geometry.parabola import Parabola, TrueArcParabola
@@ -28,16 +28,16 @@ from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
     Held,
-    InSeries,
     Isometric,
     Isotonic,
+    JointWithEndStops,
     Lever,
-    Mounted,
-    Prescribed,
+    MusclesInSeries,
+    PrescribedMotion,
     Pulley,
     SpringLoad,
-    Stopped,
-    StoppedJoint,
+    WithEndStops,
+    WithOffsets,
 )
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import (
@@ -65,7 +65,7 @@ VALVE, OTHER = Valve(1e-8, 0.4), Valve(3e-9, 0.2)
 TWO_VALVES = FillDischarge(Supply(5e5), VALVE, OTHER)
 BRAID = geometry.Braid(0.01, 0.4363, 0.2)
 FIBRES = geometry.StraightFibre(0.2, 0.02)
-SPOOL = pneumatics.Follower(20.0, 0.7)
+SPOOL = pneumatics.SecondOrderLag(20.0, 0.7)
 STOP = EndStop(0.1, HuntCrossley(1e9))
 SLIPS = ((4e4, 2e4), (2e-4, 8e-4))
 SURFACE = ContractileSurface((300.0, -200.0, 40.0, 10.0, 5.0, 3.0), 0.0, 6e5, 0.0, 0.25, 0.0, 1200.0, 2)
@@ -99,7 +99,7 @@ EXAMPLES = {
     **{name: listed(name) for name in ("chou-hannaford", "dmsp-20-300", "reynolds2003", "serres2009", "tondu-lopez")},
     "sarosi": listed("sarosi-dmsp-20-200n"),
     "surface": of(SURFACE),
-    "stand-in": of(as_force_law(VirtualWork(BRAID), Box(0.0, 6e5, 0.0, 0.25), degree=3)),
+    "stand-in": of(as_force_law(VirtualWork(BRAID), ValidityRange(0.0, 6e5, 0.0, 0.25), degree=3)),
     "dead length": of(EffectiveLength(SURFACE, 0.2, 0.02, 0.001)),
     "inverse length": of(InverseLength(SURFACE, SURFACE, 0.2, 0.3)),
     "logarithmic length": of(LogarithmicLength(SURFACE, SURFACE, 0.2, 0.3)),
@@ -140,16 +140,16 @@ EXAMPLES = {
             Supply(5e5), pneumatics.CheckValve(pneumatics.IndexedValve(1e-8, 0.3, 0.6, 3e4)), pneumatics.IndexedValve(1e-8, 0.5, 0.4)
         )
     ),
-    "three positions through a tube": fed(pneumatics.Line(pneumatics.ThreePosition(Supply(5e5), VALVE, OTHER),
+    "three positions through a tube": fed(pneumatics.WithTubes(pneumatics.ThreePosition(Supply(5e5), VALVE, OTHER),
                                                        pneumatics.Tube(pneumatics.TubeOrifice(1.0, 3e-3), 1e-5, 2))),
-    "tube with inertia": fed(pneumatics.Line(TWO_VALVES, pneumatics.DistributedTube(1.0, 2e-3, 2, EnergyBalance(0.1)))),
+    "tube with inertia": fed(pneumatics.WithTubes(TWO_VALVES, pneumatics.DistributedTube(1.0, 2e-3, 2, EnergyBalance(0.1)))),
     "overlap": fed(pneumatics.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, 0.2, 2), 2),
     "underlap": fed(pneumatics.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, -0.2)),
-    "regulator, leak": fed(pneumatics.Leaking(pneumatics.ProportionalRegulator(Supply(5e5), VALVE, VALVE, SPOOL), OTHER)),
+    "regulator, leak": fed(pneumatics.WithLeak(pneumatics.ProportionalRegulator(Supply(5e5), VALVE, VALVE, SPOOL), OTHER)),
     "manifold on tank and regulator": fed(
         pneumatics.Manifold(
             pneumatics.RegulatedSupply(pneumatics.Tank(Supply(7e5), OTHER, 1e-3, EnergyBalance(0.1)), VALVE, 4e5),
-            (FillDischarge(pneumatics.Shared(), VALVE, OTHER), pneumatics.ThreePosition(pneumatics.Shared(), VALVE, OTHER)),
+            (FillDischarge(pneumatics.SharedSupply(), VALVE, OTHER), pneumatics.ThreePosition(pneumatics.SharedSupply(), VALVE, OTHER)),
             ("one", "two"),
         ),
         2,
@@ -157,11 +157,11 @@ EXAMPLES = {
     # mechanisms
     "mass on a spring": pulled(SpringLoad(5.0, 2000.0, 20.0, 50.0)),
     "constant force": pulled(Isotonic(100.0, 2.0, 5.0)),
-    "prescribed": pulled(Prescribed()),
+    "prescribed": pulled(PrescribedMotion()),
     "lever": pulled(Lever((0.03,), 3.0, 0.2)),
-    "pulley with stops": pulled(Stopped(Pulley(0.02, 5.0), -0.005, 0.02, HuntCrossley(1e9))),
+    "pulley with stops": pulled(WithEndStops(Pulley(0.02, 5.0), -0.005, 0.02, HuntCrossley(1e9))),
     "joint with stops": pulled(
-        StoppedJoint(Mounted(AntagonisticJoint(0.03, 0.05, 0.2), (0.08, 0.08)), -0.2, 0.2, 0.05, HuntCrossley(1e9)), 2
+        JointWithEndStops(WithOffsets(AntagonisticJoint(0.03, 0.05, 0.2), (0.08, 0.08)), -0.2, 0.2, 0.05, HuntCrossley(1e9)), 2
     ),
-    "muscles in series": pulled(InSeries(HangingMass(5.0), (0.5,), 1.0), 2),
+    "muscles in series": pulled(MusclesInSeries(HangingMass(5.0), (0.5,), 1.0), 2),
 }  # fmt: skip

@@ -10,11 +10,11 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from . import characteristic, geometry, units
-from .analysis.equilibrium import equilibrium
-from .control.inputs import Schedule, Signal
+from .analysis.equilibrium import find_equilibrium
+from .control.inputs import SampledSignal, Schedule
 from .core.errors import AirmuscleError
 from .core.reference import Reference, cite
-from .library.catalogue import load, measured, names, save
+from .library.catalogue import list_library, load, load_data, save
 from .mechanism import HangingMass, Held, Isometric, Mechanism
 from .muscle import LinearDamper, LinearSpring, Muscle
 from .plant.plant import Plant
@@ -25,8 +25,8 @@ from .simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
 from .simulation.simulate import advance, simulate
 
 if TYPE_CHECKING:
-    from .identify.fit import fit
     from .identify.result import Fit
+    from .identify.static_fit import fit
 
 __version__ = "0.1.0"
 
@@ -51,19 +51,19 @@ __all__ = [
     "Reference",
     "Rodas4",
     "RungeKutta4",
+    "SampledSignal",
     "Schedule",
-    "Signal",
     "Supply",
     "Valve",
     "advance",
     "characteristic",
     "cite",
-    "equilibrium",
+    "find_equilibrium",
     "fit",
     "geometry",
+    "list_library",
     "load",
-    "measured",
-    "names",
+    "load_data",
     "read",
     "read_csv",
     "save",

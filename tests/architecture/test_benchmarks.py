@@ -19,7 +19,7 @@ import startup
 import static_fit
 from filling import runs
 
-from airmuscle.compile.program import prepared
+from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import Schedule
 from airmuscle.core import tree
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4
@@ -29,7 +29,7 @@ from airmuscle.simulation.integrators import DormandPrince8, Rodas4
 def test_the_rates_written_by_hand_are_those_of_the_plant(states):
     case = runs()[states]
     assert len(case.system.states) == states
-    assert rodas4.refuse_other_equations(case, prepared(case.system)) < 1e-12
+    assert rodas4.refuse_other_equations(case, compile_system(case.system)) < 1e-12
 
 
 @pytest.mark.parametrize(("pressure", "position"), [(7e5, 0.06), (5e4, -0.02)])
@@ -38,19 +38,19 @@ def test_so_are_they_beyond_the_box_of_the_surface(pressure, position):
     case = runs()[3]
     y = np.array(list(case.system.state_at(pressure=pressure, position=position, speed=0.1).values()))
     found = rodas4.by_hand(case)(np.array([1.0, 0.5]))[0](0.0, y)
-    np.testing.assert_allclose(found, prepared(case.system).rates(y, [1.0, 0.5]), rtol=1e-12)
+    np.testing.assert_allclose(found, compile_system(case.system).rates(y, [1.0, 0.5]), rtol=1e-12)
 
 
 def test_other_equations_are_refused():
     case = runs()[3]
     heavier = dataclasses.replace(case.system, mechanism=dataclasses.replace(case.system.mechanism, mass=5.001))
     with pytest.raises(AssertionError, match="differ by"):
-        rodas4.refuse_other_equations(case, prepared(heavier))
+        rodas4.refuse_other_equations(case, compile_system(heavier))
 
 
 def test_lsoda_with_rates_by_hand_finds_the_same_course():
     case = runs()[3]
-    ready = prepared(case.system)
+    ready = compile_system(case.system)
     reference = rodas4.kernel(case, ready, Rodas4(1e-11))()
     for solve in (rodas4.lsoda, rodas4.odeint_lsoda):
         for rates in (rodas4.by_hand(case), rodas4.by_machine(ready)):
@@ -61,11 +61,11 @@ def test_lsoda_with_rates_by_hand_finds_the_same_course():
 
 @pytest.mark.skipif(not ode8.compilers(), reason="no C compiler on the path")
 def test_the_c_computes_the_same_steps(tmp_path):
-    """Over 0.2 s from beyond the box of the surface, within which valves open; equal to rounding."""
+    """Over 0.2 s from beyond the validity range of the surface, within which valves open; equal to rounding."""
     case = runs()[3]
     start = case.system.state_at(pressure=6.5e5, position=0.05)
     short = dataclasses.replace(case, start=start, command=Schedule({"discharge": ((0.05, 1.0), (0.15, 0.0))}))
-    ready, segments = prepared(case.system), short.command.segments(case.system.inputs, 0.0, 0.2)
+    ready, segments = compile_system(case.system), short.command.segments(case.system.inputs, 0.0, 0.2)
     times = np.linspace(0.0, 0.2, 21)
     expected = DormandPrince8(ode8.STEP).run(ready, segments, 0.0, short.vector, times).rows
     for library in ode8.compiled(tmp_path).values():
@@ -79,7 +79,7 @@ def test_c_numpy_and_lanes_compute_the_same_batch(tmp_path):
     assert any("C, gcc" in name for name in timed) or not ode8.compilers()
     ends = {name: call() for name, (_, call) in timed.items()}
     parameters = batch.varied(batch.hanging(), 37)
-    table = batch.constants(tree.rebuild(batch.hanging(), list(parameters.values())), 37)
+    table = batch.constants(tree.unflatten(batch.hanging(), list(parameters.values())), 37)
     ends["NumPy"] = batch.in_numpy(table, runs()[3].vector, 0.7)
     batch.refuse_other_ends(ends, "simulate_batch", runs()[3].nominal)
     table[0, 3] *= 1.0001
@@ -102,7 +102,7 @@ def test_lmfit_finds_the_same_coefficients():
 
 def test_a_section_and_its_bars_are_printed():
     case = runs()[3]
-    times = measure.interleaved({"kernel": rodas4.kernel(case, prepared(case.system))}, rounds=2)
+    times = measure.interleaved({"kernel": rodas4.kernel(case, compile_system(case.system))}, rounds=2)
     bar = measure.Bar("speed", 3.0, 4.0, "x", at_least=True, why="a reason")
     section = measure.Section(
         "title", "text", ("what", "time"), (("kernel", measure.of_time(times["kernel"].median)),), (bar,)
@@ -115,7 +115,7 @@ def test_a_section_and_its_bars_are_printed():
 
 def test_a_new_plant_is_traced_and_compiled_anew():
     system = runs()[3].system
-    assert new_plant.fresh(system).address != prepared(system).program.address
+    assert new_plant.fresh(system).address != compile_system(system).program.address
 
 
 def test_a_process_of_its_own_runs_the_program():

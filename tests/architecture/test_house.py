@@ -26,8 +26,8 @@ LOCK = (ROOT / "requirements.lock").read_text(encoding="utf-8")
 FILES = sorted(SOURCE.rglob("*.py"))
 PHYSICS = re.compile(r"(?<![a-z])(muscle|pressure|valve|gas|contraction|force)(s|es)?(?![a-z])", re.IGNORECASE)
 # May be imported by their siblings: the base, the search, a wall's rubber, and laws made of other laws.
-SHARED_LAWS = {"base", "solve", "box", "rubber"}
-COMPOSITES = {"__init__", "scaled", "tangent", "as_force_law"}
+SHARED_LAWS = {"base", "solve", "validity_range", "rubber"}
+COMPOSITES = {"__init__", "scaled", "tangent", "polynomial_surrogate"}
 
 
 def name_of(path: Path) -> str:

@@ -20,14 +20,14 @@ import pytest
 import rodas4
 from filling import lifts, runs
 
-from airmuscle.compile.program import prepared
+from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import Schedule
 from airmuscle.plant.plant import Plant
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
 
 
 def reference(run):
-    return rodas4.kernel(run, prepared(run.system), Rodas4(1e-11))()
+    return rodas4.kernel(run, compile_system(run.system), Rodas4(1e-11))()
 
 
 @pytest.mark.parametrize("states", [3, 8])
@@ -43,7 +43,7 @@ def reference(run):
 def test_a_peer_finds_the_same_course(module, solver, states):
     pytest.importorskip(module)
     run = runs()[states]
-    found = solver(run, prepared(run.system))(1e-8)()
+    found = solver(run, compile_system(run.system))(1e-8)()
     assert found.shape == (2501, states)
     assert run.error(found, reference(run)) < 1e-8
 
@@ -52,7 +52,7 @@ def test_a_peer_finds_the_same_course(module, solver, states):
 def test_so_does_casadi_with_gcc_and_leaves_nothing_behind(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run = runs()[3]
-    call = peer_solvers.casadi_cvodes_jit(run, prepared(run.system))(1e-8)
+    call = peer_solvers.casadi_cvodes_jit(run, compile_system(run.system))(1e-8)
     assert not list(tmp_path.iterdir())  # while the solver lives, for a process that is killed cleans nothing up
     assert run.error(call(), reference(run)) < 1e-8
 
@@ -61,7 +61,7 @@ def test_so_does_casadi_with_gcc_and_leaves_nothing_behind(tmp_path, monkeypatch
 def test_so_does_diffrax():
     pytest.importorskip("diffrax")
     run = runs()[3]
-    found = peer_solvers.diffrax_kvaerno5(run, prepared(run.system))(1e-8)()
+    found = peer_solvers.diffrax_kvaerno5(run, compile_system(run.system))(1e-8)()
     assert run.error(found, reference(run)) < 1e-7
 
 
@@ -98,7 +98,7 @@ def test_the_c_of_several_muscles_computes_the_same_steps(tmp_path, muscles):
     start = run.system.state_at(pressure=tuple(5e5 + 4e4 * i for i in range(muscles)), position=0.05)
     opened = {f"{p}discharge": ((0.02 + 0.01 * i, 1.0), (0.09, 0.0)) for i, p in enumerate(run.system.prefixes)}
     run = dataclasses.replace(run, start=start, command=Schedule(opened))
-    ready, segments = prepared(run.system), run.command.segments(run.system.inputs, 0.0, 0.1)
+    ready, segments = compile_system(run.system), run.command.segments(run.system.inputs, 0.0, 0.1)
     expected = DormandPrince8(ode8.STEP).run(ready, segments, 0.0, run.vector, np.linspace(0.0, 0.1, 11)).rows
     for library in ode8.compiled(tmp_path, muscles).values():
         np.testing.assert_allclose(ode8.in_c(run, library, segments)(), expected, rtol=1e-11, atol=1e-12)
@@ -109,7 +109,7 @@ def test_mujoco_takes_the_same_steps_of_rk4(tmp_path):
     """At 1 ms, so that a step's error would show; MuJoCo's order of operations is its own, hence 1e-9."""
     run = lifts(2)
     found = mujoco_peer.in_mujoco(run, mujoco_peer.callbacks(tmp_path, 2), 1e-3)()
-    course = RungeKutta4(1e-3).run(prepared(run.system), run.segments, 0.0, run.vector, run.times)
+    course = RungeKutta4(1e-3).run(compile_system(run.system), run.segments, 0.0, run.vector, run.times)
     assert run.error(found, course.rows) < 1e-9
 
 
@@ -118,7 +118,7 @@ def test_a_plant_of_components_has_the_rates_written_out():
     assert compared == [6, 10]
     for put_together, written in components.pairs():
         if written:
-            both = prepared(written.system), prepared(put_together.system)
+            both = compile_system(written.system), compile_system(put_together.system)
             assert components.refuse_other_rates(*both, written.start) < 1e-12
 
 
@@ -129,7 +129,7 @@ def test_other_rates_are_refused():
         put_together.system, mechanism=dataclasses.replace(put_together.system.mechanism, friction=0.201)
     )
     with pytest.raises(AssertionError, match="differ by"):
-        components.refuse_other_rates(prepared(written.system), prepared(stiffer), written.start)
+        components.refuse_other_rates(compile_system(written.system), compile_system(stiffer), written.start)
 
 
 def test_the_joint_with_proportional_valves_moves_as_the_other():
@@ -137,7 +137,7 @@ def test_the_joint_with_proportional_valves_moves_as_the_other():
     (_, _), (ten, _), (twelve, _) = components.pairs()
     places = [[s.name for s in run.system.states].index("angle") for run in (ten, twelve)]
     angles = [
-        rodas4.kernel(run, prepared(run.system))()[[900, -1], place]
+        rodas4.kernel(run, compile_system(run.system))()[[900, -1], place]
         for run, place in zip((ten, twelve), places, strict=True)
     ]
     assert len(twelve.system.states) == 12
@@ -148,7 +148,7 @@ def test_the_joint_with_proportional_valves_moves_as_the_other():
 def test_the_derivative_is_that_of_the_state_given():
     """The loop moves the state by less than rounding, so that the last call is at the state of the first."""
     run = lifts(2)
-    ready = prepared(run.system)
+    ready = compile_system(run.system)
     start = run.system.state_at(pressure=3e5, position=0.03, speed=0.1)
     expected = ready.rates([start[s.name] for s in run.system.states], [0.5] * 4)
     np.testing.assert_allclose(derivative.calls(ready, start, 10)(), expected, rtol=1e-12)

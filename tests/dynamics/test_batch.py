@@ -14,19 +14,19 @@ import pytest
 from joints import chosen_muscle, joint, joint_start
 
 from airmuscle.compile import StateVariable
-from airmuscle.control.inputs import REST, Schedule, Signal
+from airmuscle.control.inputs import ZERO_INPUT, SampledSignal, Schedule
 from airmuscle.core import ops, tree
-from airmuscle.core.errors import ColumnError, FileError, OutOfReach, ParameterError
-from airmuscle.core.model import model, parameter
+from airmuscle.core.declaration import model, parameter
+from airmuscle.core.errors import ColumnError, FileError, GeometryLimitError, ParameterError
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.pneumatics.gas import Isothermal
 from airmuscle.reproduce.hosovsky_plant import Numbers, hanging
 from airmuscle.reproduce.hosovsky_plant import plant as third_paper
-from airmuscle.simulation.batch import Batch, Single, simulate_batch, thread_pool, variations
-from airmuscle.simulation.integrators import DormandPrince8, Explicit, Rodas4, RungeKutta4
-from airmuscle.simulation.sensitivity import Sensitive, sensitivity
+from airmuscle.simulation.batch import BatchSolution, Single, simulate_batch, thread_pool, variations
+from airmuscle.simulation.integrators import DormandPrince8, ExplicitRungeKutta, Rodas4, RungeKutta4
+from airmuscle.simulation.sensitivity import WithSensitivities, sensitivity
 from airmuscle.simulation.simulate import simulate
 
 PULSE = Schedule({"fill": ((0.0303, 1), (0.2, 0)), "discharge": ((0.31, 1), (0.42, 0))})
@@ -55,7 +55,7 @@ def pulses(count):
         Schedule({"fill": ((0.02 + 0.00371 * i, 1), (0.2 + 0.001 * i, 0)), "discharge": ((0.3, 1),)})
         for i in range(count)
     ]
-    return [REST, Signal({"fill": ((0.05, 0), (0.1, 1), (0.2003, 0))}), *commands][:count]
+    return [ZERO_INPUT, SampledSignal({"fill": ((0.05, 0), (0.1, 1), (0.2003, 0))}), *commands][:count]
 
 
 CASES = {
@@ -66,7 +66,7 @@ CASES = {
 }  # fmt: skip
 
 
-def greatest_difference(found: Batch, index, run):
+def greatest_difference(found: BatchSolution, index, run):
     """Between a batch's plant and a run of it alone, in sizes of the states and of the other columns."""
     rows = [int(np.argmin(np.abs(run["time"] - t))) for t in found.time]
     assert np.abs(run["time"][rows] - found.time).max() < 1e-12
@@ -188,7 +188,7 @@ class Functions:
 
 
 def test_a_system_of_ones_own_with_every_function():
-    push = Signal({"push": ((0.0, 0.0), (0.5, 1.0), (1.0, -0.5))})
+    push = SampledSignal({"push": ((0.0, 0.0), (0.5, 1.0), (1.0, -0.5))})
     start = {"x": np.linspace(-1, 1, 21), "y": 0.3}
     found = simulate_batch(
         Functions(), {"power": np.linspace(0.2, 1, 21)}, push, duration=1.0, start=start, method=FAST, output=0.0137
@@ -203,7 +203,7 @@ def test_a_system_of_ones_own_with_every_function():
 def test_sensitivities_come_in_the_same_pass(method):
     """The derivative of each plant is the difference of two plants of a batch."""
     path, count, step = "mechanism.mass", 18, 1e-3
-    system = Sensitive(plain(), ((path,),), (10.0,))
+    system = WithSensitivities(plain(), ((path,),), (10.0,))
     masses = np.linspace(8.0, 12.0, count)
     start = plain().state_at(pressure=1e5, position=0.002)
     still = {**start, **{sensitivity(s.name, 0): 0.0 for s in plain().states}}
@@ -261,7 +261,7 @@ def test_air_below_none_on_the_way_is_seen_in_a_lane_as_alone(keep):
 
 
 def test_a_plant_without_an_equilibrium_is_reported():
-    found = simulate_batch(plain(), {"mechanism.mass": [4.0, 1e5, 5.0]}, REST, duration=0.1, method=FAST)
+    found = simulate_batch(plain(), {"mechanism.mass": [4.0, 1e5, 5.0]}, ZERO_INPUT, duration=0.1, method=FAST)
     assert list(found.failed) == [1]
     assert "it has no equilibrium to start from: HangingMass finds no rest" in found.reason(1)
     assert np.isnan(found["pressure"][1]).all()
@@ -271,16 +271,16 @@ def test_a_plant_without_an_equilibrium_is_reported():
 def test_plants_that_differ_in_their_circuit_alone_share_the_search_for_rest(monkeypatch):
     from airmuscle.simulation.batch import initial_states
 
-    asked, search = [], initial_states.equilibrium_of_each
+    asked, search = [], initial_states.find_equilibrium_of_each
     monkeypatch.setattr(
         initial_states,
-        "equilibrium_of_each",
+        "find_equilibrium_of_each",
         lambda ready, table, *more: asked.append(len(table)) or search(ready, table, *more),
     )
     varied = around({"circuit.fill.conductance": 5e-9}, 6)
-    simulate_batch(plain(), varied, REST, duration=0.1, method=FAST)
+    simulate_batch(plain(), varied, ZERO_INPUT, duration=0.1, method=FAST)
     assert asked == [1]
-    simulate_batch(plain(), {**varied, "mechanism.mass": [4, 5, 4, 4, 6, 5]}, REST, duration=0.1, method=FAST)
+    simulate_batch(plain(), {**varied, "mechanism.mass": [4, 5, 4, 4, 6, 5]}, ZERO_INPUT, duration=0.1, method=FAST)
     assert asked == [1, 3]
 
 
@@ -305,7 +305,7 @@ def test_variations_that_cannot_be_are_refused(varied, message):
 
 def test_parameters_that_do_not_go_together_name_the_row():
     law = paper()
-    varied = {"muscle.contractile.least_pressure": [-1e4, -1e4, 7e5]}
+    varied = {"muscle.contractile.min_pressure": [-1e4, -1e4, 7e5]}
     assert any(leaf.path == next(iter(varied)) for leaf in tree.leaves(law))
     with pytest.raises(ParameterError, match=r"variations, row 2: "):
         simulate_batch(law, varied, PULSE, duration=0.1, method=FAST)
@@ -322,7 +322,7 @@ def test_so_do_those_of_a_model_whose_numbers_stand_in_a_list():
 
     with pytest.raises(ParameterError, match=r"variations, row 1: Rising: 3 is not below 2"):
         simulate_batch(
-            Rising(), {"weights[0]": [1.0, 3.0]}, REST, duration=0.1, start={"x": 0.0, "y": 0.0}, method=FAST
+            Rising(), {"weights[0]": [1.0, 3.0]}, ZERO_INPUT, duration=0.1, start={"x": 0.0, "y": 0.0}, method=FAST
         )
 
 
@@ -353,13 +353,13 @@ class Growing:
 def test_a_check_whose_answer_differs_from_row_to_row_is_asked_row_by_row():
     given = {"duration": 0.1, "start": {"x": 1.0}, "method": FAST}
     with pytest.raises(ParameterError, match=r"variations, row 1: Growing: 2.0 is above 1.0"):
-        simulate_batch(Growing(), {"low": [0.0, 2.0, 0.0]}, REST, **given)
-    assert not simulate_batch(Growing(), {"low": [0.0, 2.0], "high": [1.0, 3.0]}, REST, **given).failed.size
+        simulate_batch(Growing(), {"low": [0.0, 2.0, 0.0]}, ZERO_INPUT, **given)
+    assert not simulate_batch(Growing(), {"low": [0.0, 2.0], "high": [1.0, 3.0]}, ZERO_INPUT, **given).failed.size
 
 
 def test_a_number_too_large_for_single_precision_is_reported():
     start = {"x": [1.0, 3e38]}
-    found = simulate_batch(Growing(), {}, REST, duration=1.0, start=start, method=FAST, precision=Single())
+    found = simulate_batch(Growing(), {}, ZERO_INPUT, duration=1.0, start=start, method=FAST, precision=Single())
     assert list(found.failed) == [1]
     assert found.reason(1) == "a rate or an output is not finite in single precision, though not in double"
     assert np.isnan(found["x"][1]).all()
@@ -375,20 +375,26 @@ def refused(message, error=ParameterError, **arguments):
 def test_everything_else_that_cannot_be_is_refused(tmp_path):
     start = plain().state_at(pressure=0.0)
     refused("no column 'presure'; there are .* Did you mean 'pressure'", keep=("presure",))
-    refused("there are 3 commands and starts for 2", command=[REST] * 3, start={**start, "speed": [0.0, 0.1]})
-    refused("every column needs one value a plant; .* and starts or commands for 3", command=[REST] * 3)
-    refused("commands, row 1: the plant has no input 'fil'", command=[REST, Schedule({"fil": ((0, 1),)})])
-    refused("commands, row 1: None is no Command", command=[REST, None])
+    refused("there are 3 commands and starts for 2", command=[ZERO_INPUT] * 3, start={**start, "speed": [0.0, 0.1]})
+    refused("every column needs one value a plant; .* and starts or commands for 3", command=[ZERO_INPUT] * 3)
+    refused("commands, row 1: the plant has no input 'fil'", command=[ZERO_INPUT, Schedule({"fil": ((0, 1),)})])
+    refused("commands, row 1: None is no Command", command=[ZERO_INPUT, None])
     refused("the input 'fill' is 2 before", command=Schedule({"fill": ((0.05, 2.0),)}))
     refused("start, row 1: 'speed' is nan; it must be finite", start={**start, "speed": [0.0, np.nan]})
     refused("the plant has no state 'sped'", start={**start, "sped": 0.0})
     refused("the start lacks speed", start={k: v for k, v in start.items() if k != "speed"})
     refused("duration is -1 s", duration=-1)
     refused(r"1e\+06 s in steps of 0.001 s are 1e\+09 steps .* more steps than allowed, 5e\+07", duration=1e6)
-    refused("start, row 0: Braid cannot take a contraction of", OutOfReach, start={**start, "position": [1.0, 0.0]})
-    refused("start, row 1: Braid cannot take a contraction of", OutOfReach, start={**start, "position": [0.0, -1.0]})
+    refused(
+        "start, row 0: Braid cannot take a contraction of", GeometryLimitError, start={**start, "position": [1.0, 0.0]}
+    )
+    refused(
+        "start, row 1: Braid cannot take a contraction of", GeometryLimitError, start={**start, "position": [0.0, -1.0]}
+    )
     lengths = {"mechanism.mass": [9.0, 10.0], "muscle.geometry.resting_length": [0.3, 0.02]}
-    refused("start, row 1: Braid cannot take", OutOfReach, variations=lengths, start={**start, "position": -0.02})
+    refused(
+        "start, row 1: Braid cannot take", GeometryLimitError, variations=lengths, start={**start, "position": -0.02}
+    )
     refused("start: it is 'rest'; give for each state a number", start="rest")
     refused("keep: it is 3; name columns", keep=3)
     refused(r"keep: no column '3'", keep=[3])
@@ -404,7 +410,7 @@ def test_everything_else_that_cannot_be_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
     refused("cannot be written", FileError, into=tmp_path / "file" / "inside")
     with pytest.raises(ParameterError, match="give the start of Functions, a value for each state"):
-        simulate_batch(Functions(), {"power": [0.5]}, REST, duration=0.1)
+        simulate_batch(Functions(), {"power": [0.5]}, ZERO_INPUT, duration=0.1)
 
 
 def test_columns_that_do_not_fit_the_memory_are_refused():
@@ -435,7 +441,7 @@ def test_on_disk_is_what_was_in_memory(tmp_path, method):
 
 
 def test_a_column_of_a_strange_name_has_a_file(tmp_path):
-    system = Sensitive(plain(), (("mechanism.mass",),), (10.0,))
+    system = WithSensitivities(plain(), (("mechanism.mass",),), (10.0,))
     still = {s.name: 0.0 for s in system.states} | plain().state_at(pressure=1e5)
     name = sensitivity("pressure", 0)
     found = simulate_batch(
@@ -453,12 +459,12 @@ def test_a_column_of_a_strange_name_has_a_file(tmp_path):
 
 
 def test_an_error_on_the_way_leaves_nothing_behind(tmp_path, monkeypatch):
-    from airmuscle.simulation.batch.job import Task
+    from airmuscle.simulation.batch.job import BatchJob
 
     def fails(self, index):
         raise ZeroDivisionError("of the test")
 
-    monkeypatch.setattr(Task, "alone", fails)
+    monkeypatch.setattr(BatchJob, "run_single", fails)
     with pytest.raises(ZeroDivisionError):
         simulate_batch(
             plain(), {"mechanism.mass": [9.0, 10.0]}, PULSE, duration=0.1, start=plain().state_at(pressure=0.0),
@@ -474,7 +480,7 @@ def test_an_interruption_keeps_what_is_done(tmp_path, monkeypatch, method, where
     take, once = thread_pool.Queue._take, threading.Lock()
 
     def interrupting(self):
-        if self.done >= (1 if isinstance(method, Explicit) else 20) and once.acquire(blocking=False):
+        if self.done >= (1 if isinstance(method, ExplicitRungeKutta) else 20) and once.acquire(blocking=False):
             _thread.interrupt_main()
             while not self.stop[0]:
                 time.sleep(0.01)

@@ -18,22 +18,22 @@ from plants import chosen_muscle
 from scipy.linalg import expm
 from scipy.signal import cont2discrete
 
-from airmuscle.analysis.linearise import linearise
+from airmuscle.analysis.linear_model import linearise
 from airmuscle.compile import StateVariable
-from airmuscle.compile.program import prepared
-from airmuscle.control import PID, Split, TwoPoint
+from airmuscle.compile.program import compile_system
+from airmuscle.control import PID, OnOffController, SplitRange
+from airmuscle.control.control_loop import ControlLoop
 from airmuscle.control.controller import Controller
-from airmuscle.control.driver import PWM, OnOff
-from airmuscle.control.inputs import Periodic, Schedule, Signal
-from airmuscle.control.loop import Loop
+from airmuscle.control.driver import PWM, SolenoidDriver
+from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
+from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import ParameterError, SimulationError
-from airmuscle.core.model import model, parameter
 from airmuscle.core.reference import cite
 from airmuscle.mechanism import HangingMass, Held, Isometric
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Follower, ProportionalRegulator, ProportionalValve, Supply, Valve
+from airmuscle.pneumatics import FillDischarge, ProportionalRegulator, ProportionalValve, SecondOrderLag, Supply, Valve
 from airmuscle.pneumatics.gas import Isothermal
-from airmuscle.simulation.closed_loop import run_loop
+from airmuscle.simulation.closed_loop import simulate_closed_loop
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
 from airmuscle.simulation.simulate import simulate
 
@@ -73,7 +73,7 @@ def lifting(circuit=None, mass=5.0):
 
 
 PRESSURE = Schedule({"pressure": ((0.0, 1e5), (0.3, 3e5), (0.7, 1.5e5))})
-VALVES = PID("pressure", Split("fill", "discharge"), gain=1.5e-5, integral_time=0.4, derivative_time=0.02)
+VALVES = PID("pressure", SplitRange("fill", "discharge"), gain=1.5e-5, integral_time=0.4, derivative_time=0.02)
 
 
 # What a loop is
@@ -82,7 +82,7 @@ VALVES = PID("pressure", Split("fill", "discharge"), gain=1.5e-5, integral_time=
 def test_a_loop_at_a_linear_system_is_its_discretisation():
     """x_(k+1) = a x_k + (1 - a) u_k with a = exp(-h/tau), u = K (b r - x) + I, I_(k+1) = I + K h/T_i (r - x)."""
     h, a, k = 0.05, np.exp(-0.05 / 0.3), 1.5
-    run = simulate(Lag(), Loop(LAG_PI, h, STEP), duration=3.0, start={"x": 0.2}, method=FINE)
+    run = simulate(Lag(), ControlLoop(LAG_PI, h, STEP), duration=3.0, start={"x": 0.2}, method=FINE)
     x, integral, expected = 0.2, k * 0.2, []
     for i in range(60):
         r = 1.0 if i >= 10 else 0.0
@@ -97,21 +97,21 @@ def test_a_loop_at_a_linear_system_is_its_discretisation():
 def test_between_samples_a_held_command_meets_a_driven_disturbance():
     """With w linear in time x follows the exact solution of x' = (u + w - x)/tau over every period."""
     h, tau = 0.05, 0.3
-    disturbed = Loop(LAG_PI, h, STEP, beside=Signal({"w": ((0.0, 0.0), (0.5, 0.0), (1.5, 2.0))}))
+    disturbed = ControlLoop(LAG_PI, h, STEP, other_inputs=SampledSignal({"w": ((0.0, 0.0), (0.5, 0.0), (1.5, 2.0))}))
     run = simulate(Lag(), disturbed, duration=1.5, start={"x": 0.0}, method=FINE)
     at = np.searchsorted(run["time"], h * np.arange(31) - 1e-9)
     whole = np.array([[-1 / tau, 1 / tau, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])  # of x, u + w, its slope
     for begin, end in itertools.pairwise(at):
         slope = 2.0 if run["time"][begin] > 0.5 - 1e-9 else 0.0
-        known = [run["x"][begin], run["told.u"][begin] + run["w"][begin], slope]
+        known = [run["x"][begin], run["command.u"][begin] + run["w"][begin], slope]
         assert run["x"][end] == pytest.approx((expm(whole * h) @ known)[0], abs=1e-9)
 
 
 def test_for_small_steps_a_loop_is_that_of_the_linearised_plant():
     """What is left is quadratic in the step: half the step, a quarter of it."""
-    valve = ProportionalValve(Supply(5e5), VALVE, VALVE, Follower(20.0, 0.7), overlap=-0.3)
+    valve = ProportionalValve(Supply(5e5), VALVE, VALVE, SecondOrderLag(20.0, 0.7), overlap=-0.3)
     plant = Plant(chosen_muscle(), valve, Isometric(0.05), Isothermal())
-    rest = run_loop(plant, Loop(PID("pressure", "command", 0.0), 0.5, Schedule({"pressure": ()})), duration=20.0,
+    rest = simulate_closed_loop(plant, ControlLoop(PID("pressure", "command", 0.0), 0.5, Schedule({"pressure": ()})), duration=20.0,
                     start=plant.state_at(pressure=1e5), method=FINE).state  # fmt: skip
     linear = linearise(plant, rest, {"command": 0.0})
     middle = float(plant.outputs(rest, {"command": 0.0})["pressure"])
@@ -120,7 +120,7 @@ def test_for_small_steps_a_loop_is_that_of_the_linearised_plant():
     a, b, *_ = cont2discrete((linear.A, linear.B, linear.C[[row]], linear.D[[row]]), h)
     left = []
     for step in (4000.0, 2000.0):
-        loop = Loop(
+        loop = ControlLoop(
             PID("pressure", "command", k, t_i), h, Schedule({"pressure": ((0.0, middle), (h / 2, middle + step))})
         )
         run = simulate(plant, loop, duration=50 * h, start=rest, method=FINE)
@@ -141,39 +141,41 @@ def test_for_small_steps_a_loop_is_that_of_the_linearised_plant():
 def test_every_sampling_instant_is_met_exactly(method):
     """No row is missing, what was measured is what the column held then, and the command changes nowhere else."""
     h = 0.03
-    run = simulate(lifting(), Loop(VALVES, h, PRESSURE), duration=1.0, method=method, output=0.007)
+    run = simulate(lifting(), ControlLoop(VALVES, h, PRESSURE), duration=1.0, method=method, output=0.007)
     instants = h * np.arange(34)
     assert np.isin(instants, run["time"]).all()
     at = np.searchsorted(run["time"], instants)
     assert np.array_equal(run["measured.pressure"][at], run["pressure"][at])
     for name in ("fill", "discharge"):
-        changed = np.flatnonzero(np.diff(run[f"told.{name}"]) != 0) + 1
+        changed = np.flatnonzero(np.diff(run[f"command.{name}"]) != 0) + 1
         assert np.isin(run["time"][changed], instants).all()
         assert changed.size > 5
-        assert np.array_equal(run[name], run[f"told.{name}"]), "nothing stands between"
+        assert np.array_equal(run[name], run[f"command.{name}"]), "nothing stands between"
 
 
 def test_rows_do_not_change_the_solution():
-    loop = Loop(VALVES, TICK, PRESSURE, drivers={"fill": (PWM(30.0), OnOff(3e-3, 2e-3))})
+    loop = ControlLoop(VALVES, TICK, PRESSURE, drivers={"fill": (PWM(30.0), SolenoidDriver(3e-3, 2e-3))})
     plant, found = lifting(), []
     for output in (None, 0.5, 1e-3, [0.1, 0.15]):
-        run = run_loop(plant, loop, duration=1.0, output=output)
+        run = simulate_closed_loop(plant, loop, duration=1.0, output=output)
         at = np.isin(run.recording["time"], TICK * np.arange(64))
         assert at.sum() == 64
-        found.append((run.state, run.memory, *(run.recording[name][at].tolist() for name in ("pressure", "told.fill"))))
+        found.append(
+            (run.state, run.memory, *(run.recording[name][at].tolist() for name in ("pressure", "command.fill")))
+        )
     assert found[0] == found[1] == found[2] == found[3]
 
 
 def test_the_same_run_is_the_same_twice():
-    loop = Loop(VALVES, TICK, PRESSURE, drivers={"fill": PWM(30.0)})
-    one, two = (run_loop(lifting(), loop, duration=0.5) for _ in range(2))
+    loop = ControlLoop(VALVES, TICK, PRESSURE, drivers={"fill": PWM(30.0)})
+    one, two = (simulate_closed_loop(lifting(), loop, duration=0.5) for _ in range(2))
     assert (one.state, one.memory) == (two.state, two.memory)
     assert all(np.array_equal(one.recording[name], two.recording[name]) for name in one.recording)
 
 
 def test_what_jumps_with_its_input_is_measured_before_it_jumps():
     """u_k = K (r - y_k), y_k = 2 x_k + u_(k-1): the controller has not commanded u_k yet."""
-    loop = Loop(PID("y", "u", 0.5), 0.1, Schedule({"y": ((0.0, 1.0),)}))
+    loop = ControlLoop(PID("y", "u", 0.5), 0.1, Schedule({"y": ((0.0, 1.0),)}))
     run = simulate(Lag(), loop, duration=1.0, start={"x": 0.0}, method=FINE)
     a, x, u = np.exp(-0.1 / 0.3), 0.0, 0.0
     for i in np.searchsorted(run["time"], 0.1 * np.arange(10) - 1e-9):
@@ -190,9 +192,9 @@ def test_a_set_point_that_changes_at_a_sampling_instant_is_seen_there(period, pl
         at = round(k * period, places)
         off.add(float(np.sign(k * period - at)))
         wanted, beside = Schedule({"x": ((at, 1.0),)}), Schedule({"w": ((at, 1.0),)})
-        loop = Loop(PID("x", "u", 1.0), period, wanted, beside)
+        loop = ControlLoop(PID("x", "u", 1.0), period, wanted, beside)
         run = simulate(Lag(), loop, duration=60 * period, start={"x": 0.0}, output=60 * period)
-        first = int(np.flatnonzero(run["told.u"])[0])
+        first = int(np.flatnonzero(run["command.u"])[0])
         assert run["time"][first] == pytest.approx(at, abs=1e-9)
         assert (run["w"][first - 1], run["w"][first], run["setpoint.x"][first]) == (0.0, 1.0, 1.0)
         assert np.diff(run["time"]).min() > 1e-9, "no piece of 1e-17 s"
@@ -204,23 +206,23 @@ def test_a_set_point_that_changes_at_a_sampling_instant_is_seen_there(period, pl
 
 def test_a_command_is_cut_off_at_the_range_of_its_input():
     """A huge gain knows two commands, the least and the greatest."""
-    lag = Follower(20.0, 0.7)
-    regulator = ProportionalRegulator(Supply(6e5), VALVE, VALVE, lag, greatest=4e5)
+    lag = SecondOrderLag(20.0, 0.7)
+    regulator = ProportionalRegulator(Supply(6e5), VALVE, VALVE, lag, max_setpoint=4e5)
     valve = ProportionalValve(Supply(5e5), VALVE, VALVE, lag)
     for circuit, name, range_of_it, drivers in (
         (regulator, "setpoint", (0.0, 4e5), {}),
         (valve, "command", (-1.0, 1.0), {}),
         (valve, "command", (0.0, 1.0), {"command": PWM(100.0)}),  # what a driver takes
     ):
-        loop, plant = Loop(PID("pressure", name, 1e3), TICK, PRESSURE, drivers=drivers), lifting(circuit)
+        loop, plant = ControlLoop(PID("pressure", name, 1e3), TICK, PRESSURE, drivers=drivers), lifting(circuit)
         run = simulate(plant, loop, duration=1.0, start=plant.state_at(pressure=2e5))
-        assert set(run[f"told.{name}"]) == set(range_of_it)
+        assert set(run[f"command.{name}"]) == set(range_of_it)
 
 
 class Wild(Controller):
     """Commands what is no command, from a sample on."""
 
-    columns = setpoints = ("pressure",)
+    measured_columns = setpoints = ("pressure",)
     inputs = ("fill",)
 
     def __init__(self, after: int, given: Any) -> None:
@@ -238,24 +240,26 @@ class Wild(Controller):
 
 
 def test_a_controller_that_knows_no_range_is_cut_off_too():
-    run = simulate(lifting(), Loop(Wild(99, None), 0.02, PRESSURE), duration=0.1)
-    assert (run["told.fill"] == 1.0).all()
+    run = simulate(lifting(), ControlLoop(Wild(99, None), 0.02, PRESSURE), duration=0.1)
+    assert (run["command.fill"] == 1.0).all()
 
 
 def test_pulses_in_step_with_the_samples_are_as_wide_as_commanded():
     """A carrier's period that begins with a sample has that sample's command, however k/50 and k x 0.02 are rounded."""
-    loop = Loop(VALVES, 0.02, Periodic(PRESSURE, 1.0), drivers={"fill": PWM(50.0), "discharge": PWM(50.0)})
+    loop = ControlLoop(VALVES, 0.02, Periodic(PRESSURE, 1.0), drivers={"fill": PWM(50.0), "discharge": PWM(50.0)})
     run = simulate(lifting(), loop, duration=20.0, output=20.0)
     edges = 0.02 * np.arange(1001)
     edges[-1] = 20.0
     at = np.searchsorted(run["time"], edges - 1e-9)
     for name in ("fill", "discharge"):
         wide = np.add.reduceat(np.diff(run["time"]) * run[name][:-1], at[:-1])
-        assert wide == pytest.approx(0.02 * run[f"told.{name}"][at[:-1]], abs=1e-9)
+        assert wide == pytest.approx(0.02 * run[f"command.{name}"][at[:-1]], abs=1e-9)
 
 
 def test_two_point_control_swings_about_its_set_point_by_more_than_its_hysteresis():
-    loop = Loop(TwoPoint("pressure", Split("fill", "discharge"), 2e4), 2e-3, Schedule({"pressure": ((0.0, 2e5),)}))
+    loop = ControlLoop(
+        OnOffController("pressure", SplitRange("fill", "discharge"), 2e4), 2e-3, Schedule({"pressure": ((0.0, 2e5),)})
+    )
     run = simulate(lifting(), loop, duration=2.0)
     late = run["pressure"][run["time"] > 1.0]
     assert 2e4 < np.ptp(late) < 6e4
@@ -265,22 +269,25 @@ def test_two_point_control_swings_about_its_set_point_by_more_than_its_hysteresi
 
 def test_pid_follows_with_every_kind_of_valve():
     """With integral action nothing is left of the error, whatever stands between the controller and the air."""
-    lag, single = Follower(20.0, 0.7), Schedule({"pressure": ((0.0, 2e5),)})
+    lag, single = SecondOrderLag(20.0, 0.7), Schedule({"pressure": ((0.0, 2e5),)})
     for circuit, commanded, gain, drivers in (
-        (FillDischarge(Supply(5e5), VALVE, VALVE), Split("fill", "discharge"), 1e-5, {"fill": PWM(200.0), "discharge": PWM(200.0)}),
+        (FillDischarge(Supply(5e5), VALVE, VALVE), SplitRange("fill", "discharge"), 1e-5, {"fill": PWM(200.0), "discharge": PWM(200.0)}),
         (ProportionalValve(Supply(5e5), VALVE, VALVE, lag), "command", 1e-5, {}),
         (ProportionalRegulator(Supply(5e5), VALVE, VALVE, lag, 2e5), "setpoint", 0.5, {}),
     ):  # fmt: skip
-        loop = Loop(PID("pressure", commanded, gain, 0.3), 5e-3, single, drivers=drivers)
+        loop = ControlLoop(PID("pressure", commanded, gain, 0.3), 5e-3, single, drivers=drivers)
         run = simulate(lifting(circuit), loop, duration=6.0)
         assert run["pressure"][-1] == pytest.approx(2e5, rel=5e-3), type(circuit).__name__
 
 
 def test_position_is_followed_and_what_is_beside_goes_on():
     plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), Held(HangingMass(10.0)))
-    pid = PID("position", Split("fill", "discharge"), 15.0, 0.5, 0.08)
-    loop = Loop(
-        pid, 5e-3, Signal({"position": ((0.0, 0.0), (2.0, 0.02))}), beside=Schedule({"held": ((0, 1), (0.5, 0))})
+    pid = PID("position", SplitRange("fill", "discharge"), 15.0, 0.5, 0.08)
+    loop = ControlLoop(
+        pid,
+        5e-3,
+        SampledSignal({"position": ((0.0, 0.0), (2.0, 0.02))}),
+        other_inputs=Schedule({"held": ((0, 1), (0.5, 0))}),
     )
     run = simulate(plant, loop, duration=5.0, start=plant.state_at(pressure=1e5))
     early = run["time"] < 0.5
@@ -295,43 +302,43 @@ def test_position_is_followed_and_what_is_beside_goes_on():
 
 @pytest.mark.parametrize("cuts", [(32, 16), (1, 2, 60), tuple(range(1, 64))])
 def test_a_run_cut_at_its_samples_is_the_run_in_one_to_the_last_bit(cuts):
-    drivers = {"fill": (PWM(30.0), OnOff(9e-3, 7e-3, 4e-3, 2e-3)), "discharge": OnOff(20e-3, 20e-3)}
-    loop, plant = Loop(VALVES, TICK, PRESSURE, drivers=drivers), lifting()
-    whole = run_loop(plant, loop, duration=1.0, start=plant.state_at(pressure=1e5))
+    drivers = {"fill": (PWM(30.0), SolenoidDriver(9e-3, 7e-3, 4e-3, 2e-3)), "discharge": SolenoidDriver(20e-3, 20e-3)}
+    loop, plant = ControlLoop(VALVES, TICK, PRESSURE, drivers=drivers), lifting()
+    whole = simulate_closed_loop(plant, loop, duration=1.0, start=plant.state_at(pressure=1e5))
     state, memory, time = plant.state_at(pressure=1e5), None, 0.0
     for cut in [TICK * n for n in sorted({*cuts, 64})]:
-        part = run_loop(plant, loop, duration=cut - time, start=state, start_time=time, memory=memory)
+        part = simulate_closed_loop(plant, loop, duration=cut - time, start=state, start_time=time, memory=memory)
         state, memory, time = part.state, part.memory, part.time
     assert (state, memory) == (whole.state, whole.memory)
 
 
 @pytest.mark.parametrize("cut", [0.001, 0.5 - TICK / 3, 0.5 + TICK / 3])
 def test_a_run_cut_between_two_samples_goes_on_with_what_was_commanded(cut):
-    loop, plant, start = Loop(VALVES, TICK, PRESSURE), lifting(), lifting().state_at(pressure=1e5)
-    whole = run_loop(plant, loop, duration=1.0, start=start, method=FINE)
+    loop, plant, start = ControlLoop(VALVES, TICK, PRESSURE), lifting(), lifting().state_at(pressure=1e5)
+    whole = simulate_closed_loop(plant, loop, duration=1.0, start=start, method=FINE)
     if cut < TICK:
         with pytest.raises(ParameterError, match="it would look only once"):
-            run_loop(plant, loop, duration=cut, start=start)
+            simulate_closed_loop(plant, loop, duration=cut, start=start)
         return
-    first = run_loop(plant, loop, duration=cut, start=start, method=FINE)
-    short = run_loop(
+    first = simulate_closed_loop(plant, loop, duration=cut, start=start, method=FINE)
+    short = simulate_closed_loop(
         plant, loop, duration=1e-4, start=first.state, start_time=first.time, memory=first.memory, method=FINE
     )
-    second = run_loop(plant, loop, duration=1.0 - short.time, start=short.state, start_time=short.time,
+    second = simulate_closed_loop(plant, loop, duration=1.0 - short.time, start=short.state, start_time=short.time,
                       memory=short.memory, method=FINE)  # fmt: skip
-    assert second.recording["told.fill"][0] == first.recording["told.fill"][-1]
+    assert second.recording["command.fill"][0] == first.recording["command.fill"][-1]
     assert second.recording["measured.pressure"][0] == first.recording["measured.pressure"][-1]
-    assert second.memory.taken == whole.memory.taken == 64
+    assert second.memory.sample_count == whole.memory.sample_count == 64
     assert second.state == pytest.approx(whole.state, rel=1e-7, abs=1e-9)
 
 
 def test_what_was_commanded_gives_the_same_run_without_a_controller():
-    drivers = {"fill": (PWM(30.0), OnOff(9e-3, 7e-3, 4e-3, 2e-3))}
+    drivers = {"fill": (PWM(30.0), SolenoidDriver(9e-3, 7e-3, 4e-3, 2e-3))}
     plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), Held(HangingMass(10.0)))
-    loop = Loop(VALVES, TICK, PRESSURE, Schedule({"held": ((0, 1), (0.1, 0))}), drivers)
+    loop = ControlLoop(VALVES, TICK, PRESSURE, Schedule({"held": ((0, 1), (0.1, 0))}), drivers)
     start = plant.state_at(pressure=1e5)
     run = simulate(plant, loop, duration=1.0, start=start, method=FINE)
-    again = simulate(plant, loop.replayed(run), duration=1.0, start=start, method=FINE, output=run["time"])
+    again = simulate(plant, loop.as_open_loop(run), duration=1.0, start=start, method=FINE, output=run["time"])
     at = np.isin(again["time"], run["time"])
     assert at.sum() == len(run)
     for name in ("pressure", "position", "fill", "held"):
@@ -349,15 +356,15 @@ def test_a_loop_that_fails_returns_what_it_has(gas, reason):
     """Huge valves empty the muscle within one step of a fixed method."""
     plant = Plant(chosen_muscle(), HUGE, HangingMass(10.0), *([gas] if gas else []))
     falling = Schedule({"pressure": ((0.0, 3e5), (0.1, 0.0))})
-    loop = Loop(PID("pressure", Split("fill", "discharge"), 1.0), 0.02, falling)
+    loop = ControlLoop(PID("pressure", SplitRange("fill", "discharge"), 1.0), 0.02, falling)
     told = {"duration": 1.0, "start": plant.state_at(pressure=3e5), "method": RungeKutta4(0.01)}
     with pytest.raises(SimulationError, match=rf"ended at .* because .*{reason}.*at air_mass") as caught:
-        run_loop(plant, loop, **told)
+        simulate_closed_loop(plant, loop, **told)
     run = caught.value.recording
     assert 3 <= len(run) < 101
     assert all(np.isfinite(run[name]).all() for name in run)
     assert (run["pressure"] >= -101325.0).all()
-    kept = run_loop(plant, loop, **told, complete=False)
+    kept = simulate_closed_loop(plant, loop, **told, complete=False)
     assert reason in kept.recording.notes[-1]
     assert kept.time <= kept.recording["time"][-1] + 1e-12
     assert kept.state["air_mass"] > 0.0, "where it can go on from"
@@ -368,54 +375,58 @@ def test_a_command_that_is_no_number_ends_the_run_there(given):
     with pytest.raises(
         SimulationError, match=r"ended at 0.1 of 1 s because the controller gave a command that is not"
     ) as caught:
-        simulate(lifting(), Loop(Wild(5, given), 0.02, PRESSURE), duration=1.0)
+        simulate(lifting(), ControlLoop(Wild(5, given), 0.02, PRESSURE), duration=1.0)
     assert caught.value.recording["time"][-1] == 0.1
     assert not caught.value.interrupted
 
 
 def test_a_loop_that_fails_at_its_first_sample_has_no_rows_and_a_reason():
     with pytest.raises(SimulationError, match=r"ended at 0 of 1 s because the controller gave a command") as caught:
-        simulate(lifting(), Loop(Wild(0, {"fill": np.nan}), 0.02, PRESSURE), duration=1.0)
+        simulate(lifting(), ControlLoop(Wild(0, {"fill": np.nan}), 0.02, PRESSURE), duration=1.0)
     assert len(caught.value.recording) == 0
-    assert "told.fill" in caught.value.recording
+    assert "command.fill" in caught.value.recording
 
 
 @pytest.mark.parametrize("given", [{}, {"fil": 1.0}, {"fill": "open"}, None])
 def test_a_controller_that_gives_no_command_is_named(given):
     with pytest.raises(ParameterError, match=r"Wild commands .*; it must give a number for each of fill"):
-        simulate(lifting(), Loop(Wild(5, given), 0.02, PRESSURE), duration=1.0)
+        simulate(lifting(), ControlLoop(Wild(5, given), 0.02, PRESSURE), duration=1.0)
 
 
 def test_a_loop_that_is_interrupted_can_be_taken_up():
-    loop, plant = Loop(Wild(30, KeyboardInterrupt), TICK, PRESSURE), lifting()
+    loop, plant = ControlLoop(Wild(30, KeyboardInterrupt), TICK, PRESSURE), lifting()
     with pytest.raises(SimulationError, match="because it was interrupted") as caught:
         simulate(plant, loop, duration=1.0)
     assert caught.value.interrupted
     assert caught.value.recording["time"][-1] == 30 * TICK
-    run = run_loop(plant, loop, duration=1.0, complete=False)
-    assert (run.time, run.memory.taken) == (30 * TICK, 30)
+    run = simulate_closed_loop(plant, loop, duration=1.0, complete=False)
+    assert (run.time, run.memory.sample_count) == (30 * TICK, 30)
     patient = dataclasses.replace(loop, controller=Wild(99, None))
-    rest = run_loop(plant, patient, duration=1.0 - run.time, start=run.state, start_time=run.time, memory=run.memory)
-    assert rest.state == run_loop(plant, patient, duration=1.0).state
+    rest = simulate_closed_loop(
+        plant, patient, duration=1.0 - run.time, start=run.state, start_time=run.time, memory=run.memory
+    )
+    assert rest.state == simulate_closed_loop(plant, patient, duration=1.0).state
 
 
 def test_a_loop_that_is_interrupted_within_a_piece_goes_on_from_the_sample_before(monkeypatch):
     from airmuscle.simulation.integrators import Stepper
 
     stepped, run = Stepper.run, iter(range(100))
-    loop, plant = Loop(VALVES, TICK, PRESSURE, drivers={"fill": PWM(30.0)}), lifting()
-    whole = run_loop(plant, loop, duration=1.0)
+    loop, plant = ControlLoop(VALVES, TICK, PRESSURE, drivers={"fill": PWM(30.0)}), lifting()
+    whole = simulate_closed_loop(plant, loop, duration=1.0)
 
     def interrupted(self, *given):
         course = stepped(self, *given)
         return course._replace(status=5, reached=min(course.reached, 1)) if next(run) == 20 else course
 
     monkeypatch.setattr(Stepper, "run", interrupted)
-    part = run_loop(plant, loop, duration=1.0, complete=False)
+    part = simulate_closed_loop(plant, loop, duration=1.0, complete=False)
     monkeypatch.undo()
     assert "interrupted" in part.recording.notes[-1]
-    assert (part.time, part.memory.time, part.memory.taken) == (20 * TICK, 20 * TICK, 20)
-    rest = run_loop(plant, loop, duration=1.0 - part.time, start=part.state, start_time=part.time, memory=part.memory)
+    assert (part.time, part.memory.time, part.memory.sample_count) == (20 * TICK, 20 * TICK, 20)
+    rest = simulate_closed_loop(
+        plant, loop, duration=1.0 - part.time, start=part.state, start_time=part.time, memory=part.memory
+    )
     assert (rest.state, rest.memory) == (whole.state, whole.memory)
 
 
@@ -434,14 +445,14 @@ def test_what_does_not_change_is_made_once(monkeypatch):
         return counts
 
     plant, start = lifting(), lifting().state_at(pressure=1e5)
-    simulate(plant, Loop(VALVES, TICK, PRESSURE), duration=0.1, start=start)  # compiles
+    simulate(plant, ControlLoop(VALVES, TICK, PRESSURE), duration=0.1, start=start)  # compiles
     monkeypatch.setattr(Plant, "states", property(counting("states", Plant.states.fget)))
     monkeypatch.setattr(Rodas4, "_kernel", counting("kernel", Rodas4._kernel))
-    monkeypatch.setattr("airmuscle.compile.program.prepared", counting("prepared", prepared))
+    monkeypatch.setattr("airmuscle.compile.program.compile_system", counting("prepared", compile_system))
     found = []
     for duration in (0.5, 1.0):
         counted.clear()
-        simulate(plant, Loop(VALVES, TICK, PRESSURE), duration=duration, start=start)
+        simulate(plant, ControlLoop(VALVES, TICK, PRESSURE), duration=duration, start=start)
         found.append(dict(counted))
     assert found[0] == found[1]
     assert found[0]["kernel"] == found[0]["prepared"] == 1
@@ -451,51 +462,53 @@ def test_what_does_not_change_is_made_once(monkeypatch):
 
 
 def test_the_recording_says_who_commanded_what():
-    loop = Loop(VALVES, TICK, PRESSURE)
+    loop = ControlLoop(VALVES, TICK, PRESSURE)
     run = simulate(lifting(), loop, duration=0.5)
     assert run.notes[0].startswith(
         "controlled: every 0.015625 s pressure [Pa] is measured and fill [1], discharge [1] commanded by PID(measured='pr"
     )
     heads = list(run.to_pandas())
-    assert {"setpoint.pressure [Pa]", "measured.pressure [Pa]", "told.fill [1]", "told.discharge [1]"} <= set(heads)
+    assert {"setpoint.pressure [Pa]", "measured.pressure [Pa]", "command.fill [1]", "command.discharge [1]"} <= set(
+        heads
+    )
     assert [r.key for r in cite(loop)] == ["astrom-hagglund-1995"]
     assert np.array_equal(run["setpoint.pressure"], np.where(run["time"] < 0.3, 1e5, 3e5))
 
 
 @pytest.mark.parametrize("period", [0.0, -0.1, np.nan, np.inf, True, "1 s"])
 def test_a_period_that_cannot_be_is_refused(period):
-    with pytest.raises(ParameterError, match=r"Loop.period is .*; it must be positive and finite"):
-        Loop(VALVES, period, PRESSURE)
+    with pytest.raises(ParameterError, match=r"ControlLoop.period is .*; it must be positive and finite"):
+        ControlLoop(VALVES, period, PRESSURE)
 
 
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        ({"controller": 3}, "Loop.controller is 3; give a PID"),
+        ({"controller": 3}, "ControlLoop.controller is 3; give a PID"),
         ({"setpoint": {"pressure": 1e5}}, "the command is {'pressure'"),
-        ({"setpoint": Schedule({"presure": ()})}, "Loop.setpoint names presure; PID follows pressure"),
-        ({"setpoint": Schedule({})}, "Loop.setpoint names nothing; PID follows pressure"),
-        ({"setpoint": Periodic(Schedule({"force": ()}), 1.0)}, "Loop.setpoint names force"),
-        ({"beside": Schedule({"fill": ((0, 1),)})}, "'fill' is commanded by the controller, and beside it too"),
+        ({"setpoint": Schedule({"presure": ()})}, "ControlLoop.setpoint names presure; PID follows pressure"),
+        ({"setpoint": Schedule({})}, "ControlLoop.setpoint names nothing; PID follows pressure"),
+        ({"setpoint": Periodic(Schedule({"force": ()}), 1.0)}, "ControlLoop.setpoint names force"),
+        ({"other_inputs": Schedule({"fill": ((0, 1),)})}, "'fill' is commanded by the controller, and beside it too"),
         ({"drivers": {"fill": 3}}, "the driver of 'fill' is 3"),
     ],
 )
 def test_a_loop_that_cannot_be_is_refused(changed, message):
     with pytest.raises(ParameterError, match=message):
-        Loop(**{"controller": VALVES, "period": 0.01, "setpoint": PRESSURE, **changed})
+        ControlLoop(**{"controller": VALVES, "period": 0.01, "setpoint": PRESSURE, **changed})
 
 
 @pytest.mark.parametrize(
     ("loop", "message"),
     [
-        (Loop(PID("presure", "fill", 1.0), 0.01, Schedule({"presure": ()})), "measures 'presure'.*Did you mean 'pressure'"),
-        (Loop(PID("fill", "fill", 1.0), 0.01, Schedule({"fill": ()})), "measures 'fill', which the plant does not have"),
-        (Loop(PID("pressure", "fil", 1.0), 0.01, PRESSURE), "no input 'fil'; .*Did you mean 'fill'"),
-        (Loop(VALVES, 0.01, PRESSURE, drivers={"vent": PWM(50.0)}), "no input 'vent'; there are fill, discharge"),
-        (Loop(VALVES, 0.01, PRESSURE, Schedule({"vent": ()})), "no input 'vent'"),
-        (Loop(PID("pressure", "fill", 1.0), 0.01, PRESSURE, Schedule({"discharge": ((0.05, 2.0),)})), "'discharge' is 2 before"),
-        (Loop(VALVES, 1.5, PRESSURE), r"looks every 1.5 s, and the run lasts 1 s: it would look only once"),
-        (Loop(VALVES, 1e-8, PRESSURE), r"a period of 1e-08 s makes 1e\+08 samples; 10000000 are allowed"),
+        (ControlLoop(PID("presure", "fill", 1.0), 0.01, Schedule({"presure": ()})), "measures 'presure'.*Did you mean 'pressure'"),
+        (ControlLoop(PID("fill", "fill", 1.0), 0.01, Schedule({"fill": ()})), "measures 'fill', which the plant does not have"),
+        (ControlLoop(PID("pressure", "fil", 1.0), 0.01, PRESSURE), "no input 'fil'; .*Did you mean 'fill'"),
+        (ControlLoop(VALVES, 0.01, PRESSURE, drivers={"vent": PWM(50.0)}), "no input 'vent'; there are fill, discharge"),
+        (ControlLoop(VALVES, 0.01, PRESSURE, Schedule({"vent": ()})), "no input 'vent'"),
+        (ControlLoop(PID("pressure", "fill", 1.0), 0.01, PRESSURE, Schedule({"discharge": ((0.05, 2.0),)})), "'discharge' is 2 before"),
+        (ControlLoop(VALVES, 1.5, PRESSURE), r"looks every 1.5 s, and the run lasts 1 s: it would look only once"),
+        (ControlLoop(VALVES, 1e-8, PRESSURE), r"a period of 1e-08 s makes 1e\+08 samples; 10000000 are allowed"),
     ],
 )  # fmt: skip
 def test_a_loop_that_does_not_fit_its_plant_is_refused(loop, message):
@@ -505,24 +518,28 @@ def test_a_loop_that_does_not_fit_its_plant_is_refused(loop, message):
 
 @pytest.mark.parametrize("start_time", [0.0, 0.9, 1.2])
 def test_a_memory_belongs_to_its_instant(start_time):
-    loop, plant = Loop(VALVES, 0.1, PRESSURE), lifting()
-    run = run_loop(plant, loop, duration=1.0)
+    loop, plant = ControlLoop(VALVES, 0.1, PRESSURE), lifting()
+    run = simulate_closed_loop(plant, loop, duration=1.0)
     with pytest.raises(
         ParameterError, match=r"the memory of the loop is of 1 s, and the run begins at .* Give the time"
     ):
-        run_loop(plant, loop, duration=1.0, start=run.state, start_time=start_time, memory=run.memory)
+        simulate_closed_loop(plant, loop, duration=1.0, start=run.state, start_time=start_time, memory=run.memory)
 
 
 def test_a_batch_and_an_experiment_refuse_a_loop():
     from airmuscle.identify.dynamic.experiment import Experiment
-    from airmuscle.identify.dynamic.start import Start
+    from airmuscle.identify.dynamic.initial_conditions import InitialConditions
     from airmuscle.simulation.batch import simulate_batch
 
-    loop, plant = Loop(VALVES, 0.1, PRESSURE), lifting()
+    loop, plant = ControlLoop(VALVES, 0.1, PRESSURE), lifting()
     for given in (loop, [loop, loop]):
-        with pytest.raises(ParameterError, match=r"simulate_batch: a Loop is no command known beforehand.*run_loop"):
+        with pytest.raises(
+            ParameterError, match=r"simulate_batch: a Loop is no command known beforehand.*simulate_closed_loop"
+        ):
             simulate_batch(plant, {"mechanism.mass": [9.0, 10.0]}, given, duration=1.0)
     run = simulate(plant, loop, duration=0.2)
-    with pytest.raises(ParameterError, match="the command is Loop"):
-        Experiment(run, loop, Start.at_rest(plant, 0.0))
-    assert Experiment(run, loop.replayed(run), Start.at_rest(plant, 0.0)).command == loop.replayed(run)
+    with pytest.raises(ParameterError, match="the command is ControlLoop"):
+        Experiment(run, loop, InitialConditions.at_rest(plant, 0.0))
+    assert Experiment(run, loop.as_open_loop(run), InitialConditions.at_rest(plant, 0.0)).command == loop.as_open_loop(
+        run
+    )

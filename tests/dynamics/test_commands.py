@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle import Recording, read_csv
-from airmuscle.control.inputs import Periodic, Schedule, Segments, Signal
+from airmuscle.control.inputs import Periodic, PiecewiseLinear, SampledSignal, Schedule
 from airmuscle.core.errors import ColumnError, ParameterError
 
 
 def course(command, start: float, duration: float, times: np.ndarray) -> np.ndarray:
-    segments: Segments = command.segments(("fill",), start, duration)
+    segments: PiecewiseLinear = command.segments(("fill",), start, duration)
     assert (np.diff(segments.ends, prepend=start) > 0).all()
     assert segments.ends[-1] == start + duration
     return segments.inputs_at(times, start)[:, 0]
@@ -39,13 +39,13 @@ def test_a_measured_column_is_a_command(tmp_path):
     file = tmp_path / "bench.csv"
     file.write_text("time [ms],fill [%],pressure [kPa]\n0,0,0\n100,40,20\n300,80,50\n", encoding="utf-8")
     recording = read_csv(file, units={"pressure": "kPa(g)"})
-    signal = Signal.recorded(recording, {"fill": "fill"})
-    assert signal == Signal({"fill": ((0.0, 0.0), (0.1, 0.4), (0.3, 0.8))})
+    signal = SampledSignal.recorded(recording, {"fill": "fill"})
+    assert signal == SampledSignal({"fill": ((0.0, 0.0), (0.1, 0.4), (0.3, 0.8))})
     assert course(signal, 0.0, 0.4, np.array([0.05, 0.2, 0.35])) == pytest.approx([0.2, 0.6, 0.8])
     with pytest.raises(ColumnError, match=r"bench.csv: no column 'discharge'; there are time, fill, pressure"):
-        Signal.recorded(recording, {"fill": "discharge"})
+        SampledSignal.recorded(recording, {"fill": "discharge"})
     with pytest.raises(ColumnError, match="no column 'time'"):
-        Signal.recorded(Recording({"fill": np.zeros(2)}, "a list"), {"fill": "fill"})
+        SampledSignal.recorded(Recording({"fill": np.zeros(2)}, "a list"), {"fill": "fill"})
 
 
 # Sampled
@@ -56,7 +56,7 @@ def test_a_sampled_function_is_followed_to_the_stated_error(error: float):
     def sine(t: float) -> float:
         return 0.5 + 0.4 * math.sin(2 * math.pi * 3 * t)
 
-    signal = Signal.sampled({"fill": sine}, start=0.7, duration=2.0, error=error)
+    signal = SampledSignal.sampled({"fill": sine}, start=0.7, duration=2.0, error=error)
     times = np.random.default_rng(1).uniform(0.7, 2.7, 20_000)
     away = np.abs(course(signal, 0.7, 2.0, times) - [sine(t) for t in times])
     assert away.max() <= error * 1.01, "the quarters of a line see its greatest distance but for a hundredth"
@@ -72,12 +72,12 @@ def test_a_function_that_no_lines_follow_is_refused():
         with pytest.raises(
             ParameterError, match=r"'fill' is not followed to .* points: it differs by .* as a Schedule"
         ):
-            Signal.sampled({"fill": function}, duration=1.0, error=error)
+            SampledSignal.sampled({"fill": function}, duration=1.0, error=error)
     with pytest.raises(ParameterError, match=r"'fill' is nan at 0 s; it must be finite"):
-        Signal.sampled({"fill": lambda t: math.nan}, duration=1.0)
+        SampledSignal.sampled({"fill": lambda t: math.nan}, duration=1.0)
     for wrong in ({"error": 0.0}, {"duration": 0.0}, {"duration": math.inf}):
         with pytest.raises(ParameterError, match="an error above 0 is needed, and a duration above 0"):
-            Signal.sampled({"fill": math.sin}, **{"duration": 1.0, **wrong})
+            SampledSignal.sampled({"fill": math.sin}, **{"duration": 1.0, **wrong})
 
 
 # Repeated
@@ -85,7 +85,7 @@ def test_a_function_that_no_lines_follow_is_refused():
 
 @given(st.integers(-40, 40), st.integers(1, 60))
 def test_what_is_periodic_is_the_same_a_period_later(start: int, duration: int):
-    once = Signal({"fill": ((0.0, 0.2), (0.03, 1.0), (0.05, 0.4))})
+    once = SampledSignal({"fill": ((0.0, 0.2), (0.03, 1.0), (0.05, 0.4))})
     command, begin, length = Periodic(once, 0.1), start * 0.05, duration * 0.02
     times = begin + (np.arange(50) + 0.37) * length / 50
     found = course(command, begin, length, times)

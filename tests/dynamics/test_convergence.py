@@ -12,12 +12,12 @@ import pytest
 from joints import chosen_muscle
 
 from airmuscle.characteristic import VirtualWork
-from airmuscle.control.inputs import REST, Schedule, Signal
+from airmuscle.control.inputs import ZERO_INPUT, SampledSignal, Schedule
 from airmuscle.geometry import Braid
 from airmuscle.mechanism import HangingMass
 from airmuscle.muscle import CreepElements, CubicSpring, LaggingWall, LinearDamper, Muscle
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import ClosedChamber, DistributedTube, FillDischarge, Line, Supply, Valve
+from airmuscle.pneumatics import ClosedChamber, DistributedTube, FillDischarge, Supply, Valve, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Polytropic
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
 from airmuscle.simulation.simulate import simulate
@@ -31,14 +31,14 @@ MUSCLE = Muscle(
 WAVES = Polytropic(1.3)
 SMOOTH = {
     "heat": Plant(MUSCLE, ClosedChamber(), HangingMass(20.0), HEAT),
-    "tube": Plant(MUSCLE, Line(ClosedChamber(), DistributedTube(0.5, 2e-3, 2, WAVES)), HangingMass(20.0), WAVES),
+    "tube": Plant(MUSCLE, WithTubes(ClosedChamber(), DistributedTube(0.5, 2e-3, 2, WAVES)), HangingMass(20.0), WAVES),
 }
 METHODS = [Rodas4(1e-5), RungeKutta4(2e-4), DormandPrince8(5e-4)]
 
 
 def valves_and_all():
     valve = Valve(8e-9, 0.4)
-    circuit = Line(FillDischarge(Supply(5e5), valve, valve), DistributedTube(0.5, 3e-3, 2, HEAT))
+    circuit = WithTubes(FillDischarge(Supply(5e5), valve, valve), DistributedTube(0.5, 3e-3, 2, HEAT))
     return Plant(chosen_muscle(), circuit, HangingMass(10.0), HEAT)
 
 
@@ -67,7 +67,7 @@ def test_states_at_common_instants_are_bit_for_bit_the_same(method):
 def test_the_last_state_does_not_know_how_often_it_was_looked_at():
     plant = valves_and_all()
     start = plant.state_at(pressure=1e5, position=0.005)
-    command = Signal({"fill": ((0.0, 0.0), (0.1, 1.0), (0.2, 0.0))})
+    command = SampledSignal({"fill": ((0.0, 0.0), (0.1, 1.0), (0.2, 0.0))})
     for method in METHODS:
         ends = [
             simulate(plant, command, duration=0.4, start=start, method=method, output=output) for output in (0.4, 1e-4)
@@ -82,7 +82,7 @@ def course(name, method, duration=0.32):
     """The states at 40 instants, by their nominal sizes, and the number of steps."""
     plant = SMOOTH[name]
     start = plant.state_at(pressure=3e5, position=0.025, speed=0.02)
-    run = simulate(plant, REST, duration=duration, start=start, method=method, output=duration / 40)
+    run = simulate(plant, ZERO_INPUT, duration=duration, start=start, method=method, output=duration / 40)
     steps = int(run.notes[0].split(": ")[1].split()[0])
     assert run["force"].min() > 10.0  # taut
     for flow in ("tube1.flow", "tube2.flow"):  # laminar

@@ -28,8 +28,8 @@ from airmuscle import (
     load,
     simulate,
 )
-from airmuscle.control.driver import PWM, Driven, OnOff
-from airmuscle.control.inputs import Schedule, Segments, Signal
+from airmuscle.control.driver import PWM, SolenoidDriver, WithDrivers
+from airmuscle.control.inputs import PiecewiseLinear, SampledSignal, Schedule
 from airmuscle.core.errors import ParameterError
 from airmuscle.simulation.simulate import output_times
 
@@ -40,7 +40,7 @@ END = 400
 
 ticks = st.integers(0, 30)
 switchings = st.lists(st.integers(0, END + 20), min_size=1, max_size=40, unique=True).map(sorted)
-drivers = st.builds(OnOff, *[ticks.map(lambda n: n * TICK)] * 4)
+drivers = st.builds(SolenoidDriver, *[ticks.map(lambda n: n * TICK)] * 4)
 modulators = st.builds(
     PWM, st.floats(15.0, 300.0), st.one_of(st.just(0.0), st.floats(0.0, 1e-3))
 )  # periods of 3 to 67 ms in a run of 390 ms
@@ -54,22 +54,22 @@ def alternating(instants: list[int]) -> Schedule:
     return Schedule({"fill": tuple((n * TICK, (i + 1) % 2) for i, n in enumerate(instants))})
 
 
-def polyline(points: list[tuple[int, float]]) -> Signal:
-    return Signal({"fill": tuple((n * TICK, value) for n, value in sorted(points))})
+def polyline(points: list[tuple[int, float]]) -> SampledSignal:
+    return SampledSignal({"fill": tuple((n * TICK, value) for n, value in sorted(points))})
 
 
-def fill_at(segments: Segments, times: np.ndarray) -> np.ndarray:
+def fill_at(segments: PiecewiseLinear, times: np.ndarray) -> np.ndarray:
     return segments.inputs_at(times, 0.0)[:, 1]
 
 
-def in_order(segments: Segments, end: float) -> bool:
+def in_order(segments: PiecewiseLinear, end: float) -> bool:
     return bool(np.all(np.diff(segments.ends, prepend=0.0) > 0) and segments.ends[-1] == end)
 
 
 # On and off
 
 
-def by_ticks(driver: OnOff, instants: list[int]) -> np.ndarray:
+def by_ticks(driver: SolenoidDriver, instants: list[int]) -> np.ndarray:
     """The opening at every tick, from the law in words: heading changes when the coil has held for the whole delay."""
     coil = np.array([np.searchsorted(instants, n, side="right") % 2 for n in range(END)])
     delays = [round(driver.closing_delay / TICK), round(driver.opening_delay / TICK)]
@@ -90,19 +90,19 @@ def by_ticks(driver: OnOff, instants: list[int]) -> np.ndarray:
 
 @settings(max_examples=300, deadline=None)
 @given(drivers, switchings)
-def test_on_off_does_what_its_law_says_tick_by_tick(driver: OnOff, instants: list[int]):
-    course = Driven(alternating(instants), {"fill": driver}).segments(INPUTS, 0.0, END * TICK)
+def test_on_off_does_what_its_law_says_tick_by_tick(driver: SolenoidDriver, instants: list[int]):
+    course = WithDrivers(alternating(instants), {"fill": driver}).segments(INPUTS, 0.0, END * TICK)
     assert in_order(course, END * TICK)
     assert fill_at(course, np.arange(END) * TICK) == pytest.approx(by_ticks(driver, instants), abs=1e-9)
 
 
 def test_pulses_of_the_documentation():
     """5 ms to open and 10 ms of motion, 2 ms to shut and 4 ms of motion: swallowed, in part, whole."""
-    driver = OnOff(opening_delay=5e-3, closing_delay=2e-3, opening_ramp=10e-3, closing_ramp=4e-3)
+    driver = SolenoidDriver(opening_delay=5e-3, closing_delay=2e-3, opening_ramp=10e-3, closing_ramp=4e-3)
 
     def peak(length: float) -> float:
         command = Schedule({"fill": ((0.1, 1), (0.1 + length, 0))})
-        course = Driven(command, {"fill": driver}).segments(INPUTS, 0.0, 0.3)
+        course = WithDrivers(command, {"fill": driver}).segments(INPUTS, 0.0, 0.3)
         return float(fill_at(course, np.arange(0.0, 0.3, 1e-5)).max())
 
     assert peak(5e-3 - 1e-9) == 0.0, "no longer than the opening delay: it never opens"
@@ -113,7 +113,7 @@ def test_pulses_of_the_documentation():
 def test_a_gap_no_longer_than_the_closing_delay_does_not_shut():
     command = Schedule({"fill": ((0.1, 1), (0.2, 0), (0.202, 1))})
     for delay, least in ((3e-3, 1.0), (1e-3, 0.0)):
-        course = Driven(command, {"fill": OnOff(closing_delay=delay)}).segments(INPUTS, 0.0, 0.3)
+        course = WithDrivers(command, {"fill": SolenoidDriver(closing_delay=delay)}).segments(INPUTS, 0.0, 0.3)
         assert fill_at(course, np.arange(0.15, 0.3, 1e-4)).min() == least
 
 
@@ -122,7 +122,9 @@ def test_a_gap_no_longer_than_the_closing_delay_does_not_shut():
 def test_without_delay_and_ramp_a_switch_comes_out_as_it_went_in(instants: list[int]):
     command = alternating(instants)
     times = np.arange(0.0, END * TICK, TICK / 2)
-    told, done = (c.segments(INPUTS, 0.0, END * TICK) for c in (command, Driven(command, {"fill": OnOff()})))
+    told, done = (
+        c.segments(INPUTS, 0.0, END * TICK) for c in (command, WithDrivers(command, {"fill": SolenoidDriver()}))
+    )
     assert np.array_equal(fill_at(told, times), fill_at(done, times))
 
 
@@ -130,7 +132,7 @@ def test_without_delay_and_ramp_a_switch_comes_out_as_it_went_in(instants: list[
 @given(signals)
 def test_a_coil_switches_where_the_command_crosses_a_half(points: list[tuple[int, float]]):
     signal = polyline(points)
-    course = Driven(signal, {"fill": OnOff()}).segments(INPUTS, 0.0, END * TICK)
+    course = WithDrivers(signal, {"fill": SolenoidDriver()}).segments(INPUTS, 0.0, END * TICK)
     times = np.arange(0.0, END * TICK, TICK / 3)
     told = fill_at(signal.segments(INPUTS, 0.0, END * TICK), times)
     clear = np.abs(told - 0.5) > 1e-9
@@ -144,7 +146,7 @@ def test_a_coil_switches_where_the_command_crosses_a_half(points: list[tuple[int
 @given(modulators, signals)
 def test_the_mean_of_a_period_is_the_command_at_its_beginning(driver: PWM, points: list[tuple[int, float]]):
     signal, period = polyline(points), 1 / driver.frequency
-    course = Driven(signal, {"fill": driver}).segments(INPUTS, 0.0, END * TICK)
+    course = WithDrivers(signal, {"fill": driver}).segments(INPUTS, 0.0, END * TICK)
     assert in_order(course, END * TICK)
     periods = int(END * TICK * driver.frequency * (1 - 1e-12))
     lengths = np.diff(course.ends, prepend=0.0)
@@ -160,19 +162,19 @@ def test_the_mean_of_a_period_is_the_command_at_its_beginning(driver: PWM, point
 @settings(max_examples=200, deadline=None)
 @given(modulators, signals)
 def test_no_pulse_and_no_gap_is_shorter_than_the_smallest(driver: PWM, points: list[tuple[int, float]]):
-    course = Driven(polyline(points), {"fill": driver}).segments(("fill",), 0.0, END * TICK)
+    course = WithDrivers(polyline(points), {"fill": driver}).segments(("fill",), 0.0, END * TICK)
     edges = np.append(0.0, course.ends)[np.flatnonzero(np.diff(course.values[:, 0], prepend=-1.0))]
     assert np.diff(edges).min(initial=1.0) >= driver.smallest_pulse * (1 - 1e-9)
 
 
 def test_a_duty_ratio_of_none_and_of_all_makes_no_pulses():
     for duty, driver in ((0.0, PWM(50.0)), (1.0, PWM(50.0)), (0.01, PWM(50.0, 1e-3)), (0.99, PWM(50.0, 1e-3))):
-        course = Driven(Schedule({"fill": ((0.0, duty),)}), {"fill": driver}).segments(("fill",), 0.0, 1.0)
+        course = WithDrivers(Schedule({"fill": ((0.0, duty),)}), {"fill": driver}).segments(("fill",), 0.0, 1.0)
         assert (course.ends.tolist(), course.values.tolist()) == ([1.0], [[round(duty)]])
 
 
 def test_the_carrier_begins_with_the_run():
-    command = Driven(Signal({"fill": ((0.0, 0.25),)}), {"fill": PWM(10.0)})
+    command = WithDrivers(SampledSignal({"fill": ((0.0, 0.25),)}), {"fill": PWM(10.0)})
     course = command.segments(("fill",), 3.21, 0.2)
     assert course.ends - 3.21 == pytest.approx([0.025, 0.1, 0.125, 0.2])
     assert course.values[:, 0].tolist() == [1.0, 0.0, 1.0, 0.0]
@@ -186,7 +188,7 @@ chains = st.one_of(drivers, modulators, st.tuples(modulators, drivers))
 @settings(max_examples=200, deadline=None)
 @given(chains, signals, st.lists(st.integers(1, END - 1), unique=True, max_size=8).map(sorted))
 def test_a_run_cut_anywhere_is_the_run_in_one(chain, points: list[tuple[int, float]], cuts: list[int]):
-    command, edges = Driven(polyline(points), {"fill": chain}), np.array([0, *cuts, END]) * TICK
+    command, edges = WithDrivers(polyline(points), {"fill": chain}), np.array([0, *cuts, END]) * TICK
     memory, found = command.init(0.0), []
     times = np.arange(0.5, 4 * END) * TICK / 4  # cuts and corners lie beside them
     for start, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
@@ -207,7 +209,8 @@ def test_what_is_commanded_later_changes_nothing_before(chain, points, others, n
     early = [p for p in points if p[0] <= now] or [(0, 0.3)]
     one, two = ([*early, (now, early_value(early)), *((n, v) for n, v in late if n > now)] for late in (points, others))
     courses = [
-        Driven(polyline(list(dict(p).items())), {"fill": chain}).segments(INPUTS, 0.0, END * TICK) for p in (one, two)
+        WithDrivers(polyline(list(dict(p).items())), {"fill": chain}).segments(INPUTS, 0.0, END * TICK)
+        for p in (one, two)
     ]
     times = np.arange(0.0, now * TICK, TICK / 4)
     first, second = (fill_at(course, times) for course in courses)
@@ -221,7 +224,7 @@ def early_value(points: list[tuple[int, float]]) -> float:
 @settings(max_examples=200, deadline=None)
 @given(chains, signals)
 def test_an_opening_stays_within_shut_and_open(chain, points: list[tuple[int, float]]):
-    course = Driven(polyline(points), {"fill": chain}).segments(INPUTS, 0.0, END * TICK)
+    course = WithDrivers(polyline(points), {"fill": chain}).segments(INPUTS, 0.0, END * TICK)
     assert in_order(course, END * TICK)
     last = course.values + course.slopes * np.diff(course.ends, prepend=0.0)[:, None]
     for values in (course.values, last):
@@ -244,8 +247,8 @@ def plant() -> Plant:
 def test_ten_thousand_switchings_neither_stall_nor_drift():
     """5000 pulses of either valve: bounded steps, and the pressure of the pulses is that of openings held in the mean."""
     duties = {"fill": ((0.0, 0.3),), "discharge": ((0.0, 0.4),)}
-    coils = OnOff(opening_delay=1e-3, closing_delay=1e-3)
-    command = Driven(Signal(duties), dict.fromkeys(duties, (PWM(100.0), coils)))
+    coils = SolenoidDriver(opening_delay=1e-3, closing_delay=1e-3)
+    command = WithDrivers(SampledSignal(duties), dict.fromkeys(duties, (PWM(100.0), coils)))
     run = simulate(plant(), command, duration=50.0)
     switchings = np.count_nonzero(np.diff(run["fill"])) + np.count_nonzero(np.diff(run["discharge"]))
     steps = int(run.notes[0].split(": ")[1].split(" steps")[0])
@@ -260,7 +263,7 @@ def test_the_cost_of_instants_grows_with_their_number_alone():
     """100 000 instants; anything quadratic would take minutes and 80 GB."""
     began = time.perf_counter()
     switched = Schedule({"fill": tuple((i * 1e-3, i % 2) for i in range(100_000))})
-    command = Driven(switched, {"fill": OnOff(opening_delay=1e-4, closing_delay=1e-4)})
+    command = WithDrivers(switched, {"fill": SolenoidDriver(opening_delay=1e-4, closing_delay=1e-4)})
     course = command.segments(("fill",), 0.0, 100.0)
     times = output_times(1e-3, 0.0, 100.0, course.ends)
     assert course.ends.size == 100_000
@@ -283,12 +286,21 @@ def test_rows_too_near_an_instant_give_way_to_it():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: OnOff(opening_delay=-1e-3), r"OnOff.opening_delay .* is -0.001 s; allowed are 0 to 10 s"),
-        (lambda: OnOff(closing_ramp=float("nan")), r"OnOff.closing_ramp .* must be finite"),
+        (
+            lambda: SolenoidDriver(opening_delay=-1e-3),
+            r"SolenoidDriver.opening_delay .* is -0.001 s; allowed are 0 to 10 s",
+        ),
+        (lambda: SolenoidDriver(closing_ramp=float("nan")), r"SolenoidDriver.closing_ramp .* must be finite"),
         (lambda: PWM(0.0), r"PWM.frequency .* is 0 1/s; allowed are 0.001 to"),
         (lambda: PWM(100.0, 6e-3), r"PWM.smallest_pulse is 0.006 s, more than half of the carrier's period of 0.01 s"),
-        (lambda: Driven(Schedule({}), {"fill": 3}), r"the driver of 'fill' is 3; write OnOff\(\.\.\.\), PWM"),
-        (lambda: Driven(Schedule({}), {"fill": (OnOff(), "PWM")}), r"the driver of 'fill' is 'PWM'; write OnOff"),
+        (
+            lambda: WithDrivers(Schedule({}), {"fill": 3}),
+            r"the driver of 'fill' is 3; write SolenoidDriver\(\.\.\.\), PWM",
+        ),
+        (
+            lambda: WithDrivers(Schedule({}), {"fill": (SolenoidDriver(), "PWM")}),
+            r"the driver of 'fill' is 'PWM'; write SolenoidDriver",
+        ),
     ],
 )
 def test_an_impossible_driver_is_refused(make, message: str):
@@ -297,21 +309,23 @@ def test_an_impossible_driver_is_refused(make, message: str):
 
 
 def test_a_driver_refuses_names_and_commands_it_cannot_follow():
-    told = Signal({"fill": ((0.0, 0.5), (1.0, 1.5))})
-    command = Driven(told, {"fill": PWM(10.0)})
+    told = SampledSignal({"fill": ((0.0, 0.5), (1.0, 1.5))})
+    command = WithDrivers(told, {"fill": PWM(10.0)})
     with pytest.raises(ParameterError, match=r"the driver of 'fill' is told 1.5 before 1 s; allowed are 0 to 1"):
         command.segments(INPUTS, 0.0, 1.0)
     assert command.segments(INPUTS, 0.0, 0.5).ends.size > 1, "what is not reached is not refused"
     with pytest.raises(ParameterError, match=r"no input 'fil'; there are other, fill. Did you mean 'fill'\?"):
-        replace(command, drivers={"fil": OnOff()}).segments(INPUTS, 0.0, 0.5)
-    fast = Driven(Schedule({}), {"fill": PWM(1e6)})
+        replace(command, drivers={"fil": SolenoidDriver()}).segments(INPUTS, 0.0, 0.5)
+    fast = WithDrivers(Schedule({}), {"fill": PWM(1e6)})
     with pytest.raises(ParameterError, match=r"carrier of 1e\+06 Hz has 1e\+08 periods in 100 s; 10000000 are allowed"):
         fast.segments(INPUTS, 0.0, 100.0)
 
 
 def test_the_plant_meets_every_instant_of_a_driver():
     """A ramp within a step would be smeared: the opening in the recording is the driver's, at its corners too."""
-    command = Driven(Schedule({"fill": ((0.1, 1),)}), {"fill": OnOff(opening_delay=5e-3, opening_ramp=2e-3)})
+    command = WithDrivers(
+        Schedule({"fill": ((0.1, 1),)}), {"fill": SolenoidDriver(opening_delay=5e-3, opening_ramp=2e-3)}
+    )
     run = simulate(plant(), command, duration=0.3, method=Rodas4(1e-8), output=0.1)
     assert run["time"] == pytest.approx([0.0, 0.1, 0.105, 0.107, 0.2, 0.3])
     assert run["fill"] == pytest.approx([0, 0, 0, 1, 1, 1])
@@ -324,7 +338,9 @@ def test_stepping_with_the_memory_of_the_drivers_is_the_whole_run():
     muscle = replace(load("dmsp-20-300").muscle, damper=LinearDamper(200.0))
     valve = Valve(2.6167e-9, 0.433)
     plant = Plant(muscle, FillDischarge(Supply(5e5), valve, valve), HangingMass(10.0))
-    command = Driven(Signal({"fill": ((0.0, 0.2), (0.3, 0.8))}), {"fill": (PWM(40.0), OnOff(4e-3, 6e-3, 2e-3, 1e-3))})
+    command = WithDrivers(
+        SampledSignal({"fill": ((0.0, 0.2), (0.3, 0.8))}), {"fill": (PWM(40.0), SolenoidDriver(4e-3, 6e-3, 2e-3, 1e-3))}
+    )
     state = plant.state_at(pressure=1e5)
     method = Rodas4(1e-10)
     whole = simulate(plant, command, duration=0.3, start=state, method=method, output=0.3)

@@ -11,30 +11,30 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joints import chosen_muscle
 
-from airmuscle.analysis.equilibrium import equilibria, equilibrium
+from airmuscle.analysis.equilibrium import find_equilibria, find_equilibrium
 from airmuscle.analysis.equilibrium.single_dof import grid
-from airmuscle.analysis.equilibrium.statics import Static
-from airmuscle.compile.program import prepared
-from airmuscle.control.inputs import REST, Schedule
+from airmuscle.analysis.equilibrium.statics import StaticProblem
+from airmuscle.compile.program import compile_system
+from airmuscle.control.inputs import ZERO_INPUT, Schedule
 from airmuscle.core import ops
-from airmuscle.core.errors import NoEquilibrium, OutOfReach, ParameterError
+from airmuscle.core.errors import EquilibriumError, GeometryLimitError, ParameterError
 from airmuscle.friction import Dahl
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
     Held,
-    InSeries,
     Isometric,
+    JointWithEndStops,
     Lever,
-    Mounted,
-    Prescribed,
+    MusclesInSeries,
+    PrescribedMotion,
     SpringLoad,
-    StoppedJoint,
+    WithOffsets,
 )
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, LaggingWall, SeriesSpring
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import ClosedChamber, FillDischarge, Follower, ProportionalValve, Supply, Valve
+from airmuscle.pneumatics import ClosedChamber, FillDischarge, ProportionalValve, SecondOrderLag, Supply, Valve
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.simulation.simulate import simulate
 
@@ -51,7 +51,7 @@ def joint_plant(mechanism=JOINT, gas=Polytropic(1.2)):
 
 
 def rates(plant, state):
-    found = prepared(plant).rates([state[s.name] for s in plant.states], [0.0] * len(plant.inputs))
+    found = compile_system(plant).rates([state[s.name] for s in plant.states], [0.0] * len(plant.inputs))
     return found / [s.nominal for s in plant.states]
 
 
@@ -65,9 +65,9 @@ PLANTS = {
         HangingMass(20.0),
     ),
     "lever": joint_plant(Lever((0.05, -0.05), 2.0, 0.3, 0.01, 0.1, (0.1, 0.1))),
-    "parallel": joint_plant(Mounted(HangingMass(25.0), (0.02, 0.05))),
-    "series": joint_plant(InSeries(HangingMass(20.0), (0.5,))),
-    "series on a spring": joint_plant(InSeries(SpringLoad(1.0, 3e3), (0.5,))),
+    "parallel": joint_plant(WithOffsets(HangingMass(25.0), (0.02, 0.05))),
+    "series": joint_plant(MusclesInSeries(HangingMass(20.0), (0.5,))),
+    "series on a spring": joint_plant(MusclesInSeries(SpringLoad(1.0, 3e3), (0.5,))),
     "isometric": Plant(chosen_muscle(), CIRCUIT, Isometric(0.1)),
 }
 
@@ -78,10 +78,10 @@ ALL = [(name, gas) for name in PLANTS for gas in GASES if name != "compliant" or
 @pytest.mark.parametrize(("name", "gas"), ALL, ids=str)
 def test_at_an_equilibrium_nothing_moves(name, gas):
     plant = replace(PLANTS[name], gas=gas)
-    for rest in equilibria(plant, pressure=3e5):
+    for rest in find_equilibria(plant, pressure=3e5):
         assert np.abs(rates(plant, rest.state)).max() < 1e-6
-    state = equilibrium(plant, pressure=3e5)
-    run = simulate(plant, REST, duration=1.0, start=state)
+    state = find_equilibrium(plant, pressure=3e5)
+    run = simulate(plant, ZERO_INPUT, duration=1.0, start=state)
     for c in plant.mechanism.coordinates:
         np.testing.assert_allclose(run[c.name], state[c.name], atol=1e-6 * c.nominal)
 
@@ -90,26 +90,26 @@ def test_at_an_equilibrium_nothing_moves(name, gas):
 @pytest.mark.parametrize("name", [n for n in PLANTS if n not in ("compliant", "creep and friction")])
 def test_the_air_that_a_pressure_puts_in_gives_the_same_rest(name, gas):
     plant = replace(PLANTS[name], gas=gas)
-    by_pressure = equilibrium(plant, pressure=2.5e5)
+    by_pressure = find_equilibrium(plant, pressure=2.5e5)
     air = tuple(by_pressure[f"{p}air_mass"] for p in plant.prefixes)
-    by_mass = equilibrium(plant, air_mass=air)
+    by_mass = find_equilibrium(plant, air_mass=air)
     assert by_mass == pytest.approx(by_pressure, rel=1e-7, abs=1e-9)
 
 
 def test_so_it_does_where_wall_and_series_spring_give():
     plant = Plant(COMPLIANT, CIRCUIT, Isometric(0.1))
-    state = equilibrium(plant, pressure=2.5e5)
-    assert equilibrium(plant, air_mass=state["air_mass"]) == pytest.approx(state, rel=1e-7, abs=1e-9)
+    state = find_equilibrium(plant, pressure=2.5e5)
+    assert find_equilibrium(plant, air_mass=state["air_mass"]) == pytest.approx(state, rel=1e-7, abs=1e-9)
 
 
 def test_shut_in_air_takes_up_pressure_where_the_load_stretches_the_muscle():
     plant = PLANTS["hanging"]
-    state = equilibrium(plant, pressure=3e5)
+    state = find_equilibrium(plant, pressure=3e5)
     heavier = replace(plant, mechanism=HangingMass(25.0))
-    found = equilibrium(heavier, air_mass=state["air_mass"])
+    found = find_equilibrium(heavier, air_mass=state["air_mass"])
     assert found["position"] < state["position"]
     assert heavier.outputs(found, {"fill": 0.0, "discharge": 0.0})["pressure"] > 3e5
-    at_pressure = equilibrium(heavier, pressure=3e5)
+    at_pressure = find_equilibrium(heavier, pressure=3e5)
     assert at_pressure["position"] < found["position"]
 
 
@@ -119,13 +119,13 @@ def test_shut_in_air_takes_up_pressure_where_the_load_stretches_the_muscle():
 @given(st.floats(1e5, 5e5))
 @settings(max_examples=10, deadline=None)
 def test_a_symmetric_joint_rests_at_zero(pressure):
-    assert equilibrium(joint_plant(), pressure=pressure)["angle"] == pytest.approx(0.0, abs=1e-12)
+    assert find_equilibrium(joint_plant(), pressure=pressure)["angle"] == pytest.approx(0.0, abs=1e-12)
 
 
 @given(st.floats(1e5, 5e5), st.floats(1e5, 5e5))
 @settings(max_examples=10, deadline=None)
 def test_with_its_pressures_changed_over_it_rests_on_the_other_side(one, other):
-    forward, back = (equilibrium(joint_plant(), pressure=p)["angle"] for p in ((one, other), (other, one)))
+    forward, back = (find_equilibrium(joint_plant(), pressure=p)["angle"] for p in ((one, other), (other, one)))
     assert forward == pytest.approx(-back, abs=1e-9)
     assert np.sign(round(forward, 9)) == np.sign(round(one - other, 3)) or abs(one - other) < 1.0
 
@@ -134,16 +134,16 @@ def test_with_its_pressures_changed_over_it_rests_on_the_other_side(one, other):
 
 
 def test_two_equal_muscles_in_parallel_carry_twice_the_load():
-    alone = equilibrium(Plant(LEFT, ClosedChamber(), HangingMass(10.0)), pressure=3e5)
-    both = equilibrium(joint_plant(HangingMass(20.0)), pressure=3e5)
+    alone = find_equilibrium(Plant(LEFT, ClosedChamber(), HangingMass(10.0)), pressure=3e5)
+    both = find_equilibrium(joint_plant(HangingMass(20.0)), pressure=3e5)
     assert both["position"] == pytest.approx(alone["position"], rel=1e-12)
 
 
 def test_muscles_in_series_carry_the_same_load_over_the_sum_of_their_ways():
-    single = equilibrium(Plant(LEFT, ClosedChamber(), HangingMass(10.0)), pressure=3e5)["position"]
-    weak = equilibrium(Plant(LEFT, ClosedChamber(), HangingMass(10.0)), pressure=2e5)["position"]
-    chain = joint_plant(InSeries(HangingMass(10.0), (0.5,), gravity=0.0))
-    found = equilibrium(chain, pressure=(3e5, 2e5))
+    single = find_equilibrium(Plant(LEFT, ClosedChamber(), HangingMass(10.0)), pressure=3e5)["position"]
+    weak = find_equilibrium(Plant(LEFT, ClosedChamber(), HangingMass(10.0)), pressure=2e5)["position"]
+    chain = joint_plant(MusclesInSeries(HangingMass(10.0), (0.5,), gravity=0.0))
+    found = find_equilibrium(chain, pressure=(3e5, 2e5))
     assert found["node1.position"] == pytest.approx(single, rel=1e-9)
     assert found["position"] == pytest.approx(single + weak, rel=1e-9)
 
@@ -156,7 +156,7 @@ def test_muscles_in_series_carry_the_same_load_over_the_sum_of_their_ways():
 @settings(max_examples=10, deadline=None)
 def test_a_pair_of_rests_is_found_however_close(half, middle):
     plant = Plant(chosen_muscle(), ClosedChamber(), Bumpy(middle, half))
-    found = equilibria(plant, pressure=1e5)
+    found = find_equilibria(plant, pressure=1e5)
     assert [r.state["position"] for r in found] == pytest.approx([middle - half, middle + half], abs=1e-10)
     assert [r.stable for r in found] == [True, False]
 
@@ -166,7 +166,7 @@ def test_no_pair_is_made_up_where_the_force_only_comes_near_zero():
         def acceleration(self, q, v, pulls, inputs):
             return {"position": (q["position"] - self.middle) ** 2 + self.half**2}
 
-    assert equilibria(Plant(chosen_muscle(), ClosedChamber(), Above(0.02, 1e-4)), pressure=1e5) == ()
+    assert find_equilibria(Plant(chosen_muscle(), ClosedChamber(), Above(0.02, 1e-4)), pressure=1e5) == ()
 
 
 def test_a_rest_that_is_one_of_the_places_looked_at_is_found_once():
@@ -175,8 +175,8 @@ def test_a_rest_that_is_one_of_the_places_looked_at_is_found_once():
             return {"position": self.middle - q["position"]}
 
     plant = Plant(chosen_muscle(), ClosedChamber(), Towards(0.0, 0.0))
-    place = float(grid(Static(plant, 1e5, None))[37])
-    found = equilibria(replace(plant, mechanism=Towards(place, 0.0)), pressure=1e5)
+    place = float(grid(StaticProblem(plant, 1e5, None))[37])
+    found = find_equilibria(replace(plant, mechanism=Towards(place, 0.0)), pressure=1e5)
     assert [r.state["position"] for r in found] == [place]
 
 
@@ -187,9 +187,9 @@ def test_of_a_stretch_in_balance_the_ends_are_given():
             return {"position": ops.maximum(-self.half - x, 0.0) - ops.maximum(x - self.half, 0.0)}
 
     plant = Plant(chosen_muscle(), ClosedChamber(), Flat(0.02, 0.015))
-    found = [r.state["position"] for r in equilibria(plant, pressure=1e5)]
-    assert found == pytest.approx([0.005, 0.035], abs=np.diff(grid(Static(plant, 1e5, None)))[0])
-    assert equilibrium(plant, pressure=1e5)["position"] == found[0]
+    found = [r.state["position"] for r in find_equilibria(plant, pressure=1e5)]
+    assert found == pytest.approx([0.005, 0.035], abs=np.diff(grid(StaticProblem(plant, 1e5, None)))[0])
+    assert find_equilibrium(plant, pressure=1e5)["position"] == found[0]
 
 
 STANDING = replace(JOINT, weight_torque=-25.0)
@@ -198,13 +198,13 @@ STANDING = replace(JOINT, weight_torque=-25.0)
 
 def test_a_joint_may_stand_with_shut_valves_that_falls_at_constant_pressure():
     plant = joint_plant(STANDING)
-    (at_pressure,) = (r for r in equilibria(plant, pressure=2e5) if abs(r.state["angle"]) < 1e-9)
+    (at_pressure,) = (r for r in find_equilibria(plant, pressure=2e5) if abs(r.state["angle"]) < 1e-9)
     air = tuple(at_pressure.state[f"{name}.air_mass"] for name in ("left", "right"))
-    (shut,) = (r for r in equilibria(plant, air_mass=air) if abs(r.state["angle"]) < 1e-9)
+    (shut,) = (r for r in find_equilibria(plant, air_mass=air) if abs(r.state["angle"]) < 1e-9)
     assert (at_pressure.stable, shut.stable) == (False, True)
 
     pushed = {**shut.state, "angle": 0.01}
-    stands = simulate(plant, REST, duration=10.0, start=pushed)
+    stands = simulate(plant, ZERO_INPUT, duration=10.0, start=pushed)
     assert abs(stands["angle"][-1]) < 1e-3
 
     wide = FillDischarge(Supply(2e5), Valve(1e-6, 0.433), Valve(1e-6, 0.433))
@@ -214,47 +214,49 @@ def test_a_joint_may_stand_with_shut_valves_that_falls_at_constant_pressure():
 
 
 def test_between_stops_a_joint_that_falls_has_three_rests():
-    stopped = StoppedJoint(replace(JOINT, weight_torque=-60.0), -0.4, 0.4, 0.05, HuntCrossley(1e8))
-    found = equilibria(joint_plant(stopped), pressure=2e5)
+    stopped = JointWithEndStops(replace(JOINT, weight_torque=-60.0), -0.4, 0.4, 0.05, HuntCrossley(1e8))
+    found = find_equilibria(joint_plant(stopped), pressure=2e5)
     assert [r.stable for r in found] == [True, False, True]
     assert [r.state["angle"] for r in found] == pytest.approx([-0.4, 0.0, 0.4], abs=0.01)
     assert found[0].state["angle"] == pytest.approx(-found[2].state["angle"], abs=1e-9)
 
 
 def test_of_two_stable_rests_the_one_nearer_to_full_length_is_taken():
-    stopped = StoppedJoint(replace(JOINT, weight_torque=-60.0), -0.4, 0.2, 0.05, HuntCrossley(1e8))
-    assert [r.stable for r in equilibria(joint_plant(stopped), pressure=2e5)] == [True, False, True]
-    assert equilibrium(joint_plant(stopped), pressure=2e5)["angle"] == pytest.approx(0.2, abs=0.01)
+    stopped = JointWithEndStops(replace(JOINT, weight_torque=-60.0), -0.4, 0.2, 0.05, HuntCrossley(1e8))
+    assert [r.stable for r in find_equilibria(joint_plant(stopped), pressure=2e5)] == [True, False, True]
+    assert find_equilibrium(joint_plant(stopped), pressure=2e5)["angle"] == pytest.approx(0.2, abs=0.01)
 
 
 # What is said where there is none
 
 
 def test_the_failure_names_the_muscles_and_what_they_pull():
-    with pytest.raises(NoEquilibrium, match=r"left pulls [\d.]+ N at 200 kPa .*right pulls .* at 200 kPa.*rad/s2"):
-        equilibrium(joint_plant(replace(JOINT, weight_torque=-60.0)), pressure=2e5)
+    with pytest.raises(EquilibriumError, match=r"left pulls [\d.]+ N at 200 kPa .*right pulls .* at 200 kPa.*rad/s2"):
+        find_equilibrium(joint_plant(replace(JOINT, weight_torque=-60.0)), pressure=2e5)
     with pytest.raises(
-        NoEquilibrium, match=r"InSeries finds no rest: left pulls .*node1.position at .* m/s2, position at"
+        EquilibriumError, match=r"MusclesInSeries finds no rest: left pulls .*node1.position at .* m/s2, position at"
     ):
-        equilibrium(joint_plant(InSeries(HangingMass(900.0), (0.5,))), pressure=2e5)
+        find_equilibrium(joint_plant(MusclesInSeries(HangingMass(900.0), (0.5,))), pressure=2e5)
 
 
 def test_what_rests_anywhere_is_said_to():
-    for mechanism in (Prescribed(), Held(HangingMass(5.0))):
+    for mechanism in (PrescribedMotion(), Held(HangingMass(5.0))):
         plant = Plant(chosen_muscle(), ClosedChamber(), mechanism)
         inputs = {"held": 1.0} if plant.inputs == ("held",) else None
-        with pytest.raises(NoEquilibrium, match=r"rests wherever it is.*plant.state_at\(pressure=..., position=...\)"):
-            equilibrium(plant, pressure=1e5, inputs=inputs)
+        with pytest.raises(
+            EquilibriumError, match=r"rests wherever it is.*plant.state_at\(pressure=..., position=...\)"
+        ):
+            find_equilibrium(plant, pressure=1e5, inputs=inputs)
 
 
 def test_a_joint_whose_muscles_cannot_both_be_mounted_is_refused():
-    with pytest.raises(OutOfReach, match="no place that left, right can all take"):
-        equilibrium(joint_plant(Mounted(replace(JOINT), (-0.6 + 0.12, -0.6 + 0.12))), pressure=1e5)
+    with pytest.raises(GeometryLimitError, match="no place that left, right can all take"):
+        find_equilibrium(joint_plant(WithOffsets(replace(JOINT), (-0.6 + 0.12, -0.6 + 0.12))), pressure=1e5)
 
 
 def test_air_that_no_pressure_holds_names_the_muscle():
-    with pytest.raises(NoEquilibrium, match=r"muscle cannot hold 10 kg of air at a contraction of 10.0%"):
-        equilibrium(PLANTS["isometric"], air_mass=10.0)
+    with pytest.raises(EquilibriumError, match=r"muscle cannot hold 10 kg of air at a contraction of 10.0%"):
+        find_equilibrium(PLANTS["isometric"], air_mass=10.0)
 
 
 @pytest.mark.parametrize(
@@ -272,7 +274,7 @@ def test_air_that_no_pressure_holds_names_the_muscle():
 )
 def test_bad_input_is_refused(given_air, message):
     with pytest.raises(ParameterError, match=message):
-        equilibrium(joint_plant(), **given_air)
+        find_equilibrium(joint_plant(), **given_air)
 
 
 def test_a_state_at_three_pressures_of_two_muscles_is_refused():
@@ -281,6 +283,6 @@ def test_a_state_at_three_pressures_of_two_muscles_is_refused():
 
 
 def test_an_input_beyond_its_range_is_refused():
-    valve = ProportionalValve(Supply(6e5), VALVE, VALVE, Follower(80.0), muscles=2)
+    valve = ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(80.0), muscles=2)
     with pytest.raises(ParameterError, match=r"the input 'command' is 2; allowed are -1 to 1"):
-        equilibrium(Plant((LEFT, RIGHT), valve, JOINT), pressure=1e5, inputs={"command": 2.0})
+        find_equilibrium(Plant((LEFT, RIGHT), valve, JOINT), pressure=1e5, inputs={"command": 2.0})

@@ -11,30 +11,30 @@ from bumpy import Bumpy
 from joints import chosen_muscle
 from plants import BRAID, EXAMPLES, TWO_VALVES, of, pulled
 
-from airmuscle.analysis.equilibrium import equilibria, equilibrium, equilibrium_of_each
+from airmuscle.analysis.equilibrium import find_equilibria, find_equilibrium, find_equilibrium_of_each
 from airmuscle.analysis.equilibrium.grid import grids
 from airmuscle.analysis.equilibrium.single_dof import grid
-from airmuscle.analysis.equilibrium.statics import Static
+from airmuscle.analysis.equilibrium.statics import StaticProblem
 from airmuscle.analysis.equilibrium.vectorised import SideBySide
 from airmuscle.characteristic import MartensBoblan2017, VirtualWork
-from airmuscle.compile.program import prepared
-from airmuscle.control.inputs import REST
+from airmuscle.compile.program import compile_system
+from airmuscle.control.inputs import ZERO_INPUT
 from airmuscle.core import ops, tree
-from airmuscle.core.errors import AirmuscleError, NoEquilibrium, ParameterError
+from airmuscle.core.errors import AirmuscleError, EquilibriumError, ParameterError
 from airmuscle.geometry import Braid
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
-    InSeries,
     Isometric,
+    JointWithEndStops,
     Lever,
+    MusclesInSeries,
     SpringLoad,
-    StoppedJoint,
 )
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import LaggingWall, LinearSpring, SeriesSpring
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import ClosedChamber, FillDischarge, Line, ProportionalRegulator, Supply, Tube, Valve
+from airmuscle.pneumatics import ClosedChamber, FillDischarge, ProportionalRegulator, Supply, Tube, Valve, WithTubes
 from airmuscle.pneumatics.gas import Ambient, Polytropic
 from airmuscle.simulation.batch import simulate_batch
 from airmuscle.simulation.integrators import RungeKutta4
@@ -44,7 +44,7 @@ FAST = RungeKutta4(1e-3)
 JOINT = pulled(AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12), 2)
 OTHERS = {
     "a joint that falls to a stop on either side": pulled(
-        StoppedJoint(AntagonisticJoint(0.03, 0.05, 0.2, -60.0, 0.12), -0.4, 0.2, 0.05, HuntCrossley(1e8)), 2
+        JointWithEndStops(AntagonisticJoint(0.03, 0.05, 0.2, -60.0, 0.12), -0.4, 0.2, 0.05, HuntCrossley(1e8)), 2
     ),
     "two muscles on a lever": pulled(Lever((0.05, -0.05), 2.0, 0.3, 0.01, 0.1, (0.1, 0.1)), 2),
     "series springs on a joint": Plant(
@@ -77,16 +77,16 @@ def varied(plant, count):
 def found(plant, parameters, pressure, inputs=None):
     pressures = pressure if isinstance(pressure, tuple) else (pressure,) * len(plant.muscles)
     given_inputs = np.zeros(len(plant.inputs)) if inputs is None else inputs
-    return equilibrium_of_each(prepared(plant), parameters, pressures, given_inputs)
+    return find_equilibrium_of_each(compile_system(plant), parameters, pressures, given_inputs)
 
 
 def one_by_one(plant, pressure):
     """The stable rest nearest to full length among all that are found of one plant alone; none if it has none."""
     try:
-        stable = [rest.state for rest in equilibria(plant, pressure=pressure) if rest.stable]
+        stable = [rest.state for rest in find_equilibria(plant, pressure=pressure) if rest.stable]
     except AirmuscleError:
         return None
-    return min(stable, key=Static(plant, pressure, None).contracted) if stable else None
+    return min(stable, key=StaticProblem(plant, pressure, None).contracted) if stable else None
 
 
 def as_alone(plant, parameters, pressure):
@@ -127,7 +127,7 @@ def test_of_several_rests_each_takes_its_own():
     plant = OTHERS["a joint that falls to a stop on either side"]
     paths = [leaf.path for leaf in tree.leaves(plant)]
     table = np.repeat(tree.flatten(plant)[None, :], 3, axis=0)
-    ends = ("mechanism.least", "mechanism.greatest")
+    ends = ("mechanism.lower_stop", "mechanism.upper_stop")
     table[1, [paths.index(end) for end in ends]] = -0.2, 0.4
     table[2, [paths.index(end) for end in ends]] = -0.4, 0.39
     angle = [s.name for s in plant.states].index("angle")
@@ -154,7 +154,7 @@ def test_neighbours_do_not_matter_to_the_last_digit(name):
     together = found(plant, table, 2e5).states
     for i, row in enumerate(table):
         np.testing.assert_array_equal(found(plant, row[None, :], 2e5).states[0], together[i])
-        alone = equilibrium(tree.with_parameters(plant, row.tolist()), pressure=2e5)
+        alone = find_equilibrium(tree.with_parameters(plant, row.tolist()), pressure=2e5)
         assert list(alone.values()) == together[i].tolist()
     np.testing.assert_array_equal(found(plant, table[3:7], 2e5).states, together[3:7])
 
@@ -213,9 +213,9 @@ def test_a_pole_is_no_rest():
     """A law whose braid straightens within the muscle's reach passes from one sign to the other through infinity."""
     law = MartensBoblan2017(Braid(0.0103, 0.39, 0.3), 0.0019, 9.4e7, -7.4e8, 1.6e9, -4.9e8)
     plant = of(law, Braid(0.01, 0.4363, 0.2), spring=LinearSpring(3000.0))
-    rests = equilibria(plant, pressure=1e5)
+    rests = find_equilibria(plant, pressure=1e5)
     assert rests
-    ready = prepared(plant)
+    ready = compile_system(plant)
     for rest in rests:
         assert np.abs(ready.rates(list(rest.state.values()), [0.0, 0.0])).max() < 1e-6
     assert as_alone(plant, varied(plant, 3), 1e5)[1].searched.all()
@@ -226,10 +226,10 @@ def test_they_are_looked_at_in_the_same_places(name):
     """Ends of the reach and all, whether contractions are straight lines over the coordinate or not."""
     plant = PLANTS[name]
     table = varied(plant, 4)
-    ready = prepared(plant)
+    ready = compile_system(plant)
     each = SideBySide.of_plants(ready, table, (0.0,) * len(plant.muscles), np.zeros(len(plant.inputs)))
     for row, x in zip(table, grids(each), strict=True):
-        alone = grid(Static(tree.with_parameters(plant, row.tolist()), 0.0, None))
+        alone = grid(StaticProblem(tree.with_parameters(plant, row.tolist()), 0.0, None))
         np.testing.assert_allclose(x[np.isfinite(x)], alone, rtol=0.0, atol=1e-15)
 
 
@@ -237,14 +237,14 @@ def test_they_are_looked_at_in_the_same_places(name):
 
 
 def test_several_coordinates_are_asked_alone():
-    plant = pulled(InSeries(HangingMass(10.0), (0.5,)), 2)
+    plant = pulled(MusclesInSeries(HangingMass(10.0), (0.5,)), 2)
     of_each = found(plant, varied(plant, 2), 3e5)
     assert not of_each.searched.any()
     assert np.isnan(of_each.states).all()
-    batch = simulate_batch(pulled(InSeries(HangingMass(1.0), (0.05,)), 2), {"mechanism.inner.mass": [1.0, 1.1]}, REST,
+    batch = simulate_batch(pulled(MusclesInSeries(HangingMass(1.0), (0.05,)), 2), {"mechanism.inner.mass": [1.0, 1.1]}, ZERO_INPUT,
                            duration=2e-3, method=FAST)  # fmt: skip
     for i in range(2):
-        alone = equilibrium(batch.plant(i), pressure=0.0)
+        alone = find_equilibrium(batch.plant(i), pressure=0.0)
         np.testing.assert_allclose(batch["position"][i, 0], alone["position"], rtol=1e-12)
 
 
@@ -260,7 +260,7 @@ def test_a_law_that_takes_no_arrays_is_asked_alone():
     assert not found(plant, table, 2e5).searched.any()
     usual = found(pulled(SpringLoad(5.0, 2000.0, 1.0, 50.0)), table, 2e5).states
     for row, state in zip(table, usual, strict=True):
-        alone = equilibrium(tree.with_parameters(plant, row.tolist()), pressure=2e5)
+        alone = find_equilibrium(tree.with_parameters(plant, row.tolist()), pressure=2e5)
         np.testing.assert_allclose(list(alone.values()), state, rtol=1e-11, atol=1e-15)
 
 
@@ -278,7 +278,7 @@ def test_a_plant_beyond_its_reach_or_in_a_vacuum_is_asked_alone_and_its_neighbou
         assert of_each.searched.tolist() == [False, True]
         assert np.isnan(of_each.states[0]).all()
         with pytest.raises(ParameterError, match="below absolute zero"):
-            equilibrium(replace(one, ambient=Ambient(5e4)), pressure=-6e4)
+            find_equilibrium(replace(one, ambient=Ambient(5e4)), pressure=-6e4)
 
 
 def test_an_input_that_one_of_them_refuses_is_asked_alone():
@@ -288,7 +288,7 @@ def test_an_input_that_one_of_them_refuses_is_asked_alone():
     plant = Plant(chosen_muscle(), regulator, Isometric(0.05))
     paths = [leaf.path for leaf in tree.leaves(plant)]
     table = np.repeat(tree.flatten(plant)[None, :], 2, axis=0)
-    table[0, paths.index("circuit.greatest")] = 1e5
+    table[0, paths.index("circuit.max_setpoint")] = 1e5
     assert found(plant, table, 1e5, np.array([2e5])).searched.tolist() == [False, True]
 
 
@@ -297,7 +297,7 @@ def test_an_input_that_one_of_them_refuses_is_asked_alone():
 
 def starts_of(plant, variations):
     """Where the plants of a batch begin, by state (N,), and why some do not."""
-    batch = simulate_batch(plant, variations, REST, duration=1e-3, method=FAST)
+    batch = simulate_batch(plant, variations, ZERO_INPUT, duration=1e-3, method=FAST)
     return {s.name: batch[s.name][:, 0] for s in plant.states}, batch
 
 
@@ -308,16 +308,16 @@ def test_a_batch_begins_at_rest_and_says_of_each_that_has_none_what_is_said_alon
     for i, mass in enumerate(masses):
         alone = replace(plant, mechanism=HangingMass(mass))
         if mass < 100.0:
-            assert {name: column[i] for name, column in start.items()} == equilibrium(alone, pressure=0.0)
+            assert {name: column[i] for name, column in start.items()} == find_equilibrium(alone, pressure=0.0)
         else:
-            with pytest.raises(NoEquilibrium) as said:
-                equilibrium(alone, pressure=0.0)
+            with pytest.raises(EquilibriumError) as said:
+                find_equilibrium(alone, pressure=0.0)
             assert batch.reason(i) == f"it has no equilibrium to start from: {said.value}"
 
 
 def test_what_a_circuit_holds_at_rest_is_its_own():
     """A tube twice as large holds twice the air: plants that differ in it alone do not share their start."""
-    plant = Plant(chosen_muscle(), Line(TWO_VALVES, Tube(Valve(1e-8, 0.3), 1e-5)), HangingMass(1.0))
+    plant = Plant(chosen_muscle(), WithTubes(TWO_VALVES, Tube(Valve(1e-8, 0.3), 1e-5)), HangingMass(1.0))
     start, _ = starts_of(plant, {"circuit.tube.volume": [1e-5, 2e-5]})
     (name,) = [n for n in start if "tube" in n]
     assert start[name][1] == pytest.approx(2.0 * start[name][0], rel=1e-12)
@@ -330,7 +330,7 @@ def test_the_example_of_the_batch_begins_where_it_rests():
     table = varied(replace(plant, mechanism=HangingMass(3.0)), 200)
     of_each = found(plant, table, 0.0)
     assert of_each.searched.all()
-    rates = [prepared(tree.with_parameters(plant, row.tolist())).rates(state, [0.0, 0.0])
+    rates = [compile_system(tree.with_parameters(plant, row.tolist())).rates(state, [0.0, 0.0])
              for row, state in zip(table[::20], of_each.states[::20], strict=True)]  # fmt: skip
     assert np.abs(np.array(rates)[:, 1:]).max() < 1e-9
 

@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.analysis.linearise import linearise
-from airmuscle.analysis.stiffness import stiffness
-from airmuscle.compile.program import prepared
-from airmuscle.control.inputs import Schedule, Segments
+from airmuscle.analysis.linear_model import linearise
+from airmuscle.analysis.static_stiffness import stiffness
+from airmuscle.compile.program import compile_system
+from airmuscle.control.inputs import PiecewiseLinear, Schedule
 from airmuscle.core.errors import AirmuscleError, SimulationError
-from airmuscle.mechanism import HangingMass, Held, InSeries, Stopped
+from airmuscle.mechanism import HangingMass, Held, MusclesInSeries, WithEndStops
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import LinearDamper, SeriesSpring
 from airmuscle.plant.plant import Plant
 from airmuscle.plant.state import state_vector
-from airmuscle.pneumatics import FillDischarge, Leaking, Line, Manifold, Shared, Supply, Tube, Valve
+from airmuscle.pneumatics import FillDischarge, Manifold, SharedSupply, Supply, Tube, Valve, WithLeak, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.simulation.batch import simulate_batch
 from airmuscle.simulation.integrators import LESS_THAN_NONE, TOO_MANY, Rodas4, RungeKutta4
-from airmuscle.simulation.result import outside_box
+from airmuscle.simulation.result import extrapolation_warnings
 from airmuscle.simulation.simulate import advance, simulate
 
 HUGE = Valve(9e-6, 0.3)
@@ -47,7 +47,9 @@ def test_a_fixed_step_that_is_too_long_is_not_called_a_result():
     assert "not finite" in kept.notes[-1]
 
 
-@pytest.mark.parametrize("mechanism", [HangingMass(60.0), InSeries(HangingMass(50.0), (0.3,))], ids=["one", "two"])
+@pytest.mark.parametrize(
+    "mechanism", [HangingMass(60.0), MusclesInSeries(HangingMass(50.0), (0.3,))], ids=["one", "two"]
+)
 @pytest.mark.parametrize("gas", [Isothermal(), Polytropic(1.2), EnergyBalance(0.2)], ids=repr)
 def test_a_load_that_tears_a_muscle_out_of_its_reach_is_named_as_the_cause(mechanism, gas):
     """A braid stretched until its threads lie along it encloses nothing; a stop is what keeps a load from doing so."""
@@ -58,7 +60,7 @@ def test_a_load_that_tears_a_muscle_out_of_its_reach_is_named_as_the_cause(mecha
         simulate(plant, empty, duration=2.0, start=plant.state_at(pressure=0.0))
     assert len(caught.value.recording) > 1
     if len(muscles) == 1:
-        held = replace(plant, mechanism=Stopped(mechanism, -0.015, 0.05, HuntCrossley(1e8)))
+        held = replace(plant, mechanism=WithEndStops(mechanism, -0.015, 0.05, HuntCrossley(1e8)))
         assert simulate(held, empty, duration=2.0, start=held.state_at(pressure=0.0))["time"][-1] == 2.0
 
 
@@ -85,7 +87,7 @@ def test_isothermal_air_of_negative_mass_has_a_pressure_and_yet_ends_the_run():
 
 
 STATE = isothermal().state_at(pressure=1e5, position=0.01)
-REACH = chosen_muscle().geometry.contraction_reach
+REACH = chosen_muscle().geometry.contraction_range
 
 
 @pytest.mark.parametrize(
@@ -113,7 +115,9 @@ def test_a_state_that_cannot_be_is_refused_wherever_one_is_given(state, message)
 
 def pieces(ends, values, slopes=None):
     values = np.array(values, dtype=float)
-    return Segments(np.array(ends, dtype=float), values, np.zeros_like(values) if slopes is None else np.array(slopes))
+    return PiecewiseLinear(
+        np.array(ends, dtype=float), values, np.zeros_like(values) if slopes is None else np.array(slopes)
+    )
 
 
 @pytest.mark.parametrize(
@@ -184,13 +188,19 @@ def test_a_batch_has_no_more_plants_than_it_has():
 
 PARTS = [
     (lambda: FillDischarge(Supply(5e5), 3, VALVE), "FillDischarge: its fill must be of Orifice; it is 3"),
-    (lambda: FillDischarge(5e5, VALVE, VALVE), "its supply must be of Source; it is 500000"),
-    (lambda: Line(FillDischarge(Supply(5e5), VALVE, VALVE), VALVE), "Line: its tube must be of Conduit"),
-    (lambda: Line(FillDischarge(Supply(5e5), VALVE, VALVE), Tube(VALVE, 1e-6, 1, "air")), "its gas must be of Gas"),
-    (lambda: Leaking(None, VALVE), "Leaking: its circuit must be of Circuit; it is None"),
+    (lambda: FillDischarge(5e5, VALVE, VALVE), "its supply must be of AirSource; it is 500000"),
+    (lambda: WithTubes(FillDischarge(Supply(5e5), VALVE, VALVE), VALVE), "WithTubes: its tube must be of TubeModel"),
+    (
+        lambda: WithTubes(FillDischarge(Supply(5e5), VALVE, VALVE), Tube(VALVE, 1e-6, 1, "air")),
+        "its gas must be of Gas",
+    ),
+    (lambda: WithLeak(None, VALVE), "WithLeak: its circuit must be of Circuit; it is None"),
     (lambda: Manifold(Supply(5e5), (3,), ("a",)), "its branches must be a tuple of Circuit"),
-    (lambda: Manifold(Supply(5e5), FillDischarge(Shared(), VALVE, VALVE), ("a",)), "must be a tuple of Circuit"),
-    (lambda: Manifold(Supply(5e5), (FillDischarge(Shared(), VALVE, VALVE),), (1,)), "names must be a tuple of str"),
+    (lambda: Manifold(Supply(5e5), FillDischarge(SharedSupply(), VALVE, VALVE), ("a",)), "must be a tuple of Circuit"),
+    (
+        lambda: Manifold(Supply(5e5), (FillDischarge(SharedSupply(), VALVE, VALVE),), (1,)),
+        "names must be a tuple of str",
+    ),
 ]
 
 
@@ -204,9 +214,9 @@ def test_a_part_of_another_kind_is_named(make, message):
     ("make", "message"),
     [
         (lambda: Held(3), "Held: its inner must be of Mechanism; it is 3"),
-        (lambda: InSeries(3, (1.0,)), "InSeries: its inner must be of Mechanism"),
-        (lambda: Stopped(3, 0.0, 0.1, HuntCrossley(1e9)), "Stopped: its inner must be of Mechanism"),
-        (lambda: Stopped(HangingMass(1.0), 0.0, 0.1, 3), "Stopped: its contact must be of HuntCrossley"),
+        (lambda: MusclesInSeries(3, (1.0,)), "MusclesInSeries: its inner must be of Mechanism"),
+        (lambda: WithEndStops(3, 0.0, 0.1, HuntCrossley(1e9)), "WithEndStops: its inner must be of Mechanism"),
+        (lambda: WithEndStops(HangingMass(1.0), 0.0, 0.1, 3), "WithEndStops: its contact must be of HuntCrossley"),
     ],
 )
 def test_a_part_of_a_mechanism_is_one(make, message):
@@ -216,7 +226,7 @@ def test_a_part_of_a_mechanism_is_one(make, message):
 
 def test_the_response_at_a_pole_is_infinite():
     with pytest.raises(AirmuscleError, match="there is a pole at 0 Hz"):
-        linearise(isothermal(), {**STATE, "speed": 0.0}).response([0.0])
+        linearise(isothermal(), {**STATE, "speed": 0.0}).frequency_response([0.0])
 
 
 def test_a_run_says_where_no_muscle_can_be():
@@ -228,10 +238,12 @@ def test_a_run_says_where_no_muscle_can_be():
     assert (caught.value.recording["volume"] > 0).all()
     assert 1 < len(caught.value.recording) < 101
     columns = {"time": np.array([0.0, 1.0]), "pressure": np.zeros(2), "contraction": np.array([0.0, -0.2])}
-    (note,) = [note for note in outside_box(plant, columns) if "was beyond the reach of its geometry in" in note]
+    (note,) = [
+        note for note in extrapolation_warnings(plant, columns) if "was beyond the reach of its geometry in" in note
+    ]
     assert note.endswith("by at most 9.664 % at 1 s; no muscle can do this")
     series = replace(plant, muscle=replace(plant.muscle, damper=LinearDamper(50.0), series=SeriesSpring(3e4)))
-    (note,) = outside_box(series, columns | {"inner_contraction": np.array([-0.2, 0.0])})
+    (note,) = extrapolation_warnings(series, columns | {"inner_contraction": np.array([-0.2, 0.0])})
     assert "in inner_contraction" in note
     calm = simulate(plant, Schedule({}), duration=0.1, start=STATE)
     assert not [note for note in calm.notes if "reach" in note]
@@ -242,9 +254,9 @@ def test_no_more_steps_are_taken_than_allowed(method):
     plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), HangingMass(10.0))
     start = state_vector(plant, plant.state_at(pressure=1e5))
     segments, times = FILL.segments(plant.inputs, 0.0, 1.0), np.linspace(0.0, 1.0, 11)
-    whole = method.run(prepared(plant), segments, 0.0, start, times)
+    whole = method.run(compile_system(plant), segments, 0.0, start, times)
     assert whole.status == 0
-    left = method.run(prepared(plant), segments, 0.0, start, times, whole.steps - 1)
+    left = method.run(compile_system(plant), segments, 0.0, start, times, whole.steps - 1)
     assert (left.status, left.steps) == (TOO_MANY, whole.steps - 1)
-    enough = method.run(prepared(plant), segments, 0.0, start, times, whole.steps)
+    enough = method.run(compile_system(plant), segments, 0.0, start, times, whole.steps)
     np.testing.assert_array_equal(enough.rows, whole.rows)

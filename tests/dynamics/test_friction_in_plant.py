@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.analysis.equilibrium import equilibrium
-from airmuscle.compile.functions import traced
+from airmuscle.analysis.equilibrium import find_equilibrium
+from airmuscle.compile.functions import trace_system
 from airmuscle.control.inputs import Schedule
+from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import ParameterError
-from airmuscle.core.model import model, parameter
 from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
 from airmuscle.mechanism import HangingMass
 from airmuscle.mechanism.base import Coordinate, Mechanism
-from airmuscle.plant.energy_balance import Metered
+from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4
@@ -50,7 +50,7 @@ def plant_with(friction):
 def loops_of(friction, duration=9.0, output=2e-3, method=None):
     """Fill, discharge and fill again, from rest at 150 kPa."""
     plant = plant_with(friction)
-    start = equilibrium(plant, pressure=1.5e5)
+    start = find_equilibrium(plant, pressure=1.5e5)
     return simulate(plant, LOOPS, duration=duration, start=start, output=output, method=method or Rodas4(1e-7))
 
 
@@ -76,12 +76,12 @@ def test_without_friction_a_plant_is_what_it_was():
     plant = plant_with(NoFriction())
     assert plant == Plant(chosen_muscle(), CIRCUIT, HangingMass(10.0))
     assert [s.name for s in plant.states] == ["air_mass", "position", "speed"]
-    found = traced(plant)
+    found = trace_system(plant)
     assert "friction" not in found.output_names
     muscle = chosen_muscle()
     p, c, v = (casadi.SX.sym(n) for n in "pcv")
     bare = muscle.contractile.force(p, c) - muscle.spring.force(p, c, 0.2) - muscle.damper.force(p, c, v)
-    count = [casadi.Function("f", [p, c, v], [x]).n_instructions() for x in (bare, muscle.unslackened(p, c, v))]
+    count = [casadi.Function("f", [p, c, v], [x]).n_instructions() for x in (bare, muscle.unclamped_tension(p, c, v))]
     assert count[0] == count[1]
 
 
@@ -91,7 +91,7 @@ def test_the_plant_integrates_the_law_s_own_replay_of_its_path(friction):
     assert np.ptp(run["position"]) > 0.004
     start = run["position"][0]
     path = np.concatenate([[start], run["position"]])
-    replayed = friction.replay(path, np.concatenate([[-1.0], run["time"]]))[1:]
+    replayed = friction.force_along(path, np.concatenate([[-1.0], run["time"]]))[1:]
     largest = np.abs(run["friction"]).max()
     slack = 0.05 if hasattr(friction, "transition") else 0.01
     assert largest > 10.0
@@ -103,7 +103,7 @@ def test_the_slips_of_a_plant_tend_to_the_exact_ones():
     for transition in (0.2, 0.02):
         friction = replace(SLIP, transition=transition)
         run = loops_of(friction)
-        worst.append(np.abs(run["friction"] - friction.replay(run["position"])).max())
+        worst.append(np.abs(run["friction"] - friction.force_along(run["position"])).max())
     assert worst[1] < 0.3 * worst[0]
     assert worst[1] <= 0.02 * sum(k * d for k, d in zip(SLIP.stiffnesses, SLIP.limits, strict=True))
 
@@ -130,8 +130,8 @@ def test_a_load_stands_lower_on_the_way_up_than_on_the_way_down():
 
 def test_the_books_close_and_friction_gives_nothing():
     """Mechanical: kinetic and potential energy grow by the work of the tension; friction keeps what it took."""
-    metered = Metered(plant_with(SLIP))
-    start = metered.reset(equilibrium(metered.plant, pressure=1.5e5))
+    metered = WithEnergyMeters(plant_with(SLIP))
+    start = metered.reset(find_equilibrium(metered.plant, pressure=1.5e5))
     run = simulate(metered, LOOPS, duration=9.0, start=start, method=Rodas4(1e-9))
     mechanical = run["kinetic_energy"] + run["potential_energy"]
     np.testing.assert_allclose(mechanical - mechanical[0], run["work_of_tension"], atol=1e-6)
@@ -139,7 +139,7 @@ def test_the_books_close_and_friction_gives_nothing():
     heat = run["friction_work"] - stored
     assert (np.diff(heat) >= -1e-8).all()
     assert heat[-1] > 0.1
-    assert "friction_work" not in [m.name for m in Metered(plant_with(NoFriction())).meters]
+    assert "friction_work" not in [m.name for m in WithEnergyMeters(plant_with(NoFriction())).meters]
 
 
 def test_bristles_carry_the_name_of_their_muscle():

@@ -18,15 +18,15 @@ from airmuscle.compile.cache import numpy_layout as array_layout
 from airmuscle.compile.cache import store as kept
 from airmuscle.compile.cache.entry_point import REFUSED
 from airmuscle.compile.cache.kernel import Kernel
-from airmuscle.compile.cache.object_code import made
-from airmuscle.compile.program import prepared
+from airmuscle.compile.cache.object_code import build
+from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import Schedule
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4
 from airmuscle.simulation.simulate import simulate
 
 CASE = runs()[3]
-READY = prepared(CASE.system)
-kept_found = kept.found
+READY = compile_system(CASE.system)
+kept_found = kept.load
 ROWS = 7
 
 
@@ -35,7 +35,7 @@ def arguments(rows=ROWS):
     seeds = np.random.default_rng(1)
     states = CASE.vector * seeds.uniform(0.9, 1.1, (rows, CASE.vector.size))
     inputs = seeds.uniform(0.0, 1.0, (rows, len(CASE.system.inputs)))
-    return READY.address["outputs"], READY.held, states, inputs, np.zeros((rows, READY.sizes.outputs))
+    return READY.address["outputs"], READY.precomputed, states, inputs, np.zeros((rows, READY.sizes.outputs))
 
 
 def expected():
@@ -186,12 +186,12 @@ def test_a_folder_that_cannot_be_written_to_is_passed_over(tmp_path, monkeypatch
     blocked = tmp_path / "file"
     blocked.write_text("not a folder", encoding="utf-8")
     monkeypatch.setattr(kept, "_folders", lambda: iter((blocked / "in it", tmp_path / "good")))
-    assert kept.keep("evaluate", ("q",), b"code") == b"code"
-    assert kept.found("evaluate", ("q",)) == b"code"
+    assert kept.save("evaluate", ("q",), b"code") == b"code"
+    assert kept.load("evaluate", ("q",)) == b"code"
     assert {path.parent for path in files(tmp_path)} == {tmp_path, tmp_path / "good"}
     monkeypatch.setattr(kept, "_folders", lambda: iter((blocked / "in it",)))
-    assert kept.keep("evaluate", ("q",), b"code") == b"code"
-    assert kept.found("evaluate", ("q",)) is None
+    assert kept.save("evaluate", ("q",), b"code") == b"code"
+    assert kept.load("evaluate", ("q",)) is None
 
 
 @numba.njit(error_model="numpy")
@@ -227,10 +227,10 @@ def returns_a_float(x, y):
 
 def test_only_what_does_without_numba_is_made_machine_code():
     given = (np.ones(3), np.zeros(3))
-    assert made(plain, ("d1", "d1"), given)
-    assert made(plain, ("d1", "d2"), given) == b""  # as if numba took arguments apart otherwise
+    assert build(plain, ("d1", "d1"), given)
+    assert build(plain, ("d1", "d2"), given) == b""  # as if numba took arguments apart otherwise
     for kernel in (allocates, raises, calls_a_library, returns_a_float):
-        assert made(kernel, ("d1", "d1"), given) == b""
+        assert build(kernel, ("d1", "d1"), given) == b""
 
 
 def test_a_kernel_that_needs_numba_is_tried_once_on_a_machine(empty, monkeypatch):
@@ -238,7 +238,7 @@ def test_a_kernel_that_needs_numba_is_tried_once_on_a_machine(empty, monkeypatch
     n, seen, looked = 2, [], []
     given = (1, *(np.zeros(n) for _ in range(5)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n * n + n))
     monkeypatch.setattr(Kernel, "_by_numba", lambda self, given: seen.append(self.name))
-    monkeypatch.setattr(kernels.store, "found", lambda *asked: looked.append(asked) or kept_found(*asked))
+    monkeypatch.setattr(kernels.store, "load", lambda *asked: looked.append(asked) or kept_found(*asked))
     for kernel in (Kernel("root", "newton"), Kernel("root", "newton")):
         kernel(*given)
         kernel(*given)
@@ -262,7 +262,7 @@ def test_arrays_laid_out_otherwise_are_left_to_numba(monkeypatch):
 
 def test_threads_that_ask_at_once_get_one_machine_code(empty, without_numba, monkeypatch):
     kernel, right, looked = Kernel("evaluate"), expected(), []
-    monkeypatch.setattr(kernels.store, "found", lambda *asked: looked.append(asked) or kept_found(*asked))
+    monkeypatch.setattr(kernels.store, "load", lambda *asked: looked.append(asked) or kept_found(*asked))
 
     def found(_):
         given = arguments()

@@ -9,11 +9,11 @@ from joints import chosen_muscle, joint, joint_start
 from scipy.integrate import solve_ivp
 
 from airmuscle.compile import StateVariable
-from airmuscle.compile.program import prepared
-from airmuscle.control.inputs import REST, Schedule, Signal
+from airmuscle.compile.program import compile_system
+from airmuscle.control.inputs import ZERO_INPUT, SampledSignal, Schedule
 from airmuscle.core import ops
+from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import SimulationError
-from airmuscle.core.model import model, parameter
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
@@ -83,7 +83,7 @@ def test_plants_of_every_size_agree_with_scipy(size):
 @pytest.mark.parametrize("size", CASES)
 def test_the_printed_rates_are_the_rates(size):
     plant, start, _, _ = CASES[size]
-    ready, rng = prepared(plant), np.random.default_rng(size)
+    ready, rng = compile_system(plant), np.random.default_rng(size)
     for _ in range(20):
         state = {n: v * (1 + 0.05 * rng.standard_normal()) + 1e-3 * (v == 0) for n, v in start.items()}
         inputs = dict(zip(plant.inputs, rng.uniform(0, 1, len(plant.inputs)), strict=True))
@@ -114,7 +114,7 @@ class Pendulum:
 
 
 START = {"angle": 1.0, "speed": 0.0, "filtered": 0.5}
-PUSH = Signal({"push": ((0.0, 0.0), (1.0, 1.0), (2.0, -0.5))})
+PUSH = SampledSignal({"push": ((0.0, 0.0), (1.0, 1.0), (2.0, -0.5))})
 
 
 def end_error(method, exact, command=PUSH):
@@ -206,16 +206,16 @@ def test_a_run_that_fails_returns_what_it_has(method):
     with pytest.raises(
         SimulationError, match=r"the run ended at (0\.99\d*|1) of 2 s because .*, after \d+ steps, at y "
     ) as caught:
-        simulate(Explodes(), REST, duration=2.0, start={"y": 1.0}, method=method, output=0.1)
+        simulate(Explodes(), ZERO_INPUT, duration=2.0, start={"y": 1.0}, method=method, output=0.1)
     kept = caught.value.recording
     np.testing.assert_allclose(kept["y"][:10], 1 / (1 - kept["time"][:10]), rtol=1e-4)
-    again = simulate(Explodes(), REST, duration=2.0, start={"y": 1.0}, method=method, output=0.1, complete=False)
+    again = simulate(Explodes(), ZERO_INPUT, duration=2.0, start={"y": 1.0}, method=method, output=0.1, complete=False)
     assert len(again) == len(kept)
     assert "the run ended" in again.notes[-1]
 
 
 def test_another_parameter_set_shares_the_program():
-    one, other = prepared(Pendulum(stiffness=4.0)), prepared(Pendulum(stiffness=9.0))
+    one, other = compile_system(Pendulum(stiffness=4.0)), compile_system(Pendulum(stiffness=9.0))
     assert one.program is other.program
     assert one.rates([1.0, 0.0, 0.0], [0.0])[1] == pytest.approx(-4 * np.sin(1.0))
     assert other.rates([1.0, 0.0, 0.0], [0.0])[1] == pytest.approx(-9 * np.sin(1.0))

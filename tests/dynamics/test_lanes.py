@@ -12,12 +12,12 @@ import pytest
 from airmuscle.compile.functions import Printer
 from airmuscle.compile.ir.instructions import MAXIMUM, MINIMUM, SELECT
 from airmuscle.compile.llvm import emit, vector_math
-from airmuscle.compile.llvm.jit import compiled
-from airmuscle.compile.llvm.types import Number
+from airmuscle.compile.llvm.jit import jit_compile
+from airmuscle.compile.llvm.types import LlvmType
 from airmuscle.core.errors import TraceError
 from airmuscle.simulation.batch.lanes import aligned
 
-NUMBERS = {"16 doubles": Number(64, 16), "8 doubles": Number(64, 8), "32 singles": Number(32, 32)}
+NUMBERS = {"16 doubles": LlvmType(64, 16), "8 doubles": LlvmType(64, 8), "32 singles": LlvmType(32, 32)}
 WIDE = max(number.lanes for number in NUMBERS.values())
 ENDS = np.array(
     [0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -3.0, 1e-300, 5e-324, 1e300, -1e300, 40.0, np.inf, -np.inf, np.nan, 3.0]
@@ -32,7 +32,7 @@ def run(number, expressions, *columns):
     printer.add("f", {"x": symbols}, {"y": casadi.densify(outputs)})
     parts = [vector_math.definition(name, count, number) for name, count in printer.needed.items()]
     text = "\n".join([vector_math.declarations({number}), *parts, printer.module()])
-    return call(compiled(text), number, columns, outputs.numel())
+    return call(jit_compile(text), number, columns, outputs.numel())
 
 
 def call(engine, number, columns, results):
@@ -119,13 +119,13 @@ def test_an_operation_in_lanes_means_what_it_means_in_numpy(name, number):
 
 @pytest.mark.parametrize("number", NUMBERS.values(), ids=NUMBERS)
 def test_the_printers_own_operations_choose_lane_by_lane(number):
-    block = emit.Block((), number)
+    block = emit.FunctionBody((), number)
     a, b = block.load("x", 0), block.load("x", 1)
     for i, (operation, operands) in enumerate(
         [(MAXIMUM, (a, b)), (MINIMUM, (a, b)), (SELECT, (a, b, a)), (casadi.OP_ASSIGN, (b,)), (casadi.OP_AND, (a, b))]
     ):
         block.store("y", i, block.operate(operation, operands))
-    engine = compiled(emit.function("f", ["x", "y"], block))
+    engine = jit_compile(emit.function("f", ["x", "y"], block))
     kind = np.float64 if number.bits == 64 else np.float32
     x, y = (
         column.astype(kind) for column in ([0.0, 1.0, 0.0, -2.0] * 5, np.arange(20.0)) for column in [np.array(column)]

@@ -13,24 +13,24 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.analysis.equilibrium import equilibrium
-from airmuscle.control.inputs import REST, Schedule
+from airmuscle.analysis.equilibrium import find_equilibrium
+from airmuscle.control.inputs import ZERO_INPUT, Schedule
 from airmuscle.friction import Dahl
-from airmuscle.mechanism import AntagonisticJoint, HangingMass, Isometric, SpringLoad, Stopped
+from airmuscle.mechanism import AntagonisticJoint, HangingMass, Isometric, SpringLoad, WithEndStops
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.plant.plant import Plant, total_air
 from airmuscle.pneumatics import (
     ClosedChamber,
     FillDischarge,
-    Follower,
-    Leaking,
-    Line,
     ProportionalRegulator,
     ProportionalValve,
+    SecondOrderLag,
     Supply,
     Tank,
     Tube,
     Valve,
+    WithLeak,
+    WithTubes,
 )
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.simulation.integrators import Rodas4
@@ -56,7 +56,7 @@ def steps_of(run):
 
 def pushed(plant, pressure):
     """Off its rest, so that what has just come to a limit swings about it."""
-    start = equilibrium(plant, pressure=pressure)
+    start = find_equilibrium(plant, pressure=pressure)
     return {name: value + 0.05 * (name == "speed") for name, value in start.items()}
 
 
@@ -71,28 +71,28 @@ def in_limits(run, most):
 CASES = {
     "no flow through a valve of conductance zero": (
         FillDischarge(Supply(5e5), Valve(0.0, 0.433), Valve(0.0, 0.433)), LOAD, BOTH, 2e5, 100.0, 180),
-    "shut valves for an hour": (valves(5e5), LOAD, REST, 2e5, 3600.0, 180),
+    "shut valves for an hour": (valves(5e5), LOAD, ZERO_INPUT, 2e5, 3600.0, 180),
     "supply at the muscle's pressure": (valves(2e5), LOAD, OPEN, 2e5, 100.0, 150),
     "all at the pressure of the surroundings": (valves(0.0), LOAD, BOTH, 0.0, 100.0, 150),
     "both valves open": (valves(5e5), LOAD, BOTH, 2e5, 100.0, 210),
     "vacuum from the supply": (valves(-0.98e5), LOAD, OPEN, 0.0, 60.0, 120),
     "vacuum in a frame": (valves(-1e5), Isometric(0.05), OPEN, 1e5, 60.0, 120),
     "emptied through its valve": (valves(5e5), LOAD, EMPTY, 4e5, 100.0, 450),
-    "emptied through a leak": (Leaking(ClosedChamber(), Valve(1e-11, 0.3)), LOAD, REST, 4e5, 3600.0, 800),
+    "emptied through a leak": (WithLeak(ClosedChamber(), Valve(1e-11, 0.3)), LOAD, ZERO_INPUT, 4e5, 3600.0, 800),
     "emptied with a load that stretches it slack": (
-        Leaking(ClosedChamber(), Valve(1e-9, 0.3)), Stopped(HangingMass(15.0), -0.005, 0.1, HuntCrossley(1e7)), REST, 3e5,
+        WithLeak(ClosedChamber(), Valve(1e-9, 0.3)), WithEndStops(HangingMass(15.0), -0.005, 0.1, HuntCrossley(1e7)), ZERO_INPUT, 3e5,
         100.0, 1200),
     "a tank that empties into the muscle": (
         FillDischarge(Tank(Supply(6e5), Valve(0.0, 0.3), 1e-4), VALVE, VALVE), LOAD, OPEN, 0.0, 100.0, 330),
     "a regulator at its set point": (
-        ProportionalRegulator(Supply(6e5), VALVE, VALVE, Follower(20.0)), LOAD, Schedule({"setpoint": ((0.0, 2e5),)}), 2e5,
+        ProportionalRegulator(Supply(6e5), VALVE, VALVE, SecondOrderLag(20.0)), LOAD, Schedule({"setpoint": ((0.0, 2e5),)}), 2e5,
         100.0, 150),
     "a regulator set to nothing": (
-        ProportionalRegulator(Supply(6e5), VALVE, VALVE, Follower(20.0)), LOAD, REST, 4e5, 100.0, 500),
+        ProportionalRegulator(Supply(6e5), VALVE, VALVE, SecondOrderLag(20.0)), LOAD, ZERO_INPUT, 4e5, 100.0, 500),
     "a proportional valve with underlap": (
-        ProportionalValve(Supply(6e5), VALVE, VALVE, Follower(50.0), -0.1), LOAD, REST, 2e5, 100.0, 420),
+        ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(50.0), -0.1), LOAD, ZERO_INPUT, 2e5, 100.0, 420),
     "a tube with no pressure across it": (
-        Line(valves(2e5), Tube(Valve(1e-7, 0.2), 1e-6)), LOAD, OPEN, 2e5, 100.0, 150),
+        WithTubes(valves(2e5), Tube(Valve(1e-7, 0.2), 1e-6)), LOAD, OPEN, 2e5, 100.0, 150),
 }  # fmt: skip
 
 
@@ -105,15 +105,15 @@ def test_a_plant_at_its_limits_runs_through(circuit, load, command, pressure, du
 
 
 def test_an_emptied_muscle_ends_at_the_pressure_of_the_surroundings():
-    plant = Plant(MUSCLE, Leaking(ClosedChamber(), Valve(1e-10, 0.3)), LOAD)
-    run = simulate(plant, REST, duration=3600.0, start=equilibrium(plant, pressure=4e5))
+    plant = Plant(MUSCLE, WithLeak(ClosedChamber(), Valve(1e-10, 0.3)), LOAD)
+    run = simulate(plant, ZERO_INPUT, duration=3600.0, start=find_equilibrium(plant, pressure=4e5))
     assert run["pressure"][-1] == pytest.approx(0.0, abs=1.0)
     assert run["mass_flow"][-1] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_vacuum_leaves_what_the_supply_has():
     plant = Plant(MUSCLE, valves(-0.98e5), LOAD)
-    run = simulate(plant, OPEN, duration=60.0, start=equilibrium(plant, pressure=0.0))
+    run = simulate(plant, OPEN, duration=60.0, start=find_equilibrium(plant, pressure=0.0))
     assert run["pressure"][-1] == pytest.approx(-0.98e5, abs=50.0)
     assert run["force"].min() >= 0.0
 
@@ -129,9 +129,9 @@ def test_at_no_flow_and_shut_valves_the_air_stays_but_for_rounding():
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9])
 def test_a_joint_between_equal_pressures_stays_where_it_is(rtol):
     muscles = tuple(replace(MUSCLE, name=name, friction=Dahl(1e5, 5.0)) for name in ("left", "right"))
-    valve = ProportionalValve(Supply(3e5), VALVE, VALVE, Follower(50.0), 0.05, muscles=2)
+    valve = ProportionalValve(Supply(3e5), VALVE, VALVE, SecondOrderLag(50.0), 0.05, muscles=2)
     plant = Plant(muscles, valve, AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12))
-    run = simulate(plant, REST, duration=600.0, start=equilibrium(plant, pressure=3e5), method=Rodas4(rtol))
+    run = simulate(plant, ZERO_INPUT, duration=600.0, start=find_equilibrium(plant, pressure=3e5), method=Rodas4(rtol))
     assert all(np.isfinite(run[name]).all() for name in run)
     assert steps_of(run) <= 60
     np.testing.assert_allclose(run["angle"], 0.0, atol=1e-9)
@@ -142,5 +142,5 @@ def test_a_joint_between_equal_pressures_stays_where_it_is(rtol):
 def test_a_thousand_switchings_at_equal_pressures_cost_a_few_steps_each():
     plant = Plant(MUSCLE, valves(2e5), LOAD)
     changes = tuple((0.01 * k, float(k % 2)) for k in range(1, 1001))
-    run = simulate(plant, Schedule({"fill": changes}), duration=10.1, start=equilibrium(plant, pressure=2e5))
+    run = simulate(plant, Schedule({"fill": changes}), duration=10.1, start=find_equilibrium(plant, pressure=2e5))
     in_limits(run, 3100)

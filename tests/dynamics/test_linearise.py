@@ -9,9 +9,9 @@ import pytest
 from joints import chosen_muscle, joint, joint_start
 from scipy.signal import lsim
 
-from airmuscle.analysis.equilibrium import equilibrium
-from airmuscle.analysis.linearise import linearise
-from airmuscle.compile.program import prepared
+from airmuscle.analysis.equilibrium import find_equilibrium
+from airmuscle.analysis.linear_model import linearise
+from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import Schedule
 from airmuscle.core.errors import AirmuscleError, ParameterError
 from airmuscle.friction import LuGre
@@ -21,13 +21,13 @@ from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import (
     ClosedChamber,
     FillDischarge,
-    Follower,
-    Line,
     ProportionalRegulator,
     ProportionalValve,
+    SecondOrderLag,
     Supply,
     Tube,
     Valve,
+    WithTubes,
 )
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal
 from airmuscle.simulation.integrators import Rodas4
@@ -36,11 +36,11 @@ from airmuscle.simulation.simulate import simulate
 VALVE = Valve(2.6e-9, 0.433)
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))
 JOINT = AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12)
-PROPORTIONAL = ProportionalValve(Supply(6e5), VALVE, VALVE, Follower(50.0), muscles=2)
+PROPORTIONAL = ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(50.0), muscles=2)
 HANGING = Plant(chosen_muscle(), FillDischarge(Supply(6e5), VALVE, VALVE), HangingMass(20.0))
 REGULATED = Plant(
     replace(chosen_muscle(), series=SeriesSpring(5e4)),
-    Line(ProportionalRegulator(Supply(6e5), VALVE, VALVE, Follower(20.0)), Tube(Valve(1e-8, 0.2), 2e-5)),
+    WithTubes(ProportionalRegulator(Supply(6e5), VALVE, VALVE, SecondOrderLag(20.0)), Tube(Valve(1e-8, 0.2), 2e-5)),
     SpringLoad(5.0, 2e3, 10.0, 40.0), EnergyBalance(0.5),
 )  # fmt: skip
 CASES = {
@@ -56,7 +56,7 @@ CASES = {
 
 def moving(plant, pressure=3e5):
     """A state away from rest and from kinks."""
-    state = equilibrium(plant, pressure=pressure)
+    state = find_equilibrium(plant, pressure=pressure)
     push = {"speed": 0.02, "angular_speed": 0.2, "spool": 0.1, "regulated": 8e3, "tube.air_mass": 1e-6, "bristle": 1e-6}
     return {n: v + push.get(n, 0.0) for n, v in state.items()}
 
@@ -65,8 +65,8 @@ def moving(plant, pressure=3e5):
 def test_the_matrices_are_the_slopes_of_rates_and_outputs(plant, inputs):
     state = moving(plant)
     found = linearise(plant, state, inputs)
-    ready = prepared(plant)
-    x, u = np.array([state[n] for n in found.states]), np.array([found.given[n] for n in found.inputs])
+    ready = compile_system(plant)
+    x, u = np.array([state[n] for n in found.states]), np.array([found.input_values[n] for n in found.inputs])
     np.testing.assert_allclose(found.rates, ready.rates(x, u), rtol=1e-9, atol=1e-9)
 
     def values(x, u):
@@ -86,8 +86,8 @@ def test_the_matrices_are_the_slopes_of_rates_and_outputs(plant, inputs):
 
 def test_it_follows_a_small_step_of_the_simulated_plant():
     """The error is of second order: half the step leaves a quarter of it."""
-    start, times = equilibrium(HANGING, pressure=3e5), np.linspace(0.0, 0.3, 61)
-    found = linearise(HANGING, start).part(("fill",), ("position", "pressure", "force"))
+    start, times = find_equilibrium(HANGING, pressure=3e5), np.linspace(0.0, 0.3, 61)
+    found = linearise(HANGING, start).select(("fill",), ("position", "pressure", "force"))
     errors = []
     for step in (4e-4, 2e-4):
         command = Schedule({"fill": ((0.0, step),)})
@@ -103,7 +103,7 @@ def test_it_follows_a_small_step_of_the_simulated_plant():
 def test_a_hanging_mass_with_shut_valves_swings_with_its_shut_stiffness():
     """Pole of m s^2 + d s + k/L0 = 0 with the damper of the muscle, and one at zero for the air that is shut in."""
     plant = Plant(chosen_muscle(), ClosedChamber(), HangingMass(20.0), Isothermal())
-    state = equilibrium(plant, pressure=3e5)
+    state = find_equilibrium(plant, pressure=3e5)
     found = linearise(plant, state)
     stiff = found.stiffness.per_metre["muscle"].shut_valves
     resting, first, second = found.poles
@@ -120,7 +120,7 @@ def test_names_and_units_come_along():
     found = linearise(plant, moving(plant), inputs)
     assert found.states == tuple(s.name for s in plant.states)
     assert found.outputs[: len(found.states)] == found.states
-    assert (found.inputs, found.given) == (("command",), {"command": 0.2})
+    assert (found.inputs, found.input_values) == (("command",), {"command": 0.2})
     assert {found.units[n] for n in ("left.pressure", "right.pressure")} == {"Pa"}
     assert (found.units["angle"], found.units["angular_speed"], found.units["angular_acceleration"]) == (
         "rad",
@@ -128,14 +128,14 @@ def test_names_and_units_come_along():
         "rad/s^2",
     )
     assert set(found.units) >= {*found.states, *found.inputs, *found.outputs}
-    assert repr(found).startswith("Linearised(6 states, inputs command, 17 outputs; poles ")
+    assert repr(found).startswith("LinearModel(6 states, inputs command, 17 outputs; poles ")
 
 
 def test_scipy_and_python_control_see_the_same_system():
     plant, inputs = CASES["joint"]
-    found = linearise(plant, moving(plant), inputs).part(outputs=("angle", "left.pressure"))
+    found = linearise(plant, moving(plant), inputs).select(outputs=("angle", "left.pressure"))
     frequencies = np.array([0.1, 1.0, 10.0])
-    response = found.response(frequencies)
+    response = found.frequency_response(frequencies)
     assert response.shape == (3, 2, 1)
     in_scipy = found.to_scipy()
     for name in "ABCD":
@@ -170,8 +170,8 @@ def test_an_own_system_is_linearised_like_a_plant():
         (lambda s: linearise(HANGING, {**s, "speed": float("nan")}), "must be finite"),
         (lambda s: linearise(HANGING, s, {"fil": 1.0}), "no input 'fil'"),
         (lambda s: linearise(HANGING, s, {"fill": 1.5}), "the input 'fill' is 1.5; allowed are 0 to 1"),
-        (lambda s: linearise(HANGING, s).part(outputs=("presure",)), "no output 'presure'.*Did you mean 'pressure'"),
-        (lambda s: linearise(HANGING, s).response([-1.0]), "must be finite and not negative"),
+        (lambda s: linearise(HANGING, s).select(outputs=("presure",)), "no output 'presure'.*Did you mean 'pressure'"),
+        (lambda s: linearise(HANGING, s).frequency_response([-1.0]), "must be finite and not negative"),
         (lambda s: linearise(joint(), joint_start(joint()), {"fill": 1.0}), "no input 'fill'; there are left.fill"),
     ],
 )

@@ -10,40 +10,40 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joints import HEAT_CAPACITY, chosen_muscle, joint, joint_start
 
-from airmuscle.analysis.equilibrium import equilibrium
-from airmuscle.compile.program import prepared
-from airmuscle.control.inputs import REST, Schedule, Signal
-from airmuscle.control.trajectory import follow
+from airmuscle.analysis.equilibrium import find_equilibrium
+from airmuscle.compile.program import compile_system
+from airmuscle.control.inputs import ZERO_INPUT, SampledSignal, Schedule
+from airmuscle.control.trajectory import spline_trajectory
 from airmuscle.core.errors import ParameterError
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
-    InSeries,
     Isotonic,
+    JointWithEndStops,
     Lever,
-    Mounted,
-    Prescribed,
+    MusclesInSeries,
+    PrescribedMotion,
     Pulley,
     SpringLoad,
-    Stopped,
-    StoppedJoint,
+    WithEndStops,
+    WithOffsets,
 )
 from airmuscle.mechanism.contact import HuntCrossley
-from airmuscle.plant.energy_balance import Metered
+from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import (
     ClosedChamber,
     DistributedTube,
     FillDischarge,
-    Follower,
-    Line,
     Manifold,
     ProportionalValve,
-    Shared,
+    SecondOrderLag,
+    SharedSupply,
     Supply,
     ThreePosition,
     Tube,
     Valve,
+    WithTubes,
 )
 from airmuscle.pneumatics.gas import GAS_CONSTANT, EnergyBalance, Isothermal, Polytropic
 from airmuscle.simulation.integrators import Rodas4
@@ -59,13 +59,13 @@ MECHANISMS = {
     "spring": SpringLoad(3.0, 2000.0, 20.0, 50.0),
     "isotonic": Isotonic(200.0, 2.0, 30.0),
     "pulley": Pulley(0.04, 30.0, 0.5, 0.02, 20.0),
-    "parallel": Mounted(HangingMass(30.0), (0.0, 0.03)),
+    "parallel": WithOffsets(HangingMass(30.0), (0.0, 0.03)),
     "joint": JOINT,
     "lever": LEVER,
-    "series": InSeries(HangingMass(12.0), (0.3,), 15.0),
-    "series on a lever": InSeries(Lever((0.05,), 12.0, 0.1, 0.05, 0.3), (0.3,)),
-    "stopped": Stopped(SpringLoad(3.0, 500.0, 5.0), -0.002, 0.02, CONTACT),
-    "stopped joint": StoppedJoint(JOINT, -0.1, 0.15, 0.05, CONTACT),
+    "series": MusclesInSeries(HangingMass(12.0), (0.3,), 15.0),
+    "series on a lever": MusclesInSeries(Lever((0.05,), 12.0, 0.1, 0.05, 0.3), (0.3,)),
+    "stopped": WithEndStops(SpringLoad(3.0, 500.0, 5.0), -0.002, 0.02, CONTACT),
+    "stopped joint": JointWithEndStops(JOINT, -0.1, 0.15, 0.05, CONTACT),
 }
 
 
@@ -77,8 +77,8 @@ def pair(mechanism, gas=Polytropic(1.2), circuit=CIRCUIT):
 @pytest.mark.parametrize("mechanism", MECHANISMS.values(), ids=MECHANISMS)
 def test_the_energy_book_closes_with_what_is_lost(mechanism):
     """Fill one muscle, then the other, then let both out a little; at rtol 1e-10."""
-    plant = Metered(pair(mechanism))
-    start = plant.reset(equilibrium(plant.plant, pressure=2e5))
+    plant = WithEnergyMeters(pair(mechanism))
+    start = plant.reset(find_equilibrium(plant.plant, pressure=2e5))
     command = Schedule({
         "left.fill": ((0.1, 1.0), (0.2, 0.0)), "right.fill": ((0.4, 1.0), (0.5, 0.0)),
         "left.discharge": ((0.9, 1.0), (0.94, 0.0)), "right.discharge": ((1.1, 1.0), (1.14, 0.0)),
@@ -91,14 +91,14 @@ def test_the_energy_book_closes_with_what_is_lost(mechanism):
     assert run["kinetic_energy"].max() > 1e-4 * size
     np.testing.assert_allclose(mechanical - mechanical[0], book, atol=1e-7 * size)
     assert (np.diff(run["mechanism_loss"]) >= -1e-9 * size).all()
-    lossy = not isinstance(mechanism, Mounted)
+    lossy = not isinstance(mechanism, WithOffsets)
     assert (run["mechanism_loss"][-1] > 1e-4 * size) == lossy
 
 
 def test_stops_hold_between_their_ends_but_for_the_depth_of_the_contact():
     """At rest against the stop the contact carries what the muscle pulls beyond the spring."""
     plant = Plant(LEFT, CIRCUIT, MECHANISMS["stopped"])
-    run = simulate(plant, Schedule({"fill": ((0.0, 1.0),)}), duration=3.0, start=equilibrium(plant, pressure=0.0))
+    run = simulate(plant, Schedule({"fill": ((0.0, 1.0),)}), duration=3.0, start=find_equilibrium(plant, pressure=0.0))
     depth = run["position"][-1] - 0.02
     assert 0.0 < depth < 2e-3
     carried = run["force"][-1] - 500.0 * run["position"][-1]
@@ -113,8 +113,8 @@ def test_a_prescribed_motion_is_followed_exactly():
     rng = np.random.default_rng(0)
     times = np.cumsum(rng.uniform(0.05, 0.4, 12))
     places = rng.uniform(0.0, 0.03, 12)
-    motion = follow(times, places)
-    plant = Plant(chosen_muscle(), CIRCUIT, Prescribed())
+    motion = spline_trajectory(times, places)
+    plant = Plant(chosen_muscle(), CIRCUIT, PrescribedMotion())
     start = plant.state_at(pressure=3e5, **motion.start)
     run = simulate(plant, motion.command, duration=times[-1] - times[0], start_time=times[0], start=start, output=times)
     np.testing.assert_allclose(np.interp(times, run["time"], run["position"]), places, atol=1e-9)
@@ -128,16 +128,16 @@ def test_a_prescribed_motion_is_followed_exactly():
 def test_a_cubic_that_does_not_begin_at_rest_is_itself(coefficients):
     cubic = np.polynomial.Polynomial(coefficients)
     times = np.array([0.0, 0.2, 0.5, 0.7, 1.0])
-    motion = follow(times, cubic(times), from_rest=False)
+    motion = spline_trajectory(times, cubic(times), from_rest=False)
     assert motion.start["speed"] == pytest.approx(cubic.deriv()(0.0), abs=1e-9)
     found = [value for _, value in motion.command.points["prescribed_acceleration"]]
     assert found == pytest.approx(cubic.deriv(2)(times), abs=1e-8)
 
 
 def test_the_drive_takes_up_what_the_muscle_works():
-    plant = Metered(Plant(chosen_muscle(), CIRCUIT, Prescribed(), Isothermal()))
-    motion = follow([0.0, 0.5, 1.0], [0.0, 0.02, 0.005])
-    command = Signal({**motion.command.points, "fill": ((0.2, 0.0), (0.4, 0.5), (0.6, 0.0))})
+    plant = WithEnergyMeters(Plant(chosen_muscle(), CIRCUIT, PrescribedMotion(), Isothermal()))
+    motion = spline_trajectory([0.0, 0.5, 1.0], [0.0, 0.02, 0.005])
+    command = SampledSignal({**motion.command.points, "fill": ((0.2, 0.0), (0.4, 0.5), (0.6, 0.0))})
     start = plant.reset(plant.plant.state_at(pressure=2e5, **motion.start))
     run = simulate(plant, command, duration=1.0, start=start, method=Rodas4(1e-10))
     np.testing.assert_allclose(run["mechanism_loss"], run["work_of_tension"], atol=1e-9)
@@ -156,7 +156,7 @@ def test_the_drive_takes_up_what_the_muscle_works():
 )
 def test_points_that_are_no_motion_are_refused(times, places, settings, message):
     with pytest.raises(ParameterError, match=message):
-        follow(times, places, **settings)
+        spline_trajectory(times, places, **settings)
 
 
 # The joint
@@ -184,7 +184,7 @@ def random_state(system, rng):
 
 def test_the_joint_of_a_plant_is_the_joint_written_by_hand():
     system = joint()
-    plant = pair(JOINT, Isothermal(), Line(FillDischarge(Supply(6e5), VALVE, VALVE), TUBE))
+    plant = pair(JOINT, Isothermal(), WithTubes(FillDischarge(Supply(6e5), VALVE, VALVE), TUBE))
     rng = np.random.default_rng(1)
     for _ in range(50):
         state = random_state(system, rng)
@@ -210,7 +210,7 @@ def test_with_heat_it_is_too_but_that_air_that_leaves_a_muscle_flows_at_its_own_
     """
     system = joint(heat=True)
     valve = ThreePosition(Supply(6e5), VALVE, VALVE)
-    plant = pair(JOINT, EnergyBalance(1.0), Line(valve, TUBE))
+    plant = pair(JOINT, EnergyBalance(1.0), WithTubes(valve, TUBE))
     rng, directions = np.random.default_rng(2), set()
     for _ in range(50):
         state = random_state(system, rng)
@@ -236,8 +236,8 @@ def test_with_heat_it_is_too_but_that_air_that_leaves_a_muscle_flows_at_its_own_
 
 def test_the_tubes_of_one_circuit_for_all_are_called_by_their_muscles():
     """Each tube belongs to a muscle, whose name it carries as it does where every muscle has a circuit of its own."""
-    valve = ProportionalValve(Supply(6e5), VALVE, VALVE, Follower(80.0), muscles=2)
-    plant = Plant((LEFT, RIGHT), Line(valve, Tube(VALVE, 1e-5, 2)), JOINT, Isothermal())
+    valve = ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(80.0), muscles=2)
+    plant = Plant((LEFT, RIGHT), WithTubes(valve, Tube(VALVE, 1e-5, 2)), JOINT, Isothermal())
     of_tubes = [s.name for s in plant.states if "tube" in s.name]
     assert of_tubes == [f"{side}.tube{i}.air_mass" for side in ("left", "right") for i in (1, 2)]
     start = plant.state_at(pressure=(2e5, 3e5))
@@ -251,7 +251,7 @@ def test_the_tubes_of_one_circuit_for_all_are_called_by_their_muscles():
 def test_a_run_says_where_air_ran_too_fast_for_a_distributed_tube(nested):
     """A wide valve before a long narrow tube into an empty muscle: beyond a third of the speed of sound, in one."""
     tube, wide, narrow = DistributedTube(0.5, 2e-3, 3), Valve(1e-7, 0.4), Valve(1e-10, 0.4)
-    feeds = [Line(FillDischarge(Shared() if nested else Supply(6e5), v, v), tube) for v in (wide, narrow)]
+    feeds = [WithTubes(FillDischarge(SharedSupply() if nested else Supply(6e5), v, v), tube) for v in (wide, narrow)]
     circuit = Manifold(Supply(6e5), tuple(feeds), ("left", "right")) if nested else tuple(feeds)
     plant = Plant((LEFT, RIGHT), circuit, JOINT, Isothermal())
     command = Schedule({"left.fill": ((0.0, 1.0),), "right.fill": ((0.0, 1.0),)})
@@ -268,20 +268,22 @@ def test_a_run_says_where_air_ran_too_fast_for_a_distributed_tube(nested):
     greatest = {i: float(abs(speed).max() / np.sqrt(GAS_CONSTANT * 293.15)) for i, speed in speeds.items()}
     assert len(doubts) == sum(share > 1 / 3 for share in greatest.values()) > 0
     assert f"air ran at up to {greatest[3]:.2g} times the speed of sound" in doubts[-1]
-    still = simulate(plant, REST, duration=0.02, start=plant.state_at(pressure=0.0))
+    still = simulate(plant, ZERO_INPUT, duration=0.02, start=plant.state_at(pressure=0.0))
     assert not [note for note in still.notes if "times the speed of sound" in note]
 
 
 def test_two_tubes_of_one_name_are_refused():
     with pytest.raises(ParameterError, match=r"two of its parts use the name 'left.tube.air_mass'"):
-        pair(JOINT, Isothermal(), Line(Line(ThreePosition(Supply(6e5), VALVE, VALVE), TUBE), TUBE))
+        pair(JOINT, Isothermal(), WithTubes(WithTubes(ThreePosition(Supply(6e5), VALVE, VALVE), TUBE), TUBE))
 
 
 def test_one_five_port_valve_turns_a_joint_to_either_side():
     """Its command fills one muscle and discharges the other; changed over, the joint mirrors its motion."""
-    valve = ProportionalValve(Supply(6e5), Valve(2.6e-9, 0.433), Valve(2.6e-9, 0.433), Follower(80.0), 0.05, muscles=2)
+    valve = ProportionalValve(
+        Supply(6e5), Valve(2.6e-9, 0.433), Valve(2.6e-9, 0.433), SecondOrderLag(80.0), 0.05, muscles=2
+    )
     plant = Plant((LEFT, RIGHT), valve, JOINT, EnergyBalance(0.5))
-    start = equilibrium(plant, pressure=2.5e5)
+    start = find_equilibrium(plant, pressure=2.5e5)
     runs = [
         simulate(
             plant, Schedule({"command": ((0.1, sign), (0.25, 0.0))}), duration=2.0, start=start, method=Rodas4(1e-9)
@@ -299,18 +301,20 @@ def test_one_five_port_valve_turns_a_joint_to_either_side():
 
 
 def test_muscles_in_parallel_pull_as_one_with_the_sum_of_their_tensions():
-    both = pair(Mounted(HangingMass(20.0), (0.0, 0.05)), circuit=ClosedChamber())
+    both = pair(WithOffsets(HangingMass(20.0), (0.0, 0.05)), circuit=ClosedChamber())
     state = both.state_at(pressure=(2e5, 3e5), position=0.01)
     expected = LEFT.tension(2e5, 0.05) + RIGHT.tension(3e5, 0.10)
-    rates = prepared(both).rates(list(state.values()), [])
+    rates = compile_system(both).rates(list(state.values()), [])
     assert rates[list(state).index("speed")] == pytest.approx(expected / 20.0 - 9.80665, rel=1e-12)
 
 
 def test_a_chain_of_equal_muscles_swings_as_one_of_their_length():
     """With a light node between them; both carry the same tension, and each takes half of the way."""
-    chain = pair(InSeries(HangingMass(20.0), (1e-3,)), Isothermal(), ClosedChamber())
-    start = equilibrium(chain, pressure=3e5)
-    run = simulate(chain, REST, duration=0.5, start={**start, "speed": 0.2, "node1.speed": 0.1}, method=Rodas4(1e-9))
+    chain = pair(MusclesInSeries(HangingMass(20.0), (1e-3,)), Isothermal(), ClosedChamber())
+    start = find_equilibrium(chain, pressure=3e5)
+    run = simulate(
+        chain, ZERO_INPUT, duration=0.5, start={**start, "speed": 0.2, "node1.speed": 0.1}, method=Rodas4(1e-9)
+    )
     assert np.ptp(run["position"]) > 5e-3
     np.testing.assert_allclose(run["left.force"], run["right.force"], atol=0.05)
     np.testing.assert_allclose(2 * run["node1.position"], run["position"], atol=2e-5)

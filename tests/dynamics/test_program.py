@@ -15,10 +15,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airmuscle.compile import StateVariable
-from airmuscle.compile.program import prepared
+from airmuscle.compile.program import compile_system
 from airmuscle.core import autodiff, ops
+from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import ParameterError, TraceError
-from airmuscle.core.model import model, parameter
 
 FORMULAS = {
     "arithmetic": lambda x, y: (x + 2 * y) * (x - y) / (4 + y * y) - x,
@@ -66,7 +66,7 @@ def test_an_operation_means_the_same_everywhere(name, x, y):
         array = formula(np.array([x, x]) + 0.25, np.array([y, y]))
     assert isinstance(expected, float)
     np.testing.assert_allclose(array, expected, rtol=1e-13, atol=1e-13)
-    printed = prepared(Formula(name)).rates([x, y], [])
+    printed = compile_system(Formula(name)).rates([x, y], [])
     np.testing.assert_allclose(printed, [expected, -expected], rtol=1e-12, atol=1e-12)
 
 
@@ -81,16 +81,16 @@ def test_jax_arrays_are_accepted(name):
 
 def test_the_printed_jacobian_solves_the_shifted_system():
     """factor and solve are (d I - J)^-1, and stage is that of f + g, for a full two by two Jacobian."""
-    ready = prepared(Formula("angles"))
+    ready = compile_system(Formula("angles"))
     x, h = np.array([0.4, -0.7]), 1e-6
     jacobian = np.column_stack([(ready.rates(x + h * e, []) - ready.rates(x - h * e, [])) / (2 * h) for e in np.eye(2)])
     f, values = np.empty(2), np.empty(ready.sizes.jacobian)
     factors, g, k = np.empty(ready.sizes.factors), np.array([1.0, -2.0]), np.empty(2)
     none = np.zeros(1)
-    ready.call("jac", x, none, ready.held, f, values)
+    ready.call("jac", x, none, ready.precomputed, f, values)
     np.testing.assert_allclose(values.reshape(2, 2), jacobian, rtol=1e-7)
     ready.call("factor", values, 3.0, factors)
-    ready.call("stage", x, none, ready.held, factors, g, k)
+    ready.call("stage", x, none, ready.precomputed, factors, g, k)
     np.testing.assert_allclose((3.0 * np.eye(2) - jacobian) @ k, f + g, rtol=1e-6)
 
 
@@ -121,9 +121,9 @@ class Forgetful(Silent):
 
 def test_a_constant_that_is_not_finite_names_the_law():
     with pytest.raises(TraceError, match=r"Silent traced to a constant that is not finite. Use airmuscle.core.ops"):
-        prepared(Silent())
+        compile_system(Silent())
     with pytest.raises(TraceError, match=r"states are \['x'\], but rates are given for \[\]"):
-        prepared(Forgetful())
+        compile_system(Forgetful())
 
 
 def test_slopes_are_exact_and_equal_in_every_world():
@@ -136,10 +136,10 @@ def test_slopes_are_exact_and_equal_in_every_world():
         def value(self, x):
             return self.height * ops.sin(x) ** 2
 
-    exact = autodiff.slope(Wave(), "value", x)
+    exact = autodiff.derivative(Wave(), "value", x)
     assert exact == pytest.approx((Wave().value(x + h) - Wave().value(x - h)) / (2 * h), rel=1e-8)
     symbol = casadi.SX.sym("x")
-    inside = casadi.Function("f", [symbol], [autodiff.slope(Wave(), "value", symbol * 2)])
+    inside = casadi.Function("f", [symbol], [autodiff.derivative(Wave(), "value", symbol * 2)])
     assert float(inside(x / 2)) == pytest.approx(exact, rel=1e-14)
     values, by_parameter = autodiff.jacobian(Wave(), "value", np.array([0.1, x]))
     np.testing.assert_allclose(by_parameter[:, 0], values / 2.0)

@@ -18,14 +18,14 @@ from airmuscle.friction import Dahl, LuGre, MaxwellSlip, NoFriction
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
-    InSeries,
     Isometric,
     Isotonic,
     Lever,
-    Mounted,
+    MusclesInSeries,
     Pulley,
     SpringLoad,
-    Stopped,
+    WithEndStops,
+    WithOffsets,
 )
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import (
@@ -39,27 +39,27 @@ from airmuscle.muscle import (
     RigidSeries,
     SeriesSpring,
 )
-from airmuscle.plant.energy_balance import Metered
+from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import (
     CheckValve,
     ClosedChamber,
     DistributedTube,
     FillDischarge,
-    Follower,
     IndexedValve,
-    Leaking,
-    Line,
     Manifold,
     ProportionalRegulator,
     ProportionalValve,
     RegulatedSupply,
-    Shared,
+    SecondOrderLag,
+    SharedSupply,
     Supply,
     Tank,
     ThreePosition,
     Tube,
     Valve,
+    WithLeak,
+    WithTubes,
 )
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.simulation.simulate import simulate
@@ -117,7 +117,7 @@ class Drawer:
         return self.one_of(plain, plain, plain, tank, regulated)
 
     def circuit(self, supply, muscles=1):
-        first, second, spool = self.valve(), self.valve(), Follower(self.about(40.0))
+        first, second, spool = self.valve(), self.valve(), SecondOrderLag(self.about(40.0))
         if muscles == 2:
             return self.around(ProportionalValve(supply, first, second, spool, 0.02, 2))
         return self.around(
@@ -126,7 +126,7 @@ class Drawer:
                 ThreePosition(supply, first, second),
                 ProportionalValve(supply, first, second, spool, self.rng.uniform(-0.1, 0.1)),
                 ProportionalRegulator(supply, first, second, spool),
-                FillDischarge(supply, first, second) if isinstance(supply, Shared) else ClosedChamber(),
+                FillDischarge(supply, first, second) if isinstance(supply, SharedSupply) else ClosedChamber(),
             )
         )
 
@@ -136,8 +136,8 @@ class Drawer:
         tube = self.one_of(
             lumped, DistributedTube(self.about(0.5), 3e-3, pieces, self.one_of(Isothermal(), EnergyBalance(0.0)))
         )
-        circuit = Line(circuit, tube) if self.rng.random() < 0.4 else circuit
-        return Leaking(circuit, Valve(self.about(1e-10, 10.0), 0.3)) if self.rng.random() < 0.3 else circuit
+        circuit = WithTubes(circuit, tube) if self.rng.random() < 0.4 else circuit
+        return WithLeak(circuit, Valve(self.about(1e-10, 10.0), 0.3)) if self.rng.random() < 0.3 else circuit
 
     def plant(self):
         about = self.about
@@ -146,17 +146,17 @@ class Drawer:
             mechanism = self.one_of(
                 HangingMass(about(10.0)), SpringLoad(about(5.0), 1e3, 5.0, 40.0), Isotonic(about(80.0), 2.0, 30.0),
                 Isometric(self.rng.uniform(-0.03, 0.15)), Pulley(0.04, about(10.0), 0.5, 0.02, 20.0),
-                Lever((0.05,), 2.0, 0.3, 0.01, 0.3, (0.1,)), Stopped(HangingMass(about(15.0)), -0.005, 0.03, stop),
+                Lever((0.05,), 2.0, 0.3, 0.01, 0.3, (0.1,)), WithEndStops(HangingMass(about(15.0)), -0.005, 0.03, stop),
             )  # fmt: skip
             return Plant(self.muscle("muscle"), self.circuit(self.supply()), mechanism, self.gas())
         mechanism = self.one_of(
-            AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.08), Mounted(HangingMass(about(20.0)), (0.0, 0.03)),
-            Lever((0.05, -0.05), 2.0, 0.3, 0.01, 0.3, (0.1, 0.1)), InSeries(HangingMass(about(8.0)), (0.3,), 15.0),
+            AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.08), WithOffsets(HangingMass(about(20.0)), (0.0, 0.03)),
+            Lever((0.05, -0.05), 2.0, 0.3, 0.01, 0.3, (0.1, 0.1)), MusclesInSeries(HangingMass(about(8.0)), (0.3,), 15.0),
         )  # fmt: skip
         circuits = self.one_of(
             (self.circuit(self.supply()), self.circuit(self.supply())),
             self.circuit(self.supply(), 2),
-            Manifold(self.supply(), (self.circuit(Shared()), self.circuit(Shared())), ("left", "right")),
+            Manifold(self.supply(), (self.circuit(SharedSupply()), self.circuit(SharedSupply())), ("left", "right")),
         )
         return Plant((self.muscle("left"), self.muscle("right")), circuits, mechanism, self.gas())
 
@@ -164,8 +164,8 @@ class Drawer:
         changes = {}
         for given in plant.commands:
             instants = np.cumsum(self.rng.uniform(0.02, 0.3, 5))
-            levels = self.rng.uniform(given.least, min(given.greatest, 4e5), 5)
-            levels = np.round(levels) if given.greatest <= 1.0 and self.rng.random() < 0.7 else levels
+            levels = self.rng.uniform(given.minimum, min(given.maximum, 4e5), 5)
+            levels = np.round(levels) if given.maximum <= 1.0 and self.rng.random() < 0.7 else levels
             changes[given.name] = tuple(zip(instants.tolist(), levels.tolist(), strict=True))
         return Schedule(changes)
 
@@ -186,7 +186,7 @@ def judged(seed):
     drawer = Drawer(seed)
     plant = drawer.plant()
     command = drawer.command(plant)
-    metered = Metered(plant)
+    metered = WithEnergyMeters(plant)
     start = metered.reset(plant.state_at(pressure=drawer.one_of(0.0, 1e5, 3e5)))
     run = simulate(metered, command, duration=1.5, start=start, output=5e-3, complete=False)
     for name in run:

@@ -1,6 +1,6 @@
 """Forward sensitivities: the derivative of what a run gives by a parameter, d x/d theta, to a stated accuracy.
 
-Against closed forms where there is one, against the law that `Sensitive` states, and against differences of runs. A run
+Against closed forms where there is one, against the law that `WithSensitivities` states, and against differences of runs. A run
 with fixed steps is differentiated step by step, so that there the differences agree to their own rounding.
 """
 
@@ -13,13 +13,13 @@ import pytest
 from filling import hanging, runs
 
 from airmuscle.compile import StateVariable
-from airmuscle.compile.program import prepared
-from airmuscle.control.inputs import Schedule, Signal
+from airmuscle.compile.program import compile_system
+from airmuscle.control.inputs import SampledSignal, Schedule
 from airmuscle.core import ops, tree
+from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import ParameterError
-from airmuscle.core.model import model, parameter
 from airmuscle.simulation.integrators import Rodas4, RungeKutta4
-from airmuscle.simulation.sensitivity import Sensitive, sensitivity
+from airmuscle.simulation.sensitivity import WithSensitivities, sensitivity
 
 PATHS = (
     "circuit.fill.conductance",
@@ -120,21 +120,21 @@ def with_leaf(system, path, value):
 
 def rows(system, start, times, command, method):
     segments = command.segments(system.inputs, 0.0, times[-1])
-    course = method.run(prepared(system), segments, 0.0, np.array(start), times)
+    course = method.run(compile_system(system), segments, 0.0, np.array(start), times)
     assert course.status == 0
     return course.rows
 
 
 def sensitive(system, paths):
     values = leaf_values(system)
-    return Sensitive(system, tuple((path,) for path in paths), tuple(abs(values[path]) for path in paths))
+    return WithSensitivities(system, tuple((path,) for path in paths), tuple(abs(values[path]) for path in paths))
 
 
 @pytest.mark.parametrize("method", [Rodas4(1e-9), RungeKutta4(1e-3)], ids=["Rodas4", "RungeKutta4"])
 def test_a_linear_system_has_its_closed_form(method):
     a, b, x0 = 1.5, 0.7, 2.0
     times = np.linspace(0.0, 2.0, 21)
-    system = Sensitive(Decay(a, b), (("a",), ("b",), ()), (a, b, x0))
+    system = WithSensitivities(Decay(a, b), (("a",), ("b",), ()), (a, b, x0))
     start = [x0, 0.0, *[0.0, 0.0, 1.0], *[0.0] * 3]  # the last column is the start's own value
     found = rows(system, start, times, Schedule({"u": ((0.0, 1.0),)}), method)
     e = np.exp(-a * times)
@@ -147,8 +147,8 @@ def test_an_input_that_moves_is_carried(method):
     """x' = -a x + b t from x = 0: x = b (t/a - (1 - exp(-a t))/a^2)."""
     a, b = 1.5, 0.7
     t = np.linspace(0.0, 2.0, 21)
-    system = Sensitive(Decay(a, b), (("a",), ("b",)), (a, b))
-    found = rows(system, [0.0] * 6, t, Signal({"u": ((0.0, 0.0), (2.0, 2.0))}), method)
+    system = WithSensitivities(Decay(a, b), (("a",), ("b",)), (a, b))
+    found = rows(system, [0.0] * 6, t, SampledSignal({"u": ((0.0, 0.0), (2.0, 2.0))}), method)
     e = np.exp(-a * t)
     by_a = b * (-t / a**2 - t * e / a**2 + 2 * (1 - e) / a**3)
     np.testing.assert_allclose(found[:, 2:4], np.column_stack([by_a, t / a - (1 - e) / a**2]), atol=2e-9)
@@ -168,10 +168,10 @@ def point(system, vector, scatter, rng):
 
 def printed(system, state, inputs):
     """Rates, and outputs by name."""
-    ready, x = prepared(system), np.array([state[s.name] for s in system.states])
+    ready, x = compile_system(system), np.array([state[s.name] for s in system.states])
     outputs = np.empty(ready.sizes.outputs)
     u = np.array([inputs[name] for name in system.inputs], dtype=float)
-    ready.call("outputs", x, u, ready.held, outputs)
+    ready.call("outputs", x, u, ready.precomputed, outputs)
     return ready.rates(x, u), dict(zip(ready.output_names, outputs, strict=True))
 
 
@@ -203,7 +203,7 @@ def test_printed_columns_are_the_law(states, columns):
 @pytest.mark.parametrize("name", FORMULAS)
 def test_every_operation_has_its_derivative(name):
     """Also the second derivatives, which `jac` of a differentiated system gives."""
-    system, rng = Sensitive(Formula(name), (("shift",), ()), (1.0, 1.0)), np.random.default_rng(2)
+    system, rng = WithSensitivities(Formula(name), (("shift",), ()), (1.0, 1.0)), np.random.default_rng(2)
     for x, y in [*rng.uniform(-1.4, 1.4, (20, 2)), (0.75, 1.0), (-0.25, 0.0)]:
         state = {"x": x, "y": y, "d x/d 0": 0.3, "d x/d 1": -1.1, "d y/d 0": 0.7, "d y/d 1": 0.2}
         assert_the_law(system, state, {}, 1e-11)
@@ -212,16 +212,16 @@ def test_every_operation_has_its_derivative(name):
 @pytest.mark.parametrize("name", [n for n in FORMULAS if n not in ("choices", "extremes")])
 def test_the_change_of_the_jacobian_is_its_derivative(name):
     """dJ from `jac` against central differences of J along each column."""
-    system, at = Sensitive(Formula(name), (("shift",), ()), (1.0, 1.0)), np.array([0.4, 0.9])
+    system, at = WithSensitivities(Formula(name), (("shift",), ()), (1.0, 1.0)), np.array([0.4, 0.9])
     s = np.array([[0.3, -1.1], [0.7, 0.2]])
 
     def matrix(z, shift, rows):
-        ready = prepared(dataclasses.replace(system, inner=Formula(name, shift)))
+        ready = compile_system(dataclasses.replace(system, inner=Formula(name, shift)))
         f, found = np.empty(6), np.empty(ready.sizes.jacobian)
-        ready.call("jac", np.concatenate([z, rows.ravel()]), np.empty(0), ready.held, f, found)
+        ready.call("jac", np.concatenate([z, rows.ravel()]), np.empty(0), ready.precomputed, f, found)
         return found
 
-    whole, distinct = matrix(at, 0.25, s), prepared(Formula(name)).sizes.jacobian
+    whole, distinct = matrix(at, 0.25, s), compile_system(Formula(name)).sizes.jacobian
     moving = (whole.size - distinct) // 2
     changes = whole[distinct:].reshape(moving, 2)
     for k, by_shift in enumerate((1.0, 0.0)):
@@ -233,7 +233,7 @@ def test_the_change_of_the_jacobian_is_its_derivative(name):
 
 
 def test_outputs_carry_their_derivatives_and_their_slope_in_time():
-    system = Sensitive(Decay(1.5, 0.7), (("a",), ("b",)), (1.5, 0.7))
+    system = WithSensitivities(Decay(1.5, 0.7), (("a",), ("b",)), (1.5, 0.7))
     state = {"x": 2.0, "z": 0.3, "d x/d 0": 0.1, "d z/d 0": 0.2, "d x/d 1": -0.4, "d z/d 1": 0.0}
     found = system.outputs(state, {"u": 1.0})
     assert found["y"] == pytest.approx(0.7 * 4.0)
@@ -245,7 +245,7 @@ def test_outputs_carry_their_derivatives_and_their_slope_in_time():
 def test_a_group_shares_one_value():
     run = runs()[3]
     both = ("circuit.fill.conductance", "circuit.discharge.conductance")
-    system = Sensitive(run.system, (both, both[:1], both[1:]), (1e-9,) * 3)
+    system = WithSensitivities(run.system, (both, both[:1], both[1:]), (1e-9,) * 3)
     start = [*run.vector, *[0.0] * 9]
     found = rows(system, start, TIMES, COMMAND, Rodas4(1e-8))[:, 3:].reshape(TIMES.size, 3, 3)
     size = np.abs(found[:, :, 0]).max(axis=0)
@@ -295,12 +295,16 @@ def swings(columns=(("a",), ("b",), ("a", "b"), ())):
     """A pendulum started by hand, its own columns zero, that of the start one."""
     s = np.zeros((2, len(columns)))
     s[0, -1] = 1.0
-    return Sensitive(Swing(), columns, (1.0,) * len(columns)), np.array([1.0, 0.0, *s.ravel()])
+    return WithSensitivities(Swing(), columns, (1.0,) * len(columns)), np.array([1.0, 0.0, *s.ravel()])
 
 
 def test_fixed_steps_are_differentiated_themselves():
     """Steps so long that the run errs by 1e-3 have the derivatives of that run, not of the solution."""
-    (system, start), times, command = swings(), np.linspace(0.0, 6.0, 21), Signal({"u": ((1.0, 0.0), (5.0, 1.0))})
+    (system, start), times, command = (
+        swings(),
+        np.linspace(0.0, 6.0, 21),
+        SampledSignal({"u": ((1.0, 0.0), (5.0, 1.0))}),
+    )
     found, exact = (rows(system, start, times, command, RungeKutta4(h)) for h in (0.3, 1e-3))
     assert 1e-3 < np.abs(found - exact).max() < 0.1
     for k, paths in enumerate(system.columns):
@@ -316,7 +320,11 @@ def test_fixed_steps_are_differentiated_themselves():
 
 def test_rodas4_keeps_its_order():
     """Derivatives converge as the states do; without the change of the Jacobian they fall to order one."""
-    (system, start), times, command = swings(), np.linspace(0.0, 6.0, 21), Signal({"u": ((1.0, 0.0), (5.0, 1.0))})
+    (system, start), times, command = (
+        swings(),
+        np.linspace(0.0, 6.0, 21),
+        SampledSignal({"u": ((1.0, 0.0), (5.0, 1.0))}),
+    )
     exact = rows(system, start, times, command, RungeKutta4(1e-3))
     for rtol in (1e-5, 1e-7, 1e-9):
         errors = np.abs(rows(system, start, times, command, Rodas4(rtol)) - exact).max(axis=0)
@@ -327,7 +335,7 @@ def test_rodas4_keeps_its_order():
 def test_columns_share_one_factorisation():
     """The factors are those of the inner system; each column adds the changes of the Jacobian alone."""
     system, _ = plant_case()
-    alone, together = prepared(system).sizes, prepared(sensitive(system, PATHS)).sizes
+    alone, together = compile_system(system).sizes, compile_system(sensitive(system, PATHS)).sizes
     assert together.states == 9 * alone.states
     assert together.jacobian <= 9 * alone.jacobian
     assert together.factors - alone.factors == together.jacobian - alone.jacobian
@@ -337,7 +345,7 @@ def test_only_what_is_observed_is_given():
     system, start = plant_case()
     whole = sensitive(system, PATHS[:2])
     some = dataclasses.replace(whole, observed=("position", "pressure"))
-    assert prepared(some).output_names == (
+    assert compile_system(some).output_names == (
         "position", "pressure", "d position/d 0", "d position/d 1", "d pressure/d 0", "d pressure/d 1",
         "position.rate", "pressure.rate",
     )  # fmt: skip
@@ -352,14 +360,14 @@ def test_only_what_is_observed_is_given():
 
 def test_unknown_paths_and_missing_scales_are_refused():
     with pytest.raises(ParameterError, match=r"no parameter 'mechanism.mas'.*Did you mean 'mechanism.mass'"):
-        Sensitive(hanging(), (("mechanism.mas",),), (1.0,))
+        WithSensitivities(hanging(), (("mechanism.mas",),), (1.0,))
     with pytest.raises(ParameterError, match="2 columns need as many scales"):
-        Sensitive(hanging(), (("mechanism.mass",), ()), (1.0,))
+        WithSensitivities(hanging(), (("mechanism.mass",), ()), (1.0,))
     with pytest.raises(ParameterError, match="0 columns need as many scales, one at least"):
-        Sensitive(hanging(), (), ())
+        WithSensitivities(hanging(), (), ())
 
 
 def test_another_parameter_set_costs_no_program():
     system, _ = plant_case()
     heavier = dataclasses.replace(system, mechanism=dataclasses.replace(system.mechanism, mass=6.0))
-    assert prepared(sensitive(system, PATHS)).program is prepared(sensitive(heavier, PATHS)).program
+    assert compile_system(sensitive(system, PATHS)).program is compile_system(sensitive(heavier, PATHS)).program

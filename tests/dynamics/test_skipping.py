@@ -1,7 +1,7 @@
 """What a zero makes superfluous is skipped, and nothing else changes.
 
 Law: where a gate is zero, whatever is multiplied by it does not matter. So code with branches gives what the same code
-gives without: on graphs drawn at random, on plants at shut valves, at and beyond the ends of a box, one by one and in
+gives without: on graphs drawn at random, on plants at shut valves, at and beyond the ends of a validity range, one by one and in
 lanes; it computes what it needs, and in lanes no plant sees its neighbour. Opponent: the instructions in their order.
 """
 
@@ -19,12 +19,12 @@ from filling import hanging
 from airmuscle.compile import StateVariable
 from airmuscle.compile.ir.branches import COMMANDED, STEADY, VARYING, skipping
 from airmuscle.compile.ir.instructions import MAXIMUM, MINIMUM, SELECT, Code, Instruction, Operand
-from airmuscle.compile.ir.scheduling import Skippable
+from airmuscle.compile.ir.scheduling import Branch
 from airmuscle.compile.llvm import emit
-from airmuscle.compile.program import Program, prepared
+from airmuscle.compile.program import Program, compile_system
 from airmuscle.control.inputs import Schedule
 from airmuscle.core import ops
-from airmuscle.core.model import model, parameter
+from airmuscle.core.declaration import model, parameter
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, ThreePosition, Valve
 from airmuscle.simulation.batch import simulate_batch
@@ -111,15 +111,15 @@ def computed(items: Any, leaves: dict[Operand, float]) -> tuple[Values, int]:
     """The values of the results, and how many instructions were run."""
     values, count = Values(leaves), 0
     for item in items:
-        if isinstance(item, Skippable) and not any(values[gate] for gate in item.gates):
+        if isinstance(item, Branch) and not any(values[gate] for gate in item.gates):
             values.update({result: values[value] for result, value in item.instead})
             continue
         inner = Values(values)
-        for line in item.body if isinstance(item, Skippable) else [item]:
+        for line in item.body if isinstance(item, Branch) else [item]:
             number = MEANING[line.operation](*(inner[a] for a in line.arguments))
             inner[line.result] = float(np.clip(number, -1e3, 1e3)) if line.operation == casadi.OP_SQ else number
             count += 1
-        seen = [result for result, _ in item.instead] if isinstance(item, Skippable) else [item.result]
+        seen = [result for result, _ in item.instead] if isinstance(item, Branch) else [item.result]
         values.update({result: inner[result] for result in seen})
     return values, count
 
@@ -137,7 +137,7 @@ def test_random_code_gives_the_same_with_branches(monkeypatch: pytest.MonkeyPatc
                 early.update(line.arguments)
         for ahead in (frozenset[Operand](), frozenset(early)):
             items = skipping(code, level, ahead)
-            pieces = [{line.result for line in item.body} for item in items if isinstance(item, Skippable)]
+            pieces = [{line.result for line in item.body} for item in items if isinstance(item, Branch)]
             assert all(piece <= ahead or not piece & ahead for piece in pieces)
             for _ in range(3):
                 leaves = {leaf: rng.choice([-2.0, -1.0, 0.0, 0.5, 1.0, 3.0]) for leaf in LEAVES[:4]}
@@ -161,21 +161,21 @@ def test_a_shut_valve_and_a_box_not_left_are_skipped() -> None:
         patch.setattr(emit, "skipping", lambda *a: kept.append((a[0], real(*a))) or kept[-1][1])
         Program(plant(FillDischarge))
     code, items = kept[0]
-    skipped = [len(item.body) for item in items if isinstance(item, Skippable)]
+    skipped = [len(item.body) for item in items if isinstance(item, Branch)]
     assert len(skipped) >= 3
     assert sum(skipped) > len(code.body) / 3
-    assert {len(item.gates) for item in items if isinstance(item, Skippable)} == {1}
+    assert {len(item.gates) for item in items if isinstance(item, Branch)} == {1}
 
 
 @pytest.mark.parametrize("circuit", [FillDischarge, ThreePosition])
 def test_plant_has_the_rates_and_slopes_that_it_has_without_branches(circuit: Any) -> None:
-    """At shut and open valves, within the box of the surface, on its edges and beyond them."""
+    """At shut and open valves, within the validity range of the surface, on its edges and beyond them."""
     system = plant(circuit)
-    new = prepared(system)
+    new = compile_system(system)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(emit, "skipping", lambda code, *rest: list(code.body))
         old = Program(system)
-    held, sizes = old.held(new.parameters), new.sizes
+    held, sizes = old.precompute(new.parameters), new.sizes
     names = [s.name for s in system.states]
     rng = np.random.default_rng(4)
     for openings in (
@@ -189,7 +189,7 @@ def test_plant_has_the_rates_and_slopes_that_it_has_without_branches(circuit: An
             x = np.array([state[name] for name in names])
             u, f, g = np.array(openings), np.empty(sizes.states), np.empty(sizes.states)
             j, k = np.empty(sizes.jacobian), np.empty(sizes.jacobian)
-            new.call("jac", x, u, new.held, f, j)
+            new.call("jac", x, u, new.precomputed, f, j)
             _call(old, "jac", x, u, held, g, k)
             np.testing.assert_allclose(f, g, rtol=1e-12, atol=1e-15 * np.abs(g).max())
             np.testing.assert_allclose(j, k, rtol=1e-9, atol=1e-13 * np.abs(k).max())
@@ -225,7 +225,7 @@ class Gated:
 
 
 def test_what_is_skipped_is_not_computed() -> None:
-    ready = prepared(Gated())
+    ready = compile_system(Gated())
     assert ready.rates([2.0], [0.0]) == pytest.approx([-2.0])
     assert np.isnan(ready.rates([2.0], [0.5])).all()
     assert np.isnan(ready.rates([2.0], [np.nan])).all()

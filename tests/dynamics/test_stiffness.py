@@ -13,36 +13,36 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joints import chosen_muscle
 
-from airmuscle.analysis.equilibrium import equilibrium
-from airmuscle.analysis.stiffness import stiffness
+from airmuscle.analysis.equilibrium import find_equilibrium
+from airmuscle.analysis.static_stiffness import stiffness
 from airmuscle.characteristic.virtual_work import VirtualWork
-from airmuscle.control.trajectory import follow
+from airmuscle.control.trajectory import spline_trajectory
 from airmuscle.geometry import Braid
-from airmuscle.mechanism import AntagonisticJoint, HangingMass, InSeries, Isometric, Lever, Prescribed
+from airmuscle.mechanism import AntagonisticJoint, HangingMass, Isometric, Lever, MusclesInSeries, PrescribedMotion
 from airmuscle.muscle import LinearSpring, Muscle, SeriesSpring
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber
-from airmuscle.pneumatics.gas import HEAT_RATIO, EnergyBalance, Isothermal, Polytropic, absolute
+from airmuscle.pneumatics.gas import HEAT_CAPACITY_RATIO, EnergyBalance, Isothermal, Polytropic, absolute
 from airmuscle.simulation.integrators import Rodas4
 from airmuscle.simulation.simulate import simulate
 
 BRAID = Braid(0.01, 0.4363, 0.2)
 MUSCLE = Muscle(VirtualWork(BRAID), BRAID, LinearSpring(3000.0))
 """Without a damper, so that a pull however quick shows the stiffness alone."""
-EXPONENTS = [(Isothermal(), 1.0), (Polytropic(1.2), 1.2), (EnergyBalance(0.0), HEAT_RATIO)]
+EXPONENTS = [(Isothermal(), 1.0), (Polytropic(1.2), 1.2), (EnergyBalance(0.0), HEAT_CAPACITY_RATIO)]
 by_gas = pytest.mark.parametrize(("gas", "exponent"), EXPONENTS, ids=str)
 
 
 def pulled(gas, pressure=3e5, contraction=0.12):
     """The tensions of a muscle that is slowly pulled by 0.5 mm on either side of a contraction, valves shut."""
-    plant = Plant(MUSCLE, ClosedChamber(), Prescribed(), gas)
+    plant = Plant(MUSCLE, ClosedChamber(), PrescribedMotion(), gas)
     middle, amplitude = contraction * 0.2, 5e-4
-    motion = follow([0.0, 2.0, 4.0], [middle + amplitude, middle, middle - amplitude])
+    motion = spline_trajectory([0.0, 2.0, 4.0], [middle + amplitude, middle, middle - amplitude])
     start = plant.state_at(pressure=pressure, position=middle)
     start |= {"position": middle + amplitude, "speed": 0.0}
     if "internal_energy" in start:  # put there without heat, as its content in the middle is
         before, after = (BRAID.volume(x / 0.2) for x in (middle, middle + amplitude))
-        start["internal_energy"] *= (before / after) ** (HEAT_RATIO - 1)
+        start["internal_energy"] *= (before / after) ** (HEAT_CAPACITY_RATIO - 1)
     run = simulate(plant, motion.command, duration=4.0, start=start, method=Rodas4(1e-11), output=0.01)
     return plant, run
 
@@ -87,7 +87,7 @@ def test_a_series_spring_stands_in_series():
 
     def tension(contraction, **air):
         plant = replace(middle, mechanism=Isometric(contraction))
-        return plant.outputs(equilibrium(plant, **air), {})["force"]
+        return plant.outputs(find_equilibrium(plant, **air), {})["force"]
 
     for expected, air in (
         (found.constant_pressure, {"pressure": 2e5}),
@@ -107,7 +107,7 @@ def test_a_series_spring_stands_in_series():
     [
         AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12),
         Lever((0.05, 0.04), 4.0, 0.3, offsets=(0.1, 0.12)),
-        InSeries(HangingMass(5.0), (0.2,)),
+        MusclesInSeries(HangingMass(5.0), (0.2,)),
     ],
     ids=lambda m: type(m).__name__,
 )
@@ -124,7 +124,7 @@ def test_that_of_a_coordinate_is_the_slope_of_the_pull_with_the_same_air(mechani
         for sign in (1, -1):
             moved = {**state, c.name: state[c.name] + sign * h}
             tensions = [float(port.tension) for port in plant.ports(moved)]
-            pulls.append(mechanism.pulls(moved, tensions, plant.resting_lengths)[c.name])
+            pulls.append(mechanism.generalised_forces(moved, tensions, plant.resting_lengths)[c.name])
         assert found[c.name].shut_valves == pytest.approx(-(pulls[0] - pulls[1]) / (2 * h), rel=1e-5)
         assert found[c.name].shut_valves > found[c.name].constant_pressure
 

@@ -9,7 +9,7 @@ import pytest
 
 import airmuscle as am
 from airmuscle.core.errors import AirmuscleWarning, TraceError
-from airmuscle.plant.energy_balance import Metered
+from airmuscle.plant.energy_balance import WithEnergyMeters
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def plant():
 
 
 def test_it_lifts_its_load_to_where_the_law_balances_it(plant):
-    start = am.equilibrium(plant, pressure=0.11e6)
+    start = am.find_equilibrium(plant, pressure=0.11e6)
     run = am.simulate(plant, am.Schedule({"fill": ((0.1, 1),)}), duration=8.0, start=start)
     end = {name: run[name][-1] for name in run}
     law = plant.muscles[0].contractile
@@ -33,8 +33,8 @@ def test_it_lifts_its_load_to_where_the_law_balances_it(plant):
 
 
 def test_its_work_is_the_energy_of_the_load(plant):
-    metered = Metered(plant)
-    start = am.equilibrium(plant, pressure=0.11e6) | {s.name: 0.0 for s in metered.states[3:]}
+    metered = WithEnergyMeters(plant)
+    start = am.find_equilibrium(plant, pressure=0.11e6) | {s.name: 0.0 for s in metered.states[3:]}
     command = am.Schedule({"fill": ((0.1, 1), (1.0, 0))})
     run = am.simulate(metered, command, duration=2.0, start=start, method=am.Rodas4(1e-10))
     energy = run["kinetic_energy"] + run["potential_energy"]

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.control.driver import Driven, OnOff
+from airmuscle.control.driver import SolenoidDriver, WithDrivers
 from airmuscle.control.inputs import Schedule
 from airmuscle.friction import LuGre, MaxwellSlip
 from airmuscle.mechanism import HangingMass
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, DirectionalDamper, EndStop, LaggingWall, SeriesSpring
-from airmuscle.plant.energy_balance import Metered
+from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import DistributedTube, FillDischarge, Line, RegulatedSupply, Supply, Tank, Tube, Valve
+from airmuscle.pneumatics import DistributedTube, FillDischarge, RegulatedSupply, Supply, Tank, Tube, Valve, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance
 from airmuscle.simulation.integrators import Rodas4
 from airmuscle.simulation.simulate import simulate
@@ -50,7 +50,7 @@ def drawn(seed):
     supply = RegulatedSupply(Tank(Supply(about(7e5, 1.1)), Valve(5e-9, 0.3), 2e-3, heat), Valve(4e-8, 0.3), 5e5)
     valves = FillDischarge(supply, Valve(about(1.5e-8, 1.3), 0.4), Valve(about(3e-8, 1.3), 0.3))
     tube = Tube.of_size(about(0.5), about(5e-3, 1.3), 2, heat)
-    plant = Plant(muscle, Line(valves, tube), HangingMass(about(20.0, 1.3)), heat)
+    plant = Plant(muscle, WithTubes(valves, tube), HangingMass(about(20.0, 1.3)), heat)
     return plant, switched(rng)
 
 
@@ -63,13 +63,13 @@ def switched(rng, count=SWITCHINGS):
         name: tuple(zip(instants[:, pair].ravel().tolist(), levels.tolist(), strict=True))
         for name, pair in (("fill", [0, 1]), ("discharge", [2, 3]))
     }
-    drivers = {"fill": OnOff(3.1e-3, 4.3e-3, 1e-3), "discharge": OnOff(2.2e-3, 5.7e-3, 0.0, 2e-3)}
-    return Driven(Schedule(changes), drivers), float(instants[-1, -1]) + 0.1
+    drivers = {"fill": SolenoidDriver(3.1e-3, 4.3e-3, 1e-3), "discharge": SolenoidDriver(2.2e-3, 5.7e-3, 0.0, 2e-3)}
+    return WithDrivers(Schedule(changes), drivers), float(instants[-1, -1]) + 0.1
 
 
 def run_of(seed, rtol):
     plant, (command, duration) = drawn(seed)
-    metered = Metered(plant)
+    metered = WithEnergyMeters(plant)
     start = metered.reset(plant.state_at(pressure=1e5, position=0.0))
     segments = command.segments(plant.inputs, 0.0, duration)
     assert segments.ends.size > SWITCHINGS
@@ -142,7 +142,7 @@ def series(seed):
 
 def test_a_series_spring_and_a_tube_with_inertia_keep_the_books_as_well():
     plant = series(1)
-    metered, (command, duration) = Metered(plant), switched(np.random.default_rng(1), 400)
+    metered, (command, duration) = WithEnergyMeters(plant), switched(np.random.default_rng(1), 400)
     start = metered.reset(plant.state_at(pressure=1e5, position=0.0))
     run = simulate(metered, command, duration=duration, start=start, method=Rodas4(1e-6), output=1e-3)
     found = gaps(run)

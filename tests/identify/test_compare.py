@@ -18,13 +18,13 @@ from typer.testing import CliRunner
 import airmuscle as am
 from airmuscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.cli.app import app
-from airmuscle.cli.fit_more import part_of
+from airmuscle.cli.fit_options import part_of
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
-from airmuscle.identify import Blocks, Candidate, Levels, Runs, Specimens, compare
+from airmuscle.identify import BlockSplit, Candidate, LevelSplit, RunSplit, SpecimenSplit, compare
 from airmuscle.identify.candidates import surface
+from airmuscle.identify.cross_validation import KEPT, natural
 from airmuscle.identify.force_of import force_of
-from airmuscle.identify.leave_out import KEPT, natural
 from airmuscle.recording import Recording, write_csv
 
 TRUTH = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
@@ -55,7 +55,7 @@ CANDIDATES = (
 
 
 def test_the_order_in_sample_is_not_the_order_on_what_was_left_out():
-    found = compare(bench(), CANDIDATES, leave_out=Runs())
+    found = compare(bench(), CANDIDATES, leave_out=RunSplit())
     in_sample = min(found.contenders, key=lambda c: c.in_sample)
     assert in_sample.candidate.name == "surface of degree 5"
     assert found["surface of degree 5"].in_sample < 0.8 * found["braid"].in_sample
@@ -66,7 +66,7 @@ def test_the_order_in_sample_is_not_the_order_on_what_was_left_out():
 
 
 def test_what_is_not_determined_is_excluded_with_its_reason():
-    found = compare(bench(), CANDIDATES, leave_out=Runs())
+    found = compare(bench(), CANDIDATES, leave_out=RunSplit())
     assert [e.name for e in found.excluded] == ["surface of degree 6"]
     assert "run 0.000" in found.excluded[0].why
     assert "levels" in found.excluded[0].why
@@ -77,7 +77,7 @@ def test_a_part_left_out_is_not_among_the_points_of_its_fit():
     """With one run ruined, its own error is huge and that of laws fitted without it is what the truth leaves."""
     runs = bench()
     ruined = runs[3].with_columns(force=runs[3]["force"] + 500.0)
-    found = compare([*runs[:3], ruined, *runs[4:]], CANDIDATES[:1], leave_out=Runs())
+    found = compare([*runs[:3], ruined, *runs[4:]], CANDIDATES[:1], leave_out=RunSplit())
     errors = {part.part: part.rms for part in found.recommended.left_out}
     clean = fit_without(runs, 3)
     assert errors["run 0.100"] == pytest.approx(clean, rel=1e-6)
@@ -94,12 +94,12 @@ def test_of_laws_that_are_as_good_the_simplest_is_taken():
     exact = [isometric(c, seed=i, noise=1.0) for i, c in enumerate(np.linspace(0.0, 0.2, 9))]
     free = Candidate("braid", START)
     held = Candidate("braid, true ends", TonduLopez2000(START.geometry, 1.2), ("end_correction",))
-    found = compare(exact, [free, held], leave_out=Runs())
+    found = compare(exact, [free, held], leave_out=RunSplit())
     assert found.recommended.candidate.name == "braid, true ends"
 
 
 def test_aicc_is_hurvich_and_tsais():
-    contender = compare(bench(), CANDIDATES[:1], leave_out=Runs()).recommended
+    contender = compare(bench(), CANDIDATES[:1], leave_out=RunSplit()).recommended
     n, k = 210, 4
     pulls = sum(int((run["force"] > 0).sum()) for run in bench())
     assert pulls == n
@@ -109,21 +109,21 @@ def test_aicc_is_hurvich_and_tsais():
 
 def test_what_is_left_out_by_itself_is_the_widest_that_there_are_three_of():
     runs = bench()
-    assert natural(runs) == Runs()
-    assert natural([run.with_constants(specimen=run.origin) for run in runs]) == Specimens()
+    assert natural(runs) == RunSplit()
+    assert natural([run.with_constants(specimen=run.origin) for run in runs]) == SpecimenSplit()
     whole = Recording({n: np.concatenate([r[n] for r in runs]) for n in ("pressure", "contraction", "force")}, "whole")
-    assert natural([whole]) == Levels("contraction")
+    assert natural([whole]) == LevelSplit("contraction")
     with pytest.raises(IdentificationError, match="more levels"):
         natural([runs[0].rows(slice(0, 2))])
 
 
 def test_levels_are_what_was_held():
     runs = bench()
-    labels = [array.tolist() for array in Levels("contraction").labels(runs)]
+    labels = [array.tolist() for array in LevelSplit("contraction").labels(runs)]
     assert all(len(set(names)) == 1 for names in labels)
     assert len({names[0] for names in labels}) == 7
     with pytest.raises(IdentificationError, match="one run"):
-        compare(runs[0], CANDIDATES, leave_out=Runs())
+        compare(runs[0], CANDIDATES, leave_out=RunSplit())
 
 
 def test_laws_of_every_direction_are_judged_in_force():
@@ -141,23 +141,23 @@ def labelled(run: Recording, how) -> list[str]:
 
 def test_blocks_leave_stretches_of_every_run_out_and_keep_its_ends():
     run = isometric(0.1, seed=1, rows=100)
-    labels = labelled(run, Blocks(count=4))
+    labels = labelled(run, BlockSplit(count=4))
     shares = (run["pressure"] - run["pressure"].min()) / np.ptp(run["pressure"])
     inside = (shares >= 1 / 8) & (shares < 7 / 8)
     assert [label == KEPT for label in labels] == (~inside).tolist()
     stretch = (8 * shares[inside]).astype(int)
     assert [label for label in labels if label != KEPT] == [f"block {s % 4 + 1}" for s in stretch]
-    two = Blocks(count=4).labels([run, run])
+    two = BlockSplit(count=4).labels([run, run])
     assert all(a == KEPT or a != b for a, b in zip(*two, strict=True))
-    found = compare(bench(), CANDIDATES[:1], leave_out=Blocks())
+    found = compare(bench(), CANDIDATES[:1], leave_out=BlockSplit())
     rows = sum(part.rows for part in found.recommended.left_out)
-    assert rows == int((np.concatenate(Blocks().labels(bench())) != KEPT).sum())
+    assert rows == int((np.concatenate(BlockSplit().labels(bench())) != KEPT).sum())
     with pytest.raises(ParameterError, match="2 or more"):
-        Blocks(count=1)
+        BlockSplit(count=1)
 
 
 def test_what_is_left_out_decides_what_the_law_is_for():
-    """Specimens that each have a bend of their own: within them a rich law is right, and for another a plain one."""
+    """SpecimenSplit that each have a bend of their own: within them a rich law is right, and for another a plain one."""
     inner = ContractileSurface((300.0, -200.0, 180.0), 0.5e5, 6e5, 0.0, 0.2, -1e6, 1e6, 1)
     runs = []
     for i, length in enumerate((0.1, 0.17, 0.26, 0.4)):
@@ -169,7 +169,7 @@ def test_what_is_left_out_decides_what_the_law_is_for():
             columns = {"pressure": pressure, "contraction": held, "force": force}
             runs.append(Recording(columns, f"run {len(runs)}", {"resting_length": length, "specimen": f"{length} m"}))
     candidates = [Candidate("plain", surface(1)), Candidate("rich", InverseLength(surface(5), surface(3), 0.4, 0.4))]
-    within, beyond = (compare(runs, candidates, leave_out=how) for how in (Blocks(), Specimens()))
+    within, beyond = (compare(runs, candidates, leave_out=how) for how in (BlockSplit(), SpecimenSplit()))
     assert (within.recommended.candidate.name, beyond.recommended.candidate.name) == ("rich", "plain")
     assert within.purpose in within.reason
     assert "muscles and contractions that were measured" in within.reason
@@ -178,14 +178,15 @@ def test_what_is_left_out_decides_what_the_law_is_for():
 
 
 @pytest.mark.parametrize(
-    ("word", "how"), [("run", Runs()), ("specimen", Specimens()), ("block", Blocks()), ("pressure", Levels("pressure"))]
+    ("word", "how"),
+    [("run", RunSplit()), ("specimen", SpecimenSplit()), ("block", BlockSplit()), ("pressure", LevelSplit("pressure"))],
 )
 def test_the_command_knows_each_way_by_a_word(word: str, how):
     assert part_of(word) == how
 
 
 def test_each_way_of_leaving_out_has_a_purpose_of_its_own():
-    purposes = [how.purpose for how in (Runs(), Specimens(), Levels("pressure"), Blocks())]
+    purposes = [how.purpose for how in (RunSplit(), SpecimenSplit(), LevelSplit("pressure"), BlockSplit())]
     assert len(set(purposes)) == 4
 
 
@@ -199,7 +200,7 @@ def test_the_command_writes_a_muscle_that_loads_back(tmp_path: Path):
     done = CliRunner().invoke(app, ["fit", *map(str, files), *options])
     assert done.exit_code == 0, done.output
     printed = json.loads(done.stdout)
-    assert printed["purpose"] == Runs().purpose
+    assert printed["purpose"] == RunSplit().purpose
     assert printed["recommended"] == printed["ranking"][0]["law"] or "standard error" in printed["reason"]
     entry = am.load(out / "muscle.toml")
     fitted = {p["name"]: p["value"] for p in printed["fit"]["parameters"]}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from airmuscle.identify.dynamic.descent import descended, step_within
+from airmuscle.identify.dynamic.levenberg_marquardt import descended, step_within
 
 FREE = np.full(2, -np.inf), np.full(2, np.inf)
 
@@ -115,7 +115,7 @@ def _place(x, seed):
 
 @pytest.mark.parametrize("seed", range(12))
 def test_jumps_of_the_sum_do_not_hinder_its_end(seed):
-    """Runs of adaptive steps: the sum jumps by a millionth from place to place, while the slopes are right."""
+    """RunSplit of adaptive steps: the sum jumps by a millionth from place to place, while the slopes are right."""
     asked = []
 
     def jumping(x):

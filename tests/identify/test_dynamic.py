@@ -11,25 +11,18 @@ import numpy as np
 import pytest
 from filling import hanging
 
-from airmuscle.analysis.equilibrium import equilibrium
+from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.control.inputs import Schedule
 from airmuscle.core import tree
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.friction import Dahl
 from airmuscle.geometry import Vessel
-from airmuscle.identify.dynamic import (
-    Experiment,
-    Start,
-    StartTime,
-    StartValue,
-    fit_dynamic,
-    identifiable,
-    where_sensed,
-)
+from airmuscle.identify.dynamic import Experiment, InitialConditions, StartTime, StartValue, fit_dynamic, where_sensed
+from airmuscle.identify.dynamic import identifiable
 from airmuscle.mechanism import HangingMass, Isometric
 from airmuscle.muscle import Muscle, SwellingWall
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Leaking, Line, Supply, Tube, Valve
+from airmuscle.pneumatics import FillDischarge, Supply, Tube, Valve, WithLeak, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Polytropic
 from airmuscle.simulation.integrators import INTERRUPTED, Rodas4
 from airmuscle.simulation.simulate import simulate
@@ -72,7 +65,7 @@ def truth(plant, name):
 def recorded(plant, seed, shift=0.0):
     run = simulate(plant, FILL, duration=2.0, output=0.01)
     run = run.with_columns(time=run["time"] + shift)
-    return Experiment(noisy(run, seed, **SENSORS), FILL, Start.at_rest(plant, 0.0), 0.0)
+    return Experiment(noisy(run, seed, **SENSORS), FILL, InitialConditions.at_rest(plant, 0.0), 0.0)
 
 
 def rigid_plant():
@@ -83,7 +76,7 @@ def rigid_plant():
 
 def rigid_fill(plant, seed=3):
     command = Schedule({"fill": ((0.0, 1.0),)})
-    start = Start.held(plant, 0.0)
+    start = InitialConditions.held(plant, 0.0)
     run = simulate(plant, command, duration=1.0, start=plant.state_at(pressure=0.0), output=0.005)
     return Experiment(noisy(run, seed, pressure=300.0), command, start)
 
@@ -110,14 +103,14 @@ def test_what_the_simulation_used_is_found_within_the_stated_bands():
         truth(plants[1], "circuit.supply.pressure"),
         -0.004,
     ]
-    distance = (fit.values - expected) / np.array([e.deviation for e in fit.estimates])
+    distance = (fit.values - expected) / np.array([e.stderr for e in fit.estimates])
     assert np.abs(distance).max() < 3.5
     squared = distance @ np.linalg.solve(fit.correlations, distance)
     assert 1.83 < squared < 31.3  # 0.1 % and 99.9 % of chi squared with eleven degrees of freedom
-    assert fit.scatter == pytest.approx(1.0, abs=0.06)
+    assert fit.residual_std == pytest.approx(1.0, abs=0.06)
     assert fit.reached >= 2
     assert fit.rms("pressure", 1) == pytest.approx(500.0, rel=0.1)
-    assert all(e.deviation < 0.05 * e.value for e in fit.estimates[:7])
+    assert all(e.stderr < 0.05 * e.value for e in fit.estimates[:7])
 
 
 def test_the_bands_hold_the_truth_as_often_as_they_say():
@@ -126,7 +119,7 @@ def test_the_bands_hold_the_truth_as_often_as_they_say():
     held = 0
     for seed in range(60):
         fit = fit_dynamic(plant, [rigid_fill(plant, 100 + seed)], free=free, observed={"pressure": 300.0})
-        held += sum(abs(e.value - truth(plant, e.name)) < 1.96 * e.deviation for e in fit.estimates)
+        held += sum(abs(e.value - truth(plant, e.name)) < 1.96 * e.stderr for e in fit.estimates)
     assert 162 <= held <= 180
 
 
@@ -143,7 +136,7 @@ def test_conductance_against_volume_is_named_with_the_experiment_that_separates_
     assert "rigid vessel of known volume" in found.experiment
     assert "cannot tell apart" in str(fit)
     assert fit.identifiability.rank == 1
-    assert all(np.isnan(e.deviation) for e in fit.estimates)
+    assert all(np.isnan(e.stderr) for e in fit.estimates)
 
 
 def test_with_the_volume_known_nothing_is_named():
@@ -153,7 +146,7 @@ def test_with_the_volume_known_nothing_is_named():
     assert fit.identifiability.undetermined == ()
     assert not any("tell apart" in note for note in fit.notes)
     found = fit["circuit.fill.conductance"]
-    assert abs(found.value - 2.6167e-9) < 3 * found.deviation
+    assert abs(found.value - 2.6167e-9) < 3 * found.stderr
 
 
 def test_a_parameter_that_nothing_depends_on_is_named():
@@ -163,7 +156,7 @@ def test_a_parameter_that_nothing_depends_on_is_named():
     (found,) = fit.identifiability.undetermined
     assert [name for name, _ in found.shares] == ["circuit.discharge.conductance"]
     assert "hardly depend on circuit.discharge.conductance" in str(found)
-    assert np.isfinite(fit["circuit.fill.conductance"].deviation)
+    assert np.isfinite(fit["circuit.fill.conductance"].stderr)
 
 
 def test_singular_values_of_a_known_design():
@@ -183,7 +176,7 @@ def test_a_profile_agrees_with_the_standard_deviation_where_the_problem_is_nearl
     fit = fit_dynamic(plant, [rigid_fill(plant)], free=free, observed={"pressure": 300.0})
     found, estimate = fit.profile("circuit.fill.critical_ratio", 6), fit["circuit.fill.critical_ratio"]
     low, high = found.interval
-    assert high - low == pytest.approx(2 * 1.96 * estimate.deviation, rel=0.1)
+    assert high - low == pytest.approx(2 * 1.96 * estimate.stderr, rel=0.1)
     assert found.growth.min() == 0.0
 
 
@@ -200,26 +193,26 @@ def test_the_start_pressure_is_a_nuisance():
     plant = rigid_plant()
     command = Schedule({"fill": ((0.0, 1.0),)})
     run = simulate(plant, command, duration=0.5, start=plant.state_at(pressure=40e3), output=0.005)
-    wrong = Experiment(noisy(run, 1, pressure=300.0), command, Start.held(plant, 36e3))
+    wrong = Experiment(noisy(run, 1, pressure=300.0), command, InitialConditions.held(plant, 36e3))
     fit = fit_dynamic(
         plant, [wrong], free=("circuit.fill.conductance",), own=(StartValue("pressure", 8e3),),
         observed={"pressure": 300.0},
     )  # fmt: skip
     found = fit["start pressure of record 1"]
-    assert abs(found.value - 40e3) < 3 * found.deviation
-    assert found.deviation < 300.0
+    assert abs(found.value - 40e3) < 3 * found.stderr
+    assert found.stderr < 300.0
 
 
 def test_the_derivative_of_a_start_at_rest_is_that_of_the_equilibrium():
     plant = moving()
-    start, path = Start.at_rest(plant, 2e5), "muscle.spring.stiffness"
+    start, path = InitialConditions.at_rest(plant, 2e5), "muscle.spring.stiffness"
     experiment = Experiment(simulate(plant, FILL, duration=0.1), FILL, start)
     fit = fit_dynamic(plant, [experiment], free=(path,), own=(StartValue("pressure", 1e4),), observed=SENSORS)
     state, slopes = fit.problem.courses[0].start(np.array([4000.0, 2e5]))
-    up, down = (equilibrium(changed(plant, muscle__spring__stiffness=f), pressure=2e5) for f in (1.001, 0.999))
-    higher, lower = (equilibrium(plant, pressure=p) for p in (2e5 + 100, 2e5 - 100))
+    up, down = (find_equilibrium(changed(plant, muscle__spring__stiffness=f), pressure=2e5) for f in (1.001, 0.999))
+    higher, lower = (find_equilibrium(plant, pressure=p) for p in (2e5 + 100, 2e5 - 100))
     for i, name in enumerate(s.name for s in plant.states):
-        assert state[i] == pytest.approx(equilibrium(plant, pressure=2e5)[name], rel=1e-9, abs=1e-12)
+        assert state[i] == pytest.approx(find_equilibrium(plant, pressure=2e5)[name], rel=1e-9, abs=1e-12)
         assert slopes[i, 0] == pytest.approx((up[name] - down[name]) / 8.0, rel=1e-4, abs=1e-15)
         assert slopes[i, 1] == pytest.approx((higher[name] - lower[name]) / 200.0, rel=1e-4, abs=1e-15)
 
@@ -231,12 +224,12 @@ def free_muscle(lag=0.2, tube=3e-5):
     """An unloaded muscle of unknown length behind a valve and a line."""
     muscle = dataclasses.replace(Muscle.ideal(Vessel(1e-4)), wall=SwellingWall(1e-4, 150e3, 6e4, lag))
     valves = FillDischarge(Supply(620e3), Valve(1e-9, 0.4), Valve(0.0, 0.3))
-    return Plant(muscle, Line(valves, Tube(Valve(2e-9, 0.3), tube)), Isometric(0.0))
+    return Plant(muscle, WithTubes(valves, Tube(Valve(2e-9, 0.3), tube)), Isometric(0.0))
 
 
 def free_fill(plant, sensed, seed=2, first=1e4):
     run = simulate(plant, OPEN, duration=2.0, start=plant.state_at(pressure=first), output=0.005)
-    return Experiment(noisy(run, seed, **{sensed: 500.0}), OPEN, Start.held(plant, first))
+    return Experiment(noisy(run, seed, **{sensed: 500.0}), OPEN, InitialConditions.held(plant, first))
 
 
 def test_line_and_muscle_are_told_from_a_sensor_in_the_line():
@@ -250,8 +243,8 @@ def test_line_and_muscle_are_told_from_a_sensor_in_the_line():
         guess, [free_fill(plant, "tube.pressure")], free=free, observed={"tube.pressure": 500.0}, starts=3
     )
     for estimate in fit.estimates:
-        assert abs(estimate.value - truth(plant, estimate.name)) < 3.5 * estimate.deviation, estimate.name
-    assert fit.scatter == pytest.approx(1.0, abs=0.12)
+        assert abs(estimate.value - truth(plant, estimate.name)) < 3.5 * estimate.stderr, estimate.name
+    assert fit.residual_std == pytest.approx(1.0, abs=0.12)
 
 
 @pytest.mark.parametrize("sensed", ["tube.pressure", "pressure"])
@@ -268,7 +261,7 @@ def test_a_fill_tells_whether_it_was_sensed_before_the_muscle(sensed):
     lone = dataclasses.replace(free_muscle(lag=0.005), circuit=plant.circuit.circuit)
     valve, wall = "circuit.fill", "muscle.wall"
     inside = fit_dynamic(
-        lone, [Experiment(recording, OPEN, Start.held(lone, 1e4))], observed={"pressure": 500.0}, starts=3,
+        lone, [Experiment(recording, OPEN, InitialConditions.held(lone, 1e4))], observed={"pressure": 500.0}, starts=3,
         free=(f"{valve}.conductance", f"{valve}.critical_ratio", f"{wall}.growth_volume", f"{wall}.middle"),
         bounds={f"{valve}.critical_ratio": (0.1, 0.6), f"{wall}.growth_volume": (0.0, 2e-4)},
     )  # fmt: skip
@@ -290,29 +283,29 @@ def test_a_fill_tells_whether_it_was_sensed_before_the_muscle(sensed):
 def test_the_heat_through_the_wall_is_found_from_the_pressure_of_a_fill_and_a_hold():
     """After the valve shuts the warm air cools, and its pressure falls with a time constant m c_v/(hA)."""
     plant = dataclasses.replace(rigid_plant(), gas=EnergyBalance(0.5))
-    command, start = Schedule({"fill": ((0.0, 1.0), (0.4, 0.0))}), Start.held(plant, 0.0)
+    command, start = Schedule({"fill": ((0.0, 1.0), (0.4, 0.0))}), InitialConditions.held(plant, 0.0)
     run = simulate(plant, command, duration=1.5, start=plant.state_at(pressure=0.0), output=0.005)
     record = Experiment(noisy(run, 4, pressure=300.0), command, start)
     free = ("gas.heat_transfer", "circuit.fill.conductance")
     guess = changed(plant, gas__heat_transfer=3.0, circuit__fill__conductance=0.8)
     fit = fit_dynamic(guess, [record], free=free, observed={"pressure": 300.0})
     for estimate in fit.estimates:
-        assert abs(estimate.value - truth(plant, estimate.name)) < 3.5 * estimate.deviation, estimate.name
-        assert estimate.deviation < 0.05 * estimate.value
+        assert abs(estimate.value - truth(plant, estimate.name)) < 3.5 * estimate.stderr, estimate.name
+        assert estimate.stderr < 0.05 * estimate.value
 
 
 def test_a_leak_is_found_from_a_hold_with_shut_valves():
     plant = rigid_plant()
-    plant = dataclasses.replace(plant, circuit=Leaking(plant.circuit, Valve(2e-11, 0.3)))
-    rest, start = Schedule({}), Start.held(plant, 3e5)
+    plant = dataclasses.replace(plant, circuit=WithLeak(plant.circuit, Valve(2e-11, 0.3)))
+    rest, start = Schedule({}), InitialConditions.held(plant, 3e5)
     run = simulate(plant, rest, duration=10.0, start=plant.state_at(pressure=3e5), output=0.05)
     record = Experiment(noisy(run, 8, pressure=300.0), rest, start)
     guess = changed(plant, circuit__leak__conductance=4.0)
     fit = fit_dynamic(guess, [record], free=("circuit.leak.conductance",), observed={"pressure": 300.0},
                       own=(StartValue("pressure", 2e4),))  # fmt: skip
     leak = fit["circuit.leak.conductance"]
-    assert abs(leak.value - 2e-11) < 3.5 * leak.deviation
-    assert leak.deviation < 0.02 * leak.value
+    assert abs(leak.value - 2e-11) < 3.5 * leak.stderr
+    assert leak.stderr < 0.02 * leak.value
 
 
 def test_friction_is_found_from_the_way_up_and_down():
@@ -323,8 +316,8 @@ def test_friction_is_found_from_the_way_up_and_down():
     guess = changed(plant, muscle__friction__stiffness=0.5, muscle__friction__coulomb_force=1.6)
     fit = fit_dynamic(guess, [record], free=free, observed=SENSORS)
     for estimate in fit.estimates:
-        assert abs(estimate.value - truth(plant, estimate.name)) < 3.5 * estimate.deviation, estimate.name
-    assert fit["muscle.friction.coulomb_force"].deviation < 1.0
+        assert abs(estimate.value - truth(plant, estimate.name)) < 3.5 * estimate.stderr, estimate.name
+    assert fit["muscle.friction.coulomb_force"].stderr < 1.0
 
 
 # Bad input
@@ -370,7 +363,7 @@ def test_records_that_cannot_be_used_are_refused():
     with pytest.raises(IdentificationError, match="1 readings cannot determine 1 unknowns"):
         fit_dynamic(plant, [short], **question)
     with pytest.raises(ParameterError, match="as many conditions as there are states"):
-        fit_dynamic(plant, [dataclasses.replace(record, start=Start({}, {"air_mass": 1e-4}))], **question)
+        fit_dynamic(plant, [dataclasses.replace(record, start=InitialConditions({}, {"air_mass": 1e-4}))], **question)
 
 
 @pytest.mark.parametrize(
@@ -384,7 +377,9 @@ def test_records_that_cannot_be_used_are_refused():
 def test_a_start_that_does_not_exist_is_refused(known, still, message):
     """Conditions that say one thing twice; a pressure below absolute zero; rest under a load that nothing bears."""
     plant = dataclasses.replace(moving(), mechanism=HangingMass(1e5))
-    record = dataclasses.replace(recorded(moving(), 1), start=Start(known, moving().state_at(pressure=0.0), still))
+    record = dataclasses.replace(
+        recorded(moving(), 1), start=InitialConditions(known, moving().state_at(pressure=0.0), still)
+    )
     with pytest.raises(IdentificationError, match=message):
         fit_dynamic(plant, [record], free=("muscle.damper.damping",), observed=SENSORS)
 
@@ -445,5 +440,5 @@ def test_a_heavier_load_is_another_plant_of_the_same_structure():
     records = [recorded(light, 1), dataclasses.replace(recorded(heavy, 2), plant=heavy)]
     fit = fit_dynamic(light, records, free=("muscle.damper.damping",), own=("mechanism.mass",), observed=SENSORS)
     for found, expected in zip(fit.estimates[1:], (5.0, 8.0), strict=True):
-        assert abs(found.value - expected) < 3.5 * found.deviation
+        assert abs(found.value - expected) < 3.5 * found.stderr
     assert fit.plant(1).mechanism.mass == fit.estimates[2].value

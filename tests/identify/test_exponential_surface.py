@@ -13,7 +13,7 @@ from airmuscle.characteristic.borzikova import SAM_30X290, BorzikovaExponential
 from airmuscle.core import autodiff
 from airmuscle.core.errors import IdentificationError
 from airmuscle.identify.correlation_index import correlation_index
-from airmuscle.identify.surface.basis import Chebyshev, LoadBox, Monomials, conditioning
+from airmuscle.identify.surface.basis import Chebyshev, LoadRange, Monomials, conditioning
 from airmuscle.identify.surface.exponential import SurfaceProblem, linearised, nonlinear
 from airmuscle.identify.surface.monotone import (
     FALLS_WITH_PRESSURE,
@@ -42,10 +42,10 @@ def other_muscle(points: int = 400, seed: int = 1) -> Recording:
 def test_undisturbed_curves_give_back_the_exact_surface(procedure):
     found = procedure(CURVES, 0.40)
     assert found.model.coefficients == pytest.approx(EXACT.coefficients, rel=1e-9)
-    assert found.greatest_error < 1e-13
+    assert found.max_error < 1e-13
     assert (found.points, found.dropped, found.conditioning.rank) == (45, 0, 15)
-    assert found.model.pressure_reach == (0.0, 3.5e5)
-    assert found.model.force_reach == (45.0, 260.0)
+    assert found.model.pressure_range == (0.0, 3.5e5)
+    assert found.model.force_range == (45.0, 260.0)
 
 
 # Plane curves rounded to 0.5 %, and with normal noise of 0.5 % (numpy's default generator, seed 0):
@@ -83,17 +83,17 @@ def test_the_derivatives_by_the_coefficients_are_exact():
 @pytest.mark.parametrize("procedure", FITS)
 def test_any_degrees_and_any_saturation_are_returned(procedure):
     rng = np.random.default_rng(3)
-    box = LoadBox(0.5e5, 6e5, 100.0, 900.0)
+    validity_range = LoadRange(0.5e5, 6e5, 100.0, 900.0)
     chebyshev = 0.1 * rng.standard_normal(24)
     chebyshev[0] -= 1.0
-    plain = Chebyshev(box).in_bar_and_newton(chebyshev, 5, 3)
-    law = BorzikovaExponential(tuple(plain), *box, 5, 3, saturation=0.28)
-    pressure, force = (v.ravel() for v in box.grid(12, 7))
+    plain = Chebyshev(validity_range).in_bar_and_newton(chebyshev, 5, 3)
+    law = BorzikovaExponential(tuple(plain), *validity_range, 5, 3, saturation=0.28)
+    pressure, force = (v.ravel() for v in validity_range.grid(12, 7))
     data = Recording(
         {"pressure": pressure, "force": force, "contraction": law.contraction(pressure, force)}, origin="law"
     )
     found = procedure(data, 0.28, pressure_degree=5, force_degree=3)
-    assert found.greatest_error < 1e-12
+    assert found.max_error < 1e-12
     assert found.model.saturation == 0.28
     middle = (3.3e5, 444.0)
     assert found.model.contraction(*middle) == pytest.approx(law.contraction(*middle), abs=1e-12)
@@ -106,18 +106,18 @@ def test_points_without_a_logarithm_are_left_out_and_counted():
     found = linearised(data, 0.40)
     assert found.dropped == 2
     assert found.model.coefficients == pytest.approx(EXACT.coefficients, rel=1e-8)
-    assert found.greatest_error == pytest.approx(0.41 - EXACT.contraction(3.5e5, 45.0), abs=1e-10)
+    assert found.max_error == pytest.approx(0.41 - EXACT.contraction(3.5e5, 45.0), abs=1e-10)
     assert "45 points, 2 of them not used (k >= k_max)" in str(found)
     assert nonlinear(data, 0.40).dropped == 0
 
 
 def test_two_loads_determine_ten_of_fifteen_coefficients():
     two = CURVES.rows(CURVES["force"] < 200)
-    assert conditioning(two, Chebyshev(LoadBox.of_recording(two))).rank == 10
+    assert conditioning(two, Chebyshev(LoadRange.of_recording(two))).rank == 10
     for procedure in (*FITS, monotone):
         with pytest.raises(IdentificationError, match=r"under 45, 130 N determine 10 of the 15 .* Measure at 3 loads"):
             procedure(two, 0.40)
-    assert linearised(two, 0.40, force_degree=1).greatest_error < 1e-13
+    assert linearised(two, 0.40, force_degree=1).max_error < 1e-13
 
 
 def test_too_few_points_below_saturation_are_refused():
@@ -146,7 +146,7 @@ def test_unusable_recordings_are_refused(change, message):
         (Monomials(1e5, 1.0), 2.2e8, 0.05e8),
         (Monomials(1.0, 1.0), 2.9560487788e27, 1e20),
         (Monomials(3.5e5, 260.0), 1.5e4, 0.05e4),
-        (Chebyshev(LoadBox(0.0, 3.5e5, 45.0, 260.0)), 2.9, 0.05),
+        (Chebyshev(LoadRange(0.0, 3.5e5, 45.0, 260.0)), 2.9, 0.05),
     ],
 )
 def test_conditioning_of_the_plane_curves(basis, condition, digit):
@@ -167,11 +167,11 @@ def test_breaks_are_named_with_their_places():
     assert falls_at_the_end.across == pytest.approx((94, 249), abs=1.5)
     assert falls_at_the_end.pressure == pytest.approx((3.22e5, 3.5e5), abs=0.02e5)
     assert rises.worst_slope > 0 > falls.worst_slope
-    assert "rises with force between 8.75 and 350 kPa, 202 N and 260 N (16.1% of the box)" in str(rises)
+    assert "rises with force between 8.75 and 350 kPa, 202 N and 260 N (16.1% of the validity range)" in str(rises)
 
 
 def test_a_box_without_a_break_has_none():
-    assert monotonicity_breaks(EXACT, LoadBox(1e5, 3e5, 45.0, 180.0)) == ()
+    assert monotonicity_breaks(EXACT, LoadRange(1e5, 3e5, 45.0, 180.0)) == ()
 
 
 @pytest.mark.parametrize("degrees", [(4, 2), (6, 3)])
@@ -188,13 +188,13 @@ def test_the_monotone_fit_holds_between_its_cells(degrees):
 
 
 def test_the_monotone_fit_is_the_best_of_the_monotone():
-    """Nothing gains that a general solver finds with the slopes on a grid, where it is freer than on all the box."""
+    """Nothing gains that a general solver finds with the slopes on a grid, where it is freer than on all the validity range."""
     from scipy.optimize import minimize
 
     found = monotone(CURVES, 0.40, cells=(32, 24))
     assert 100 * found.rms == pytest.approx(1.472, abs=0.0005)
-    box = LoadBox.of_recording(CURVES)
-    columns = Chebyshev(box).columns(CURVES["pressure"], CURVES["force"], 4, 2)
+    validity_range = LoadRange.of_recording(CURVES)
+    columns = Chebyshev(validity_range).columns(CURVES["pressure"], CURVES["force"], 4, 2)
     rows = slope_constraints(4, 2, (20, 15))
     start = np.linalg.lstsq(columns, -CURVES["pressure"] / 2e5, rcond=None)[0]
 
@@ -215,11 +215,11 @@ def test_the_monotone_fit_is_the_best_of_the_monotone():
 
 
 def test_data_that_are_monotone_are_fitted_as_if_free():
-    pressure, force = (v.ravel() for v in LoadBox(0.0, 3e5, 50.0, 250.0).grid(9, 5))
+    pressure, force = (v.ravel() for v in LoadRange(0.0, 3e5, 50.0, 250.0).grid(9, 5))
     exponent = -1e-5 * pressure * (1 - force / 500)
     data = Recording({"pressure": pressure, "force": force, "contraction": 0.3 * (1 - np.exp(exponent))}, origin="law")
     # level at zero pressure, so the margin of the monotone fit costs its 1e-9
-    assert monotone(data, 0.3).greatest_error < 1e-8
+    assert monotone(data, 0.3).max_error < 1e-8
 
 
 def test_the_index_is_the_root_of_the_explained_part():

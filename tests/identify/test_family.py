@@ -20,9 +20,9 @@ from airmuscle.characteristic import (
 )
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
-from airmuscle.identify import Candidate, Specimens, compare, fit
+from airmuscle.identify import Candidate, SpecimenSplit, compare, fit
 from airmuscle.identify.candidates import standard_candidates, surface
-from airmuscle.library.build import Place, build
+from airmuscle.library.build import Location, build
 from airmuscle.library.entry import Entry
 from airmuscle.library.write import to_toml
 from airmuscle.recording import Recording
@@ -68,7 +68,7 @@ def test_a_family_is_recovered_and_speaks_of_a_length_never_measured(truth):
 def test_the_law_of_lengths_is_chosen_by_leaving_specimens_out(truth):
     runs = [measured(truth, length, noise=2.0) for length in (*LENGTHS, 0.3)]
     candidates = [Candidate(type(t).__name__, blank(t)) for t in TRUTHS] + [Candidate("no length", surface(2))]
-    found = compare(runs, candidates, leave_out=Specimens())
+    found = compare(runs, candidates, leave_out=SpecimenSplit())
     assert found.contenders[0].candidate.name == type(truth).__name__
     assert found["no length"].cross_validated > 5 * found.contenders[0].cross_validated
 
@@ -107,7 +107,7 @@ def test_a_family_is_written_and_read_back(truth, tmp_path):
     import tomllib
 
     table = tomllib.loads(to_toml(Entry("family", "family", "chosen", truth)))
-    assert build(table["characteristic"], Place("family", "characteristic", tmp_path)) == truth
+    assert build(table["characteristic"], Location("family", "characteristic", tmp_path)) == truth
 
 
 def test_a_dead_length_that_leaves_nothing_is_refused():

@@ -26,17 +26,17 @@ from airmuscle.characteristic.saga2007 import LINE_A, Saga2007
 from airmuscle.characteristic.sarosi2012 import Sarosi2012
 from airmuscle.characteristic.tondu_lopez2000 import TonduLopez2000
 from airmuscle.core import ops
+from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import IdentificationError, ParameterError
-from airmuscle.core.model import model, parameter
 from airmuscle.geometry.braid import Braid
 from airmuscle.geometry.parabola import Parabola
 from airmuscle.geometry.straight_fibre import StraightFibre
 from airmuscle.identify import UNCENSORED, Censoring, Fit, Huber, LeastSquares, Loss, SoftL1, fit
-from airmuscle.library.catalogue import load, measured
+from airmuscle.library.catalogue import load, load_data
 from airmuscle.recording import Recording, read_csv
 
 DATA = Path(airmuscle.__file__).parent / "library" / "data"
-WIDE = {"least_force": -1e6, "greatest_force": 1e6}
+WIDE = {"min_force": -1e6, "max_force": 1e6}
 MUSCLE = Sarosi2012(1.2e-4, 420.0, -57.0, -8.7e-3, 2.7e-3, -310.0)
 """Near to what the measured map of the DMSP-20-300 gives."""
 
@@ -76,7 +76,7 @@ def test_a_surface_gives_its_forces_back(degree: int):
     found = fit(ContractileSurface.blank(degree, **WIDE), recording)
     assert found.rank == len(exponents(degree))
     assert np.abs(found.errors).max() < 1e-9
-    boxed = truth.with_box(found.box.pressure, found.box.contraction)
+    boxed = truth.with_validity_range(found.validity_range.pressure, found.validity_range.contraction)
     refitted = fit(boxed, points(boxed.force))
     assert refitted.values == pytest.approx(boxed.coefficients, abs=1e-8)
 
@@ -249,7 +249,7 @@ def test_figures_of_quality_are_their_formulas():
     assert found.r2 == pytest.approx(1 - np.sum(errors**2) / np.sum((measured - measured.mean()) ** 2))
     assert found.correlation_index == pytest.approx(np.sqrt(found.r2))
     worst = int(np.argmax(np.abs(errors)))
-    extreme = found.greatest_error
+    extreme = found.max_error
     assert extreme.error == pytest.approx(errors[worst])
     assert (extreme.pressure, extreme.contraction) == (recording["pressure"][worst], recording["contraction"][worst])
 
@@ -267,7 +267,7 @@ def test_a_law_worse_than_the_mean_has_no_correlation_index():
 
 def slack_and_taut(noise: float = 0.0) -> tuple[ContractileSurface, Recording]:
     """A muscle that is slack in about a third of the points."""
-    truth = surface(2, least_force=0.0)
+    truth = surface(2, min_force=0.0)
     truth = dataclasses.replace(truth, coefficients=(100.0, -400.0, 30.0, 250.0, -90.0, 20.0))
     clean = points(truth.polynomial, noise=noise)
     return truth, clean.with_columns(force=np.maximum(clean["force"], 0.0))
@@ -313,7 +313,7 @@ def test_points_at_the_upper_clamp_are_bounds_too():
     clean = points(truth.polynomial)
     limit = float(np.quantile(clean["force"], 0.8))
     recording = clean.with_columns(force=np.minimum(clean["force"], limit))
-    found = fit(ContractileSurface.blank(2, greatest_force=limit), recording)
+    found = fit(ContractileSurface.blank(2, max_force=limit), recording)
     assert found.rows_censored == 40
     assert found.model.polynomial(clean["pressure"], clean["contraction"]) == pytest.approx(clean["force"], abs=1e-8)
 
@@ -321,10 +321,10 @@ def test_points_at_the_upper_clamp_are_bounds_too():
 def test_the_resolution_of_the_sensor_may_be_where_it_is_cut_off():
     truth, recording = slack_and_taut()
     offset = recording.with_columns(force=np.where(recording["force"] < 2.0, 1.3, recording["force"]))
-    found = fit(ContractileSurface.blank(2), offset, censoring=Censoring(least_force=2.0))
+    found = fit(ContractileSurface.blank(2), offset, censoring=Censoring(min_force=2.0))
     right = truth.force(recording["pressure"], recording["contraction"])
     assert np.abs(found.modelled - right).max() < 1e-8
-    assert abs(found.greatest_error.error) < 1e-8  # 1.3 N read where the muscle hangs slack is no error of the law
+    assert abs(found.max_error.error) < 1e-8  # 1.3 N read where the muscle hangs slack is no error of the law
 
 
 def test_slack_points_bound_laws_in_contraction_and_pressure_too():
@@ -393,7 +393,7 @@ def test_a_robust_loss_of_any_scale_settles_where_no_change_helps(name: str, deg
     """Maps with slack rows, of which the shortest length of the DMSP-20-300 has nothing else."""
     recording = read_csv(DATA / f"{name}.csv")
     loss = kind(scale)
-    found = fit(ContractileSurface.blank(degree, greatest_force=1e5), recording, loss=loss)
+    found = fit(ContractileSurface.blank(degree, max_force=1e5), recording, loss=loss)
     assert found.rank == len(exponents(degree))
 
     def total(values: np.ndarray) -> float:
@@ -407,7 +407,7 @@ def test_a_robust_loss_of_any_scale_settles_where_no_change_helps(name: str, deg
 
 def test_a_wide_robust_loss_is_least_squares_for_slack_rows_too():
     recording = read_csv(DATA / "dmsp-20-300.csv")
-    start = ContractileSurface.blank(5, greatest_force=2000.0)
+    start = ContractileSurface.blank(5, max_force=2000.0)
     plain, robust = fit(start, recording), fit(start, recording, loss=Huber(1000.0))
     assert robust.values == pytest.approx(plain.values, rel=1e-6, abs=1e-6)
 
@@ -426,7 +426,7 @@ def test_a_loss_narrower_than_the_noise_is_noted():
 @given(st.floats(1e-3, 1e3), st.floats(1e-6, 1e3), st.floats(-1e5, 1e5), st.floats(0.1, 10.0))
 def test_units_and_scales_change_nothing(force_scale: float, pressure_scale: float, shift: float, stretch: float):
     recording = points(surface(3).force, n=60, noise=3.0)
-    start = ContractileSurface.blank(3, least_force=-1e9, greatest_force=1e9)
+    start = ContractileSurface.blank(3, min_force=-1e9, max_force=1e9)
     found = fit(start, recording)
     other = fit(
         start,
@@ -491,7 +491,7 @@ def test_parameters_that_only_act_together_are_named_and_may_be_held():
 
 
 def test_a_library_muscle_is_refitted_to_its_own_map_without_a_word_more():
-    found = fit(load("dmsp-20-300").characteristic, measured("dmsp-20-300"))
+    found = fit(load("dmsp-20-300").characteristic, load_data("dmsp-20-300"))
     assert found.rank == 6
     assert found.rmse < 3.3
 
@@ -561,8 +561,8 @@ def test_a_parameter_on_its_bound_is_flagged_and_has_no_deviation():
     estimate = found["end_correction"]
     assert estimate.on_bound
     assert estimate.value == pytest.approx(1.0, abs=1e-6)
-    assert np.isnan(estimate.deviation)
-    assert np.isfinite(found["geometry.braid_angle"].deviation)
+    assert np.isnan(estimate.stderr)
+    assert np.isfinite(found["geometry.braid_angle"].stderr)
     assert "end_correction stopped at its bound; the value is not a measured one." in found.notes
 
 
@@ -586,7 +586,7 @@ def test_a_recording_of_another_specimen_is_noted():
 def test_the_measured_map_of_the_dmsp_20_determines_21_coefficients():
     """Martens and Boblan (2017), appendix: 6 lengths at 21 pressures, slack in 66 of 126 points."""
     recording = read_csv(DATA / "dmsp-20-300.csv")
-    found = fit(ContractileSurface.blank(5, greatest_force=2000.0), recording)
+    found = fit(ContractileSurface.blank(5, max_force=2000.0), recording)
     assert (found.rank, found.rows_used, found.rows_censored) == (21, 126, 66)
     assert found.rmse == pytest.approx(2.07, abs=0.01)
     assert found.condition == pytest.approx(757, abs=5)
@@ -601,7 +601,7 @@ def test_what_only_bounds_determine_stays_near_to_them_and_is_noted():
     """
     recording = read_csv(DATA / "dmsp-20-300.csv")
     assert recording["force"][recording["length"] == 0.222].max() == 0
-    start = ContractileSurface.blank(5, greatest_force=2000.0)
+    start = ContractileSurface.blank(5, max_force=2000.0)
     found = fit(start, recording)
     assert "The measured rows determine 20 of 21 parameters" in " ".join(found.notes)
     at_shortest = found.recording["contraction"] == found.recording["contraction"].max()
@@ -611,13 +611,13 @@ def test_what_only_bounds_determine_stays_near_to_them_and_is_noted():
     assert again.values == pytest.approx(found.values, abs=1e-3)
     taut = recording.rows(recording["force"] > 0)
     assert "rank 20 of 21" in refused(start, taut)
-    assert "determine 20 of 21" not in " ".join(fit(ContractileSurface.blank(4, greatest_force=2e3), recording).notes)
+    assert "determine 20 of 21" not in " ".join(fit(ContractileSurface.blank(4, max_force=2e3), recording).notes)
 
 
 @pytest.mark.parametrize(("name", "rms"), [("10", 2.7), ("20", 8.4), ("40", 30.0)])
 def test_the_tool_tables_are_met_as_an_independent_fit_meets_them(name: str, rms: float):
     recording = read_csv(DATA / f"festo-tool-dmsp-{name}.csv")
-    found = fit(ContractileSurface.blank(5, greatest_force=1e5, least_force=-1e5), recording)
+    found = fit(ContractileSurface.blank(5, max_force=1e5, min_force=-1e5), recording)
     assert found.rows_censored == 0
     assert found.rmse == pytest.approx(rms, rel=0.02)
 
@@ -629,7 +629,7 @@ def test_a_fit_prints_its_parameters_and_figures():
     recording = points(TonduLopez2000(Braid(0.0095, 0.42, 0.3), 1.3).force, high=0.2, noise=1.0)
     found = fit(TonduLopez2000(Braid(0.0095, 0.5, 0.3), 1.1), recording, fixed=("geometry.radius",))
     text = str(found)
-    twice = 2 * found["end_correction"].deviation
+    twice = 2 * found["end_correction"].stderr
     assert f"{found['end_correction'].value:.6g}" in text
     assert f"{twice:.3g}" in text
     assert "how much more the middle contracts than the whole muscle" in text

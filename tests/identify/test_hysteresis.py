@@ -21,7 +21,7 @@ from airmuscle.identify.hysteresis.creep import Creep, fit_creep
 from airmuscle.identify.hysteresis.evidence import aicc, effective_rows, f_test
 from airmuscle.identify.hysteresis.plot import plot_loops, winding
 from airmuscle.recording import Recording
-from airmuscle.recording.segment import ways_along
+from airmuscle.recording.segment import motion_direction
 
 LENGTH = 0.2
 LIMITS = (3e-4, 1.2e-3, 5e-3)
@@ -44,7 +44,7 @@ def isobaric(friction, noise=0.2, seed=1, pressure=3e5):
     contraction = np.concatenate([np.linspace(a, b, 60) for a, b in itertools.pairwise(turns)])
     rng = np.random.default_rng(seed)
     static = 400.0 - 2500.0 * contraction - 3000.0 * contraction**2
-    force = static - (friction.replay(contraction * LENGTH) if friction else 0.0)
+    force = static - (friction.force_along(contraction * LENGTH) if friction else 0.0)
     columns = {
         "time": np.arange(contraction.size) * 0.1,
         "pressure": np.full(contraction.size, pressure),
@@ -72,7 +72,7 @@ CURVE = PolynomialCurve("contraction", 2)
 def test_the_friction_that_made_a_loop_is_found_again(law):
     run = isobaric(law)
     fit = fit_hysteresis(start_of(law), run, static=CURVE, slide=OnContraction())
-    made, found = (x.replay(fit.course.path) for x in (law, fit.friction))
+    made, found = (x.force_along(fit.course.path) for x in (law, fit.friction))
     assert np.abs(made - found - np.mean(made - found)).max() < 0.25
     assert fit.rmse == pytest.approx(0.2, rel=0.1)
     assert fit.plain_rmse > 5.0
@@ -91,7 +91,7 @@ def test_the_parameters_of_dahl_and_of_the_slips_come_back():
 def test_a_given_characteristic_takes_the_place_of_the_curve():
     law = VirtualWork(Braid(0.01, 0.4363, LENGTH))
     run = isobaric(SLIP)
-    force = law.force(run["pressure"], run["contraction"]) + 3.0 - SLIP.replay(run["contraction"] * LENGTH)
+    force = law.force(run["pressure"], run["contraction"]) + 3.0 - SLIP.force_along(run["contraction"] * LENGTH)
     fit = fit_hysteresis(start_of(SLIP), run.with_columns(force=force), static=Given(law))
     assert fit.coefficients == pytest.approx([3.0], abs=1e-6)
     assert fit.friction.stiffnesses == pytest.approx(SLIP.stiffnesses, rel=1e-6)
@@ -101,7 +101,7 @@ def test_an_isometric_ramp_shows_friction_on_the_pressure():
     pressure = np.concatenate([np.linspace(0, 6e5, 150), np.linspace(6e5, 0, 150)])
     slide = OnPressure()
     friction = MaxwellSlip((3e3, 1e3), (4e-4, 2e-3))
-    force = 5e-4 * pressure - friction.replay(slide.travel_per_pressure * pressure)
+    force = 5e-4 * pressure - friction.force_along(slide.travel_per_pressure * pressure)
     run = Recording({"pressure": pressure, "force": force}, "ramp")
     fit = fit_hysteresis(MaxwellSlip((1.0, 1.0), friction.limits), run, static=PolynomialCurve("pressure", 1),
                          slide=slide)  # fmt: skip
@@ -113,7 +113,7 @@ def test_lugre_uses_the_time_of_the_rows():
     run = isobaric(None, 0.0)
     path, time = run["contraction"] * LENGTH, np.cumsum(np.repeat([0.02, 0.1, 1.0, 0.05, 0.1, 0.5], 60))
     rng = np.random.default_rng(2)
-    force = run["force"] - law.replay(path, time) + 0.1 * rng.standard_normal(time.size)
+    force = run["force"] - law.force_along(path, time) + 0.1 * rng.standard_normal(time.size)
     fit = fit_hysteresis(LuGre(1e4, 20.0, 3.0, 0.01), run.with_columns(time=time, force=force), static=CURVE)
     assert fit.rmse < 0.15
     assert fit.friction.coulomb_force == pytest.approx(10.0, rel=0.1)
@@ -155,7 +155,7 @@ def test_a_friction_that_does_not_carry_over_to_the_second_run_is_not_justified(
 def test_the_gap_between_branches_and_between_runs_is_measured_place_by_place():
     path = np.concatenate([np.linspace(0, 1, 200), np.linspace(1, 0, 200)])
     loop = np.where(np.arange(400) < 200, -2.0, 3.0)
-    way = ways_along(path)
+    way = motion_direction(path)
     assert gap(path, loop, way) == pytest.approx(5.0 * np.ones(24), abs=0.2)
     assert repeat_difference(path, loop, way, path, loop + 1.5, way) == pytest.approx(1.5 * np.ones(48))
 
@@ -163,10 +163,10 @@ def test_the_gap_between_branches_and_between_runs_is_measured_place_by_place():
 def test_an_inner_loop_belongs_to_both_branches():
     """Up, half back, up, down: both falling ways lie 5 N above the rising ones, at every place they share."""
     path = np.concatenate([np.linspace(a, b, 100) for a, b in ((0, 1), (1, 0.5), (0.5, 1), (1, 0))])
-    way = ways_along(path)
+    way = motion_direction(path)
     assert [int(s) for s in way[[50, 150, 250, 350]]] == [1, -1, 1, -1]
     assert gap(path, np.where(way > 0, -2.0, 3.0), way) == pytest.approx(5.0 * np.ones(24))
-    assert not ways_along(np.ones(20)).any()
+    assert not motion_direction(np.ones(20)).any()
 
 
 def test_the_criteria_meet_their_definitions():
@@ -180,7 +180,7 @@ def test_the_criteria_meet_their_definitions():
 def test_candidates_are_sized_by_the_data_and_all_of_them_fit():
     run = isobaric(SLIP)
     path = run["contraction"] * LENGTH
-    fits = [fit_hysteresis(f, run, static=CURVE) for f in candidates(path, SLIP.replay(path))]
+    fits = [fit_hysteresis(f, run, static=CURVE) for f in candidates(path, SLIP.force_along(path))]
     assert {name(f.friction) for f in fits} == {"Dahl", "LuGre", "BoucWen", "MaxwellSlip", "PrandtlIshlinskii"}
     assert all(f.rmse < 0.35 * f.plain_rmse for f in fits)
     best = min(fits, key=lambda f: f.rmse)
@@ -233,8 +233,10 @@ def test_a_hold_too_short_for_its_creep_is_said_to_be_so():
 def test_figures_show_units_and_what_was_fitted():
     figure = plot_loops(SLIP)
     assert figure.axes[0].get_xlabel() == "displacement [mm]"
-    path = winding(SLIP.travel)
-    assert (path.max(), path.min(), path[-1]) == pytest.approx((2 * SLIP.travel, -2 * SLIP.travel, path.max()))
+    path = winding(SLIP.presliding_distance)
+    assert (path.max(), path.min(), path[-1]) == pytest.approx(
+        (2 * SLIP.presliding_distance, -2 * SLIP.presliding_distance, path.max())
+    )
     fit = fit_hysteresis(start_of(SLIP), isobaric(SLIP), static=CURVE)
     upper, lower = fit.plot().axes
     assert (upper.get_ylabel(), lower.get_ylabel()) == ("force [N]", "measured less modelled [N]")

@@ -11,16 +11,23 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.characteristic.box import Box
 from airmuscle.characteristic.tondu_lopez2000 import TonduLopez2000
+from airmuscle.characteristic.validity_range import ValidityRange
 from airmuscle.cli.app import app
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
-from airmuscle.identify.fit import fit
-from airmuscle.identify.plan import Bench, _exchanged, _greedy, _logarithm, plan, possible_runs
+from airmuscle.identify.experiment_design import (
+    BenchLimits,
+    _exchanged,
+    _greedy,
+    _logarithm,
+    optimal_design,
+    possible_runs,
+)
+from airmuscle.identify.static_fit import fit
 from airmuscle.recording import Recording, read_csv
 
-BENCH = Bench(Box(50e3, 500e3, 0.0, 0.25), 400.0)
+BENCH = BenchLimits(ValidityRange(50e3, 500e3, 0.0, 0.25), 400.0)
 
 
 def law():
@@ -57,7 +64,7 @@ def test_every_candidate_stays_within_the_bench():
 
 def test_the_deviations_are_those_that_a_fit_then_has():
     """Measured as planned with readings of 2 N, the fit states what the plan promised, to 15 %."""
-    free = plan(law(), BENCH, runs=6, points=20, sigma=2.0, fixed=("geometry.radius",))
+    free = optimal_design(law(), BENCH, runs=6, points=20, sigma=2.0, fixed=("geometry.radius",))
     points = free.recording()
     rng = np.random.default_rng(2)
     columns = {"pressure": points["pressure"], "contraction": points["contraction"]}
@@ -68,27 +75,27 @@ def test_the_deviations_are_those_that_a_fit_then_has():
 
 
 def test_the_plan_tells_more_than_runs_spread_evenly():
-    assert plan(law(), BENCH, runs=4, fixed=("geometry.radius",)).gain > 1.1
+    assert optimal_design(law(), BENCH, runs=4, fixed=("geometry.radius",)).gain > 1.1
 
 
 def test_what_the_runs_cannot_tell_is_named():
     """Radius, angle, end correction: F is linear in r0^2, so all three are told; a single isobar at rest is not it."""
-    found = plan(law(), BENCH, runs=3)
+    found = optimal_design(law(), BENCH, runs=3)
     assert found.undetermined == ()
-    tight = Bench(Box(50e3, 500e3, 0.0, 1e-9), 5000.0)
-    assert plan(law(), tight, runs=3).undetermined != ()
+    tight = BenchLimits(ValidityRange(50e3, 500e3, 0.0, 1e-9), 5000.0)
+    assert optimal_design(law(), tight, runs=3).undetermined != ()
 
 
 def test_a_bench_that_can_do_nothing_is_refused():
     with pytest.raises(IdentificationError, match="pulls nowhere between 0 and 1e-06 N"):
-        plan(law(), Bench(Box(50e3, 500e3, 0.0, 0.25), 1e-6))
+        optimal_design(law(), BenchLimits(ValidityRange(50e3, 500e3, 0.0, 0.25), 1e-6))
     with pytest.raises(ParameterError, match="plan needs one run or more"):
-        plan(law(), BENCH, runs=0)
-    with pytest.raises(ParameterError, match="least_pressure"):
-        Bench(Box(5e5, 5e4, 0.0, 0.25), 100.0)
+        optimal_design(law(), BENCH, runs=0)
+    with pytest.raises(ParameterError, match="min_pressure"):
+        BenchLimits(ValidityRange(5e5, 5e4, 0.0, 0.25), 100.0)
 
 
-ARGUMENTS = ["plan", "tondu-lopez", "--greatest-pressure", "5 bar", "--greatest-force", "400 N", "--runs", "4"]
+ARGUMENTS = ["plan", "tondu-lopez", "--max-pressure", "5 bar", "--max-force", "400 N", "--runs", "4"]
 
 
 def test_the_command_prints_a_table_and_writes_points_to_follow(tmp_path):
@@ -109,6 +116,6 @@ def test_the_command_prints_json():
 
 
 def test_a_limit_without_its_unit_is_one_line():
-    done = CliRunner().invoke(app, ["plan", "tondu-lopez", "--greatest-pressure", "5", "--greatest-force", "400 N"])
+    done = CliRunner().invoke(app, ["plan", "tondu-lopez", "--max-pressure", "5", "--max-force", "400 N"])
     assert done.exit_code == 1
     assert "carries no unit" in done.output

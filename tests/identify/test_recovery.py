@@ -1,6 +1,6 @@
 """What made the data comes back from noisy data within the bands that the fit states, for every law of the library.
 
-Each characteristic of the library that has parameters makes points on its own box with noise; the fit starts elsewhere.
+Each characteristic of the library that has parameters makes points on its own validity range with noise; the fit starts elsewhere.
 Tables have no parameters, and are refused. The force (or what the law gives) must be held by its 99.9 % bands, and parameters that the data determine
 by their standard deviations.
 """
@@ -12,15 +12,15 @@ import warnings
 import numpy as np
 import pytest
 
-from airmuscle.characteristic import Box
+from airmuscle.characteristic import ValidityRange
 from airmuscle.characteristic.base import ContractionLaw, ForceLaw
 from airmuscle.characteristic.clamped import Clamped
 from airmuscle.characteristic.tabulated import Tabulated
 from airmuscle.core import tree
 from airmuscle.core.errors import AirmuscleWarning, IdentificationError
-from airmuscle.identify import UNCENSORED, band, fit
+from airmuscle.identify import UNCENSORED, confidence_band, fit
 from airmuscle.identify.problem import direction_of
-from airmuscle.identify.profile import weakly_determined
+from airmuscle.identify.profile_likelihood import weakly_determined
 from airmuscle.library import catalogue
 from airmuscle.recording import Recording
 
@@ -37,24 +37,26 @@ def law_of(name: str):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
         entry = catalogue.load(name)
-    return entry.characteristic, entry.box or Box(1e5, 6e5, 0.0, 0.2)
+    return entry.characteristic, entry.validity_range or ValidityRange(1e5, 6e5, 0.0, 0.2)
 
 
 def recoverable() -> list[str]:
-    return [n for n in catalogue.names() if any(leaf.declared.fitted for leaf in tree.leaves(law_of(n)[0]))]
+    return [n for n in catalogue.list_library() if any(leaf.declared.fitted for leaf in tree.leaves(law_of(n)[0]))]
 
 
-def simulated(law, box: Box, seed: int, least: float = -0.02) -> tuple[Recording, Recording, float]:
+def simulated(
+    law, validity_range: ValidityRange, seed: int, least: float = -0.02
+) -> tuple[Recording, Recording, float]:
     """Noisy points, the same points without noise, and the noise: 0.5 % of the range of what the law gives."""
     random = np.random.default_rng(seed)
-    low, high = max(box.contraction[0], least), box.contraction[1]
-    pressure = random.uniform(*box.pressure, 400)
+    low, high = max(validity_range.contraction[0], least), validity_range.contraction[1]
+    pressure = random.uniform(*validity_range.pressure, 400)
     direction = direction_of(law)
     if isinstance(law, ForceLaw):
         contraction = random.uniform(low, high, 400)
         columns = {"pressure": pressure, "contraction": contraction, "force": law.unclamped(pressure, contraction)}
     elif isinstance(law, ContractionLaw):
-        force = random.uniform(*law.force_reach, 400)
+        force = random.uniform(*law.force_range, 400)
         columns = {"pressure": pressure, "force": force, "contraction": law.contraction(pressure, force)}
     else:
         contraction, force = random.uniform(low, high, 400), random.uniform(0.0, 60.0, 400)
@@ -80,13 +82,13 @@ def disturbed(law, fixed: tuple[str, ...]):
 
 @pytest.mark.parametrize("name", recoverable())
 def test_a_law_is_recovered_within_its_bands(name: str):
-    law, box = law_of(name)
+    law, validity_range = law_of(name)
     inner = law.inner if isinstance(law, Clamped) else law
     fixed = HELD.get(name, ())
-    noisy, exact, noise = simulated(inner, box, 7, LEAST_CONTRACTION.get(name, -0.02))
+    noisy, exact, noise = simulated(inner, validity_range, 7, LEAST_CONTRACTION.get(name, -0.02))
     found = fit(disturbed(inner, fixed), noisy, censoring=UNCENSORED, fixed=fixed)
     assert found.sigma == pytest.approx(noise, rel=0.15)
-    stated = band(found, exact, level=0.999)
+    stated = confidence_band(found, exact, level=0.999)
     truth = exact[found.direction.quantity]
     held = (stated.low <= truth) & (truth <= stated.high)
     assert held.mean() > 0.97
@@ -95,14 +97,14 @@ def test_a_law_is_recovered_within_its_bands(name: str):
     loose = weakly_determined(found)
     for estimate in found.estimates:
         if not estimate.on_bound and estimate.name not in loose:
-            assert abs(estimate.value - true[estimate.name]) < 4.5 * estimate.deviation, estimate.name
+            assert abs(estimate.value - true[estimate.name]) < 4.5 * estimate.stderr, estimate.name
 
 
 def test_every_law_of_the_library_is_tried_and_a_table_has_nothing_to_find():
-    tables = {name for name in catalogue.names() if isinstance(law_of(name)[0], Tabulated)}
-    assert set(recoverable()) | tables == set(catalogue.names())
+    tables = {name for name in catalogue.list_library() if isinstance(law_of(name)[0], Tabulated)}
+    assert set(recoverable()) | tables == set(catalogue.list_library())
     assert tables == {"festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40"}
     for name in tables:
-        law, box = law_of(name)
+        law, validity_range = law_of(name)
         with pytest.raises(IdentificationError, match="cannot be fitted"):
-            fit(law, simulated(law, box, 7)[1])
+            fit(law, simulated(law, validity_range, 7)[1])

@@ -16,13 +16,13 @@ import airmuscle
 from airmuscle import read_csv
 from airmuscle.characteristic import ContractileSurface, EffectiveLength, Hunt2017, Sarosi2012
 from airmuscle.core.errors import IdentificationError
-from airmuscle.identify import UNCENSORED, Candidate, Levels, compare, fit
+from airmuscle.identify import UNCENSORED, Candidate, LevelSplit, compare, fit
 from airmuscle.identify.candidates import standard_candidates, surface
+from airmuscle.identify.censored_least_squares import least_squares_of
 from airmuscle.identify.censoring import Censoring
-from airmuscle.identify.leave_out import parts
-from airmuscle.identify.one_sided import least_squares_of
-from airmuscle.identify.problem import pose
-from airmuscle.identify.separable import linear_leaves, projected_start
+from airmuscle.identify.cross_validation import parts
+from airmuscle.identify.problem import make_problem
+from airmuscle.identify.variable_projection import linear_leaves, projected_start
 from airmuscle.recording import Recording
 
 DATA = Path(airmuscle.__file__).parent / "library" / "data"
@@ -64,7 +64,7 @@ def test_with_any_level_left_out_a_fit_settles_or_names_what_nothing_tells_apart
     recording = read_csv(DATA / f"{name}.csv")
     candidates = [c for c in standard_candidates([recording]) if isinstance(c.law, Sarosi2012 | Hunt2017)]
     assert len(candidates) == 2
-    (labels,), names = parts([recording], Levels("contraction"))
+    (labels,), names = parts([recording], LevelSplit("contraction"))
     reasons = []
     for candidate in candidates:
         for left_out in names:
@@ -112,7 +112,7 @@ def test_slack_rows_take_part_in_the_projection():
     """The start is the least over the linear parameters of the whole sum, rows that are cut off among them."""
     recording = pulled(SAROSI)
     slack = recording.with_columns(force=np.maximum(recording["force"], 0.0))
-    problem = pose(Sarosi2012(0.0, 1.0, -10.0, 0.0, 0.0, 0.0), slack, Censoring(), np.ones(120), ())
+    problem = make_problem(Sarosi2012(0.0, 1.0, -10.0, 0.0, 0.0, 0.0), slack, Censoring(), np.ones(120), ())
     assert problem.sides.any()
     start = projected_start(problem)
     assert start[2] == pytest.approx(-40.0, rel=1e-4)
@@ -133,6 +133,6 @@ def test_a_fold_that_leaves_the_exponential_open_is_excluded_by_name():
     """On this map one level alone lies where the exponential acts."""
     recording = read_csv(DATA / "dmsp-20-300.csv")
     (candidate,) = (c for c in standard_candidates([recording]) if isinstance(c.law, Sarosi2012))
-    found = compare(recording, [candidate, Candidate("plane", surface(1, 4e3))], leave_out=Levels("contraction"))
+    found = compare(recording, [candidate, Candidate("plane", surface(1, 4e3))], leave_out=LevelSplit("contraction"))
     (excluded,) = found.excluded
     assert "cannot tell apart a_1, a_2, a_3" in excluded.why

@@ -1,4 +1,4 @@
-"""A shaped surface never loses force with pressure nor gains it with contraction, at any point of its box.
+"""A shaped surface never loses force with pressure nor gains it with contraction, at any point of its validity range.
 
 The conditions hold between the points of any grid; where data keep them anyway they change nothing; where the free
 surface breaks them the place is named. A conversion of one law into another says how far the two are apart.
@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airmuscle.characteristic import Box, ContractileSurface, Sarosi2012, TonduLopez2000
-from airmuscle.core.errors import IdentificationError, NoSolution
+from airmuscle.characteristic import ContractileSurface, Sarosi2012, TonduLopez2000, ValidityRange
+from airmuscle.core.errors import IdentificationError, SolveError
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify import convert, fit, fit_shaped, shape_breaks
 from airmuscle.identify.candidates import surface
@@ -18,7 +18,7 @@ from airmuscle.identify.surface.shape import FALLS_WITH_PRESSURE, RISES_WITH_CON
 from airmuscle.recording import Recording
 
 MUSCLE = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
-BOX = Box(1e5, 6e5, 0.0, 0.2)
+BOX = ValidityRange(1e5, 6e5, 0.0, 0.2)
 
 
 def points(n: int, noise: float, seed: int = 2) -> Recording:
@@ -32,9 +32,11 @@ def test_few_and_noisy_points_bend_a_free_surface_and_not_a_shaped_one():
     data = points(40, 60.0)
     found = fit_shaped(surface(4), data)
     assert {b.rule for b in found.broken} == {FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION}
-    assert shape_breaks(found.model, found.model.box, points=201) == ()
+    assert shape_breaks(found.model, found.model.validity_range, points=201) == ()
     assert found.rmse > found.unconstrained
-    grid = np.meshgrid(np.linspace(*found.model.box.pressure, 60), np.linspace(*found.model.box.contraction, 60))
+    grid = np.meshgrid(
+        np.linspace(*found.model.validity_range.pressure, 60), np.linspace(*found.model.validity_range.contraction, 60)
+    )
 
     def distance(law):
         return float(np.sqrt(np.mean((law.force(*grid) - MUSCLE.force(*grid)) ** 2)))
@@ -76,7 +78,7 @@ def test_at_points_of_free_contraction_the_force_is_zero():
     free = Recording({"pressure": pressure, "contraction": np.full(3, 0.2)}, "hung free")
     found = fit_shaped(surface(4), data, free=free)
     assert found.model.unclamped(pressure, free["contraction"]) == pytest.approx(np.zeros(3), abs=1e-8)
-    assert shape_breaks(found.model, found.model.box) == ()
+    assert shape_breaks(found.model, found.model.validity_range) == ()
     many = Recording({"pressure": np.linspace(1e5, 6e5, 9), "contraction": np.linspace(0.05, 0.2, 9) ** 2}, "too many")
     with pytest.raises(IdentificationError, match="leave none"):
         fit_shaped(surface(1), data, free=many)
@@ -103,13 +105,13 @@ def test_a_conversion_says_how_far_it_is_off():
     found = convert(MUSCLE, surface(1), BOX)
     grid = np.meshgrid(np.linspace(*BOX.pressure, 300), np.linspace(*BOX.contraction, 300))
     difference = found.model.force(*grid) - MUSCLE.force(*grid)
-    assert np.abs(found.greatest) == pytest.approx(np.abs(difference).max(), rel=0.02)
+    assert np.abs(found.max_error) == pytest.approx(np.abs(difference).max(), rel=0.02)
     denser = (1 - np.cos(np.pi * np.linspace(0, 1, 300))) / 2  # as the conversion judges: denser towards the edges
     grid = np.meshgrid(1e5 + 5e5 * denser, 0.2 * denser)
     difference = found.model.force(*grid) - MUSCLE.force(*grid)
     assert found.rms == pytest.approx(np.sqrt(np.mean(difference**2)), rel=0.1)
     at = (found.pressure, found.contraction)
-    assert found.model.force(*at) - MUSCLE.force(*at) == pytest.approx(found.greatest, rel=1e-9)
-    assert f"{found.greatest:.4g} N" in str(found)
-    with pytest.raises(NoSolution, match="pulls nowhere"):
-        convert(MUSCLE, surface(1), Box(1e5, 6e5, 0.5, 0.55))
+    assert found.model.force(*at) - MUSCLE.force(*at) == pytest.approx(found.max_error, rel=1e-9)
+    assert f"{found.max_error:.4g} N" in str(found)
+    with pytest.raises(SolveError, match="pulls nowhere"):
+        convert(MUSCLE, surface(1), ValidityRange(1e5, 6e5, 0.5, 0.55))

@@ -16,15 +16,15 @@ from airmuscle.core.errors import IdentificationError
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify import (
     Huber,
-    Levels,
-    Runs,
-    band,
+    LevelSplit,
+    RunSplit,
     bootstrap,
+    confidence_band,
     fit,
     profile,
     weakly_determined,
 )
-from airmuscle.identify.bootstrap import _one_by_one, _parts
+from airmuscle.identify.bootstrapping import _one_by_one, _parts
 from airmuscle.identify.candidates import surface
 from airmuscle.recording import Recording
 
@@ -65,7 +65,7 @@ def share_held(fits, law, *, reading: bool = False) -> np.ndarray:
     truth = law.unclamped(PLACES["pressure"], PLACES["contraction"])
     inside = []
     for found in fits:
-        low, high = band(found, PLACES, reading=reading)[1:]
+        low, high = confidence_band(found, PLACES, reading=reading)[1:]
         seen = truth + reading * NOISE * random.standard_normal(truth.size)
         inside.append((low <= seen) & (seen <= high))
     return np.mean(inside, axis=0)
@@ -99,8 +99,8 @@ def test_bands_of_a_law_that_is_not_linear_hold_it_as_often():
 def test_refits_at_once_are_refits_one_by_one():
     runs = experiment(1)
     found = fit(surface(2, 4000), runs)
-    drawn = bootstrap(found, runs, refits=40, by=Runs(), seed=3)
-    which, count = _parts(found, runs, Runs())
+    drawn = bootstrap(found, runs, refits=40, by=RunSplit(), seed=3)
+    which, count = _parts(found, runs, RunSplit())
     times = np.random.default_rng(3).multinomial(count, np.full(count, 1 / count), size=40).astype(float)
     expected = _one_by_one(found, which, times)
     assert np.isfinite(expected).all()
@@ -116,7 +116,7 @@ def test_refits_by_runs_see_what_a_run_shares():
         found = fit(surface(1, 4000), runs)
         scatter.append(found.values)
         claimed.append(found.standard_deviations)
-        drawn.append(bootstrap(found, runs, refits=200, by=Runs(), seed=seed).standard_deviations)
+        drawn.append(bootstrap(found, runs, refits=200, by=RunSplit(), seed=seed).standard_deviations)
     actual = np.std(scatter, axis=0)[:2]
     assert np.mean(drawn, axis=0)[:2] == pytest.approx(actual, rel=0.35)
     assert (np.mean(claimed, axis=0)[:2] < 0.6 * actual).all()
@@ -136,7 +136,7 @@ def test_a_law_that_is_not_linear_is_refitted_too():
 def test_a_seed_gives_the_same_refits():
     runs = experiment(1)
     found = fit(surface(2, 4000), runs)
-    first, again, other = (bootstrap(found, runs, refits=20, by=Runs(), seed=s).values for s in (1, 1, 2))
+    first, again, other = (bootstrap(found, runs, refits=20, by=RunSplit(), seed=s).values for s in (1, 1, 2))
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
 
@@ -145,17 +145,17 @@ def test_what_cannot_be_drawn_is_refused():
     runs = experiment(1)
     found = fit(TRUTH, runs)
     with pytest.raises(IdentificationError, match="64 rows and these recordings 56"):
-        bootstrap(found, runs[1:], by=Runs())
+        bootstrap(found, runs[1:], by=RunSplit())
     few = fit(surface(1, 4000), runs[:2])
     with pytest.raises(IdentificationError, match="only 2 runs"):
-        bootstrap(few, runs[:2], by=Runs())
-    assert bootstrap(few, runs[:2], by=Levels("pressure"), refits=10).parts == 8
+        bootstrap(few, runs[:2], by=RunSplit())
+    assert bootstrap(few, runs[:2], by=LevelSplit("pressure"), refits=10).parts == 8
 
 
 def test_refits_that_their_runs_do_not_determine_are_counted():
     runs = experiment(1)
     found = fit(surface(5, 4000), runs)
-    drawn = bootstrap(found, runs, by=Runs(), refits=100)
+    drawn = bootstrap(found, runs, by=RunSplit(), refits=100)
     assert drawn.lost > 10
     assert np.isfinite(drawn.standard_deviations).all()
 
@@ -164,7 +164,7 @@ def test_the_profile_of_a_linear_parameter_is_students_interval():
     found = fit(surface(2, 4000), experiment(1))
     name = found.names[1]
     ends = profile(found, name)
-    half = student.ppf(0.975, found.rows_used - 6) * found[name].deviation
+    half = student.ppf(0.975, found.rows_used - 6) * found[name].stderr
     assert ends.low == pytest.approx(found[name].value - half, abs=1e-3 * half)
     assert ends.high == pytest.approx(found[name].value + half, abs=1e-3 * half)
 
@@ -189,7 +189,7 @@ def test_a_profile_is_not_symmetric_where_the_law_is_curved():
     found = fit(EXPONENTIAL, short_of_contraction(0.05, 4), fixed=("a1", "a4", "a5"))
     ends, estimate = profile(found, "a2"), found["a2"]
     assert ends.low < 300.0 < ends.high
-    assert estimate.value - 2 * estimate.deviation < 0.0 < ends.low
+    assert estimate.value - 2 * estimate.stderr < 0.0 < ends.low
     assert ends.high - estimate.value > 5 * (estimate.value - ends.low)
 
 
@@ -206,7 +206,7 @@ def test_a_robust_fit_has_no_profile():
 def test_a_band_without_a_spare_point_or_with_a_level_of_95_is_refused():
     runs = experiment(1)
     with pytest.raises(IdentificationError, match=r"between 0 and 1"):
-        band(fit(TRUTH, runs), PLACES, level=95)
+        confidence_band(fit(TRUTH, runs), PLACES, level=95)
     three = runs[3].rows([0, 3, 6]).with_columns(contraction=np.array([0.0, 0.1, 0.05]))
     with pytest.raises(IdentificationError, match="as many points"):
-        band(fit(surface(1, 4000), three), PLACES)
+        confidence_band(fit(surface(1, 4000), three), PLACES)

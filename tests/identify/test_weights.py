@@ -17,10 +17,10 @@ from airmuscle.geometry.braid import Braid
 from airmuscle.identify import fit
 from airmuscle.identify.weights import deviations
 from airmuscle.recording import Recording
-from airmuscle.recording.write_csv import write_csv
+from airmuscle.recording.csv_writer import write_csv
 
 MUSCLE = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
-SURFACE = ContractileSurface.blank(3, greatest_force=1e5)
+SURFACE = ContractileSurface.blank(3, max_force=1e5)
 
 
 def ramp(pressure: float, step: float, noise: float, seed: int, name: str = "ramp", count: int = 400) -> Recording:

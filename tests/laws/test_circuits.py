@@ -14,30 +14,30 @@ import pytest
 import scipy.signal
 from joints import chosen_muscle
 
-from airmuscle.control.inputs import REST, Schedule
+from airmuscle.control.inputs import ZERO_INPUT, Schedule
 from airmuscle.core.errors import ParameterError
 from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.plant.energy_balance import Metered
+from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import (
     CheckValve,
     ClosedChamber,
     DistributedTube,
     FillDischarge,
-    Follower,
     IndexedValve,
-    Leaking,
-    Line,
     Manifold,
     ProportionalRegulator,
     ProportionalValve,
     RegulatedSupply,
-    Shared,
+    SecondOrderLag,
+    SharedSupply,
     Supply,
     Tank,
     ThreePosition,
     Tube,
     Valve,
+    WithLeak,
+    WithTubes,
 )
 from airmuscle.pneumatics.gas import Ambient, EnergyBalance, Isothermal
 from airmuscle.simulation.integrators import Rodas4
@@ -47,7 +47,7 @@ AMBIENT = Ambient()
 VALVE, WIDE, NARROW = Valve(1e-8, 0.4), Valve(5e-8, 0.4), Valve(2e-9, 0.3)
 HELD = Isometric(0.05)
 ADIABATIC = EnergyBalance(0.0)
-SPOOL = Follower(20.0, 0.7)
+SPOOL = SecondOrderLag(20.0, 0.7)
 
 
 def tube(pieces=1):
@@ -70,19 +70,21 @@ CIRCUITS = {
     "regulated supply on a tank": plant(
         FillDischarge(RegulatedSupply(tank(), WIDE, 4e5, gas=ADIABATIC), VALVE, NARROW)
     ),
-    "tube": plant(Line(FillDischarge(tank(), VALVE, NARROW), tube(3))),
-    "tube with inertia": plant(Line(FillDischarge(tank(), VALVE, NARROW), DistributedTube(1.0, 4e-3, 3, ADIABATIC))),
+    "tube": plant(WithTubes(FillDischarge(tank(), VALVE, NARROW), tube(3))),
+    "tube with inertia": plant(
+        WithTubes(FillDischarge(tank(), VALVE, NARROW), DistributedTube(1.0, 4e-3, 3, ADIABATIC))
+    ),
     "proportional valve for two": plant(ProportionalValve(tank(), VALVE, NARROW, SPOOL, -0.1, 2), count=2),
     "regulator through a leaking tube": plant(
-        Leaking(Line(ProportionalRegulator(tank(), VALVE, VALVE, SPOOL), tube()), NARROW)
+        WithLeak(WithTubes(ProportionalRegulator(tank(), VALVE, VALVE, SPOOL), tube()), NARROW)
     ),
     "manifold": plant(
         Manifold(
             tank(),
             (
-                Line(ProportionalValve(Shared(), VALVE, VALVE, SPOOL, 0.1, 2), tube()),
-                Leaking(FillDischarge(Shared(), VALVE, VALVE), NARROW),
-                ClosedChamber(Shared()),
+                WithTubes(ProportionalValve(SharedSupply(), VALVE, VALVE, SPOOL, 0.1, 2), tube()),
+                WithLeak(FillDischarge(SharedSupply(), VALVE, VALVE), NARROW),
+                ClosedChamber(SharedSupply()),
             ),
             ("arm", "hand", "spare"),
         ),
@@ -100,7 +102,7 @@ def shaken(system, seed):
     for s in system.states:
         swing = rng.uniform(-0.3, 0.3)
         state[s.name] = start[s.name] * (1 + swing) if start[s.name] else s.nominal * 2 * swing
-    inputs = {i.name: rng.uniform(i.least, min(i.greatest, 6e5)) for i in system.commands}
+    inputs = {i.name: rng.uniform(i.minimum, min(i.maximum, 6e5)) for i in system.commands}
     return state, inputs
 
 
@@ -139,7 +141,7 @@ def spool_course(overlap=0.0, follower=SPOOL, to=0.6, duration=0.3):
 
 @pytest.mark.parametrize("damping", [0.2, 0.7, 1.0, 3.0])
 def test_a_spool_follows_its_command_as_a_second_order_lag(damping):
-    follower = Follower(20.0, damping)
+    follower = SecondOrderLag(20.0, damping)
     _, run = spool_course(follower=follower)
     w = 2 * np.pi * 20.0
     _, expected = scipy.signal.step(([w**2], [1, 2 * damping * w, w**2]), T=run["time"])
@@ -186,7 +188,7 @@ def test_the_second_port_does_the_opposite():
 
 
 def test_a_regulator_reaches_its_set_point_up_and_down_and_no_faster_than_its_orifice():
-    circuit = ProportionalRegulator(Supply(7e5), VALVE, VALVE, Follower(50.0))
+    circuit = ProportionalRegulator(Supply(7e5), VALVE, VALVE, SecondOrderLag(50.0))
     system = plant(circuit, Isothermal())
     start = system.state_at(pressure=1e5)
     command = Schedule({"setpoint": ((0.0, 1e5), (0.1, 4e5), (1.2, 1.5e5))})
@@ -201,7 +203,7 @@ def test_a_regulator_reaches_its_set_point_up_and_down_and_no_faster_than_its_or
 
 
 def test_a_regulator_with_a_leak_stays_below_its_set_point_within_its_band():
-    circuit = Leaking(ProportionalRegulator(Supply(7e5), VALVE, VALVE, Follower(50.0), 2e4), Valve(3e-9, 0.4))
+    circuit = WithLeak(ProportionalRegulator(Supply(7e5), VALVE, VALVE, SecondOrderLag(50.0), 2e4), Valve(3e-9, 0.4))
     system = plant(circuit, Isothermal())
     command = Schedule({"setpoint": ((0.0, 3e5),)})
     run = simulate(system, command, duration=4.0, start=system.state_at(pressure=0.0))
@@ -209,7 +211,7 @@ def test_a_regulator_with_a_leak_stays_below_its_set_point_within_its_band():
 
 
 def test_a_set_point_beyond_the_range_is_refused():
-    system = plant(ProportionalRegulator(Supply(7e5), VALVE, VALVE, Follower(50.0)))
+    system = plant(ProportionalRegulator(Supply(7e5), VALVE, VALVE, SecondOrderLag(50.0)))
     with pytest.raises(ParameterError, match=r"setpoint.*allowed are 0 to 1e\+06 Pa"):
         simulate(system, Schedule({"setpoint": ((0.0, 2e6),)}), duration=1.0)
 
@@ -242,7 +244,7 @@ def test_a_tank_left_to_itself_shares_its_air_with_the_muscle():
 def test_a_regulated_supply_droops_in_proportion_to_the_flow():
     """Steady: what the outlet gives is opening times what its valve passes, opening = (p_set - p)/B."""
     source = RegulatedSupply(Supply(8e5), WIDE, 5e5, 2e4)
-    system = plant(Leaking(FillDischarge(source, WIDE, VALVE), NARROW), Isothermal())
+    system = plant(WithLeak(FillDischarge(source, WIDE, VALVE), NARROW), Isothermal())
     run = simulate(system, Schedule({"fill": ((0.0, 1.0),)}), duration=5.0, start=system.state_at(pressure=4e5))
     end = {s.name: run[s.name][-1] for s in system.states}
     outlet = source.air({"air_mass": end["supply.air_mass"]}, AMBIENT).pressure
@@ -255,17 +257,17 @@ def test_a_regulated_supply_droops_in_proportion_to_the_flow():
 
 def test_a_regulated_supply_begins_no_higher_than_what_feeds_it():
     low = RegulatedSupply(Supply(3e5), WIDE, 5e5)
-    content = low.settled(AMBIENT)
+    content = low.steady_state(AMBIENT)
     assert low.air(content, AMBIENT).pressure == pytest.approx(3e5 + AMBIENT.pressure)
     assert RegulatedSupply(Supply(8e5), WIDE, 5e5).air(
-        RegulatedSupply(Supply(8e5), WIDE, 5e5).settled(AMBIENT), AMBIENT
+        RegulatedSupply(Supply(8e5), WIDE, 5e5).steady_state(AMBIENT), AMBIENT
     ).pressure == pytest.approx(5e5 + AMBIENT.pressure)
 
 
 def test_branches_starve_each_other_on_one_tank():
     """A tank left to itself fills one muscle to p V_T/(V_T + V), and two to p V_T/(V_T + 2 V)."""
     source = Tank(Supply(6e5), Valve(0.0, 0.4), 2e-4)
-    branch = FillDischarge(Shared(), WIDE, VALVE)
+    branch = FillDischarge(SharedSupply(), WIDE, VALVE)
     system = plant(Manifold(source, (branch, branch), ("greedy", "patient")), Isothermal(), count=2)
     volume, start = system.muscles[0].geometry.volume(0.05), system.state_at(pressure=0.0)
     for greedy, filled in ((0.0, 1), (1.0, 2)):
@@ -276,7 +278,7 @@ def test_branches_starve_each_other_on_one_tank():
 
 
 def test_a_manifold_books_what_its_branches_draw():
-    metered = Metered(CIRCUITS["manifold"])
+    metered = WithEnergyMeters(CIRCUITS["manifold"])
     start = metered.reset(metered.plant.state_at(pressure=1e5))
     command = Schedule({"arm.command": ((0.0, 0.8), (0.3, -0.5)), "hand.fill": ((0.1, 1.0), (0.4, 0.0))})
     run = simulate(metered, command, duration=0.6, start=start, method=Rodas4(1e-9))
@@ -291,14 +293,14 @@ def test_a_manifold_books_what_its_branches_draw():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: plant(FillDischarge(Shared(), VALVE, VALVE)), r"Plant: its FillDischarge: Shared\(\) is the supply of"),
-        (lambda: plant(Line(FillDischarge(Shared(), VALVE, VALVE), tube())), r"Plant: its Line: Shared\(\)"),
-        (lambda: Tank(Shared(), VALVE, 1e-3), r"Tank: Shared\(\) .* here give a Supply, a Tank or a Reg"),
-        (lambda: RegulatedSupply(Shared(), VALVE, 4e5), r"RegulatedSupply: Shared\(\)"),
+        (lambda: plant(FillDischarge(SharedSupply(), VALVE, VALVE)), r"Plant: its FillDischarge: SharedSupply\(\) is the supply of"),
+        (lambda: plant(WithTubes(FillDischarge(SharedSupply(), VALVE, VALVE), tube())), r"Plant: its WithTubes: SharedSupply\(\)"),
+        (lambda: Tank(SharedSupply(), VALVE, 1e-3), r"Tank: SharedSupply\(\) .* here give a Supply, a Tank or a Reg"),
+        (lambda: RegulatedSupply(SharedSupply(), VALVE, 4e5), r"RegulatedSupply: SharedSupply\(\)"),
         (lambda: Manifold(Supply(6e5), (FillDischarge(Supply(6e5), VALVE, VALVE),), ("a",)), "branch 'a' has a supply of"),
-        (lambda: Manifold(Supply(6e5), (ClosedChamber(Shared()),), ("a", "b")), "1 branches need as many different"),
-        (lambda: Manifold(Supply(6e5), (ClosedChamber(Shared()),), ("supply",)), "cannot be named 'supply'"),
-        (lambda: Manifold(Supply(6e5), (ClosedChamber(Shared()),), ("a.b",)), "a word without a dot"),
+        (lambda: Manifold(Supply(6e5), (ClosedChamber(SharedSupply()),), ("a", "b")), "1 branches need as many different"),
+        (lambda: Manifold(Supply(6e5), (ClosedChamber(SharedSupply()),), ("supply",)), "cannot be named 'supply'"),
+        (lambda: Manifold(Supply(6e5), (ClosedChamber(SharedSupply()),), ("a.b",)), "a word without a dot"),
         (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 0.0, 3), "one muscle or two, not 3"),
         (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 0.0, True), "one muscle or two, not True"),
         (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 1.0), r"overlap .* allowed are -0.5 to 0.9"),
@@ -313,8 +315,8 @@ def test_what_cannot_be_is_refused_with_what_can(make, message):
 
 
 def test_a_muscle_that_leaks_empties_to_the_surroundings_and_rests_there():
-    system = plant(Leaking(ClosedChamber(), NARROW), Isothermal(), mechanism=HangingMass(1.0))
+    system = plant(WithLeak(ClosedChamber(), NARROW), Isothermal(), mechanism=HangingMass(1.0))
     start = system.state_at(pressure=3e5, position=0.02)
-    run = simulate(system, REST, duration=60.0, start=start)
+    run = simulate(system, ZERO_INPUT, duration=60.0, start=start)
     assert run["pressure"][-1] == pytest.approx(0.0, abs=20.0)
     assert np.isfinite(run["position"]).all()

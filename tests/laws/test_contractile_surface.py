@@ -18,7 +18,7 @@ BOX = (50e3, 650e3), (0.0, 0.25)
 
 def surface(seed, degree=5, **clamp):
     coefficients = np.random.default_rng(seed).normal(0.0, 200.0, len(exponents(degree)))
-    limits = {"least_force": -1e9, "greatest_force": 1e9} | clamp
+    limits = {"min_force": -1e9, "max_force": 1e9} | clamp
     return ContractileSurface(tuple(coefficients), *BOX[0], *BOX[1], degree=degree, **limits)
 
 
@@ -69,7 +69,7 @@ def test_where_the_tangent_is_physical_it_goes_on_by_it():
 
 
 def test_it_stays_within_its_clamp():
-    law = surface(3, least_force=0.0, greatest_force=1200.0)
+    law = surface(3, min_force=0.0, max_force=1200.0)
     force = law.force(np.linspace(-1e5, 1e6, 50)[:, None], np.linspace(-0.05, 0.4, 50)[None, :])
     assert force.min() == 0.0
     assert force.max() == 1200.0
@@ -79,9 +79,9 @@ def test_it_stays_within_its_clamp():
     ("change", "message"),
     [
         ({"coefficients": (1.0, 2.0)}, "degree 5 needs 21 coefficients, not 2"),
-        ({"greatest_pressure": 1e3}, "least_pressure 50000 must lie below greatest_pressure 1000"),
-        ({"greatest_contraction": -0.1}, "least_contraction 0 must lie below greatest_contraction -0.1"),
-        ({"least_force": 1e10}, "least_force 1e\\+10 must lie below greatest_force"),
+        ({"max_pressure": 1e3}, "min_pressure 50000 must lie below max_pressure 1000"),
+        ({"max_contraction": -0.1}, "min_contraction 0 must lie below max_contraction -0.1"),
+        ({"min_force": 1e10}, "min_force 1e\\+10 must lie below max_force"),
     ],
 )
 def test_what_is_no_surface_is_refused(change, message):

@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from airmuscle.control import PID, Split, TwoPoint
+from airmuscle.control import PID, OnOffController, SplitRange
 from airmuscle.control.controller import Measurement, relative_unit
 from airmuscle.core.errors import ParameterError
 from airmuscle.core.reference import cite
@@ -52,7 +52,7 @@ courses = st.lists(st.tuples(numbers, numbers), min_size=2, max_size=40)
 def test_pid_is_its_discrete_transfer_functions(course, k, t_i, t_d, n, b, c):
     """P, I = K h/T_i/(z - 1) and D = K T_d N (1 - 1/z)/(T_d + N h - T_d/z), each by a filter of its own."""
     r, y = np.array(course).T
-    pid = PID("y", "fill", k, t_i, t_d, n, b, c, first=0.7)
+    pid = PID("y", "fill", k, t_i, t_d, n, b, c, initial_output=0.7)
     told, _ = carried(pid, r, y)
     proportional = k * (b * r - y)
     integral = 0.7 - proportional[0] + lfilter([0.0, k * H / t_i], [1.0, -1.0], r - y)
@@ -67,20 +67,20 @@ def test_pid_by_hand():
     T_d + N h = 0.6, so D_k = D_(k-1)/6 - (5/3) (y_k - y_(k-1)); K h/T_i = 0.4.
     k = 0: P = 1, I = 0, D = 0: u = 1.  k = 1: P = 0, I = 0.4, D = -5/6.  k = 2: P = -0.6, I = 0.6, D = -5/36 - 0.5.
     """
-    pid = PID("y", "fill", 2.0, 0.5, 0.1, 5.0, 0.5, 0.0, first=1.0)
+    pid = PID("y", "fill", 2.0, 0.5, 0.1, 5.0, 0.5, 0.0, initial_output=1.0)
     told, _ = carried(pid, [1.0, 1.0, 1.0], [0.0, 0.5, 0.8], dt=0.1)
     assert told == pytest.approx([1.0, 0.4 - 5 / 6, -5 / 36 - 0.5], rel=1e-12)
 
 
 @given(st.floats(-100.0, 100.0), st.floats(-100.0, 100.0), st.floats(0.0, 1.0))
 def test_the_first_command_is_the_one_that_is_given(setpoint, measured, first):
-    pid = PID("y", "fill", 3.0, 0.2, 0.1, first=first)
+    pid = PID("y", "fill", 3.0, 0.2, 0.1, initial_output=first)
     told, _ = carried(pid, [setpoint], [measured], {"fill": (0.0, 1.0)})
     assert told[0] == pytest.approx(first, abs=1e-12)
 
 
 def test_without_integral_action_the_first_command_is_a_bias():
-    told, _ = carried(PID("y", "fill", 2.0, first=0.3), [1.0, 1.0, 2.0], [0.5, 0.9, 2.0])
+    told, _ = carried(PID("y", "fill", 2.0, initial_output=0.3), [1.0, 1.0, 2.0], [0.5, 0.9, 2.0])
     assert told == pytest.approx([1.3, 0.5, 0.3], rel=1e-12)
 
 
@@ -136,7 +136,7 @@ def test_a_controller_keeps_nothing_outside_its_memory():
         ({"gain": math.inf}, "it must be finite"),
         ({"gain": "2"}, "must be a number in u/y"),
         ({"integral_time": -1.0}, r"PID.integral_time .* is -1 s; allowed are 0 to"),
-        ({"derivative_limit": 0.0}, r"PID.derivative_limit .* allowed are 1 to 1000"),
+        ({"derivative_filter": 0.0}, r"PID.derivative_filter .* allowed are 1 to 1000"),
         ({"setpoint_weight": 2.0}, r"PID.setpoint_weight .* allowed are 0 to 1"),
     ],
 )
@@ -147,7 +147,7 @@ def test_what_a_controller_cannot_be_is_said(changed, message):
 
 def test_a_controller_has_its_source():
     assert [r.key for r in cite(PID("y", "fill", 1.0))] == ["astrom-hagglund-1995"]
-    assert [r.key for r in cite(TwoPoint("y", "fill", 1.0))] == ["astrom-hagglund-1995"]
+    assert [r.key for r in cite(OnOffController("y", "fill", 1.0))] == ["astrom-hagglund-1995"]
 
 
 # Two points
@@ -156,7 +156,7 @@ def test_a_controller_has_its_source():
 @given(st.lists(st.floats(-2.0, 2.0), min_size=1, max_size=60), st.floats(0.0, 1.5))
 def test_two_point_holds_within_its_hysteresis_and_switches_beyond(away, hysteresis):
     told, _ = carried(
-        TwoPoint("y", "fill", hysteresis), [1.0] * len(away), [1.0 + a for a in away], {"fill": (0.2, 0.9)}
+        OnOffController("y", "fill", hysteresis), [1.0] * len(away), [1.0 + a for a in away], {"fill": (0.2, 0.9)}
     )
     assert set(told) <= {0.2, 0.9}
     before = [0.2, *told]
@@ -175,7 +175,7 @@ def test_two_point_holds_within_its_hysteresis_and_switches_beyond(away, hystere
 
 @given(st.floats(-3.0, 3.0))
 def test_split_opens_one_side_or_the_other(setpoint):
-    pid = PID("y", Split("up", "down"), 1.0)
+    pid = PID("y", SplitRange("up", "down"), 1.0)
     ranges = {"up": (0.0, 1.0), "down": (0.0, 0.5)}
     commands, _ = pid.step(pid.init(), Measurement({"y": 0.0}, {"y": setpoint}, ranges), H)
     assert commands["up"] == pytest.approx(min(max(setpoint, 0.0), 1.0))
@@ -184,8 +184,8 @@ def test_split_opens_one_side_or_the_other(setpoint):
 
 
 def test_both_sides_of_split_are_not_one_input():
-    with pytest.raises(ParameterError, match="Split: both sides are 'fill'; name two inputs"):
-        Split("fill", "fill")
+    with pytest.raises(ParameterError, match="SplitRange: both sides are 'fill'; name two inputs"):
+        SplitRange("fill", "fill")
 
 
 @pytest.mark.parametrize(
@@ -207,6 +207,6 @@ def test_a_relative_unit_follows_from_column_and_input(unit, measured, commanded
 
 def test_every_number_of_a_controller_is_declared():
     assert {leaf.path: leaf.declared.unit for leaf in leaves(PID("y", "fill", 1.0))} == {
-        "gain": "u/y", "integral_time": "s", "derivative_time": "s", "derivative_limit": "1", "setpoint_weight": "1",
-        "derivative_weight": "1", "tracking_time": "s", "first": "u",
+        "gain": "u/y", "integral_time": "s", "derivative_time": "s", "derivative_filter": "1", "setpoint_weight": "1",
+        "derivative_weight": "1", "tracking_time": "s", "initial_output": "u",
     }  # fmt: skip

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from airmuscle.characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
-from airmuscle.characteristic.box import Box
+from airmuscle.characteristic.validity_range import ValidityRange
 from airmuscle.core import autodiff
-from airmuscle.core.errors import AirmuscleWarning, NoSolution, ParameterError
+from airmuscle.core.errors import AirmuscleWarning, ParameterError, SolveError
 from airmuscle.library import catalogue
 
 ARGUMENTS = {
@@ -26,7 +26,7 @@ ARGUMENTS = {
     "pressure": ("contraction", "force"),
 }
 SEARCHES = {ForceLaw: "force", ContractionLaw: "contraction", PressureLaw: "pressure"}
-# Away from the ends of a box and from round numbers, where tables have their kinks.
+# Away from the ends of a validity range and from round numbers, where tables have their kinks.
 PLACES = np.array([0.0871, 0.2913, 0.4931, 0.7127, 0.9083])
 
 
@@ -55,11 +55,11 @@ def own_direction(law: Characteristic) -> str:
 
 @functools.cache
 def points(name: str) -> Points:
-    law, box = entry(name).characteristic, entry(name).box
+    law, validity_range = entry(name).characteristic, entry(name).validity_range
     ranges = {
-        "pressure": box.pressure if box else law.pressure_reach,
-        "contraction": box.contraction if box else law.contraction_reach,
-        "force": (law.force_reach[0], min(law.force_reach[1], 500.0)),
+        "pressure": validity_range.pressure if validity_range else law.pressure_range,
+        "contraction": validity_range.contraction if validity_range else law.contraction_range,
+        "force": (law.force_range[0], min(law.force_range[1], 500.0)),
     }
     own = own_direction(law)
     first, second = (
@@ -75,7 +75,7 @@ def points(name: str) -> Points:
 def answer(law: Characteristic, direction: str, first: float, second: float) -> float:
     try:
         return getattr(law, direction)(first, second)
-    except NoSolution:
+    except SolveError:
         return np.nan
 
 
@@ -91,7 +91,7 @@ def reached_from_rest(law: Characteristic, pressure: float, contraction: float, 
     return bool(slopes.by_pressure > 0 and slopes.by_contraction < 0)
 
 
-every_entry = pytest.mark.parametrize("name", catalogue.names())
+every_entry = pytest.mark.parametrize("name", catalogue.list_library())
 
 
 @every_entry
@@ -118,7 +118,7 @@ def test_a_closed_form_equals_the_root_search(name: str):
         given = there.given(direction)
         try:
             searched = getattr(base, direction)(law, *given)
-        except NoSolution:  # a law that refuses a part of the reach cannot be searched through it
+        except SolveError:  # a law that refuses a part of the reach cannot be searched through it
             continue
         np.testing.assert_allclose(getattr(law, direction)(*given), searched, rtol=1e-9)
 
@@ -128,10 +128,10 @@ def test_a_force_that_no_muscle_has_is_refused(name: str):
     law, there = entry(name).characteristic, points(name)
     if own_direction(law) != "force":
         pytest.skip("solved for another quantity, the law answers any force")
-    if law.force(there.pressure[0], law.contraction_reach[0]) < 1e7:  # straight fibres pull without limit at rest
-        with pytest.raises(NoSolution, match=r"no contraction between .* balances 1e\+07 N"):
+    if law.force(there.pressure[0], law.contraction_range[0]) < 1e7:  # straight fibres pull without limit at rest
+        with pytest.raises(SolveError, match=r"no contraction between .* balances 1e\+07 N"):
             law.contraction(there.pressure[0], 1e7)
-    with pytest.raises(NoSolution, match=r"no gauge pressure between .* gives 1e\+07 N"):
+    with pytest.raises(SolveError, match=r"no gauge pressure between .* gives 1e\+07 N"):
         law.pressure(there.contraction, 1e7)
 
 
@@ -179,5 +179,5 @@ def test_jax_gives_what_numpy_gives(name: str):
 
 
 def test_a_box_refuses_ends_that_do_not_rise():
-    with pytest.raises(ParameterError, match="least_pressure 2 must lie below greatest_pressure 1"):
-        Box(2.0, 1.0, 0.0, 0.1)
+    with pytest.raises(ParameterError, match="min_pressure 2 must lie below max_pressure 1"):
+        ValidityRange(2.0, 1.0, 0.0, 0.1)

@@ -82,16 +82,18 @@ def yielded(law, ends):
 def test_the_replay_is_the_integral_of_the_rates(law):
     ends = (1e-3, -2e-4, 3e-4, 2e-4, 9e-4, -3e-3)
     for count in range(1, len(ends) + 1):
-        assert law.replay(path_through(ends[:count]))[-1] == pytest.approx(integrated(law, ends[:count])[0], abs=2e-5)
+        assert law.force_along(path_through(ends[:count]))[-1] == pytest.approx(
+            integrated(law, ends[:count])[0], abs=2e-5
+        )
 
 
 def test_the_replay_of_lugre_in_time_is_the_integral_of_its_rates():
     ends = (1e-3, -2e-4, 3e-4)
     path = path_through(ends)
     time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(path)))]) / 5e-3
-    assert LUGRE.replay(path, time)[-1] == pytest.approx(integrated(LUGRE, ends, 5e-3)[0], rel=1e-6)
-    slow = LUGRE.replay(path, time * 1e6)
-    np.testing.assert_allclose(slow, LUGRE.replay(path), atol=1e-3)
+    assert LUGRE.force_along(path, time)[-1] == pytest.approx(integrated(LUGRE, ends, 5e-3)[0], rel=1e-6)
+    slow = LUGRE.force_along(path, time * 1e6)
+    np.testing.assert_allclose(slow, LUGRE.force_along(path), atol=1e-3)
 
 
 @pytest.mark.parametrize("transition", [0.3, 0.05])
@@ -107,19 +109,19 @@ def test_a_yielding_stop_stays_within_its_transition_of_the_exact_one(law, trans
 
 def test_dahl_meets_its_closed_form():
     x = np.linspace(0.0, 2e-3, 50)
-    np.testing.assert_allclose(DAHL.replay(x), 20.0 * (1.0 - np.exp(-5e4 * x / 20.0)), rtol=1e-12)
+    np.testing.assert_allclose(DAHL.force_along(x), 20.0 * (1.0 - np.exp(-5e4 * x / 20.0)), rtol=1e-12)
 
 
 def test_bouc_wen_meets_its_closed_forms():
     """n = 2, sigma = 1/2 is a tangens hyperbolicus from rest; n = sigma = 1 is Dahl's law; sharp n is one stop."""
     x = np.linspace(0.0, 2e-3, 50)
-    np.testing.assert_allclose(BoucWen(5e4, 20.0, 2.0, 0.5).replay(x), 20.0 * np.tanh(5e4 * x / 20.0), atol=1e-6)
+    np.testing.assert_allclose(BoucWen(5e4, 20.0, 2.0, 0.5).force_along(x), 20.0 * np.tanh(5e4 * x / 20.0), atol=1e-6)
     ends = (1e-3, -2e-4, 3e-4, -1e-3)
     path = path_through(ends)
-    np.testing.assert_allclose(BoucWen(5e4, 20.0, 1.0, 1.0).replay(path), DAHL.replay(path), atol=1e-6)
+    np.testing.assert_allclose(BoucWen(5e4, 20.0, 1.0, 1.0).force_along(path), DAHL.force_along(path), atol=1e-6)
     stop = MaxwellSlip((5e4,), (4e-4,))
-    assert np.abs(BoucWen(5e4, 20.0, 20.0, 0.5).replay(path) - stop.replay(path)).max() < 0.05 * 20.0
-    assert np.abs(BoucWen(5e4, 20.0, 2.0, 0.5).replay(path) - stop.replay(path)).max() > 0.05 * 20.0
+    assert np.abs(BoucWen(5e4, 20.0, 20.0, 0.5).force_along(path) - stop.force_along(path)).max() < 0.05 * 20.0
+    assert np.abs(BoucWen(5e4, 20.0, 2.0, 0.5).force_along(path) - stop.force_along(path)).max() > 0.05 * 20.0
 
 
 @pytest.mark.parametrize("bend", [-3e-4, -1e-4, 0.0, 2e-4, 3.9e-4])
@@ -146,7 +148,7 @@ def test_friction_never_drives(law, ends):
     """The work done against it from rest is never negative; on a closed path all of it but the bristles' is heat."""
     path = path_through((*ends, 0.0), 400)
     time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(path)))]) / 0.02
-    force = law.replay(path, time)
+    force = law.force_along(path, time)
     work = np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(path))
     assert work.min(initial=0.0) >= -1e-4 * 40.0 * 1e-3
 
@@ -155,7 +157,7 @@ def test_friction_never_drives(law, ends):
 def test_a_loop_run_again_and_again_closes_and_costs_work(law):
     ends = (2e-3, -2e-3) * 6
     path = path_through(ends, 400)
-    force = law.replay(path)
+    force = law.force_along(path)
     before, last = force[-1601:-800], force[-801:]
     np.testing.assert_allclose(last, before, atol=1e-6)
     assert np.sum(0.5 * (last[1:] + last[:-1]) * np.diff(path[-801:])) > 0.03
@@ -179,7 +181,9 @@ def test_lugre_depends_on_the_rate_and_says_so():
 @pytest.mark.parametrize("law", RATE_INDEPENDENT, ids=name)
 def test_rows_between_two_turning_points_change_nothing(law):
     ends = (1e-3, -2e-4, 3e-4, -1e-3)
-    assert law.replay(path_through(ends, 300))[-1] == pytest.approx(law.replay(np.array([0.0, *ends]))[-1], abs=1e-6)
+    assert law.force_along(path_through(ends, 300))[-1] == pytest.approx(
+        law.force_along(np.array([0.0, *ends]))[-1], abs=1e-6
+    )
 
 
 @settings(max_examples=100, deadline=None)
@@ -200,9 +204,9 @@ def test_a_stop_is_what_defines_it(ends):
 
 
 def test_masing_unloading_is_the_first_loading_drawn_twice_as_large():
-    first = SLIP.replay(np.linspace(0.0, 1.5e-3, 301))
+    first = SLIP.force_along(np.linspace(0.0, 1.5e-3, 301))
     path = path_through((1.5e-3, -1.5e-3), 600)
-    unloading = SLIP.replay(path)[600:]
+    unloading = SLIP.force_along(path)[600:]
     np.testing.assert_allclose(unloading[0] - unloading, 2.0 * np.interp(np.linspace(0, 1.5e-3, 601),
                                np.linspace(0, 1.5e-3, 301), first), atol=1e-9)  # fmt: skip
 
@@ -211,16 +215,16 @@ def test_masing_unloading_is_the_first_loading_drawn_twice_as_large():
 def test_an_inner_loop_closes_and_is_forgotten(law):
     """Back at the point where it began the force is what it was, and goes on as if there had been no inner loop."""
     outer, inner = (1.5e-3, -1e-3, 4e-4), (0.0, 2e-4, 1e-4, 4e-4)
-    assert law.replay(np.array([0.0, *outer, *inner]))[-1] == law.replay(np.array([0.0, *outer]))[-1]
+    assert law.force_along(np.array([0.0, *outer, *inner]))[-1] == law.force_along(np.array([0.0, *outer]))[-1]
     going_on = (9e-4, -1.4e-3)
-    with_it, without = (law.replay(np.array([0.0, *outer, *x, *going_on])) for x in (inner, ()))
+    with_it, without = (law.force_along(np.array([0.0, *outer, *x, *going_on])) for x in (inner, ()))
     np.testing.assert_allclose(with_it[-2:], without[-2:], atol=1e-12)
 
 
 def test_a_single_bristle_does_not_close_inner_loops():
     outer, inner = (1.5e-3, -1e-3, -8e-4), (-9e-4, -8e-4)
     for law in (DAHL, BOUC_WEN):
-        ends = law.replay(np.array([0.0, *outer, *inner]))[-1], law.replay(np.array([0.0, *outer]))[-1]
+        ends = law.force_along(np.array([0.0, *outer, *inner]))[-1], law.force_along(np.array([0.0, *outer]))[-1]
         assert abs(ends[0] - ends[1]) > 0.1
 
 
@@ -228,18 +232,18 @@ def test_a_single_bristle_does_not_close_inner_loops():
 @given(ends=st.lists(st.floats(-3e-3, 3e-3), min_size=1, max_size=6), reach=st.floats(3e-3, 6e-3))
 def test_a_greater_extremum_wipes_out_what_was_before(ends, reach):
     for law in EXACT_STOPS:
-        after = law.replay(np.array([0.0, *ends, reach, 1e-3]))[-1]
-        assert after == pytest.approx(law.replay(np.array([0.0, reach, 1e-3]))[-1], abs=1e-9)
+        after = law.force_along(np.array([0.0, *ends, reach, 1e-3]))[-1]
+        assert after == pytest.approx(law.force_along(np.array([0.0, reach, 1e-3]))[-1], abs=1e-9)
 
 
 def test_without_dead_zones_prandtl_ishlinskii_is_maxwell_slip_and_with_them_lopsided():
     path = path_through((1.5e-3, -1.5e-3, 1.5e-3))
     plain = PrandtlIshlinskii(STIFFNESSES, LIMITS)
-    np.testing.assert_allclose(plain.replay(path), SLIP.replay(path), rtol=1e-12)
-    assert plain.replay(path).max() == pytest.approx(-plain.replay(path).min())
+    np.testing.assert_allclose(plain.force_along(path), SLIP.force_along(path), rtol=1e-12)
+    assert plain.force_along(path).max() == pytest.approx(-plain.force_along(path).min())
     u = 4.0 + 8.0 + 10.0
-    assert LOPSIDED.replay(path).max() == pytest.approx(u + 0.8 * (u - 5.0) - 0.5 * (u - 12.0))
-    assert LOPSIDED.replay(path).min() == pytest.approx(-u + 0.6 * (u - 8.0))
+    assert LOPSIDED.force_along(path).max() == pytest.approx(u + 0.8 * (u - 5.0) - 0.5 * (u - 12.0))
+    assert LOPSIDED.force_along(path).min() == pytest.approx(-u + 0.6 * (u - 8.0))
 
 
 @pytest.mark.parametrize("law", ALL, ids=name)
@@ -264,7 +268,7 @@ def test_the_rates_are_continuous_in_the_speed_and_vanish_at_rest(law):
 def test_no_friction_is_no_force_and_no_state():
     assert NoFriction().states == ()
     assert not list(leaves(NoFriction()))
-    assert NoFriction().replay(np.ones(3)).tolist() == [0.0, 0.0, 0.0]
+    assert NoFriction().force_along(np.ones(3)).tolist() == [0.0, 0.0, 0.0]
 
 
 def test_elements_that_do_not_pair_and_dead_zones_that_would_drive_are_refused():

@@ -137,11 +137,13 @@ def test_the_specific_heats_are_those_of_dry_air():
 def test_what_a_process_stores_is_the_work_it_can_do(gas):
     mass, small, large = 3e-4, 0.8e-4, 1.7e-4
     work = quad(lambda v: gas.pressure(mass, v, AMBIENT), small, large, epsrel=1e-12)[0]
-    stored = [gas.stored({"air_mass": mass}, v, AMBIENT) for v in (small, large)]
+    stored = [gas.available_energy({"air_mass": mass}, v, AMBIENT) for v in (small, large)]
     assert stored[0] - stored[1] == pytest.approx(work, rel=1e-9)
     step = 1e-9
-    grown = gas.stored({"air_mass": mass + step}, small, AMBIENT) - gas.stored({"air_mass": mass}, small, AMBIENT)
-    brought = gas.carried({"air_mass": mass}, Flow(1.0, 0.0), small, AMBIENT)
+    grown = gas.available_energy({"air_mass": mass + step}, small, AMBIENT) - gas.available_energy(
+        {"air_mass": mass}, small, AMBIENT
+    )
+    brought = gas.energy_flow({"air_mass": mass}, Flow(1.0, 0.0), small, AMBIENT)
     assert brought == pytest.approx(grown / step, rel=1e-4)
 
 
@@ -149,7 +151,7 @@ def test_what_a_process_stores_is_the_work_it_can_do(gas):
 def test_sound_travels_at_the_root_of_dp_by_drho(gas):
     """Along the gas's own process: a chamber that is squeezed a little, its mass kept."""
     V = 1e-4
-    content = gas.content(4e5, V, AMBIENT)
+    content = gas.state_at(4e5, V, AMBIENT)
     air = gas.air(content, V, AMBIENT)
     squeeze = 1e-6 * V
     rates = gas.rates(content, air, Flow(0.0, 0.0), -squeeze, AMBIENT)
@@ -167,7 +169,7 @@ def test_sound_in_warm_still_air_has_its_known_speed():
 @pytest.mark.parametrize("gas", [*PROCESSES, EnergyBalance(2.0)], ids=repr)
 def test_content_and_air_are_each_others_inverse(gas):
     for pressure in (2e4, 1e5, 8e5):
-        content = gas.content(pressure, 1e-4, AMBIENT)
+        content = gas.state_at(pressure, 1e-4, AMBIENT)
         assert gas.air(content, 1e-4, AMBIENT).pressure == pytest.approx(pressure, rel=1e-12)
         assert set(content) == {s.name for s in gas.states(1e-4, AMBIENT)}
 
@@ -175,5 +177,5 @@ def test_content_and_air_are_each_others_inverse(gas):
 @pytest.mark.parametrize("gas", PROCESSES, ids=repr)
 def test_the_slope_of_the_stored_energy_is_the_pressure(gas):
     mass, volume = 2e-4, 9e-5
-    (by_volume,) = autodiff.directional(lambda x: [gas.energy(mass, x[0], AMBIENT)], [volume], [1.0])
+    (by_volume,) = autodiff.jvp(lambda x: [gas.energy(mass, x[0], AMBIENT)], [volume], [1.0])
     assert -by_volume == pytest.approx(gas.pressure(mass, volume, AMBIENT), rel=1e-12)

@@ -20,17 +20,17 @@ from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
     Held,
-    InSeries,
     Isometric,
     Isotonic,
+    JointWithEndStops,
     Lever,
     Mechanism,
-    Mounted,
-    Prescribed,
+    MusclesInSeries,
+    PrescribedMotion,
     Pulley,
     SpringLoad,
-    Stopped,
-    StoppedJoint,
+    WithEndStops,
+    WithOffsets,
 )
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.plant.plant import Plant
@@ -42,20 +42,23 @@ JOINT = AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12)
 LEVER = Lever((0.05, 0.08), 4.0, 0.3, 0.01, 0.1, (0.1, 0.15))
 MECHANISMS: dict[str, tuple[Mechanism, int]] = {
     "hanging": (HangingMass(8.0), 2),
-    "mounted": (Mounted(HangingMass(8.0), (0.05, -0.02)), 2),
+    "mounted": (WithOffsets(HangingMass(8.0), (0.05, -0.02)), 2),
     "spring": (SpringLoad(3.0, 2000.0, 20.0, 5.0), 1),
     "isotonic": (Isotonic(150.0, 0.5, 3.0), 1),
-    "prescribed": (Prescribed(), 1),
+    "prescribed": (PrescribedMotion(), 1),
     "lever": (LEVER, 2),
     "against": (replace(LEVER, arms=(0.05, -0.06)), 2),
     "pulley": (Pulley(0.04, 12.0, 0.5, 0.02, 4.0), 1),
-    "series": (InSeries(HangingMass(5.0), (0.3, 0.2), 8.0), 3),
-    "series on a lever": (InSeries(replace(LEVER, arms=(0.07,), offsets=()), (0.3,)), 2),
-    "series in a frame": (InSeries(Isometric(0.05), (0.3,)), 2),
+    "series": (MusclesInSeries(HangingMass(5.0), (0.3, 0.2), 8.0), 3),
+    "series on a lever": (MusclesInSeries(replace(LEVER, arms=(0.07,), offsets=()), (0.3,)), 2),
+    "series in a frame": (MusclesInSeries(Isometric(0.05), (0.3,)), 2),
     "joint": (JOINT, 2),
-    "stopped": (Stopped(SpringLoad(3.0, 2000.0), -0.01, 0.02, CONTACT), 1),
-    "stopped chain": (Stopped(InSeries(HangingMass(5.0), (0.3,)), -0.01, 0.02, CONTACT, "node1.position"), 2),
-    "stopped joint": (StoppedJoint(JOINT, -0.3, 0.4, 0.05, CONTACT), 2),
+    "stopped": (WithEndStops(SpringLoad(3.0, 2000.0), -0.01, 0.02, CONTACT), 1),
+    "stopped chain": (
+        WithEndStops(MusclesInSeries(HangingMass(5.0), (0.3,)), -0.01, 0.02, CONTACT, "node1.position"),
+        2,
+    ),
+    "stopped joint": (JointWithEndStops(JOINT, -0.3, 0.4, 0.05, CONTACT), 2),
     "held": (Held(JOINT), 2),
 }
 LENGTHS = (0.2, 0.25, 0.3)
@@ -81,9 +84,9 @@ def test_pulls_are_virtual_work(mechanism, count, draw, tensions):
     """Central differences of the work, and for every pull written by hand the derived one."""
     lengths, tensions = LENGTHS[:count], tensions[:count]
     q, _ = placed(mechanism, draw)
-    pulls = mechanism.pulls(q, tensions, lengths)
+    pulls = mechanism.generalised_forces(q, tensions, lengths)
     assert set(pulls) == set(q)
-    assert pulls == pytest.approx(Mechanism.pulls(mechanism, q, tensions, lengths), rel=1e-12, abs=1e-9)
+    assert pulls == pytest.approx(Mechanism.generalised_forces(mechanism, q, tensions, lengths), rel=1e-12, abs=1e-9)
     for name in q:
         step = 1e-6
         ends = [work(mechanism, {**q, name: q[name] + s}, tensions, lengths) for s in (step, -step)]
@@ -112,7 +115,7 @@ def test_the_power_of_the_pulls_goes_into_energy_or_is_lost(mechanism, count, dr
     lengths = LENGTHS[:count]
     q, v = placed(mechanism, draw)
     inputs = {i.name: 0.0 if i.name == "held" else given_input for i in mechanism.inputs}
-    pulls = mechanism.pulls(q, tensions[:count], lengths)
+    pulls = mechanism.generalised_forces(q, tensions[:count], lengths)
     acceleration = mechanism.acceleration(q, v, pulls, inputs)
     names, speeds = list(q), list(v)
 
@@ -121,9 +124,9 @@ def test_the_power_of_the_pulls_goes_into_energy_or_is_lost(mechanism, count, dr
         return [mechanism.potential_energy(places) + mechanism.kinetic_energy(places, moving)]
 
     along = [v[s] for s in speeds] + [acceleration[n] for n in names]
-    (growth,) = autodiff.directional(energy, [*q.values(), *v.values()], along)
+    (growth,) = autodiff.jvp(energy, [*q.values(), *v.values()], along)
     power = sum(pulls[n] * v[s] for n, s in zip(names, speeds, strict=True))
-    lost = mechanism.lost_power(q, v, pulls, inputs)
+    lost = mechanism.dissipated_power(q, v, pulls, inputs)
     scale = abs(power) + abs(lost) + abs(growth) + 1e-3
     assert growth == pytest.approx(power - lost, abs=1e-9 * scale)
     if "prescribed_acceleration" not in inputs:
@@ -135,7 +138,7 @@ def test_the_power_of_the_pulls_goes_into_energy_or_is_lost(mechanism, count, dr
 
 def test_a_lever_at_a_small_angle_is_a_weight_at_the_ratio_of_its_arms():
     lever = Lever((0.1,), 5.0, 0.2)
-    pulls = lever.pulls({"angle": 0.0}, [98.0665], [0.3])
+    pulls = lever.generalised_forces({"angle": 0.0}, [98.0665], [0.3])
     assert pulls["angle"] == pytest.approx(9.80665)
     assert lever.acceleration({"angle": 0.0}, {"angular_speed": 0.0}, pulls, {})["angle"] == pytest.approx(
         0.0, abs=1e-12
@@ -148,13 +151,15 @@ def test_a_muscle_on_a_negative_arm_turns_a_lever_back():
     lever = Lever((0.1, -0.1), 0.0, 0.2, 0.01)
     up, down = lever.contractions({"angle": 0.05}, [0.3, 0.3])
     assert up > 0 > down
-    assert lever.pulls({"angle": 0.0}, [100.0, 100.0], [0.3, 0.3])["angle"] == pytest.approx(0.0, abs=1e-12)
+    assert lever.generalised_forces({"angle": 0.0}, [100.0, 100.0], [0.3, 0.3])["angle"] == pytest.approx(
+        0.0, abs=1e-12
+    )
 
 
 def test_a_pulley_of_ratio_one_without_inertia_is_a_hanging_mass():
     pulley, hanging = Pulley(0.05, 7.0), HangingMass(7.0)
     for tension in (0.0, 40.0, 300.0):
-        pulls = pulley.pulls({"position": 0.01}, [tension], [0.3])
+        pulls = pulley.generalised_forces({"position": 0.01}, [tension], [0.3])
         at = ({"position": 0.01}, {"speed": 0.3}, pulls, {})
         assert pulley.acceleration(*at) == pytest.approx(hanging.acceleration(*at))
     half = Pulley(0.05, 7.0, 0.5, 0.01)
@@ -162,7 +167,7 @@ def test_a_pulley_of_ratio_one_without_inertia_is_a_hanging_mass():
 
 
 def test_a_chain_of_muscles_shortens_by_the_sum_of_its_parts():
-    chain = InSeries(HangingMass(5.0), (0.3, 0.2))
+    chain = MusclesInSeries(HangingMass(5.0), (0.3, 0.2))
     q = {"node1.position": 0.01, "node2.position": 0.015, "position": 0.05}
     contractions = chain.contractions(q, LENGTHS)
     assert sum(n * e for n, e in zip(LENGTHS, contractions, strict=True)) == pytest.approx(0.05)
@@ -175,13 +180,13 @@ def test_the_first_muscle_turns_the_joint_forward_and_the_second_back():
     assert back == pytest.approx(0.12 - 0.003 / 0.25)
     still = {"angular_speed": 0.0}
     for tensions, sign in (((100.0, 20.0), 1), ((20.0, 100.0), -1), ((50.0, 50.0), 0)):
-        pulls = JOINT.pulls({"angle": 0.0}, tensions, [0.2, 0.25])
+        pulls = JOINT.generalised_forces({"angle": 0.0}, tensions, [0.2, 0.25])
         assert np.sign(JOINT.acceleration({"angle": 0.0}, still, pulls, {})["angle"]) == sign
 
 
 @given(st.floats(-0.4, 0.6), st.floats(-3.0, 3.0))
 def test_stops_act_beyond_the_ends_alone_and_push_back(angle, speed):
-    stops = StoppedJoint(JOINT, -0.3, 0.4, 0.05, CONTACT)
+    stops = JointWithEndStops(JOINT, -0.3, 0.4, 0.05, CONTACT)
     push = stops.push({"angle": angle}, {"angular_speed": speed})
     if -0.3 <= angle <= 0.4:
         assert push == 0.0
@@ -195,7 +200,7 @@ def test_stops_act_beyond_the_ends_alone_and_push_back(angle, speed):
 @given(st.floats(-3.0, 3.0))
 def test_a_stop_begins_without_a_jump(speed):
     """Where the contact begins, on either side of it, and where it opens again because the body leaves fast."""
-    stops, still = StoppedJoint(JOINT, -0.3, 0.4, 0.05, CONTACT), {"angle": 0.0}
+    stops, still = JointWithEndStops(JOINT, -0.3, 0.4, 0.05, CONTACT), {"angle": 0.0}
     for end in (-0.3, 0.4):
         inside, outside = (
             stops.acceleration({"angle": end * (1 + h)}, {"angular_speed": speed}, still, {})["angle"]
@@ -216,13 +221,16 @@ def test_a_stop_begins_without_a_jump(speed):
         (lambda: Lever((), 1.0, 0.1), "give an arm for every muscle"),
         (lambda: Lever((0.1, 0.1), 1.0, 0.1, offsets=(0.1,)), "2 arms and 1 offsets"),
         (lambda: Lever((0.1,), 1.0, 0.0), "without inertia"),
-        (lambda: Mounted(JOINT, (0.1,)), "AntagonisticJoint takes 2 muscles; 1 offsets are given"),
-        (lambda: InSeries(HangingMass(1.0), ()), "give the mass of each node"),
-        (lambda: InSeries(JOINT, (0.1,)), "AntagonisticJoint takes 2"),
-        (lambda: Stopped(JOINT, 0.0, 0.1, CONTACT), "AntagonisticJoint has 0 coordinates in m"),
-        (lambda: Stopped(InSeries(HangingMass(1.0), (0.1,)), 0.0, 0.1, CONTACT), "node1.position or position"),
-        (lambda: Stopped(HangingMass(1.0), 0.0, 0.1, CONTACT, "angle"), "no coordinate 'angle' in m"),
-        (lambda: Stopped(HangingMass(1.0), 0.1, 0.1, CONTACT), "must lie below"),
+        (lambda: WithOffsets(JOINT, (0.1,)), "AntagonisticJoint takes 2 muscles; 1 offsets are given"),
+        (lambda: MusclesInSeries(HangingMass(1.0), ()), "give the mass of each node"),
+        (lambda: MusclesInSeries(JOINT, (0.1,)), "AntagonisticJoint takes 2"),
+        (lambda: WithEndStops(JOINT, 0.0, 0.1, CONTACT), "AntagonisticJoint has 0 coordinates in m"),
+        (
+            lambda: WithEndStops(MusclesInSeries(HangingMass(1.0), (0.1,)), 0.0, 0.1, CONTACT),
+            "node1.position or position",
+        ),
+        (lambda: WithEndStops(HangingMass(1.0), 0.0, 0.1, CONTACT, "angle"), "no coordinate 'angle' in m"),
+        (lambda: WithEndStops(HangingMass(1.0), 0.1, 0.1, CONTACT), "must lie below"),
         (lambda: SpringLoad(float("nan"), 1.0), "must be finite"),
         (lambda: Isotonic(-5.0, 1.0), "allowed are 0 to"),
         (lambda: Pulley(0.0, 1.0), "allowed are 0.0001"),
@@ -240,10 +248,10 @@ def test_a_plant_refuses_another_number_of_muscles_than_its_mechanism_takes():
 
 def test_wrapping_hands_on_everything():
     """A wrapper's interface is the inner mechanism's; none of it falls back to the base's."""
-    stopped = Stopped(Held(SpringLoad(3.0, 2000.0, 20.0)), -1.0, 1.0, CONTACT)
+    stopped = WithEndStops(Held(SpringLoad(3.0, 2000.0, 20.0)), -1.0, 1.0, CONTACT)
     assert [i.name for i in stopped.inputs] == ["held"]
     q, v = {"position": 0.1}, {"speed": 0.2}
     assert stopped.potential_energy(q) == 10.0
     assert stopped.kinetic_energy(q, v) == pytest.approx(0.06)
-    assert stopped.lost_power(q, v, {"position": 0.0}, {"held": 0.0}) == pytest.approx(0.8)
-    assert dataclasses.replace(stopped, least=-2.0).ends == (-2.0, 1.0)
+    assert stopped.dissipated_power(q, v, {"position": 0.0}, {"held": 0.0}) == pytest.approx(0.8)
+    assert dataclasses.replace(stopped, lower_stop=-2.0).ends == (-2.0, 1.0)

@@ -46,7 +46,7 @@ def test_a_damper_takes_energy_whatever_the_direction(p, v):
 @given(st.floats(1e4, 5e5), st.floats(0.0, 0.25))
 def test_the_stiffness_is_the_slope_of_the_tension(p, eps):
     muscle, step = hill(), 1e-6
-    slope = (muscle.unslackened(p, eps + step) - muscle.unslackened(p, eps - step)) / (2 * step)
+    slope = (muscle.unclamped_tension(p, eps + step) - muscle.unclamped_tension(p, eps - step)) / (2 * step)
     assert muscle.stiffness(p, eps) == pytest.approx(-slope, rel=1e-6)
 
 

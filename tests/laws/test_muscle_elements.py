@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from airmuscle.characteristic import Reynolds2003, Serres2009
-from airmuscle.control.inputs import REST, Schedule
+from airmuscle.control.inputs import ZERO_INPUT, Schedule
 from airmuscle.core.errors import ParameterError
 from airmuscle.friction import Dahl, LuGre
 from airmuscle.mechanism import HangingMass, Isometric
@@ -35,7 +35,7 @@ from airmuscle.muscle import (
     Serres2009Spring,
     SwellingWall,
 )
-from airmuscle.plant.energy_balance import Metered
+from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, FillDischarge, Supply, Valve
 from airmuscle.pneumatics.gas import Isothermal
@@ -100,7 +100,7 @@ def test_creep_relaxes_after_a_step_as_a_maxwell_element():
     plant = Plant(muscle, ClosedChamber(), Isometric(0.05), Isothermal())
     step = 1e-3
     start = plant.state_at(pressure=3e5, creep1=step, creep2=step)
-    run = simulate(plant, REST, duration=5.0, start=start, method=Rodas4(1e-9))
+    run = simulate(plant, ZERO_INPUT, duration=5.0, start=start, method=Rodas4(1e-9))
     t = run["time"]
     settled = muscle.tension(3e5, 0.05)
     expected = settled - step * (2e4 * np.exp(-t / 0.2) + 1e4 * np.exp(-t / 3.0))
@@ -112,7 +112,7 @@ def test_a_creeping_muscle_goes_on_to_contract_and_ends_where_it_would_without_c
     creeping = replace(plain, muscle=replace(chosen_muscle(), creep=CreepElements((2e4,), (0.3,))))
     ends = []
     for plant in (plain, creeping):
-        run = simulate(plant, REST, duration=6.0, start=plant.state_at(pressure=4e5, position=0.03))
+        run = simulate(plant, ZERO_INPUT, duration=6.0, start=plant.state_at(pressure=4e5, position=0.03))
         ends.append(run["position"])
     assert ends[1][-1] == pytest.approx(ends[0][-1], abs=1e-6)
     assert abs(ends[1][100] - ends[1][-1]) > 1e-4
@@ -148,7 +148,7 @@ def test_a_wall_comes_to_rest_where_it_says_and_nowhere_without_pressure(wall):
 def test_the_air_in_a_lagging_wall_counts_and_its_work_is_booked():
     muscle = replace(chosen_muscle(), wall=LaggingWall(5e-11, 0.05))
     valve = Valve(5e-9, 0.4)
-    metered = Metered(Plant(muscle, FillDischarge(Supply(5e5), valve, valve), HangingMass(15.0)))
+    metered = WithEnergyMeters(Plant(muscle, FillDischarge(Supply(5e5), valve, valve), HangingMass(15.0)))
     start = metered.reset(metered.plant.state_at(pressure=2e5))
     command = Schedule({"fill": ((0.1, 1), (0.4, 0)), "discharge": ((0.8, 1), (1.0, 0))})
     run = simulate(metered, command, duration=1.5, start=start, method=Rodas4(1e-9))
@@ -192,7 +192,7 @@ def test_a_contact_begins_without_a_jump_and_never_pulls(depth, speed):
 def test_an_end_stop_ends_the_way_and_the_book_of_the_load_still_closes():
     muscle = replace(chosen_muscle(), stop=STOP)
     valve = Valve(2e-8, 0.4)
-    metered = Metered(Plant(muscle, FillDischarge(Supply(6e5), valve, valve), HangingMass(5.0)))
+    metered = WithEnergyMeters(Plant(muscle, FillDischarge(Supply(6e5), valve, valve), HangingMass(5.0)))
     start = metered.reset(metered.plant.state_at(pressure=1e5))
     command = Schedule({"fill": ((0.05, 1), (0.5, 0)), "discharge": ((0.7, 1), (0.9, 0))})
     run = simulate(metered, command, duration=1.0, start=start, method=Rodas4(1e-10), output=1e-3)
@@ -216,9 +216,9 @@ def test_a_series_spring_at_rest_holds_what_the_contractile_part_pulls(contracti
     muscle = in_series(**({"stop": stop} if stop else {}))
     inner = muscle.settled(p, contraction)["inner_contraction"]
     stretch = (inner - contraction) * 0.2
-    assert muscle.series.force(stretch) == pytest.approx(muscle.static(p, inner), abs=1e-6)
+    assert muscle.series.force(stretch) == pytest.approx(muscle.static_force(p, inner), abs=1e-6)
     pull = muscle.pull(p, inner, contraction, 0.3, {"inner_contraction": inner})
-    assert pull.tension == pytest.approx(max(muscle.static(p, inner), 0.0), abs=1e-6)
+    assert pull.tension == pytest.approx(max(muscle.static_force(p, inner), 0.0), abs=1e-6)
     assert pull.speed == pytest.approx(0.0, abs=1e-8)
 
 
@@ -228,7 +228,7 @@ def test_the_speed_inside_balances_the_forces(contraction, stretch, p):
     muscle = in_series(stop=STOP, damper=DirectionalDamper(300.0, 150.0, 1e-3, 0.0))
     inner = contraction + stretch / 0.2
     pull = muscle.pull(p, inner, contraction, 0.0, {"inner_contraction": inner})
-    held = muscle.unslackened(p, inner, pull.speed) - muscle.stop.force(inner, pull.speed, 0.2)
+    held = muscle.unclamped_tension(p, inner, pull.speed) - muscle.stop.force(inner, pull.speed, 0.2)
     assert held == pytest.approx(muscle.series.force(stretch), rel=1e-9, abs=1e-6)
 
 
@@ -248,7 +248,7 @@ def test_a_slack_series_spring_pulls_nothing_and_pushes_nothing():
     muscle = in_series()
     assert muscle.pull(5e5, 0.05, 0.1, 0.0, {"inner_contraction": 0.05}).tension == 0.0
     plant = Plant(muscle, ClosedChamber(), HangingMass(1.0))
-    run = simulate(plant, REST, duration=1.0, start=plant.state_at(pressure=1e5, position=0.05, speed=0.5))
+    run = simulate(plant, ZERO_INPUT, duration=1.0, start=plant.state_at(pressure=1e5, position=0.05, speed=0.5))
     assert run["force"].min() == 0.0
 
 
@@ -259,7 +259,7 @@ def test_the_books_of_load_muscle_and_air_close_with_everything_in_it():
         wall=LaggingWall(2e-11, 0.02),
     )  # fmt: skip
     valve = Valve(2e-8, 0.4)
-    metered = Metered(Plant(muscle, FillDischarge(Supply(6e5), valve, valve), HangingMass(20.0)))
+    metered = WithEnergyMeters(Plant(muscle, FillDischarge(Supply(6e5), valve, valve), HangingMass(20.0)))
     start = metered.reset(metered.plant.state_at(pressure=2e5, position=0.005))
     command = Schedule({"fill": ((0.1, 1), (0.6, 0)), "discharge": ((0.8, 1), (1.1, 0))})
     run = simulate(metered, command, duration=1.5, start=start, method=Rodas4(1e-9))

@@ -22,18 +22,18 @@ from airmuscle.recording.segment import (
     ISOBARIC,
     ISOMETRIC,
     ISOTONIC,
-    branches,
+    analyse_sampling,
+    check_swept,
     directions,
+    estimate_sensors,
+    find_branches,
+    find_outliers,
+    find_plateaus,
+    find_runs,
     inspect,
     inspect_all,
-    outliers,
     plateau_points,
-    plateaus,
-    quasi_static,
-    refuse_unswept,
-    runs,
-    sampling,
-    sensors,
+    quasi_static_rows,
 )
 from airmuscle.recording.segment.branches import agreement
 from airmuscle.recording.segment.sensor import noise_of, resolution_of
@@ -70,7 +70,7 @@ def bench(seed: int = 1, noise: float = 400.0) -> tuple[Recording, int]:
 
 def test_a_stepped_ramp_with_overshoots_has_one_turn_at_the_last_row_of_the_top():
     recording, turn = bench()
-    up, down = branches(recording)
+    up, down = find_branches(recording)
     assert (up.direction, up.name, up.stretch.start, up.stretch.stop) == (1, "inflating", 0, turn)
     assert (down.direction, down.name, down.stretch.stop) == (-1, "deflating", len(recording))
 
@@ -92,7 +92,7 @@ def test_every_turn_of_a_random_history_is_found(turns, rows, rest, first, seed)
         truth += [first * (-1.0) ** i] * (rows + rest)
     pressure = np.concatenate(parts)
     measured = pressure + RANDOM(seed).normal(0, 200.0, len(pressure))
-    found = branches(timed(measured))
+    found = find_branches(timed(measured))
     assert [b.direction for b in found] == [first * (-1) ** i for i in range(len(turns))]
     slack = 0.6 * 0.05 * np.ptp(pressure) / (0.2 * 5e5 / rows) + 2  # rows that half a swing takes at the least slope
     differing = np.count_nonzero(directions(timed(measured), found) != truth)
@@ -104,47 +104,50 @@ def test_every_turn_of_a_random_history_is_found(turns, rows, rest, first, seed)
 def test_branches_do_not_depend_on_unit_or_zero_of_the_pressure(scale: float, shift: float, stretch: float):
     recording, _ = bench()
     other = recording.with_columns(pressure=recording["pressure"] * scale + shift)
-    cut = [(b.direction, b.stretch) for b in branches(recording)]
-    assert [(b.direction, b.stretch) for b in branches(other)] == cut
+    cut = [(b.direction, b.stretch) for b in find_branches(recording)]
+    assert [(b.direction, b.stretch) for b in find_branches(other)] == cut
 
 
 def test_turning_the_pressure_over_turns_the_branches_over():
     recording, turn = bench()
-    found = branches(recording.with_columns(pressure=6e5 - recording["pressure"]))
+    found = find_branches(recording.with_columns(pressure=6e5 - recording["pressure"]))
     assert [b.direction for b in found] == [-1, 1]
     assert found[0].stretch.stop == turn
 
 
 def test_a_minor_loop_is_found_and_a_ripple_is_not():
     loop = np.concatenate([np.linspace(0, 4e5, 80), np.linspace(4e5, 3e5, 30), np.linspace(3e5, 6e5, 60)])
-    assert [b.direction for b in branches(timed(loop))] == [1, -1, 1]
+    assert [b.direction for b in find_branches(timed(loop))] == [1, -1, 1]
     ripple = np.linspace(0, 6e5, 300) + 1.2e4 * np.sin(np.arange(300) * 0.5)
-    assert [b.direction for b in branches(timed(ripple))] == [1]
-    assert len(branches(timed(loop), swing=0.3)) == 1
+    assert [b.direction for b in find_branches(timed(ripple))] == [1]
+    assert len(find_branches(timed(loop), swing=0.3)) == 1
 
 
 def test_a_saw_tooth_has_a_deflating_branch_of_a_row_or_two_at_each_fall():
     tooth = np.tile(np.linspace(0, 6e5, 200), 4)
-    found = branches(timed(tooth))
+    found = find_branches(timed(tooth))
     assert [b.direction for b in found] == [1, -1, 1, -1, 1, -1, 1]
     assert all(len(b.stretch) < 10 for b in found[1::2])
 
 
 def test_constant_pressure_and_no_pressure_have_no_branch():
     assert (
-        branches(timed(2e5 + RANDOM(0).normal(0, 300, 200)), sensors(timed(RANDOM(0).normal(0, 300, 200)))["pressure"])
+        find_branches(
+            timed(2e5 + RANDOM(0).normal(0, 300, 200)),
+            estimate_sensors(timed(RANDOM(0).normal(0, 300, 200)))["pressure"],
+        )
         == ()
     )
-    assert branches(Recording({"force": np.arange(9.0)}, "x")) == ()
+    assert find_branches(Recording({"force": np.arange(9.0)}, "x")) == ()
 
 
 def test_a_branch_column_judges_and_decides_nothing():
     recording, turn = bench()
     stated = np.where(np.arange(len(recording)) < turn - 9, 1.0, 2.0)
     judged = recording.with_columns(branch=stated)
-    assert branches(judged) == branches(recording)
-    assert agreement(judged, branches(judged)) == pytest.approx(1.0 - 9 / len(recording))
-    assert agreement(recording, branches(recording)) is None
+    assert find_branches(judged) == find_branches(recording)
+    assert agreement(judged, find_branches(judged)) == pytest.approx(1.0 - 9 / len(recording))
+    assert agreement(recording, find_branches(recording)) is None
 
 
 # Sensors
@@ -191,12 +194,12 @@ def test_noise_is_told_from_the_course(sigma: float, seed: int):
 
 def test_resolution_and_cut_off_of_a_bench_are_found():
     recording, _ = bench()
-    found = sensors(recording)
+    found = estimate_sensors(recording)
     assert found["pressure"].resolution == pytest.approx(765.0, rel=1e-3)
     assert found["force"].resolution == pytest.approx(0.68, rel=1e-3)
-    assert found["force"].least == pytest.approx(recording["force"].min())
-    assert np.isinf(found["force"].greatest)
-    assert np.isinf(found["pressure"].least)
+    assert found["force"].lower_limit == pytest.approx(recording["force"].min())
+    assert np.isinf(found["force"].upper_limit)
+    assert np.isinf(found["pressure"].lower_limit)
     assert "time" not in found
     sides = found["force"].sides(recording["force"])
     assert np.array_equal(sides == 1, recording["force"] < -8.7)
@@ -207,31 +210,33 @@ def test_resolution_and_cut_off_of_a_bench_are_found():
 def test_a_saturated_sensor_is_found_at_its_upper_end():
     recording, _ = bench()
     full = np.minimum(recording["force"], recording["force"][180])
-    found = sensors(recording.with_columns(force=full))["force"]
-    assert (found.least, found.greatest) == (full.min(), full.max())
-    assert found.noise == pytest.approx(sensors(recording)["force"].noise, rel=0.3), "cut-off rows hide no noise"
-    assert found.at_greatest == np.count_nonzero(full == full.max())
+    found = estimate_sensors(recording.with_columns(force=full))["force"]
+    assert (found.lower_limit, found.upper_limit) == (full.min(), full.max())
+    assert found.noise == pytest.approx(estimate_sensors(recording)["force"].noise, rel=0.3), (
+        "cut-off rows hide no noise"
+    )
+    assert found.at_upper_limit == np.count_nonzero(full == full.max())
     few, many = (np.minimum(recording["force"], recording["force"][row]) for row in (180, 80))
     for values, serious in ((few, False), (many, True)):
-        said = [f for f in inspect(recording.with_columns(force=values)).findings if "greatest reading" in f.text]
+        said = [f for f in inspect(recording.with_columns(force=values)).findings if "highest reading" in f.text]
         assert [f.serious for f in said] == [serious]
         assert "Such rows are bounds, not values." in said[0].text
 
 
 def test_what_rests_without_flicker_or_with_it_on_both_sides_is_not_cut_off():
     vented = timed(np.maximum(np.concatenate([np.zeros(200), np.linspace(0, 5e5, 300)]), 0.0))
-    assert np.isinf(sensors(vented)["pressure"].least), "a sensor without noise does not show its end"
+    assert np.isinf(estimate_sensors(vented)["pressure"].lower_limit), "a sensor without noise does not show its end"
     noisy = timed(765.0 * np.round((vented["pressure"] + RANDOM(4).normal(0, 600, 500)) / 765.0))
-    assert np.isinf(sensors(noisy)["pressure"].least)
+    assert np.isinf(estimate_sensors(noisy)["pressure"].lower_limit)
 
 
 def test_several_runs_of_a_rig_show_an_end_that_one_hardly_reaches():
     reaching, _ = bench(1)
     rows = np.concatenate([np.flatnonzero(reaching["force"] <= reaching["force"].min())[:2], np.arange(150, 380)])
     hardly = reaching.rows(np.sort(rows))
-    assert np.isinf(sensors(hardly)["force"].least)
+    assert np.isinf(estimate_sensors(hardly)["force"].lower_limit)
     seen = inspect_all([reaching, hardly])
-    assert seen[1].sensors["force"].least == pytest.approx(reaching["force"].min())
+    assert seen[1].sensors["force"].lower_limit == pytest.approx(reaching["force"].min())
 
 
 # Plateaus and transients
@@ -239,7 +244,7 @@ def test_several_runs_of_a_rig_show_an_end_that_one_hardly_reaches():
 
 def test_the_plateaus_of_a_staircase_are_its_steps():
     recording, _ = bench()
-    found = plateaus(recording)
+    found = find_plateaus(recording)
     steps = {p.stretch.start // 10 for p in found}
     assert len(found) == len(steps) == 45
     levels = [*np.linspace(0, 6e5, 25), *np.linspace(5.4e5, 5e4, 20)]
@@ -253,22 +258,22 @@ def test_the_plateaus_of_a_staircase_are_its_steps():
 
 def test_a_slow_ramp_is_quasi_static_and_no_plateau_a_fast_one_is_neither():
     slow = timed(np.linspace(0, 6e5, 600))
-    assert quasi_static(slow).all()
-    assert plateaus(slow) == ()
+    assert quasi_static_rows(slow).all()
+    assert find_plateaus(slow) == ()
     fast = timed(np.concatenate([np.zeros(50), np.linspace(0, 6e5, 20), np.full(50, 6e5)]))
-    calm = quasi_static(fast)
+    calm = quasi_static_rows(fast)
     assert not calm[50:70].any()
     assert calm[:47].all()
     assert calm[73:].all()
-    assert [p.values["pressure"] for p in plateaus(fast)] == pytest.approx([0.0, 6e5], abs=1.0)
+    assert [p.values["pressure"] for p in find_plateaus(fast)] == pytest.approx([0.0, 6e5], abs=1.0)
 
 
 def test_points_without_time_are_all_settled():
     table = Recording({"pressure": np.array([0.0, 3e5, 1e5]), "force": np.zeros(3)}, "table")
-    assert quasi_static(table).all()
-    assert plateaus(table) == ()
-    assert outliers(table) == ()
-    assert sampling(table) is None
+    assert quasi_static_rows(table).all()
+    assert find_plateaus(table) == ()
+    assert find_outliers(table) == ()
+    assert analyse_sampling(table) is None
 
 
 # Glitches
@@ -283,11 +288,11 @@ def test_planted_glitches_are_listed_and_stay_in_the_recording(rows: set[int], s
     for row in planted:
         force[row] += sign * 40.0
     spoilt = recording.with_columns(force=force)
-    found = {o.row for o in outliers(spoilt) if o.column == "force"}
+    found = {o.row for o in find_outliers(spoilt) if o.column == "force"}
     assert planted <= found
     assert len(found - planted) <= 1
     assert np.array_equal(inspect(spoilt).recording["force"], force), "listed, not removed"
-    for outlier in outliers(spoilt):
+    for outlier in find_outliers(spoilt):
         if outlier.row in planted and outlier.column == "force":
             assert outlier.expected == pytest.approx(recording["force"][outlier.row], abs=4.0)
 
@@ -296,9 +301,9 @@ def test_a_glitch_of_two_rows_is_found_and_the_overshoot_of_a_step_is_not():
     noise = RANDOM(3).normal(0, 300.0, 200)
     step = np.where(np.arange(200) < 100, 1e5, 3e5) + noise
     step[100:102] += 5e4
-    assert outliers(timed(step)) == ()
+    assert find_outliers(timed(step)) == ()
     step[150:152] += 5e4
-    assert [o.row for o in outliers(timed(step))] == [150, 151]
+    assert [o.row for o in find_outliers(timed(step))] == [150, 151]
 
 
 # Runs
@@ -310,19 +315,19 @@ def test_each_kind_of_run_is_recognised():
     swept = {"pressure": 6e5 * sweep, "contraction": 0.25 * sweep, "force": 1500 * (1 - sweep)}
     for kind, name in ((ISOBARIC, "pressure"), (ISOMETRIC, "contraction"), (ISOTONIC, "force")):
         recording = Recording({**swept, name: held[name]}, "run")
-        (run,) = runs(recording)
+        (run,) = find_runs(recording)
         assert (run.kind, run.column) == (kind, name)
         assert run.value == pytest.approx(np.median(held[name]))
         assert set(run.swept) == set(swept) - {name}
-    assert [r.kind for r in runs(Recording(swept, "free"))] == [FREE]
-    assert [r.kind for r in runs(Recording(held, "rest"))] == [AT_REST]
+    assert [r.kind for r in find_runs(Recording(swept, "free"))] == [FREE]
+    assert [r.kind for r in find_runs(Recording(held, "rest"))] == [AT_REST]
     by_length = {"pressure": swept["pressure"], "length": np.full(200, 0.3), "force": swept["force"]}
-    assert runs(Recording(by_length, "length"))[0].kind is ISOMETRIC
+    assert find_runs(Recording(by_length, "length"))[0].kind is ISOMETRIC
 
 
 def test_a_relaxation_at_held_pressure_and_length_is_named_by_its_pressure():
     force = 500.0 + 80.0 * np.exp(-np.linspace(0, 4, 200))
-    (run,) = runs(timed(np.full(200, 3e5), length=np.full(200, 0.28), force=force))
+    (run,) = find_runs(timed(np.full(200, 3e5), length=np.full(200, 0.28), force=force))
     assert (run.kind, run.swept) == (ISOBARIC, ("force",))
 
 
@@ -333,7 +338,7 @@ def test_a_table_of_isobars_is_as_many_runs():
     table = Recording(
         {"pressure": pressures, "contraction": contractions, "force": pressures * (0.01 - 0.03 * contractions)}, "t"
     )
-    found = runs(table)
+    found = find_runs(table)
     assert [run.kind for run in found] == [ISOBARIC] * 6
     assert [run.value for run in found] == pytest.approx(np.linspace(1e5, 6e5, 6))
     assert [(r.stretch.start, r.stretch.stop) for r in found] == [(11 * i, 11 * i + 11) for i in range(6)]
@@ -343,12 +348,12 @@ def test_constant_pressure_given_as_an_isometric_sweep_is_refused():
     noise = RANDOM(0).normal(0, 1, 200)
     resting = timed(3e5 + 100 * noise, force=200 + 0.5 * noise, length=np.full(200, 0.28))
     with pytest.raises(ColumnError, match=r"synthetic: nothing that was measured changes .*299\.\d to 300\.\d kPa"):
-        refuse_unswept(resting, runs(resting))
+        check_swept(resting, find_runs(resting))
     isobaric = timed(3e5 + 100 * noise, force=np.linspace(0, 900, 200), length=np.linspace(0.25, 0.3, 200))
-    refuse_unswept(isobaric, runs(isobaric))
+    check_swept(isobaric, find_runs(isobaric))
     said = isobaric.with_constants(run="isometric")
     with pytest.raises(ColumnError, match="said to be isometric, but what was measured is isobaric"):
-        refuse_unswept(said, runs(said))
+        check_swept(said, find_runs(said))
     assert inspect(said).findings[0].serious
 
 
@@ -361,7 +366,7 @@ def test_rate_jitter_gaps_repeats_and_steps_back():
     time = np.concatenate([[0.0], np.cumsum(steps)])
     time[200] = time[199]
     time[301] = time[299]
-    seen = sampling(Recording({"time": time}, "clock"))
+    seen = analyse_sampling(Recording({"time": time}, "clock"))
     assert seen.rate == pytest.approx(20.0, rel=0.01)
     assert seen.jitter == pytest.approx(0.02, rel=0.25)
     assert [(g.row, round(g.length, 6)) for g in seen.gaps] == [(100, 2.0)]

@@ -13,7 +13,7 @@ from airmuscle.characteristic import VirtualWork
 from airmuscle.core import autodiff, tree
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CubicSpring, EndStop, LinearSpring, SeriesSpring
-from airmuscle.muscle.settle import last_pulling
+from airmuscle.muscle.series_equilibrium import last_pulling
 
 STOP = EndStop(0.1, HuntCrossley(1e9, 0.5))
 
@@ -24,14 +24,14 @@ def in_series(stiffness=2e5, **parts):
 
 def bisected(muscle, p, contraction):
     """The greatest inner contraction at which the spring does not hold more than the contractile part pulls."""
-    (least, most), length = muscle.geometry.contraction_reach, muscle.geometry.resting_length
-    here = muscle.unbalance_inside(p, contraction, contraction)
+    (least, most), length = muscle.geometry.contraction_range, muscle.geometry.resting_length
+    here = muscle.internal_imbalance(p, contraction, contraction)
     low, high = (min(least, contraction), contraction) if here < 0 else (contraction, max(most, contraction))
     if here >= 0:
         high = min(high, contraction + here / (muscle.series.stiffness * length))
     for _ in range(200):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if muscle.unbalance_inside(p, middle, contraction) >= 0 else (low, middle)
+        low, high = (middle, high) if muscle.internal_imbalance(p, middle, contraction) >= 0 else (low, middle)
     return low
 
 
@@ -72,13 +72,13 @@ def test_a_law_that_is_not_closed_form_settles_too():
 
 def test_inside_it_settles_in_a_few_looks(monkeypatch):
     """It took fifty, and a thousand where the spring is slack at no pressure."""
-    looks, traced = [], autodiff.with_slope
+    looks, traced = [], autodiff.value_and_derivative
 
     def counted(*given, **named):
         function = traced(*given, **named)
         return lambda *arguments: looks.append(1) or function(*arguments)
 
-    monkeypatch.setattr("airmuscle.muscle.settle.autodiff.with_slope", counted)
+    monkeypatch.setattr("airmuscle.muscle.series_equilibrium.autodiff.value_and_derivative", counted)
     for muscle in INSIDE.values():
         for p in (0.0, 2e5):
             for contraction in (-0.02, 0.0, 0.05, 0.2):
@@ -116,7 +116,7 @@ def test_a_table_of_muscles_settles_as_each_of_them():
     muscle = in_series(stop=STOP)
     values = tree.flatten(muscle)
     table = values * (1.0 + 0.03 * np.random.default_rng(2).uniform(-1, 1, (4, values.size)))
-    columns = tree.rebuild(muscle, [column[:, None] for column in table.T])
+    columns = tree.unflatten(muscle, [column[:, None] for column in table.T])
     contractions = np.array([[0.0, 0.05, 0.2]])
     together = columns.settled(2e5, contractions + np.zeros((4, 1)))["inner_contraction"]
     for row, inner in zip(table, together, strict=True):
@@ -127,7 +127,7 @@ def test_a_table_of_muscles_settles_as_each_of_them():
 
 def test_a_value_comes_with_its_exact_slope_for_numbers_arrays_and_tables_of_parameters():
     braid = chosen_muscle().geometry
-    both, x = autodiff.with_slope(braid, "volume", 1), np.linspace(0.0, 0.3, 7)
+    both, x = autodiff.value_and_derivative(braid, "volume", 1), np.linspace(0.0, 0.3, 7)
     value, slope = both(0.1)
     assert (value, slope) == pytest.approx((braid.volume(0.1), braid.volume_growth(0.1)), rel=1e-14)
     values, slopes = both(x.reshape(7, 1))
@@ -135,8 +135,8 @@ def test_a_value_comes_with_its_exact_slope_for_numbers_arrays_and_tables_of_par
     np.testing.assert_allclose(values[:, 0], braid.volume(x), rtol=1e-14)
     np.testing.assert_allclose(slopes[:, 0], [braid.volume_growth(float(c)) for c in x], rtol=1e-14)
     radii = np.array([[0.01], [0.02]])
-    table = tree.rebuild(braid, [radii, *tree.flatten(braid)[1:].tolist()])
-    values, slopes = autodiff.with_slope(table, "volume", 1)(x)
+    table = tree.unflatten(braid, [radii, *tree.flatten(braid)[1:].tolist()])
+    values, slopes = autodiff.value_and_derivative(table, "volume", 1)(x)
     np.testing.assert_allclose(values, (radii / 0.01) ** 2 * braid.volume(x), rtol=1e-14)
     np.testing.assert_allclose(slopes, (radii / 0.01) ** 2 * braid.volume_growth(x), rtol=1e-14)
     np.testing.assert_allclose(table.volume_growth(x), slopes, rtol=1e-14)

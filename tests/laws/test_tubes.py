@@ -21,11 +21,11 @@ from scipy.optimize import brentq
 from airmuscle.control.inputs import Schedule
 from airmuscle.mechanism import Isometric
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import DistributedTube, FillDischarge, Line, Supply, Tube, TubeOrifice, Valve
+from airmuscle.pneumatics import DistributedTube, FillDischarge, Supply, Tube, TubeOrifice, Valve, WithTubes
 from airmuscle.pneumatics.gas import (
     GAS_CONSTANT,
     HEAT_AT_CONSTANT_PRESSURE,
-    STILL,
+    NO_FLOW,
     Air,
     Ambient,
     EnergyBalance,
@@ -55,7 +55,7 @@ def steady(p1, p2, length, diameter, end_loss=1.5):
 
 def at_rest(tube, pressure, tilt=0.0):
     """States of a tube and its airs; `tilt` makes the pressures fall towards the muscle."""
-    state = tube.settled(Air(pressure, WARM), AMBIENT)
+    state = tube.steady_state(Air(pressure, WARM), AMBIENT)
     n = tube.pieces
     for i in range(n):
         prefix = "tube." if n == 1 else f"tube{i + 1}."
@@ -79,7 +79,7 @@ def test_a_steady_flow_obeys_darcys_law_however_few_the_pieces(p1, p2, length, d
     state = {}
     for name, p in zip(tube.names, np.sqrt(squares), strict=True):
         state |= {f"{name}air_mass": p * tube.piece_volume / (GAS_CONSTANT * WARM), f"{name}flow": q}
-    rates, onward = tube.rates(state, tube.airs(state, AMBIENT), STILL, Air(p2, WARM), AMBIENT)
+    rates, onward = tube.rates(state, tube.air_states(state, AMBIENT), NO_FLOW, Air(p2, WARM), AMBIENT)
     driving = tube.area * (p1 - p2) / length
     assert onward.mass == q
     for name in tube.names:
@@ -112,8 +112,8 @@ def test_the_air_that_flows_on_is_as_warm_as_where_it_comes_from(mass_flow):
     tube = DistributedTube(1.0, 3e-3, 2, EnergyBalance(0.0))
     state = at_rest(tube, 3e5) | {"tube2.flow": mass_flow}
     state["tube2.internal_energy"] *= 1.1
-    airs, muscle = tube.airs(state, AMBIENT), Air(3e5, 350.0)
-    _, onward = tube.rates(state, airs, STILL, muscle, AMBIENT)
+    airs, muscle = tube.air_states(state, AMBIENT), Air(3e5, 350.0)
+    _, onward = tube.rates(state, airs, NO_FLOW, muscle, AMBIENT)
     origin = airs[1] if mass_flow > 0 else muscle
     assert onward.enthalpy == pytest.approx(HEAT_AT_CONSTANT_PRESSURE * origin.temperature * mass_flow)
 
@@ -134,7 +134,7 @@ def test_the_pieces_of_a_lumped_tube_flow_as_the_whole(pieces):
     p1, p2 = 6e5, 3e5
     squares = p1**2 + (p2**2 - p1**2) * np.arange(pieces) / pieces
     state = {f"tube{i}.air_mass": p * 2e-5 / pieces / (GAS_CONSTANT * WARM) for i, p in enumerate(np.sqrt(squares), 1)}
-    rates, onward = cut.rates(state, cut.airs(state, AMBIENT), STILL, Air(p2, WARM), AMBIENT)
+    rates, onward = cut.rates(state, cut.air_states(state, AMBIENT), NO_FLOW, Air(p2, WARM), AMBIENT)
     expected = whole.orifice.mass_flow(p1, p2, 1.0, WARM)
     assert onward.mass == pytest.approx(expected, rel=1e-9)
     assert [abs(rates[f"tube{i}.air_mass"]) < 1e-9 * expected for i in range(2, pieces + 1)] == [True] * (pieces - 1)
@@ -146,13 +146,13 @@ def test_the_pieces_of_a_lumped_tube_flow_as_the_whole(pieces):
 def linearised(tube, pressure):
     """Rates of flows and inner pieces by themselves, and by 1 Pa imposed on the first; the muscle's pressure stays."""
     state = at_rest(tube, pressure)
-    muscle = tube.airs(state, AMBIENT)[0]
+    muscle = tube.air_states(state, AMBIENT)[0]
     first = [n for n in state if n.startswith("tube1.") and not n.endswith("flow")]
     inner = [n for n in state if n not in first]
     exponent = tube.gas.sound_speed(muscle) ** 2 / (GAS_CONSTANT * muscle.temperature)
 
     def rates(values):
-        found = tube.rates(values, tube.airs(values, AMBIENT), STILL, muscle, AMBIENT)[0]
+        found = tube.rates(values, tube.air_states(values, AMBIENT), NO_FLOW, muscle, AMBIENT)[0]
         return np.array([found[n] for n in inner])
 
     def by(shift):
@@ -186,7 +186,7 @@ def test_vibrations_are_delayed_and_weakened_as_the_telegraph_equation_has_it(ga
 def shock_tube(tube, gas, duration):
     """Both ends behind much wider openings: 3 bar at the valve, then a little more."""
     wide = Valve(1e-6, 0.4)
-    plant = Plant(chosen_muscle(), Line(FillDischarge(Supply(2.1e5), wide, wide), tube), Isometric(0.05), gas)
+    plant = Plant(chosen_muscle(), WithTubes(FillDischarge(Supply(2.1e5), wide, wide), tube), Isometric(0.05), gas)
     start = plant.state_at(pressure=2e5)
     return simulate(
         plant, Schedule({"fill": ((0.0, 1.0),)}), duration=duration, start=start, method=Rodas4(1e-6), output=1e-5
@@ -220,7 +220,7 @@ def test_a_lumped_tube_knows_no_delay_and_both_agree_once_the_waves_are_gone():
     length, diameter = 2.0, 4e-3
     valve, courses = Valve(2.6167e-9, 0.433), {}
     for tube in (DistributedTube(length, diameter, 30), Tube.of_size(length, diameter)):
-        circuit = Line(FillDischarge(Supply(5.5e5), valve, valve), tube)
+        circuit = WithTubes(FillDischarge(Supply(5.5e5), valve, valve), tube)
         plant = Plant(chosen_muscle(), circuit, Isometric(0.1), Isothermal())
         start = plant.state_at(pressure=0.0)
         times = np.concatenate([np.arange(0.0, 0.02, 1e-4), np.arange(0.02, 1.0, 1e-3)])

@@ -134,7 +134,7 @@ def test_where_cracking_takes_up_all_of_the_subsonic_range_it_opens_over_the_lam
 @given(indexed, st.floats(0.0, 2.0))
 def test_the_power_itself_has_a_finite_slope_even_where_another_branch_rules(valve, way):
     """Derivatives of both branches are worked out before one is chosen: infinity times zero would be NaN in JAX."""
-    assert np.isfinite(autodiff.slope(valve, "_fraction", way, wrt=0))
+    assert np.isfinite(autodiff.derivative(valve, "_fraction", way, wrt=0))
 
 
 def kinks(law: Orifice, p1: float) -> list[float]:
@@ -164,7 +164,7 @@ def test_slopes_are_finite_everywhere_and_of_the_right_sign(law):
     for p1 in (5e4, 4e5, 1.2e6):
         for p2 in [*kinks(law, p1), *np.linspace(1e3, 1.5e6, 60)]:
             by_upstream, by_downstream = (
-                autodiff.slope(law, "mass_flow", p1, float(p2), 1.0, T0, wrt=i) for i in (0, 1)
+                autodiff.derivative(law, "mass_flow", p1, float(p2), 1.0, T0, wrt=i) for i in (0, 1)
             )
             assert np.isfinite([by_upstream, by_downstream]).all(), (p1, p2)
             assert by_upstream >= -1e-20, (p1, p2)

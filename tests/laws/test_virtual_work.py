@@ -15,25 +15,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.analysis.energy_defect import maxwell_defect, virtual_work_defect
-from airmuscle.characteristic.box import Box
 from airmuscle.characteristic.chou_hannaford1996 import ChouHannaford1996
 from airmuscle.characteristic.tondu_lopez2000 import TonduLopez2000
+from airmuscle.characteristic.validity_range import ValidityRange
 from airmuscle.characteristic.virtual_work import VirtualWork
-from airmuscle.core.errors import NoSolution, TraceError
+from airmuscle.core.errors import SolveError, TraceError
 from airmuscle.geometry.braid import Braid
 from airmuscle.geometry.chebyshev import as_polynomial
 from airmuscle.geometry.tabulated import TabulatedGeometry
 from airmuscle.library import catalogue
 
 BRAID = Braid(0.01, np.radians(25.0), 0.3)
-BOX = Box(5e4, 6e5, 0.0, 0.28)
+BOX = ValidityRange(5e4, 6e5, 0.0, 0.28)
 braids = st.builds(Braid, st.floats(2e-3, 0.05), st.floats(0.2, 0.8), st.floats(0.05, 2.0))
 
 
 @given(braid=braids, pressure=st.floats(1e3, 8e5), place=st.floats(0.01, 0.95))
 def test_the_braid_gives_the_force_of_chou_and_hannaford(braid: Braid, pressure: float, place: float):
     law = ChouHannaford1996(braid)
-    contraction = place * law.contraction_reach[1]
+    contraction = place * law.contraction_range[1]
     ideal = VirtualWork(braid).force(pressure, contraction)
     assert law.force(pressure, contraction) == pytest.approx(ideal, rel=1e-9)
 
@@ -57,10 +57,10 @@ def test_corrected_ends_leave_virtual_work_by_a_sixth_at_the_end_of_the_stroke()
 @pytest.mark.parametrize(("name", "newtons"), [("dmsp-20-300", 418.4), ("dmsp-10-250", 199.5)])
 def test_a_rubber_wall_takes_hundreds_of_newtons_and_keeps_energy(name: str, newtons: float):
     muscle = catalogue.load(name)
-    assert virtual_work_defect(muscle.characteristic, muscle.geometry, muscle.box).worst == pytest.approx(
+    assert virtual_work_defect(muscle.characteristic, muscle.geometry, muscle.validity_range).worst == pytest.approx(
         newtons, abs=0.05
     )
-    assert maxwell_defect(muscle.characteristic, muscle.geometry, muscle.box).relative < 1e-9
+    assert maxwell_defect(muscle.characteristic, muscle.geometry, muscle.validity_range).relative < 1e-9
 
 
 def test_a_volume_that_is_not_the_laws_shows_as_a_maxwell_defect_of_its_size():
@@ -70,8 +70,8 @@ def test_a_volume_that_is_not_the_laws_shows_as_a_maxwell_defect_of_its_size():
 
 
 def test_a_muscle_that_pulls_nowhere_has_no_defect_to_tell():
-    with pytest.raises(NoSolution, match="pulls nowhere"):
-        maxwell_defect(ChouHannaford1996(BRAID), BRAID, Box(1e5, 2e5, 0.5, 0.6))
+    with pytest.raises(SolveError, match="pulls nowhere"):
+        maxwell_defect(ChouHannaford1996(BRAID), BRAID, ValidityRange(1e5, 2e5, 0.5, 0.6))
 
 
 def test_a_tabulated_volume_gives_its_force_but_no_second_derivative():

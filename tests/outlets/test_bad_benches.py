@@ -18,7 +18,7 @@ from airmuscle.geometry.braid import Braid
 from airmuscle.identify import UNCENSORED, fit
 from airmuscle.library.catalogue import load
 from airmuscle.recording import Recording, read
-from airmuscle.recording.write_csv import write_csv
+from airmuscle.recording.csv_writer import write_csv
 
 MUSCLE = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
 SURFACE = ("--characteristic", "ContractileSurface", "--degree", "3", "--resting-length", "300 mm")
@@ -126,19 +126,19 @@ def test_a_force_sensor_at_its_upper_end_gives_bounds_not_values(tmp_path):
     assert true > 850.0
     assert law.unclamped(4e5, 0.02) == pytest.approx(true, rel=0.01)
     runs = read(files, resting_length=0.3)
-    found = fit(ContractileSurface.blank(3, greatest_force=1e5), runs)
+    found = fit(ContractileSurface.blank(3, max_force=1e5), runs)
     high = np.concatenate([run["force"] for run in runs]) >= 500.0
     assert high.sum() > 100
     assert (found.sides[high] == -1).all()
     assert found.rmse < 1.0
-    as_it_stands = fit(ContractileSurface.blank(3, greatest_force=1e5), runs, censoring=UNCENSORED)
+    as_it_stands = fit(ContractileSurface.blank(3, max_force=1e5), runs, censoring=UNCENSORED)
     assert as_it_stands.rmse > 10.0
     assert float(as_it_stands.model.unclamped(4e5, 0.02)) < 0.65 * true
 
 
 def test_a_sensor_without_an_end_changes_nothing(tmp_path):
     runs = read([ramp(tmp_path / f"run{i}.csv", p, seed=i) for i, p in enumerate((2e5, 3e5))], resting_length=0.3)
-    assert (fit(ContractileSurface.blank(1, greatest_force=1e5), runs).sides <= 0).sum() == sum(
+    assert (fit(ContractileSurface.blank(1, max_force=1e5), runs).sides <= 0).sum() == sum(
         (run["force"] > 0).sum() for run in runs
     )
 
@@ -146,7 +146,7 @@ def test_a_sensor_without_an_end_changes_nothing(tmp_path):
 def test_a_sensor_that_is_cut_off_most_of_the_time_is_a_problem_to_see(tmp_path):
     file = ramp(tmp_path / "run.csv", 5e5, ceiling=600.0)
     said = airmuscle("inspect", file).stdout
-    assert "PROBLEM: the force stands still at its greatest reading, 600 N" in said
+    assert "PROBLEM: the force stands still at its highest reading, 600 N" in said
     assert "Such rows are bounds, not values." in said
 
 

@@ -19,19 +19,19 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle import advance, load, measured, read_csv, simulate
-from airmuscle.analysis.equilibrium import equilibrium
+from airmuscle import advance, load, load_data, read_csv, simulate
+from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.cli.app import app
 from airmuscle.compile.cache.kernel import Kernel
-from airmuscle.control.inputs import Schedule, Signal
-from airmuscle.core.errors import FileError, NoSolution, ParameterError, UnitError
-from airmuscle.core.model import model, parameter
+from airmuscle.control.inputs import SampledSignal, Schedule
+from airmuscle.core.declaration import model, parameter
+from airmuscle.core.errors import FileError, ParameterError, SolveError, UnitError
 from airmuscle.core.units import ABSOLUTE, conversion, quantity
-from airmuscle.library.catalogue import names, parsed
+from airmuscle.library.catalogue import list_library, parsed
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.report.staged import refuse_unwritable, staged
+from airmuscle.report.output_folder import atomic_folder, check_writable
 from airmuscle.simulation import integrators
 from airmuscle.simulation.integrators import RungeKutta4
 
@@ -152,7 +152,7 @@ def test_a_bad_option_of_fit(tmp_path: Path, option: tuple[str, str], message: s
 def test_a_data_set_is_known_by_a_unique_beginning_and_brings_its_units(tmp_path: Path):
     surface = ("--characteristic", "ContractileSurface", "--degree", "2")
     result = CliRunner().invoke(app, ["fit", "dmsp-20", *surface, "--out", str(tmp_path / "fit"), "--json"])
-    assert json.loads(result.stdout)["rows_used"] == len(measured(MUSCLE))
+    assert json.loads(result.stdout)["rows_used"] == len(load_data(MUSCLE))
     said = refused(tmp_path, "fit", MUSCLE, *surface, "--unit", "pressure=psi", "--out", tmp_path / "other")
     assert said == f"{MUSCLE}: a data set of the library brings its units and constants along; leave out units."
     said = refused(tmp_path, "fit", "dmps-20-300", *surface, "--out", tmp_path / "other")
@@ -185,7 +185,7 @@ def test_a_request_that_no_muscle_can_meet(tmp_path: Path, given: tuple[str, ...
 
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", list_library())
 def test_every_entry_answers_or_refuses_in_one_line(name: str):
     """Loads, pressures and contractions far beyond any muscle: a number that JSON can hold, or one line."""
     beyond = (
@@ -208,7 +208,7 @@ def test_every_entry_answers_or_refuses_in_one_line(name: str):
 def test_without_pressure_a_closed_form_bears_no_load(name: str):
     law = load(name).characteristic
     for pressure in (0.0, np.array([0.0, 3e5])):
-        with pytest.raises(NoSolution, match=r"balances 100 N at 0 kPa. Between these the muscle pulls 0 to 0 N there"):
+        with pytest.raises(SolveError, match=r"balances 100 N at 0 kPa. Between these the muscle pulls 0 to 0 N there"):
             law.contraction(pressure, 100.0)
 
 
@@ -276,14 +276,14 @@ def test_a_parameter_that_cannot_be(given: dict[str, object], message: str):
         Tube(**given)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("kind", [Schedule, Signal])
+@pytest.mark.parametrize("kind", [Schedule, SampledSignal])
 @pytest.mark.parametrize("given", [1, (1, 2), ((1, 2, 3),), (("5 s", 1),)])
 def test_a_command_that_is_no_pairs(kind: type, given: object):
     with pytest.raises(ParameterError, match=r"of 'fill' is .*; write pairs of time \[s\] and value, \(\(5, 1\)"):
         kind({"fill": given})
 
 
-@pytest.mark.parametrize("kind", [Schedule, Signal])
+@pytest.mark.parametrize("kind", [Schedule, SampledSignal])
 @pytest.mark.parametrize("given", [None, ((5, 1), (15, 0))])
 def test_a_command_that_names_no_inputs(kind: type, given: object):
     with pytest.raises(ParameterError, match=r"a (schedule|signal) is .*; name the inputs: {'fill': "):
@@ -308,13 +308,13 @@ def test_a_run_that_cannot_be(plant: Plant):
         ):
             simulate(plant, Schedule({"fill": ((0, opening),)}), duration=1.0)
         with pytest.raises(ParameterError, match=rf"the input 'fill' is {opening:g}"):
-            advance(plant, equilibrium(plant, pressure=0.0), {"fill": opening}, 0.1)
+            advance(plant, find_equilibrium(plant, pressure=0.0), {"fill": opening}, 0.1)
 
 
 @pytest.mark.parametrize("dt", [0.0, -1.0, np.nan, np.inf])
 def test_a_step_of_no_length(plant: Plant, dt: float):
     with pytest.raises(ParameterError, match=r"advance: dt is .* s; it must be positive and finite"):
-        advance(plant, equilibrium(plant, pressure=0.0), {}, dt)
+        advance(plant, find_equilibrium(plant, pressure=0.0), {}, dt)
 
 
 # Muscle files
@@ -342,16 +342,16 @@ def test_a_name_that_no_file_can_have(name: str):
         parsed(Path(name))
 
 
-BOX = "least_pressure = 0\ngreatest_pressure = 6e5\nleast_contraction = 0\ngreatest_contraction = 0.25\n"
+BOX = "min_pressure = 0\nmax_pressure = 6e5\nmin_contraction = 0\nmax_contraction = 0.25\n"
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("box = 3", r"\[box\]: 3 is not a table"),
-        (f"[box]\n{BOX.replace('0.25', '25')}", r"\[box\]: Box.greatest_contraction .* is 25; allowed are -0.5 to 1"),
-        (f"[box]\n{BOX.replace('least_pressure = 0', 'least_pressure = -3e5', 1)}", r"\[box\]: .* is -300000 Pa"),
-        (f'[box]\nmodel = "Braid"\n{BOX}', r"\[box\]: Braid has no parameter 'least_pressure'"),
+        ("validity_range = 3", r"\[validity_range\]: 3 is not a table"),
+        (f"[validity_range]\n{BOX.replace('0.25', '25')}", r"\[validity_range\]: Box.max_contraction .* is 25; allowed are -0.5 to 1"),
+        (f"[validity_range]\n{BOX.replace('min_pressure = 0', 'min_pressure = -3e5', 1)}", r"\[validity_range\]: .* is -300000 Pa"),
+        (f'[validity_range]\nmodel = "Braid"\n{BOX}', r"\[validity_range\]: Braid has no parameter 'min_pressure'"),
         ('[[check]]\nquantity = "volume"\ncontraction = nan\nequals = 1\ntolerance = 1\nsource = "s"', r"contraction is nan"),
         ('[[check]]\nquantity = "volume"\ncontraction = 0\nequals = 1\ntolerance = -1\nsource = "s"', r"tolerance is -1"),
         ('[[reference]]\nkey = "k"\nauthors = "a"\ntitle = "t"\nwhere = "w"\ndoi = 3', r"\[reference 1\]: doi is 3"),
@@ -359,10 +359,10 @@ BOX = "least_pressure = 0\ngreatest_pressure = 6e5\nleast_contraction = 0\ngreat
 )  # fmt: skip
 def test_a_muscle_file_with_a_bad_table(tmp_path: Path, text: str, message: str):
     law = '[characteristic]\nmodel = "ChouHannaford1996"\n[characteristic.geometry]\nmodel = "Braid"\n'
-    head = f'title = "t"\ntrust = "chosen"\n{text if text.startswith("box") else ""}\n'
+    head = f'title = "t"\nprovenance = "chosen"\n{text if text.startswith("validity_range") else ""}\n'
     braid = "radius = 0.01\nbraid_angle = 0.4\nresting_length = 0.3\n"
     file = tmp_path / "muscle.toml"
-    file.write_text(head + law + braid + ("" if text.startswith("box") else text), encoding="utf-8")
+    file.write_text(head + law + braid + ("" if text.startswith("validity_range") else text), encoding="utf-8")
     said = refused(tmp_path, "show", file)
     assert re.search(rf"muscle\.toml.*{message}", said), said
 
@@ -374,12 +374,12 @@ def test_a_muscle_file_with_a_bad_table(tmp_path: Path, text: str, message: str)
 def test_a_folder_that_cannot_be_made(tmp_path: Path, name: str):
     (tmp_path / "taken").write_text("a file", encoding="utf-8")
     with pytest.raises(FileError, match=r"cannot be written to: .*Name a folder that you may write to"):
-        refuse_unwritable(tmp_path / name)
+        check_writable(tmp_path / name)
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 
 
 def write_a_run(folder: Path) -> None:
-    with staged(folder) as place:
+    with atomic_folder(folder) as place:
         for name in ("data/rows.csv", "figures/run.png", "report.html"):
             (place / name).parent.mkdir(exist_ok=True)
             (place / name).write_text("new", encoding="utf-8")
@@ -435,7 +435,7 @@ def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch
         return (Interrupted(first), *others)
 
     monkeypatch.setattr(RungeKutta4, "_kernel", kernel)
-    monkeypatch.setattr(integrators, "BUDGET", 100)
+    monkeypatch.setattr(integrators, "INTERRUPT_CHECK_STEPS", 100)
     result = CliRunner().invoke(app, ["simulate", str(tmp_path / "run.toml"), "--out", str(tmp_path / "run")])
     assert result.exit_code == 130
     assert result.stderr == f"what was computed until then stands in {tmp_path / 'run'}\ninterrupted\n"

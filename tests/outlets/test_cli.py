@@ -22,9 +22,9 @@ from typer.testing import CliRunner, Result
 from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.cli.app import app
 from airmuscle.cli.cite import as_bibtex
-from airmuscle.core.errors import UnknownName
+from airmuscle.core.errors import UnknownNameError
 from airmuscle.core.reference import Reference
-from airmuscle.library.catalogue import load, names
+from airmuscle.library.catalogue import list_library, load
 from airmuscle.library.valve_catalogue import valve_names
 from airmuscle.recording import read_csv
 from airmuscle.report.chapter import Chapter, Claim, Equal
@@ -120,16 +120,16 @@ def test_wrong_usage_is_exit_code_2(arguments: tuple[str, ...]):
 def test_list_names_every_entry_with_title_kind_and_trust():
     found = json.loads(airmuscle("list", "--json").output)
     listed = {entry["name"]: entry for entry in found if entry["kind"] != "data set"}
-    assert tuple(listed) == (*names(), *valve_names())
+    assert tuple(listed) == (*list_library(), *valve_names())
     entry = load(MUSCLE)
     assert listed[MUSCLE] == {
         "name": MUSCLE,
         "title": entry.title,
         "kind": f"muscle, {type(entry.characteristic).__name__}",
-        "trust": entry.trust,
+        "provenance": entry.provenance,
     }
     table = airmuscle("list").output
-    assert all(name in table for name in names())
+    assert all(name in table for name in list_library())
 
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
@@ -138,13 +138,13 @@ def test_list_calls_a_muscle_what_can_be_simulated():
         if entry["kind"].startswith("muscle"):
             assert load(entry["name"]).muscle.geometry.resting_length > 0
         elif entry["kind"].startswith("characteristic"):
-            with pytest.raises(UnknownName, match="is a characteristic, not yet a muscle"):
+            with pytest.raises(UnknownNameError, match="is a characteristic, not yet a muscle"):
                 _ = load(entry["name"]).muscle
 
 
 def test_list_names_the_data_sets_that_fit_takes():
     found = json.loads(airmuscle("list", "--json").output)
-    data = {entry["name"]: entry["trust"] for entry in found if entry["kind"] == "data set"}
+    data = {entry["name"]: entry["provenance"] for entry in found if entry["kind"] == "data set"}
     assert data[MUSCLE] == "measured"
     assert data["festo-tool-dmsp-20"] == "second hand"
 
@@ -157,11 +157,11 @@ def test_show_gives_parameters_sources_and_checks():
     assert shown["checks"][0]["source"]
     assert any("Martens" in reference for reference in shown["references"])
     text = airmuscle("show", MUSCLE).output
-    assert all(word in text for word in ("L_0", "0.3", "length between the fittings", "Martens", "trust: printed"))
+    assert all(word in text for word in ("L_0", "0.3", "length between the fittings", "Martens", "provenance: printed"))
 
 
 def test_show_leaves_out_the_middle_of_long_lists():
-    long = next(n for n in names() if len(json.loads(airmuscle("show", n, "--json").stdout)["parameters"]) > 60)
+    long = next(n for n in list_library() if len(json.loads(airmuscle("show", n, "--json").stdout)["parameters"]) > 60)
     text = airmuscle("show", long).output
     assert re.search(r"\.\.\. \d+ more", text)
     assert len(text.splitlines()) < 60
@@ -234,12 +234,16 @@ def test_the_chart_and_its_data_stand_in_the_folder(tmp_path: Path):
 
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", list_library())
 def test_every_entry_has_a_chart(tmp_path: Path, name: str):
     entry = load(name)
-    low, high = entry.box.pressure if entry.box else entry.characteristic.pressure_reach
+    low, high = entry.validity_range.pressure if entry.validity_range else entry.characteristic.pressure_range
     pressure = 0.5 * (low + high)
-    contraction = sum(entry.box.contraction) / 2 if entry.box else entry.characteristic.contraction(pressure, 100.0)
+    contraction = (
+        sum(entry.validity_range.contraction) / 2
+        if entry.validity_range
+        else entry.characteristic.contraction(pressure, 100.0)
+    )
     given = (f"--pressure={pressure} Pa", f"--contraction={contraction!r}")
     result = airmuscle("solve", name, *given, "--out", tmp_path)
     assert result.exit_code == 0, result.stderr
@@ -297,10 +301,10 @@ def test_fit_finds_the_muscle_that_made_the_data_and_writes_it(tmp_path: Path):
     assert result.exit_code == 0, result.output
     assert result.stdout.splitlines()[-1] == f"report: {tmp_path / 'fit' / 'report.html'}"
     entry = load(tmp_path / "fit" / "muscle.toml")
-    assert entry.trust == "fitted"
+    assert entry.provenance == "fitted"
     assert entry.characteristic.coefficients == pytest.approx(known.coefficients, abs=1e-6)
-    assert entry.box is not None
-    assert entry.box.pressure == pytest.approx((1e5, 5e5))
+    assert entry.validity_range is not None
+    assert entry.validity_range.pressure == pytest.approx((1e5, 5e5))
     written = {p.relative_to(tmp_path / "fit").as_posix() for p in (tmp_path / "fit").rglob("*") if p.is_file()}
     assert {"report.html", "muscle.toml", "figures/isobars.svg", "figures/errors.png", "data/rows.csv"} <= written
     solved = airmuscle("solve", tmp_path / "fit" / "muscle.toml", "--pressure=3 bar", "--contraction=0.1", "--json")
@@ -395,7 +399,7 @@ def test_the_report_of_a_run_shows_inputs_parameters_sources_and_notes(scenario:
     named = re.sub(
         r"\[plant.muscle.contractile\](.|\n)*?damper", '[plant.muscle]\nlibrary = "dmsp-20"\ndamper', SCENARIO
     )
-    driver = '[command.drivers]\nfill = [{ model = "PWM", frequency = "50 Hz" }, { model = "OnOff", opening_delay = "1 ms" }]'
+    driver = '[command.drivers]\nfill = [{ model = "PWM", frequency = "50 Hz" }, { model = "SolenoidDriver", opening_delay = "1 ms" }]'
     named = named.replace('pressure = "1 bar" }', 'pressure = "0 bar" }')
     scenario.write_text(f"{named}\n{driver}\n[output]\ncolumns = ['force']", encoding="utf-8")
     result = airmuscle("simulate", scenario, "--out", tmp_path / "run")
@@ -403,9 +407,9 @@ def test_the_report_of_a_run_shows_inputs_parameters_sources_and_notes(scenario:
     page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
     for text in (
         "A run of 0.5 s. The recording is recording.csv.",
-        "was outside the box of its characteristic in pressure",
+        "was outside the validity range of its characteristic in pressure",
         "Inputs of the plant; dashed, what the drivers were told.",
-        "fill 1 from 0.1 s, 0 from 0.3 s; driven: fill by PWM(frequency=50.0, smallest_pulse=0.0), OnOff(opening_delay=",
+        "fill 1 from 0.1 s, 0 from 0.3 s; driven: fill by PWM(frequency=50.0, smallest_pulse=0.0), SolenoidDriver(opening_delay=",
         "<td>muscle.contractile.wall_thickness</td>",
         "Rodas4(rtol=1e-06)",
         "Martens",
@@ -423,7 +427,7 @@ def test_the_report_of_a_run_shows_inputs_parameters_sources_and_notes(scenario:
 def test_simulate_prints_json(scenario: Path, tmp_path: Path):
     found = json.loads(airmuscle("simulate", scenario, "--out", tmp_path / "run", "--json").stdout)
     assert found["title"] == "Fill and discharge"
-    assert found["range"]["time"] == {"column": "time [s]", "least": 0.0, "greatest": 0.5, "last": 0.5}
+    assert found["range"]["time"] == {"column": "time [s]", "min": 0.0, "max": 0.5, "last": 0.5}
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ TUBE = """
 muscle = { library = "dmsp-20-300", series = { model = "SeriesSpring", stiffness = "200 N/mm" }, damper = "Serres2009Damper", stop = { model = "EndStop", contraction = "20 %", contact = { model = "HuntCrossley", stiffness = 1e9 } } }
 gas = { model = "EnergyBalance", heat_transfer = "0.5 W/K" }
 [plant.circuit]
-model = "Line"
+model = "WithTubes"
 tube = { model = "DistributedTube", length = "1.5 m", diameter = "4 mm", pieces = 5 }
 [plant.circuit.circuit]
 model = "ThreePosition"
@@ -77,10 +77,10 @@ def test_components_nest_in_a_file_with_units_as_text(tmp_path):
     [
         ('pieces = 5', 'pieces = 0', r"DistributedTube: pieces is 0; give a whole number from 1 to 200"),
         ('diameter = "4 mm"', 'diameter = "4 m"', r"diameter \(D, inner diameter of the tube\) is 4 m; allowed are"),
-        ('tube = { model = "DistributedTube"', 'tube = { model = "Supply", pressure = "1 bar" } #', r"tube is Supply; a Conduit is wanted"),
+        ('tube = { model = "DistributedTube"', 'tube = { model = "Supply", pressure = "1 bar" } #', r"tube is Supply; a TubeModel is wanted"),
         ('damper = "Serres2009Damper"', 'damper = "LinearSpring"', r"needs 'stiffness'"),
         ('valve = [["10 ms", 1]', 'valve = [["10 ms", 2]', r"the input 'valve' is 2 .* allowed are -1 to 1"),
-        ('supply = { model = "Tank"', 'supply = "Shared" #', r"Shared\(\) is the supply of a branch in a Manifold"),
+        ('supply = { model = "Tank"', 'supply = "SharedSupply" #', r"SharedSupply\(\) is the supply of a branch in a Manifold"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_a_component_is_said_with_its_place(right, wrong, message, tmp_path):

@@ -19,11 +19,11 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.control import PID, Split, TwoPoint
-from airmuscle.control.driver import PWM, Driven, OnOff
-from airmuscle.control.inputs import REST, Periodic, Schedule, Signal
-from airmuscle.control.loop import Loop
-from airmuscle.core.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownName
+from airmuscle.control import PID, OnOffController, SplitRange
+from airmuscle.control.control_loop import ControlLoop
+from airmuscle.control.driver import PWM, SolenoidDriver, WithDrivers
+from airmuscle.control.inputs import ZERO_INPUT, Periodic, SampledSignal, Schedule
+from airmuscle.core.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownNameError
 from airmuscle.report.run_chapter import in_words, run_chapter
 from airmuscle.scenario.scenario import load_scenario
 from airmuscle.scenario.schema import scenario_schema
@@ -90,9 +90,9 @@ def test_the_table_of_the_page_is_a_loop(tmp_path: Path):
         'model = "HangingMass"\nmass = "5 kg"', 'model = "Held"\ninner = { model = "HangingMass", mass = 5 }'
     )
     scenario = load_scenario(written(tmp_path, text=f"{held}{TABLE}"))
-    pid = PID("position", Split("fill", "discharge"), 40.0, 1.0, 0.05)
+    pid = PID("position", SplitRange("fill", "discharge"), 40.0, 1.0, 0.05)
     wanted, beside = Schedule({"position": ((0.0, 0.0), (0.2, 0.02))}), Schedule({"held": ((0.0, 1.0), (0.1, 0.0))})
-    assert scenario.command == Loop(pid, 5e-3, wanted, beside, {"fill": PWM(200.0), "discharge": PWM(200.0)})
+    assert scenario.command == ControlLoop(pid, 5e-3, wanted, beside, {"fill": PWM(200.0), "discharge": PWM(200.0)})
     run = scenario.simulate()
     assert np.ptp(run["position"][run["time"] <= 0.1]) < 1e-12
     assert run["position"][-1] > run["position"][0] + 1e-3
@@ -107,53 +107,60 @@ def test_a_gain_has_any_unit_that_fits(tmp_path: Path, gain: str, value: float):
 
 
 def regulated(commanded: str = '"setpoint"', gain: str = '"0.5 bar/bar"') -> str:
-    regulator = 'model = "ProportionalRegulator"\nlag = { model = "Follower", frequency = 20 }'
+    regulator = 'model = "ProportionalRegulator"\nlag = { model = "SecondOrderLag", frequency = 20 }'
     text = GOOD.replace('model = "FillDischarge"', regulator).replace('"fill"', commanded)
     return text.replace('"1.5 1/bar"', gain)
 
 
 def test_units_follow_from_column_and_input(tmp_path: Path):
-    text = regulated().replace("[command.controller.setpoint]", 'first = "1.2 bar"\n[command.controller.setpoint]')
+    text = regulated().replace(
+        "[command.controller.setpoint]", 'initial_output = "1.2 bar"\n[command.controller.setpoint]'
+    )
     controller = load_scenario(written(tmp_path, text=text)).command.controller
-    assert (controller.gain, controller.first) == (0.5, 1.2e5)
+    assert (controller.gain, controller.initial_output) == (0.5, 1.2e5)
     height = ('measured = "pressure"', 'measured = "position"'), (SETPOINT, 'position = [[0, "10 mm"]]')
     controller = load_scenario(written(tmp_path, *height, text=regulated(gain='"20 kPa/mm"'))).command.controller
     assert controller.gain == pytest.approx(2e7)
     two = load_scenario(
-        written(tmp_path, ('model = "PID"', 'model = "TwoPoint"'), ('gain = "1.5 1/bar"\nintegral_time = "300 ms"', 'hysteresis = "20 kPa"'))
+        written(tmp_path, ('model = "PID"', 'model = "OnOffController"'), ('gain = "1.5 1/bar"\nintegral_time = "300 ms"', 'hysteresis = "20 kPa"'))
     )  # fmt: skip
-    assert two.command.controller == TwoPoint("pressure", "fill", 2e4)
+    assert two.command.controller == OnOffController("pressure", "fill", 2e4)
 
 
 def test_a_set_point_is_a_command_of_any_kind(tmp_path: Path):
     (tmp_path / "wanted.csv").write_text("time [ms],pressure [kPa],other [bar]\n0,100,1\n200,300,2\n", encoding="utf-8")
     corners = ((0.0, 1e5), (0.2, 3e5))
     for rows, expected in (
-        ('model = "Signal"\npressure = [[0, "1 bar"], ["0.2 s", 3e5]]', Signal({"pressure": corners})),
-        ('file = "wanted.csv"', Signal({"pressure": corners})),
+        ('model = "SampledSignal"\npressure = [[0, "1 bar"], ["0.2 s", 3e5]]', SampledSignal({"pressure": corners})),
+        ('file = "wanted.csv"', SampledSignal({"pressure": corners})),
         ('file = "wanted.csv"\nmodel = "Schedule"\nperiod = "0.3 s"', Periodic(Schedule({"pressure": corners}), 0.3)),
-        ('file = "wanted.csv"\ncolumns = { pressure = "other" }', Signal({"pressure": ((0.0, 1e5), (0.2, 2e5))})),
+        (
+            'file = "wanted.csv"\ncolumns = { pressure = "other" }',
+            SampledSignal({"pressure": ((0.0, 1e5), (0.2, 2e5))}),
+        ),
     ):
         assert load_scenario(written(tmp_path, (SETPOINT, rows))).command.setpoint == expected
 
 
 def test_drivers_and_inputs_beside_stand_where_they_always_do(tmp_path: Path):
-    beside = 'discharge = [["0.1 s", 0.5]]\ndrivers = { fill = [{ model = "PWM", frequency = 100 }, "OnOff"] }\n'
+    beside = (
+        'discharge = [["0.1 s", 0.5]]\ndrivers = { fill = [{ model = "PWM", frequency = 100 }, "SolenoidDriver"] }\n'
+    )
     command = load_scenario(written(tmp_path, ("[command]\n", f"[command]\n{beside}"))).command
-    assert command.beside == Schedule({"discharge": ((0.1, 0.5),)})
-    assert command.drivers == {"fill": (PWM(100.0), OnOff())}
-    assert load_scenario(written(tmp_path)).command.beside == REST
+    assert command.other_inputs == Schedule({"discharge": ((0.1, 0.5),)})
+    assert command.drivers == {"fill": (PWM(100.0), SolenoidDriver())}
+    assert load_scenario(written(tmp_path)).command.other_inputs == ZERO_INPUT
 
 
 def test_the_columns_of_a_loop_may_be_asked_for(tmp_path: Path):
-    asked = ("[run]", '[output]\ncolumns = ["setpoint.pressure", "told.fill"]\n[run]')
+    asked = ("[run]", '[output]\ncolumns = ["setpoint.pressure", "command.fill"]\n[run]')
     scenario = load_scenario(written(tmp_path, asked))
-    assert list(scenario.chosen(scenario.simulate())) == ["time", "setpoint.pressure", "told.fill"]
+    assert list(scenario.chosen(scenario.simulate())) == ["time", "setpoint.pressure", "command.fill"]
 
 
 # What is wrong
 
-PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "Split", positive = "{}", negative = "{}" }}')
+PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "SplitRange", positive = "{}", negative = "{}" }}')
 
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
@@ -165,9 +172,9 @@ PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "Split", positive = "
         ('measured = "pressure"', "measured = 3", ParameterError, r"\[command.controller\]: measured is 3; text is wanted"),
         ('measured = "pressure"\n', "", ParameterError, r"\[command.controller\]: PID needs 'measured' \(text\); it is missing"),
         ('commanded = "fill"', 'commanded = "fil"', ParameterError, r"\[command.controller\]: the plant has no input 'fil'; there are fill, discharge. Did you mean 'fill'\?"),
-        ('commanded = "fill"', "commanded = 3", ParameterError, r"commanded is 3; text or a Split is wanted"),
+        ('commanded = "fill"', "commanded = 3", ParameterError, r"commanded is 3; text or a SplitRange is wanted"),
         ('commanded = "fill"', PID_TABLE[1].format("fill", "vent"), ParameterError, r"\[command.controller\]: the plant has no input 'vent'"),
-        ('commanded = "fill"', PID_TABLE[1].format("fill", "fill"), ParameterError, r"Split: both sides are 'fill'"),
+        ('commanded = "fill"', PID_TABLE[1].format("fill", "fill"), ParameterError, r"SplitRange: both sides are 'fill'"),
         ('"1.5 1/bar"', '"1.5 1/mm"', UnitError, r"\[command.controller\], gain: unit '1/mm' cannot become '1/Pa'"),
         ('"1.5 1/bar"', '"1.5"', UnitError, r"gain: '1.5' carries no unit; write it like '1.5 1/Pa'"),
         ('"1.5 1/bar"', "nan", ParameterError, r"\[command.controller\]: PID.gain .* is nan; it must be finite"),
@@ -175,28 +182,28 @@ PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "Split", positive = "
         ('"1.5 1/bar"', "true", ParameterError, r"gain is True; it must be a number in 1/Pa"),
         ("integral_time", "integral_tim", ParameterError, r"PID has no parameter 'integral_tim'; .*mean 'integral_time'\?"),
         ('"300 ms"\nperiod', '"-3 ms"\nperiod', ParameterError, r"PID.integral_time .* is -0.003 s; allowed are 0 to"),
-        ('period = "5 ms"', 'period = "0 ms"', ParameterError, r"\[command.controller\]: Loop.period is 0.0 s; it must be positive"),
-        ('period = "5 ms"', "period = -1", ParameterError, r"Loop.period is -1.0 s"),
+        ('period = "5 ms"', 'period = "0 ms"', ParameterError, r"\[command.controller\]: ControlLoop.period is 0.0 s; it must be positive"),
+        ('period = "5 ms"', "period = -1", ParameterError, r"ControlLoop.period is -1.0 s"),
         ('period = "5 ms"', "period = nan", ParameterError, r"\[command.controller\], period is nan; it must be finite"),
         ('period = "5 ms"', 'period = "5 bar"', UnitError, r"period: unit 'bar' cannot become 's'"),
         ('period = "5 ms"', 'period = "1 s"', ParameterError, r"\[command.controller\]: the controller looks every 1 s, and the run lasts 0.3 s"),
         ('period = "5 ms"\n', "", ParameterError, r"\[command.controller\]: 'period' is missing; write period = \"10 ms\""),
         ("[command.controller.setpoint]", "[plant.setpoint]", ParameterError, r"Plant has no parameter 'setpoint'"),
         (f"[command.controller.setpoint]\n{SETPOINT}", "", ParameterError, r"'setpoint' is missing; write \[command.controller.setpoint\]"),
-        (SETPOINT, "", ParameterError, r"Loop.setpoint names nothing; PID follows pressure"),
+        (SETPOINT, "", ParameterError, r"ControlLoop.setpoint names nothing; PID follows pressure"),
         (SETPOINT, 'presure = [[0, 1]]', ParameterError, r"\[command.controller.setpoint\]: the controller has no set point 'presure'; there are pressure.*Did you mean"),
         (SETPOINT, 'pressure = [[0, "1 mm"]]', UnitError, r"setpoint\], pressure: unit 'mm' cannot become 'Pa'"),
         (SETPOINT, 'pressure = [[0, nan]]', ParameterError, r"setpoint\], pressure is nan; it must be finite"),
         (SETPOINT, 'pressure = 3', ParameterError, r"setpoint\], pressure is 3; write instants and values"),
-        (SETPOINT, f'{SETPOINT}\ndrivers = {{ pressure = "OnOff" }}', ParameterError, r"a set point has no drivers; write \[command.drivers\]"),
+        (SETPOINT, f'{SETPOINT}\ndrivers = {{ pressure = "SolenoidDriver" }}', ParameterError, r"a set point has no drivers; write \[command.drivers\]"),
         (SETPOINT, f'{SETPOINT}\ncontroller = 3', ParameterError, r"a controller stands in a scenario only"),
         (SETPOINT, 'file = "none.csv"', AirmuscleError, r"none.csv"),
-        ('model = "PID"', 'model = "Valve"', ParameterError, r"\[command.controller\]: Valve is no controller; there are PID, TwoPoint"),
-        ('model = "PID"', 'model = "PDI"', UnknownName, r"no model 'PDI'"),
+        ('model = "PID"', 'model = "Valve"', ParameterError, r"\[command.controller\]: Valve is no controller; there are OnOffController, PID"),
+        ('model = "PID"', 'model = "PDI"', UnknownNameError, r"no model 'PDI'"),
         ('model = "PID"\n', "", ParameterError, r"\[command.controller\]: no model is named"),
         ("[command]\n", '[command]\nfill = [["0.1 s", 1]]\n', ParameterError, r"'fill' is commanded by the controller, and beside it too"),
         ("[command]\n", '[command]\ndischarge = [["0.1 s", 2]]\n', ParameterError, r"\[command\]: the input 'discharge' is 2 before"),
-        ("[command]\n", '[command]\ndrivers = { vent = "OnOff" }\n', ParameterError, r"\[command.drivers\]: the plant has no input 'vent'"),
+        ("[command]\n", '[command]\ndrivers = { vent = "SolenoidDriver" }\n', ParameterError, r"\[command.drivers\]: the plant has no input 'vent'"),
     ],
 )  # fmt: skip
 def test_a_loop_that_cannot_be_is_refused(tmp_path: Path, was: str, becomes: str, kind: type, message: str):
@@ -215,7 +222,7 @@ def test_what_is_no_table_of_a_controller_is_refused(tmp_path: Path):
 
 
 def test_two_inputs_of_one_command_are_of_one_kind(tmp_path: Path):
-    text = regulated('{ model = "Split", positive = "setpoint", negative = "held" }')
+    text = regulated('{ model = "SplitRange", positive = "setpoint", negative = "held" }')
     text = text.replace(
         'model = "HangingMass"\nmass = "5 kg"', 'model = "Held"\ninner = { model = "HangingMass", mass = 5 }'
     )
@@ -230,13 +237,13 @@ def test_a_column_that_a_set_point_follows_is_there(tmp_path: Path):
 
 
 def test_a_record_has_no_controller(tmp_path: Path):
-    from airmuscle.library.place import Place
+    from airmuscle.library.location import Location
     from airmuscle.scenario.inputs import command_from
 
     with pytest.raises(
         ParameterError, match=r"record, \[command\]: a controller stands in a scenario only; give what was"
     ):
-        command_from({"controller": {}}, (), Place("record", "command", tmp_path))
+        command_from({"controller": {}}, (), Location("record", "command", tmp_path))
 
 
 # Schema, report, program, study
@@ -265,7 +272,7 @@ def test_the_schema_takes_what_the_program_takes(text: str):
         ('"1.5 1/bar"', '"1,5 1/bar"'),
         ('"1.5 1/bar"', "true"),
         (SETPOINT, "pressure = 3"),
-        (SETPOINT, f'{SETPOINT}\ndrivers = {{ pressure = "OnOff" }}'),
+        (SETPOINT, f'{SETPOINT}\ndrivers = {{ pressure = "SolenoidDriver" }}'),
         (f"[command.controller.setpoint]\n{SETPOINT}", ""),
     ],
 )
@@ -278,8 +285,8 @@ def test_what_the_schema_refuses_the_program_refuses(tmp_path: Path, was: str, b
 
 def test_the_schema_knows_every_controller():
     tables = scenario_schema()["properties"]["command"]["properties"]["controller"]["anyOf"]
-    assert [table["properties"]["model"]["const"] for table in tables] == ["PID", "TwoPoint"]
-    assert tables[0]["properties"]["gain"]["description"] == "K [u/y]: proportional gain"
+    assert [table["properties"]["model"]["const"] for table in tables] == ["OnOffController", "PID"]
+    assert tables[1]["properties"]["gain"]["description"] == "K [u/y]: proportional gain"
 
 
 def test_the_report_shows_set_point_and_measurement_with_units():
@@ -313,7 +320,7 @@ def test_a_loop_without_drivers_is_drawn_to_its_end(tmp_path: Path):
     assert plot.caption == "Inputs of the plant."
     assert had[-1, 0] == 0.3
     assert in_words(scenario.command).endswith("; beside: none")
-    assert not isinstance(scenario.command.replayed(run), Driven)
+    assert not isinstance(scenario.command.as_open_loop(run), WithDrivers)
 
 
 def test_a_run_that_ends_early_is_reported(tmp_path: Path):
@@ -334,7 +341,7 @@ def test_the_program_runs_the_example(tmp_path: Path):
     assert shown["range"]["pressure"]["last"] == pytest.approx(1.5e5, rel=0.05)
     with (tmp_path / "run" / "recording.csv").open(encoding="utf-8") as file:
         heading = next(row for row in csv.reader(file) if row[0] == "time [s]")
-    assert {"measured.pressure [Pa]", "told.discharge [1]"} <= set(heading)
+    assert {"measured.pressure [Pa]", "command.discharge [1]"} <= set(heading)
 
 
 def test_the_program_of_the_example_runs(tmp_path: Path):
@@ -356,7 +363,7 @@ scenario = "scenario.toml"
 model = "Grid"
 [outcome]
 last = { model = "Final", column = "setpoint.pressure" }
-told = { model = "Maximum", column = "told.fill" }
+told = { model = "Maximum", column = "command.fill" }
 """
 
 

@@ -1,6 +1,6 @@
 """`airmuscle convert` brings one law near another, and the error it prints is the one between the two files.
 
-A law that holds the other gives it back; a box that is not known is asked for; other parts of the muscle stay.
+A law that holds the other gives it back; a validity range that is not known is asked for; other parts of the muscle stay.
 """
 
 from __future__ import annotations
@@ -28,13 +28,16 @@ def test_the_printed_error_is_that_between_the_two_files(tmp_path):
     first, second = load(MUSCLE), load(tmp_path / "m.toml")
     assert (second.geometry, second.damper, second.checks) == (first.geometry, first.damper, ())
     grid = [
-        g.ravel() for g in np.meshgrid(np.linspace(*first.box.pressure, 90), np.linspace(*first.box.contraction, 90))
+        g.ravel()
+        for g in np.meshgrid(
+            np.linspace(*first.validity_range.pressure, 90), np.linspace(*first.validity_range.contraction, 90)
+        )
     ]
     force = first.characteristic.force(*grid)
     error = (second.characteristic.force(*grid) - force)[force > 0]
     assert said["rms"] == pytest.approx(np.sqrt(np.mean(error**2)), rel=0.15)
-    assert abs(said["greatest"]) == pytest.approx(np.abs(error).max(), rel=0.15)
-    assert max(row["greatest"] for row in said["by_pressure"]) == pytest.approx(abs(said["greatest"]))
+    assert abs(said["max"]) == pytest.approx(np.abs(error).max(), rel=0.15)
+    assert max(row["max"] for row in said["by_pressure"]) == pytest.approx(abs(said["max"]))
     together = np.sqrt(np.mean([row["rms"] ** 2 for row in said["by_pressure"]]))
     assert together == pytest.approx(said["rms"], rel=0.15)
 
@@ -52,11 +55,11 @@ def test_a_stated_end_takes_the_place_of_the_muscles(tmp_path):
     wide = json.loads(airmuscle("convert", MUSCLE, "Sarosi2012", "--json").stdout)
     narrow = json.loads(
         airmuscle(
-            "convert", MUSCLE, "Sarosi2012", "--least-pressure", "3 bar", "--greatest-contraction", "15 %", "--json"
+            "convert", MUSCLE, "Sarosi2012", "--min-pressure", "3 bar", "--max-contraction", "15 %", "--json"
         ).stdout
     )
-    assert narrow["box"]["least_pressure"] == 3e5
-    assert narrow["box"]["greatest_contraction"] == 0.15
+    assert narrow["validity_range"]["min_pressure"] == 3e5
+    assert narrow["validity_range"]["max_contraction"] == 0.15
     assert narrow["rms"] < 0.5 * wide["rms"]
 
 
@@ -70,16 +73,19 @@ def test_the_table_is_printed(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("borzikova-exponential", "ContractileSurface"), "states no box to convert it on; give --least-pressure, "),
+        (
+            ("borzikova-exponential", "ContractileSurface"),
+            "states no validity range to convert it on; give --min-pressure, ",
+        ),
         ((MUSCLE, "ContractileSurfac"), "no library entry 'ContractileSurfac'"),
         ((MUSCLE, "Saga2007"), "MODEL: Saga2007 needs values to start from"),
         ((MUSCLE, "hunt"), "has no force at"),
-        ((MUSCLE, "ContractileSurface", "--least-pressure", "7 bar"), "must lie below greatest_pressure"),
+        ((MUSCLE, "ContractileSurface", "--min-pressure", "7 bar"), "must lie below max_pressure"),
         (
-            (MUSCLE, "ContractileSurface", "--least-contraction", "25.9 %", "--greatest-pressure", "1 bar"),
+            (MUSCLE, "ContractileSurface", "--min-contraction", "25.9 %", "--max-pressure", "1 bar"),
             "nothing to c",
         ),
-        ((MUSCLE, "ContractileSurface", "--least-pressure", "7 mm"), "--least-pressure: unit 'mm' cannot become 'Pa'"),
+        ((MUSCLE, "ContractileSurface", "--min-pressure", "7 mm"), "--min-pressure: unit 'mm' cannot become 'Pa'"),
     ],
 )
 def test_what_cannot_be_converted_is_refused(arguments, message, tmp_path):

@@ -12,23 +12,32 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle import measured
+from airmuscle import load_data
 from airmuscle.characteristic import ContractileSurface, Sarosi2012
-from airmuscle.characteristic.box import Box
+from airmuscle.characteristic.validity_range import ValidityRange
 from airmuscle.cli.app import app
 from airmuscle.cli.remedies import in_options
-from airmuscle.identify import Levels, band, bootstrap, fit, fit_shaped, profile, shape_breaks, weakly_determined
+from airmuscle.identify import (
+    LevelSplit,
+    bootstrap,
+    confidence_band,
+    fit,
+    fit_shaped,
+    profile,
+    shape_breaks,
+    weakly_determined,
+)
 from airmuscle.identify.candidates import surface
 from airmuscle.library.catalogue import load
 from airmuscle.recording import Recording
-from airmuscle.recording.write_csv import write_csv
+from airmuscle.recording.csv_writer import write_csv
 from airmuscle.report.band_plot import band_plot
 from airmuscle.report.levels import levels_of
 
 MUSCLE = "dmsp-20-300"
 SURFACE = ("--characteristic", "ContractileSurface", "--degree", "2")
 SAROSI = Sarosi2012(1.2e-4, 420.0, -57.0, -8.7e-3, 2.7e-3, -310.0)
-BOX = Box(1e5, 6e5, 0.0, 0.2)
+BOX = ValidityRange(1e5, 6e5, 0.0, 0.2)
 
 
 def airmuscle(*arguments):
@@ -54,7 +63,7 @@ def test_bootstrap_and_profiles_are_those_of_the_library(tmp_path):
     assert result.exit_code == 0, result.stderr
     said = json.loads(result.stdout)
     found = fit(surface(2), recording)
-    drawn = bootstrap(found, recording, refits=50, by=Levels("pressure"))
+    drawn = bootstrap(found, recording, refits=50, by=LevelSplit("pressure"))
     ends = dict(zip(found.names, drawn.intervals().tolist(), strict=True))
     assert said["bootstrap"]["refits"] == 50
     assert said["bootstrap"]["parts"] == 6
@@ -76,7 +85,7 @@ def test_weak_says_so_where_no_parameter_is(tmp_path):
 
 def test_a_muscle_with_a_law_of_tied_parameters_has_them_profiled(tmp_path):
     result = airmuscle("fit", MUSCLE, "--characteristic", MUSCLE, "--profile", "weak", "--json", "--out", tmp_path)
-    weak = weakly_determined(fit(load(MUSCLE).characteristic, measured(MUSCLE), fixed=("wall_thickness",)))
+    weak = weakly_determined(fit(load(MUSCLE).characteristic, load_data(MUSCLE), fixed=("wall_thickness",)))
     assert set(json.loads(result.stdout)["profiles"]) == set(weak) != set()
 
 
@@ -85,12 +94,12 @@ def test_a_shape_on_request_is_the_one_written(tmp_path):
     degree = ("--characteristic", "ContractileSurface", "--degree", "4")
     loose = airmuscle("fit", tmp_path / "bench.csv", *degree, "--out", tmp_path / "loose")
     assert "note: force" in loose.stdout
-    assert "of the box), most at" in loose.stdout
+    assert "of the validity range), most at" in loose.stdout
     assert "Where the law behaves as no muscle does" in (tmp_path / "loose" / "report.html").read_text("utf-8")
     result = airmuscle("fit", tmp_path / "bench.csv", *degree, "--shape", "--out", tmp_path / "fit")
     assert "shape: rms" in result.stdout
     law = load(tmp_path / "fit" / "muscle.toml").characteristic
-    assert shape_breaks(law, law.box, points=201) == ()
+    assert shape_breaks(law, law.validity_range, points=201) == ()
     assert law.coefficients == pytest.approx(fit_shaped(surface(4), recording).model.coefficients, abs=1e-6)
     assert "keeps a muscle&#39;s shape" in (tmp_path / "fit" / "report.html").read_text("utf-8")
 
@@ -176,7 +185,7 @@ def test_the_figure_draws_the_band_that_the_library_gives(tmp_path):
     curve, half = left.lines[0], right.lines[0]
     x = np.asarray(curve.get_xdata()) / 100
     points = Recording({"pressure": np.full(x.size, 1e5), "contraction": x}, "curve")
-    expected = band(found, points)
+    expected = confidence_band(found, points)
     kept = np.isfinite(x)
     assert np.asarray(curve.get_ydata())[kept] == pytest.approx(expected.value[kept])
     assert np.asarray(half.get_ydata())[kept] == pytest.approx((expected.high - expected.value)[kept])
@@ -186,7 +195,7 @@ def test_the_figure_draws_the_band_that_the_library_gives(tmp_path):
 def test_without_a_point_to_spare_there_is_no_band():
     columns = {"pressure": [1e5, 3e5, 1e5], "contraction": [0.0, 0.0, 0.1], "force": [100.0, 300.0, 50.0]}
     rows = Recording({name: np.array(values) for name, values in columns.items()}, "three")
-    assert band_plot(fit(ContractileSurface.blank(1, greatest_force=1e3), rows)) is None
+    assert band_plot(fit(ContractileSurface.blank(1, max_force=1e3), rows)) is None
 
 
 def test_levels_are_those_held_and_a_ramp_has_quantiles():

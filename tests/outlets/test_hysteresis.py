@@ -16,12 +16,12 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.friction import MaxwellSlip
-from airmuscle.identify.hysteresis import OnPressure, find_loops, holds
+from airmuscle.identify.hysteresis import OnPressure, find_holds, find_loops
 from airmuscle.identify.hysteresis.plot import plot_loops
 from airmuscle.library.catalogue import load
-from airmuscle.library.place import Place
+from airmuscle.library.location import Location
 from airmuscle.recording import Recording, read
-from airmuscle.recording.write_csv import write_csv
+from airmuscle.recording.csv_writer import write_csv
 from airmuscle.scenario.scenario import muscle_from
 
 SLIP = MaxwellSlip((2e4, 1e4, 3e3), (3e-4, 1.2e-3, 5e-3))
@@ -41,7 +41,7 @@ def loop(path: Path, seed: int, friction: MaxwellSlip | None = SLIP, turns=TURNS
     rng, count = np.random.default_rng(seed), contraction.size
     force = load(MUSCLE).characteristic.force(3e5, contraction) + 0.5 * rng.standard_normal(count)
     if friction is not None:
-        force = force - friction.replay((contraction - contraction[0]) * 0.3)
+        force = force - friction.force_along((contraction - contraction[0]) * 0.3)
     columns = {
         "time": 0.2 * np.arange(count), "pressure": 3e5 + 50.0 * rng.standard_normal(count),
         "contraction": contraction, "force": force,
@@ -65,7 +65,7 @@ def test_the_friction_of_two_loops_enters_the_muscle_file(two, tmp_path):
     entry = load(tmp_path / "out" / "muscle.toml")
     assert entry.characteristic == load(MUSCLE).characteristic
     path = np.concatenate([np.linspace(a, b, 50) for a, b in itertools.pairwise(TURNS)]) * 0.3
-    made, found = (law.replay(path - path[0]) for law in (SLIP, entry.friction))
+    made, found = (law.force_along(path - path[0]) for law in (SLIP, entry.friction))
     assert np.sqrt(np.mean((made - found) ** 2)) < 0.05 * np.abs(made).max()  # the grid of limits is not the true one
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert all(word in page for word in ("minor loops", "Friction laws", "MaxwellSlip", "second run at the same level"))
@@ -84,7 +84,7 @@ def test_without_a_muscle_the_friction_stands_in_a_table_that_a_plant_takes(two,
     assert found["recommended"] == found["laws"][0]["law"]
     assert found["laws"][0]["repeat_rmse"] is None, "one run has no second"
     table = tomllib.loads((tmp_path / "friction.toml").read_text(encoding="utf-8"))
-    muscle = muscle_from({"library": MUSCLE, **table}, Place("scenario.toml", "plant.muscle", tmp_path))
+    muscle = muscle_from({"library": MUSCLE, **table}, Location("scenario.toml", "plant.muscle", tmp_path))
     assert type(muscle.friction).__name__ == found["recommended"]
 
 
@@ -100,7 +100,7 @@ def test_a_loop_without_friction_writes_none(tmp_path):
 def test_friction_on_the_pressure_is_reported_and_not_written(tmp_path):
     pressure = np.concatenate([np.linspace(0.5e5, 5e5, 300), np.linspace(5e5, 0.5e5, 300)])
     rng = np.random.default_rng(5)
-    force = 2e-3 * pressure - SLIP.replay(1e-8 * (pressure - pressure[0])) + 0.1 * rng.standard_normal(600)
+    force = 2e-3 * pressure - SLIP.force_along(1e-8 * (pressure - pressure[0])) + 0.1 * rng.standard_normal(600)
     columns = {"time": 0.2 * np.arange(600), "pressure": pressure, "contraction": np.full(600, 0.05), "force": force}
     write_csv(Recording(columns, "ramp"), tmp_path / "ramp.csv")
     result = airmuscle("hysteresis", tmp_path / "ramp.csv", *LENGTH, "--degree", 1, "--out", tmp_path / "out")
@@ -113,7 +113,7 @@ def test_figures_of_it_stand_over_the_pressure():
     axes = plot_loops(SLIP, OnPressure().axis).axes[0]
     assert axes.get_xlabel() == "gauge pressure [kPa]"
     drawn = np.concatenate([line.get_xdata() for line in axes.lines])
-    assert drawn.max() == pytest.approx(2.0 * SLIP.travel * 1e5, rel=1e-6), "1 mm stands for 100 kPa"
+    assert drawn.max() == pytest.approx(2.0 * SLIP.presliding_distance * 1e5, rel=1e-6), "1 mm stands for 100 kPa"
 
 
 def test_a_second_run_at_another_level_is_a_loop_of_its_own(two):
@@ -149,10 +149,10 @@ def test_quick_rows_do_not_count_unless_told_to(tmp_path):
 
 def test_a_hold_begins_where_the_length_has_arrived(two):
     (recording,) = read(two[0], resting_length=0.3)
-    (found,) = holds(recording)
+    (found,) = find_holds(recording)
     assert (found.stretch.start, found.stretch.stop, found.quantity) == (899, 940, "force")
     weight = recording.with_columns(force=np.full(len(recording), 200.0))
-    assert {hold.quantity for hold in holds(weight)} == {"contraction"}
+    assert {hold.quantity for hold in find_holds(weight)} == {"contraction"}
 
 
 def test_rows_on_the_way_to_a_hold_are_none_of_it():
@@ -160,5 +160,5 @@ def test_rows_on_the_way_to_a_hold_are_none_of_it():
     contraction = np.concatenate([np.linspace(0.0897, 0.1, 103, endpoint=False), np.full(40, 0.1)])
     rows = {"time": 0.5 * np.arange(143), "pressure": np.full(143, 3e5), "contraction": contraction}
     force = np.linspace(100.0, 300.0, 143)
-    found = max(holds(Recording({**rows, "force": force}, "hold")), key=lambda hold: len(hold.stretch))
+    found = max(find_holds(Recording({**rows, "force": force}, "hold")), key=lambda hold: len(hold.stretch))
     assert (found.stretch.start, found.stretch.stop) == (103, 143)

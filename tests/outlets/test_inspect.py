@@ -59,12 +59,12 @@ def test_json_holds_what_the_library_says(tmp_path: Path):
         "name": "pressure",
         "unit": "Pa",
         "written_in": "kPa",
-        "least": recording["pressure"].min(),
-        "greatest": recording["pressure"].max(),
+        "min": recording["pressure"].min(),
+        "max": recording["pressure"].max(),
     }
     assert found["sampling"]["rate"] == pytest.approx(20.0)
     force = next(sensor for sensor in found["sensors"] if sensor["name"] == "force")
-    assert (force["resolution"], force["least"], force["greatest"]) == (pytest.approx(0.5), -5.0, None)
+    assert (force["resolution"], force["lower_limit"], force["upper_limit"]) == (pytest.approx(0.5), -5.0, None)
     assert found["runs"] == [
         {"kind": "isometric", "first_row": 1, "last_row": ROWS, "held": "contraction",
          "value": pytest.approx(0.1), "swept": ["pressure", "force"]}
@@ -90,7 +90,7 @@ def test_the_text_says_it_in_words(tmp_path: Path):
         "branches: inflating, rows 1 to 200; deflating, rows 201 to 400",
         "plateaus: 40 with",
         "suspected glitches: 1, kept: force in row 96",
-        "note: the force stands still at its least reading, -5 N",
+        "note: the force stands still at its lowest reading, -5 N",
     ):
         assert said in text
     assert "PROBLEM" not in text
@@ -154,7 +154,7 @@ def test_flags_and_mapping_say_what_the_file_does_not(tmp_path: Path):
     (by_file,) = seen(path, "--mapping", tmp_path / "rig.toml")
     assert by_file == by_flags
     pressure = next(column for column in by_file["columns"] if column["name"] == "pressure")
-    assert (pressure["least"], pressure["greatest"]) == pytest.approx((1e5, 5e5))
+    assert (pressure["min"], pressure["max"]) == pytest.approx((1e5, 5e5))
 
 
 @pytest.mark.parametrize(

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.analysis.equilibrium import equilibrium
+from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.core import tree
 from airmuscle.friction import MaxwellSlip
 from airmuscle.mechanism import HangingMass
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, EndStop, LaggingWall, SeriesSpring
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Leaking, Line, Supply, Tank, Tube, Valve
+from airmuscle.pneumatics import FillDischarge, Supply, Tank, Tube, Valve, WithLeak, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 
 jax = pytest.importorskip("jax")
@@ -40,7 +40,7 @@ def plant_of_everything(gas):
         creep=CreepElements((500.0,), (2.0,)),
     )
     valves = FillDischarge(Tank(Supply(5e5), Valve(3e-9, 0.3), 1e-3), VALVE, VALVE)
-    circuit = Leaking(Line(valves, Tube(Valve(1e-8, 0.2), 2e-5, 3)), Valve(1e-12, 0.3))
+    circuit = WithLeak(WithTubes(valves, Tube(Valve(1e-8, 0.2), 2e-5, 3)), Valve(1e-12, 0.3))
     return Plant(muscle, circuit, HangingMass(10.0), gas)
 
 
@@ -51,7 +51,7 @@ def as_jax(values):
 @pytest.mark.parametrize("gas", GASES, ids=repr)
 def test_the_rates_under_jit_are_those_of_numpy(gas):
     plant = plant_of_everything(gas)
-    state = equilibrium(plant, pressure=2e5)
+    state = find_equilibrium(plant, pressure=2e5)
     expected = plant.rates(state, INPUTS)
     found = jax.jit(plant.rates)(as_jax(state), as_jax(INPUTS))
     for variable in plant.states:
@@ -62,7 +62,7 @@ def test_the_rates_under_jit_are_those_of_numpy(gas):
 @pytest.mark.parametrize("gas", GASES, ids=repr)
 def test_outputs_over_many_states_at_once_are_those_of_each(gas):
     plant = plant_of_everything(gas)
-    state = equilibrium(plant, pressure=2e5)
+    state = find_equilibrium(plant, pressure=2e5)
     heights = np.linspace(0.9, 1.1, 7) * state["position"]
     forces = jax.vmap(lambda y: plant.outputs({**as_jax(state), "position": y}, as_jax(INPUTS))["force"])(heights)
     each = [float(plant.outputs({**state, "position": float(y)}, INPUTS)["force"]) for y in heights]
@@ -71,11 +71,11 @@ def test_outputs_over_many_states_at_once_are_those_of_each(gas):
 
 def test_a_gradient_by_every_parameter_is_the_difference_quotient():
     plant = plant_of_everything(EnergyBalance(1.0))
-    state = equilibrium(plant, pressure=2e5)
+    state = find_equilibrium(plant, pressure=2e5)
     leaves = tree.flatten(plant)
 
     def inflow(values):
-        rates = tree.rebuild(plant, list(values)).rates(as_jax(state), as_jax(INPUTS))
+        rates = tree.unflatten(plant, list(values)).rates(as_jax(state), as_jax(INPUTS))
         return 1e3 * rates["tube1.air_mass"] + rates["speed"]
 
     gradient = np.asarray(jax.jit(jax.grad(inflow))(jnp.asarray(leaves)))

@@ -14,23 +14,30 @@ import pytest
 
 from airmuscle.characteristic.chou_hannaford1996 import ChouHannaford1996
 from airmuscle.characteristic.clamped import Clamped
-from airmuscle.core.errors import AirmuscleError, AirmuscleWarning, FileError, ParameterError, UnitError, UnknownName
+from airmuscle.core.errors import (
+    AirmuscleError,
+    AirmuscleWarning,
+    FileError,
+    ParameterError,
+    UnitError,
+    UnknownNameError,
+)
 from airmuscle.core.reference import cite
 from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
 from airmuscle.geometry.braid import Braid
 from airmuscle.library import catalogue
+from airmuscle.library.location import Location
 from airmuscle.library.models import model_class, model_names
-from airmuscle.library.place import Place
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, EndStop, LinearDamper, LinearSpring, PressureDamper, SwellingWall
 from airmuscle.scenario.scenario import muscle_from
 
 GOOD = """
 title = "A muscle of our own"
-trust = "chosen"
+provenance = "chosen"
 [characteristic]
 model = "Clamped"
-greatest_force = "1.2 kN"
+max_force = "1.2 kN"
 [characteristic.inner]
 model = "TonduLopez2000"
 end_correction = 1.2
@@ -51,11 +58,11 @@ stiffness = "2 N/mm"
 model = "PressureDamper"
 damping = 50.0
 growth = "1 N s/(m bar)"
-[box]
-least_pressure = "0 bar"
-greatest_pressure = "6 bar"
-least_contraction = 0.0
-greatest_contraction = "25 %"
+[validity_range]
+min_pressure = "0 bar"
+max_pressure = "6 bar"
+min_contraction = 0.0
+max_contraction = "25 %"
 [[check]]
 quantity = "force"
 pressure = "5 bar"
@@ -82,10 +89,10 @@ def test_a_file_becomes_a_muscle_in_si(tmp_path: Path):
     entry = catalogue.load(written(tmp_path, GOOD))
     assert entry.name == "muscle"
     assert isinstance(entry.characteristic, Clamped)
-    assert (entry.characteristic.greatest_force, entry.characteristic.inner.geometry.radius) == (1200.0, 0.01)
+    assert (entry.characteristic.max_force, entry.characteristic.inner.geometry.radius) == (1200.0, 0.01)
     assert entry.spring == LinearSpring(2000.0)
     assert entry.damper == PressureDamper(50.0, 1e-5)
-    assert entry.box.pressure == (0.0, 6e5)
+    assert entry.validity_range.pressure == (0.0, 6e5)
     assert entry.checks[0].given == (("pressure", 5e5), ("contraction", 0.0))
     assert {"ours", "tondu-lopez-2000"} <= {reference.key for reference in cite(entry)}
     assert entry.muscle.tension(5e5, 0.0) == 1200.0
@@ -122,15 +129,17 @@ def test_a_muscle_file_carries_its_friction(law, tmp_path: Path):
     assert again.muscle.friction == law
     assert {r.key for r in cite(again)} >= {r.key for r in law.references}
     bristles = {state.name: 1e-4 for state in law.states}
-    held = again.muscle.unslackened(3e5, 0.1, 0.01, bristles)
-    assert held == dataclasses.replace(entry, friction=None).muscle.unslackened(3e5, 0.1) - law.force(bristles, 0.01)
+    held = again.muscle.unclamped_tension(3e5, 0.1, 0.01, bristles)
+    assert held == dataclasses.replace(entry, friction=None).muscle.unclamped_tension(3e5, 0.1) - law.force(
+        bristles, 0.01
+    )
 
 
 def test_a_plant_takes_over_the_friction_of_its_muscle_file_unless_it_states_another(tmp_path: Path):
     entry = dataclasses.replace(catalogue.load("dmsp-20-300"), friction=FRICTION[0])
     catalogue.save(entry, tmp_path / "muscle.toml")
     table = {"library": "muscle.toml", "damper": {"model": "LinearDamper", "damping": 100.0}}
-    place = Place("scenario.toml", "plant.muscle", tmp_path)
+    place = Location("scenario.toml", "plant.muscle", tmp_path)
     assert muscle_from(table, place).friction == FRICTION[0]
     assert muscle_from({**table, "friction": {"model": "NoFriction"}}, place).friction == NoFriction()
 
@@ -150,7 +159,7 @@ def test_a_muscle_file_carries_wall_stop_and_creep(tmp_path: Path):
 def test_a_friction_of_another_kind_is_refused(tmp_path: Path):
     spring = '[friction]\nmodel = "LinearSpring"\nstiffness = 1.0\n'
     with pytest.raises(ParameterError, match=r"\[friction\]: LinearSpring is no friction"):
-        catalogue.load(written(tmp_path, GOOD.replace("[box]", spring + "[box]")))
+        catalogue.load(written(tmp_path, GOOD.replace("[validity_range]", spring + "[validity_range]")))
 
 
 def test_a_saved_muscle_loads_to_the_same_numbers(tmp_path: Path):
@@ -160,7 +169,7 @@ def test_a_saved_muscle_loads_to_the_same_numbers(tmp_path: Path):
     assert [path.name for path in tmp_path.iterdir()] == ["muscle.toml"]
 
 
-@pytest.mark.parametrize("name", catalogue.names())
+@pytest.mark.parametrize("name", catalogue.list_library())
 def test_every_library_entry_survives_saving(name: str, tmp_path: Path):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
@@ -195,7 +204,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path):
             r"\[characteristic.inner.geometry\]: Braid needs 'radius' \[m\] \(r_0",
         ),
         ('model = "Clamped"', "", ParameterError, r"\[characteristic\]: no model is named"),
-        ('trust = "chosen"', "", ParameterError, r"muscle.toml: 'trust' is missing"),
+        ('provenance = "chosen"', "", ParameterError, r"muscle.toml: 'provenance' is missing"),
         (
             "[characteristic.inner.geometry]",
             "[x]",
@@ -220,7 +229,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path):
         (
             '"TonduLopez2000"',
             '"TonduLopez2001"',
-            UnknownName,
+            UnknownNameError,
             r"\[characteristic.inner\], model: no model 'TonduLopez2001'",
         ),
         ("[spring]", "[sprng]", ParameterError, r"'sprng' is not known here.*Did you mean 'spring'\?"),
@@ -258,9 +267,14 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path):
             '"1.2 kN"',
             '"-1 N"',
             ParameterError,
-            r"\[characteristic\]: Clamped: least_force 0 N must lie below greatest_force",
+            r"\[characteristic\]: Clamped: min_force 0 N must lie below max_force",
         ),
-        ('"6 bar"', '"-1 bar"', ParameterError, r"\[box\]: Box: least_pressure 0 must lie below greatest_pressure"),
+        (
+            '"6 bar"',
+            '"-1 bar"',
+            ParameterError,
+            r"\[validity_range\]: ValidityRange: min_pressure 0 must lie below max_pressure",
+        ),
     ],
 )
 def test_a_bad_file_is_told_what_is_wrong(
@@ -274,18 +288,18 @@ def test_a_bad_file_is_told_what_is_wrong(
 
 def test_a_model_of_another_kind_is_refused(tmp_path: Path):
     braid = 'model = "Braid"\nradius = 0.01\nbraid_angle = 0.4\nresting_length = 0.3\n'
-    text = f'title = "t"\ntrust = "chosen"\n[characteristic]\n{braid}'
+    text = f'title = "t"\nprovenance = "chosen"\n[characteristic]\n{braid}'
     with pytest.raises(ParameterError, match=r"\[characteristic\]: Braid is no characteristic"):
         catalogue.load(written(tmp_path, text))
-    text = f'title = "t"\ntrust = "chosen"\n[characteristic]\nmodel = "Clamped"\n[characteristic.inner]\n{braid}'
+    text = f'title = "t"\nprovenance = "chosen"\n[characteristic]\nmodel = "Clamped"\n[characteristic.inner]\n{braid}'
     with pytest.raises(ParameterError, match=r"\[characteristic\]: inner is Braid; a ForceLaw is wanted"):
         catalogue.load(written(tmp_path, text))
 
 
 def test_a_value_where_a_table_belongs_is_refused(tmp_path: Path):
     with pytest.raises(ParameterError, match=r"\[characteristic\]: 3 is not a table; write model = "):
-        catalogue.load(written(tmp_path, 'title = "t"\ntrust = "chosen"\ncharacteristic = 3\n'))
-    text = 'title = "t"\ntrust = "chosen"\n[characteristic]\nmodel = "ChouHannaford1996"\ngeometry = 3\n'
+        catalogue.load(written(tmp_path, 'title = "t"\nprovenance = "chosen"\ncharacteristic = 3\n'))
+    text = 'title = "t"\nprovenance = "chosen"\n[characteristic]\nmodel = "ChouHannaford1996"\ngeometry = 3\n'
     with pytest.raises(ParameterError, match=r"\[characteristic\]: geometry is 3; a Braid is wanted"):
         catalogue.load(written(tmp_path, text))
 
@@ -307,11 +321,15 @@ def test_a_byte_order_mark_does_no_harm(tmp_path: Path):
 
 def test_a_unique_beginning_of_a_name_is_enough():
     assert catalogue.load("chou").name == "chou-hannaford"
-    with pytest.raises(UnknownName, match=r"'dmsp' is the beginning of several: dmsp-10-250, dmsp-20-300\. Write more"):
+    with pytest.raises(
+        UnknownNameError, match=r"'dmsp' is the beginning of several: dmsp-10-250, dmsp-20-300\. Write more"
+    ):
         catalogue.load("dmsp")
-    with pytest.raises(UnknownName, match=r"no library entry 'dsmp-20-300'; there are .* Did you mean 'dmsp-20-300'\?"):
+    with pytest.raises(
+        UnknownNameError, match=r"no library entry 'dsmp-20-300'; there are .* Did you mean 'dmsp-20-300'\?"
+    ):
         catalogue.load("dsmp-20-300")
-    with pytest.raises(UnknownName, match="no library entry ''"):
+    with pytest.raises(UnknownNameError, match="no library entry ''"):
         catalogue.load("")
 
 
@@ -321,29 +339,29 @@ def test_an_entry_with_a_warning_gives_it(tmp_path: Path):
 
 
 def test_an_entry_that_is_no_muscle_says_what_it_lacks():
-    with pytest.raises(UnknownName, match=r"sarosi-dmsp-10 .* lacks a \[geometry\]"):
+    with pytest.raises(UnknownNameError, match=r"sarosi-dmsp-10 .* lacks a \[geometry\]"):
         _ = catalogue.load("sarosi-dmsp-10").muscle
     table = dataclasses.replace(catalogue.load("festo-tool-dmsp-20"), geometry=Braid(0.01, 0.4, 0.2))
-    with pytest.raises(UnknownName, match="lacks a law solved for the force: see as_force_law"):
+    with pytest.raises(UnknownNameError, match="lacks a law solved for the force: see as_force_law"):
         _ = table.muscle
 
 
 @pytest.mark.parametrize("name", catalogue.measured_names())
 def test_a_data_set_says_where_it_is_from(name: str):
-    recording = catalogue.measured(name)
+    recording = catalogue.load_data(name)
     assert len(recording) >= 60
     assert "source: " in recording.notes[-1]
     assert "licence: " in recording.notes[-1]
 
 
 def test_the_measured_maps_know_their_resting_length():
-    assert catalogue.measured("dmsp-20")["contraction"].max() == pytest.approx(0.26)
-    assert catalogue.measured("dmsp-10")["contraction"].max() == pytest.approx(0.208)
+    assert catalogue.load_data("dmsp-20")["contraction"].max() == pytest.approx(0.26)
+    assert catalogue.load_data("dmsp-10")["contraction"].max() == pytest.approx(0.208)
 
 
 def test_a_column_of_a_file_that_is_not_there(tmp_path: Path):
     table = '{ file = "map.csv", column = "force" }'
-    text = f'title = "t"\ntrust = "chosen"\n[characteristic]\nmodel = "Tabulated"\npressures = {table}\n'
+    text = f'title = "t"\nprovenance = "chosen"\n[characteristic]\nmodel = "Tabulated"\npressures = {table}\n'
     text += f"contractions = {table}\nforces = {table}\n"
     with pytest.raises(FileError, match=r"map\.csv"):
         catalogue.load(written(tmp_path, text))

@@ -11,9 +11,9 @@ import pytest
 
 from airmuscle import mechanism
 from airmuscle.library.build import build
+from airmuscle.library.location import Location
 from airmuscle.library.models import model_names
-from airmuscle.library.place import Place
-from airmuscle.mechanism import AntagonisticJoint, Mechanism, StoppedJoint
+from airmuscle.mechanism import AntagonisticJoint, JointWithEndStops, Mechanism
 from airmuscle.simulation.sensitivity import sensitivity
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -61,15 +61,15 @@ def test_the_code_on_batches_runs():
 
 def test_the_table_of_a_scenario_is_built():
     table = tomllib.loads(blocks("mechanisms.md", "toml")[0])["plant"]["mechanism"]
-    found = build(table, Place("page", "", DOCS))
-    assert isinstance(found, StoppedJoint)
+    found = build(table, Location("page", "", DOCS))
+    assert isinstance(found, JointWithEndStops)
     assert isinstance(found.inner, AntagonisticJoint)
-    assert found.least == pytest.approx(-0.349066, abs=1e-6)
+    assert found.lower_stop == pytest.approx(-0.349066, abs=1e-6)
 
 
 def test_every_mechanism_is_on_the_page_and_may_stand_in_a_file():
     text = (DOCS / "mechanisms.md").read_text(encoding="utf-8")
     classes = [c for c in vars(mechanism).values() if isinstance(c, type) and issubclass(c, Mechanism)]
-    final = {c.__name__ for c in classes} - {"Mechanism", "Wrapper"}
+    final = {c.__name__ for c in classes} - {"Mechanism", "MechanismWrapper"}
     assert final == {name for name in final if f"`{name}`" in text}
     assert final <= set(model_names())

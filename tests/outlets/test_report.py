@@ -23,11 +23,11 @@ import numpy as np
 import pytest
 
 from airmuscle.core import plotting
-from airmuscle.core.errors import FileError, NoSolution, UnknownName
+from airmuscle.core.errors import FileError, SolveError, UnknownNameError
 from airmuscle.core.reference import Reference
 from airmuscle.report.chapter import AtLeast, AtMost, Chapter, Claim, Equal, Plot, Table
 from airmuscle.report.html import GREATEST_VECTOR
-from airmuscle.report.staged import refuse_unwritable, staged
+from airmuscle.report.output_folder import atomic_folder, check_writable
 from airmuscle.report.wording import number, published
 from airmuscle.report.write import as_json, write_report
 from airmuscle.reproduce import run
@@ -231,10 +231,10 @@ def test_a_folder_that_cannot_be_written_is_named_and_left_alone(tmp_path: Path,
     assert sorted(tmp_path.rglob("*")) == before
 
 
-@pytest.mark.parametrize("reason", [NoSolution("no"), KeyboardInterrupt()])
+@pytest.mark.parametrize("reason", [SolveError("no"), KeyboardInterrupt()])
 def test_work_that_breaks_off_leaves_nothing(tmp_path: Path, reason: BaseException):
     def work() -> None:
-        with staged(tmp_path / "deep" / "out") as place:
+        with atomic_folder(tmp_path / "deep" / "out") as place:
             (place / "half").write_text("half")
             raise reason
 
@@ -244,7 +244,7 @@ def test_work_that_breaks_off_leaves_nothing(tmp_path: Path, reason: BaseExcepti
 
 
 def test_asking_whether_a_folder_is_writable_leaves_nothing(tmp_path: Path):
-    refuse_unwritable(tmp_path / "deep" / "out")
+    check_writable(tmp_path / "deep" / "out")
     assert list(tmp_path.rglob("*")) == []
 
 
@@ -306,7 +306,7 @@ def test_papers_are_named_by_a_unique_beginning(tmp_path: Path, asked: list[str]
 
 @pytest.mark.usefixtures("two_papers")
 def test_an_unknown_paper_is_refused_before_any_work(tmp_path: Path):
-    with pytest.raises(UnknownName, match=r"no paper 'saga2008'; there are saga2007, borzikova.*'saga2007'\?"):
+    with pytest.raises(UnknownNameError, match=r"no paper 'saga2008'; there are saga2007, borzikova.*'saga2007'\?"):
         run.reproduce(["saga2008"], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -319,7 +319,7 @@ def test_an_unwritable_folder_is_refused_before_any_work(tmp_path: Path, monkeyp
 
 
 @pytest.mark.usefixtures("two_papers")
-@pytest.mark.parametrize("reason", [NoSolution("no"), KeyboardInterrupt()])
+@pytest.mark.parametrize("reason", [SolveError("no"), KeyboardInterrupt()])
 def test_an_interrupted_run_leaves_the_chapters_that_are_complete(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reason: BaseException
 ):

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.control.driver import PWM, Driven
-from airmuscle.control.inputs import Periodic, Schedule, Signal
+from airmuscle.control.driver import PWM, WithDrivers
+from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
 from airmuscle.report.run_chapter import MOST_PIECES, in_words, run_chapter
 from airmuscle.scenario.scenario import load_scenario
 
@@ -21,10 +21,10 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
     [
         (Schedule({}), "none"),
         (Schedule({"fill": ((5, 1), (15, 0)), "discharge": ((19, 1),)}), "fill 1 from 5 s, 0 from 15 s; discharge 1 from 19 s"),
-        (Signal({"fill": ((0, 0), (2, 0.5))}), "fill 0 at 0 s, 0.5 at 2 s"),
+        (SampledSignal({"fill": ((0, 0), (2, 0.5))}), "fill 0 at 0 s, 0.5 at 2 s"),
         (Schedule({"fill": tuple((i, i % 2) for i in range(1000))}), "fill: 1000 values from 0 to 1, 0 to 999 s"),
         (Periodic(Schedule({"fill": ((1, 1),)}), 2.0), "every 2 s: fill 1 from 1 s"),
-        (Driven(Schedule({"fill": ((1, 0.5),)}), {"fill": PWM(50.0)}), "fill 0.5 from 1 s; driven: fill by PWM(frequency=50.0, smallest_pulse=0.0)"),
+        (WithDrivers(Schedule({"fill": ((1, 0.5),)}), {"fill": PWM(50.0)}), "fill 0.5 from 1 s; driven: fill by PWM(frequency=50.0, smallest_pulse=0.0)"),
     ],
 )  # fmt: skip
 def test_a_command_in_words(command, words: str):
@@ -44,7 +44,7 @@ def test_a_jump_is_upright():
 
 
 def test_of_a_long_command_the_beginning_is_drawn_beside_what_the_driver_was_told():
-    command = Driven(Schedule({"fill": ((0.0, 0.5),)}), {"fill": PWM(1000.0)})
+    command = WithDrivers(Schedule({"fill": ((0.0, 0.5),)}), {"fill": PWM(1000.0)})
     plot, lines = drawn(command, 0.5)
     assert plot.caption == "Inputs of the plant; the first 300 pieces; dashed, what the drivers were told."
     had, told = lines["what the plant had"], lines["command"]

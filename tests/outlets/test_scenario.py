@@ -12,17 +12,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.control.driver import PWM, Driven, OnOff
-from airmuscle.control.inputs import Periodic, Schedule, Signal
+from airmuscle.control.driver import PWM, SolenoidDriver, WithDrivers
+from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
 from airmuscle.core.errors import (
     AirmuscleError,
     ColumnError,
+    EquilibriumError,
     FileError,
-    NoEquilibrium,
     ParameterError,
     PhysicsError,
     UnitError,
-    UnknownName,
+    UnknownNameError,
 )
 from airmuscle.geometry import Braid
 from airmuscle.library.catalogue import load, save
@@ -167,8 +167,10 @@ def test_a_fitted_surface_becomes_a_muscle_by_the_geometry_of_the_page(tmp_path:
 
 
 def test_a_signal_is_linear_between_its_points(tmp_path: Path):
-    scenario = load_scenario(written(tmp_path, (FILL, f'model = "Signal"\n{FILL}'), (DURATION, 'duration = "200 ms"')))
-    assert scenario.command == Signal({"fill": ((0.1, 1.0), (0.2, 0.0))})
+    scenario = load_scenario(
+        written(tmp_path, (FILL, f'model = "SampledSignal"\n{FILL}'), (DURATION, 'duration = "200 ms"'))
+    )
+    assert scenario.command == SampledSignal({"fill": ((0.1, 1.0), (0.2, 0.0))})
     run = scenario.simulate()
     assert run["fill"][run["time"] == 0.15] == pytest.approx(0.5)
 
@@ -184,12 +186,12 @@ def driven(folder: Path, *changes: tuple[str, str]) -> Path:
 
 def test_the_command_of_the_page_runs(tmp_path: Path):
     scenario = load_scenario(driven(tmp_path))
-    told = Signal({"fill": ((0, 0), (0.1, 0.5), (0.3, 0)), "discharge": ((0, 0.5), (0.1, 0.5), (0.3, 0.25))})
+    told = SampledSignal({"fill": ((0, 0), (0.1, 0.5), (0.3, 0)), "discharge": ((0, 0.5), (0.1, 0.5), (0.3, 0.25))})
     drivers = {
-        "fill": OnOff(opening_delay=5e-3, closing_delay=2e-3),
-        "discharge": (PWM(50.0, smallest_pulse=1e-3), OnOff(opening_delay=2e-3)),
+        "fill": SolenoidDriver(opening_delay=5e-3, closing_delay=2e-3),
+        "discharge": (PWM(50.0, smallest_pulse=1e-3), SolenoidDriver(opening_delay=2e-3)),
     }
-    assert scenario.command == Driven(Periodic(told, 0.4), drivers)
+    assert scenario.command == WithDrivers(Periodic(told, 0.4), drivers)
     run = scenario.simulate()
     assert np.count_nonzero(np.diff(run["discharge"]) > 0) == 15, "a pulse in each period of the carrier"
 
@@ -199,7 +201,7 @@ def test_a_recorded_command_may_be_held_and_rows_may_stand_beside_it(tmp_path: P
     (tmp_path / "data" / "bench.csv").write_text(OPENINGS, encoding="utf-8")
     file = 'file = "data/bench.csv"\ndischarge = [["0.1 s", 1]]'
     fill = ((0.0, 0.0), (0.1, 0.5), (0.3, 0.0))
-    for model, kind in (("", Signal), ('model = "Schedule"\n', Schedule)):
+    for model, kind in (("", SampledSignal), ('model = "Schedule"\n', Schedule)):
         command = load_scenario(written(tmp_path, (FILL, f"{model}{file}"))).command
         assert command == kind({"fill": fill, "discharge": ((0.1, 1.0),)})
 
@@ -210,7 +212,7 @@ def test_a_driver_may_have_the_delays_of_a_valve_of_the_catalogue(tmp_path: Path
     command = load_scenario(
         written(tmp_path, (FILL, f'{FILL}\ndrivers = {{ fill = {{ library = "smc-sx91" }} }}'))
     ).command
-    assert command.drivers == {"fill": OnOff(response.opening_delay, response.closing_delay)}
+    assert command.drivers == {"fill": SolenoidDriver(response.opening_delay, response.closing_delay)}
 
 
 def test_an_input_is_read_in_its_own_unit(tmp_path: Path):
@@ -219,7 +221,7 @@ def test_an_input_is_read_in_its_own_unit(tmp_path: Path):
 supply = {{ model = "Supply", pressure = "6 bar" }}
 fill = {valve}
 discharge = {valve}
-lag = {{ model = "Follower", frequency = "20 Hz", damping_ratio = 0.7 }}
+lag = {{ model = "SecondOrderLag", frequency = "20 Hz", damping_ratio = 0.7 }}
 """
     i, j = GOOD.index('model = "FillDischarge"'), GOOD.index("[plant.mechanism]")
     text = GOOD[:i] + regulator + GOOD[j:].replace(FILL, 'setpoint = [["0.1 s", "2 bar"], ["0.2 s", 1e5]]')
@@ -237,7 +239,7 @@ def test_a_column_of_no_known_quantity_has_the_unit_of_its_heading(tmp_path: Pat
     for column in ("valve", "valve [%]"):
         table = f'file = "bench.csv"\ncolumns = {{ fill = "{column}", discharge = "discharge" }}'
         command = load_scenario(written(tmp_path, (FILL, table))).command
-        assert command == Signal({"fill": ((0, 0.5), (1, 0.2)), "discharge": ((0, 1), (1, 0))})
+        assert command == SampledSignal({"fill": ((0, 0.5), (1, 0.2)), "discharge": ((0, 1), (1, 0))})
     with pytest.raises(UnitError, match=r"bench.csv, port \[mm\]: unit 'mm' cannot become a ratio"):
         load_scenario(written(tmp_path, (FILL, 'file = "bench.csv"\ncolumns = { fill = "port" }')))
 
@@ -245,7 +247,7 @@ def test_a_column_of_no_known_quantity_has_the_unit_of_its_heading(tmp_path: Pat
 def test_columns_called_like_inputs_are_taken_unasked(tmp_path: Path):
     (tmp_path / "bench.csv").write_text("time [s],discharge [1],fill [1]\n0,1,0\n1,0.5,0.2\n", encoding="utf-8")
     command = load_scenario(written(tmp_path, (FILL, 'file = "bench.csv"'))).command
-    assert command == Signal({"fill": ((0, 0), (1, 0.2)), "discharge": ((0, 1), (1, 0.5))})
+    assert command == SampledSignal({"fill": ((0, 0), (1, 0.2)), "discharge": ((0, 1), (1, 0.5))})
 
 
 def test_the_file_of_a_run_holds_the_columns_that_are_asked_for(tmp_path: Path):
@@ -260,10 +262,10 @@ def test_the_file_of_a_run_holds_the_columns_that_are_asked_for(tmp_path: Path):
 def test_a_muscle_of_the_library_keeps_the_box_of_its_law(tmp_path: Path):
     entry = load("dmsp-20-300")
     named = 'muscle = { library = "dmsp-20", damper = { model = "LinearDamper", damping = 7 } }'
-    assert load_scenario(written(tmp_path, (MUSCLE, named))).plant.muscle.box == entry.box
+    assert load_scenario(written(tmp_path, (MUSCLE, named))).plant.muscle.validity_range == entry.validity_range
     law = 'contractile = { model = "ChouHannaford1996", geometry = { model = "Braid", radius = "10 mm", braid_angle = "25 deg", resting_length = "300 mm" } }'
     other = f'muscle = {{ library = "dmsp-20", {law} }}'
-    assert load_scenario(written(tmp_path, (MUSCLE, other))).plant.muscle.box is None, (
+    assert load_scenario(written(tmp_path, (MUSCLE, other))).plant.muscle.validity_range is None, (
         "another law was measured elsewhere"
     )
 
@@ -300,11 +302,26 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
         (MUSCLE, "", ParameterError, r"\[plant\]: 'muscle' is missing; name a library entry, a file, or write"),
         (MUSCLE, "muscle = 3", ParameterError, r"\[plant.muscle\] is 3; name a library entry or a muscle file"),
         (MUSCLE, "muscle = [3]", ParameterError, r"\[plant.muscle\[0\]\] is 3; name a library entry"),
-        (MUSCLE, 'muscle = "chou-hanaford"', UnknownName, r"\[plant.muscle\]: no library .*mean 'chou-hannaford'\?"),
-        (MUSCLE, 'muscle = "dmsp"', UnknownName, r"\[plant.muscle\]: 'dmsp' is the beginning of several: dmsp-10-250"),
+        (
+            MUSCLE,
+            'muscle = "chou-hanaford"',
+            UnknownNameError,
+            r"\[plant.muscle\]: no library .*mean 'chou-hannaford'\?",
+        ),
+        (
+            MUSCLE,
+            'muscle = "dmsp"',
+            UnknownNameError,
+            r"\[plant.muscle\]: 'dmsp' is the beginning of several: dmsp-10-250",
+        ),
         (MUSCLE, 'muscle = "mine.toml"', FileError, r"\[plant.muscle\]: .*mine\.toml: there is no such file"),
-        (MUSCLE, 'muscle = "sarosi-dmsp-10"', UnknownName, r"\[plant.muscle\]: sarosi-dmsp-10 .* lacks a \[geometry\]"),
-        (MUSCLE, 'muscle = { library = "x" }', UnknownName, r"\[plant.muscle.library\]: no library entry 'x'"),
+        (
+            MUSCLE,
+            'muscle = "sarosi-dmsp-10"',
+            UnknownNameError,
+            r"\[plant.muscle\]: sarosi-dmsp-10 .* lacks a \[geometry\]",
+        ),
+        (MUSCLE, 'muscle = { library = "x" }', UnknownNameError, r"\[plant.muscle.library\]: no library entry 'x'"),
         (
             MUSCLE,
             'muscle = { library = "saga2007" }',
@@ -320,7 +337,12 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
         (MUSCLE, "muscle = {}", ParameterError, r"\[plant.muscle\]: Muscle needs 'contractile'"),
         (MUSCLE, f"{MUSCLE}\ngaz = 1", ParameterError, r"\[plant\]: Plant has no parameter 'gaz'.*mean 'gas'\?"),
         (MUSCLE, f'{MUSCLE}\ngas = "Rodas4"', ParameterError, r"\[plant\]: gas is Rodas4; a Gas is wanted"),
-        (MUSCLE, f'{MUSCLE}\ngas = "Isotherm"', UnknownName, r"\[plant.gas\], model: .*Did you mean 'Isothermal'\?"),
+        (
+            MUSCLE,
+            f'{MUSCLE}\ngas = "Isotherm"',
+            UnknownNameError,
+            r"\[plant.gas\], model: .*Did you mean 'Isothermal'\?",
+        ),
         ("3e-9, critical_ratio = 0.3", "3e-9", ParameterError, r"\[plant.circuit.fill\]: Valve needs 'critical_ratio'"),
         ("= 0.3", "= 30", ParameterError, r"is 30; allowed are 0 to 0.95. Is it in per cent\? As a ratio it is 0.3"),
         ('"5 bar"', '"-2 bar"', ParameterError, r"\[plant.circuit.supply\]: .* is -200000 Pa; allowed are -100000 to"),
@@ -342,14 +364,24 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
         ),
         (FILL, "fill = [[0.1, 7]]", ParameterError, r"\[command\]: the input 'fill' is 7 before 0.3 s; allowed are 0"),
         (FILL, "fill = [[0, -0.5]]", ParameterError, r"\[command\]: the input 'fill' is -0.5 before"),
-        (FILL, 'model = "Signal"\nfill = [[0, 0], [0.3, 2]]', ParameterError, r"the input 'fill' is 2 before 0.3 s"),
         (
             FILL,
-            'model = "Signal"\nfill = []',
+            'model = "SampledSignal"\nfill = [[0, 0], [0.3, 2]]',
+            ParameterError,
+            r"the input 'fill' is 2 before 0.3 s",
+        ),
+        (
+            FILL,
+            'model = "SampledSignal"\nfill = []',
             ParameterError,
             r"\[command\]: the signal of 'fill' must be finite points",
         ),
-        (FILL, 'model = "Shedule"', UnknownName, r"\[command\], model: no model 'Shedule'.*Did you mean 'Schedule'\?"),
+        (
+            FILL,
+            'model = "Shedule"',
+            UnknownNameError,
+            r"\[command\], model: no model 'Shedule'.*Did you mean 'Schedule'\?",
+        ),
         (FILL, 'model = "Braid"', ParameterError, r"\[command\]: Braid is no command; there are Schedule and Signal"),
         (
             FILL,
@@ -373,12 +405,17 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             ParameterError,
             r"\[command.drivers\] is 3; write \[command.drivers\] and fill = \{ model",
         ),
-        (FILL, 'drivers = { fil = "OnOff" }', ParameterError, r"\[command.drivers\]: .* no input 'fil'.*mean 'fill'\?"),
         (
             FILL,
-            'drivers = { fill = "OnOf" }',
-            UnknownName,
-            r"\[command.drivers.fill\], model: .*Did you mean 'OnOff'\?",
+            'drivers = { fil = "SolenoidDriver" }',
+            ParameterError,
+            r"\[command.drivers\]: .* no input 'fil'.*mean 'fill'\?",
+        ),
+        (
+            FILL,
+            'drivers = { fill = "SolenoidDrive" }',
+            UnknownNameError,
+            r"\[command.drivers.fill\], model: .*Did you mean 'SolenoidDriver'\?",
         ),
         (
             FILL,
@@ -394,13 +431,13 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
         ),
         (
             FILL,
-            f'{FILL}\ndrivers = {{ fill = {{ model = "OnOff", opening_delay = "-1 s" }} }}',
+            f'{FILL}\ndrivers = {{ fill = {{ model = "SolenoidDriver", opening_delay = "-1 s" }} }}',
             ParameterError,
-            r"\[command.drivers.fill\]: OnOff.opening_delay .* is -1 s; allowed are 0 to 10 s",
+            r"\[command.drivers.fill\]: SolenoidDriver.opening_delay .* is -1 s; allowed are 0 to 10 s",
         ),
         (
             FILL,
-            'fill = [[0, 2]]\ndrivers = { fill = "OnOff" }',
+            'fill = [[0, 2]]\ndrivers = { fill = "SolenoidDriver" }',
             ParameterError,
             r"\[command\]: the driver of 'fill' is told 2 before",
         ),
@@ -435,7 +472,7 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             ParameterError,
             r"\[output\]: 'column' is not known here; .*'columns'\?",
         ),
-        (FILL, "model = 3", UnknownName, r"\[command\], model is 3; it must be a name in quotes"),
+        (FILL, "model = 3", UnknownNameError, r"\[command\], model is 3; it must be a name in quotes"),
         # the run
         (DURATION, "duration = 0", ParameterError, r"\[run\], duration is 0; it must be greater than zero"),
         (DURATION, 'duration = "-1 s"', ParameterError, r"\[run\], duration is '-1 s'; it must be greater than zero"),
@@ -444,8 +481,13 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
         (DURATION, 'duration = "1 m"', UnitError, r"\[run\], duration: unit 'm' cannot become 's'"),
         (DURATION, f"{DURATION}\noutput = 0", ParameterError, r"\[run\], output is 0; it must be greater than zero"),
         (DURATION, f"{DURATION}\nstart_time = nan", ParameterError, r"\[run\], start_time is nan; it must be finite"),
-        (DURATION, f'{DURATION}\nmethod = "Rodas"', UnknownName, r"\[run.method\], .*Did you mean 'Rodas4'\?"),
-        (DURATION, f'{DURATION}\nmethod = "Isothermal"', ParameterError, r"\[run.method\]: Isothermal is no method"),
+        (DURATION, f'{DURATION}\nmethod = "Rodas"', UnknownNameError, r"\[run.method\], .*Did you mean 'Rodas4'\?"),
+        (
+            DURATION,
+            f'{DURATION}\nmethod = "Isothermal"',
+            ParameterError,
+            r"\[run.method\]: Isothermal is no integrator",
+        ),
         (DURATION, f"{DURATION}\nmethod = 3", ParameterError, r"\[run.method\]: 3 is not a table; write model ="),
         (
             '{ pressure = "1 bar" }',
@@ -511,7 +553,7 @@ def test_a_recording_without_a_column_of_an_input_says_how_to_name_one(tmp_path:
 
 def test_a_plant_that_cannot_rest_names_muscle_and_forces(tmp_path: Path):
     heavy = written(tmp_path, ('"5 kg"', '"500 kg"'), (MUSCLE, 'muscle = { library = "chou-hannaford", name = "arm" }'))
-    with pytest.raises(NoEquilibrium, match=r"scenario\.toml, \[run\.start\]: HangingMass finds no rest") as raised:
+    with pytest.raises(EquilibriumError, match=r"scenario\.toml, \[run\.start\]: HangingMass finds no rest") as raised:
         load_scenario(heavy)
     assert re.search(r"arm pulls \d+(\.\d+)? N at 100 kPa and a contraction of", str(raised.value))
     assert re.search(r"needs a pull of 4903\.\d+ N\. Change the load, the pressure or the parallel", str(raised.value))

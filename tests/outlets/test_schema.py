@@ -16,9 +16,9 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
+from airmuscle.core.declaration import parameters
 from airmuscle.core.errors import AirmuscleError
-from airmuscle.core.model import parameters
-from airmuscle.library.catalogue import load, names, to_toml
+from airmuscle.library.catalogue import list_library, load, to_toml
 from airmuscle.library.models import model_class
 from airmuscle.library.read import entry_from
 from airmuscle.scenario.scenario import load_scenario
@@ -113,7 +113,7 @@ def test_every_file_of_the_library_passes(path: Path):
 
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", list_library())
 def test_every_entry_passes_in_the_form_that_fit_and_save_write(name: str):
     assert judged(tomllib.loads(to_toml(load(name))), MUSCLE) == []
 
@@ -161,7 +161,7 @@ BROKEN = [
     ('fill = [["5 s", 1], ["15 s", 0]]', 'fill = [["5 s"], ["15 s", 0]]', ".command.fill[0]"),
     ('fill = [["5 s", 1], ["15 s", 0]]', "fill = 1", ".command.fill: no array"),
     ('fill = [["5 s", 1], ["15 s", 0]]', "fill = [[0, true]]", ".command.fill[0][1]: none of"),
-    ("[command]", '[command]\nmodel = "Shedule"', ".command.model: none of ['Schedule', 'Signal']"),
+    ("[command]", '[command]\nmodel = "Shedule"', ".command.model: none of ['Schedule', 'SampledSignal']"),
     ("[command]", '[command]\ndrivers = { fill = "OnOf" }', ".command.drivers.fill: none of"),
     ("[command]", '[command]\ndrivers = { fill = { model = "PWM" } }', ".command.drivers.fill: none of"),
     ("[command]", "[command]\nfile = 3", ".command.file: no string"),
@@ -193,7 +193,7 @@ def test_a_broken_scenario_is_found_by_the_schema_and_refused_by_the_program(
         ('wall_thickness = "1.8 mm"\n', "", ".characteristic: none of"),
         ('quantity = "force"', 'quantity = "stiffness"', ".check[0].quantity: none of"),
         ('equals = "328.0 N"', "", ".check[0]: lacks equals"),
-        ("greatest_contraction", "greatest_contractoin", ".box: greatest_contractoin is not known"),
+        ("max_contraction", "max_contractoin", ".validity_range: greatest_contractoin is not known"),
     ],
 )
 def test_a_broken_muscle_is_found_by_the_schema_and_refused_by_the_program(was: str, becomes: str, fault: str):

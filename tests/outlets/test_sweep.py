@@ -25,7 +25,7 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.cli.interruption import look, remembered
+from airmuscle.cli.interruption import check_interrupted, deferred_sigint
 from airmuscle.core.errors import AirmuscleError, FileError, InputError, SimulationError
 from airmuscle.report.write import save_table
 from airmuscle.scenario.scenario import load_scenario
@@ -39,7 +39,7 @@ from airmuscle.study.metrics import OUTCOMES
 ROOT = Path(__file__).parents[2]
 MUSCLE = """
 title = "A braid"
-trust = "example"
+provenance = "example"
 [characteristic]
 model = "ChouHannaford1996"
 geometry = { model = "Braid", radius = "10 mm", braid_angle = "25 deg", resting_length = "300 mm" }
@@ -81,7 +81,7 @@ seed = 3
 [outcome]
 pressure = { model = "Final", column = "pressure" }
 reached = { model = "TimeToReach", column = "pressure", level = "2 bar", begin = "0.1 s" }
-course = { model = "Course", column = "force", every = "0.05 s" }
+course = { model = "TimeSeries", column = "force", every = "0.05 s" }
 """
 
 
@@ -203,13 +203,13 @@ def test_ctrl_c_that_python_loses_is_remembered(monkeypatch):
             signal.raise_signal(signal.SIGINT)
 
     def working():
-        with remembered():
-            look()
+        with deferred_sigint():
+            check_interrupted()
             thing = Dying()
             del thing
             assert [e.exc_type for e in lost] == [KeyboardInterrupt]
             with pytest.raises(KeyboardInterrupt):
-                look()
+                check_interrupted()
 
     def interrupted_import():
         with contextlib.suppress(KeyboardInterrupt):
@@ -219,10 +219,10 @@ def test_ctrl_c_that_python_loses_is_remembered(monkeypatch):
     try:
         with pytest.raises(KeyboardInterrupt):
             working()
-        look()  # forgotten once the block has raised it
-        with pytest.raises(KeyboardInterrupt), remembered():
+        check_interrupted()  # forgotten once the block has raised it
+        with pytest.raises(KeyboardInterrupt), deferred_sigint():
             interrupted_import()
-        with pytest.raises(ImportError), remembered():
+        with pytest.raises(ImportError), deferred_sigint():
             raise ImportError
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     finally:
@@ -384,7 +384,7 @@ def test_the_way_in_which_a_start_is_given_is_an_input_too(folder: Path):
     held = load_study(folder / "study.toml")
     assert held.source.scenario.start == pytest.approx(at_rest.source.scenario.start)
     assert held.scenario(0).start != pytest.approx(at_rest.scenario(0).start)
-    assert held.mark() != at_rest.mark()
+    assert held.fingerprint() != at_rest.fingerprint()
 
 
 def test_a_reason_is_the_same_from_wherever_the_study_was_read(folder: Path, monkeypatch: pytest.MonkeyPatch):
@@ -455,7 +455,7 @@ def test_what_nobody_foresaw_fails_its_run_alone(folder: Path, monkeypatch: pyte
             raise ZeroDivisionError("by nothing")
         return simulate(*given, **named)
 
-    monkeypatch.setattr("airmuscle.study.simulate.simulate", failing)
+    monkeypatch.setattr("airmuscle.study.runs.simulate", failing)
     result = run(folder)
     assert [r for r in result.reasons if r] == ["ZeroDivisionError: by nothing"]
 

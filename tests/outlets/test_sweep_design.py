@@ -15,10 +15,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airmuscle.core.errors import ParameterError
-from airmuscle.library.place import Place
+from airmuscle.library.location import Location
 from airmuscle.study.design import Grid, LatinHypercube, MonteCarlo, Saltelli, Sobol
 from airmuscle.study.distributions import (
-    Levels,
+    LevelSet,
     LogNormal,
     Normal,
     Range,
@@ -81,7 +81,7 @@ EVEN = (np.arange(100_000) + 0.5) / 100_000
         (LogNormal(2.0, 0.25), 2.0 * np.exp(0.25**2 / 2), 2.0 * np.exp(0.25**2 / 2) * np.sqrt(np.expm1(0.25**2))),
         (Triangular(1.0, 2.0, 6.0), 3.0, np.sqrt((1 + 4 + 36 - 2 - 6 - 12) / 18)),
         (Truncated(Normal(0.0, 1.0), -1.0, 1.0), 0.0, 0.5395599),  # sqrt(1 - 2 phi(1) / (Phi(1) - Phi(-1)))
-        (Levels((1.0, 2.0, 6.0)), 3.0, np.sqrt(14 / 3)),
+        (LevelSet((1.0, 2.0, 6.0)), 3.0, np.sqrt(14 / 3)),
     ],
 )
 def test_mean_and_deviation_are_those_of_the_text_books(variation, mean, deviation):
@@ -91,12 +91,12 @@ def test_mean_and_deviation_are_those_of_the_text_books(variation, mean, deviati
 
 
 def test_a_file_gives_values_in_units_and_deviations_as_differences():
-    place = Place("study.toml", "", None)
+    place = Location("study.toml", "", None)
     found = variation_from({"model": "Normal", "mean": "6.5 bara", "deviation": "0.1 bara"}, "Pa", place)
     assert found.mean == pytest.approx(548675.0)
     assert found.deviation == pytest.approx(1e4)
     assert difference("5 degC", "K", "here") == pytest.approx(5.0)
-    assert variation_from(["1 mm", 2e-3], "m", place) == Levels((0.001, 0.002))
+    assert variation_from(["1 mm", 2e-3], "m", place) == LevelSet((0.001, 0.002))
     assert variation_from({"model": "Range", "low": "0 kg", "high": "1 kg", "count": 5}, "kg", place).values == (
         0.0, 0.25, 0.5, 0.75, 1.0,
     )  # fmt: skip
@@ -106,7 +106,7 @@ def test_a_file_gives_values_in_units_and_deviations_as_differences():
 @given(st.lists(st.integers(1, 5), min_size=1, max_size=4), st.floats(0.1, 10))
 def test_a_grid_holds_every_combination_once_the_last_fastest(sizes, step):
     lists = [[step * (i + 7 * k) for i in range(size)] for k, size in enumerate(sizes)]
-    values = Grid().values([Levels(tuple(each)) for each in lists])
+    values = Grid().values([LevelSet(tuple(each)) for each in lists])
     assert [tuple(row) for row in values] == list(itertools.product(*lists))
 
 
@@ -120,7 +120,7 @@ def test_a_latin_hypercube_has_every_part_of_every_range_once(count, variables, 
 
 @pytest.mark.parametrize("design", [MonteCarlo, Sobol])
 def test_a_greater_study_begins_with_the_points_of_the_smaller_one(design):
-    variations = [Normal(0.0, 1.0), Uniform(0.0, 1.0), Levels((1.0, 2.0))]
+    variations = [Normal(0.0, 1.0), Uniform(0.0, 1.0), LevelSet((1.0, 2.0))]
     assert np.array_equal(design(64, 5).values(variations)[:16], design(16, 5).values(variations))
 
 
@@ -156,16 +156,16 @@ def test_no_value_of_a_normal_distribution_is_infinite():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Levels(()), "the list is empty"),
-        (lambda: Levels((1.0, float("nan"))), "every number must be finite"),
+        (lambda: LevelSet(()), "the list is empty"),
+        (lambda: LevelSet((1.0, float("nan"))), "every number must be finite"),
         (lambda: Normal(float("inf"), 1.0), "every number must be finite"),
         (lambda: Normal(0.0, -1.0), "deviation is -1; it must be greater than zero"),
         (lambda: Uniform(1.0, 1.0), "low must be the smaller one"),
-        (lambda: Truncated(Levels((1.0,)), 0.0, 1.0), "is no distribution that can be cut"),
+        (lambda: Truncated(LevelSet((1.0,)), 0.0, 1.0), "is no distribution that can be cut"),
         (lambda: Range(0.0, 0.0, 3), "two different ends"),
         (lambda: MonteCarlo(0), "at least one point is needed"),
         (lambda: Sobol(100), "Take 64 or 128"),
-        (lambda: Grid().values([Levels(tuple(range(2, 5000)))] * 3), "a study has 10000000 at most"),
+        (lambda: Grid().values([LevelSet(tuple(range(2, 5000)))] * 3), "a study has 10000000 at most"),
     ],
 )
 def test_what_cannot_be_is_refused(make, message):

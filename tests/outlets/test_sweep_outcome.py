@@ -16,15 +16,15 @@ from hypothesis.extra.numpy import arrays
 
 from airmuscle.core.errors import ParameterError
 from airmuscle.study.metrics import (
-    Course,
     Final,
     Maximum,
     Mean,
+    Metric,
     Minimum,
-    Outcome,
     Overshoot,
     RootMeanSquare,
     SettlingTime,
+    TimeSeries,
     TimeToReach,
 )
 
@@ -106,7 +106,7 @@ def test_a_window_ends_where_it_says_wherever_the_rows_are(begin, length):
 
 
 def test_a_course_stands_on_its_instants():
-    course = Course("x", 0.25, begin=0.5).within(0.0, 2.0)
+    course = TimeSeries("x", 0.25, begin=0.5).within(0.0, 2.0)
     assert course.instants == pytest.approx([0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0])
     assert course.rows(TIME, RAMP) == pytest.approx(3.0 * course.instants - 1.0)
     half = course.rows(TIME[:11], RAMP[:11])
@@ -115,9 +115,9 @@ def test_a_course_stands_on_its_instants():
 
 
 def test_units_follow_from_the_column():
-    found: list[tuple[Outcome, str]] = [
+    found: list[tuple[Metric, str]] = [
         (Final("p"), "Pa"), (RootMeanSquare("p"), "Pa"), (TimeToReach("p", 1.0), "s"), (Overshoot("p"), "1"),
-        (SettlingTime("p"), "s"), (Course("p", 0.1), "Pa"),
+        (SettlingTime("p"), "s"), (TimeSeries("p", 0.1), "Pa"),
     ]  # fmt: skip
     for outcome, unit in found:
         assert outcome.unit("Pa") == unit
@@ -130,8 +130,8 @@ def test_units_follow_from_the_column():
         (lambda: Final("x", begin=math.nan), "its end must be later than its begin"),
         (lambda: TimeToReach("x", math.inf), "it must be finite"),
         (lambda: SettlingTime("x", band=0.0), "it must lie between 0 and 1"),
-        (lambda: Course("x", 0.0), "it must be positive and finite"),
-        (lambda: Course("x", 1e-9).within(0.0, 1.0), "2 to 1000000 instants"),
+        (lambda: TimeSeries("x", 0.0), "it must be positive and finite"),
+        (lambda: TimeSeries("x", 1e-9).within(0.0, 1.0), "2 to 1000000 instants"),
     ],
 )
 def test_what_cannot_be_is_refused(make, message):

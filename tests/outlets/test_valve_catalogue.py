@@ -13,11 +13,11 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.core.errors import AirmuscleWarning, FileError, ParameterError, UnitError, UnknownName
+from airmuscle.core.errors import AirmuscleWarning, FileError, ParameterError, UnitError, UnknownNameError
 from airmuscle.core.reference import cite
 from airmuscle.library.build import build
 from airmuscle.library.find import find
-from airmuscle.library.place import Place
+from airmuscle.library.location import Location
 from airmuscle.library.valve_catalogue import load_valve, valve_names
 from airmuscle.pneumatics import CheckValve, Valve
 from airmuscle.reproduce.hosovsky_plant import MATRIX
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.Airmuscle
 every_valve = pytest.mark.parametrize("name", valve_names())
 GOOD = """
 title = "A valve of ours"
-trust = "measured"
+provenance = "measured"
 [valve]
 model = "IndexedValve"
 conductance = "2 dm3/(s bar)"
@@ -83,9 +83,9 @@ def test_a_check_fails_when_the_valve_changes():
 def test_every_valve_says_where_it_is_from_and_what_was_converted(name: str):
     entry = load_valve(name)
     assert entry.references, "no source"
-    assert entry.trust in ("printed", "data sheet, second hand", "second hand, converted")
+    assert entry.provenance in ("printed", "data sheet, second hand", "second hand, converted")
     assert entry.note
-    assert ("chosen" in entry.note) == ("converted" in entry.trust)
+    assert ("chosen" in entry.note) == ("converted" in entry.provenance)
     assert all(check.source for check in entry.checks)
     assert {r.key for r in cite(entry)} >= {r.key for r in entry.references}
 
@@ -130,7 +130,7 @@ def test_a_limit_of_use_is_a_warning():
 
 
 def test_a_table_may_name_a_valve_of_the_catalogue_or_of_a_file_beside_it(tmp_path: Path):
-    place = Place("scenario.toml", "plant.circuit.fill", written(tmp_path, GOOD).parent)
+    place = Location("scenario.toml", "plant.circuit.fill", written(tmp_path, GOOD).parent)
     assert build({"library": "matrix-821"}, place) == MATRIX
     assert build({"library": "ckd-m4ga1-r", "path": "exhaust"}, place) == load_valve("ckd-m4ga1-r").exhaust
     assert build({"library": "valve.toml", "path": "exhaust"}, place).conductance == pytest.approx(3e-8)
@@ -166,15 +166,15 @@ def test_a_scenario_runs_with_valves_of_the_catalogue(tmp_path: Path):
 @pytest.mark.parametrize(
     ("table", "error", "message"),
     [
-        ({"library": "matrx-821"}, UnknownName, r"\[fill\]: no valve 'matrx-821'; .* Did you mean 'matrix-821'\?"),
-        ({"library": "dmsp-20-300"}, UnknownName, "no valve 'dmsp-20-300'"),
-        ({"library": "ckd"}, UnknownName, "'ckd' is the beginning of several"),
+        ({"library": "matrx-821"}, UnknownNameError, r"\[fill\]: no valve 'matrx-821'; .* Did you mean 'matrix-821'\?"),
+        ({"library": "dmsp-20-300"}, UnknownNameError, "no valve 'dmsp-20-300'"),
+        ({"library": "ckd"}, UnknownNameError, "'ckd' is the beginning of several"),
         (
             {"library": "matrix-821", "path": "exhaust"},
-            UnknownName,
+            UnknownNameError,
             "matrix-821 has no path 'exhaust'; there are valve",
         ),
-        ({"library": "matrix-821", "path": "exaust"}, UnknownName, r"no path 'exaust'.* Did you mean 'exhaust'\?"),
+        ({"library": "matrix-821", "path": "exaust"}, UnknownNameError, r"no path 'exaust'.* Did you mean 'exhaust'\?"),
         ({"library": "matrix-821", "conductance": 1e-8}, ParameterError, "'conductance' is not known here"),
         ({"library": 821}, ParameterError, "library is 821; it must be text"),
         ({"library": "none.toml"}, FileError, r"none\.toml: there is no such file"),
@@ -182,7 +182,7 @@ def test_a_scenario_runs_with_valves_of_the_catalogue(tmp_path: Path):
 )
 def test_a_valve_that_is_not_there_is_refused(tmp_path: Path, table, error, message: str):
     with pytest.raises(error, match=message):
-        build(table, Place("scenario.toml", "fill", tmp_path))
+        build(table, Location("scenario.toml", "fill", tmp_path))
 
 
 @pytest.mark.parametrize(
@@ -211,10 +211,10 @@ def test_what_is_wrong_with_a_file_is_said_with_its_place(tmp_path: Path, old, n
 
 def test_a_file_without_a_valve_or_with_another_thing_is_refused(tmp_path: Path):
     with pytest.raises(ParameterError, match=r"the table \[valve\] is missing"):
-        load_valve(written(tmp_path, 'title = "t"\ntrust = "chosen"\n'))
+        load_valve(written(tmp_path, 'title = "t"\nprovenance = "chosen"\n'))
     supply = '[valve]\nmodel = "Supply"\npressure = "6 bar"\n'
     with pytest.raises(ParameterError, match="Supply is no orifice"):
-        load_valve(written(tmp_path, f'title = "t"\ntrust = "chosen"\n{supply}'))
+        load_valve(written(tmp_path, f'title = "t"\nprovenance = "chosen"\n{supply}'))
     head = "response = 3\n"
     with pytest.raises(ParameterError, match=r"\[response\]: 3 is no table"):
         load_valve(written(tmp_path, head + GOOD.partition("[response]")[0]))

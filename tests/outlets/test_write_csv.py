@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from airmuscle.core.errors import FileError
 from airmuscle.recording import Recording, read_csv
 from airmuscle.recording.columns import QUANTITIES
-from airmuscle.recording.write_csv import write_csv
+from airmuscle.recording.csv_writer import write_csv
 
 
 def run(rows: int = 50) -> Recording:

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle import cite, fit, load, measured, read, read_csv, save, write_csv
-from airmuscle.control.driver import PWM, Driven
-from airmuscle.control.inputs import Periodic, Schedule, Signal
-from airmuscle.control.trajectory import follow
-from airmuscle.core.errors import AirmuscleError, ColumnError, FileError, ParameterError, UnknownName
-from airmuscle.mechanism import HangingMass, Mounted
+from airmuscle import cite, fit, load, load_data, read, read_csv, save, write_csv
+from airmuscle.control.driver import PWM, WithDrivers
+from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
+from airmuscle.control.trajectory import spline_trajectory
+from airmuscle.core.errors import AirmuscleError, ColumnError, FileError, ParameterError, UnknownNameError
+from airmuscle.mechanism import HangingMass, WithOffsets
 from airmuscle.muscle import LinearDamper, Muscle
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve, in_parallel, in_series
@@ -41,7 +41,7 @@ def ramp(time):
 
 
 def sampled(function, **more):
-    return Signal.sampled({"fill": function}, **{"duration": 1.0, **more})
+    return SampledSignal.sampled({"fill": function}, **{"duration": 1.0, **more})
 
 
 CASES = {
@@ -49,22 +49,22 @@ CASES = {
     "no period": (lambda: Periodic(FILL, None), "Periodic.period is None; it must be one number"),
     "several periods": (lambda: Periodic(FILL, np.ones(2)), r"Periodic.period is array.*; it must be one number"),
     "periodic mapping": (lambda: Periodic({"fill": ((0, 1),)}, 1.0), "the command is {.*}; give a Schedule"),
-    "driven mapping": (lambda: Driven({"fill": 1}, {"fill": PWM(9.0)}), "the command is {.*}; give a Schedule"),
-    "no drivers": (lambda: Driven(FILL, None), "the drivers are None; name the inputs"),
+    "driven mapping": (lambda: WithDrivers({"fill": 1}, {"fill": PWM(9.0)}), "the command is {.*}; give a Schedule"),
+    "no drivers": (lambda: WithDrivers(FILL, None), "the drivers are None; name the inputs"),
     "sampled number": (lambda: sampled(0.5), "the signal of 'fill' is 0.5; give a function of time"),
     "sampled text": (lambda: sampled(lambda t: "a"), "the signal of 'fill' at 0 s is 'a'; it must be one number"),
     "sampled columns": (lambda: sampled(lambda t: np.ones(2)), "the signal of 'fill' at 0 s is array"),
     "sampled nan": (lambda: sampled(lambda t: math.nan if t > 0.4 else 0.0), "'fill' is nan at 0.40.* must be finite"),
     "sampled complex": (lambda: sampled(lambda t: 1j), "the signal of 'fill' at 0 s is 1j; it must be one number"),
-    "sampled alone": (lambda: Signal.sampled(ramp, duration=1.0), "a sampled signal is <function .*; name the inputs"),
+    "sampled alone": (lambda: SampledSignal.sampled(ramp, duration=1.0), "a sampled signal is <function .*; name the inputs"),
     "sampled duration": (lambda: sampled(ramp, duration="1 s"), "Signal.sampled: duration is '1 s'; it must be one"),
     "sampled start": (lambda: sampled(ramp, start="0 s"), "Signal.sampled: start is '0 s'; it must be one number"),
     "sampled error": (lambda: sampled(ramp, error="small"), "Signal.sampled: error is 'small'; it must be one number"),
-    "recorded mapping": (lambda: Signal.recorded({"time": [1]}, {"fill": "fill"}), "is no Recording; give what read"),
-    "recorded list": (lambda: Signal.recorded(RUN, ["fill"]), r"a recorded signal is \['fill'\]; name the inputs"),
+    "recorded mapping": (lambda: SampledSignal.recorded({"time": [1]}, {"fill": "fill"}), "is no Recording; give what read"),
+    "recorded list": (lambda: SampledSignal.recorded(RUN, ["fill"]), r"a recorded signal is \['fill'\]; name the inputs"),
     "complex value": (lambda: Schedule({"fill": ((0, 1j),)}), "write pairs of time"),
     "array time": (lambda: Schedule({"fill": ((np.ones(2), 1),)}), "write pairs of time"),
-    "array value": (lambda: Signal({"fill": ((0, np.ones(2)),)}), "write pairs of time"),
+    "array value": (lambda: SampledSignal({"fill": ((0, np.ones(2)),)}), "write pairs of time"),
     "input by number": (lambda: simulate(PLANT, Schedule({1: ((0, 1),)}), duration=0.1), "the plant has no input '1'"),
     "pressure as text": (lambda: PLANT.state_at(pressure="1 bar"), "pressure of a state is '1 bar'; it must be one"),
     "no pressure": (lambda: PLANT.state_at(pressure=None), "pressure of a state is None; it must be one number"),
@@ -75,7 +75,7 @@ CASES = {
     "speed nan": (lambda: PLANT.state_at(pressure=0.0, speed=math.nan), "the speed of a state is nan; it must be finite"),
     "name of a muscle": (lambda: replace(MUSCLE, name=5), "Muscle: its name is 5; it must be a word"),
     "empty name": (lambda: replace(MUSCLE, name=""), "Muscle: its name is ''; it must be a word"),
-    "box of a muscle": (lambda: replace(MUSCLE, box="all"), "Muscle: its box must be a Box, or None; it is 'all'"),
+    "validity range of a muscle": (lambda: replace(MUSCLE, validity_range="all"), "Muscle: its validity range must be a Box, or None; it is 'all'"),
     "geometry first": (lambda: Muscle(MUSCLE.geometry, MUSCLE.contractile), "Muscle: its contractile must be a Char"),
     "list of muscles": (lambda: Plant([MUSCLE], CIRCUIT, MASS), "its muscle must be a Muscle; .*stand in a tuple"),
     "library entry": (lambda: Plant(ENTRY, CIRCUIT, MASS), "its muscle must be a Muscle; .* give its .muscle"),
@@ -84,9 +84,9 @@ CASES = {
     "a class": (lambda: Plant(MUSCLE, CIRCUIT, HangingMass), "its mechanism must be a Mechanism; it is <class"),
     "supply as number": (
         lambda: Plant(MUSCLE, FillDischarge(6e5, EDGE, EDGE), MASS),
-        "FillDischarge: its supply must be of Source; it is 600000",
+        "FillDischarge: its supply must be of AirSource; it is 600000",
     ),
-    "one for several": (lambda: Mounted(MASS, 0.1), r"Mounted.offsets .* is 0.1; it must be several numbers, \(1.0"),
+    "one for several": (lambda: WithOffsets(MASS, 0.1), r"WithOffsets.offsets .* is 0.1; it must be several numbers, \(1.0"),
     "valve as number": (lambda: in_series(EDGE, 2.0), "number 2 is float; the rule holds for Valve"),
     "no valve": (in_parallel, "in_parallel needs one valve at least"),
     "muscle simulated": (lambda: simulate(MUSCLE, FILL, duration=0.1), "simulate: Muscle.* is no plant; give Plant"),
@@ -95,7 +95,7 @@ CASES = {
     "advanced from": (lambda: advance(PLANT, REST, {}, 0.1, start_time="0 s"), "advance: start_time is '0 s'; it must"),
     "method as class": (lambda: simulate(PLANT, FILL, duration=0.1, method=integrators.Rodas4), "the method is <class"),
     "times as text": (lambda: simulate(PLANT, FILL, duration=0.1, output=["a"]), r"output is \['a'\]; give a spacing"),
-    "motion as text": (lambda: follow("a", "b"), "follow: 'a' and 'b' are not times"),
+    "motion as text": (lambda: spline_trajectory("a", "b"), "follow: 'a' and 'b' are not times"),
     "sources of a name": (lambda: cite("dmsp-20-300"), r"cite: 'dmsp-20-300' is no model; .*cite\(load\("),
     "fit of a name": (lambda: fit("Sarosi2012", RUN), "fit: Sarosi2012 is no characteristic"),
     "fit to nothing": (lambda: fit(MUSCLE.contractile, None), "fit: None is no Recording, as read"),
@@ -119,9 +119,9 @@ def test_a_wrong_type_is_refused_in_words(wrong, message, tmp_path: Path, monkey
         (lambda: read(None), FileError, "read: None is no path; name a file, a folder"),
         (lambda: write_csv(RUN, None), FileError, "write_csv: None is no path"),
         (lambda: save(ENTRY, None), FileError, "save: None is no path"),
-        (lambda: measured(5), UnknownName, "no data set '5'; there are"),
+        (lambda: load_data(5), UnknownNameError, "no data set '5'; there are"),
         (lambda: RUN[3], ColumnError, "a bench: no column '3'; there are time, fill"),
-        (lambda: Signal.recorded(RUN, {"fill": 3}), ColumnError, "a bench: no column '3'"),
+        (lambda: SampledSignal.recorded(RUN, {"fill": 3}), ColumnError, "a bench: no column '3'"),
     ],
 )
 def test_what_is_no_path_or_name_is_refused_in_words(wrong, error, message):

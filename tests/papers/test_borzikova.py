@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from airmuscle.characteristic.borzikova import SAM_30X290
-from airmuscle.identify.surface.basis import LoadBox
+from airmuscle.identify.surface.basis import LoadRange
 from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_PRINTED
 from airmuscle.reproduce import borzikova
 from airmuscle.reproduce.borzikova_surfaces import (
@@ -134,7 +134,7 @@ def test_with_the_misprint_alone_mended_it_is_off_by_a_sixth_at_260_newton(laws)
 
 
 def test_between_the_loads_both_surfaces_dip_below_zero(laws):
-    pressure, force = LoadBox(0.0, 3.5e5, 130.0, 260.0).grid(351, 651)
+    pressure, force = LoadRange(0.0, 3.5e5, 130.0, 260.0).grid(351, 651)
     for name, depth, bar, newton in ((REPAIRED, -1.96, 0.43, 203), (EXPONENTIAL, -3.41, 0.61, 206)):
         contraction = laws[name].contraction(pressure, force)
         at = np.unravel_index(contraction.argmin(), contraction.shape)

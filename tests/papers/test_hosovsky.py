@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle.analysis.equilibrium import equilibrium
+from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.characteristic.contractile_surface import ContractileSurface
-from airmuscle.control.inputs import REST, Signal
-from airmuscle.identify.fit import fit
+from airmuscle.control.inputs import ZERO_INPUT, SampledSignal
+from airmuscle.identify.static_fit import fit
 from airmuscle.mechanism import HangingMass, Isometric
 from airmuscle.muscle import CubicSpring, LaggingWall, LinearDamper, LinearSpring, Muscle
 from airmuscle.plant.plant import Plant
@@ -124,7 +124,7 @@ def test_refitting_the_surface_from_simulated_runs_returns_what_went_in():
 def ramp(law: ContractileSurface, contraction: float) -> Recording:
     muscle = Muscle(law, plant(NUMBERS, latched()).muscles[0].geometry, LinearSpring(0.0), LinearDamper(300.0))
     system = Plant(muscle, plant(NUMBERS, latched()).circuits[0], Isometric(contraction), Isothermal())
-    opening = Signal({"fill": ((0.0, 0.0), (4.0, 0.2))})
+    opening = SampledSignal({"fill": ((0.0, 0.0), (4.0, 0.2))})
     return simulate(system, opening, duration=20.0, start=system.state_at(pressure=40e3), output=0.2)
 
 
@@ -133,14 +133,14 @@ def test_a_taut_closed_muscle_without_kinks_is_solved_at_the_order_of_the_method
     """No clamp, no valve, no slack: what the paper's own plant cannot show, since its kinks dominate the error."""
     ideal = Muscle.ideal(plant(NUMBERS, latched()).muscles[0].geometry)
     system = Plant(ideal, ClosedChamber(), HangingMass(20.0), Isothermal())
-    rest = equilibrium(system, pressure=300e3)
+    rest = find_equilibrium(system, pressure=300e3)
     start = rest | {"position": rest["position"] - 0.004}
 
     def end(method):
-        return simulate(system, REST, duration=0.4, start=start, method=method, output=0.4)["position"][-1]
+        return simulate(system, ZERO_INPUT, duration=0.4, start=start, method=method, output=0.4)["position"][-1]
 
     exact = end(DormandPrince8(5e-4))
-    assert simulate(system, REST, duration=0.4, start=start)["force"].min() > 1.0
+    assert simulate(system, ZERO_INPUT, duration=0.4, start=start)["force"].min() > 1.0
     errors = np.array([abs(end(method(coarse / 2**i)) - exact) for i in range(2)])
     assert order - 0.2 < np.log2(errors[0] / errors[1]) < order + 1.1  # the leading term is small: 8.9 at these steps
 
@@ -153,8 +153,8 @@ def effects():
 def test_every_suspected_cause_is_exchanged_and_changes_the_courses(effects):
     assert {e.exchanged.cause for e in effects} == {*causing.CAUSES, "one of each"}
     for effect in effects:
-        assert abs(effect.greatest("pressure", FILLING)) > 1e3
-        assert abs(effect.greatest("contraction", FILLING)) > 1e-4
+        assert abs(effect.largest("pressure", FILLING)) > 1e3
+        assert abs(effect.largest("contraction", FILLING)) > 1e-4
         before = effect.time < 5.0
         assert np.abs(effect.pressure[before]).max() < 1.0
 
@@ -213,7 +213,7 @@ def test_more_heat_transfer_turns_what_the_report_says(effects):
     chosen = [e for e in causing.exchanges(NUMBERS, suspected) if e.what in ("first law, hA = 2000 W/K", "none")]
     base = causing._run(causing.PRINTED, NUMBERS)
     heat, spring = (causing._effect(base, e, causing._run(e, NUMBERS)) for e in chosen)
-    assert abs(heat.greatest("pressure", FILLING)) < abs(spring.greatest("pressure", FILLING))
+    assert abs(heat.largest("pressure", FILLING)) < abs(spring.largest("pressure", FILLING))
 
 
 def test_every_chosen_number_stands_in_the_chapter_with_its_range():

@@ -18,14 +18,14 @@ def quietly_loaded(name: str) -> catalogue.Entry:
         return catalogue.load(name)
 
 
-@pytest.mark.parametrize("name", catalogue.names())
+@pytest.mark.parametrize("name", catalogue.list_library())
 def test_the_checks_of_an_entry_hold(name: str):
     verdicts = verify(quietly_loaded(name))
     assert verdicts, "the file has no [[check]]"
     assert [str(verdict) for verdict in verdicts if not verdict.holds] == []
 
 
-@pytest.mark.parametrize("name", catalogue.names())
+@pytest.mark.parametrize("name", catalogue.list_library())
 def test_an_entry_says_where_it_is_from(name: str):
     entry = quietly_loaded(name)
     assert entry.references or entry.characteristic.references or getattr(entry.characteristic, "inner", None)

@@ -8,18 +8,18 @@ from collections.abc import Callable
 import numpy as np
 
 from ..characteristic.base import Characteristic
-from ..characteristic.box import Box
+from ..characteristic.validity_range import ValidityRange
 from ..core.arrays import Array
-from ..core.errors import NoSolution
+from ..core.errors import SolveError
 from ..geometry.base import Geometry
 
 _POINTS = 41
-"""Points of the grid along each side of a box."""
+"""Points of the grid along each side of a validity range."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Defect:
-    """The largest difference of two sides that should be equal over a box, and where it stands."""
+class EnergyDefect:
+    """The largest difference of two sides that should be equal over a validity range, and where it stands."""
 
     worst: float
     unit: str
@@ -28,17 +28,17 @@ class Defect:
     relative: float
     """`worst` over the largest magnitude of the side that the muscle's volume gives."""
     slack: float
-    """The part of the box that was left out because the muscle does not pull there."""
+    """The part of the validity range that was left out because the muscle does not pull there."""
 
     def __str__(self) -> str:
         return (
             f"{self.worst:.4g} {self.unit} ({self.relative:.2%}) at {self.pressure / 1e3:.4g} kPa and "
-            f"{self.contraction:.2%} of contraction; slack on {self.slack:.0%} of the box"
+            f"{self.contraction:.2%} of contraction; slack on {self.slack:.0%} of the validity range"
         )
 
 
-def maxwell_defect(characteristic: Characteristic, geometry: Geometry, box: Box) -> Defect:
-    """The largest |dF/dp + dV/dL| [m2] over the box; zero where force and volume come from one potential.
+def maxwell_defect(characteristic: Characteristic, geometry: Geometry, validity_range: ValidityRange) -> EnergyDefect:
+    """The largest |dF/dp + dV/dL| [m2] over the validity range; zero where force and volume come from one potential.
 
     F(p, L) tension, V(L) volume, dV/dL = -(dV/deps)/L0. A muscle with a defect makes or loses energy on a closed
     path of pressure and length: the defect times the area of the path. Only where the muscle pulls: the volume of
@@ -49,11 +49,13 @@ def maxwell_defect(characteristic: Characteristic, geometry: Geometry, box: Box)
         by_pressure = characteristic.slopes(pressure, contraction).by_pressure
         return by_pressure, geometry.volume_growth(contraction) / geometry.resting_length
 
-    return _largest(characteristic, sides, box, "m2")
+    return _largest(characteristic, sides, validity_range, "m2")
 
 
-def virtual_work_defect(characteristic: Characteristic, geometry: Geometry, box: Box) -> Defect:
-    """The largest |F + p dV/dL| [N] over the box, where it pulls: what the wall, the ends or assumptions add.
+def virtual_work_defect(
+    characteristic: Characteristic, geometry: Geometry, validity_range: ValidityRange
+) -> EnergyDefect:
+    """The largest |F + p dV/dL| [N] over the validity range, where it pulls: what the wall, the ends or assumptions add.
 
     Zero for a muscle that is nothing but its volume. A law may keep energy and still differ, by the energy that its
     wall stores; `maxwell_defect` tells the two apart.
@@ -63,21 +65,25 @@ def virtual_work_defect(characteristic: Characteristic, geometry: Geometry, box:
         ideal = pressure * geometry.volume_growth(contraction) / geometry.resting_length
         return characteristic.force(pressure, contraction), ideal
 
-    return _largest(characteristic, sides, box, "N")
+    return _largest(characteristic, sides, validity_range, "N")
 
 
-def _largest(law: Characteristic, sides: Callable[[Array, Array], tuple[Array, Array]], box: Box, unit: str) -> Defect:
+def _largest(
+    law: Characteristic, sides: Callable[[Array, Array], tuple[Array, Array]], validity_range: ValidityRange, unit: str
+) -> EnergyDefect:
     p, c = (
         side.reshape(-1)
-        for side in np.meshgrid(np.linspace(*box.pressure, _POINTS), np.linspace(*box.contraction, _POINTS))
+        for side in np.meshgrid(
+            np.linspace(*validity_range.pressure, _POINTS), np.linspace(*validity_range.contraction, _POINTS)
+        )
     )
     taut = np.asarray(law.force(p, c)) > 0
     if not taut.any():
-        raise NoSolution(f"{type(law).__name__} pulls nowhere on the box, so that no defect can be told.")
+        raise SolveError(f"{type(law).__name__} pulls nowhere on the validity range, so that no defect can be told.")
     p, c = p[taut], c[taut]
     found, due = (np.broadcast_to(side, p.shape) for side in sides(p, c))
     difference = np.abs(found - due)
     at = int(np.argmax(difference))
     worst = float(difference[at])
     relative = worst / float(np.abs(due).max())
-    return Defect(worst, unit, float(p[at]), float(c[at]), relative, slack=float(1 - taut.mean()))
+    return EnergyDefect(worst, unit, float(p[at]), float(c[at]), relative, slack=float(1 - taut.mean()))

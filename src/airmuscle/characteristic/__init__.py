@@ -1,9 +1,7 @@
 """Static laws: what binds gauge pressure, contraction and tension. One paper, one file, one class."""
 
-from .as_force_law import as_force_law
 from .base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from .borzikova import BorzikovaDirect, BorzikovaExponential
-from .box import Box
 from .chou_hannaford1996 import ChouHannaford1996
 from .circle_virtual_work import CircleVirtualWork
 from .clamped import Clamped
@@ -13,19 +11,22 @@ from .exact_meridian import ExactMeridian
 from .hunt2017 import Hunt2017
 from .length_family import InverseLength, LogarithmicLength
 from .martens_boblan2017 import MartensBoblan2017
+from .polynomial_surrogate import PolynomialSurrogate, as_force_law
 from .reynolds2003 import Reynolds2003
-from .rubber import RubberLine
+from .rubber import AlongArc, AlongAxis, RubberLine
 from .saga2007 import Saga2007
 from .sarosi2012 import Sarosi2012
 from .serres2009 import Serres2009
 from .tabulated import Tabulated
 from .tondu_lopez2000 import TonduLopez2000
+from .validity_range import ValidityRange
 from .virtual_work import VirtualWork
 
 __all__ = [
+    "AlongArc",
+    "AlongAxis",
     "BorzikovaDirect",
     "BorzikovaExponential",
-    "Box",
     "Characteristic",
     "ChouHannaford1996",
     "CircleVirtualWork",
@@ -39,6 +40,7 @@ __all__ = [
     "InverseLength",
     "LogarithmicLength",
     "MartensBoblan2017",
+    "PolynomialSurrogate",
     "PressureLaw",
     "Reynolds2003",
     "RubberLine",
@@ -47,6 +49,7 @@ __all__ = [
     "Serres2009",
     "Tabulated",
     "TonduLopez2000",
+    "ValidityRange",
     "VirtualWork",
     "as_force_law",
 ]

@@ -36,17 +36,17 @@ class Characteristic(abc.ABC):
     """Whether the law is closed-form over `ops`; otherwise it enters a plant through `as_force_law`."""
 
     @property
-    def pressure_reach(self) -> tuple[float, float]:
+    def pressure_range(self) -> tuple[float, float]:
         """Gauge pressures [Pa] that an answer may have."""
         return (0.0, 1.0e6)
 
     @property
-    def force_reach(self) -> tuple[float, float]:
+    def force_range(self) -> tuple[float, float]:
         """Tensions [N] that an answer may have."""
         return (0.0, 1.0e4)
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
+    def contraction_range(self) -> tuple[float, float]:
         """Contractions [1] that an answer may have; a geometric law narrows it."""
         return (-0.05, 0.6)
 
@@ -71,21 +71,21 @@ class Characteristic(abc.ABC):
         return -self.slopes(pressure, contraction).by_contraction
 
     def _no_contraction(self, pressure: float, force: float) -> str:
-        start, end = self.contraction_reach
+        start, end = self.contraction_range
         return (
             f"{type(self).__name__}: no contraction between {start:.1%} and {end:.1%} balances {force:.6g} N at "
             f"{pressure / 1e3:.6g} kPa. "
         )
 
     def _no_pressure(self, contraction: float, force: float) -> str:
-        start, end = (p / 1e3 for p in self.pressure_reach)
+        start, end = (p / 1e3 for p in self.pressure_range)
         return (
             f"{type(self).__name__}: no gauge pressure between {start:.6g} and {end:.6g} kPa gives {force:.6g} N at "
             f"a contraction of {contraction:.2%}. "
         )
 
     def _no_force(self, pressure: float, contraction: float) -> str:
-        start, end = self.force_reach
+        start, end = self.force_range
         return (
             f"{type(self).__name__}: no force between {start:.6g} and {end:.6g} N holds a contraction of "
             f"{contraction:.2%} at {pressure / 1e3:.6g} kPa. "
@@ -106,7 +106,7 @@ class ForceLaw(Characteristic):
         def message(p: float, load: float, low: float, high: float) -> str:
             return self._no_contraction(p, load) + _pulls(load - high, load - low)
 
-        return first_crossing(unbalance, self.contraction_reach, (pressure, force), message)
+        return first_crossing(unbalance, self.contraction_range, (pressure, force), message)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         def excess(pressure: Value, c: Value, load: Value) -> Value:
@@ -115,21 +115,21 @@ class ForceLaw(Characteristic):
         def message(c: float, load: float, low: float, high: float) -> str:
             return self._no_pressure(c, load) + _pulls(low + load, high + load)
 
-        return first_crossing(excess, self.pressure_reach, (contraction, force), message)
+        return first_crossing(excess, self.pressure_range, (contraction, force), message)
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         return Slopes(
-            autodiff.slope(self, "force", pressure, contraction, wrt=0),
-            autodiff.slope(self, "force", pressure, contraction, wrt=1),
+            autodiff.derivative(self, "force", pressure, contraction, wrt=0),
+            autodiff.derivative(self, "force", pressure, contraction, wrt=1),
         )
 
     def _no_contraction_here(self, pressure: float, force: float) -> str:
         """For a law solved in closed form, whose tension falls steadily from one end of its reach to the other."""
-        ends = (float(self.force(pressure, end)) for end in self.contraction_reach)
+        ends = (float(self.force(pressure, end)) for end in self.contraction_range)
         return self._no_contraction(pressure, force) + _pulls(*sorted(ends))
 
     def _no_pressure_here(self, contraction: float, force: float) -> str:
-        ends = (float(self.force(end, contraction)) for end in self.pressure_reach)
+        ends = (float(self.force(end, contraction)) for end in self.pressure_range)
         return self._no_pressure(contraction, force) + _pulls(*sorted(ends))
 
 
@@ -148,7 +148,7 @@ class ContractionLaw(Characteristic):
             possible = f"Between these it contracts by {c - high:.2%} to {c - low:.2%} at this pressure."
             return self._no_force(p, c) + possible
 
-        return first_crossing(shortfall, self.force_reach, (pressure, contraction), message)
+        return first_crossing(shortfall, self.force_range, (pressure, contraction), message)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         def excess(pressure: Value, c: Value, load: Value) -> Value:
@@ -158,12 +158,12 @@ class ContractionLaw(Characteristic):
             possible = f"Between these it contracts by {low + c:.2%} to {high + c:.2%} under this load."
             return self._no_pressure(c, load) + possible
 
-        return first_crossing(excess, self.pressure_reach, (contraction, force), message)
+        return first_crossing(excess, self.pressure_range, (contraction, force), message)
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         force = self.force(pressure, contraction)
-        by_pressure = autodiff.slope(self, "contraction", pressure, force, wrt=0)
-        by_force = autodiff.slope(self, "contraction", pressure, force, wrt=1)
+        by_pressure = autodiff.derivative(self, "contraction", pressure, force, wrt=0)
+        by_force = autodiff.derivative(self, "contraction", pressure, force, wrt=1)
         return Slopes(-by_pressure / by_force, 1.0 / by_force)
 
 
@@ -178,7 +178,7 @@ class PressureLaw(Characteristic):
             possible = f"Between these it needs {(low + p) / 1e3:.6g} to {(high + p) / 1e3:.6g} kPa there."
             return self._no_force(p, c) + possible
 
-        return first_crossing(excess, self.force_reach, (pressure, contraction), message)
+        return first_crossing(excess, self.force_range, (pressure, contraction), message)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         def excess(contraction: Value, p: Value, load: Value) -> Value:
@@ -188,10 +188,10 @@ class PressureLaw(Characteristic):
             possible = f"Between these it needs {(low + p) / 1e3:.6g} to {(high + p) / 1e3:.6g} kPa under this load."
             return self._no_contraction(p, load) + possible
 
-        return first_crossing(excess, self.contraction_reach, (pressure, force), message)
+        return first_crossing(excess, self.contraction_range, (pressure, force), message)
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         force = self.force(pressure, contraction)
-        by_contraction = autodiff.slope(self, "pressure", contraction, force, wrt=0)
-        by_force = autodiff.slope(self, "pressure", contraction, force, wrt=1)
+        by_contraction = autodiff.derivative(self, "pressure", contraction, force, wrt=0)
+        by_force = autodiff.derivative(self, "pressure", contraction, force, wrt=1)
         return Slopes(1.0 / by_force, -by_contraction / by_force)

@@ -12,8 +12,8 @@ from typing import ClassVar
 import numpy as np
 
 from ..core import ops
-from ..core.errors import OutOfReach, ParameterError
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
+from ..core.errors import GeometryLimitError, ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.units import bar, percent
@@ -64,7 +64,7 @@ class PlaneCurves:
     references: ClassVar[tuple[Reference, ...]] = (BORZIKOVA,)
 
     curves: tuple[PlaneCurve, ...]
-    greatest_pressure: float = parameter("Pa", "p_high", "upper end of the measured gauge pressures", fitted=False)
+    max_pressure: float = parameter("Pa", "p_high", "upper end of the measured gauge pressures", fitted=False)
 
     def at(self, force: float) -> PlaneCurve:
         """The curve of one load [N]. Raises OutOfReach where the paper has no curve for it."""
@@ -72,11 +72,11 @@ class PlaneCurves:
             if curve.force == force:
                 return curve
         loads = ", ".join(f"{c.force:g}" for c in self.curves)
-        raise OutOfReach(f"No plane curve under {force:g} N; there are {loads} N. Between them ask a surface.")
+        raise GeometryLimitError(f"No plane curve under {force:g} N; there are {loads} N. Between them ask a surface.")
 
     def sample(self, points: int = 15) -> Recording:
         """A recording of `points` even pressures [Pa] from zero on every curve, curve after curve."""
-        pressures = np.linspace(0.0, self.greatest_pressure, points)
+        pressures = np.linspace(0.0, self.max_pressure, points)
         return Recording(
             {
                 "pressure": np.tile(pressures, len(self.curves)),
@@ -96,9 +96,9 @@ class PlaneCurves:
         # in F / F_max, or the powers of the load would cost digits
         scaled = np.linalg.solve(np.vander(loads / loads.max(), force_degree + 1, increasing=True), rows).T
         matrix = scaled / loads.max() ** np.arange(force_degree + 1)
-        box = (0.0, self.greatest_pressure, float(loads.min()), float(loads.max()))
+        validity_range = (0.0, self.max_pressure, float(loads.min()), float(loads.max()))
         saturation = self.curves[0].saturation
-        return BorzikovaExponential(tuple(matrix.ravel()), *box, degree, force_degree, saturation=saturation)
+        return BorzikovaExponential(tuple(matrix.ravel()), *validity_range, degree, force_degree, saturation=saturation)
 
 
 SAM_30X290 = PlaneCurves(
@@ -118,17 +118,17 @@ are those with which the printed matrix agrees. The range of 3.5 bar is inferred
 
 @model
 class _Surface(ContractionLaw):
-    """What the two surfaces share: Sum_ij a_ij p^i F^j in bar and newton, and the box it was fitted on."""
+    """What the two surfaces share: Sum_ij a_ij p^i F^j in bar and newton, and the validity range it was fitted on."""
 
     references: ClassVar[tuple[Reference, ...]] = (BORZIKOVA,)
 
     coefficients: tuple[float, ...] = parameter(
         "1/(bar^i N^j)", "a_ij", "coefficients by power of p in bar, then of F in N; in per cent if direct"
     )
-    least_pressure: float = parameter("Pa", "p_low", "lower end of the box in gauge pressure", fitted=False)
-    greatest_pressure: float = parameter("Pa", "p_high", "upper end of the box in gauge pressure", fitted=False)
-    least_force: float = parameter("N", "F_low", "lower end of the box in force", fitted=False)
-    greatest_force: float = parameter("N", "F_high", "upper end of the box in force", fitted=False)
+    min_pressure: float = parameter("Pa", "p_low", "lower end of the validity range in gauge pressure", fitted=False)
+    max_pressure: float = parameter("Pa", "p_high", "upper end of the validity range in gauge pressure", fitted=False)
+    min_force: float = parameter("N", "F_low", "lower end of the validity range in force", fitted=False)
+    max_force: float = parameter("N", "F_high", "upper end of the validity range in force", fitted=False)
     pressure_degree: int = 4
     force_degree: int = 2
 
@@ -141,34 +141,34 @@ class _Surface(ContractionLaw):
                 f"{wanted} coefficients; {len(self.coefficients)} given."
             )
         for what, low, high in (
-            ("pressure", self.least_pressure, self.greatest_pressure),
-            ("force", self.least_force, self.greatest_force),
+            ("pressure", self.min_pressure, self.max_pressure),
+            ("force", self.min_force, self.max_force),
         ):
             if not low < high:
-                raise ParameterError(f"{name}: least_{what} {low:g} must lie below greatest_{what} {high:g}.")
+                raise ParameterError(f"{name}: min_{what} {low:g} must lie below max_{what} {high:g}.")
 
     @property
-    def pressure_reach(self) -> tuple[float, float]:
-        """The box in gauge pressure [Pa]: a search finds nothing outside it."""
-        return (self.least_pressure, self.greatest_pressure)
+    def pressure_range(self) -> tuple[float, float]:
+        """The validity range in gauge pressure [Pa]: a search finds nothing outside it."""
+        return (self.min_pressure, self.max_pressure)
 
     @property
-    def force_reach(self) -> tuple[float, float]:
-        """The box in force [N]: a search finds nothing outside it."""
-        return (self.least_force, self.greatest_force)
+    def force_range(self) -> tuple[float, float]:
+        """The validity range in force [N]: a search finds nothing outside it."""
+        return (self.min_force, self.max_force)
 
     @abc.abstractmethod
     def contraction(self, pressure: Value, force: Value) -> Value: ...
 
-    def inside_box(self, pressure: Value, force: Value) -> Value:
+    def inside_validity_range(self, pressure: Value, force: Value) -> Value:
         """Whether gauge pressure [Pa] and force [N] lie where the muscle was measured."""
-        in_pressure = ops.both(pressure >= self.least_pressure, pressure <= self.greatest_pressure)
-        return ops.both(in_pressure, ops.both(force >= self.least_force, force <= self.greatest_force))
+        in_pressure = ops.both(pressure >= self.min_pressure, pressure <= self.max_pressure)
+        return ops.both(in_pressure, ops.both(force >= self.min_force, force <= self.max_force))
 
     def polynomial(self, pressure: Value, force: Value) -> Value:
-        """Sum_ij a_ij p^i F^j at gauge pressure [Pa] and force [N]; outside the box by its tangent."""
-        inner_p = ops.clip(pressure, self.least_pressure, self.greatest_pressure)
-        inner_f = ops.clip(force, self.least_force, self.greatest_force)
+        """Sum_ij a_ij p^i F^j at gauge pressure [Pa] and force [N]; outside the validity range by its tangent."""
+        inner_p = ops.clip(pressure, self.min_pressure, self.max_pressure)
+        inner_f = ops.clip(force, self.min_force, self.max_force)
         value, by_p, by_f = self._with_slopes(inner_p / bar, inner_f)
         return value + by_p * (pressure - inner_p) / bar + by_f * (force - inner_f)
 
@@ -191,8 +191,8 @@ class BorzikovaDirect(_Surface):
     """Contraction as a polynomial: k = Sum_{i=0..m} Sum_{j=0..n} a_ij p^i F^j.
 
     k contraction in per cent, p gauge pressure in bar, F load in N; m = 4 and n = 2 give the 15 coefficients
-    that the paper prints in a matrix. Outside its box, where nothing was measured, the surface goes on by its
-    tangent and `inside_box` says so.
+    that the paper prints in a matrix. Outside its validity range, where nothing was measured, the surface goes on by its
+    tangent and `inside_validity_range` says so.
     Reference: Borzikova et al., the printed matrix: it is this polynomial, not the exponent of equation (1).
     """
 
@@ -206,7 +206,7 @@ class BorzikovaExponential(_Surface):
 
     p gauge pressure in bar, F load in N, k_max the contraction that the muscle saturates towards [1], 0.40
     for the SAM 30 x 290. The coefficients depend on material and geometry: each muscle must be measured.
-    Outside its box v goes on by its tangent.
+    Outside its validity range v goes on by its tangent.
     Reference: Borzikova et al., equation (1).
     """
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from ..core import ops
-from ..core.model import model
+from ..core.declaration import model
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..geometry.braid import CHOU_HANNAFORD_1996, Braid
@@ -39,9 +39,9 @@ class ChouHannaford1996(ForceLaw):
         return self.thread * ops.sin(self.geometry.braid_angle) / (2 * ops.pi * self.geometry.radius)
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
+    def contraction_range(self) -> tuple[float, float]:
         """From straight threads to the greatest volume."""
-        start, _ = self.geometry.contraction_reach
+        start, _ = self.geometry.contraction_range
         return (start, float(1.0 - self.thread / (ops.sqrt(3.0) * self.geometry.resting_length)))
 
     def force(self, pressure: Value, contraction: Value) -> Value:
@@ -49,12 +49,12 @@ class ChouHannaford1996(ForceLaw):
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         found = force / self._area(contraction)
-        return within_reach(found, self.pressure_reach, (contraction, force), self._no_pressure_here)
+        return within_reach(found, self.pressure_range, (contraction, force), self._no_pressure_here)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         ratio = force / ops.where(pressure == 0.0, NO_PRESSURE, pressure) * 4 * ops.pi * self.turns**2 / self.thread**2
         found = 1.0 - self.thread * ops.sqrt((ratio + 1) / 3) / self.geometry.resting_length
-        return within_reach(found, self.contraction_reach, (pressure, force), self._no_contraction_here)
+        return within_reach(found, self.contraction_range, (pressure, force), self._no_contraction_here)
 
     def _area(self, contraction: Value) -> Value:
         """F/p [m2]."""

@@ -6,13 +6,13 @@ import functools
 from typing import ClassVar, NamedTuple
 
 from ..core import ops
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from ..core.model import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..geometry.circular_arc import FERRARESI_2001, CircularArc
 from ..geometry.meridian import SAGA_2007
-from ..geometry.straight_fibre import StraightFibre, refuse_beyond
+from ..geometry.straight_fibre import StraightFibre, check_limit
 from .base import ForceLaw
 from .rubber import RubberLine
 from .solve import first_crossing, within_reach
@@ -57,7 +57,7 @@ class CircleVirtualWork(ForceLaw):
             )
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
+    def contraction_range(self) -> tuple[float, float]:
         """From rest to the largest volume, where the pressure that holds a load becomes infinite."""
         return (0.0, _largest_volume(self.geometry) * (1.0 - 1e-9))
 
@@ -68,14 +68,14 @@ class CircleVirtualWork(ForceLaw):
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         """Tension [N], negative past the largest volume; without bound at rest, where straight fibres hold any."""
-        self._refuse(contraction, self.geometry.contraction_reach)
+        self._check(contraction, self.geometry.contraction_range)
         work = self._work(contraction)
         return (pressure * work.area - work.rubber) / ops.maximum(work.angle, _STRAIGHT)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        self._refuse(contraction, self.contraction_reach)
+        self._check(contraction, self.contraction_range)
         found = self._pressure(contraction, force)
-        return within_reach(found, self.pressure_reach, (contraction, force), self._no_pressure)
+        return within_reach(found, self.pressure_range, (contraction, force), self._no_pressure)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         def excess(contraction: Value, p: Value, load: Value) -> Value:
@@ -87,7 +87,7 @@ class CircleVirtualWork(ForceLaw):
 
         started = (self.starting_pressure, float("inf"))
         within_reach(pressure + 0.0 * force, started, (pressure, force), self._still_straight)
-        return first_crossing(excess, self.contraction_reach, (pressure, force), message)
+        return first_crossing(excess, self.contraction_range, (pressure, force), message)
 
     def _pressure(self, contraction: Value, force: Value) -> Value:
         work = self._work(contraction)
@@ -105,9 +105,9 @@ class CircleVirtualWork(ForceLaw):
             ops.sqrt(angle_squared),
         )
 
-    def _refuse(self, contraction: Value, reach: tuple[float, float]) -> None:
+    def _check(self, contraction: Value, reach: tuple[float, float]) -> None:
         if not ops.is_symbol(self.wall_thickness):
-            refuse_beyond(contraction, reach, "CircleVirtualWork")
+            check_limit(contraction, reach, "CircleVirtualWork")
 
     def _still_straight(self, pressure: float, force: float) -> str:
         return (
@@ -119,7 +119,7 @@ class CircleVirtualWork(ForceLaw):
 @functools.lru_cache(maxsize=256)
 def _largest_volume(tube: StraightFibre) -> float:
     """The contraction of largest volume, by bisection of its growth; the geometry's end if it still grows there."""
-    low, high = tube.contraction_reach
+    low, high = tube.contraction_range
     while (middle := (low + high) / 2) not in (low, high):
         arc = CircularArc()
         growth = arc.growth_times_angle(arc.angle_squared(middle), tube.fibre_length, tube.end_radius)

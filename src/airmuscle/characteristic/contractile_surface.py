@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import ClassVar
 
 from ..core import ops
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from ..core.model import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from .base import ForceLaw
-from .box import Box
+from .validity_range import ValidityRange
 
 HOSOVSKY_HILL = Reference(
     "hosovsky-hill",
@@ -29,12 +29,12 @@ def exponents(degree: int) -> tuple[tuple[int, int], ...]:
 
 @model
 class ContractileSurface(ForceLaw):
-    """F = clamp( Sum_{i+j<=n} a_ij x^i q^j ), with x and q the contraction and pressure scaled to -1..1 on the box.
+    """F = clamp( Sum_{i+j<=n} a_ij x^i q^j ), with x and q the contraction and pressure scaled to -1..1 on the validity range.
 
         x = (2 eps - eps_low - eps_high)/(eps_high - eps_low),   q likewise from p
 
     eps contraction [1], p gauge pressure [Pa], a_ij scaled coefficients [N], n = 5 gives the 21 of the paper.
-    Scaling is what keeps the fit well conditioned. Outside the box, where there was no data, the surface goes on
+    Scaling is what keeps the fit well conditioned. Outside the validity range, where there was no data, the surface goes on
     by its tangent, but there it neither rises with contraction nor falls with pressure, which no muscle does.
     Reference: Hosovsky et al., F_KE = f(k, P) under their equation (1).
     """
@@ -44,14 +44,12 @@ class ContractileSurface(ForceLaw):
     """The parameters in which the law is linear, so that a fit solves for them directly."""
 
     coefficients: tuple[float, ...] = parameter("N", "a_ij", "coefficients of the scaled powers, by pressure's power")
-    least_pressure: float = parameter("Pa", "p_low", "lower end of the box in gauge pressure", fitted=False)
-    greatest_pressure: float = parameter("Pa", "p_high", "upper end of the box in gauge pressure", fitted=False)
-    least_contraction: float = parameter("1", "eps_low", "lower end of the box in contraction", fitted=False)
-    greatest_contraction: float = parameter("1", "eps_high", "upper end of the box in contraction", fitted=False)
-    least_force: float = parameter(
-        "N", "F_min", "force that the clamp lets through at least", fitted=False, default=0.0
-    )
-    greatest_force: float = parameter(
+    min_pressure: float = parameter("Pa", "p_low", "lower end of the validity range in gauge pressure", fitted=False)
+    max_pressure: float = parameter("Pa", "p_high", "upper end of the validity range in gauge pressure", fitted=False)
+    min_contraction: float = parameter("1", "eps_low", "lower end of the validity range in contraction", fitted=False)
+    max_contraction: float = parameter("1", "eps_high", "upper end of the validity range in contraction", fitted=False)
+    min_force: float = parameter("N", "F_min", "force that the clamp lets through at least", fitted=False, default=0.0)
+    max_force: float = parameter(
         "N", "F_max", "force that the clamp lets through at most", fitted=False, default=1200.0
     )
     degree: int = 5
@@ -63,40 +61,40 @@ class ContractileSurface(ForceLaw):
                 f"ContractileSurface: degree {self.degree} needs {wanted} coefficients, not {len(self.coefficients)}."
             )
         for name, low, high in (
-            ("pressure", self.least_pressure, self.greatest_pressure),
-            ("contraction", self.least_contraction, self.greatest_contraction),
-            ("force", self.least_force, self.greatest_force),
+            ("pressure", self.min_pressure, self.max_pressure),
+            ("contraction", self.min_contraction, self.max_contraction),
+            ("force", self.min_force, self.max_force),
         ):
             if not low < high:
-                raise ParameterError(
-                    f"ContractileSurface: least_{name} {low:g} must lie below greatest_{name} {high:g}."
-                )
+                raise ParameterError(f"ContractileSurface: min_{name} {low:g} must lie below max_{name} {high:g}.")
 
     @classmethod
-    def blank(cls, degree: int = 5, *, least_force: float = 0.0, greatest_force: float = 1200.0) -> ContractileSurface:
-        """A surface without coefficients yet, for `fit`, which takes its box from the data."""
+    def blank(cls, degree: int = 5, *, min_force: float = 0.0, max_force: float = 1200.0) -> ContractileSurface:
+        """A surface without coefficients yet, for `fit`, which takes its validity range from the data."""
         size = len(exponents(degree))
-        return cls((0.0,) * size, 0.0, 1.0, 0.0, 1.0, least_force, greatest_force, degree)
+        return cls((0.0,) * size, 0.0, 1.0, 0.0, 1.0, min_force, max_force, degree)
 
-    def with_box(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> ContractileSurface:
-        """The surface with the same coefficients on another box; `fit` calls it before it solves."""
+    def with_validity_range(
+        self, pressure: tuple[float, float], contraction: tuple[float, float]
+    ) -> ContractileSurface:
+        """The surface with the same coefficients on another validity range; `fit` calls it before it solves."""
         return ContractileSurface(
-            self.coefficients, *pressure, *contraction, self.least_force, self.greatest_force, self.degree
+            self.coefficients, *pressure, *contraction, self.min_force, self.max_force, self.degree
         )
 
     @property
-    def box(self) -> Box:
+    def validity_range(self) -> ValidityRange:
         """Where the surface has data; outside it goes on by its tangent."""
-        return Box(self.least_pressure, self.greatest_pressure, self.least_contraction, self.greatest_contraction)
+        return ValidityRange(self.min_pressure, self.max_pressure, self.min_contraction, self.max_contraction)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        return ops.clip(self.polynomial(pressure, contraction), self.least_force, self.greatest_force)
+        return ops.clip(self.polynomial(pressure, contraction), self.min_force, self.max_force)
 
     def unclamped(self, pressure: Value, contraction: Value) -> Value:
         return self.polynomial(pressure, contraction)
 
     def basis(self, pressure: Value, contraction: Value) -> list[Value]:
-        """What each coefficient multiplies at points inside the box: the columns of the matrix that a fit solves."""
+        """What each coefficient multiplies at points inside the validity range: the columns of the matrix that a fit solves."""
         x, q = self._scaled(pressure, contraction)
         powers_x, powers_q = [x * 0.0 + 1.0], [q * 0.0 + 1.0]
         for _ in range(self.degree):
@@ -110,17 +108,17 @@ class ContractileSurface(ForceLaw):
         return tuple(f"{_power('x', i)} {_power('q', j)}".strip() or "1" for i, j in exponents(self.degree))
 
     def polynomial(self, pressure: Value, contraction: Value) -> Value:
-        """The force [N] before the clamp, continued by its tangent outside the box."""
+        """The force [N] before the clamp, continued by its tangent outside the validity range."""
         x, q = self._scaled(pressure, contraction)
         inner_q, inner_x = ops.clip(q, -1.0, 1.0), ops.clip(x, -1.0, 1.0)
         value, by_x, by_q = self._horner(inner_x, inner_q)
         return value + ops.minimum(by_x, 0.0) * (x - inner_x) + ops.maximum(by_q, 0.0) * (q - inner_q)
 
     def _scaled(self, pressure: Value, contraction: Value) -> tuple[Value, Value]:
-        """Contraction and pressure as x and q, from -1 to 1 on the box."""
-        half_p = (self.greatest_pressure - self.least_pressure) / 2
-        half_c = (self.greatest_contraction - self.least_contraction) / 2
-        return (contraction - self.least_contraction) / half_c - 1, (pressure - self.least_pressure) / half_p - 1
+        """Contraction and pressure as x and q, from -1 to 1 on the validity range."""
+        half_p = (self.max_pressure - self.min_pressure) / 2
+        half_c = (self.max_contraction - self.min_contraction) / 2
+        return (contraction - self.min_contraction) / half_c - 1, (pressure - self.min_pressure) / half_p - 1
 
     def _horner(self, x: Value, q: Value) -> tuple[Value, Value, Value]:
         """The polynomial and its slopes by x and q, by Horner's scheme in both variables."""
@@ -141,14 +139,14 @@ class ContractileSurface(ForceLaw):
         return value, by_x, by_q
 
     def plain_coefficients(self, pressure_unit: float = 1.0) -> dict[tuple[int, int], float]:
-        """Coefficients of eps^i p^j inside the box, p in multiples of `pressure_unit` [Pa] (1e5 for bar).
+        """Coefficients of eps^i p^j inside the validity range, p in multiples of `pressure_unit` [Pa] (1e5 for bar).
 
         Returns {(i, j): value in N per pressure_unit^j}. Plain powers are badly conditioned: for export, not for fits.
         """
-        scale_c = 2 / (self.greatest_contraction - self.least_contraction)
-        scale_p = 2 / (self.greatest_pressure - self.least_pressure)
-        powers_c = _powers(-1 - scale_c * self.least_contraction, scale_c, self.degree)
-        powers_p = _powers(-1 - scale_p * self.least_pressure, scale_p * pressure_unit, self.degree)
+        scale_c = 2 / (self.max_contraction - self.min_contraction)
+        scale_p = 2 / (self.max_pressure - self.min_pressure)
+        powers_c = _powers(-1 - scale_c * self.min_contraction, scale_c, self.degree)
+        powers_p = _powers(-1 - scale_p * self.min_pressure, scale_p * pressure_unit, self.degree)
         plain = dict.fromkeys(exponents(self.degree), 0.0)
         for (i, j), a in zip(exponents(self.degree), self.coefficients, strict=True):
             for m, by_c in enumerate(powers_c[i]):

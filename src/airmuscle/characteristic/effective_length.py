@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from ..core.model import model, parameter
 from ..core.ops import Value
 from .base import ForceLaw
 
 _ROOM = 2.0
-"""Widening of a surface's box: so much more than the whole muscle its middle may contract (chosen)."""
+"""Widening of a surface's validity range: so much more than the whole muscle its middle may contract (chosen)."""
 
 
 @model
@@ -39,8 +39,8 @@ class EffectiveLength(ForceLaw):
             )
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
-        low, high = self.inner.contraction_reach
+    def contraction_range(self) -> tuple[float, float]:
+        low, high = self.inner.contraction_range
         length, active = self.resting_length, self.resting_length - self.dead_length
         return ((low * active - self.end_shift) / length, (high * active - self.end_shift) / length)
 
@@ -54,14 +54,14 @@ class EffectiveLength(ForceLaw):
         """The law of a muscle of the same type with this length [m] between the fittings."""
         return dataclasses.replace(self, resting_length=resting_length)
 
-    def with_box(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> EffectiveLength:
-        """The law with its inner surface on a box that leaves room for the middle to contract more."""
+    def with_validity_range(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> EffectiveLength:
+        """The law with its inner surface on a validity range that leaves room for the middle to contract more."""
         inner: Any = self.inner
-        if not hasattr(inner, "with_box"):
+        if not hasattr(inner, "with_validity_range"):
             return self
         low, high = contraction
         room = (_ROOM - 1) * (high - low) / 2
-        return dataclasses.replace(self, inner=inner.with_box(pressure, (low - room, high + room)))
+        return dataclasses.replace(self, inner=inner.with_validity_range(pressure, (low - room, high + room)))
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         return self.inner.force(pressure, self._of_the_middle(contraction))

@@ -7,13 +7,13 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..geometry.circular_arc import CircularArc
 from ..geometry.meridian import SAGA_2007, Profile
 from ..geometry.pleated import DAERDEN_LEFEBER_2001, PleatedTube
-from ..geometry.straight_fibre import refuse_beyond
+from ..geometry.straight_fibre import check_limit
 from .base import PressureLaw, Slopes
 from .rubber import RubberLine
 from .solve import first_crossing, within_reach
@@ -83,7 +83,7 @@ class ExactMeridian(PressureLaw):
     wall_thickness: float = parameter("m", "t", "thickness of the wall at rest", bounds=(0.0, 0.1))
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
+    def contraction_range(self) -> tuple[float, float]:
         """From 0.01 %, where the fibres are all but straight, to the largest volume."""
         return (1e-4, self.geometry.free_contraction * (1.0 - 1e-6))
 
@@ -94,7 +94,7 @@ class ExactMeridian(PressureLaw):
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         found = self._shape(contraction, force).pressure
-        return within_reach(found, self.pressure_reach, (contraction, force), self._no_pressure)
+        return within_reach(found, self.pressure_range, (contraction, force), self._no_pressure)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         found = self.balance_under(pressure, contraction).force
@@ -124,10 +124,10 @@ class ExactMeridian(PressureLaw):
 
     def balance_at(self, contraction: Value, force: Value) -> Balance:
         """The shape that balances a tension [N] at a contraction [1]; its pressure is NaN where there is none."""
-        refuse_beyond(contraction, self.contraction_reach, "ExactMeridian")
+        check_limit(contraction, self.contraction_range, "ExactMeridian")
         c, load = np.broadcast_arrays(np.asarray(contraction, float), np.asarray(force, float))
         radius, area, rubber = self._circle(c)
-        start = np.maximum((load + rubber) / area, 1.05 * self._least_pressure(radius))
+        start = np.maximum((load + rubber) / area, 1.05 * self._min_pressure(radius))
         found = self._closed(c, Balance(radius, start, load, None, None), unknown=1)
         lost = np.isnan(found.pressure)
         return self._eased(found, c, load, start * area, lost) if lost.any() else _as_given(found)
@@ -145,7 +145,7 @@ class ExactMeridian(PressureLaw):
 
     def balance_under(self, pressure: Value, contraction: Value) -> Balance:
         """The shape that a pressure [Pa] holds at a contraction [1]; its force is NaN where there is none."""
-        refuse_beyond(contraction, self.contraction_reach, "ExactMeridian")
+        check_limit(contraction, self.contraction_range, "ExactMeridian")
         p, c = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(contraction, float))
         radius, area, rubber = self._circle(c)
         return _as_given(self._closed(c, Balance(radius, p, p * area - rubber, None, None), unknown=2))
@@ -160,7 +160,7 @@ class ExactMeridian(PressureLaw):
         radius = arc.segment(contraction, tube.fibre_length, tube.end_radius).largest_radius
         return radius, np.maximum(growth.volume / scale, 1e-6), self.wall_thickness * energy / scale
 
-    def _least_pressure(self, radius: Any) -> Any:
+    def _min_pressure(self, radius: Any) -> Any:
         """The pressure [Pa] below which the rubber overcomes it somewhere between r_0 and R (z = 0)."""
         r0, rest = self.geometry.end_radius, 2 * self.rubber.intercept
         at_end = (self.rubber.slope / r0 * (radius - r0) + rest) / (radius + r0)
@@ -233,7 +233,7 @@ class ExactMeridian(PressureLaw):
         push = radius + r - pull
         axial = force / (np.pi * pressure) + r * r
         fibre = axial + bulge * v * v * push
-        possible = np.all((push > 0) & (fibre + axial > 0), axis=0) & (pressure > self._least_pressure(radius))
+        possible = np.all((push > 0) & (fibre + axial > 0), axis=0) & (pressure > self._min_pressure(radius))
         with np.errstate(divide="ignore", invalid="ignore"):
             per_v = np.where(possible, 4 * np.sqrt(bulge) / np.sqrt(push * (fibre + axial)), np.nan)
         return _Curve(r, pull, push, axial, fibre, per_v)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 from ..core import ops
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from ..core.model import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from .base import PressureLaw
@@ -38,7 +38,7 @@ class Hunt2017(PressureLaw):
     references: ClassVar[tuple[Reference, ...]] = (HUNT_2017,)
     linear_in: ClassVar[tuple[str, ...]] = ("offset", "scale", "by_force")
 
-    greatest_contraction: float = parameter(
+    max_contraction: float = parameter(
         "1", "eps_max", "contraction of the specimen at 620 kPa without load", bounds=(0.01, 0.5), fitted=False
     )
     offset: float = parameter("Pa", "p_0", "pressure where the tangent is zero", default=254.3e3)
@@ -62,6 +62,6 @@ class Hunt2017(PressureLaw):
             )
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        span = ops.maximum(self.greatest_contraction - self.span_by_force * force, _LEAST_SPAN)
+        span = ops.maximum(self.max_contraction - self.span_by_force * force, _LEAST_SPAN)
         argument = ops.clip(self.steepness * (contraction / span - self.centre), -_STEEPEST, _STEEPEST)
         return self.offset + self.scale * ops.tan(argument) + self.by_force * force + self.half_gap * self.direction

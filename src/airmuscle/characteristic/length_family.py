@@ -7,7 +7,7 @@ import dataclasses
 from typing import Any, Self
 
 from ..core import ops
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from .base import ForceLaw
 
@@ -29,8 +29,8 @@ class LengthFamily(ForceLaw):
     )
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
-        return self.inner.contraction_reach
+    def contraction_range(self) -> tuple[float, float]:
+        return self.inner.contraction_range
 
     @property
     def linear_in(self) -> tuple[str, ...]:
@@ -43,10 +43,14 @@ class LengthFamily(ForceLaw):
         """The law of a muscle of the same type with this length [m] between the fittings."""
         return dataclasses.replace(self, resting_length=resting_length)
 
-    def with_box(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> Self:
-        """The law with its surfaces on another box."""
+    def with_validity_range(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> Self:
+        """The law with its surfaces on another validity range."""
         parts: dict[str, Any] = {"inner": self.inner, "change": self.change}
-        boxed = {n: p.with_box(pressure, contraction) for n, p in parts.items() if hasattr(p, "with_box")}
+        boxed = {
+            n: p.with_validity_range(pressure, contraction)
+            for n, p in parts.items()
+            if hasattr(p, "with_validity_range")
+        }
         return dataclasses.replace(self, **boxed)
 
     def force(self, pressure: Value, contraction: Value) -> Value:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from ..core import ops
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..geometry.braid import Braid
@@ -49,9 +49,9 @@ class MartensBoblan2017(ForceLaw):
     c3: float = parameter("Pa/m^3", "c_3", "modulus of the wall, by length cubed")
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
+    def contraction_range(self) -> tuple[float, float]:
         """From 5 % of stretch, or straight threads where they come sooner, to 40 %: E(L) was fitted within."""
-        straight, _ = self.geometry.contraction_reach
+        straight, _ = self.geometry.contraction_range
         return (max(-0.05, straight / 2), 0.4)
 
     def force(self, pressure: Value, contraction: Value) -> Value:

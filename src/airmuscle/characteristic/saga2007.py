@@ -6,14 +6,14 @@ import functools
 from typing import ClassVar, NamedTuple
 
 from ..core import autodiff, ops
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from ..core.model import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..geometry.fibre_sum import FibreSum, SumOverHalf
 from ..geometry.meridian import SAGA_2007
 from ..geometry.parabola import Parabola
-from ..geometry.straight_fibre import StraightFibre, refuse_beyond
+from ..geometry.straight_fibre import StraightFibre, check_limit
 from .base import PressureLaw
 from .rubber import AlongAxis, RubberIntegral, RubberLine
 from .solve import first_crossing, within_reach
@@ -78,9 +78,9 @@ class Saga2007(PressureLaw):
             )
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
+    def contraction_range(self) -> tuple[float, float]:
         """From rest to just before the pole, or to 50 %, where the parabola (3) is widest."""
-        return (0.0, min(self.geometry.contraction_reach[1], self.pole * (1.0 - 1e-9)))
+        return (0.0, min(self.geometry.contraction_range[1], self.pole * (1.0 - 1e-9)))
 
     @property
     def pole(self) -> float:
@@ -102,13 +102,13 @@ class Saga2007(PressureLaw):
         return float((self.wall_thickness * self.rubber.intercept / tube.end_radius * widening - stiffening) / share)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        self._refuse(contraction)
+        self._check(contraction)
         found = self.balancing_pressure(contraction, force)
-        return within_reach(found, self.pressure_reach, (contraction, force), self._no_pressure)
+        return within_reach(found, self.pressure_range, (contraction, force), self._no_pressure)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         """Tension [N]; without bound at zero contraction, where the straight fibres hold any."""
-        self._refuse(contraction)
+        self._check(contraction)
         shell, rubber, lever = self._terms(contraction)
         return (pressure * shell - rubber) / ops.maximum(lever, _STRAIGHT)
 
@@ -122,7 +122,7 @@ class Saga2007(PressureLaw):
 
         started = (self.starting_pressure, float("inf"))
         within_reach(pressure + 0.0 * force, started, (pressure, force), self._still_straight)
-        return first_crossing(excess, self.contraction_reach, (pressure, force), message)
+        return first_crossing(excess, self.contraction_range, (pressure, force), message)
 
     def balancing_pressure(self, contraction: Value, force: Value) -> Value:
         """The formula itself [Pa], at any contraction below 1, whatever comes out: beyond the pole it is negative."""
@@ -182,7 +182,7 @@ class Saga2007(PressureLaw):
         """Every contraction from 0 to 1 that balances a gauge pressure [Pa] and a load [N], smallest first.
 
         With the rubber along x they are roots of one quintic, so that no search can miss one. Past
-        `contraction_reach` they are the formula's, not a muscle's.
+        `contraction_range` they are the formula's, not a muscle's.
         """
         if not isinstance(self.rubber_integral, AlongAxis):
             raise ParameterError(
@@ -194,12 +194,12 @@ class Saga2007(PressureLaw):
 
     def _is_stable(self, contraction: float, force: float) -> bool:
         at = max(contraction, 1e-12)  # the slope is infinite at zero
-        return bool(autodiff.slope(self, "balancing_pressure", at, force) > 0)
+        return bool(autodiff.derivative(self, "balancing_pressure", at, force) > 0)
 
-    def _refuse(self, contraction: Value) -> None:
+    def _check(self, contraction: Value) -> None:
         if not ops.is_symbol(self.wall_thickness):
             why = f"; the pole of this reading is at {self.pole:.2%}" if self.pole < 0.5 else ""
-            refuse_beyond(contraction, self.contraction_reach, "Saga2007", why)
+            check_limit(contraction, self.contraction_range, "Saga2007", why)
 
     def _still_straight(self, pressure: float, force: float) -> str:
         text = (
@@ -242,7 +242,7 @@ def _polished(law: Saga2007, contraction: float, pressure: float, force: float) 
         if not 0.0 < contraction < 1.0:
             break
         miss = law.balancing_pressure(contraction, force) - pressure
-        better = contraction - miss / autodiff.slope(law, "balancing_pressure", contraction, force)
+        better = contraction - miss / autodiff.derivative(law, "balancing_pressure", contraction, force)
         if not 0.0 < better < 1.0 or abs(law.balancing_pressure(better, force) - pressure) >= abs(miss):
             break
         contraction = float(better)

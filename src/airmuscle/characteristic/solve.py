@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import NoSolution
+from ..core.errors import SolveError
 
 INTERVALS = 256
 """Places looked at within a reach; a law that rises and falls again within 1/256 of it is not resolved."""
@@ -41,7 +41,7 @@ def first_crossing(
         worst = int(np.argmax(unsolved))
         taken = values[~np.isnan(values[:, worst]), worst]
         ends = (float(taken.min()), float(taken.max())) if taken.size else (np.nan, np.nan)
-        raise NoSolution(message(float(a[worst]), float(b[worst]), *ends))
+        raise SolveError(message(float(a[worst]), float(b[worst]), *ends))
     found = np.full(a.size, reach[0])
     index = rises.argmax(axis=0)
     plateau = np.take_along_axis(values, index[None, :] + 1, axis=0)[0] == 0
@@ -65,7 +65,7 @@ def _by_sign(function: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Any, An
 def within_reach(
     found: Any, reach: tuple[float, float], given: tuple[Any, Any], message: Callable[[float, float], str]
 ) -> Any:
-    """`found`, the answer of a closed form, where it lies in `reach`; raises NoSolution(message(a, b)) elsewhere.
+    """`found`, the answer of a closed form, where it lies in `reach`; raises SolveError(message(a, b)) elsewhere.
 
     `given` are the two other quantities. Symbols and JAX arrays pass, for they have no value to look at.
     """
@@ -75,5 +75,5 @@ def within_reach(
     outside = ~((values >= reach[0]) & (values <= reach[1]))
     if outside.any():
         first, second = (np.broadcast_to(np.asarray(v, dtype=float), values.shape)[outside].flat[0] for v in given)
-        raise NoSolution(message(float(first), float(second)))
+        raise SolveError(message(float(first), float(second)))
     return found

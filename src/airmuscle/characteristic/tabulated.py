@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.arrays import Array
-from ..core.errors import NoSolution, ParameterError
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
+from ..core.errors import ParameterError, SolveError
 from ..core.ops import Value
 from .base import Characteristic, Slopes
 
@@ -51,7 +51,7 @@ class Tabulated(Characteristic):
             )
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
+    def contraction_range(self) -> tuple[float, float]:
         return (min(self.contractions), max(self.contractions))
 
     def force(self, pressure: Value, contraction: Value) -> Value:
@@ -70,7 +70,7 @@ class Tabulated(Characteristic):
         if not found.all():
             worst = int(np.argmin(found.reshape(-1)))
             column = forces.reshape(table.levels.size, -1)[:, worst]
-            raise NoSolution(self._no_pressure(c.flat[worst], load.flat[worst]) + _held(column))
+            raise SolveError(self._no_pressure(c.flat[worst], load.flat[worst]) + _held(column))
         j = between.argmax(axis=0)
         low, high = (np.take_along_axis(side, j[None], axis=0)[0] for side in (forces[:-1], forces[1:]))
         share = np.where(high > low, (load - low) / np.where(high > low, high - low, 1.0), 0.0)
@@ -84,7 +84,7 @@ class Tabulated(Characteristic):
         refused = ~((load <= ends[0]) & (load >= ends[1]))
         if refused.any():
             at = int(np.argmax(refused.reshape(-1)))
-            raise NoSolution(self._no_contraction(p.flat[at], load.flat[at]) + _held(ends.reshape(2, -1)[:, at]))
+            raise SolveError(self._no_contraction(p.flat[at], load.flat[at]) + _held(ends.reshape(2, -1)[:, at]))
         for _ in range(_HALVINGS):
             middle = (low + high) / 2
             above = table.at(p, middle)[0] > load
@@ -120,7 +120,7 @@ class _Isobars:
         outside = ~((c >= start) & (c <= end))
         if outside.any():
             worst = int(np.argmax(outside.reshape(-1)))
-            raise NoSolution(self._outside(p.flat[worst], c.flat[worst], start.flat[worst], end.flat[worst]))
+            raise SolveError(self._outside(p.flat[worst], c.flat[worst], start.flat[worst], end.flat[worst]))
         j, share = self._neighbours(p)
         low, high = (np.take_along_axis(self.forces(c), k[None], axis=0)[0] for k in (j, j + 1))
         by_c = np.array([slope(c) for slope in self.slopes])

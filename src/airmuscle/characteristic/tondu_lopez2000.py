@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from ..core import ops
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..geometry.braid import Braid
@@ -40,9 +40,9 @@ class TonduLopez2000(ForceLaw):
     )
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
+    def contraction_range(self) -> tuple[float, float]:
         """From straight threads in the middle to the end of the force."""
-        start, _ = self.geometry.contraction_reach
+        start, _ = self.geometry.contraction_range
         force_ends = 1.0 - ops.sqrt(self._b / self._a)
         return (float(start / self.end_correction), float(force_ends / self.end_correction))
 
@@ -51,12 +51,12 @@ class TonduLopez2000(ForceLaw):
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         found = force / self._area(contraction)
-        return within_reach(found, self.pressure_reach, (contraction, force), self._no_pressure_here)
+        return within_reach(found, self.pressure_range, (contraction, force), self._no_pressure_here)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         ratio = force / (ops.where(pressure == 0.0, NO_PRESSURE, pressure) * ops.pi * self.geometry.radius**2)
         found = (1.0 - ops.sqrt((ratio + self._b) / self._a)) / self.end_correction
-        return within_reach(found, self.contraction_reach, (pressure, force), self._no_contraction_here)
+        return within_reach(found, self.contraction_range, (pressure, force), self._no_contraction_here)
 
     def _area(self, contraction: Value) -> Value:
         """F/p [m2]."""

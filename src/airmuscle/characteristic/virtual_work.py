@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from ..core.declaration import model
 from ..core.errors import TraceError
-from ..core.model import model
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..geometry.base import Geometry
@@ -29,15 +29,15 @@ class VirtualWork(ForceLaw):
     geometry: Geometry
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
-        return self.geometry.contraction_reach
+    def contraction_range(self) -> tuple[float, float]:
+        return self.geometry.contraction_range
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         return pressure * self.area(contraction)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         found = force / self.area(contraction)
-        return within_reach(found, self.pressure_reach, (contraction, force), self._no_pressure)
+        return within_reach(found, self.pressure_range, (contraction, force), self._no_pressure)
 
     def area(self, contraction: Value) -> Value:
         """F/p [m2]: the piston that the muscle is worth at a contraction [1]."""

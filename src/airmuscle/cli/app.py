@@ -19,7 +19,7 @@ from .fit import fit
 from .fit_dynamic import fit_dynamic
 from .hysteresis import hysteresis
 from .inspect import inspect
-from .interruption import remembered
+from .interruption import deferred_sigint
 from .list import list_entries
 from .plan import plan
 from .remedies import in_options
@@ -42,7 +42,7 @@ class Commands(TyperGroup):
             warnings.simplefilter("always", AirmuscleWarning)
             warnings.showwarning = functools.partial(_show_warning, warnings.showwarning)
             try:
-                with remembered():
+                with deferred_sigint():
                     return super().invoke(ctx)
             except AirmuscleError as error:
                 typer.echo(f"error: {in_options(str(error))}", err=True)

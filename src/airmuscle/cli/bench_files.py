@@ -1,4 +1,4 @@
-"""Bench files as arguments of a command: where they are, and what they do not say of themselves."""
+"""BenchLimits files as arguments of a command: where they are, and what they do not say of themselves."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Surroundings = Annotated[
 def measured(files: list[Path], unit: list[str] | None, **options: Any) -> list[Recording]:
     """The runs in files, read together so that contradictions show, then the data sets of the library."""
     from ..core.errors import ParameterError
-    from ..library.catalogue import measured as data_set
+    from ..library.catalogue import load_data as data_set
     from ..recording import read
     from .progress import reading_progress
 
@@ -44,19 +44,19 @@ def measured(files: list[Path], unit: list[str] | None, **options: Any) -> list[
         )
     with reading_progress() as progress:
         runs = read(own, progress=progress, **options) if own else ()
-    _refuse_misstated(runs)
+    _check_stated(runs)
     return [*runs, *(data_set(str(name)) for name in names)]
 
 
-def _refuse_misstated(recordings: Sequence[Recording]) -> None:
+def _check_stated(recordings: Sequence[Recording]) -> None:
     """Refuse a run that is not what its file says, or a lone one in which nothing changes."""
-    from ..recording.segment import AT_REST, refuse_unswept, runs, sensors
+    from ..recording.segment import AT_REST, check_swept, estimate_sensors, find_runs
 
-    together = sensors(recordings) if recordings else {}
+    together = estimate_sensors(recordings) if recordings else {}
     for recording in recordings:
-        found = runs(recording, {name: s for name, s in together.items() if name in recording.columns})
+        found = find_runs(recording, {name: s for name, s in together.items() if name in recording.columns})
         if len(recordings) == 1 or all(run.kind is not AT_REST for run in found):
-            refuse_unswept(recording, found)
+            check_swept(recording, found)
 
 
 def pairs(option: str, texts: list[str] | None) -> dict[str, str]:

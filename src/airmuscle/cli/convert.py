@@ -8,114 +8,125 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .fit_start import start_of
+from .initial_law import start_of
 from .options import Json, Name
 from .terminal import print_json, print_table
 
 if TYPE_CHECKING:
-    from ..characteristic.box import Box
-    from ..identify.convert import Conversion
+    from ..characteristic.validity_range import ValidityRange
+    from ..identify.conversion import ModelConversion
     from ..library.entry import Entry
 
 BANDS = 6
-"""Parts of the box, by pressure, whose errors are printed."""
+"""Parts of the validity range, by pressure, whose errors are printed."""
 Model = Annotated[
     str, typer.Argument(metavar="MODEL", help="The other law: ContractileSurface, Sarosi2012, or an entry made of it.")
 ]
 Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Muscle file for the other law.")]
-Pressure = Annotated[str | None, typer.Option(metavar="QUANTITY", help="End of the box; else that of the muscle.")]
-Contraction = Annotated[str | None, typer.Option(metavar="QUANTITY", help="End of the box; else that of the muscle.")]
+Pressure = Annotated[
+    str | None, typer.Option(metavar="QUANTITY", help="End of the validity range; else that of the muscle.")
+]
+Contraction = Annotated[
+    str | None, typer.Option(metavar="QUANTITY", help="End of the validity range; else that of the muscle.")
+]
 
 
 def convert(
     name: Name,
     model: Model,
     out: Out = None,
-    least_pressure: Pressure = None,
-    greatest_pressure: Pressure = None,
-    least_contraction: Contraction = None,
-    greatest_contraction: Contraction = None,
+    min_pressure: Pressure = None,
+    max_pressure: Pressure = None,
+    min_contraction: Contraction = None,
+    max_contraction: Contraction = None,
     degree: Annotated[int, typer.Option(min=1, max=9, help="Total degree of a ContractileSurface.")] = 5,
     json: Json = False,
 ) -> None:
     """Bring another model as near to a muscle's law as it comes, and say how near that is.
 
     \b
-    Compared in force, where the first law pulls, over the box of the muscle or the one that you state.
+    Compared in force, where the first law pulls, over the validity range of the muscle or the one that you state.
     With --out, FILE is a muscle with the other law and all other parts as they were.
 
     \b
     Examples:
       airmuscle convert dmsp-20-300 ContractileSurface --degree 5 --out surface.toml
-      airmuscle convert fit/muscle.toml Sarosi2012 --greatest-pressure "5 bar"
+      airmuscle convert fit/muscle.toml Sarosi2012 --max-pressure "5 bar"
     """
     from ..identify import convert as converted
-    from ..identify.convert import POINTS, on_grid
+    from ..identify.conversion import POINTS, on_grid
     from ..library.catalogue import load, save
 
     entry = load(name)
-    box = _box(entry, (least_pressure, greatest_pressure, least_contraction, greatest_contraction))
-    grid = on_grid(entry.characteristic, box, POINTS)
+    validity_range = _validity_range(entry, (min_pressure, max_pressure, min_contraction, max_contraction))
+    grid = on_grid(entry.characteristic, validity_range, POINTS)
     rest = getattr(entry.geometry, "resting_length", None)
     start = start_of(model, [grid if rest is None else grid.with_constants(resting_length=rest)], degree, "MODEL")
-    found = converted(entry.characteristic, start.entry.characteristic, box)
+    found = converted(entry.characteristic, start.entry.characteristic, validity_range)
     if out is not None:
-        save(_changed(entry, found, box), out)
+        save(_changed(entry, found, validity_range), out)
     if json:
-        print_json(_as_data(found, box))
+        print_json(_as_data(found, validity_range))
         return
-    _print(entry, found, box)
+    _print(entry, found, validity_range)
     if out is not None:
         typer.echo(f"muscle: {out}")
 
 
-def _box(entry: Entry, given: tuple[str | None, str | None, str | None, str | None]) -> Box:
-    """The muscle's box, with the ends that were given put in."""
-    from ..characteristic.box import Box
+def _validity_range(entry: Entry, given: tuple[str | None, str | None, str | None, str | None]) -> ValidityRange:
+    """The muscle's validity range, with the ends that were given put in."""
+    from ..characteristic.validity_range import ValidityRange
     from ..core.errors import ParameterError
     from ..core.units import quantity
-    from ..report.chart import box_of
+    from ..report.chart import validity_range_of
 
-    names = ("least_pressure", "greatest_pressure", "least_contraction", "greatest_contraction")
-    own = box_of(entry.characteristic, entry.box)
+    names = ("min_pressure", "max_pressure", "min_contraction", "max_contraction")
+    own = validity_range_of(entry.characteristic, entry.validity_range)
     ends: dict[str, float] = {} if own is None else {name: getattr(own, name) for name in names}
     for name, text, unit in zip(names, given, ("Pa", "Pa", "1", "1"), strict=True):
         if text is not None:
             ends[name] = quantity(text, unit, where=f"--{name.replace('_', '-')}")
     lacking = [f"--{name.replace('_', '-')}" for name in names if name not in ends]
     if lacking:
-        raise ParameterError(f"{entry.name} states no box to convert it on; give {', '.join(lacking)}.")
-    return Box(**ends)
+        raise ParameterError(f"{entry.name} states no validity range to convert it on; give {', '.join(lacking)}.")
+    return ValidityRange(**ends)
 
 
-def _changed(entry: Entry, found: Conversion, box: Box) -> Entry:
+def _changed(entry: Entry, found: ModelConversion, validity_range: ValidityRange) -> Entry:
     """The muscle with the other law; its checks were of the first."""
     import dataclasses
 
     title = f"{type(found.model).__name__} in place of {type(entry.characteristic).__name__}: {entry.title}"
     note = f"Converted from {entry.name}: {found}. {entry.note}".strip()
     return dataclasses.replace(
-        entry, name="muscle", title=title, trust="fitted", note=note, characteristic=found.model, box=box, checks=()
+        entry,
+        name="muscle",
+        title=title,
+        provenance="fitted",
+        note=note,
+        characteristic=found.model,
+        validity_range=validity_range,
+        checks=(),
     )
 
 
-def _by_pressure(found: Conversion, box: Box) -> list[dict[str, float]]:
-    """Errors in parts of the box by pressure."""
+def _by_pressure(found: ModelConversion, validity_range: ValidityRange) -> list[dict[str, float]]:
+    """Errors in parts of the validity range by pressure."""
     import numpy as np
 
-    edges = np.linspace(*box.pressure, BANDS + 1)
+    edges = np.linspace(*validity_range.pressure, BANDS + 1)
     rows = []
     for low, high in itertools.pairwise(edges):
         here = (found.judged["pressure"] >= low) & (found.judged["pressure"] <= high)
         if here.any():
             error, force = found.judged["error"][here], found.judged["force"][here]
-            rows.append({"least_pressure": float(low), "greatest_pressure": float(high),
-                         "rms": float(np.sqrt(np.mean(error**2))), "greatest": float(np.abs(error).max()),
-                         "greatest_force": float(force.max())})  # fmt: skip
+            rows.append({"min_pressure": float(low), "max_pressure": float(high),
+                         "rms": float(np.sqrt(np.mean(error**2))), "max": float(np.abs(error).max()),
+                         "max_force": float(force.max())})  # fmt: skip
     return rows
 
 
-def _as_data(found: Conversion, box: Box) -> dict[str, Any]:
+def _as_data(found: ModelConversion, validity_range: ValidityRange) -> dict[str, Any]:
     import dataclasses
 
     from ..core.tree import leaves
@@ -123,23 +134,23 @@ def _as_data(found: Conversion, box: Box) -> dict[str, Any]:
     return {
         "model": type(found.model).__name__,
         "parameters": {leaf.path: leaf.value for leaf in leaves(found.model)},
-        "box": dataclasses.asdict(box),
+        "validity_range": dataclasses.asdict(validity_range),
         "rms": found.rms,
-        "greatest": found.greatest,
+        "max": found.max_error,
         "greatest_at": {"pressure": found.pressure, "contraction": found.contraction},
-        "by_pressure": _by_pressure(found, box),
+        "by_pressure": _by_pressure(found, validity_range),
     }
 
 
-def _print(entry: Entry, found: Conversion, box: Box) -> None:
-    (p0, p1), (c0, c1) = box.pressure, box.contraction
+def _print(entry: Entry, found: ModelConversion, validity_range: ValidityRange) -> None:
+    (p0, p1), (c0, c1) = validity_range.pressure, validity_range.contraction
     typer.echo(f"{entry.name}, {type(entry.characteristic).__name__}, over {p0 / 1e3:.4g} to {p1 / 1e3:.4g} kPa and "
                f"{c0:.2%} to {c1:.2%}")  # fmt: skip
     typer.echo(f"{found}\n")
     rows = [
-        (f"{row['least_pressure'] / 1e3:.4g} to {row['greatest_pressure'] / 1e3:.4g}",
-         *(f"{row[key]:.4g}" for key in ("rms", "greatest", "greatest_force")))
-        for row in _by_pressure(found, box)
+        (f"{row['min_pressure'] / 1e3:.4g} to {row['max_pressure'] / 1e3:.4g}",
+         *(f"{row[key]:.4g}" for key in ("rms", "max", "max_force")))
+        for row in _by_pressure(found, validity_range)
     ]  # fmt: skip
     heads = ("pressure [kPa]", "rms error [N]", "greatest error [N]", "greatest force [N]")
     print_table(heads, rows, right=heads[1:])

@@ -9,7 +9,7 @@ import typer
 
 from .bench_files import Files, Length, Surroundings, Units, measured
 from .fit_output import as_data, echo, fitted, write
-from .fit_start import start_of
+from .initial_law import start_of
 from .options import Folder, Json, Map
 from .terminal import print_json
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from ..characteristic.base import Characteristic
     from ..identify.result import Fit
     from ..recording import Recording
-    from .fit_more import Asked
-    from .fit_start import Start
+    from .fit_options import FitRequest
+    from .initial_law import InitialLaw
 
 Law = Annotated[
     str | None,
@@ -108,12 +108,12 @@ def fit(
       airmuscle fit runs/*.xlsx --mapping rig.toml --compare --leave-out run
       airmuscle solve fit/muscle.toml --pressure "3 bar" --force "100 N"
     """
-    from .fit_more import Asked, More
+    from .fit_options import FitOptions, FitRequest
 
     if characteristic is None and not compare:
         raise typer.BadParameter("name a law to fit with --characteristic, or let --compare find one")
-    more = More.of(bootstrap, profile, leave_out, shape, free, compare)
-    asked = Asked(more, tuple(fix or ()), degree, robust, uncensored, equal_weights, out, json)
+    more = FitOptions.of(bootstrap, profile, leave_out, shape, free, compare)
+    asked = FitRequest(more, tuple(fix or ()), degree, robust, uncensored, equal_weights, out, json)
     recordings = measured(files, unit, mapping=mapping, resting_length=resting_length, ambient=ambient)
     if characteristic is not None and not compare:
         _one(files, recordings, characteristic, asked)
@@ -123,12 +123,12 @@ def fit(
     compared(files, recordings, characteristic, asked)
 
 
-def _one(files: list[Path], recordings: list[Recording], characteristic: str, asked: Asked) -> None:
+def _one(files: list[Path], recordings: list[Recording], characteristic: str, asked: FitRequest) -> None:
     """Fit the law that was named."""
-    from ..report.staged import refuse_unwritable
+    from ..report.output_folder import check_writable
 
     start = start_of(characteristic, recordings, asked.degree)
-    refuse_unwritable(asked.out)
+    check_writable(asked.out)
     result = _identified(start, recordings, asked)
     found = asked.more.find(result, recordings)
     entry = fitted(result, start.entry, files)
@@ -139,7 +139,7 @@ def _one(files: list[Path], recordings: list[Recording], characteristic: str, as
     echo([str(result), *found.lines()], asked.out)
 
 
-def _identified(start: Start, recordings: list[Recording], asked: Asked) -> Fit:
+def _identified(start: InitialLaw, recordings: list[Recording], asked: FitRequest) -> Fit:
     from ..identify import UNCENSORED
     from ..identify import fit as identify
 

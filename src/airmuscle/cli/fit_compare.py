@@ -13,23 +13,23 @@ from .terminal import print_json
 
 if TYPE_CHECKING:
     from ..identify.candidates import Candidate
-    from ..identify.compare import Comparison
+    from ..identify.model_selection import Comparison
     from ..recording import Recording
-    from .fit_more import Asked
+    from .fit_options import FitRequest
 
 
-def compared(files: list[Path], recordings: list[Recording], characteristic: str | None, asked: Asked) -> None:
+def compared(files: list[Path], recordings: list[Recording], characteristic: str | None, asked: FitRequest) -> None:
     """Compare, print the ranking, and write the recommended muscle with its report."""
-    from ..identify.compare import compare
+    from ..identify.model_selection import compare
     from ..report.compare_chapter import compare_chapter
-    from ..report.staged import refuse_unwritable
+    from ..report.output_folder import check_writable
     from .fit_output import echo, fitted, write
 
     if asked.uncensored or asked.robust is not None or asked.equal_weights:
         raise typer.BadParameter(
             "--compare judges by squared errors of the rows that pull: no --robust, --uncensored, --equal-weights"
         )
-    refuse_unwritable(asked.out)
+    check_writable(asked.out)
     candidates = _candidates(recordings, characteristic, asked)
     said = None if asked.json else lambda name: typer.echo(f"  {name}", err=True)
     found = _worded(compare(recordings, candidates, leave_out=asked.more.by, progress=said))
@@ -49,10 +49,10 @@ def _worded(found: Comparison) -> Comparison:
     return dataclasses.replace(found, excluded=excluded)
 
 
-def _candidates(recordings: list[Recording], characteristic: str | None, asked: Asked) -> list[Candidate]:
+def _candidates(recordings: list[Recording], characteristic: str | None, asked: FitRequest) -> list[Candidate]:
     """All that start from data alone, and the one named beside them."""
     from ..identify.candidates import Candidate, standard_candidates
-    from .fit_start import start_of
+    from .initial_law import start_of
 
     found = list(standard_candidates(recordings))
     if characteristic is not None:

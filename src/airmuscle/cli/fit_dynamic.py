@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..identify.dynamic import DynamicFit
-    from ..identify.dynamic.profile import Profile
+    from ..identify.dynamic.profile import DynamicProfile
     from ..scenario.identification import DynamicStudy
 
 WEAK = "weak"
@@ -58,13 +58,13 @@ def fit_dynamic(
     """
     import dataclasses
 
-    from ..report.staged import refuse_unwritable
+    from ..report.output_folder import check_writable
     from ..scenario.identification import load_study
 
     loaded = load_study(study)
     if starts is not None:
         loaded = dataclasses.replace(loaded, starts=starts)
-    refuse_unwritable(out)
+    check_writable(out)
     remarks = _remarks(loaded)
     if not json:
         typer.echo(f"  {len(loaded.experiments)} records, {loaded.starts} starts", err=True)
@@ -103,14 +103,14 @@ def _profiled(found: DynamicFit, names: Sequence[str]) -> list[str]:
 
 
 def _write(
-    study: DynamicStudy, found: DynamicFit, profiles: Sequence[Profile], remarks: Sequence[str], out: Path
+    study: DynamicStudy, found: DynamicFit, profiles: Sequence[DynamicProfile], remarks: Sequence[str], out: Path
 ) -> list[Path]:
     from ..report.dynamic_chapter import dynamic_chapters
-    from ..report.staged import staged
+    from ..report.output_folder import atomic_folder
     from ..report.write import fill
 
     names = []
-    with staged(out) as place:
+    with atomic_folder(out) as place:
         for i in range(len(study.experiments)):
             suffix = f"-{i + 1}" if len(study.experiments) > 1 else ""
             names.append(f"scenario{suffix}.toml")
@@ -119,7 +119,7 @@ def _write(
     return [out / name for name in names]
 
 
-def _as_data(found: DynamicFit, profiles: Sequence[Profile], remarks: Sequence[str]) -> dict[str, Any]:
+def _as_data(found: DynamicFit, profiles: Sequence[DynamicProfile], remarks: Sequence[str]) -> dict[str, Any]:
     """A dynamic fit as plain data, all numbers SI."""
     import dataclasses
 
@@ -129,7 +129,7 @@ def _as_data(found: DynamicFit, profiles: Sequence[Profile], remarks: Sequence[s
             {"origin": course.experiment.recording.origin, "rms": {n: found.rms(n, i) for n in course.names}}
             for i, course in enumerate(found.problem.courses)
         ],
-        "scatter": found.scatter,
+        "scatter": found.residual_std,
         "rank": found.identifiability.rank,
         "starts_at_optimum": found.reached,
         "not_determined": [

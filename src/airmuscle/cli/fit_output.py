@@ -36,8 +36,8 @@ def fitted(result: Fit, start: Entry, files: list[Path]) -> Entry:
     note = f"Fitted to {names}: rms error {summary['rms error']}, greatest {summary['greatest error']}."
     title = f"{type(result.model).__name__} fitted to {', '.join(f.stem for f in files)}"
     return dataclasses.replace(
-        start, name="muscle", title=title, trust="fitted", note=note, warning="", characteristic=result.model,
-        box=result.box, checks=(),
+        start, name="muscle", title=title, provenance="fitted", note=note, warning="", characteristic=result.model,
+        validity_range=result.validity_range, checks=(),
     )  # fmt: skip
 
 
@@ -51,7 +51,7 @@ def as_data(result: Fit) -> dict[str, Any]:
         "unit": result.direction.unit,
         "parameters": [dataclasses.asdict(estimate) for estimate in result.estimates],
         "rmse": result.rmse,
-        "greatest_error": dataclasses.asdict(result.greatest_error),
+        "max_error": dataclasses.asdict(result.max_error),
         "sigma": result.sigma,
         "r2": result.r2,
         "correlation_index": result.correlation_index,
@@ -71,10 +71,10 @@ def write(result: Fit, entry: Entry, recordings: list[Recording], out: Path, cha
 
     from ..library.catalogue import save
     from ..report.fit_chapter import fit_chapter
-    from ..report.staged import staged
+    from ..report.output_folder import atomic_folder
     from ..report.write import fill
 
-    with staged(out) as place:
+    with atomic_folder(out) as place:
         save(entry, place / "muscle.toml")
         notes = tuple(dict.fromkeys(note for run in recordings for note in run.notes))
         worded = dataclasses.replace(result, notes=tuple(in_options(note) for note in result.notes))

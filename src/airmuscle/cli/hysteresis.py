@@ -59,7 +59,7 @@ def hysteresis(
     """
     from ..identify.hysteresis import find_loops, fit_loop
     from ..library.catalogue import load
-    from ..report.staged import refuse_unwritable
+    from ..report.output_folder import check_writable
 
     if given and muscle is None:
         raise typer.BadParameter("--given takes the law of the muscle that --muscle names")
@@ -67,7 +67,7 @@ def hysteresis(
     entry = None if muscle is None else load(muscle)
     law = entry.characteristic if entry is not None and given else None
     loops = find_loops(recordings, characteristic=law, degree=degree, all_rows=all_rows)
-    refuse_unwritable(out)
+    check_writable(out)
     said = None if json else lambda name: typer.echo(f"  {name}", err=True)
     found = [fit_loop(loop, elements=elements, progress=said) for loop in loops]
     crept = _creep(recordings) if creep else []
@@ -91,11 +91,11 @@ def _chosen(found: Sequence[LoopFit]) -> HysteresisFit | None:
 
 def _creep(recordings: Sequence[Recording]) -> list[str]:
     """What is to be said of creep in each recording's longest hold."""
-    from ..identify.hysteresis import fit_creep, holds
+    from ..identify.hysteresis import find_holds, fit_creep
 
     said = []
     for recording in recordings:
-        found = max(holds(recording), key=lambda hold: len(hold.stretch), default=None)
+        found = max(find_holds(recording), key=lambda hold: len(hold.stretch), default=None)
         if found is None:
             said.append(f"{recording.origin}: pressure and load, or pressure and length, are never held for 12 rows.")
             continue
@@ -111,11 +111,11 @@ def _write(
     from ..library.catalogue import save
     from ..library.write import part_lines
     from ..report.hysteresis_chapter import hysteresis_chapters
-    from ..report.staged import staged
+    from ..report.output_folder import atomic_folder
     from ..report.write import fill
 
     name = None if chosen is None else "friction.toml" if entry is None else "muscle.toml"
-    with staged(out) as place:
+    with atomic_folder(out) as place:
         fill(place, hysteresis_chapters(found, creep), title="Friction")
         if chosen is not None and entry is not None:
             save(_with_friction(entry, chosen), place / "muscle.toml")

@@ -90,9 +90,9 @@ def _draw(seen: tuple[Inspection, ...], out: Path) -> None:
     import re
 
     from ..core.plotting import save
-    from ..report.staged import staged
+    from ..report.output_folder import atomic_folder
 
-    with staged(out) as place:
+    with atomic_folder(out) as place:
         for i, each in enumerate(seen, 1):
             stem = re.sub(r"[^\w.-]+", "-", each.recording.origin).strip("-")
             name = f"{stem}.png" if len(seen) == 1 else f"{i:0{len(str(len(seen)))}}-{stem}.png"
@@ -152,8 +152,8 @@ def _column(recording: Recording, name: str) -> dict[str, Any]:
         "name": name,
         "unit": quantity.unit if quantity else None,
         "written_in": recording.units.get(name),
-        "least": float(values.min()),
-        "greatest": float(values.max()),
+        "min": float(values.min()),
+        "max": float(values.max()),
     }
 
 
@@ -161,7 +161,7 @@ def _print(seen: Inspection) -> None:
     from .inspection_text import COLUMNS, column_rows, summary
 
     typer.echo(f"{seen.recording.origin}: {len(seen.recording)} rows")
-    print_table(COLUMNS, column_rows(seen), right=("least", "greatest", "resolution", "noise"))
+    print_table(COLUMNS, column_rows(seen), right=("min", "max", "resolution", "noise"))
     for line in summary(seen):
         typer.echo(line)
     typer.echo("")

@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from ..recording.segment import Inspection, Outlier, Run, Sampling
 
-COLUMNS = ("column", "written in", "least", "greatest", "unit", "resolution", "noise", "cut off at")
+COLUMNS = ("column", "written in", "min", "max", "unit", "resolution", "noise", "cut off at")
 SHOWN = 8
 """Rows of a list that are printed; JSON has them all."""
 
@@ -21,7 +21,11 @@ def column_rows(seen: Inspection) -> Iterator[tuple[str, ...]]:
     for name in recording:
         factor, unit = _scale(name)
         values, sensor = recording[name] * factor, seen.sensors.get(name)
-        ends = [f"{end * factor:.4g}" for end in (sensor.least, sensor.greatest) if np.isfinite(end)] if sensor else []
+        ends = (
+            [f"{end * factor:.4g}" for end in (sensor.lower_limit, sensor.upper_limit) if np.isfinite(end)]
+            if sensor
+            else []
+        )
         yield (
             name,
             recording.units.get(name, ""),

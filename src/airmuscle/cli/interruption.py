@@ -12,7 +12,7 @@ _pressed = threading.Event()
 
 
 @contextlib.contextmanager
-def remembered() -> Iterator[None]:
+def deferred_sigint() -> Iterator[None]:
     """Within the block Ctrl-C raises KeyboardInterrupt as ever; if that is lost, `look` and the block's end raise it.
 
     Python throws away what is raised in a destructor or in the callback of a weak reference, of which imports have
@@ -27,16 +27,16 @@ def remembered() -> Iterator[None]:
     signal.signal(signal.SIGINT, _hear)
     try:
         yield
-        look()
+        check_interrupted()
     except Exception:
-        look()
+        check_interrupted()
         raise
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
         _pressed.clear()
 
 
-def look() -> None:
+def check_interrupted() -> None:
     """Raise KeyboardInterrupt if Ctrl-C was pressed in a block; long work asks this now and then."""
     if _pressed.is_set():
         raise KeyboardInterrupt

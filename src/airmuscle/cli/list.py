@@ -11,13 +11,13 @@ from .terminal import print_json, print_table
 
 
 @dataclasses.dataclass(frozen=True)
-class Head:
+class ListRow:
     """What a library file says of itself before anything is built from it."""
 
     name: str
     title: str
     kind: str
-    trust: str
+    provenance: str
 
 
 def list_entries(json: Json = False) -> None:
@@ -36,22 +36,22 @@ def list_entries(json: Json = False) -> None:
     if json:
         print_json([dataclasses.asdict(head) for head in found])
         return
-    print_table(("name", "title", "kind", "trust"), (dataclasses.astuple(head) for head in found))
+    print_table(("name", "title", "kind", "provenance"), (dataclasses.astuple(head) for head in found))
 
 
-def heads() -> list[Head]:
+def heads() -> list[ListRow]:
     """The heads of all library entries and data sets; nothing is built, so that listing stays quick."""
     from ..library import valve_catalogue
-    from ..library.catalogue import DATA, FOLDER, measured_names, names
+    from ..library.catalogue import DATA, FOLDER, list_library, measured_names
 
     return [
-        *(_entry_head(FOLDER / f"{name}.toml") for name in names()),
+        *(_entry_head(FOLDER / f"{name}.toml") for name in list_library()),
         *(_valve_head(valve_catalogue.FOLDER / f"{name}.toml") for name in valve_catalogue.valve_names()),
         *(_data_head(DATA / f"{name}.csv") for name in measured_names()),
     ]
 
 
-def _entry_head(path: Path) -> Head:
+def _entry_head(path: Path) -> ListRow:
     import tomllib
 
     from ..characteristic.base import ForceLaw
@@ -60,23 +60,23 @@ def _entry_head(path: Path) -> Head:
     tables = tomllib.loads(path.read_text(encoding="utf-8"))
     law = tables["characteristic"]
     muscle = issubclass(model_class(law["model"], str(path)), ForceLaw) and ("geometry" in tables or "geometry" in law)
-    return Head(
-        path.stem, tables["title"], f"{'muscle' if muscle else 'characteristic'}, {law['model']}", tables["trust"]
+    return ListRow(
+        path.stem, tables["title"], f"{'muscle' if muscle else 'characteristic'}, {law['model']}", tables["provenance"]
     )
 
 
-def _valve_head(path: Path) -> Head:
+def _valve_head(path: Path) -> ListRow:
     import tomllib
 
     tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    return Head(path.stem, tables["title"], f"valve, {tables['valve']['model']}", tables["trust"])
+    return ListRow(path.stem, tables["title"], f"valve, {tables['valve']['model']}", tables["provenance"])
 
 
-def _data_head(path: Path) -> Head:
-    """Title and trust from the comments that open a data file."""
+def _data_head(path: Path) -> ListRow:
+    """Title and provenance from the comments that open a data file."""
     with path.open(encoding="utf-8") as file:
         comments = list(itertools.takewhile(lambda line: line.startswith("#"), file))
     text = " ".join(line.lstrip("# ").strip() for line in comments)
     title = comments[0].lstrip("# ").strip() if comments else ""
-    trust = "second hand" if "second hand" in text else "measured" if "measured" in text else ""
-    return Head(path.stem, title, "data set", trust)
+    provenance = "second hand" if "second hand" in text else "measured" if "measured" in text else ""
+    return ListRow(path.stem, title, "data set", provenance)

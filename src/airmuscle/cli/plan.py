@@ -11,16 +11,16 @@ from .options import Json, Name, OptionalFolder
 from .terminal import print_json, print_table
 
 if TYPE_CHECKING:
-    from ..identify.plan import Plan, Run
+    from ..identify.experiment_design import Plan, PlannedRun
 
 
 def plan(
     name: Name,
-    greatest_pressure: Annotated[str, typer.Option(metavar="QUANTITY", help="Of the bench: '6 bar'.")],
-    greatest_force: Annotated[str, typer.Option(metavar="QUANTITY", help="Of the load cell or frame: '1 kN'.")],
-    least_pressure: Annotated[str, typer.Option(metavar="QUANTITY", help="Where runs begin.")] = "50 kPa",
-    greatest_contraction: Annotated[str, typer.Option(metavar="QUANTITY", help="Of the frame.")] = "25 %",
-    least_contraction: Annotated[str, typer.Option(metavar="QUANTITY", help="Negative where it stretches.")] = "0 %",
+    max_pressure: Annotated[str, typer.Option(metavar="QUANTITY", help="Of the bench: '6 bar'.")],
+    max_force: Annotated[str, typer.Option(metavar="QUANTITY", help="Of the load cell or frame: '1 kN'.")],
+    min_pressure: Annotated[str, typer.Option(metavar="QUANTITY", help="Where runs begin.")] = "50 kPa",
+    max_contraction: Annotated[str, typer.Option(metavar="QUANTITY", help="Of the frame.")] = "25 %",
+    min_contraction: Annotated[str, typer.Option(metavar="QUANTITY", help="Negative where it stretches.")] = "0 %",
     runs: Annotated[int, typer.Option(min=1, max=100, help="How many runs to measure.")] = 6,
     points: Annotated[int, typer.Option(min=3, max=1000, help="Points of a run.")] = 15,
     sigma: Annotated[
@@ -40,20 +40,18 @@ def plan(
 
     \b
     Examples:
-      airmuscle plan dmsp-20-300 --greatest-pressure "6 bar" --greatest-force "1 kN"
-      airmuscle plan my/muscle.toml --greatest-pressure "4 bar" --greatest-force "300 N" --runs 4 --out bench
+      airmuscle plan dmsp-20-300 --max-pressure "6 bar" --max-force "1 kN"
+      airmuscle plan my/muscle.toml --max-pressure "4 bar" --max-force "300 N" --runs 4 --out bench
     """
-    from ..characteristic.box import Box
+    from ..characteristic.validity_range import ValidityRange
     from ..core.units import quantity
-    from ..identify.plan import Bench
-    from ..identify.plan import plan as planned
+    from ..identify.experiment_design import BenchLimits
+    from ..identify.experiment_design import optimal_design as planned
     from ..library.catalogue import load
 
-    pressures = [quantity(text, "Pa", where="limits of pressure") for text in (least_pressure, greatest_pressure)]
-    contractions = [
-        quantity(text, "1", where="limits of contraction") for text in (least_contraction, greatest_contraction)
-    ]
-    bench = Bench(Box(*pressures, *contractions), quantity(greatest_force, "N", where="--greatest-force"))
+    pressures = [quantity(text, "Pa", where="limits of pressure") for text in (min_pressure, max_pressure)]
+    contractions = [quantity(text, "1", where="limits of contraction") for text in (min_contraction, max_contraction)]
+    bench = BenchLimits(ValidityRange(*pressures, *contractions), quantity(max_force, "N", where="--max-force"))
     found = planned(load(name).characteristic, bench, runs=runs, points=points, sigma=sigma, fixed=fix or ())
     if out is not None:
         _write(found, out)
@@ -66,11 +64,11 @@ def plan(
 
 
 def _write(found: Plan, out: Path) -> None:
-    from ..recording.write_csv import write_csv
-    from ..report.staged import refuse_unwritable, staged
+    from ..recording.csv_writer import write_csv
+    from ..report.output_folder import atomic_folder, check_writable
 
-    refuse_unwritable(out)
-    with staged(out) as place:
+    check_writable(out)
+    with atomic_folder(out) as place:
         write_csv(found.recording(), place / "plan.csv")
 
 
@@ -78,7 +76,7 @@ def _words(quantity: str, value: float) -> str:
     return f"{value / 1e3:.4g} kPa" if quantity == "pressure" else f"{value:.2%}"
 
 
-def _row(number: int, run: Run) -> tuple[str, ...]:
+def _row(number: int, run: PlannedRun) -> tuple[str, ...]:
     held = f"{run.held} {_words(run.held, run.level)}"
     ends = " to ".join(_words(run.swept, end) for end in run.ends)
     forces = f"{run.force.max():.4g} to {run.force.min():.4g} N"

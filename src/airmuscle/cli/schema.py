@@ -27,7 +27,7 @@ def schema(
       airmuscle schema --out scenario.schema.json
       airmuscle schema --muscle --out muscle.schema.json
     """
-    from ..report.staged import staged
+    from ..report.output_folder import atomic_folder
     from ..report.write import as_json
     from ..scenario.schema import muscle_schema, scenario_schema
 
@@ -37,6 +37,6 @@ def schema(
         return
     if not out.name:
         raise typer.BadParameter("--out wants the name of a file, like scenario.schema.json")
-    with staged(out.parent) as place:
+    with atomic_folder(out.parent) as place:
         (place / out.name).write_text(text, encoding="utf-8")
     typer.echo(f"schema: {out}")

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..library.valve_catalogue import ValveEntry
 
 PARTS = (
-    "characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "box", "valve",
+    "characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "validity_range", "valve",
     "exhaust", "response",
 )  # fmt: skip
 MANY = 30
@@ -49,7 +49,7 @@ def described(entry: Entry | ValveEntry) -> dict[str, Any]:
     return {
         "name": entry.name,
         "title": entry.title,
-        "trust": entry.trust,
+        "provenance": entry.provenance,
         "note": entry.note,
         "warning": entry.warning,
         "models": {part: type(thing).__name__ for part, thing in parts.items()},
@@ -94,7 +94,7 @@ def _print(entry: dict[str, Any]) -> None:
     from ..report.wording import number
 
     typer.echo(f"{entry['name']}: {entry['title']}")
-    typer.echo(f"trust: {entry['trust']}")
+    typer.echo(f"provenance: {entry['provenance']}")
     for key in ("note", "warning"):
         if entry[key]:
             typer.echo(f"{key}: {entry[key]}")

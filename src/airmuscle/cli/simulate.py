@@ -34,11 +34,11 @@ def simulate(
       airmuscle simulate examples/fill_discharge.toml --out run
     """
     from ..core.errors import SimulationError
-    from ..report.staged import refuse_unwritable
+    from ..report.output_folder import check_writable
     from ..scenario.scenario import load_scenario
 
     loaded = load_scenario(scenario)
-    refuse_unwritable(out)
+    check_writable(out)
     try:
         recording = loaded.simulate()
     except SimulationError as error:
@@ -64,8 +64,8 @@ def _range(recording: Recording) -> dict[str, dict[str, float | str]]:
     return {
         name: {
             "column": header(name),
-            "least": float(recording[name].min()),
-            "greatest": float(recording[name].max()),
+            "min": float(recording[name].min()),
+            "max": float(recording[name].max()),
             "last": float(recording[name][-1]),
         }
         for name in recording
@@ -77,17 +77,17 @@ def _print(scenario: Scenario, recording: Recording) -> None:
 
     typer.echo(f"{scenario.title}: {len(recording)} rows over {scenario.duration:g} s")
     rows = [tuple(number(v) for v in found.values()) for found in _range(recording).values()]
-    print_table(("column", "least", "greatest", "last"), rows, right=("least", "greatest", "last"))
+    print_table(("column", "min", "max", "last"), rows, right=("min", "max", "last"))
     for note in recording.notes:
         typer.echo(f"note: {note}")
 
 
 def _write(scenario: Scenario, recording: Recording, out: Path) -> None:
-    from ..recording.write_csv import write_csv
+    from ..recording.csv_writer import write_csv
+    from ..report.output_folder import atomic_folder
     from ..report.run_chapter import run_chapter
-    from ..report.staged import staged
     from ..report.write import fill
 
-    with staged(out) as place:
+    with atomic_folder(out) as place:
         write_csv(scenario.chosen(recording), place / "recording.csv")
         fill(place, [run_chapter(scenario, recording)], title="Simulation")

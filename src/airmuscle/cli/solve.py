@@ -13,7 +13,7 @@ from .terminal import print_json, print_table
 
 if TYPE_CHECKING:
     from ..characteristic.base import Characteristic
-    from ..characteristic.box import Box
+    from ..characteristic.validity_range import ValidityRange
     from ..library.entry import Entry
     from ..report.chart import Point
 
@@ -47,55 +47,58 @@ def solve(
       airmuscle solve my/muscle.toml --pressure "400 kPa" --contraction 0.1 --json
     """
     from ..library.catalogue import load
-    from ..report.chart import box_of, point_text
+    from ..report.chart import point_text, validity_range_of
 
     texts = {"pressure": pressure, "contraction": contraction, "force": force}
     missing = [quantity for quantity, text in texts.items() if text is None]
     if len(missing) != 1:
         raise typer.BadParameter(f"give two of --pressure, --contraction and --force; {3 - len(missing)} given")
     entry = load(name)
-    point, box = _solved(entry.characteristic, texts), box_of(entry.characteristic, entry.box)
-    _warn(point, box)
+    point, validity_range = (
+        _solved(entry.characteristic, texts),
+        validity_range_of(entry.characteristic, entry.validity_range),
+    )
+    _warn(point, validity_range)
     if json:
-        print_json(_as_data(entry, point, box, missing[0]))
+        print_json(_as_data(entry, point, validity_range, missing[0]))
     else:
         typer.echo(f"{entry.name}: {entry.title}")
         print_table(("quantity", "value", ""), _rows(entry, point, missing[0]), right=("value",))
     if out is not None:
-        _write(entry, point, box, out)
+        _write(entry, point, validity_range, out)
         typer.echo(f"chart: {out / 'isobars.png'}, data: {out / 'isobars.csv'} ({point_text(point)})", err=json)
 
 
 def _solved(characteristic: Characteristic, texts: dict[str, str | None]) -> Point:
     from ..characteristic.base import ForceLaw
-    from ..core.errors import NoSolution
+    from ..core.errors import SolveError
     from ..core.units import quantity
-    from ..pneumatics.gas import Ambient, refuse_vacuum
+    from ..pneumatics.gas import Ambient, check_above_vacuum
     from ..report.chart import Point, point_text
 
     given = {name: quantity(text, UNITS[name], where=f"--{name}") for name, text in texts.items() if text is not None}
     if "pressure" in given:
-        refuse_vacuum(given["pressure"], Ambient())
+        check_above_vacuum(given["pressure"], Ambient())
     if "contraction" in given and isinstance(characteristic, ForceLaw):  # others refuse by themselves
-        _refuse_out_of_reach(characteristic, given["contraction"])
+        _check_reachable(characteristic, given["contraction"])
     (wanted,) = UNITS.keys() - given.keys()
     point = Point(**given, **{wanted: float(getattr(characteristic, wanted)(*given.values()))})
     if not math.isfinite(sum(point)) or (wanted == "contraction" and not -0.5 <= point.contraction < 1.0):
-        raise NoSolution(
+        raise SolveError(
             f"{type(characteristic).__name__} answers with {point_text(point)}, which no muscle can be. "
             "The question lies far outside the range of its numbers (airmuscle show)."
         )
     return point
 
 
-def _refuse_out_of_reach(characteristic: Characteristic, contraction: float) -> None:
-    from ..core.errors import OutOfReach
+def _check_reachable(characteristic: Characteristic, contraction: float) -> None:
+    from ..core.errors import GeometryLimitError
 
-    low, high = characteristic.contraction_reach
+    low, high = characteristic.contraction_range
     if not low <= contraction <= high:
         per_cent = contraction >= 1.0 and contraction / 100 <= high
         hint = f" Is it in per cent? Write '{contraction:g} %'." if per_cent else ""
-        raise OutOfReach(
+        raise GeometryLimitError(
             f"--contraction: {type(characteristic).__name__} cannot take a contraction of {100 * contraction:.6g} %; "
             f"it reaches from {100 * low:.4g} to {100 * high:.4g} %.{hint}"
         )
@@ -111,15 +114,15 @@ def _stiffness(entry: Entry, point: Point) -> float | None:
         return None
 
 
-def _warn(point: Point, box: Box | None) -> None:
+def _warn(point: Point, validity_range: ValidityRange | None) -> None:
     import warnings
 
     from ..core.errors import AirmuscleWarning
 
     if point.force < 0:
         warnings.warn("a muscle pulls and never pushes: it is slack here.", AirmuscleWarning, stacklevel=2)
-    if box is not None and not box.holds(point.pressure, point.contraction):
-        (p_low, p_high), (c_low, c_high) = box.pressure, box.contraction
+    if validity_range is not None and not validity_range.contains(point.pressure, point.contraction):
+        (p_low, p_high), (c_low, c_high) = validity_range.pressure, validity_range.contraction
         warnings.warn(
             "the working point lies outside the range where the muscle was measured or printed, "
             f"{p_low / 1e3:.4g} to {p_high / 1e3:.4g} kPa and {c_low:.2%} to {c_high:.2%}: "
@@ -158,25 +161,27 @@ def _rows(entry: Entry, point: Point, wanted: str) -> list[tuple[str, str, str]]
     return [*rows, ("stiffness", per_length, "at constant pressure")]
 
 
-def _as_data(entry: Entry, point: Point, box: Box | None, wanted: str) -> dict[str, Any]:
+def _as_data(entry: Entry, point: Point, validity_range: ValidityRange | None, wanted: str) -> dict[str, Any]:
     return {
         "name": entry.name,
         "solved": wanted,
         **point._asdict(),
         "stiffness": _stiffness(entry, point),
         "resting_length": _resting_length(entry),
-        "inside_data": None if box is None else bool(box.holds(point.pressure, point.contraction)),
+        "inside_data": None
+        if validity_range is None
+        else bool(validity_range.contains(point.pressure, point.contraction)),
         "units": {**UNITS, "pressure": "Pa gauge", "stiffness": "N per unit of contraction", "resting_length": "m"},
     }
 
 
-def _write(entry: Entry, point: Point, box: Box | None, out: Path) -> None:
+def _write(entry: Entry, point: Point, validity_range: ValidityRange | None, out: Path) -> None:
     from ..core.plotting import save
     from ..report.chart import chart, isobars, table
-    from ..report.staged import staged
+    from ..report.output_folder import atomic_folder
     from ..report.write import save_table
 
-    with staged(out) as place:
-        curves = isobars(entry.characteristic, box, point)
+    with atomic_folder(out) as place:
+        curves = isobars(entry.characteristic, validity_range, point)
         save_table(table(curves), place / "isobars.csv")
-        save(chart(entry.characteristic, entry.title, curves, box, point).figure, place / "isobars.png")
+        save(chart(entry.characteristic, entry.title, curves, validity_range, point).figure, place / "isobars.png")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .interruption import look
+from .interruption import check_interrupted
 from .options import Folder, Json
 from .terminal import print_json, print_table
 
@@ -104,7 +104,7 @@ def _bar(title: str) -> Iterator[Callable[[int, int], None]]:
         task = bar.add_task(title, total=None)
 
         def show(done: int, of: int) -> None:
-            look()
+            check_interrupted()
             bar.update(task, completed=done, total=of)
 
         yield show

@@ -7,7 +7,7 @@ from typing import Any
 import casadi
 
 from .functions import Printer
-from .llvm.jit import compiled
+from .llvm.jit import jit_compile
 
 
 class Function:
@@ -20,5 +20,5 @@ class Function:
         rows = {name: casadi.densify(casadi.vec(casadi.SX(value).T)) for name, value in outputs.items()}
         printer = Printer()
         printer.add("function", inputs, rows)
-        self._engine = compiled(printer.module())
+        self._engine = jit_compile(printer.module())
         self.address = int(self._engine.get_function_address("function"))

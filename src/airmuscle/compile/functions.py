@@ -15,14 +15,14 @@ from .ir.instructions import Code, Operand, finished, hoisted, instructions, rec
 from .ir.jacobian import ZERO, Tape, derivatives
 from .ir.sparse_lu import Factors
 from .llvm import emit
-from .llvm.types import DOUBLE, Number
+from .llvm.types import DOUBLE, LlvmType
 
 PARAMETERS = "p"
 """The argument of a traced function that holds parameters; it is replaced by what `prepare` left in `c`."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Traced:
+class TracedSystem:
     """A system as CasADi expressions: states x, inputs u, their slopes w, parameters p, rates f, outputs o."""
 
     x: Any
@@ -34,7 +34,7 @@ class Traced:
     output_names: tuple[str, ...]
 
 
-def traced(system: System) -> Traced:
+def trace_system(system: System) -> TracedSystem:
     """Call a system once with symbols; raises TraceError where that does not give finite expressions."""
     model, p = autodiff.symbolic(system)
     names = [s.name for s in system.states]
@@ -48,12 +48,12 @@ def traced(system: System) -> Traced:
     # Dense, because a printed function writes non-zeros one after the other.
     f = casadi.densify(casadi.vertcat(*(rates[name] for name in names)))
     o = casadi.densify(casadi.vertcat(*outputs.values())) if outputs else casadi.SX(0, 1)
-    autodiff.refuse_non_finite(casadi.vertcat(f, o), type(system).__name__)
-    return Traced(x, u, w, p, f, o, tuple(outputs))
+    autodiff.check_finite(casadi.vertcat(f, o), type(system).__name__)
+    return TracedSystem(x, u, w, p, f, o, tuple(outputs))
 
 
 @dataclasses.dataclass(frozen=True)
-class Sizes:
+class ArraySizes:
     """Lengths of the arrays that the printed functions read and write."""
 
     states: int
@@ -71,11 +71,11 @@ class Printer:
     Every element of every array is a `number`; in lanes one of each plant.
     """
 
-    def __init__(self, number: Number = DOUBLE) -> None:
+    def __init__(self, number: LlvmType = DOUBLE) -> None:
         self.text: list[str] = []
         self.needed: dict[str, int] = {}
         self._number = number
-        self._prepare = emit.Block((), number)
+        self._prepare = emit.FunctionBody((), number)
         self._places: dict[str, int] = {}
 
     @property
@@ -92,13 +92,13 @@ class Printer:
         self, name: str, inputs: Sequence[str], code: Code, outputs: Sequence[str], scalars: Sequence[str] = ()
     ) -> None:
         """The same of instructions."""
-        block = emit.Block(scalars, self._number)
+        block = emit.FunctionBody(scalars, self._number)
         for (output, index), value in self.compute(block, code, inputs).items():
             block.store(outputs[output], index, value)
         self.end(name, [*inputs, *outputs], block)
 
     def compute(
-        self, block: emit.Block, code: Code, names: Sequence[str], given: Mapping[Operand, str] | None = None
+        self, block: emit.FunctionBody, code: Code, names: Sequence[str], given: Mapping[Operand, str] | None = None
     ) -> dict[tuple[int, int], str]:
         """Append code to a function: `names` are its arguments, `given` inputs whose values are there already.
 
@@ -107,7 +107,7 @@ class Printer:
         code, held = self.set_apart(code, names)
         return emit.computed(block, code, names, held, given or {})
 
-    def end(self, name: str, arguments: Sequence[str], block: emit.Block) -> None:
+    def end(self, name: str, arguments: Sequence[str], block: emit.FunctionBody) -> None:
         """Close a function; the argument that holds parameters becomes `c`."""
         self.text.append(emit.function(name, ["c" if a == PARAMETERS else a for a in arguments], block))
         self.needed |= {**block.needed, **self._prepare.needed}
@@ -132,7 +132,7 @@ class Printer:
         return "\n".join([prepare, *self.text])
 
 
-def implicit_module(t: Traced) -> tuple[str, Sizes]:
+def implicit_module(t: TracedSystem) -> tuple[str, ArraySizes]:
     """What an implicit method needs: rhs, jac, factor, solve, stage, drift and outputs.
 
     rhs(x, u, c, f)              f = rates
@@ -158,11 +158,11 @@ def implicit_module(t: Traced) -> tuple[str, Sizes]:
     drift = casadi.densify(casadi.jtimes(t.f, t.u, t.w) if t.u.numel() else casadi.SX(size, 1))
     printer.add("drift", {**point, "w": t.w}, {"f": drift})
     printer.add("outputs", point, {"o": t.o})
-    sizes = Sizes(size, t.u.shape[0], t.p.shape[0], printer.held, lu.j.numel(), lu.values.numel(), t.o.shape[0])
+    sizes = ArraySizes(size, t.u.shape[0], t.p.shape[0], printer.held, lu.j.numel(), lu.values.numel(), t.o.shape[0])
     return printer.module(), sizes
 
 
-def _rates_and_slopes(t: Traced) -> tuple[Code, tuple[tuple[int, int], ...], tuple[int, ...]]:
+def _rates_and_slopes(t: TracedSystem) -> tuple[Code, tuple[tuple[int, int], ...], tuple[int, ...]]:
     """The rates and the distinct non-zeros of their Jacobian; its places, and which non-zero stands in each."""
     code = recorded([t.x, t.u, t.p], [t.f])
     tape, found = Tape(code.body), {index: operand for _, index, operand in code.outputs}
@@ -175,7 +175,7 @@ def _rates_and_slopes(t: Traced) -> tuple[Code, tuple[tuple[int, int], ...], tup
     return finished(Code(tuple(tape.body), tuple(outputs))), tuple(slopes), slots
 
 
-def explicit_module(t: Traced, a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[str, int]:
+def explicit_module(t: TracedSystem, a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[str, int]:
     """One whole step of an explicit Runge-Kutta method: step(x, u, c, w, h, y), and how long `c` must be.
 
     `a` are the rows of the tableau below its first, `b` its weights; nodes are the row sums. Inputs move at w.

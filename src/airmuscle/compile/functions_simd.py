@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .functions import PARAMETERS, Printer, Traced
+from .functions import PARAMETERS, Printer, TracedSystem
 from .ir.instructions import Code, Operand
 from .llvm import emit, vector_math
-from .llvm.emit import FLAGS, Block
-from .llvm.types import Number
+from .llvm.emit import FLAGS, FunctionBody
+from .llvm.types import LlvmType
 
 POINT = ("x", "u", PARAMETERS)
 """The arguments that rates and outputs depend on."""
@@ -16,7 +16,9 @@ AT_ONCE = 64
 """Bytes of one value in the step: the widest register (measured; values of two do not fit the registers)."""
 
 
-def lanes_module(t: Traced, a: Sequence[Sequence[float]], b: Sequence[float], number: Number) -> tuple[str, int]:
+def lanes_module(
+    t: TracedSystem, a: Sequence[Sequence[float]], b: Sequence[float], number: LlvmType
+) -> tuple[str, int]:
     """One whole step of an explicit Runge-Kutta method, and the outputs, for one plant a lane; how long `c` must be.
 
     step(x, u, c, w, h, y)   as the step of one plant; h is an array too, as each plant has its own
@@ -45,12 +47,12 @@ class _Step:
     on, for which there are no registers.
     """
 
-    def __init__(self, t: Traced, code: Code, held: dict[Operand, int], number: Number) -> None:
-        self.number = Number(number.bits, min(number.lanes, AT_ONCE * 8 // number.bits))
+    def __init__(self, t: TracedSystem, code: Code, held: dict[Operand, int], number: LlvmType) -> None:
+        self.number = LlvmType(number.bits, min(number.lanes, AT_ONCE * 8 // number.bits))
         self.groups = number.lanes // self.number.lanes
         self.states, self.inputs = t.x.shape[0], t.u.shape[0]
         self.items, self.outputs, self.held = emit.with_gates(code, POINT, held), code.outputs, held
-        self.block = Block((), self.number)
+        self.block = FunctionBody((), self.number)
 
     def printed(self, a: Sequence[Sequence[float]], b: Sequence[float]) -> str:
         """The text of the step, and of its stages for one group."""
@@ -62,7 +64,7 @@ class _Step:
         copies = [f"c{stage}" for stage in range(len(slopes))]
         names = ["x", "u", *copies, "w", "h", "y"]
         stages = emit.function("stages", names, self.block, "nounwind noinline").replace("define", "define internal", 1)
-        outer = Block((), self.number)
+        outer = FunctionBody((), self.number)
         for group in range(self.groups):
             arrays = {n: outer.put(f"getelementptr inbounds i8, ptr %{n}, i64 {group * AT_ONCE}") for n in "xucwhy"}
             given = ", ".join(f"ptr {arrays['c' if name in copies else name]}" for name in names)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..core.arrays import Array
-from .program import Prepared, Program
+from .program import CompiledSystem, Program
 
 _functions: weakref.WeakKeyDictionary[Program, Any] = weakref.WeakKeyDictionary()
 
@@ -27,7 +27,7 @@ class Derivatives:
     outputs_by_input: Array
 
 
-def derivatives(ready: Prepared, state: Sequence[float], inputs: Sequence[float]) -> Derivatives:
+def derivatives(ready: CompiledSystem, state: Sequence[float], inputs: Sequence[float]) -> Derivatives:
     """The derivatives at a state vector (n,) under inputs (m,). At a kink they are those of one of its sides."""
     results = _function(ready.program)(np.asarray(state, float), np.asarray(inputs, float), ready.parameters)
     f, o, *slopes = (np.asarray(part, dtype=float) for part in results)

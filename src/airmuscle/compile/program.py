@@ -15,10 +15,10 @@ import numpy.typing as npt
 from ..core import tree
 from ..core.system import Differentiated, System
 from . import functions, sensitivities, sensitivities_explicit
-from .functions import Sizes, Traced
+from .functions import ArraySizes, TracedSystem
 from .functions_simd import lanes_module
-from .llvm.jit import compiled
-from .llvm.types import Number
+from .llvm.jit import jit_compile
+from .llvm.types import LlvmType
 
 _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "drift", "outputs")
 
@@ -28,26 +28,26 @@ class Program:
 
     def __init__(self, system: System) -> None:
         self._system = system
-        self._form: Traced | sensitivities.Moved
+        self._form: TracedSystem | sensitivities.TangentSystem
         if isinstance(system, Differentiated):
-            self._form = sensitivities.moved(system)
+            self._form = sensitivities.tangent_system(system)
             text, self.sizes = sensitivities.implicit_module(self._form)
         else:
-            self._form = functions.traced(system)
+            self._form = functions.trace_system(system)
             text, self.sizes = functions.implicit_module(self._form)
         self.output_names = self._form.output_names
-        self._engine = compiled(text)
+        self._engine = jit_compile(text)
         self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
         self._prepare = _preparing(self._engine)
         self._steps: dict[Any, tuple[Any, int]] = {}
         self._compiling = threading.Lock()  # of two threads that ask for a step, one makes it: an engine must not go
 
     @functools.cached_property
-    def traced(self) -> Traced:
+    def traced(self) -> TracedSystem:
         """The system's own rates and outputs as expressions, also of a differentiated one."""
-        return self._form if isinstance(self._form, Traced) else functions.traced(self._system)
+        return self._form if isinstance(self._form, TracedSystem) else functions.trace_system(self._system)
 
-    def held(self, parameters: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def precompute(self, parameters: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """What the functions need of a set of parameters, computed once."""
         return self._prepare(parameters, self.sizes.held)
 
@@ -58,23 +58,23 @@ class Program:
         with self._compiling:
             if (a, b) not in self._steps:
                 text, held = self._printed_step(a, b)
-                self._steps[a, b] = compiled(text), held
+                self._steps[a, b] = jit_compile(text), held
         engine, held = self._steps[a, b]
         return int(engine.get_function_address("step")), _preparing(engine)(parameters, held)
 
     def _printed_step(self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...]) -> tuple[str, int]:
-        if isinstance(self._form, sensitivities.Moved):
+        if isinstance(self._form, sensitivities.TangentSystem):
             return sensitivities_explicit.explicit_module(self._form, a, b)
         return functions.explicit_module(self._form, a, b)
 
     def lanes(
-        self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...], number: Number
+        self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...], number: LlvmType
     ) -> tuple[tuple[int, int, int], int]:
         """The addresses of `prepare`, the explicit step and `outputs` in lanes, and how long `c` must be."""
         with self._compiling:
             if (a, b, number) not in self._steps:
                 text, held = lanes_module(self.traced, a, b, number)
-                self._steps[a, b, number] = compiled(text), held
+                self._steps[a, b, number] = jit_compile(text), held
         engine, held = self._steps[a, b, number]
         prepare, step, outputs = (int(engine.get_function_address(n)) for n in ("prepare", "step", "outputs"))
         return (prepare, step, outputs), held
@@ -99,18 +99,18 @@ _programs: dict[Any, Program] = {}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Prepared:
+class CompiledSystem:
     """A system with its program: addresses, parameters, and the layout of its arrays."""
 
     system: System
     program: Program
     parameters: npt.NDArray[np.float64]
-    held: npt.NDArray[np.float64]
+    precomputed: npt.NDArray[np.float64]
     known_nominal: npt.NDArray[np.float64] | None = None
     """The nominal sizes of the states, where they are not to be asked of the system."""
 
     @property
-    def sizes(self) -> Sizes:
+    def sizes(self) -> ArraySizes:
         """Lengths of the arrays that the functions read and write."""
         return self.program.sizes
 
@@ -128,9 +128,9 @@ class Prepared:
         """The size of each state below which its relative error no longer matters."""
         return np.array([s.nominal for s in self.system.states]) if self.known_nominal is None else self.known_nominal
 
-    def at(self, parameters: npt.NDArray[np.float64], nominal: npt.NDArray[np.float64]) -> Prepared:
+    def at(self, parameters: npt.NDArray[np.float64], nominal: npt.NDArray[np.float64]) -> CompiledSystem:
         """The same system with other parameters, its nominal sizes given: for those who change them often."""
-        return Prepared(self.system, self.program, parameters, self.program.held(parameters), nominal)
+        return CompiledSystem(self.system, self.program, parameters, self.program.precompute(parameters), nominal)
 
     def call(self, name: str, *arrays: npt.NDArray[np.float64] | float) -> None:
         """Call one printed function by hand; arrays are passed by address, floats by value."""
@@ -142,15 +142,15 @@ class Prepared:
         """The compiled rates at a state vector (n,) under inputs (m,)."""
         x, u = np.array(state, dtype=float), np.array(inputs, dtype=float)
         f = np.empty(self.sizes.states)
-        self.call("rhs", x, u, self.held, f)
+        self.call("rhs", x, u, self.precomputed, f)
         return f
 
 
-def prepared(system: System) -> Prepared:
+def compile_system(system: System) -> CompiledSystem:
     """The system with compiled functions. Another parameter set of the same structure costs nothing."""
     key = tree.structure(system)
     if key not in _programs:
         _programs[key] = Program(system)
     program = _programs[key]
     parameters = tree.flatten(system)
-    return Prepared(system, program, parameters, program.held(parameters))
+    return CompiledSystem(system, program, parameters, program.precompute(parameters))

@@ -14,22 +14,22 @@ from typing import Any
 import casadi
 
 from ..core.system import Differentiated
-from .functions import PARAMETERS, Printer, Sizes, Traced, traced
+from .functions import PARAMETERS, ArraySizes, Printer, TracedSystem, trace_system
 from .ir.instructions import Code, Operand, finished, recorded
 from .ir.jacobian import ZERO, Tape, derivatives
 from .ir.sparse_lu import Factors
-from .llvm.emit import Block
-from .llvm.vectors import Value, loaded, packed
+from .llvm.emit import FunctionBody
+from .llvm.vectors import LlvmValue, loaded, packed
 
 POINT = ("x", "u", PARAMETERS)
 """The arguments that rates and outputs depend on."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Moved:
+class TangentSystem:
     """A traced system, and for every column the places in its parameters that move together; none moves nothing."""
 
-    inner: Traced
+    inner: TracedSystem
     groups: tuple[tuple[int, ...], ...]
     output_names: tuple[str, ...]
 
@@ -43,32 +43,32 @@ class Moved:
         """How many columns there are."""
         return len(self.groups)
 
-    def rows(self, block: Block, array: str) -> list[Value]:
+    def rows(self, block: FunctionBody, array: str) -> list[LlvmValue]:
         """The rows of S, which follow the states in an array."""
         return [loaded(block, array, self.size + i * self.lanes, self.lanes) for i in range(self.size)]
 
 
-def moved(system: Differentiated) -> Moved:
+def tangent_system(system: Differentiated) -> TangentSystem:
     """The inner system of a differentiated one, traced, with what is observed as its outputs."""
-    inner, names = traced(system.inner), [s.name for s in system.inner.states]
+    inner, names = trace_system(system.inner), [s.name for s in system.inner.states]
     found = {
         **{n: inner.x[i] for i, n in enumerate(names)},
         **{n: inner.o[i] for i, n in enumerate(inner.output_names)},
     }
     observed = casadi.densify(casadi.vertcat(casadi.SX(0, 1), *(found[n] for n in system.observed_names)))
-    return Moved(dataclasses.replace(inner, o=observed), system.places, system.output_names)
+    return TangentSystem(dataclasses.replace(inner, o=observed), system.places, system.output_names)
 
 
 class Values:
     """Expressions of a point as instructions, and how they change along every column: dv = (dv/dx) S + dv/dtheta."""
 
-    def __init__(self, t: Moved, expressions: Any, further: Sequence[Any] = ()) -> None:
+    def __init__(self, t: TangentSystem, expressions: Any, further: Sequence[Any] = ()) -> None:
         code = recorded([*(getattr(t.inner, name) for name in POINT), *further], [expressions])
         self.t, self.tape = t, Tape(code.body)
         by_index = {index: operand for _, index, operand in code.outputs}
         self.results = [by_index.get(i, ZERO) for i in range(expressions.numel())]
 
-    def along(self, results: Sequence[Operand]) -> Along:
+    def along(self, results: Sequence[Operand]) -> DirectionalDerivative:
         """The derivatives of some operands of the tape."""
         states = [("in", POINT.index("x"), i) for i in range(self.t.size)]
         leaves = {place: ("in", POINT.index(PARAMETERS), place) for group in self.t.groups for place in group}
@@ -80,21 +80,21 @@ class Values:
                 for place in group:
                     sums[k] = self.tape.add(sums[k], row.get(leaves[place], ZERO))
             by_column.append({k: part for k, part in sums.items() if part != ZERO})
-        return Along(tuple(by_state), tuple(by_column))
+        return DirectionalDerivative(tuple(by_state), tuple(by_column))
 
     def compute(
-        self, printer: Printer, block: Block, wanted: Sequence[Operand], names: Sequence[str] = POINT,
+        self, printer: Printer, block: FunctionBody, wanted: Sequence[Operand], names: Sequence[str] = POINT,
         given: Mapping[Operand, str] | None = None,
-    ) -> dict[Operand, Value]:  # fmt: skip
+    ) -> dict[Operand, LlvmValue]:  # fmt: skip
         """Append what some operands need to a function, and give their values."""
         distinct = tuple(dict.fromkeys(wanted))
         code = finished(Code(tuple(self.tape.body), tuple((0, i, operand) for i, operand in enumerate(distinct))))
         found = printer.compute(block, code, names, given)
-        return {operand: Value(block, found[0, i]) for i, operand in enumerate(distinct)}
+        return {operand: LlvmValue(block, found[0, i]) for i, operand in enumerate(distinct)}
 
 
 @dataclasses.dataclass(frozen=True)
-class Along:
+class DirectionalDerivative:
     """The non-zero derivatives of each of some operands, by state and by column."""
 
     by_state: tuple[dict[int, Operand], ...]
@@ -105,7 +105,7 @@ class Along:
         """All of them."""
         return [part for row in (*self.by_state, *self.by_column) for part in row.values()]
 
-    def rows(self, values: Mapping[Operand, Value], s: Sequence[Value]) -> list[Value]:
+    def rows(self, values: Mapping[Operand, LlvmValue], s: Sequence[LlvmValue]) -> list[LlvmValue]:
         """The change of each operand, a column, from the values of the parts and the rows of S."""
         found = []
         for states, columns in zip(self.by_state, self.by_column, strict=True):
@@ -117,7 +117,7 @@ class Along:
         return found
 
 
-def stored(values: Sequence[Value], array: str) -> None:
+def stored(values: Sequence[LlvmValue], array: str) -> None:
     """Write values and columns one after the other."""
     index = 0
     for value in values:
@@ -125,7 +125,7 @@ def stored(values: Sequence[Value], array: str) -> None:
         index += max(value.lanes, 1)
 
 
-def implicit_module(t: Moved) -> tuple[str, Sizes]:
+def implicit_module(t: TangentSystem) -> tuple[str, ArraySizes]:
     """The functions of `printed.implicit_module` for the states and their derivatives.
 
     J holds the distinct non-zeros of the inner df/dx, then dJ of those that change, K numbers each; A the factors of
@@ -142,7 +142,7 @@ def implicit_module(t: Moved) -> tuple[str, Sizes]:
     slope = Values(t, casadi.densify(casadi.jtimes(inner.o, inner.x, inner.f)))
     _print_along(printer, "outputs", outputs, POINT, "o", slope)
     further, count = len(step.moving) * t.lanes, inner.o.numel()
-    return printer.module(), Sizes(
+    return printer.module(), ArraySizes(
         states=t.size * (1 + t.lanes),
         inputs=inner.u.numel(),
         parameters=inner.p.numel() + t.lanes,  # a scale for each column comes last
@@ -157,7 +157,7 @@ def _print_along(
     printer: Printer, name: str, values: Values, arguments: Sequence[str], target: str, last: Values | None = None
 ) -> None:
     """A function that writes values, their columns, and what is to come last."""
-    block, along = Block(), values.along(values.results)
+    block, along = FunctionBody(), values.along(values.results)
     found = values.compute(printer, block, [*values.results, *along.parts], arguments)
     rows = [found[v] for v in values.results] + along.rows(found, values.t.rows(block, "x"))
     if last is not None:
@@ -170,7 +170,7 @@ def _print_along(
 class _Step:
     """What the functions of a Rosenbrock step share."""
 
-    def __init__(self, t: Moved) -> None:
+    def __init__(self, t: TangentSystem) -> None:
         self.t, self.rates = t, Values(t, t.inner.f)
         self.slopes = self.rates.along(self.rates.results)
         places = [((i, j), part) for i, row in enumerate(self.slopes.by_state) for j, part in row.items()]
@@ -186,19 +186,19 @@ class _Step:
         both = zip(self.bends.by_state, self.bends.by_column, strict=True)
         return [q for q, rows in enumerate(both) if any(rows)]
 
-    def _bends(self, block: Block, array: str, first: int) -> dict[int, Value]:
+    def _bends(self, block: FunctionBody, array: str, first: int) -> dict[int, LlvmValue]:
         """dJ by number of the distinct non-zero, from an array where they stand from `first` on."""
         lanes = self.t.lanes
         return {q: loaded(block, array, first + m * lanes, lanes) for m, q in enumerate(self.moving)}
 
     def print_rates(self, printer: Printer) -> None:
         """rhs(x, u, c, f) and jac(x, u, c, f, J)."""
-        block, s = Block(), self.slopes
+        block, s = FunctionBody(), self.slopes
         rates = self.rates.compute(printer, block, [*self.rates.results, *s.parts])
         rows = [rates[f] for f in self.rates.results] + s.rows(rates, self.t.rows(block, "x"))
         stored(rows, "f")
         printer.end("rhs", [*POINT, "f"], block)
-        block = Block()
+        block = FunctionBody()
         wanted = [*self.rates.results, *s.parts, *self.bends.parts]
         found, rows = self.rates.compute(printer, block, wanted), self.t.rows(block, "x")
         stored([found[f] for f in self.rates.results] + s.rows(found, rows), "f")
@@ -208,22 +208,22 @@ class _Step:
 
     def print_factor(self, printer: Printer) -> None:
         """factor(J, d, A)."""
-        code, block = finished(recorded([self.lu.j, self.lu.d], [self.lu.values])), Block(["d"])
+        code, block = finished(recorded([self.lu.j, self.lu.d], [self.lu.values])), FunctionBody(["d"])
         found = printer.compute(block, code, ["J", "d"])
         bends = self._bends(block, "J", len(self.jacobian))
-        stored([Value(block, found[0, i]) for i in range(self.lu.values.numel())] + list(bends.values()), "A")
+        stored([LlvmValue(block, found[0, i]) for i in range(self.lu.values.numel())] + list(bends.values()), "A")
         printer.end("factor", ["J", "d", "A"], block)
 
     def print_solve(self, printer: Printer) -> None:
         """solve(A, b, y)."""
-        block = Block()
+        block = FunctionBody()
         right = [loaded(block, "b", i) for i in range(self.t.size)]
         stored(self._solved(block, right, self.t.rows(block, "b")), "y")
         printer.end("solve", ["A", "b", "y"], block)
 
     def print_stage(self, printer: Printer) -> None:
         """stage(x, u, c, A, g, k)."""
-        t, block = self.t, Block()
+        t, block = self.t, FunctionBody()
         found = self.rates.compute(printer, block, [*self.rates.results, *self.slopes.parts])
         right = [found[f] + loaded(block, "g", i) for i, f in enumerate(self.rates.results)]
         slopes = self.slopes.rows(found, t.rows(block, "x"))
@@ -231,7 +231,7 @@ class _Step:
         stored(self._solved(block, right, columns), "k")
         printer.end("stage", [*POINT, "A", "g", "k"], block)
 
-    def _solved(self, block: Block, right: list[Value], columns: list[Value]) -> list[Value]:
+    def _solved(self, block: FunctionBody, right: list[LlvmValue], columns: list[LlvmValue]) -> list[LlvmValue]:
         """k = (d I - J)^-1 right, then (d I - J)^-1 (columns + dJ k), with the factors and dJ that stand in A."""
         count = self.lu.values.numel()
         factors = [loaded(block, "A", q) for q in range(count)]

@@ -8,8 +8,8 @@ from .functions import PARAMETERS, Printer
 from .ir.instructions import Code, Instruction, Operand, finished
 from .ir.scheduling import Item
 from .llvm import emit
-from .llvm.vectors import Value, loaded
-from .sensitivities import POINT, Along, Moved, Values, stored
+from .llvm.vectors import LlvmValue, loaded
+from .sensitivities import POINT, DirectionalDerivative, TangentSystem, Values, stored
 
 
 class _Stage:
@@ -20,7 +20,12 @@ class _Stage:
     """
 
     def __init__(
-        self, rates: Values, along: Along, printer: Printer, block: emit.Block, given: dict[Operand, str]
+        self,
+        rates: Values,
+        along: DirectionalDerivative,
+        printer: Printer,
+        block: emit.FunctionBody,
+        given: dict[Operand, str],
     ) -> None:
         self.rates, self.along, self.block, self.values = rates, along, block, given
         wanted = tuple((0, i, operand) for i, operand in enumerate([*rates.results, *along.parts]))
@@ -52,19 +57,21 @@ class _Stage:
         for line in self.second[begin:end]:
             emit.append(self.block, line, POINT, self.held, self.values)
 
-    def _value(self, operand: Operand) -> Value:
-        return Value(self.block, emit.value_of(self.block, operand, POINT, self.held, self.values))
+    def _value(self, operand: Operand) -> LlvmValue:
+        return LlvmValue(self.block, emit.value_of(self.block, operand, POINT, self.held, self.values))
 
-    def slopes(self) -> list[Value]:
+    def slopes(self) -> list[LlvmValue]:
         """The rates."""
         return [self._value(operand) for operand in self.rates.results]
 
-    def columns(self, s: Sequence[Value]) -> list[Value]:
+    def columns(self, s: Sequence[LlvmValue]) -> list[LlvmValue]:
         """The derivatives of the rates along the columns, from the rows of S."""
         return self.along.rows({operand: self._value(operand) for operand in self.along.parts}, s)
 
 
-def _after(row: Sequence[float], begin: Sequence[Value], slopes: Sequence[Sequence[Value]], h: Value) -> list[Value]:
+def _after(
+    row: Sequence[float], begin: Sequence[LlvmValue], slopes: Sequence[Sequence[LlvmValue]], h: LlvmValue
+) -> list[LlvmValue]:
     """States, or S, after the stages so far, each with its weight."""
     found = list(begin)
     for weight, slope in zip(row, slopes, strict=True):
@@ -73,18 +80,18 @@ def _after(row: Sequence[float], begin: Sequence[Value], slopes: Sequence[Sequen
     return found
 
 
-def _times(h: Value, weight: float) -> Value:
-    return h * Value(h.block, h.block.constant(weight))
+def _times(h: LlvmValue, weight: float) -> LlvmValue:
+    return h * LlvmValue(h.block, h.block.constant(weight))
 
 
-def explicit_module(t: Moved, a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[str, int]:
+def explicit_module(t: TangentSystem, a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[str, int]:
     """One whole step, as in `printed.explicit_module`: step(x, u, c, w, h, y), and how long `c` must be."""
     rates = Values(t, t.inner.f)
     along = rates.along(rates.results)
-    printer, block = Printer(), emit.Block(["h"])
-    h, states, s = Value(block, "%h"), [loaded(block, "x", i) for i in range(t.size)], t.rows(block, "x")
-    slopes: list[list[Value]] = []
-    columns: list[list[Value]] = []
+    printer, block = Printer(), emit.FunctionBody(["h"])
+    h, states, s = LlvmValue(block, "%h"), [loaded(block, "x", i) for i in range(t.size)], t.rows(block, "x")
+    slopes: list[list[LlvmValue]] = []
+    columns: list[list[LlvmValue]] = []
     rows, before = [(), *a], None
     for number, row in enumerate(rows):
         given = {("in", POINT.index("x"), i): x.name for i, x in enumerate(_after(row, states, slopes, h))}

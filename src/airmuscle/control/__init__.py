@@ -1,11 +1,34 @@
-"""Controllers: what closes a loop around a plant, each a frozen model with a memory that is a value."""
+"""Control: input signals in time, drivers between command and valve, sampled controllers and their loop."""
 
+from .control_loop import ControlLoop, ControlLoopState
+from .controller import Controller, Measurement
+from .driver import PWM, Driver, SolenoidDriver, WithDrivers
+from .inputs import ZERO_INPUT, InputSignal, Periodic, PiecewiseLinear, SampledSignal, Schedule
+from .on_off import OnOffController
 from .pid import PID
-from .split import Split
-from .two_point import TwoPoint
+from .siso import SisoController
+from .split_range import SplitRange
+from .trajectory import Trajectory, spline_trajectory
 
 __all__ = [
     "PID",
-    "Split",
-    "TwoPoint",
+    "PWM",
+    "ZERO_INPUT",
+    "ControlLoop",
+    "ControlLoopState",
+    "Controller",
+    "Driver",
+    "InputSignal",
+    "Measurement",
+    "OnOffController",
+    "Periodic",
+    "PiecewiseLinear",
+    "SampledSignal",
+    "Schedule",
+    "SisoController",
+    "SolenoidDriver",
+    "SplitRange",
+    "Trajectory",
+    "WithDrivers",
+    "spline_trajectory",
 ]

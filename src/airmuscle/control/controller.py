@@ -25,7 +25,7 @@ class Controller(abc.ABC):
 
     @property
     @abc.abstractmethod
-    def columns(self) -> tuple[str, ...]:
+    def measured_columns(self) -> tuple[str, ...]:
         """The states and outputs of the plant that it measures."""
 
     @property

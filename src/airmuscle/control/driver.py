@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.arrays import Array
+from ..core.declaration import INFINITY, model, parameter
 from ..core.errors import ParameterError
-from ..core.model import INFINITY, model, parameter
-from .inputs import Command, Segments, refuse_no_command, refuse_unknown_input
+from .inputs import InputSignal, PiecewiseLinear, check_input_names, check_input_signal
 
 THRESHOLD = 0.5
 """A coil carries current while its command is at least this (chosen)."""
@@ -37,14 +37,14 @@ class Driver(abc.ABC):
         """The memory of a driver at rest at `start` [s]."""
 
     @abc.abstractmethod
-    def step(self, memory: Any, signal: Segments, start: float) -> tuple[Segments, Any]:
+    def step(self, memory: Any, signal: PiecewiseLinear, start: float) -> tuple[PiecewiseLinear, Any]:
         """What comes out for a signal of one input from `start` to its end, and the memory there.
 
         Nothing depends on what the signal does later: cut at any instant, it gives the same course.
         """
 
 
-class Switched(NamedTuple):
+class SolenoidState(NamedTuple):
     """An on/off valve at one moment: current in the coil 0 or 1, the instant [s] at which the plunger will follow it
     (infinite when nothing is pending), where the plunger is heading, 0 or 1, and the opening it has."""
 
@@ -55,7 +55,7 @@ class Switched(NamedTuple):
 
 
 @model
-class OnOff(Driver):
+class SolenoidDriver(Driver):
     """A solenoid valve that answers late and moves at a finite speed.
 
     The coil carries current while the command is at least 0.5 (chosen). The plunger follows the coil after the delay of
@@ -70,10 +70,12 @@ class OnOff(Driver):
     opening_ramp: float = parameter("s", "T_on", "from shut to open, in motion", bounds=(0.0, 10.0), default=0.0)
     closing_ramp: float = parameter("s", "T_off", "from open to shut, in motion", bounds=(0.0, 10.0), default=0.0)
 
-    def init(self, start: float) -> Switched:
-        return Switched(coil=0.0, pending=INFINITY, heading=0.0, opening=0.0)
+    def init(self, start: float) -> SolenoidState:
+        return SolenoidState(coil=0.0, pending=INFINITY, heading=0.0, opening=0.0)
 
-    def step(self, memory: Switched, signal: Segments, start: float) -> tuple[Segments, Switched]:
+    def step(
+        self, memory: SolenoidState, signal: PiecewiseLinear, start: float
+    ) -> tuple[PiecewiseLinear, SolenoidState]:
         end = float(signal.ends[-1])
         switched, currents = _switchings(signal, start, memory.coil)
         coil = float(currents[-1]) if currents.size else memory.coil
@@ -85,7 +87,7 @@ class OnOff(Driver):
         heading = float(headings[-1]) if headings.size else memory.heading
         edges, targets = np.concatenate([[start], instants, [end]]), np.append(memory.heading, headings)
         openings = self._openings(edges, targets, memory.opening)
-        return self._motion(edges, targets, openings), Switched(coil, pending, heading, float(openings[-1]))
+        return self._motion(edges, targets, openings), SolenoidState(coil, pending, heading, float(openings[-1]))
 
     def _openings(self, edges: Array, targets: Array, opening: float) -> Array:
         """The opening at every edge, a target being held between two."""
@@ -97,7 +99,7 @@ class OnOff(Driver):
             found.append(opening)
         return np.array(found)
 
-    def _motion(self, edges: Array, targets: Array, openings: Array) -> Segments:
+    def _motion(self, edges: Array, targets: Array, openings: Array) -> PiecewiseLinear:
         """Straight lines through the openings at the edges: from each a motion, then rest where it arrived."""
         before, after, begins = openings[:-1], openings[1:], edges[:-1]
         ramps = np.where(targets > before, self.opening_ramp, self.closing_ramp)
@@ -108,10 +110,10 @@ class OnOff(Driver):
         np.divide(after - before, arrivals - begins, out=slopes, where=moving)
         starts = np.column_stack([begins, arrivals])[kept := np.column_stack([moving, resting])]
         values, rates = np.column_stack([before, after])[kept], np.column_stack([slopes, np.zeros_like(slopes)])[kept]
-        return Segments(np.append(starts[1:], edges[-1]), values[:, None], rates[:, None])
+        return PiecewiseLinear(np.append(starts[1:], edges[-1]), values[:, None], rates[:, None])
 
 
-class Pulsing(NamedTuple):
+class PwmState(NamedTuple):
     """A pulse width modulator at one moment: when its carrier began [s], how many periods have begun since, and when
     the pulse of the last of them ends [s] (infinite when it fills its period, minus infinite when it has none)."""
 
@@ -138,16 +140,16 @@ class PWM(Driver):
                 f"{1 / self.frequency:g} s: no pulse would leave room for a gap. Lower the frequency."
             )
 
-    def init(self, start: float) -> Pulsing:
-        return Pulsing(origin=start, begun=0.0, pulse_end=-INFINITY)
+    def init(self, start: float) -> PwmState:
+        return PwmState(origin=start, begun=0.0, pulse_end=-INFINITY)
 
-    def step(self, memory: Pulsing, signal: Segments, start: float) -> tuple[Segments, Pulsing]:
+    def step(self, memory: PwmState, signal: PiecewiseLinear, start: float) -> tuple[PiecewiseLinear, PwmState]:
         end, period = float(signal.ends[-1]), 1.0 / self.frequency
         starts = self._periods(memory, start, end)
         widths = period * np.clip(signal.inputs_at(starts, start)[:, 0], 0.0, 1.0)
         least = max(self.smallest_pulse, 1e-9 * period, 4 * float(np.spacing(end)))
         pulse_ends = np.where(widths < least, -INFINITY, np.where(period - widths < least, INFINITY, starts + widths))
-        later = Pulsing(memory.origin, memory.begun + starts.size, float(np.append(memory.pulse_end, pulse_ends)[-1]))
+        later = PwmState(memory.origin, memory.begun + starts.size, float(np.append(memory.pulse_end, pulse_ends)[-1]))
         if starts.size == 0 or starts[0] > start:  # the rest of a period that began earlier
             starts, pulse_ends = np.append(start, starts), np.append(memory.pulse_end, pulse_ends)
         on = pulse_ends > starts
@@ -156,9 +158,9 @@ class PWM(Driver):
         levels = np.column_stack([on, np.zeros_like(on)])[kept].astype(float)
         instants, levels = _changes(instants, levels, before=-1.0)
         ends = np.append(instants[1:], end)
-        return Segments(ends, levels[:, None], np.zeros((ends.size, 1))), later
+        return PiecewiseLinear(ends, levels[:, None], np.zeros((ends.size, 1))), later
 
-    def _periods(self, memory: Pulsing, start: float, end: float) -> Array:
+    def _periods(self, memory: PwmState, start: float, end: float) -> Array:
         """The beginnings [s] of the periods that begin before `end`."""
         count = (end - memory.origin) * self.frequency - memory.begun
         if count > MOST_PERIODS:
@@ -171,7 +173,7 @@ class PWM(Driver):
         return np.asarray(np.maximum(starts[starts < end - 4 * np.spacing(abs(end))], start))
 
 
-def _switchings(signal: Segments, start: float, coil: float) -> tuple[Array, Array]:
+def _switchings(signal: PiecewiseLinear, start: float, coil: float) -> tuple[Array, Array]:
     """When the current of a coil changes [s], and to what; `coil` is what it was before."""
     begins, value, slope = signal.starts(start), signal.values[:, 0], signal.slopes[:, 0]
     first, last = value >= THRESHOLD, value + slope * (signal.ends - begins) >= THRESHOLD
@@ -188,25 +190,25 @@ def _changes(instants: Array, levels: npt.NDArray[Any], before: float) -> tuple[
 
 
 @dataclasses.dataclass(frozen=True)
-class Driven(Command):
+class WithDrivers(InputSignal):
     """A command whose inputs, some or all, pass through drivers: one each, or several in the order of the signal.
 
-    `Driven(Signal({"fill": ...}), {"fill": (PWM(50), OnOff(opening_delay=5e-3))})`. Inputs without a driver do as they
+    `WithDrivers(Signal({"fill": ...}), {"fill": (PWM(50), SolenoidDriver(opening_delay=5e-3))})`. Inputs without a driver do as they
     are told at once. Raises ParameterError where the command of a driver leaves 0 to 1.
     """
 
-    inner: Command
+    inner: InputSignal
     drivers: Mapping[str, Driver | tuple[Driver, ...]]
 
     def __post_init__(self) -> None:
-        refuse_no_command(self.inner)
+        check_input_signal(self.inner)
         if not isinstance(self.drivers, Mapping):
-            raise ParameterError(f"the drivers are {self.drivers!r}; name the inputs: {{'fill': OnOff(...)}}.")
+            raise ParameterError(f"the drivers are {self.drivers!r}; name the inputs: {{'fill': SolenoidDriver(...)}}.")
         for name, chain in self.chains.items():
             for driver in chain:
                 if not isinstance(driver, Driver):
                     raise ParameterError(
-                        f"the driver of '{name}' is {driver!r}; write OnOff(...), PWM(...) or several."
+                        f"the driver of '{name}' is {driver!r}; write SolenoidDriver(...), PWM(...) or several."
                     )
 
     @property
@@ -224,35 +226,35 @@ class Driven(Command):
 
     def step(
         self, memory: Mapping[str, tuple[Any, ...]], inputs: Sequence[str], start: float, duration: float
-    ) -> tuple[Segments, dict[str, tuple[Any, ...]]]:
+    ) -> tuple[PiecewiseLinear, dict[str, tuple[Any, ...]]]:
         """The command from `start` on for `duration` [s], and the memories then: give them to the next step."""
-        refuse_unknown_input(list(self.drivers), inputs)
-        return self.passed(memory, self.inner.segments(inputs, start, duration), inputs, start)
+        check_input_names(list(self.drivers), inputs)
+        return self.apply_drivers(memory, self.inner.segments(inputs, start, duration), inputs, start)
 
-    def passed(
-        self, memory: Mapping[str, tuple[Any, ...]], told: Segments, inputs: Sequence[str], start: float
-    ) -> tuple[Segments, dict[str, tuple[Any, ...]]]:
+    def apply_drivers(
+        self, memory: Mapping[str, tuple[Any, ...]], told: PiecewiseLinear, inputs: Sequence[str], start: float
+    ) -> tuple[PiecewiseLinear, dict[str, tuple[Any, ...]]]:
         """What the drivers make of a course of all inputs that is told from `start` on, and the memories at its end."""
         columns, later = {}, {}
         for name, chain in self.chains.items():
             signal, memories = column(told, inputs.index(name)), []
-            _refuse_beyond(name, signal, start)
+            _check_command_range(name, signal, start)
             for driver, remembered in zip(chain, memory[name], strict=True):
                 signal, now = driver.step(remembered, signal, start)
                 memories.append(now)
             columns[inputs.index(name)], later[name] = signal, tuple(memories)
-        return together(told, columns, start), later
+        return merge_inputs(told, columns, start), later
 
-    def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
+    def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
         return self.step(self.init(start), inputs, start, duration)[0]
 
 
-def column(segments: Segments, i: int) -> Segments:
+def column(segments: PiecewiseLinear, i: int) -> PiecewiseLinear:
     """The course of one input alone."""
-    return Segments(segments.ends, segments.values[:, i : i + 1], segments.slopes[:, i : i + 1])
+    return PiecewiseLinear(segments.ends, segments.values[:, i : i + 1], segments.slopes[:, i : i + 1])
 
 
-def _refuse_beyond(name: str, signal: Segments, start: float) -> None:
+def _check_command_range(name: str, signal: PiecewiseLinear, start: float) -> None:
     last = signal.values + signal.slopes * (signal.ends - signal.starts(start))[:, None]
     for values in (signal.values[:, 0], last[:, 0]):
         beyond = (values < -1e-9) | (values > 1 + 1e-9)
@@ -263,7 +265,7 @@ def _refuse_beyond(name: str, signal: Segments, start: float) -> None:
             )
 
 
-def together(told: Segments, columns: Mapping[int, Segments], start: float) -> Segments:
+def merge_inputs(told: PiecewiseLinear, columns: Mapping[int, PiecewiseLinear], start: float) -> PiecewiseLinear:
     """One course of all inputs, those in `columns` replaced, cut wherever any of them is."""
     if not columns:
         return told
@@ -271,4 +273,4 @@ def together(told: Segments, columns: Mapping[int, Segments], start: float) -> S
     starts = np.unique(np.concatenate([np.array([start]), *(course.starts(start) for course in courses)]))
     cut = [course.cut_at(starts, start) for course in courses]
     ends = np.append(starts[1:], told.ends[-1])
-    return Segments(ends, np.hstack([c.values for c in cut]), np.hstack([c.slopes for c in cut]))
+    return PiecewiseLinear(ends, np.hstack([c.values for c in cut]), np.hstack([c.slopes for c in cut]))

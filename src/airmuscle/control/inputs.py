@@ -6,13 +6,13 @@ import abc
 import dataclasses
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from ..core.arrays import Array
+from ..core.declaration import as_float
 from ..core.errors import ParameterError, suggestion
-from ..core.model import number_of
 
 if TYPE_CHECKING:
     from ..recording import Recording
@@ -24,7 +24,7 @@ COARSEST, MOST_POINTS = 64, 100_000
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Segments:
+class PiecewiseLinear:
     """A command cut at its instants: ends (S,), inputs at each start (S, m), and their slopes [1/s] (S, m)."""
 
     ends: Array
@@ -41,7 +41,7 @@ class Segments:
         """Where each segment begins (S,)."""
         return np.concatenate([[start], self.ends[:-1]])
 
-    def refuse_misshapen(self, inputs: int, start: float) -> None:
+    def check_shape(self, inputs: int, start: float) -> None:
         """Raise ParameterError unless ends rise from `start` [s] and every segment has all inputs, all finite.
 
         A kernel reads what it is told is there, so this stands before it.
@@ -58,19 +58,19 @@ class Segments:
         if not (np.diff(ends, prepend=start) > 0).all():
             raise ParameterError(f"segments must end in rising order after {start:g} s; they end at {ends.tolist()} s.")
 
-    def cut_at(self, starts: Array, start: float) -> Segments:
+    def cut_at(self, starts: Array, start: float) -> PiecewiseLinear:
         """The same course with segments that begin at other instants (R,), in rising order, the first not before
         `start`; within them it must have no instant of its own."""
         index = np.maximum(np.searchsorted(self.starts(start), starts, side="right") - 1, 0)
         ends = np.append(starts[1:], self.ends[-1])
-        return Segments(ends, self.inputs_at(starts, start), self.slopes[index])
+        return PiecewiseLinear(ends, self.inputs_at(starts, start), self.slopes[index])
 
 
-class Command(abc.ABC):
+class InputSignal(abc.ABC):
     """What the inputs of a plant do in time."""
 
     @abc.abstractmethod
-    def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
+    def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
         """The command for these inputs from `start` on, cut so that every input is linear within a segment."""
 
     @property
@@ -79,16 +79,16 @@ class Command(abc.ABC):
         return None
 
 
-def refuse_no_command(given: object) -> None:
+def check_input_signal(given: object) -> None:
     """Raise ParameterError for what is no Command, as a dictionary is."""
-    if not isinstance(given, Command):
+    if not isinstance(given, InputSignal):
         raise ParameterError(f"the command is {given!r}; give a Schedule, a Signal or another Command.")
 
 
 NO_INPUT = "the plant has no input"
 
 
-def refuse_unknown_input(given: Sequence[str], inputs: Sequence[str], lacks: str = NO_INPUT) -> None:
+def check_input_names(given: Sequence[str], inputs: Sequence[str], lacks: str = NO_INPUT) -> None:
     """Raise ParameterError, with the nearest name, for a name that is no input of the plant."""
     for name in given:
         if name not in inputs:
@@ -96,48 +96,50 @@ def refuse_unknown_input(given: Sequence[str], inputs: Sequence[str], lacks: str
             raise ParameterError(f"{lacks} '{name}'; there are {known}.{suggestion(name, inputs)}")
 
 
-def _refuse_no_mapping(kind: str, given: object, example: str = "((5, 1), (15, 0))") -> None:
+def _check_mapping(kind: str, given: object, example: str = "((5, 1), (15, 0))") -> None:
     if not isinstance(given, Mapping):
         raise ParameterError(f"a {kind} is {given!r}; name the inputs: {{'fill': {example}}}.")
 
 
 def _pairs(kind: str, name: str, given: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     try:
-        return [(number_of("a time", time), number_of("a value", value)) for time, value in given]
+        return [(as_float("a time", time), as_float("a value", value)) for time, value in given]
     except (TypeError, ValueError, ParameterError):
         raise ParameterError(
             f"the {kind} of '{name}' is {given!r}; write pairs of time [s] and value, ((5, 1), (15, 0))."
         ) from None
 
 
-def _refuse_disorder(kind: str, word: str, name: str, times: Sequence[float]) -> None:
+def _check_order(kind: str, word: str, name: str, times: Sequence[float]) -> None:
     if any(b <= a for a, b in itertools.pairwise(times)):
         raise ParameterError(f"the {kind} of '{name}' must name its {word} in rising order; it has {times}.")
 
 
 @dataclasses.dataclass(frozen=True)
-class Schedule(Command):
+class Schedule(InputSignal):
     """Piecewise constant inputs, each a sequence of (instant [s], value from then on); before the first it is 0.
 
     `Schedule({"fill": ((5, 1), (15, 0)), "discharge": ((19, 1),)})`
     """
 
+    from_file: ClassVar[bool] = True
+
     changes: Mapping[str, Sequence[tuple[float, float]]]
 
     def __post_init__(self) -> None:
-        _refuse_no_mapping("schedule", self.changes)
+        _check_mapping("schedule", self.changes)
         for name, given in self.changes.items():
             changes = _pairs("schedule", name, given)
             if changes and not np.isfinite(changes).all():
                 raise ParameterError(f"the schedule of '{name}' holds a number that is not finite: {changes}.")
-            _refuse_disorder("schedule", "instants", name, [time for time, _ in changes])
+            _check_order("schedule", "instants", name, [time for time, _ in changes])
 
     @property
     def names(self) -> tuple[str, ...]:
         return tuple(self.changes)
 
-    def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
-        refuse_unknown_input(list(self.changes), inputs)
+    def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
+        check_input_names(list(self.changes), inputs)
         end = start + duration
         instants = {time for changes in self.changes.values() for time, _ in changes if start < time < end}
         starts = np.array([start, *sorted(instants)])
@@ -145,29 +147,31 @@ class Schedule(Command):
         for i, name in enumerate(inputs):
             times, levels = np.array([(-np.inf, 0.0), *self.changes.get(name, ())], dtype=float).T
             values[:, i] = levels[np.searchsorted(times, starts, side="right") - 1]
-        return Segments(np.append(starts[1:], end), values, np.zeros_like(values))
+        return PiecewiseLinear(np.append(starts[1:], end), values, np.zeros_like(values))
 
 
 @dataclasses.dataclass(frozen=True)
-class Signal(Command):
+class SampledSignal(InputSignal):
     """Piecewise linear inputs, each a sequence of (time [s], value); constant before the first and after the last."""
+
+    from_file: ClassVar[bool] = True
 
     points: Mapping[str, Sequence[tuple[float, float]]]
 
     def __post_init__(self) -> None:
-        _refuse_no_mapping("signal", self.points)
+        _check_mapping("signal", self.points)
         for name, given in self.points.items():
             points = _pairs("signal", name, given)
             if not points or not np.isfinite(points).all():
                 raise ParameterError(f"the signal of '{name}' must be finite points (time, value); it is {points}.")
-            _refuse_disorder("signal", "times", name, [time for time, _ in points])
+            _check_order("signal", "times", name, [time for time, _ in points])
 
     @property
     def names(self) -> tuple[str, ...]:
         return tuple(self.points)
 
     @classmethod
-    def recorded(cls, recording: Recording, columns: Mapping[str, str]) -> Signal:
+    def recorded(cls, recording: Recording, columns: Mapping[str, str]) -> SampledSignal:
         """What was measured, as a command: for each input the column of the recording that it follows.
 
         `Signal.recorded(read_csv("bench.csv"), {"fill": "fill"})`; the values are those of the recording, in SI.
@@ -176,7 +180,7 @@ class Signal(Command):
 
         if not isinstance(recording, Recording):
             raise ParameterError(f"Signal.recorded: {recording!r} is no Recording; give what read_csv or read returns.")
-        _refuse_no_mapping("recorded signal", columns, "'column'")
+        _check_mapping("recorded signal", columns, "'column'")
         times = recording["time"].tolist()
         return cls({name: tuple(zip(times, recording[c].tolist(), strict=True)) for name, c in columns.items()})
 
@@ -184,7 +188,7 @@ class Signal(Command):
     def sampled(
         cls, functions: Mapping[str, Callable[[float], float]], *, duration: float, start: float = 0.0,
         error: float = 1e-4,
-    ) -> Signal:  # fmt: skip
+    ) -> SampledSignal:  # fmt: skip
         """Functions of time [s], followed to within `error` by straight lines that are halved until they do.
 
         Each line is held against its function at a quarter, a half and three quarters of it, and none is longer than
@@ -192,13 +196,13 @@ class Signal(Command):
         a function that 100 000 points do not follow, for one that jumps (give that one as a Schedule), and for one that
         does not return a finite number.
         """
-        _refuse_no_mapping("sampled signal", functions, "lambda t: 0.5")
-        duration, start = number_of("Signal.sampled: duration", duration), number_of("Signal.sampled: start", start)
-        error = number_of("Signal.sampled: error", error)
+        _check_mapping("sampled signal", functions, "lambda t: 0.5")
+        duration, start = as_float("Signal.sampled: duration", duration), as_float("Signal.sampled: start", start)
+        error = as_float("Signal.sampled: error", error)
         return cls({name: _followed(name, f, start, start + duration, error) for name, f in functions.items()})
 
-    def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
-        refuse_unknown_input(list(self.points), inputs)
+    def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
+        check_input_names(list(self.points), inputs)
         end = start + duration
         corners = {time for points in self.points.values() for time, _ in points if start < time < end}
         ends = np.array([*sorted(corners), end])
@@ -208,7 +212,7 @@ class Signal(Command):
             if name in self.points:
                 times, levels = np.array(self.points[name], dtype=float).T
                 values[:, i] = np.interp(edges, times, levels)
-        return Segments(ends, values[:-1], np.diff(values, axis=0) / np.diff(edges)[:, None])
+        return PiecewiseLinear(ends, values[:-1], np.diff(values, axis=0) / np.diff(edges)[:, None])
 
 
 def _followed(
@@ -244,32 +248,32 @@ def _values(name: str, function: Callable[[float], float], times: Array) -> Arra
         raise ParameterError(f"the signal of '{name}' is {function!r}; give a function of time [s].")
     values = np.empty(times.size)
     for i, time in enumerate(times.tolist()):
-        values[i] = number_of(f"the signal of '{name}' at {time:g} s", function(time))
+        values[i] = as_float(f"the signal of '{name}' at {time:g} s", function(time))
         if not np.isfinite(values[i]):
             raise ParameterError(f"the signal of '{name}' is {values[i]} at {time:g} s; it must be finite.")
     return values
 
 
 @dataclasses.dataclass(frozen=True)
-class Periodic(Command):
+class Periodic(InputSignal):
     """The first `period` [s] of another command, from its time 0 on, over and over, before time 0 too.
 
-    Drivers go around it, `Driven(Periodic(...), ...)`: inside it they would begin anew with every period.
+    Drivers go around it, `WithDrivers(Periodic(...), ...)`: inside it they would begin anew with every period.
     """
 
-    inner: Command
+    inner: InputSignal
     period: float
 
     def __post_init__(self) -> None:
-        refuse_no_command(self.inner)
-        if not 0 < number_of("Periodic.period", self.period) < np.inf:
+        check_input_signal(self.inner)
+        if not 0 < as_float("Periodic.period", self.period) < np.inf:
             raise ParameterError(f"Periodic.period is {self.period!r} s; it must be positive and finite.")
 
     @property
     def names(self) -> tuple[str, ...] | None:
         return self.inner.names
 
-    def segments(self, inputs: Sequence[str], start: float, duration: float) -> Segments:
+    def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
         once, end = self.inner.segments(inputs, 0.0, self.period), start + duration
         first, last = np.floor(start / self.period), np.ceil(end / self.period)
         if (last - first) * once.ends.size > MOST_INSTANTS:
@@ -281,10 +285,10 @@ class Periodic(Command):
         starts = (begins[:, None] + once.starts(0.0)).ravel()
         rounding = 4 * np.spacing(max(abs(start), self.period))
         starts[np.abs(starts - start) <= rounding] = start  # 3 * 0.1 is more than 0.3: no piece of 1e-17 s
-        whole = Segments(np.append(starts[1:], end), np.tile(once.values, size), np.tile(once.slopes, size))
+        whole = PiecewiseLinear(np.append(starts[1:], end), np.tile(once.values, size), np.tile(once.slopes, size))
         within = starts[(starts > start) & (starts < end)]
         return whole.cut_at(np.append(start, within), float(starts[0]))
 
 
-REST = Schedule({})
+ZERO_INPUT = Schedule({})
 """Every input stays at zero: valves shut, latch open."""

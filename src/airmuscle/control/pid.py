@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import ClassVar, NamedTuple
 
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.reference import Reference
 from .controller import Measurement
-from .siso import OneColumn
-from .split import Commanded, commands, range_of
+from .siso import SisoController
+from .split_range import Commanded, commands, range_of
 
 ASTROM_HAGGLUND1995 = Reference(
     key="astrom-hagglund-1995",
@@ -25,14 +25,14 @@ class PIDMemory(NamedTuple):
     """A PID controller between two samples: whether it has begun, its integral and derivative parts [u], and the
     weighted error of the derivative at the last sample [y]."""
 
-    begun: bool
+    started: bool
     integral: float
     derivative: float
     weighted: float
 
 
 @model
-class PID(OneColumn):
+class PID(SisoController):
     """u = K (b r - y) + I + D,   I' = K/T_i (r - y),   (T_d/N) D' + D = K T_d (c r - y)',   standard (ISA) form.
 
     r set point and y measurement, in the unit of the measured column; u command, in that of the commanded input. At
@@ -56,7 +56,7 @@ class PID(OneColumn):
     gain: float = parameter("u/y", "K", "proportional gain")
     integral_time: float = parameter("s", "T_i", "integral time; 0: no integral", bounds=(0.0, 1e6), default=0.0)
     derivative_time: float = parameter("s", "T_d", "derivative time; 0: no derivative", bounds=(0.0, 1e6), default=0.0)
-    derivative_limit: float = parameter(
+    derivative_filter: float = parameter(
         "1", "N", "greatest gain of the derivative, in K", bounds=(1.0, 1e3), default=10.0
     )
     setpoint_weight: float = parameter(
@@ -64,22 +64,22 @@ class PID(OneColumn):
     )
     derivative_weight: float = parameter("1", "c", "of the set point in the derivative", bounds=(0.0, 1.0), default=0.0)
     tracking_time: float = parameter("s", "T_t", "of the anti-windup; 0: by the rule", bounds=(0.0, 1e6), default=0.0)
-    first: float = parameter("u", "u_0", "first command; without integral action the bias", default=0.0)
+    initial_output: float = parameter("u", "u_0", "first command; without integral action the bias", default=0.0)
 
     def init(self) -> PIDMemory:
-        return PIDMemory(begun=False, integral=0.0, derivative=0.0, weighted=0.0)
+        return PIDMemory(started=False, integral=0.0, derivative=0.0, weighted=0.0)
 
     def step(self, memory: PIDMemory, measurement: Measurement, dt: float) -> tuple[dict[str, float], PIDMemory]:
         setpoint, measured = measurement.setpoints[self.measured], measurement.columns[self.measured]
         proportional = self.gain * (self.setpoint_weight * setpoint - measured)
         weighted = self.derivative_weight * setpoint - measured
-        if memory.begun:
+        if memory.started:
             integral = memory.integral
-            held = self.derivative_time + self.derivative_limit * dt
-            pushed = self.gain * self.derivative_limit * (weighted - memory.weighted)
+            held = self.derivative_time + self.derivative_filter * dt
+            pushed = self.gain * self.derivative_filter * (weighted - memory.weighted)
             derivative = self.derivative_time / held * (memory.derivative + pushed)
         else:
-            integral = self.first - proportional if self.integral_time > 0 else self.first
+            integral = self.initial_output - proportional if self.integral_time > 0 else self.initial_output
             derivative = 0.0
         wanted = proportional + integral + derivative
         least, greatest = range_of(self.commanded, measurement.ranges)

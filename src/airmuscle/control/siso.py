@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from .controller import Controller
-from .split import Commanded, inputs_of
+from .split_range import Commanded, inputs_of
 
 
-class OneColumn(Controller):
+class SisoController(Controller):
     """A controller that compares one column with its set point: `measured` names it, `commanded` what it acts on."""
 
     measured: str
     commanded: Commanded
 
     @property
-    def columns(self) -> tuple[str, ...]:
+    def measured_columns(self) -> tuple[str, ...]:
         return (self.measured,)
 
     @property

@@ -8,25 +8,25 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.errors import ParameterError
-from .inputs import Signal
+from .inputs import SampledSignal
 
 ACCELERATION = "prescribed_acceleration"
-"""The input of `Prescribed`."""
+"""The input of `PrescribedMotion`."""
 
 
-class Motion(NamedTuple):
+class Trajectory(NamedTuple):
     """The command that drives a motion, and the position [m] and speed [m/s] that it begins with.
 
     `simulate(plant, motion.command, duration=..., start=plant.state_at(pressure=..., **motion.start))`; with other
     inputs, `Signal({**motion.command.points, "fill": ...})`.
     """
 
-    command: Signal
+    command: SampledSignal
     start: dict[str, float]
 
 
-def follow(times: npt.ArrayLike, positions: npt.ArrayLike, *, from_rest: bool = True) -> Motion:
-    """The motion along the cubic spline through positions (N,) [m] at times (N,) [s], for `Prescribed`.
+def spline_trajectory(times: npt.ArrayLike, positions: npt.ArrayLike, *, from_rest: bool = True) -> Trajectory:
+    """The motion along the cubic spline through positions (N,) [m] at times (N,) [s], for `PrescribedMotion`.
 
     The second derivative of a cubic spline is linear between its points, and so is an input: the motion is followed
     exactly, the spline's corners being instants. `from_rest` has it begin and end at rest; otherwise the first two and
@@ -52,4 +52,4 @@ def follow(times: npt.ArrayLike, positions: npt.ArrayLike, *, from_rest: bool = 
     spline = CubicSpline(t, y, bc_type="clamped" if from_rest else "not-a-knot")
     accelerations = spline(t, 2)
     points = tuple((float(a), float(b)) for a, b in zip(t, accelerations, strict=True))
-    return Motion(Signal({ACCELERATION: points}), {"position": float(y[0]), "speed": float(spline(t[0], 1))})
+    return Trajectory(SampledSignal({ACCELERATION: points}), {"position": float(y[0]), "speed": float(spline(t[0], 1))})

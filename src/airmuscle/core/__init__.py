@@ -2,10 +2,10 @@
 
 from . import ops
 from .arrays import Array
-from .model import Parameter, model, parameter, parameters
+from .declaration import Parameter, model, parameter, parameters
 from .reference import Reference, cite
 from .system import Differentiated, System
-from .tree import Leaf, flatten, leaves, rebuild, structure, with_parameters
+from .tree import Leaf, flatten, leaves, structure, unflatten, with_parameters
 from .variables import Input, StateVariable
 
 __all__ = [
@@ -24,7 +24,7 @@ __all__ = [
     "ops",
     "parameter",
     "parameters",
-    "rebuild",
     "structure",
+    "unflatten",
     "with_parameters",
 ]

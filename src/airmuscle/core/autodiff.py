@@ -26,10 +26,10 @@ def symbolic(thing: Any) -> tuple[Any, Any]:
 
     count = sum(1 for _ in tree.leaves(thing))
     vector = casadi.SX.sym("p", count)
-    return tree.rebuild(thing, [vector[i] for i in range(count)]), vector
+    return tree.unflatten(thing, [vector[i] for i in range(count)]), vector
 
 
-def refuse_non_finite(expression: Any, owner: str) -> None:
+def check_finite(expression: Any, owner: str) -> None:
     """Raise TraceError where a trace holds NaN or infinity: math.sqrt or float() of a symbol makes them silently."""
     import casadi
 
@@ -51,7 +51,7 @@ def _function(thing: Any, method: str, count: int) -> Any:
         model, parameters = symbolic(thing)
         arguments = [casadi.SX.sym(f"x{i}") for i in range(count)]
         value = casadi.SX(getattr(model, method)(*arguments))
-        refuse_non_finite(value, f"{type(thing).__name__}.{method}")
+        check_finite(value, f"{type(thing).__name__}.{method}")
         outputs = [value, *(casadi.jacobian(value, x) for x in arguments), casadi.jacobian(value, parameters)]
         _functions[key] = casadi.Function("law", [*arguments, parameters], casadi.cse(outputs))
     return _functions[key]
@@ -74,7 +74,7 @@ def _at(function: Any, parameters: Sequence[Any], arguments: Sequence[Any]) -> t
     return [r.full() for r in function(*rows[:count], vector)], broadcast[0].shape
 
 
-def slope(thing: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
+def derivative(thing: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
     """The exact derivative of `thing.method(*arguments)` by argument number `wrt`, shaped like the arguments."""
     if ops.is_symbol(*arguments):
         return _symbolic_slope(thing, method, arguments, wrt)
@@ -104,7 +104,7 @@ def _jax_slope(thing: Any, method: str, arguments: tuple[Any, ...], wrt: int) ->
     return jax.jvp(along, (at,), (jax.numpy.ones_like(at),))[1]
 
 
-def directional(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], along: Sequence[Any]) -> tuple[Any, ...]:
+def jvp(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], along: Sequence[Any]) -> tuple[Any, ...]:
     """The exact derivative of a vector function over `ops` at a point, along a direction: J(at) along.
 
     `at` and `along` hold numbers, CasADi symbols or JAX arrays; `function` takes the point as one sequence.
@@ -120,7 +120,7 @@ def directional(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], alo
     return _put_in(casadi.jtimes(values, x, casadi.vertcat(*along)), x, at, ops.is_symbol(*at, *along))
 
 
-def pulled_back(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], weights: Sequence[Any]) -> tuple[Any, ...]:
+def vjp(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], weights: Sequence[Any]) -> tuple[Any, ...]:
     """The exact gradient of the weighted sum of a vector function over `ops`: J(at)^T weights, as `directional`."""
     if _is_jax(*at, *weights):
         import jax  # type: ignore[import-not-found, unused-ignore]
@@ -134,7 +134,7 @@ def pulled_back(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], wei
     return _put_in(casadi.jtimes(values, x, casadi.vertcat(*weights), True), x, at, ops.is_symbol(*at, *weights))
 
 
-def with_slope(thing: Any, method: str, count: int, wrt: int = 0) -> Callable[..., tuple[Any, Any]]:
+def value_and_derivative(thing: Any, method: str, count: int, wrt: int = 0) -> Callable[..., tuple[Any, Any]]:
     """`thing.method` of `count` arguments together with its exact derivative by number `wrt`, for a search.
 
     The function takes numbers, or arrays that broadcast, and gives numbers or arrays of their shape. The parameters of
@@ -147,7 +147,7 @@ def with_slope(thing: Any, method: str, count: int, wrt: int = 0) -> Callable[..
         model, symbols = symbolic(thing)
         x = [casadi.SX.sym(f"x{i}") for i in range(count)]
         value = casadi.SX(getattr(model, method)(*x))
-        refuse_non_finite(value, f"{type(thing).__name__}.{method}")
+        check_finite(value, f"{type(thing).__name__}.{method}")
         _functions[key] = casadi.Function("law", [*x, symbols], casadi.cse([value, casadi.jacobian(value, x[wrt])]))
     function, parameters = _functions[key], [leaf.value for leaf in tree.leaves(thing)]
     if any(isinstance(value, np.ndarray) for value in parameters):

@@ -53,7 +53,7 @@ class ParameterError(InputError):
     """A parameter that is missing, misspelt, mistyped or physically impossible."""
 
 
-class UnknownName(InputError):
+class UnknownNameError(InputError):
     """No muscle, characteristic, component or paper of that name."""
 
 
@@ -61,15 +61,15 @@ class PhysicsError(AirmuscleError):
     """The question has no answer in this model."""
 
 
-class NoSolution(PhysicsError):
+class SolveError(PhysicsError):
     """No pressure, contraction or force satisfies the request."""
 
 
-class OutOfReach(PhysicsError):
+class GeometryLimitError(PhysicsError):
     """A contraction that the geometry cannot take."""
 
 
-class NoEquilibrium(PhysicsError):
+class EquilibriumError(PhysicsError):
     """A plant that cannot rest; the message names the muscle and the forces."""
 
 

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from .model import Parameter, parameters
+from .declaration import Parameter, parameters
 
 T = TypeVar("T")
 
@@ -61,7 +61,7 @@ def structure(thing: Any) -> Any:
     return (type(thing), *fields)
 
 
-def rebuild(thing: T, values: Sequence[Any]) -> T:
+def unflatten(thing: T, values: Sequence[Any]) -> T:
     """The same model with other leaf values, in the order of `leaves`; symbols are put in unchecked."""
     feed = iter(values)
     rebuilt: T = _rebuild(thing, feed)
@@ -89,7 +89,7 @@ def _rebuild(thing: Any, feed: Iterator[Any]) -> Any:
 
 def with_parameters(thing: T, values: Sequence[float]) -> T:
     """The same model with other leaf values, checked as if it were newly made."""
-    checked: T = _revalidated(rebuild(thing, [float(v) for v in values]))
+    checked: T = _revalidated(unflatten(thing, [float(v) for v in values]))
     return checked
 
 

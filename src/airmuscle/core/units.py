@@ -50,7 +50,7 @@ _SPELLING = {"pa": "Pa", "hpa": "hPa", "kpa": "kPa", "mpa": "MPa"}
 
 
 @dataclasses.dataclass(frozen=True)
-class Conversion:
+class UnitConversion:
     """How a column or number in some unit becomes SI: `value * factor + offset`."""
 
     factor: float
@@ -78,7 +78,7 @@ _TOWER = re.compile(r"(\*\*|\^)[\s\d()+-]*(\*\*|\^)|(\*\*|\^)\s*\(?\s*[-+]?\s*\d
 """Powers of powers and powers of ten or more: no unit has them, and working them out may never end."""
 
 
-def _by_pint(unit: str, target: str, where: str) -> Conversion:
+def _by_pint(unit: str, target: str, where: str) -> UnitConversion:
     import pint
 
     try:
@@ -92,14 +92,14 @@ def _by_pint(unit: str, target: str, where: str) -> Conversion:
         raise UnitError(
             f"{where}'{unit}' is no unit known here. Write it like 'mm', 'kPa', 'bara', 'N', '%' or 'm3/(s Pa)'."
         ) from None
-    return Conversion(float(one - zero), float(zero))
+    return UnitConversion(float(one - zero), float(zero))
 
 
 def _kind(target: str) -> str:
     return "a ratio" if target in ("1", "dimensionless") else f"'{target}'"
 
 
-def conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, where: str = "") -> Conversion:
+def conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, where: str = "") -> UnitConversion:
     """How values in `unit` become `target` (an SI unit; pressures become gauge).
 
     `where` opens the message of the UnitError raised for a unit that is unknown or measures something else.
@@ -110,19 +110,19 @@ def conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, whe
         return dataclasses.replace(conversion(unit, "Pa", ambient=0.0, where=where), assumed_gauge=False)
     unit, where = unit.strip(), f"{where}: " if where else ""
     if unit == target and target != "Pa":
-        return Conversion(1.0)
+        return UnitConversion(1.0)
     found = _GAUGE_OR_ABSOLUTE.match(unit)
     if found:
         if target != "Pa":
             raise UnitError(f"{where}unit '{unit}' is a pressure; a quantity in '{target}' was expected.")
         bare = _SPELLING.get(found["unit"].lower(), found["unit"].lower())
         absolute = found["kind"].lower().startswith("a")
-        return Conversion(conversion(bare, "Pa").factor, -ambient if absolute else 0.0)
+        return UnitConversion(conversion(bare, "Pa").factor, -ambient if absolute else 0.0)
     if unit in _FACTORS and {_FACTORS[unit][1], target} == {"1", "rad"}:  # pint takes an angle for a ratio
         raise UnitError(f"{where}unit '{unit}' cannot become {_kind(target)}: it measures something else.")
     if unit in _FACTORS and _FACTORS[unit][1] == target:
         factor = _FACTORS[unit][0]
-        return Conversion(factor, assumed_gauge=target == "Pa")
+        return UnitConversion(factor, assumed_gauge=target == "Pa")
     found_by_pint = _by_pint(unit or "dimensionless", "dimensionless" if target == "1" else target, where)
     return dataclasses.replace(found_by_pint, assumed_gauge=target == "Pa")
 

@@ -25,21 +25,21 @@ class Input:
 
     name: str
     unit: str = "1"
-    least: float = 0.0
-    greatest: float = 1.0
+    minimum: float = 0.0
+    maximum: float = 1.0
     meaning: str = "opening, 0 shut to 1 open"
 
 
-def renamed(prefix: str, variables: tuple[T, ...]) -> tuple[T, ...]:
+def add_prefix(prefix: str, variables: tuple[T, ...]) -> tuple[T, ...]:
     """The same variables, each with a prefix before its name."""
     return tuple(dataclasses.replace(variable, name=f"{prefix}{variable.name}") for variable in variables)
 
 
-def within(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
+def select_prefix(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
     """The values whose name begins with the prefix, by the rest of their names."""
     return {name.removeprefix(prefix): value for name, value in values.items() if name.startswith(prefix)}
 
 
-def outside(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
+def with_prefix(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
     """The values with a prefix before every name."""
     return {f"{prefix}{name}": value for name, value in values.items()}

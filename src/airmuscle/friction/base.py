@@ -6,7 +6,7 @@ import abc
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from ..core.model import model
+from ..core.declaration import model
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
@@ -40,7 +40,7 @@ class Friction(abc.ABC):
         """Force against the motion [N]."""
 
     @abc.abstractmethod
-    def replay(self, displacement: Any, time: Any = None) -> Any:
+    def force_along(self, displacement: Any, time: Any = None) -> Any:
         """Force [N] along a path [m] that starts with relaxed bristles; NumPy arrays of shape (N,).
 
         The motion is taken as straight from one row to the next: turning points must be rows. `time` [s] matters to
@@ -49,7 +49,7 @@ class Friction(abc.ABC):
 
     @property
     @abc.abstractmethod
-    def travel(self) -> float:
+    def presliding_distance(self) -> float:
         """Displacement from rest within which the force builds up [m], for figures and nominal sizes."""
 
     def relaxed(self) -> dict[str, Value]:
@@ -71,9 +71,9 @@ class NoFriction(Friction):
     def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
         return 0.0
 
-    def replay(self, displacement: Any, time: Any = None) -> Any:
+    def force_along(self, displacement: Any, time: Any = None) -> Any:
         return 0.0 * displacement
 
     @property
-    def travel(self) -> float:
+    def presliding_distance(self) -> float:
         return 0.0

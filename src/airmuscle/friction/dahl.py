@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from ..core import ops
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
@@ -39,10 +39,10 @@ class Dahl(Friction):
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
-        return (StateVariable("bristle", "m", self.travel, "deflection of the bristle"),)
+        return (StateVariable("bristle", "m", self.presliding_distance, "deflection of the bristle"),)
 
     @property
-    def travel(self) -> float:
+    def presliding_distance(self) -> float:
         return self.coulomb_force / self.stiffness
 
     def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
@@ -52,5 +52,5 @@ class Dahl(Friction):
     def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
         return self.stiffness * bristles["bristle"]
 
-    def replay(self, displacement: Any, time: Any = None) -> Any:
-        return self.stiffness * deflection(displacement, self.travel)
+    def force_along(self, displacement: Any, time: Any = None) -> Any:
+        return self.stiffness * deflection(displacement, self.presliding_distance)

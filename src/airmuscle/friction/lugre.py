@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from ..core import ops
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
@@ -53,10 +53,10 @@ class LuGre(Friction):
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
-        return (StateVariable("bristle", "m", self.travel, "mean deflection of the bristles"),)
+        return (StateVariable("bristle", "m", self.presliding_distance, "mean deflection of the bristles"),)
 
     @property
-    def travel(self) -> float:
+    def presliding_distance(self) -> float:
         return (self.coulomb_force + self.stribeck_force) / self.stiffness
 
     def sliding_force(self, speed: Value) -> Value:
@@ -71,9 +71,9 @@ class LuGre(Friction):
         bending = self.rates(bristles, speed)["bristle"]
         return self.stiffness * bristles["bristle"] + self.bristle_damping * bending + self.damping * speed
 
-    def replay(self, displacement: Any, time: Any = None) -> Any:
+    def force_along(self, displacement: Any, time: Any = None) -> Any:
         if time is None:
-            return self.stiffness * deflection(displacement, self.travel)
+            return self.stiffness * deflection(displacement, self.presliding_distance)
         speed = speeds(displacement, time)
         bend = deflection(displacement, self.sliding_force(speed) / self.stiffness)
         return self.force({"bristle": bend}, speed)

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from ..core import ops
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from ..core.model import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
@@ -55,7 +55,7 @@ def yielding(bend: Value, limit: Value, transition: Value, speed: Value) -> Valu
     return speed - sliding - sliding_back
 
 
-def refuse_uneven(owner: str, stiffnesses: Sequence[Value], limits: Sequence[Value]) -> None:
+def check_equal_lengths(owner: str, stiffnesses: Sequence[Value], limits: Sequence[Value]) -> None:
     """Raise ParameterError unless every element has a stiffness and a limit, one element at least."""
     if len(stiffnesses) != len(limits) or not limits:
         raise ParameterError(
@@ -88,7 +88,7 @@ class MaxwellSlip(Friction):
     )  # fmt: skip
 
     def check(self) -> None:
-        refuse_uneven("MaxwellSlip", self.stiffnesses, self.limits)
+        check_equal_lengths("MaxwellSlip", self.stiffnesses, self.limits)
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
@@ -98,7 +98,7 @@ class MaxwellSlip(Friction):
         )
 
     @property
-    def travel(self) -> float:
+    def presliding_distance(self) -> float:
         return max(self.limits)
 
     def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
@@ -114,5 +114,5 @@ class MaxwellSlip(Friction):
         """The exact deflection [m] of every element along a path, shape (N, elements)."""
         return stops(displacement, self.limits)
 
-    def replay(self, displacement: Any, time: Any = None) -> Any:
+    def force_along(self, displacement: Any, time: Any = None) -> Any:
         return self.terms(displacement) @ self.stiffnesses

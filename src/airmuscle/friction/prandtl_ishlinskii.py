@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from ..core import ops
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from ..core.model import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
 from .base import Friction
-from .maxwell_slip import refuse_uneven, yielding
+from .maxwell_slip import check_equal_lengths, yielding
 from .path import stops
 
 KUHNEN2003 = Reference(
@@ -66,7 +66,7 @@ class PrandtlIshlinskii(Friction):
     )  # fmt: skip
 
     def check(self) -> None:
-        refuse_uneven("PrandtlIshlinskii", self.stiffnesses, self.limits)
+        check_equal_lengths("PrandtlIshlinskii", self.stiffnesses, self.limits)
         if len(self.thresholds) != len(self.weights) or 0.0 in self.thresholds:
             raise ParameterError(
                 f"PrandtlIshlinskii: {len(self.thresholds)} thresholds and {len(self.weights)} weights; give one of "
@@ -89,7 +89,7 @@ class PrandtlIshlinskii(Friction):
         )
 
     @property
-    def travel(self) -> float:
+    def presliding_distance(self) -> float:
         return max(self.limits)
 
     def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
@@ -107,5 +107,5 @@ class PrandtlIshlinskii(Friction):
             total = total + weight * ops.where(threshold > 0, ops.maximum(beyond, 0.0), ops.minimum(beyond, 0.0))
         return total
 
-    def replay(self, displacement: Any, time: Any = None) -> Any:
+    def force_along(self, displacement: Any, time: Any = None) -> Any:
         return self.shaped(stops(displacement, self.limits) @ self.stiffnesses)

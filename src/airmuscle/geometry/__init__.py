@@ -1,8 +1,12 @@
-"""Enclosed volume and outline of a muscle, from its contraction."""
+"""Geometries: volume and outline of a muscle from its contraction."""
 
 from .base import Geometry
 from .braid import Braid
+from .catenary import Catenary
 from .chebyshev import ChebyshevGeometry
+from .circular_arc import CircularArc
+from .fibre_sum import EvenSpread, GivenSum, SumOverHalf, SumPastHalf
+from .parabola import Parabola, TrueArcParabola
 from .pleated import PleatedTube
 from .straight_fibre import StraightFibre
 from .tabulated import TabulatedGeometry
@@ -10,10 +14,18 @@ from .vessel import Vessel
 
 __all__ = [
     "Braid",
+    "Catenary",
     "ChebyshevGeometry",
+    "CircularArc",
+    "EvenSpread",
     "Geometry",
+    "GivenSum",
+    "Parabola",
     "PleatedTube",
     "StraightFibre",
+    "SumOverHalf",
+    "SumPastHalf",
     "TabulatedGeometry",
+    "TrueArcParabola",
     "Vessel",
 ]

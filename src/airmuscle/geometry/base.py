@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core import autodiff
-from ..core.errors import OutOfReach
+from ..core.errors import GeometryLimitError
 from ..core.ops import Value
 from ..core.reference import Reference
 
@@ -26,7 +26,7 @@ class Geometry(abc.ABC):
 
     @property
     @abc.abstractmethod
-    def contraction_reach(self) -> tuple[float, float]:
+    def contraction_range(self) -> tuple[float, float]:
         """The contractions [1] that this geometry can take."""
 
     @abc.abstractmethod
@@ -42,15 +42,15 @@ class Geometry(abc.ABC):
 
     def volume_growth(self, contraction: Value) -> Value:
         """dV/deps [m3], exact; virtual work makes p dV/deps / L0 the tension of an ideal muscle."""
-        return autodiff.slope(self, "volume", contraction)
+        return autodiff.derivative(self, "volume", contraction)
 
-    def refuse_out_of_reach(self, contraction: Value) -> None:
+    def check_contraction(self, contraction: Value) -> None:
         """Raise OutOfReach, naming the limits, for any contraction that this geometry cannot take."""
-        low, high = self.contraction_reach
+        low, high = self.contraction_range
         values = np.asarray(contraction, dtype=float)
         outside = ~((values >= low) & (values <= high))
         if outside.any():
-            raise OutOfReach(
+            raise GeometryLimitError(
                 f"{type(self).__name__} cannot take a contraction of {values[outside].flat[0]:.2%}; "
                 f"it reaches from {low:.2%} to {high:.2%}."
             )

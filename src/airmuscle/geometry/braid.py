@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core import ops
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from .base import Geometry
@@ -43,7 +43,7 @@ class Braid(Geometry):
     )
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
+    def contraction_range(self) -> tuple[float, float]:
         """From straight threads to a braid of no length."""
         return (1.0 - 1.0 / ops.cos(self.braid_angle), 1.0)
 
@@ -58,6 +58,6 @@ class Braid(Geometry):
         return self.radius * sine / ops.sin(self.braid_angle)
 
     def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        self.refuse_out_of_reach(contraction)
+        self.check_contraction(contraction)
         half = self.resting_length * (1.0 - contraction) / 2
         return np.linspace(-half, half, points), np.full(points, float(self.radius_at(contraction)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..core import ops
 from ..core.arrays import Array
-from ..core.model import model
+from ..core.declaration import model
 from ..core.ops import Value
 from .meridian import Meridian, Profile, Segment, volume_of
 from .stumpff import double_arc, stumpff, triple_arc

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core import ops
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from ..core.model import model, parameter
 from ..core.ops import Value
 from .base import Geometry
 
@@ -19,34 +19,38 @@ _PLACES = 1001
 class ChebyshevGeometry(Geometry):
     """V = Sum_k a_k T_k(x),   x = (2 eps - eps_low - eps_high)/(eps_high - eps_low).
 
-    T_k Chebyshev polynomials, by Clenshaw's scheme; outside the box the volume goes on by its tangent. The outline
+    T_k Chebyshev polynomials, by Clenshaw's scheme; outside the validity range the volume goes on by its tangent. The outline
     is the cylinder of this volume: draw the geometry it stands in for instead. `volume_error` and `growth_error`
     are the largest differences to that one in V and dV/deps, as `as_polynomial` measured them.
     """
 
     coefficients: tuple[float, ...] = parameter("m3", "a_k", "coefficients of the Chebyshev polynomials", fitted=False)
-    least_contraction: float = parameter("1", "eps_low", "lower end of the box in contraction", fitted=False)
-    greatest_contraction: float = parameter("1", "eps_high", "upper end of the box in contraction", fitted=False)
+    min_contraction: float = parameter("1", "eps_low", "lower end of the validity range in contraction", fitted=False)
+    max_contraction: float = parameter("1", "eps_high", "upper end of the validity range in contraction", fitted=False)
     resting_length: float = parameter(
         "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
     )
-    volume_error: float = parameter("m3", "dV", "largest error of the volume on the box", fitted=False, default=0.0)
-    growth_error: float = parameter("m3", "dV'", "largest error of dV/deps on the box", fitted=False, default=0.0)
+    volume_error: float = parameter(
+        "m3", "dV", "largest error of the volume on the validity range", fitted=False, default=0.0
+    )
+    growth_error: float = parameter(
+        "m3", "dV'", "largest error of dV/deps on the validity range", fitted=False, default=0.0
+    )
 
     def check(self) -> None:
-        if len(self.coefficients) < 2 or not self.least_contraction < self.greatest_contraction < 1.0:
+        if len(self.coefficients) < 2 or not self.min_contraction < self.max_contraction < 1.0:
             raise ParameterError(
-                f"ChebyshevGeometry: {len(self.coefficients)} coefficients on contractions {self.least_contraction:g} "
-                f"to {self.greatest_contraction:g}; it needs two coefficients at least and rising ends below 1."
+                f"ChebyshevGeometry: {len(self.coefficients)} coefficients on contractions {self.min_contraction:g} "
+                f"to {self.max_contraction:g}; it needs two coefficients at least and rising ends below 1."
             )
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
-        return (self.least_contraction, self.greatest_contraction)
+    def contraction_range(self) -> tuple[float, float]:
+        return (self.min_contraction, self.max_contraction)
 
     def volume(self, contraction: Value) -> Value:
-        half = (self.greatest_contraction - self.least_contraction) / 2
-        x = (contraction - self.least_contraction) / half - 1.0
+        half = (self.max_contraction - self.min_contraction) / 2
+        x = (contraction - self.min_contraction) / half - 1.0
         inner = ops.clip(x, -1.0, 1.0)
         value, slope = self._clenshaw(inner)
         return value + slope * (x - inner)
@@ -63,7 +67,7 @@ class ChebyshevGeometry(Geometry):
         return self.coefficients[0] + x * b - b_next, b + x * d - d_next
 
     def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        self.refuse_out_of_reach(contraction)
+        self.check_contraction(contraction)
         length = self.resting_length * (1.0 - contraction)
         radius = float(np.sqrt(self.volume(contraction) / (np.pi * length)))
         return np.linspace(-length / 2, length / 2, points), np.full(points, radius)
@@ -75,8 +79,8 @@ def as_polynomial(geometry: Geometry, degree: int = 16, reach: tuple[float, floa
     Interpolates at the Chebyshev points; the errors are measured at 1001 places. A growth that is infinite at zero
     contraction, as of straight fibres, needs a `reach` that begins above zero.
     """
-    low, high = reach or geometry.contraction_reach
-    geometry.refuse_out_of_reach([low, high])
+    low, high = reach or geometry.contraction_range
+    geometry.check_contraction([low, high])
     middle, half = (low + high) / 2, (high - low) / 2
     fit = np.polynomial.chebyshev.chebinterpolate(
         lambda x: geometry.volume(_inside(middle + half * x, low, high)), degree

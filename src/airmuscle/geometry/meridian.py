@@ -63,7 +63,7 @@ class Meridian(abc.ABC):
     """The curve that straight fibres are taken to follow, in one segment of fibre length l_0 and end radius r_0."""
 
     references: ClassVar[tuple[Reference, ...]] = (SAGA_2007,)
-    greatest_contraction: ClassVar[float] = 0.5
+    max_contraction: ClassVar[float] = 0.5
     """Past 50 % every outline has long passed its largest volume or, the parabola (3), its largest radius."""
 
     @abc.abstractmethod

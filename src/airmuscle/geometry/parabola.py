@@ -6,7 +6,7 @@ import numpy as np
 
 from ..core import ops
 from ..core.arrays import Array
-from ..core.model import model
+from ..core.declaration import model
 from ..core.ops import Value
 from .meridian import Meridian, Profile, Segment, volume_of
 

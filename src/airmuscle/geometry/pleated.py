@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.arrays import Array
-from ..core.model import model
+from ..core.declaration import model
 from ..core.ops import Value
 from ..core.reference import Reference
 from .meridian import Profile, Segment
@@ -57,7 +57,7 @@ class PleatedTube(FibreTube):
     traceable: ClassVar[bool] = False
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
+    def contraction_range(self) -> tuple[float, float]:
         """From straight fibres to half the length, less for a short tube; past `free_contraction` it must be pushed."""
         return (0.0, _reach(self._slenderness))
 
@@ -74,7 +74,7 @@ class PleatedTube(FibreTube):
         """The parameter, angle and integrals at a contraction [1], by a bracketed search for the parameter."""
         from scipy.optimize import elementwise
 
-        self.refuse_out_of_reach(contraction)
+        self.check_contraction(contraction)
         wanted = np.asarray(contraction, dtype=float)
 
         def surplus(root: Any, c: Any) -> Any:

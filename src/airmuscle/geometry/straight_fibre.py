@@ -7,22 +7,22 @@ import abc
 import numpy as np
 
 from ..core.arrays import Array
-from ..core.errors import OutOfReach, ParameterError
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
+from ..core.errors import GeometryLimitError, ParameterError
 from ..core.ops import Value
 from .base import Geometry
 from .circular_arc import CircularArc
 from .meridian import Meridian, Profile, Segment
 
 
-def refuse_beyond(contraction: Value, reach: tuple[float, float], owner: str, why: str = "") -> None:
+def check_limit(contraction: Value, reach: tuple[float, float], owner: str, why: str = "") -> None:
     """Raise OutOfReach, naming what is possible, for numbers outside `reach`; a traced contraction passes."""
     if not isinstance(contraction, float | int | np.ndarray | np.generic):
         return
     values = np.asarray(contraction, dtype=float)
     outside = ~((values >= reach[0]) & (values <= reach[1]))
     if outside.any():
-        raise OutOfReach(
+        raise GeometryLimitError(
             f"{owner} cannot take a contraction of {values[outside].flat[0]:.2%}; "
             f"it reaches from {reach[0]:.2%} to {reach[1]:.2%}{why}."
         )
@@ -75,7 +75,7 @@ class FibreTube(Geometry):
         return self.segments * self.segment(contraction).volume
 
     def outline(self, contraction: float, points: int = 201) -> Profile:
-        self.refuse_out_of_reach(contraction)
+        self.check_contraction(contraction)
         place = np.linspace(0.0, self.segments, points)
         number = np.minimum(np.floor(place), self.rings)
         axial, radius = self.profile(contraction, 2 * (place - number) - 1)
@@ -93,12 +93,12 @@ class StraightFibre(FibreTube):
     meridian: Meridian = CircularArc()
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
+    def contraction_range(self) -> tuple[float, float]:
         """From straight fibres to where the outline means nothing any more."""
-        return (0.0, self.meridian.greatest_contraction)
+        return (0.0, self.meridian.max_contraction)
 
     def segment(self, contraction: Value) -> Segment:
-        refuse_beyond(contraction, self.contraction_reach, "StraightFibre")
+        check_limit(contraction, self.contraction_range, "StraightFibre")
         return self.meridian.segment(contraction, self.fibre_length, self.end_radius)
 
     def profile(self, contraction: float, along: Array) -> Profile:

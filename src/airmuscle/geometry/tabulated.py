@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from ..core.model import model, parameter
 from ..core.ops import Value
 from .base import Geometry
 
@@ -39,15 +39,15 @@ class TabulatedGeometry(Geometry):
             )
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
+    def contraction_range(self) -> tuple[float, float]:
         return (self.contractions[0], self.contractions[-1])
 
     def volume(self, contraction: Value) -> Value:
-        self.refuse_out_of_reach(contraction)
+        self.check_contraction(contraction)
         return _curve(self)(contraction)[()]
 
     def volume_growth(self, contraction: Value) -> Value:
-        self.refuse_out_of_reach(contraction)
+        self.check_contraction(contraction)
         return _curve(self).derivative()(contraction)[()]
 
     def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from .base import Geometry
 
@@ -20,7 +20,7 @@ class Vessel(Geometry):
     )
 
     @property
-    def contraction_reach(self) -> tuple[float, float]:
+    def contraction_range(self) -> tuple[float, float]:
         return (-0.5, 0.9)
 
     def volume(self, contraction: Value) -> Value:
@@ -30,7 +30,7 @@ class Vessel(Geometry):
         return 0.0 * contraction
 
     def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        self.refuse_out_of_reach(contraction)
+        self.check_contraction(contraction)
         length = self.resting_length * (1.0 - contraction)
         radius = (self.enclosed_volume / (np.pi * length)) ** 0.5
         return np.linspace(-length / 2, length / 2, points), np.full(points, radius)

@@ -1,42 +1,42 @@
 """Parameters from measurements: `fit` and what it returns, `compare` and what stands around them."""
 
-from .band import Band, band
-from .bootstrap import Bootstrap, bootstrap
+from .bootstrapping import Bootstrap, bootstrap
 from .candidates import Candidate, standard_candidates
 from .censoring import UNCENSORED, Censoring
-from .compare import Comparison, compare
-from .convert import Conversion, convert
-from .fit import fit
-from .leave_out import Blocks, LeaveOut, Levels, Runs, Specimens
+from .confidence_bands import Band, confidence_band
+from .conversion import ModelConversion, convert
+from .cross_validation import BlockSplit, GroupSplit, LevelSplit, RunSplit, SpecimenSplit
 from .loss import Huber, LeastSquares, Loss, SoftL1
-from .profile import Profile, profile, weakly_determined
+from .model_selection import Comparison, compare
+from .profile_likelihood import ProfileLikelihood, profile, weakly_determined
 from .result import Estimate, Fit
+from .static_fit import fit
 from .surface.shape import ShapedFit, fit_shaped, shape_breaks
 
 __all__ = [
     "UNCENSORED",
     "Band",
-    "Blocks",
+    "BlockSplit",
     "Bootstrap",
     "Candidate",
     "Censoring",
     "Comparison",
-    "Conversion",
     "Estimate",
     "Fit",
+    "GroupSplit",
     "Huber",
     "LeastSquares",
-    "LeaveOut",
-    "Levels",
+    "LevelSplit",
     "Loss",
-    "Profile",
-    "Runs",
+    "ModelConversion",
+    "ProfileLikelihood",
+    "RunSplit",
     "ShapedFit",
     "SoftL1",
-    "Specimens",
-    "band",
+    "SpecimenSplit",
     "bootstrap",
     "compare",
+    "confidence_band",
     "convert",
     "fit",
     "fit_shaped",

@@ -41,7 +41,7 @@ class Candidate:
 
 
 @dataclasses.dataclass(frozen=True)
-class Sizes:
+class DataScales:
     """What start values are scaled by."""
 
     force: float
@@ -53,7 +53,7 @@ class Sizes:
     """How many different ones."""
 
     @classmethod
-    def of(cls, recordings: Sequence[Recording]) -> Sizes:
+    def of(cls, recordings: Sequence[Recording]) -> DataScales:
         """Of all rows of all recordings."""
         force, pressure, contraction = (
             max(float(np.nanmax(run[name])) for run in recordings) for name in ("force", "pressure", "contraction")
@@ -72,7 +72,7 @@ class Sizes:
 
 def standard_candidates(recordings: Sequence[Recording]) -> tuple[Candidate, ...]:
     """Every law that can be started from data alone; those that need a length, where the recordings state it."""
-    sizes = Sizes.of(recordings)
+    sizes = DataScales.of(recordings)
     found = [Candidate(f"surface of degree {n}", surface(n, 2 * sizes.force)) for n in range(1, 7)]
     found += [_sarosi(sizes), _hunt(sizes)]
     if sizes.length is not None:
@@ -82,12 +82,12 @@ def standard_candidates(recordings: Sequence[Recording]) -> tuple[Candidate, ...
     return tuple(found)
 
 
-def surface(degree: int, greatest_force: float = _WIDE) -> ContractileSurface:
+def surface(degree: int, max_force: float = _WIDE) -> ContractileSurface:
     """A surface without coefficients yet, and with no clamp among the points."""
-    return ContractileSurface.blank(degree, greatest_force=max(greatest_force, 1.0))
+    return ContractileSurface.blank(degree, max_force=max(max_force, 1.0))
 
 
-def _sarosi(sizes: Sizes) -> Candidate:
+def _sarosi(sizes: DataScales) -> Candidate:
     scale = sizes.force / 1500.0  # of a DMSP-20, whose measured map these values fit
     by_pressure = scale * 6e5 / sizes.pressure
     return Candidate(
@@ -96,14 +96,14 @@ def _sarosi(sizes: Sizes) -> Candidate:
     )
 
 
-def _hunt(sizes: Sizes) -> Candidate:
+def _hunt(sizes: DataScales) -> Candidate:
     scale = 450.0 / sizes.force  # the printed values are of a 10 mm muscle, which pulls about so much
     greatest = min(max(sizes.contraction, 0.02), 0.5)
     law = Hunt2017(greatest, span_by_force=0.331e-3 * scale * greatest / 0.17, by_force=1.23e3 * scale)
     return Candidate("Hunt2017", law)
 
 
-def _of_a_length(sizes: Sizes, length: float) -> list[Candidate]:
+def _of_a_length(sizes: DataScales, length: float) -> list[Candidate]:
     braid = Braid(sizes.radius, _ANGLE, length)
     # The modulus of a DMSP-10 in terms of L/L_0; the wall's thickness only multiplies it, so that it stays.
     modulus = (74.085e6, -172.3e6 / length, 114.8e6 / length**2, -13.26e6 / length**3)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ..characteristic.base import Characteristic, ForceLaw
 from ..recording import Recording
-from ..recording.segment import sensors
+from ..recording.segment import estimate_sensors
 from .weights import deviations
 
 
@@ -19,17 +19,17 @@ from .weights import deviations
 class Censoring:
     """The range of force [N] within which a point was measured; at its ends, and beyond, it was cut off.
 
-    A row at or below `least_force` says that the muscle, could it push, would give this much or less; a row at
-    or above `greatest_force` that it would give this much or more. A fit counts such a row only where the law
-    contradicts it. Give the resolution of the sensor as `least_force` where slack rows read a little more than 0.
+    A row at or below `min_force` says that the muscle, could it push, would give this much or less; a row at
+    or above `max_force` that it would give this much or more. A fit counts such a row only where the law
+    contradicts it. Give the resolution of the sensor as `min_force` where slack rows read a little more than 0.
     """
 
-    least_force: float = 0.0
-    greatest_force: float = math.inf
+    min_force: float = 0.0
+    max_force: float = math.inf
 
     def sides(self, force: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """By row: 0 measured, 1 cut off below (the truth is less), -1 cut off above."""
-        return (force <= self.least_force) * 1.0 - (force >= self.greatest_force) * 1.0
+        return (force <= self.min_force) * 1.0 - (force >= self.max_force) * 1.0
 
 
 UNCENSORED = Censoring(-math.inf, math.inf)
@@ -43,7 +43,7 @@ def censoring_of(law: Characteristic) -> Censoring:
     """
     if not isinstance(law, ForceLaw):
         return UNCENSORED
-    return Censoring(getattr(law, "least_force", 0.0), getattr(law, "greatest_force", math.inf))
+    return Censoring(getattr(law, "min_force", 0.0), getattr(law, "max_force", math.inf))
 
 
 def within_sensor(censoring: Censoring, law: Characteristic, runs: Sequence[Recording]) -> Censoring:
@@ -54,8 +54,8 @@ def within_sensor(censoring: Censoring, law: Characteristic, runs: Sequence[Reco
     timed = bool(runs) and all("time" in run.columns and "force" in run.columns and len(run) for run in runs)
     if not isinstance(law, ForceLaw) or not timed or deviations(runs, "force") is not None:
         return censoring
-    sensor = sensors(runs)["force"]
+    sensor = estimate_sensors(runs)["force"]
     near = 0.25 * sensor.resolution
     return Censoring(
-        max(censoring.least_force, sensor.least + near), min(censoring.greatest_force, sensor.greatest - near)
+        max(censoring.min_force, sensor.lower_limit + near), min(censoring.max_force, sensor.upper_limit - near)
     )

@@ -41,7 +41,7 @@ class Huber(Loss):
     scale: float
 
     def __post_init__(self) -> None:
-        _refuse_scale(self)
+        _check_scale(self)
 
     def rho(self, z: Array) -> Array:
         root = np.sqrt(np.maximum(z, 1.0))
@@ -56,14 +56,14 @@ class SoftL1(Loss):
     scale: float
 
     def __post_init__(self) -> None:
-        _refuse_scale(self)
+        _check_scale(self)
 
     def rho(self, z: Array) -> Array:
         root = np.sqrt(1.0 + z)
         return np.stack([2 * (root - 1), 1 / root, -0.5 / root**3])
 
 
-def _refuse_scale(loss: Loss) -> None:
+def _check_scale(loss: Loss) -> None:
     if not 0 < loss.scale < np.inf:
         raise ParameterError(
             f"{type(loss).__name__}.scale is {loss.scale!r}; it must be greater than zero, in the unit of the fitted "

@@ -51,10 +51,10 @@ def by_specimen(law: Any, data: Recording) -> list[tuple[Any, npt.NDArray[np.int
 def _of_length(law: Any, length: float) -> Any:
     """As `law.of_length`, but unchecked: a search may pass where the law has no meaning."""
     leaves = tree.leaves(law)
-    return tree.rebuild(law, [length if leaf.path == RESTING_LENGTH else leaf.value for leaf in leaves])
+    return tree.unflatten(law, [length if leaf.path == RESTING_LENGTH else leaf.value for leaf in leaves])
 
 
-def answers(law: Any, method: str, arguments: tuple[str, str], data: Recording) -> Array:
+def evaluate(law: Any, method: str, arguments: tuple[str, str], data: Recording) -> Array:
     """What a law, or that of each length, gives at every row; shape (N,)."""
     found = np.zeros(len(data))
     for specimen, rows in by_specimen(law, data):
@@ -71,7 +71,7 @@ def direction_of(law: Characteristic) -> Direction:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Problem:
+class FitProblem:
     """N points and the P parameters to be found from them."""
 
     law: Any
@@ -121,9 +121,9 @@ class Problem:
 
     def modelled(self, values: Array) -> Array:
         """What the law gives with these parameters; shape (N,)."""
-        law = tree.rebuild(self.law, self.leaf_values(values))
+        law = tree.unflatten(self.law, self.leaf_values(values))
         with np.errstate(all="ignore"):  # what is not finite is refused, or the search steps back from it
-            return answers(law, self.direction.method, self.direction.arguments, self.data)
+            return evaluate(law, self.direction.method, self.direction.arguments, self.data)
 
     def errors(self, modelled: Array) -> Array:
         """Weighted errors; a row that was cut off has one only where the law contradicts it."""
@@ -137,7 +137,7 @@ class Problem:
     def slopes(self, values: Array) -> Array:
         """The derivatives of `modelled` by the free parameters, shape (N, P): exact where the law can be traced."""
         if _can_be_traced(self.law):
-            law = tree.rebuild(self.law, self.leaf_values(values))
+            law = tree.unflatten(self.law, self.leaf_values(values))
             found = np.empty((len(self.data), len(self.leaves)))
             for specimen, rows in by_specimen(law, self.data):
                 arguments = (values[rows] for values in self.arguments)
@@ -167,28 +167,30 @@ def _can_be_traced(thing: Any) -> bool:
     return autodiff.is_traceable(kind) and all(_can_be_traced(item) for item in inside)
 
 
-def pose(law: Characteristic, data: Recording, censoring: Censoring, weights: Array, fixed: Collection[str]) -> Problem:
+def make_problem(
+    law: Characteristic, data: Recording, censoring: Censoring, weights: Array, fixed: Collection[str]
+) -> FitProblem:
     """The problem of fitting a law to points. Raises IdentificationError where it cannot be posed."""
     direction = direction_of(law)
     sides = censoring.sides(data["force"])
     goal = data[direction.quantity]
     if direction is FORCE:
-        goal = np.where(sides > 0, censoring.least_force, np.where(sides < 0, censoring.greatest_force, goal))
+        goal = np.where(sides > 0, censoring.min_force, np.where(sides < 0, censoring.max_force, goal))
     elif direction is PRESSURE:
         sides = -sides  # where the force is less than stated, the pressure that would hold it is more
     leaves = tuple(tree.leaves(law))
-    _refuse_unknown(law, leaves, fixed)
+    _check_known(law, leaves, fixed)
     free = tuple(i for i, leaf in enumerate(leaves) if leaf.declared.fitted and not _is_fixed(leaf, fixed))
     measured = int(np.count_nonzero(sides == 0))
-    _refuse_too_few(law, data, len(free), measured)
-    return Problem(law, direction, data, goal, sides, weights, leaves, free)
+    _check_row_count(law, data, len(free), measured)
+    return FitProblem(law, direction, data, goal, sides, weights, leaves, free)
 
 
 def _is_fixed(leaf: Leaf, fixed: Collection[str]) -> bool:
     return leaf.path in fixed or leaf.path.partition("[")[0] in fixed
 
 
-def _refuse_unknown(law: Characteristic, leaves: Sequence[Leaf], fixed: Collection[str]) -> None:
+def _check_known(law: Characteristic, leaves: Sequence[Leaf], fixed: Collection[str]) -> None:
     known = list(dict.fromkeys(name for leaf in leaves for name in (leaf.path.partition("[")[0], leaf.path)))
     for name in fixed:
         if name not in known:
@@ -199,7 +201,7 @@ def _refuse_unknown(law: Characteristic, leaves: Sequence[Leaf], fixed: Collecti
             )
 
 
-def _refuse_too_few(law: Characteristic, data: Recording, free: int, measured: int) -> None:
+def _check_row_count(law: Characteristic, data: Recording, free: int, measured: int) -> None:
     name = f"{data.origin}: {type(law).__name__}"
     if free == 0:
         raise IdentificationError(f"{name} has no parameter left to be fitted. Hold fewer fixed.")

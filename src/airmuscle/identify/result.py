@@ -10,13 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from ..characteristic.base import Characteristic
-from ..characteristic.box import Box
+from ..characteristic.validity_range import ValidityRange
 from ..core.arrays import Array
 from ..core.errors import ParameterError, suggestion
 from ..recording import Recording
 from .correlation_index import CorrelationIndex
 from .loss import Loss
-from .problem import CONTRACTION, FORCE, Direction, Problem, answers
+from .problem import CONTRACTION, FORCE, Direction, FitProblem, evaluate
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,14 +26,14 @@ class Estimate:
     name: str
     label: str
     value: float
-    deviation: float
+    stderr: float
     unit: str
     meaning: str
     on_bound: bool
 
 
 @dataclasses.dataclass(frozen=True)
-class Extreme:
+class WorstPoint:
     """The greatest error, model less measured, and the point where it occurs, all SI."""
 
     error: float
@@ -47,7 +47,7 @@ class Fit:
     """A fitted characteristic with its pedigree; `print` it, or `.plot()` it.
 
     Errors are compared in the quantity that the law gives. `rmse`, `index` and `sigma` are over the rows that
-    were measured, `greatest_error` over all rows: those cut off at the ends of the range of force have an error
+    were measured, `max_error` over all rows: those cut off at the ends of the range of force have an error
     only where the law contradicts them.
     """
 
@@ -61,7 +61,7 @@ class Fit:
     sigma: float
     """Standard deviation of the errors, N - P in the denominator."""
     rmse: float
-    greatest_error: Extreme
+    max_error: WorstPoint
     index: CorrelationIndex | None
     """1 - SSE/SST and its root; None where the measured values do not vary."""
     rows_censored: int
@@ -71,7 +71,7 @@ class Fit:
     direction: Direction
     sides: npt.NDArray[np.float64]
     """By row: 0 measured, else cut off: the model may lie below (1) or above (-1)."""
-    problem: Problem
+    problem: FitProblem
     """What was posed, for refits: points, goals, weights and the free parameters."""
     loss: Loss
     notes: tuple[str, ...] = ()
@@ -95,7 +95,7 @@ class Fit:
 
     @property
     def standard_deviations(self) -> Array:
-        return np.array([estimate.deviation for estimate in self.estimates])
+        return np.array([estimate.stderr for estimate in self.estimates])
 
     @property
     def covariance(self) -> Array:
@@ -120,7 +120,7 @@ class Fit:
     @property
     def modelled(self) -> Array:
         """What the fitted model gives at the rows that were used, as a user of it sees it: clamped."""
-        return answers(self.model, self.direction.quantity, self.direction.arguments, self.recording)
+        return evaluate(self.model, self.direction.quantity, self.direction.arguments, self.recording)
 
     @property
     def errors(self) -> Array:
@@ -134,10 +134,10 @@ class Fit:
         return {name: (float(values.min()), float(values.max())) for name, values in columns}
 
     @property
-    def box(self) -> Box:
-        """The box of validity in pressure and contraction. Raises ParameterError where either did not vary."""
+    def validity_range(self) -> ValidityRange:
+        """The validity range of validity in pressure and contraction. Raises ParameterError where either did not vary."""
         ranges = self.ranges
-        return Box(*ranges["pressure"], *ranges["contraction"])
+        return ValidityRange(*ranges["pressure"], *ranges["contraction"])
 
     def plot(self) -> Any:
         """Model against measurement, and the errors over it; a Matplotlib figure."""
@@ -156,7 +156,7 @@ class Fit:
 
     def summary(self) -> list[tuple[str, str]]:
         """The figures of the fit as lines of name and text with units."""
-        worst = self.greatest_error
+        worst = self.max_error
         place = f"at {worst.pressure / 1e3:.4g} kPa, {worst.contraction:.2%}, {worst.force:.4g} N"
         index = "not defined: the measured values do not vary" if self.index is None else str(self.index)
         r2 = f"{self.r2:.6f}" if self.r2 is not None else "not defined"
@@ -196,4 +196,4 @@ class Fit:
 def _twice(estimate: Estimate) -> str:
     if estimate.on_bound:
         return "on bound"
-    return f"{2 * estimate.deviation:.3g}" if np.isfinite(estimate.deviation) else "unknown"
+    return f"{2 * estimate.stderr:.3g}" if np.isfinite(estimate.stderr) else "unknown"

@@ -10,10 +10,10 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
 from ..core.tree import Leaf
+from .censored_least_squares import least_squares_of, measured_alone_determine
 from .loss import LeastSquares, Loss
-from .one_sided import least_squares_of, measured_alone_determine
-from .problem import Problem
-from .separable import linear_leaves, projected_start
+from .problem import FitProblem
+from .variable_projection import linear_leaves, projected_start
 
 SEARCHES = (("trf", 100), ("dogbox", 500), ("trf", 500))
 """Methods of a fit, each after its iterations where the one before did not settle; the last gives up (chosen).
@@ -34,7 +34,7 @@ class Solution(NamedTuple):
     slopes: Array
 
 
-def solve(problem: Problem, loss: Loss, start: Array | None = None) -> Solution:
+def solve(problem: FitProblem, loss: Loss, start: Array | None = None) -> Solution:
     """The free parameters that make the loss least. Raises IdentificationError where the search fails.
 
     It begins at `start`, which a refit knows; without it, at the best of several places where the law allows that.
@@ -51,20 +51,20 @@ def solve(problem: Problem, loss: Loss, start: Array | None = None) -> Solution:
     return _solve_linear(_reweighted(problem, loss, robust))
 
 
-def _reweighted(problem: Problem, loss: Loss, solution: Solution) -> Problem:
+def _reweighted(problem: FitProblem, loss: Loss, solution: Solution) -> FitProblem:
     """The problem of which a robust solution is the least-squares one: every square weighted by rho' there."""
     slope = loss.rho((problem.errors(solution.modelled) / loss.scale) ** 2)[1]
     return dataclasses.replace(problem, weights=problem.weights * np.sqrt(slope))
 
 
-def is_linear(problem: Problem) -> bool:
+def is_linear(problem: FitProblem) -> bool:
     """Whether the law is linear in all that is to be found, and nothing bounds it."""
     leaves: list[Leaf] = [problem.leaves[i] for i in problem.free]
     unbounded = all(leaf.declared.bounds == (-np.inf, np.inf) for leaf in leaves)
     return unbounded and bool(linear_leaves(problem).all())
 
 
-def design(problem: Problem) -> tuple[Array, Array]:
+def design(problem: FitProblem) -> tuple[Array, Array]:
     """Matrix (N, P) and constant part (N,) of a law linear in its free parameters."""
     basis = getattr(problem.law, "basis", None)
     if basis is not None and len(problem.free) == len(problem.law.terms):
@@ -73,13 +73,13 @@ def design(problem: Problem) -> tuple[Array, Array]:
     return matrix, problem.modelled(problem.start) - matrix @ problem.start
 
 
-def _solve_linear(problem: Problem) -> Solution:
+def _solve_linear(problem: FitProblem) -> Solution:
     slopes, constant = design(problem)
     values = least_squares_of(problem, slopes, constant)
     return Solution(values, slopes @ values + constant, slopes)
 
 
-def _solve_iterating(problem: Problem, loss: Loss, start: Array) -> Solution:
+def _solve_iterating(problem: FitProblem, loss: Loss, start: Array) -> Solution:
     """Bounded trust-region least squares, parameters and errors brought to the order of one."""
     from scipy.optimize import least_squares
 
@@ -87,7 +87,7 @@ def _solve_iterating(problem: Problem, loss: Loss, start: Array) -> Solution:
     start = np.clip(start, low, high)
     scale = np.where(start != 0, np.abs(start), np.where(np.isfinite(high - low), high - low, 1.0))
     spread = float(np.ptp(problem.goal)) or float(np.max(np.abs(problem.goal))) or 1.0
-    _refuse_non_finite(problem, start)
+    _check_finite(problem, start)
 
     def errors(scaled: Array) -> Array:
         return problem.errors(problem.modelled(scaled * scale)) / spread
@@ -135,7 +135,7 @@ def _is_least(result: Any) -> bool:
     return bool(squares / size <= _OFFSET**2 * (2 * result.cost - squares) / spare)
 
 
-def _refuse_non_finite(problem: Problem, start: Array) -> None:
+def _check_finite(problem: FitProblem, start: Array) -> None:
     values = problem.modelled(start)
     bad = ~np.isfinite(values)
     if bad.any():
@@ -148,7 +148,7 @@ def _refuse_non_finite(problem: Problem, start: Array) -> None:
         )
 
 
-def _no_end(problem: Problem) -> IdentificationError:
+def _no_end(problem: FitProblem) -> IdentificationError:
     steps = sum(most for _, most in SEARCHES)
     return IdentificationError(
         f"{problem.data.origin}: the fit of {type(problem.law).__name__} did not settle in {steps} steps. Start from "

@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
+from .censored_least_squares import RANK_TOLERANCE, measured_rank
 from .loss import Loss
-from .one_sided import RANK_TOLERANCE, measured_rank
-from .problem import Problem
+from .problem import FitProblem
 from .solve import Solution
 
 
@@ -31,7 +31,7 @@ class Statistics:
     on_bound: npt.NDArray[np.bool_]
 
 
-def statistics(problem: Problem, solution: Solution, loss: Loss) -> Statistics:
+def statistics(problem: FitProblem, solution: Solution, loss: Loss) -> Statistics:
     """Statistics of a solution. Raises IdentificationError where parameters cannot be told apart."""
     values, modelled, slopes = solution
     on_bound = _on_bound(problem, values)
@@ -60,7 +60,7 @@ def statistics(problem: Problem, solution: Solution, loss: Loss) -> Statistics:
     return Statistics(singular.size, measured, condition, scatter, deviations, correlations, on_bound)
 
 
-def _on_bound(problem: Problem, values: Array) -> npt.NDArray[np.bool_]:
+def _on_bound(problem: FitProblem, values: Array) -> npt.NDArray[np.bool_]:
     """Which parameters were stopped by a bound; the search keeps a hair's breadth away from it."""
     low, high = problem.bounds
     near = 1e-6 * np.maximum(np.abs(values), np.abs(problem.start))
@@ -81,7 +81,7 @@ def _scatter(errors: Array, parameters: int, loss: Loss) -> float:
     return float(np.sqrt(np.sum((errors * first) ** 2) / spare) / np.mean(first + 2 * z * second))
 
 
-def _indistinct(problem: Problem, kept: npt.NDArray[np.bool_], shares: Array, rank: int) -> str:
+def _indistinct(problem: FitProblem, kept: npt.NDArray[np.bool_], shares: Array, rank: int) -> str:
     labels = [label for label, keep in zip(problem.labels, kept, strict=True) if keep]
     names = [label for label, share in zip(labels, shares, strict=True) if share > 1e-3 * shares.max()]
     first, second = problem.direction.arguments

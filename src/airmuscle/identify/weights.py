@@ -9,7 +9,7 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.errors import ColumnError
 from ..recording import Recording
-from ..recording.segment import sensors
+from ..recording.segment import estimate_sensors
 
 APART = 2.0
 """Ratio of neighbouring deviations from which on two sensors differ (chosen: one sensor's estimates scatter less)."""
@@ -49,7 +49,7 @@ def _deviation(run: Recording, quantity: str, timed: bool) -> float:
     values = run[quantity][np.isfinite(run[quantity])]
     if not values.size:
         return 0.0
-    sensor = sensors(Recording({quantity: values}, run.origin)).get(quantity)
+    sensor = estimate_sensors(Recording({quantity: values}, run.origin)).get(quantity)
     if sensor is None:
         return 0.0
     return sensor.deviation if timed else float(sensor.resolution / np.sqrt(12.0))

@@ -15,13 +15,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ..core.declaration import Parameter, check_field, parameters
 from ..core.errors import ParameterError
-from ..core.model import Parameter, field_or_suggestion, parameters
+from .location import Location, check_keys, located_errors, number, text
 from .models import model_class
-from .place import Place, number, refuse_unknown, said_at, text
 
 
-def build(table: Mapping[str, Any], place: Place, ready: Mapping[str, Any] | None = None) -> Any:
+def build(table: Mapping[str, Any], place: Location, ready: Mapping[str, Any] | None = None) -> Any:
     """The model that a table describes. Raises ParameterError, UnitError or UnknownName, saying where.
 
     `ready` holds fields that are models already and so do not stand in the table.
@@ -35,32 +35,32 @@ def build(table: Mapping[str, Any], place: Place, ready: Mapping[str, Any] | Non
     cls = model_class(table["model"], f"{place}, model")
     given = {key: value for key, value in table.items() if key != "model"}
     for key in given:
-        with said_at(place):
-            field_or_suggestion(cls, key)
+        with located_errors(place):
+            check_field(cls, key)
     declared = {p.name: p for p in parameters(cls)}
     hints = typing.get_type_hints(cls)
-    _refuse_missing(cls, {**given, **(ready or {})}, hints, place)
+    _check_present(cls, {**given, **(ready or {})}, hints, place)
     values = {
         key: _numbers(value, declared[key], hints[key], place)
         if key in declared
         else _part(value, hints[key], key, place)
         for key, value in given.items()
     }
-    with said_at(place):
+    with located_errors(place):
         return cls(**values, **(ready or {}))
 
 
-def _from_catalogue(table: Mapping[str, Any], place: Place) -> Any:
+def _from_catalogue(table: Mapping[str, Any], place: Location) -> Any:
     """A valve of the catalogue, or of a file beside the one that names it."""
     from .valve_catalogue import PATHS, load_valve  # which is built from tables itself
 
-    refuse_unknown(table, ("library", "path"), place)
+    check_keys(table, ("library", "path"), place)
     name, path = (text({"path": PATHS[0], **table}, key, place, needed=True) for key in ("library", "path"))
-    with said_at(place):
+    with located_errors(place):
         return load_valve(place.folder / name if name.endswith(".toml") else name).along(path)
 
 
-def _refuse_missing(cls: type[Any], given: Mapping[str, Any], hints: Mapping[str, Any], place: Place) -> None:
+def _check_present(cls: type[Any], given: Mapping[str, Any], hints: Mapping[str, Any], place: Location) -> None:
     for field in dataclasses.fields(cls):
         optional = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
         if not field.init or optional or field.name in given:
@@ -72,7 +72,7 @@ def _refuse_missing(cls: type[Any], given: Mapping[str, Any], hints: Mapping[str
         raise ParameterError(f"{place}: {cls.__name__} needs '{field.name}' {what}; it is missing.")
 
 
-def _numbers(value: Any, declared: Parameter, hint: Any, place: Place) -> Any:
+def _numbers(value: Any, declared: Parameter, hint: Any, place: Location) -> Any:
     """A declared parameter: one number, or a tuple of them where the model has a tuple."""
     where = f"{place}, {declared.name}"
     many = typing.get_origin(hint) is tuple
@@ -98,12 +98,12 @@ def _column(value: Mapping[str, Any], where: str, folder: Path) -> tuple[float, 
 
     if set(value) != {"file", "column"} or not all(isinstance(v, str) for v in value.values()):
         raise ParameterError(f'{where}: a column of a file is written {{ file = "data/map.csv", column = "force" }}.')
-    with said_at(where):
+    with located_errors(where):
         recording = read_csv(folder / value["file"])
         return tuple(float(v) for v in recording[value["column"]])
 
 
-def _part(value: Any, hint: Any, key: str, place: Place) -> Any:
+def _part(value: Any, hint: Any, key: str, place: Location) -> Any:
     """A field that is structure: a model, a tuple of models, a whole number, a name, true or false."""
     inner = place.inside(key)
     if isinstance(value, Mapping):

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..core.errors import AirmuscleWarning, FileError, UnknownName, suggestion
+from ..core.errors import AirmuscleWarning, FileError, UnknownNameError, suggestion
 from .entry import Check, Entry
 from .read import entry_from
 from .write import save, to_toml
@@ -21,14 +21,23 @@ if TYPE_CHECKING:
     from ..recording import Recording
 
 __all__ = [
-    "Check", "Entry", "complete", "load", "measured", "measured_names", "names", "parsed", "save", "to_toml",
+    "Check",
+    "Entry",
+    "complete",
+    "list_library",
+    "load",
+    "load_data",
+    "measured_names",
+    "parsed",
+    "save",
+    "to_toml",
 ]  # fmt: skip
 
 FOLDER = Path(__file__).parent
 DATA = FOLDER / "data"
 
 
-def names() -> tuple[str, ...]:
+def list_library() -> tuple[str, ...]:
     """The names of all library entries, sorted."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
@@ -46,14 +55,14 @@ def load(name_or_path: str | Path) -> Entry:
     """
     text = str(name_or_path)
     is_path = isinstance(name_or_path, Path) or text.endswith(".toml") or "/" in text or "\\" in text
-    path = Path(name_or_path) if is_path else FOLDER / f"{complete(text, names(), 'library entry')}.toml"
+    path = Path(name_or_path) if is_path else FOLDER / f"{complete(text, list_library(), 'library entry')}.toml"
     entry = entry_from(parsed(path), path.stem, path if is_path else Path(path.name), path.parent)
     if entry.warning:
         warnings.warn(f"{entry.name}: {entry.warning}", AirmuscleWarning, stacklevel=2)
     return entry
 
 
-def measured(name: str) -> Recording:
+def load_data(name: str) -> Recording:
     """A data set that comes with the library, by its name or a unique beginning of it.
 
     The head of its file, with source and licence, is the last of the Recording's notes.
@@ -74,9 +83,9 @@ def complete(name: str, known: Iterable[str], kind: str) -> str:
         return name
     found = [candidate for candidate in known if name and candidate.startswith(name)]
     if len(found) > 1:
-        raise UnknownName(f"'{name}' is the beginning of several: {', '.join(found)}. Write more of it.")
+        raise UnknownNameError(f"'{name}' is the beginning of several: {', '.join(found)}. Write more of it.")
     if not found:
-        raise UnknownName(f"no {kind} '{name}'; there are {', '.join(known)}.{suggestion(name, known)}")
+        raise UnknownNameError(f"no {kind} '{name}'; there are {', '.join(known)}.{suggestion(name, known)}")
     return found[0]
 
 

@@ -6,8 +6,8 @@ import dataclasses
 from typing import TYPE_CHECKING
 
 from ..characteristic.base import Characteristic, ForceLaw
-from ..characteristic.box import Box
-from ..core.errors import UnknownName
+from ..characteristic.validity_range import ValidityRange
+from ..core.errors import UnknownNameError
 from ..core.reference import Reference
 from ..geometry.base import Geometry
 
@@ -34,13 +34,13 @@ class Check:
 class Entry:
     """One library file: a muscle or a law as it was read, all numbers SI.
 
-    `trust` says how the numbers came here (printed, measured, second hand, fitted, chosen), `warning` what a user
-    must know before using it, and `box` where the entry was measured or printed, when the file says so.
+    `provenance` says how the numbers came here (printed, measured, second hand, fitted, chosen), `warning` what a user
+    must know before using it, and `validity_range` where the entry was measured or printed, when the file says so.
     """
 
     name: str
     title: str
-    trust: str
+    provenance: str
     characteristic: Characteristic
     geometry: Geometry | None = None
     spring: Spring | None = None
@@ -52,7 +52,7 @@ class Entry:
     creep: CreepElements | None = None
     note: str = ""
     warning: str = ""
-    box: Box | None = None
+    validity_range: ValidityRange | None = None
     checks: tuple[Check, ...] = ()
     references: tuple[Reference, ...] = ()
 
@@ -67,6 +67,6 @@ class Entry:
                 if self.geometry is None
                 else "a law solved for the force: see as_force_law"
             )
-            raise UnknownName(f"{self.name} is a characteristic, not yet a muscle; it lacks {lack}.")
+            raise UnknownNameError(f"{self.name} is a characteristic, not yet a muscle; it lacks {lack}.")
         given = {part: getattr(self, part) for part in OPTIONAL if getattr(self, part) is not None}
-        return Muscle(self.characteristic, self.geometry, box=self.box, **given)
+        return Muscle(self.characteristic, self.geometry, validity_range=self.validity_range, **given)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from .catalogue import complete, load, names, parsed
+from .catalogue import complete, list_library, load, parsed
 from .entry import Entry
 from .valve_catalogue import ValveEntry, load_valve, valve_names
 
@@ -18,7 +18,7 @@ def find(name_or_path: str | Path) -> Entry | ValveEntry:
     text = str(name_or_path)
     if isinstance(name_or_path, Path) or text.endswith(".toml") or "/" in text or "\\" in text:
         return load_valve(Path(name_or_path)) if _is_valve(parsed(Path(name_or_path))) else load(name_or_path)
-    name = complete(text, (*names(), *valve_names()), "library entry")
+    name = complete(text, (*list_library(), *valve_names()), "library entry")
     return load_valve(name) if name in valve_names() else load(name)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..characteristic.base import Characteristic
-from ..characteristic.box import Box
+from ..characteristic.validity_range import ValidityRange
 from ..core.errors import ParameterError, suggestion
 from ..core.reference import Reference
 from ..friction.base import Friction
@@ -15,7 +15,7 @@ from ..geometry.base import Geometry
 from ..muscle import CreepElements, Damper, Series, Spring, Stop, Wall
 from .build import build
 from .entry import Check, Entry
-from .place import Place, checked, finite, refuse_unknown, text
+from .location import Location, check_keys, checked, finite, text
 
 QUANTITIES = {"pressure": "Pa", "contraction": "1", "force": "N", "volume": "m3"}
 """What a check may give and ask for, with the unit its plain numbers are in."""
@@ -26,12 +26,12 @@ _GIVEN = {
     "force": ("pressure", "contraction"),
     "volume": ("contraction",),
 }
-_TEXTS = ("title", "trust", "note", "warning")
+_TEXTS = ("title", "provenance", "note", "warning")
 _PARTS = {
     "characteristic": Characteristic, "geometry": Geometry, "spring": Spring, "damper": Damper, "friction": Friction,
     "wall": Wall, "series": Series, "stop": Stop, "creep": CreepElements,
 }  # fmt: skip
-_KEYS = (*_TEXTS, *_PARTS, "box", "check", "reference")
+_KEYS = (*_TEXTS, *_PARTS, "validity_range", "check", "reference")
 _CHECK_TEXTS = ("quantity", "source")
 _CHECK_KEYS = (*_CHECK_TEXTS, "equals", "tolerance", *QUANTITIES)
 _REFERENCE_KEYS = ("key", "authors", "title", "where", "year", "doi", "note")
@@ -39,9 +39,9 @@ _REFERENCE_KEYS = ("key", "authors", "title", "where", "year", "doi", "note")
 
 def entry_from(tables: Mapping[str, Any], name: str, file: Path, folder: Path) -> Entry:
     """The entry that a parsed file describes; messages name `file`, data files are relative to `folder`."""
-    place = Place(str(file), "", folder)
-    refuse_unknown(tables, _KEYS, place)
-    texts: dict[str, Any] = {key: text(tables, key, place, needed=key in ("title", "trust")) for key in _TEXTS}
+    place = Location(str(file), "", folder)
+    check_keys(tables, _KEYS, place)
+    texts: dict[str, Any] = {key: text(tables, key, place, needed=key in ("title", "provenance")) for key in _TEXTS}
     if "characteristic" not in tables:
         raise ParameterError(f"{place}: the table [characteristic] is missing; it says which law and its parameters.")
     parts = {
@@ -56,18 +56,20 @@ def entry_from(tables: Mapping[str, Any], name: str, file: Path, folder: Path) -
         name=name,
         **texts,
         **parts,
-        box=_box(tables["box"], place.inside("box")) if "box" in tables else None,
+        validity_range=_box(tables["validity_range"], place.inside("validity_range"))
+        if "validity_range" in tables
+        else None,
         checks=tuple(_check(t, p) for t, p in rows_of(tables, "check", place)),
         references=references_from(tables, place),
     )
 
 
-def _box(table: Any, place: Place) -> Any:
-    named = {"model": "Box", **table} if isinstance(table, Mapping) else table
-    return checked(build(named, place), Box, place)
+def _box(table: Any, place: Location) -> Any:
+    named = {"model": "ValidityRange", **table} if isinstance(table, Mapping) else table
+    return checked(build(named, place), ValidityRange, place)
 
 
-def rows_of(tables: Mapping[str, Any], key: str, place: Place) -> list[tuple[Mapping[str, Any], Place]]:
+def rows_of(tables: Mapping[str, Any], key: str, place: Location) -> list[tuple[Mapping[str, Any], Location]]:
     """The tables written as [[key]], each with its place."""
     rows = tables.get(key, [])
     if not isinstance(rows, list) or not all(isinstance(row, Mapping) for row in rows):
@@ -75,8 +77,8 @@ def rows_of(tables: Mapping[str, Any], key: str, place: Place) -> list[tuple[Map
     return [(row, place.inside(f"{key} {i}")) for i, row in enumerate(rows, 1)]
 
 
-def _check(table: Mapping[str, Any], place: Place) -> Check:
-    refuse_unknown(table, _CHECK_KEYS, place)
+def _check(table: Mapping[str, Any], place: Location) -> Check:
+    check_keys(table, _CHECK_KEYS, place)
     quantity, source = (text(table, key, place, needed=True) for key in _CHECK_TEXTS)
     if quantity not in QUANTITIES:
         raise ParameterError(
@@ -98,17 +100,17 @@ def _check(table: Mapping[str, Any], place: Place) -> Check:
     return Check(quantity, given, equals, tolerance, source)
 
 
-def _value(table: Mapping[str, Any], key: str, quantity: str, place: Place) -> float:
+def _value(table: Mapping[str, Any], key: str, quantity: str, place: Location) -> float:
     return finite(table[key], QUANTITIES[quantity], f"{place}, {key}")
 
 
-def references_from(tables: Mapping[str, Any], place: Place) -> tuple[Reference, ...]:
+def references_from(tables: Mapping[str, Any], place: Location) -> tuple[Reference, ...]:
     """The sources that a file names."""
     return tuple(_reference(t, p) for t, p in rows_of(tables, "reference", place))
 
 
-def _reference(table: Mapping[str, Any], place: Place) -> Reference:
-    refuse_unknown(table, _REFERENCE_KEYS, place)
+def _reference(table: Mapping[str, Any], place: Location) -> Reference:
+    check_keys(table, _REFERENCE_KEYS, place)
     for key in ("key", "authors", "title", "where", "doi", "note"):
         text(table, key, place, needed=key not in ("doi", "note"))
     if not isinstance(table.get("year", 0), int) or isinstance(table.get("year"), bool):

@@ -1,7 +1,7 @@
 """The catalogue of valves: what data sheets and papers print of real valves, by name, and valve files of the user.
 
     title = "..."                   what it is, and which of its paths
-    trust = "data sheet"            how the numbers came here
+    provenance = "data sheet"       how the numbers came here
     [valve]                         the law and its parameters; a path to the muscle where the two paths differ
     [exhaust]                       optional: the path to the surroundings, where its figures differ
     [response]                      optional: opening_delay, closing_delay, as published
@@ -20,8 +20,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import AirmuscleWarning, ParameterError, UnknownName, suggestion
-from ..core.model import model, parameter, parameters
+from ..core.declaration import model, parameter, parameters
+from ..core.errors import AirmuscleWarning, ParameterError, UnknownNameError, suggestion
 from ..core.reference import Reference
 from ..core.units import ABSOLUTE
 from ..pneumatics.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
@@ -29,18 +29,18 @@ from ..pneumatics.orifice import Orifice
 from .build import build
 from .catalogue import complete, parsed
 from .entry import Check
-from .place import Place, checked, finite, refuse_unknown, said_at, text
+from .location import Location, check_keys, checked, finite, located_errors, text
 from .read import references_from, rows_of
 
 FOLDER = Path(__file__).parent / "valves"
 PATHS = ("valve", "exhaust")
 """The paths through a valve that a file may describe; the first is the usual one."""
-_TEXTS = ("title", "trust", "note", "warning")
+_TEXTS = ("title", "provenance", "note", "warning")
 _CHECK = {"upstream": ABSOLUTE, "downstream": ABSOLUTE, "flow": "m3/s", "tolerance": "m3/s"}
 
 
 @model
-class Response:
+class SwitchingTimes:
     """How long a valve takes to answer its command, as published; a sheet may give an upper limit, "10 ms or less"."""
 
     opening_delay: float = parameter("s", "t_on", "time from the command to open until it is open", bounds=(0.0, 1.0))
@@ -51,16 +51,16 @@ class Response:
 class ValveEntry:
     """One valve of the catalogue as it was read, all numbers SI.
 
-    `trust` says how the numbers came here, `note` what was published and how it was converted. A check is a published
+    `provenance` says how the numbers came here, `note` what was published and how it was converted. A check is a published
     volume flow [m3/s at the reference atmosphere] between two absolute pressures.
     """
 
     name: str
     title: str
-    trust: str
+    provenance: str
     valve: Orifice
     exhaust: Orifice | None = None
-    response: Response | None = None
+    response: SwitchingTimes | None = None
     note: str = ""
     warning: str = ""
     checks: tuple[Check, ...] = ()
@@ -71,7 +71,9 @@ class ValveEntry:
         found = getattr(self, path, None) if path in PATHS else None
         if found is None:
             there = ", ".join(p for p in PATHS if getattr(self, p) is not None)
-            raise UnknownName(f"{self.name} has no path '{path}'; there are {there}.{suggestion(str(path), PATHS)}")
+            raise UnknownNameError(
+                f"{self.name} has no path '{path}'; there are {there}.{suggestion(str(path), PATHS)}"
+            )
         law: Orifice = found
         return law
 
@@ -102,11 +104,11 @@ def load_valve(name_or_path: str | Path) -> ValveEntry:
 
 def valve_from(tables: Mapping[str, Any], name: str, file: Path) -> ValveEntry:
     """The valve that a parsed file describes; messages name `file`."""
-    place = Place(str(file), "", file.parent)
-    refuse_unknown(tables, (*_TEXTS, *PATHS, "response", "check", "reference"), place)
+    place = Location(str(file), "", file.parent)
+    check_keys(tables, (*_TEXTS, *PATHS, "response", "check", "reference"), place)
     if "valve" not in tables:
         raise ParameterError(f"{place}: the table [valve] is missing; it says which flow law and its parameters.")
-    texts: dict[str, Any] = {key: text(tables, key, place, needed=key in ("title", "trust")) for key in _TEXTS}
+    texts: dict[str, Any] = {key: text(tables, key, place, needed=key in ("title", "provenance")) for key in _TEXTS}
     paths = {key: _orifice(tables[key], place.inside(key)) for key in PATHS if key in tables}
     return ValveEntry(
         name=name,
@@ -118,24 +120,24 @@ def valve_from(tables: Mapping[str, Any], name: str, file: Path) -> ValveEntry:
     )
 
 
-def _orifice(table: Any, place: Place) -> Any:
+def _orifice(table: Any, place: Location) -> Any:
     return checked(build(table, place), Orifice, place)
 
 
-def _response(table: Any, place: Place) -> Response:
+def _response(table: Any, place: Location) -> SwitchingTimes:
     if not isinstance(table, Mapping):
         raise ParameterError(f'{place}: {table!r} is no table; write opening_delay = "10 ms" under [response].')
-    names = tuple(p.name for p in parameters(Response))
-    refuse_unknown(table, names, place)
+    names = tuple(p.name for p in parameters(SwitchingTimes))
+    check_keys(table, names, place)
     for name in names:
         if name not in table:
             raise ParameterError(f"{place}: '{name}' is missing; a response has {' and '.join(names)}.")
-    with said_at(place):
-        return Response(**{name: finite(table[name], "s", f"{place}, {name}") for name in names})
+    with located_errors(place):
+        return SwitchingTimes(**{name: finite(table[name], "s", f"{place}, {name}") for name in names})
 
 
-def _check(table: Mapping[str, Any], place: Place) -> Check:
-    refuse_unknown(table, (*_CHECK, "source"), place)
+def _check(table: Mapping[str, Any], place: Location) -> Check:
+    check_keys(table, (*_CHECK, "source"), place)
     for key, unit in _CHECK.items():
         if key not in table:
             raise ParameterError(f"{place}: '{key}' is missing; it is a number in {unit}, or text with a unit.")

@@ -15,15 +15,15 @@ from .entry import OPTIONAL, Check, Entry
 
 def to_toml(entry: Entry) -> str:
     """The text of a library file for this entry; numbers in SI, with all their digits."""
-    texts = {key: getattr(entry, key) for key in ("title", "trust", "note", "warning")}
+    texts = {key: getattr(entry, key) for key in ("title", "provenance", "note", "warning")}
     lines = [f"{key} = {_value(text)}" for key, text in texts.items() if text]
     for part in ("characteristic", "geometry", *OPTIONAL):
         built = getattr(entry, part)
         belongs_to_law = part == "geometry" and built == getattr(entry.characteristic, "geometry", None)
         if built is not None and not belongs_to_law:
             lines += part_lines(part, built)
-    if entry.box is not None:
-        lines += _table("box", dataclasses.asdict(entry.box))
+    if entry.validity_range is not None:
+        lines += _table("validity_range", dataclasses.asdict(entry.validity_range))
     for check in entry.checks:
         lines += _table("[check]", _row(check))
     for reference in entry.references:

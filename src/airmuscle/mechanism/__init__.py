@@ -2,34 +2,36 @@
 
 from .antagonistic_joint import AntagonisticJoint
 from .base import Coordinate, Mechanism
+from .contact import HuntCrossley
+from .end_stops import JointWithEndStops, WithEndStops
 from .hanging_mass import HangingMass
 from .held import Held
-from .in_series import InSeries
 from .isometric import Isometric
 from .isotonic import Isotonic
 from .lever import Lever
-from .mounted import Mounted
-from .prescribed import Prescribed
+from .muscles_in_series import MusclesInSeries
+from .offsets import WithOffsets
+from .prescribed_motion import PrescribedMotion
 from .pulley import Pulley
 from .spring_load import SpringLoad
-from .stopped import Stopped, StoppedJoint
-from .wrapper import Wrapper
+from .wrapper import MechanismWrapper
 
 __all__ = [
     "AntagonisticJoint",
     "Coordinate",
     "HangingMass",
     "Held",
-    "InSeries",
+    "HuntCrossley",
     "Isometric",
     "Isotonic",
+    "JointWithEndStops",
     "Lever",
     "Mechanism",
-    "Mounted",
-    "Prescribed",
+    "MechanismWrapper",
+    "MusclesInSeries",
+    "PrescribedMotion",
     "Pulley",
     "SpringLoad",
-    "Stopped",
-    "StoppedJoint",
-    "Wrapper",
+    "WithEndStops",
+    "WithOffsets",
 ]

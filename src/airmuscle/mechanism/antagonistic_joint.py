@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..core import ops
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from .base import Coordinate, Mechanism
 
@@ -41,7 +41,7 @@ class AntagonisticJoint(Mechanism):
         way, (first, second) = self.radius * q["angle"], resting_lengths
         return (self.offset + way / first, self.offset - way / second)
 
-    def pulls(
+    def generalised_forces(
         self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
     ) -> dict[str, Value]:
         return {"angle": self.radius * (tensions[0] - tensions[1])}
@@ -52,7 +52,7 @@ class AntagonisticJoint(Mechanism):
         held = self.weight_torque * ops.sin(q["angle"]) + self.damping * v["angular_speed"]
         return {"angle": (pulls["angle"] - held) / self.inertia}
 
-    def lost_power(
+    def dissipated_power(
         self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
         return self.damping * v["angular_speed"] ** 2

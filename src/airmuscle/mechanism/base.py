@@ -25,8 +25,8 @@ class Coordinate:
     unit: str
     nominal: float
     nominal_speed: float
-    least: float = -INFINITY
-    greatest: float = INFINITY
+    lower_limit: float = -INFINITY
+    upper_limit: float = INFINITY
 
     @property
     def acceleration(self) -> str:
@@ -64,14 +64,14 @@ class Mechanism(abc.ABC):
         names = [c.name for c in self.coordinates]
         if not names:
             return tuple(0.0 for _ in resting_lengths)
-        rates = autodiff.directional(
+        rates = autodiff.jvp(
             lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths),
             [q[name] for name in names],
             [v[c.speed] for c in self.coordinates],
         )
         return tuple(length * rate for length, rate in zip(resting_lengths, rates, strict=True))
 
-    def pulls(
+    def generalised_forces(
         self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
     ) -> dict[str, Value]:
         """Generalised force of the muscles' tensions [N] on every coordinate: virtual work, J^T F, from `contractions`.
@@ -81,7 +81,7 @@ class Mechanism(abc.ABC):
         names = [c.name for c in self.coordinates]
         if not names:
             return {}
-        found = autodiff.pulled_back(
+        found = autodiff.vjp(
             lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths),
             [q[name] for name in names],
             [tension * length for tension, length in zip(tensions, resting_lengths, strict=True)],
@@ -94,7 +94,7 @@ class Mechanism(abc.ABC):
     ) -> Mapping[str, Value]:
         """Acceleration of every coordinate under the generalised forces `pulls` and the mechanism's own."""
 
-    def lost_power(
+    def dissipated_power(
         self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
         """Power [W] that leaves it otherwise than to the muscles: by its own dampers, stops and drives."""

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..core.model import model
+from ..core.declaration import model
 from ..core.ops import Value
 from ..core.variables import Input
 from .base import Mechanism
-from .wrapper import Wrapper
+from .wrapper import MechanismWrapper
 
 
 @model
-class Held(Wrapper):
+class Held(MechanismWrapper):
     """While the input `held` is 1 the mechanism rests and the latch carries what is out of balance; 0 frees it.
 
     The input must change at an instant, from rest.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from .translation import Translation
 
@@ -26,7 +26,7 @@ class Isotonic(Translation):
     ) -> Mapping[str, Value]:
         return {"position": (pulls["position"] - self.force - self.damping * v["speed"]) / self.mass}
 
-    def lost_power(
+    def dissipated_power(
         self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
         return self.damping * v["speed"] ** 2

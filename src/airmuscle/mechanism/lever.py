@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..core import ops
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from ..core.model import model, parameter
 from ..core.ops import Value
 from .base import Coordinate, Mechanism
 from .hanging_mass import STANDARD_GRAVITY
@@ -70,7 +70,7 @@ class Lever(Mechanism):
         weight = self.mass * self.gravity * self.load_arm * ops.cos(q["angle"])
         return {"angle": (pulls["angle"] - weight - self.damping * v["angular_speed"]) / self._total_inertia()}
 
-    def lost_power(
+    def dissipated_power(
         self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
         return self.damping * v["angular_speed"] ** 2

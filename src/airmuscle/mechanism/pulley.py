@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from .hanging_mass import STANDARD_GRAVITY
 from .translation import Translation
@@ -37,7 +37,7 @@ class Pulley(Translation):
         held = self.ratio * self.mass * self.gravity + self.damping * v["speed"]
         return {"position": (pulls["position"] - held) / self._inertial_mass()}
 
-    def lost_power(
+    def dissipated_power(
         self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
         return self.damping * v["speed"] ** 2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from .translation import Translation
 
@@ -28,7 +28,7 @@ class SpringLoad(Translation):
         held = self.preload + self.stiffness * q["position"] + self.damping * v["speed"]
         return {"position": (pulls["position"] - held) / self.mass}
 
-    def lost_power(
+    def dissipated_power(
         self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
         return self.damping * v["speed"] ** 2

@@ -21,7 +21,7 @@ class Translation(Mechanism, abc.ABC):
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return tuple(q["position"] / length for length in resting_lengths)
 
-    def pulls(
+    def generalised_forces(
         self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
     ) -> dict[str, Value]:
         return {"position": sum(tensions, 0.0)}

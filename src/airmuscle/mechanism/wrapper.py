@@ -9,7 +9,7 @@ from ..core.variables import Input
 from .base import Coordinate, Mechanism
 
 
-class Wrapper(Mechanism):
+class MechanismWrapper(Mechanism):
     """All is the inner mechanism's, but what a wrapper says otherwise; it adds to the pulls, or to the contractions."""
 
     inner: Mechanism
@@ -29,20 +29,20 @@ class Wrapper(Mechanism):
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return self.inner.contractions(q, resting_lengths)
 
-    def pulls(
+    def generalised_forces(
         self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
     ) -> dict[str, Value]:
-        return self.inner.pulls(q, tensions, resting_lengths)
+        return self.inner.generalised_forces(q, tensions, resting_lengths)
 
     def acceleration(
         self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
         return self.inner.acceleration(q, v, pulls, inputs)
 
-    def lost_power(
+    def dissipated_power(
         self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
-        return self.inner.lost_power(q, v, pulls, inputs)
+        return self.inner.dissipated_power(q, v, pulls, inputs)
 
     def potential_energy(self, q: Mapping[str, Value]) -> Value:
         return self.inner.potential_energy(q)

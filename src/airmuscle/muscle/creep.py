@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from ..core.model import model, parameter
 from ..core.ops import Value
 from ..core.variables import StateVariable
 

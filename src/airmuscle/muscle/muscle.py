@@ -7,12 +7,12 @@ from types import MappingProxyType
 from typing import ClassVar, NamedTuple
 
 from ..characteristic.base import Characteristic, ForceLaw
-from ..characteristic.box import Box
 from ..characteristic.contractile_surface import HOSOVSKY_HILL
+from ..characteristic.validity_range import ValidityRange
 from ..characteristic.virtual_work import VirtualWork
 from ..core import autodiff, ops
+from ..core.declaration import model
 from ..core.errors import ParameterError
-from ..core.model import model
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
@@ -21,7 +21,7 @@ from ..geometry.base import Geometry
 from .creep import CreepElements
 from .damper import Damper, LinearDamper
 from .series import RigidSeries, Series, SeriesSpring
-from .settle import settled_inside
+from .series_equilibrium import settled_inside
 from .spring import LinearSpring, Spring
 from .stop import NoStop, Stop
 from .wall import RigidWall, Wall
@@ -32,7 +32,7 @@ INNER = "inner_contraction"
 """The state of a muscle with a compliant series element: contraction of its contractile part."""
 
 
-class Pull(NamedTuple):
+class MuscleForce(NamedTuple):
     """What a muscle does at one moment: tension, friction [N], and the speed of its contractile part [m/s]."""
 
     tension: Value
@@ -62,7 +62,7 @@ class Muscle:
     damper: Damper = LinearDamper(0.0)
     friction: Friction = NoFriction()
     name: str = "muscle"
-    box: Box | None = None
+    validity_range: ValidityRange | None = None
     """Where its numbers were measured, if that is known: a run says when and how far it left it."""
     wall: Wall = RigidWall()
     series: Series = RigidSeries()
@@ -83,12 +83,12 @@ class Muscle:
                 raise ParameterError(f"Muscle: its {field} must be a {kind.__name__}; it is {part!r}.")
         if not isinstance(self.name, str) or not self.name:
             raise ParameterError(f"Muscle: its name is {self.name!r}; it must be a word, as 'left'.")
-        if not isinstance(self.box, Box | None):
-            raise ParameterError(f"Muscle: its box must be a Box, or None; it is {self.box!r}.")
+        if not isinstance(self.validity_range, ValidityRange | None):
+            raise ParameterError(f"Muscle: its validity range must be a Box, or None; it is {self.validity_range!r}.")
         if isinstance(self.series, SeriesSpring):
-            self._refuse_beside_series()
+            self._check_series_elements()
 
-    def _refuse_beside_series(self) -> None:
+    def _check_series_elements(self) -> None:
         for pressure in (-1e5, 0.0, 1e6):  # every damper is linear in pressure, or made of lines
             if not min(self.damper.coefficients(pressure, 0.0)) > 0.0:
                 raise ParameterError(
@@ -116,12 +116,12 @@ class Muscle:
             found[INNER] = settled_inside(self, pressure, contraction)
         return found
 
-    def unbalance_inside(self, pressure: Value, inner_contraction: Value, contraction: Value) -> Value:
+    def internal_imbalance(self, pressure: Value, inner_contraction: Value, contraction: Value) -> Value:
         """Pull of the contractile part at standstill less that of its series spring [N], which falls with the first's
         contraction [1]; 0 at rest."""
         assert isinstance(self.series, SeriesSpring)
         stretch = (inner_contraction - contraction) * self.geometry.resting_length
-        return self.static(pressure, inner_contraction) - self.series.force(stretch)
+        return self.static_force(pressure, inner_contraction) - self.series.force(stretch)
 
     def inner_contraction(self, contraction: Value, state: Mapping[str, Value] = RELAXED) -> Value:
         """Contraction [1] of the contractile part, where the fittings stand at `contraction`."""
@@ -135,19 +135,19 @@ class Muscle:
     def pull(
         self, pressure: Value, inner_contraction: Value, contraction: Value, speed: Value,
         state: Mapping[str, Value] = RELAXED,
-    ) -> Pull:  # fmt: skip
+    ) -> MuscleForce:  # fmt: skip
         """What it does at gauge pressure [Pa], contraction [1] inside and at the fittings, speed [m/s] of these."""
         if not isinstance(self.series, SeriesSpring):
             friction = self.friction_force(speed, state)
-            return Pull(self.tension(pressure, contraction, speed, state), friction, speed)
+            return MuscleForce(self.tension(pressure, contraction, speed, state), friction, speed)
         tension = self.series.force((inner_contraction - contraction) * self.geometry.resting_length)
-        left = self.unslackened(pressure, inner_contraction, 0.0, state) - tension
+        left = self.unclamped_tension(pressure, inner_contraction, 0.0, state) - tension
         inside = self.damper.speed(pressure, inner_contraction, left)
         if not isinstance(self.stop, NoStop):
             # The contact never pulls: of the speeds with and without it the lesser is the one at which it does not.
             still, growth = self.stop.parts(inner_contraction, self.geometry.resting_length)
             inside = ops.minimum(inside, self.damper.speed(pressure, inner_contraction, left - still, growth))
-        return Pull(tension, self.friction_force(inside, state), inside)
+        return MuscleForce(tension, self.friction_force(inside, state), inside)
 
     def rates(self, state: Mapping[str, Value], pressure: Value, inner_speed: Value) -> dict[str, Value]:
         """The time derivatives of its states at gauge pressure [Pa] and speed [m/s] of its contractile part."""
@@ -162,12 +162,12 @@ class Muscle:
         self, pressure: Value, contraction: Value, speed: Value = 0.0, state: Mapping[str, Value] = RELAXED
     ) -> Value:
         """Pull on the load [N] at gauge pressure [Pa], contraction [1], speed of contraction [m/s], rigid in series."""
-        taut = ops.maximum(self.unslackened(pressure, contraction, speed, state), 0.0)
+        taut = ops.maximum(self.unclamped_tension(pressure, contraction, speed, state), 0.0)
         if isinstance(self.stop, NoStop):
             return taut
         return taut - self.stop.force(contraction, speed, self.geometry.resting_length)
 
-    def unslackened(
+    def unclamped_tension(
         self, pressure: Value, contraction: Value, speed: Value = 0.0, state: Mapping[str, Value] = RELAXED
     ) -> Value:
         """The sum of the elements' forces [N]; where it is negative the muscle hangs slack."""
@@ -179,9 +179,9 @@ class Muscle:
         )
         return total - self.creep.force({**self._still(), **state}) if self.creep.states else total
 
-    def static(self, pressure: Value, contraction: Value) -> Value:
+    def static_force(self, pressure: Value, contraction: Value) -> Value:
         """The sum of the elements' forces [N] at standstill, end stop and all, with everything else relaxed."""
-        elements = self.unslackened(pressure, contraction)
+        elements = self.unclamped_tension(pressure, contraction)
         return elements - self.stop.force(contraction, 0.0, self.geometry.resting_length)
 
     def friction_force(self, speed: Value, state: Mapping[str, Value] = RELAXED) -> Value:
@@ -202,4 +202,4 @@ class Muscle:
         With shut valves the pressure rises as the muscle is pulled, and it is stiffer: module `stiffness`. Friction is
         left out: its bristles add theirs until they slide.
         """
-        return -autodiff.slope(self, "static", pressure, contraction, wrt=1)
+        return -autodiff.derivative(self, "static_force", pressure, contraction, wrt=1)

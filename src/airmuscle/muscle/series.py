@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..core import ops
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 
 

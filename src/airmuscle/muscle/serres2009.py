@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from ..characteristic.serres2009 import SERRES_2009
 from ..core import ops
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from .damper import Damper

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 
 

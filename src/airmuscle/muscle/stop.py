@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 
 from ..core import ops
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..mechanism.contact import HuntCrossley
 

@@ -6,7 +6,7 @@ import abc
 from collections.abc import Mapping
 
 from ..core import ops
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.variables import StateVariable
 

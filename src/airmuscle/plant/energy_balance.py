@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
-from ..core.model import model
+from ..core.declaration import model
 from ..core.ops import Value
 from ..core.variables import StateVariable
 from ..muscle import Muscle, SeriesSpring
-from .muscle_state import Port
+from .muscle_state import MuscleState
 from .plant import Plant, total_air
 
 _METERS = (
@@ -28,7 +28,7 @@ _FRICTION = StateVariable("friction_work", "J", 1.0, "work done against friction
 
 
 @model
-class Metered:
+class WithEnergyMeters:
     """A plant with meters as further states, and its energies and its air as outputs.
 
     Four books must close. Mechanical: kinetic + potential energy grow by `work_of_tension`, which counts the push of an
@@ -38,6 +38,8 @@ class Metered:
     `energy_of_flow` + `heat_to_air` less `work_of_air`. Mass: `air_total`, of all air, grows by `air_supplied` less
     `air_exhausted`.
     """
+
+    from_file: ClassVar[bool] = False
 
     plant: Plant
 
@@ -70,12 +72,12 @@ class Metered:
         for muscle, port, flow in zip(plant.muscles, ports, flows, strict=True):
             powers["work_of_tension"] += port.tension * port.speed
             powers["work_of_air"] += port.air.pressure * port.volume_rate
-            powers["energy_of_flow"] += plant.gas.carried(port.states, flow, port.volume, plant.ambient)
-            powers["heat_to_air"] += plant.gas.warmed(port.air, plant.ambient)
+            powers["energy_of_flow"] += plant.gas.energy_flow(port.states, flow, port.volume, plant.ambient)
+            powers["heat_to_air"] += plant.gas.heat_flow(port.air, plant.ambient)
             for name, power in _muscle_powers(muscle, port).items():
                 powers[name] += power
-        pulls = plant.mechanism.pulls(state, [port.tension for port in ports], plant.resting_lengths)
-        powers["mechanism_loss"] += plant.mechanism.lost_power(state, state, pulls, inputs)
+        pulls = plant.mechanism.generalised_forces(state, [port.tension for port in ports], plant.resting_lengths)
+        powers["mechanism_loss"] += plant.mechanism.dissipated_power(state, state, pulls, inputs)
         for response in responses:
             powers["air_supplied"] += response.drawn.mass
             powers["air_exhausted"] += response.exhausted.mass
@@ -93,11 +95,11 @@ class Metered:
             "air_total": total_air(own),
         }
 
-    def _stored(self, port: Port) -> Value:
-        return self.plant.gas.stored(port.states, port.volume, self.plant.ambient)
+    def _stored(self, port: MuscleState) -> Value:
+        return self.plant.gas.available_energy(port.states, port.volume, self.plant.ambient)
 
 
-def _muscle_powers(muscle: Muscle, port: Port) -> dict[str, Value]:
+def _muscle_powers(muscle: Muscle, port: MuscleState) -> dict[str, Value]:
     """What the elements inside a muscle give and take [W]."""
     pressure, inner, speed = port.pressure, port.inner_contraction, port.inner_speed
     length = muscle.geometry.resting_length

@@ -10,7 +10,7 @@ from ..muscle import Muscle
 from ..pneumatics.gas import Air, Ambient, Gas, gauge
 
 
-class Port(NamedTuple):
+class MuscleState(NamedTuple):
     """One muscle at one moment: contraction [1], shortening speed [m/s], volume [m3], pressures [Pa], forces [N].
 
     `inner_contraction` and `inner_speed` are those of the contractile part, which differ from the fittings' beside a
@@ -31,9 +31,9 @@ class Port(NamedTuple):
     rates: Mapping[str, Value]
 
 
-def port_of(
+def muscle_state(
     muscle: Muscle, state: Mapping[str, Value], contraction: Value, speed: Value, gas: Gas, ambient: Ambient
-) -> Port:
+) -> MuscleState:
     """A muscle with its own state and that of its air, at a contraction and a shortening speed of its fittings."""
     inner = muscle.inner_contraction(contraction, state)
     volume = muscle.volume(inner, state)
@@ -43,7 +43,7 @@ def port_of(
     rates = muscle.rates(state, pressure, pull.speed)
     growth = muscle.geometry.volume_growth(inner) * pull.speed / muscle.geometry.resting_length
     growth = sum((rates[s.name] for s in muscle.wall.states), growth)
-    return Port(
+    return MuscleState(
         contraction, speed, volume, air, pressure, pull.tension, pull.friction, inner, pull.speed, growth, state,
         rates,
     )  # fmt: skip

@@ -7,17 +7,17 @@ from dataclasses import replace
 from typing import Any
 
 from ..compile import StateVariable
+from ..core.declaration import as_finite_float, check_structure, model
 from ..core.errors import ParameterError, TraceError
-from ..core.model import finite_number, model, refuse_misplaced
 from ..core.ops import Value
-from ..core.variables import Input, outside, renamed, within
+from ..core.variables import Input, add_prefix, select_prefix, with_prefix
 from ..mechanism import Mechanism
 from ..muscle import Muscle
-from ..pneumatics import Circuit, Response
-from ..pneumatics.gas import Air, Ambient, Flow, Gas, Polytropic, absolute, refuse_vacuum
+from ..pneumatics import Circuit, CircuitFlows
+from ..pneumatics.gas import Air, Ambient, Flow, Gas, Polytropic, absolute, check_above_vacuum
 from ..pneumatics.ports import by_muscle, by_port
-from ..pneumatics.supply import refuse_shared
-from .muscle_state import Port, port_of
+from ..pneumatics.supply import check_not_shared
+from .muscle_state import MuscleState, muscle_state
 
 
 @model
@@ -44,10 +44,10 @@ class Plant:
                 hint = " Several stand in a tuple." if isinstance(part, list) else ""
                 hint = f" It has one: give its .{field}." if hasattr(part, field) else hint
                 raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {str(part)[:80]}.{hint}")
-        self._refuse_not_closed_form()
-        refuse_misplaced((self.muscles, self.circuits, self.mechanism))
+        self._check_closed_form()
+        check_structure((self.muscles, self.circuits, self.mechanism))
         for circuit in self.circuits:
-            refuse_shared(f"Plant: its {type(circuit).__name__}", circuit.supply)
+            check_not_shared(f"Plant: its {type(circuit).__name__}", circuit.supply)
         names = [m.name for m in self.muscles]
         if not names:
             raise ParameterError("Plant: it has no muscle; give one, or a tuple of them.")
@@ -62,18 +62,18 @@ class Plant:
             raise ParameterError("Plant: a circuit that feeds several muscles stands alone, not in a tuple.")
         if len(set(names)) < len(names):
             raise ParameterError(f"Plant: muscles need different names; they are {names}.")
-        self._refuse_twice()
+        self._check_unique_names()
 
-    def _refuse_not_closed_form(self) -> None:
+    def _check_closed_form(self) -> None:
         for muscle in self.muscles:
             for part in (muscle.contractile, muscle.geometry):
                 if not part.traceable:
                     raise TraceError(
                         f"{type(part).__name__} of {muscle.name} is not closed-form and cannot enter a plant. Use "
-                        "as_force_law(law, box) for a characteristic, as_polynomial(geometry) for a geometry."
+                        "as_force_law(law, validity range) for a characteristic, as_polynomial(geometry) for a geometry."
                     )
 
-    def _refuse_twice(self) -> None:
+    def _check_unique_names(self) -> None:
         names = [*(s.name for s in self.states), *self.inputs]
         for name in (n for n in names if names.count(n) > 1):
             raise ParameterError(f"Plant: two of its parts use the name '{name}'; rename one of them.")
@@ -126,7 +126,7 @@ class Plant:
     @property
     def commands(self) -> tuple[Input, ...]:
         """Inputs of the circuits, then of the mechanism, with what may be commanded."""
-        return (*(i for p, c in self._circuits() for i in renamed(p, c.inputs)), *self.mechanism.inputs)
+        return (*(i for p, c in self._circuits() for i in add_prefix(p, c.inputs)), *self.mechanism.inputs)
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -141,30 +141,30 @@ class Plant:
 
     def _outside(self, prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
         """What a circuit calls by its own names, by the plant's."""
-        return by_muscle(self.prefixes, values) if self._shared else outside(prefix, values)
+        return by_muscle(self.prefixes, values) if self._shared else with_prefix(prefix, values)
 
     def _within(self, prefix: str, values: Mapping[str, Value]) -> Mapping[str, Value]:
         """What the plant calls by its names, by a circuit's own."""
-        return by_port(self.prefixes, values) if self._shared else within(prefix, values)
+        return by_port(self.prefixes, values) if self._shared else select_prefix(prefix, values)
 
-    def ports(self, state: Mapping[str, Value]) -> tuple[Port, ...]:
+    def ports(self, state: Mapping[str, Value]) -> tuple[MuscleState, ...]:
         """Every muscle at a state."""
         contractions = self.mechanism.contractions(state, self.resting_lengths)
         speeds = self.mechanism.contraction_speeds(state, state, self.resting_lengths)
         return tuple(
-            port_of(muscle, within(prefix, state), contraction, speed, self.gas, self.ambient)
+            muscle_state(muscle, select_prefix(prefix, state), contraction, speed, self.gas, self.ambient)
             for muscle, prefix, contraction, speed in zip(
                 self.muscles, self.prefixes, contractions, speeds, strict=True
             )
         )
 
     def responses(
-        self, ports: tuple[Port, ...], state: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> tuple[Response, ...]:
+        self, ports: tuple[MuscleState, ...], state: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> tuple[CircuitFlows, ...]:
         """What every circuit does."""
         shares = self._shares([port.air for port in ports])
         return tuple(
-            circuit.respond(share, self._within(prefix, state), within(prefix, inputs), self.ambient)
+            circuit.respond(share, self._within(prefix, state), select_prefix(prefix, inputs), self.ambient)
             for (prefix, circuit), share in zip(self._circuits(), shares, strict=True)
         )
 
@@ -174,8 +174,8 @@ class Plant:
         done = self.responses(ports, state, inputs)
         rates: dict[str, Value] = {}
         for port, prefix, flow in zip(ports, self.prefixes, _flows(done), strict=True):
-            rates |= outside(prefix, self.gas.rates(port.states, port.air, flow, port.volume_rate, self.ambient))
-            rates |= outside(prefix, port.rates)
+            rates |= with_prefix(prefix, self.gas.rates(port.states, port.air, flow, port.volume_rate, self.ambient))
+            rates |= with_prefix(prefix, port.rates)
         accelerations = self._accelerations(state, ports, inputs)
         for c in self.mechanism.coordinates:
             rates |= {c.name: state[c.speed], c.speed: accelerations[c.name]}
@@ -184,9 +184,9 @@ class Plant:
         return rates
 
     def _accelerations(
-        self, state: Mapping[str, Value], ports: tuple[Port, ...], inputs: Mapping[str, Value]
+        self, state: Mapping[str, Value], ports: tuple[MuscleState, ...], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
-        pulls = self.mechanism.pulls(state, [port.tension for port in ports], self.resting_lengths)
+        pulls = self.mechanism.generalised_forces(state, [port.tension for port in ports], self.resting_lengths)
         return self.mechanism.acceleration(state, state, pulls, inputs)
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
@@ -221,8 +221,8 @@ class Plant:
         takes all volume away.
         """
         given = pressure if isinstance(pressure, tuple) else (pressure,) * len(self.muscles)
-        pressures = [finite_number("Plant: the pressure of a state", p) for p in given]
-        values = {name: finite_number(f"Plant: the {name} of a state", value) for name, value in values.items()}
+        pressures = [as_finite_float("Plant: the pressure of a state", p) for p in given]
+        values = {name: as_finite_float(f"Plant: the {name} of a state", value) for name, value in values.items()}
         if len(pressures) != len(self.muscles):
             raise ParameterError(f"Plant: {len(pressures)} pressures are given for {len(self.muscles)} muscles.")
         air = {f"{p}{s.name}" for p, m in zip(self.prefixes, self.muscles, strict=True)
@@ -235,8 +235,8 @@ class Plant:
         state: dict[str, Value] = {n: 0.0 for c in self.mechanism.coordinates for n in (c.name, c.speed)} | values
         contractions = self.mechanism.contractions(state, self.resting_lengths)
         for muscle, p, eps in zip(self.muscles, pressures, contractions, strict=True):
-            refuse_vacuum(p, self.ambient)
-            muscle.geometry.refuse_out_of_reach(eps)
+            check_above_vacuum(p, self.ambient)
+            muscle.geometry.check_contraction(eps)
         state, volumes = self.settled_muscles(pressures, state)
         for muscle, p, volume in zip(self.muscles, pressures, volumes, strict=True):
             if not volume > 0.0:
@@ -255,9 +255,9 @@ class Plant:
         found, volumes = dict(state), []
         contractions = self.mechanism.contractions(state, self.resting_lengths)
         for muscle, prefix, p, eps in zip(self.muscles, self.prefixes, pressures, contractions, strict=True):
-            own = {**muscle.settled(p, eps), **within(prefix, state)}
+            own = {**muscle.settled(p, eps), **select_prefix(prefix, state)}
             volumes.append(muscle.volume(muscle.inner_contraction(eps, own), own))
-            found = {**outside(prefix, own), **found}
+            found = {**with_prefix(prefix, own), **found}
         return found, volumes
 
     def filled(
@@ -266,11 +266,11 @@ class Plant:
         """The state with air at these gauge pressures [Pa] in muscles of these volumes [m3], and circuits settled."""
         found, airs = dict(state), []
         for prefix, p, volume in zip(self.prefixes, pressures, volumes, strict=True):
-            content = self.gas.content(absolute(p, self.ambient), volume, self.ambient)
+            content = self.gas.state_at(absolute(p, self.ambient), volume, self.ambient)
             airs.append(self.gas.air(content, volume, self.ambient))
-            found |= outside(prefix, content)
+            found |= with_prefix(prefix, content)
         for (prefix, circuit), share in zip(self._circuits(), self._shares(airs), strict=True):
-            found = {**self._outside(prefix, circuit.settled(share, self.ambient)), **found}
+            found = {**self._outside(prefix, circuit.steady_state(share, self.ambient)), **found}
         return found
 
 
@@ -278,7 +278,7 @@ def _of_muscle(prefix: str, muscle: Muscle, states: tuple[StateVariable, ...]) -
     return [StateVariable(f"{prefix}{s.name}", s.unit, s.nominal, f"{s.meaning} of {muscle.name}") for s in states]
 
 
-def _flows(responses: tuple[Response, ...]) -> list[Flow]:
+def _flows(responses: tuple[CircuitFlows, ...]) -> list[Flow]:
     return [flow for response in responses for flow in response.flows]
 
 

@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from ..compile import System
 from ..core.arrays import Array
+from ..core.declaration import as_float
 from ..core.errors import ParameterError, suggestion
-from ..core.model import number_of
-from ..core.variables import within
+from ..core.variables import select_prefix
 from .plant import Plant
 
 ROUNDING = 1e-3
@@ -19,7 +19,7 @@ ROUNDING = 1e-3
 _OF_AIR = ("air_mass", "internal_energy")
 
 
-def refuse_no_system(what: str, given: object) -> None:
+def check_system(what: str, given: object) -> None:
     """Raise ParameterError for what has no states, inputs, rates and outputs, as a muscle or a class."""
     if isinstance(given, type) or not all(hasattr(given, name) for name in ("states", "inputs", "rates", "outputs")):
         raise ParameterError(f"{what}: {str(given)[:80]} is no plant; give Plant(muscle, circuit, mechanism).")
@@ -42,10 +42,10 @@ def state_vector(system: System, state: Mapping[str, float]) -> Array:
     missing = [name for name in names if name not in state]
     if missing:
         raise ParameterError(f"the start lacks {', '.join(missing)}; use plant.state_at(pressure=...) or equilibrium.")
-    values = np.array([number_of(f"the start's {name}", state[name]) for name in names], dtype=float)
+    values = np.array([as_float(f"the start's {name}", state[name]) for name in names], dtype=float)
     if not np.isfinite(values).all():
         raise ParameterError(f"the start must be finite; it is {dict(zip(names, values.tolist(), strict=True))}.")
-    for i in np.flatnonzero(less_than_none(system, values)):
+    for i in np.flatnonzero(has_negative_mass(system, values)):
         raise ParameterError(
             f"the start's {names[i]} is {values[i]:g} {system.states[i].unit}; there is no less air than none. Use "
             "plant.state_at(pressure=...)."
@@ -53,24 +53,24 @@ def state_vector(system: System, state: Mapping[str, float]) -> Array:
     return values
 
 
-def less_than_none(system: System, values: Array) -> npt.NDArray[np.bool_]:
+def has_negative_mass(system: System, values: Array) -> npt.NDArray[np.bool_]:
     """For states (..., n) of a Plant, where there is less air than none: a step was far too long for its valves."""
-    return np.asarray(values < least_states(system))
+    return np.asarray(values < state_lower_bounds(system))
 
 
-def least_states(system: System) -> Array:
+def state_lower_bounds(system: System) -> Array:
     """What each state (n,) of a Plant may be at least, lest there be less air than none; elsewhere minus infinity."""
     of_air = _OF_AIR if isinstance(system, Plant) else ()
     return np.array([-ROUNDING * s.nominal if s.name.endswith(of_air) else -np.inf for s in system.states])
 
 
-def refuse_impossible(plant: Plant, state: Mapping[str, float]) -> None:
+def check_state(plant: Plant, state: Mapping[str, float]) -> None:
     """Raise OutOfReach where a muscle cannot take its contraction, ParameterError where it encloses nothing."""
     contractions = plant.mechanism.contractions(state, plant.resting_lengths)
     for muscle, prefix, contraction in zip(plant.muscles, plant.prefixes, contractions, strict=True):
-        own = within(prefix, state)
+        own = select_prefix(prefix, state)
         inner = muscle.inner_contraction(contraction, own)
-        muscle.geometry.refuse_out_of_reach(inner)
+        muscle.geometry.check_contraction(inner)
         volume = muscle.volume(inner, own)
         if not volume > 0.0:
             raise ParameterError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..core import ops
-from ..core.model import model
+from ..core.declaration import model
 from ..core.ops import Value
 from .orifice import Orifice
 

@@ -9,24 +9,24 @@ from typing import Any, ClassVar
 
 from ..core.ops import Value
 from ..core.reference import Reference
-from ..core.variables import Input, StateVariable, outside, renamed, within
-from .gas import STILL, Air, Ambient, Flow
-from .supply import Source
+from ..core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
+from .gas import NO_FLOW, Air, Ambient, Flow
+from .supply import AirSource
 
 SUPPLY = "supply."
 """What the names of the supply's states begin with."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Response:
+class CircuitFlows:
     """What a circuit does at one moment: flow into every muscle, rates of its own states, what one may want to see.
 
     `drawn` is what it takes from its supply, `exhausted` what it gives to the surroundings.
     """
 
     flows: tuple[Flow, ...]
-    drawn: Flow = STILL
-    exhausted: Flow = STILL
+    drawn: Flow = NO_FLOW
+    exhausted: Flow = NO_FLOW
     rates: Mapping[str, Value] = dataclasses.field(default_factory=dict)
     outputs: Mapping[str, Value] = dataclasses.field(default_factory=dict)
 
@@ -35,7 +35,7 @@ class Circuit(abc.ABC):
     """The pneumatic side of one muscle or more: inputs that are commanded, states, and the flow that follows."""
 
     references: ClassVar[tuple[Reference, ...]] = ()
-    supply: Source
+    supply: AirSource
 
     @property
     def ports(self) -> int:
@@ -56,29 +56,29 @@ class Circuit(abc.ABC):
         return {}
 
     @abc.abstractmethod
-    def draw(
+    def supplied_flow(
         self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
-    ) -> Response:  # fmt: skip
+    ) -> CircuitFlows:  # fmt: skip
         """What it does between this air at its supply and this air in the muscles."""
 
-    def doubts(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+    def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
         """Where a run, columns (N,) by its names, went beyond what its laws describe: in words, by part."""
         return {}
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         """All its states."""
-        return (*self.own_states(ambient), *renamed(SUPPLY, self.supply.states(ambient)))
+        return (*self.own_states(ambient), *add_prefix(SUPPLY, self.supply.states(ambient)))
 
-    def settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+    def steady_state(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
         """All its states at rest."""
-        return {**self.own_settled(airs, ambient), **outside(SUPPLY, self.supply.settled(ambient))}
+        return {**self.own_settled(airs, ambient), **with_prefix(SUPPLY, self.supply.steady_state(ambient))}
 
     def respond(
         self, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value], ambient: Ambient
-    ) -> Response:
+    ) -> CircuitFlows:
         """What it does with this air in the muscles; `drawn` is then what comes from outside the plant."""
-        of_supply = within(SUPPLY, state)
-        done = self.draw(self.supply.air(of_supply, ambient), airs, state, inputs, ambient)
+        of_supply = select_prefix(SUPPLY, state)
+        done = self.supplied_flow(self.supply.air(of_supply, ambient), airs, state, inputs, ambient)
         rates, taken = self.supply.balance(of_supply, done.drawn, ambient)
-        return dataclasses.replace(done, rates={**done.rates, **outside(SUPPLY, rates)}, drawn=taken)
+        return dataclasses.replace(done, rates={**done.rates, **with_prefix(SUPPLY, rates)}, drawn=taken)

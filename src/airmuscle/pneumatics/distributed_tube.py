@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from ..core import ops
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
-from ..core.variables import StateVariable, outside, renamed, within
-from .conduit import Conduit
+from ..core.variables import StateVariable, add_prefix, select_prefix, with_prefix
 from .gas import GAS_CONSTANT, HEAT_AT_CONSTANT_PRESSURE, Air, Ambient, Flow, Gas, Isothermal
-from .tube import refuse_pieces
+from .tube import check_segment_count
+from .tube_model import TubeModel
 
 BLASIUS1913 = Reference(
     "blasius-1913",
@@ -31,7 +31,7 @@ SWIFT = 1.0 / 3.0
 
 
 @model
-class DistributedTube(Conduit):
+class DistributedTube(TubeModel):
     """A tube of n pieces with mass and flow in each, by balance of mass and of momentum:
 
         m_i' = q_(i-1) - q_i,   q_i' = (A/dx) (p_i - p_(i+1)) - f q_i,   f = 32 mu/(rho D^2) max(1, Re/1187)^(3/4)
@@ -60,7 +60,7 @@ class DistributedTube(Conduit):
     end_loss: float = parameter("1", "zeta", "loss at both ends, in dynamic heads", bounds=(0.0, 10.0), default=1.5)
 
     def check(self) -> None:
-        refuse_pieces("DistributedTube", self.pieces)
+        check_segment_count("DistributedTube", self.pieces)
 
     @property
     def area(self) -> Value:
@@ -78,14 +78,14 @@ class DistributedTube(Conduit):
             *self.gas.states(self.piece_volume, ambient),
             StateVariable("flow", "kg/s", brisk, "mass flow to the next piece"),
         )
-        return tuple(state for name in self.names for state in renamed(name, of_piece))
+        return tuple(state for name in self.names for state in add_prefix(name, of_piece))
 
-    def settled(self, air: Air, ambient: Ambient) -> dict[str, Value]:
-        content = {**self.gas.content(air.pressure, self.piece_volume, ambient), "flow": 0.0}
-        return {name: value for prefix in self.names for name, value in outside(prefix, content).items()}
+    def steady_state(self, air: Air, ambient: Ambient) -> dict[str, Value]:
+        content = {**self.gas.state_at(air.pressure, self.piece_volume, ambient), "flow": 0.0}
+        return {name: value for prefix in self.names for name, value in with_prefix(prefix, content).items()}
 
-    def airs(self, state: Mapping[str, Value], ambient: Ambient) -> tuple[Air, ...]:
-        held = (within(name, state) for name in self.names)
+    def air_states(self, state: Mapping[str, Value], ambient: Ambient) -> tuple[Air, ...]:
+        held = (select_prefix(name, state) for name in self.names)
         return tuple(self.gas.air(content, self.piece_volume, ambient) for content in held)
 
     def rates(
@@ -95,7 +95,7 @@ class DistributedTube(Conduit):
         for name, air, after in zip(self.names, airs, (*airs[1:], muscle), strict=True):
             mass = state[f"{name}flow"]
             onward = _carried(mass, air, after)
-            rates |= outside(name, self.gas.rates(within(name, state), air, flow - onward, 0.0, ambient))
+            rates |= with_prefix(name, self.gas.rates(select_prefix(name, state), air, flow - onward, 0.0, ambient))
             density = (_density(air) + _density(after)) / 2.0
             force = self.area * (air.pressure - after.pressure)
             if after is muscle:
@@ -104,7 +104,7 @@ class DistributedTube(Conduit):
             flow = onward
         return rates, flow
 
-    def doubts(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+    def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
         """Where its air ran faster than a third of the speed of sound, at the temperature of the surroundings."""
         still, found = _still(ambient), {}
         for name in self.names:

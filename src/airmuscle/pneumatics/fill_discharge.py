@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..core import ops
-from ..core.model import model
+from ..core.declaration import model
 from ..core.ops import Value
 from ..core.variables import Input
-from .circuit import Circuit, Response
-from .flow import through
-from .gas import STILL, Air, Ambient
+from .circuit import Circuit, CircuitFlows
+from .flow import orifice_flow
+from .gas import NO_FLOW, Air, Ambient
 from .orifice import Orifice
-from .supply import Source, Supply
+from .supply import AirSource, Supply
 
 
 def surroundings(ambient: Ambient) -> Air:
@@ -24,7 +24,7 @@ def surroundings(ambient: Ambient) -> Air:
 class FillDischarge(Circuit):
     """Two on/off valves: one from the supply, one to the surroundings."""
 
-    supply: Source
+    supply: AirSource
     fill: Orifice
     discharge: Orifice
 
@@ -32,20 +32,20 @@ class FillDischarge(Circuit):
     def inputs(self) -> tuple[Input, ...]:
         return (Input("fill"), Input("discharge"))
 
-    def draw(
+    def supplied_flow(
         self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
-    ) -> Response:  # fmt: skip
-        incoming = through(self.fill, inlet, airs[0], inputs["fill"])
-        outgoing = through(self.discharge, airs[0], surroundings(ambient), inputs["discharge"])
-        return Response((incoming - outgoing,), incoming, outgoing)
+    ) -> CircuitFlows:  # fmt: skip
+        incoming = orifice_flow(self.fill, inlet, airs[0], inputs["fill"])
+        outgoing = orifice_flow(self.discharge, airs[0], surroundings(ambient), inputs["discharge"])
+        return CircuitFlows((incoming - outgoing,), incoming, outgoing)
 
 
 @model
 class ThreePosition(Circuit):
     """A 3/3 valve with closed centre: one input, `valve`; 1 fills, 0 shuts, -1 discharges, less is part of the area."""
 
-    supply: Source
+    supply: AirSource
     fill: Orifice
     discharge: Orifice
 
@@ -53,28 +53,28 @@ class ThreePosition(Circuit):
     def inputs(self) -> tuple[Input, ...]:
         return (Input("valve", "1", -1.0, 1.0, "1 fill, 0 shut, -1 discharge"),)
 
-    def draw(
+    def supplied_flow(
         self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
-    ) -> Response:  # fmt: skip
+    ) -> CircuitFlows:  # fmt: skip
         place = inputs["valve"]
-        incoming = through(self.fill, inlet, airs[0], ops.maximum(place, 0.0))
-        outgoing = through(self.discharge, airs[0], surroundings(ambient), ops.maximum(-place, 0.0))
-        return Response((incoming - outgoing,), incoming, outgoing)
+        incoming = orifice_flow(self.fill, inlet, airs[0], ops.maximum(place, 0.0))
+        outgoing = orifice_flow(self.discharge, airs[0], surroundings(ambient), ops.maximum(-place, 0.0))
+        return CircuitFlows((incoming - outgoing,), incoming, outgoing)
 
 
 @model
 class ClosedChamber(Circuit):
     """No connection at all: the air mass stays what it is."""
 
-    supply: Source = Supply(0.0)
+    supply: AirSource = Supply(0.0)
 
     @property
     def inputs(self) -> tuple[Input, ...]:
         return ()
 
-    def draw(
+    def supplied_flow(
         self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
-    ) -> Response:  # fmt: skip
-        return Response((STILL,))
+    ) -> CircuitFlows:  # fmt: skip
+        return CircuitFlows((NO_FLOW,))

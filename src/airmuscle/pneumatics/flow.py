@@ -8,7 +8,7 @@ from .gas import HEAT_AT_CONSTANT_PRESSURE, Air, Flow
 from .orifice import Orifice
 
 
-def through(orifice: Orifice, first: Air, second: Air, opening: Value = 1.0) -> Flow:
+def orifice_flow(orifice: Orifice, first: Air, second: Air, opening: Value = 1.0) -> Flow:
     """The flow from the first place to the second; it has the temperature of the place that it comes from."""
     temperature = first.temperature
     if second.temperature is not first.temperature:  # a choice between two equal temperatures would cost time
@@ -17,6 +17,6 @@ def through(orifice: Orifice, first: Air, second: Air, opening: Value = 1.0) -> 
     return Flow(mass, HEAT_AT_CONSTANT_PRESSURE * temperature * mass)
 
 
-def opened(excess: Value, band: Value) -> Value:
+def proportional_opening(excess: Value, band: Value) -> Value:
     """Opening [1] that grows from 0 to 1 as `excess` grows from 0 to `band`."""
     return ops.clip(excess / band, 0.0, 1.0)

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from typing import ClassVar, NamedTuple
 
 from ..core import autodiff, ops
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from ..core.model import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.units import ABSOLUTE, AMBIENT_PRESSURE
@@ -20,11 +20,11 @@ from ..core.variables import StateVariable
 
 GAS_CONSTANT = 287.05
 """Specific gas constant of dry air [J/(kg K)]."""
-HEAT_RATIO = 1.4
+HEAT_CAPACITY_RATIO = 1.4
 """Ratio of the specific heats of a diatomic ideal gas, as dry air is taken for here."""
-HEAT_AT_CONSTANT_VOLUME = GAS_CONSTANT / (HEAT_RATIO - 1.0)
+HEAT_AT_CONSTANT_VOLUME = GAS_CONSTANT / (HEAT_CAPACITY_RATIO - 1.0)
 """Specific heat c_v of dry air [J/(kg K)]."""
-HEAT_AT_CONSTANT_PRESSURE = HEAT_RATIO * HEAT_AT_CONSTANT_VOLUME
+HEAT_AT_CONSTANT_PRESSURE = HEAT_CAPACITY_RATIO * HEAT_AT_CONSTANT_VOLUME
 """Specific heat c_p of dry air [J/(kg K)]."""
 REFERENCE_DENSITY = 1.185
 """Density of air at the reference atmosphere of ISO 8778, 100 kPa and 293.15 K [kg/m3]."""
@@ -66,7 +66,7 @@ def gauge(pressure: Value, ambient: Ambient) -> Value:
     return pressure - ambient.pressure
 
 
-def refuse_vacuum(pressure: float, ambient: Ambient) -> None:
+def check_above_vacuum(pressure: float, ambient: Ambient) -> None:
     """Raise ParameterError for a gauge pressure [Pa] at or below absolute zero."""
     if not absolute(pressure, ambient) > 0:
         raise ParameterError(
@@ -99,7 +99,7 @@ class Flow:
         return Flow(-self.mass, -self.enthalpy)
 
 
-STILL = Flow(0.0, 0.0)
+NO_FLOW = Flow(0.0, 0.0)
 """No air moves."""
 
 
@@ -117,7 +117,7 @@ class Gas(abc.ABC):
         """Pressure and temperature of what a chamber holds, in a volume [m3]."""
 
     @abc.abstractmethod
-    def content(self, pressure: Value, volume: Value, ambient: Ambient) -> dict[str, Value]:
+    def state_at(self, pressure: Value, volume: Value, ambient: Ambient) -> dict[str, Value]:
         """What a volume [m3] holds at rest at an absolute pressure [Pa]."""
 
     @abc.abstractmethod
@@ -127,23 +127,23 @@ class Gas(abc.ABC):
         """The time derivative of every state, as air flows in and the volume grows at `volume_rate` [m3/s]."""
 
     @abc.abstractmethod
-    def stored(self, content: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
+    def available_energy(self, content: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
         """Energy [J] that the chamber can give; along the process its slope by volume is minus the pressure."""
 
     @abc.abstractmethod
-    def carried(self, content: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
+    def energy_flow(self, content: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
         """Power [W] that comes in with the flow."""
 
     @abc.abstractmethod
     def sound_speed(self, air: Air) -> Value:
         """Speed [m/s] at which a small disturbance travels: sqrt(dp/drho) along the process."""
 
-    def warmed(self, air: Air, ambient: Ambient) -> Value:
+    def heat_flow(self, air: Air, ambient: Ambient) -> Value:
         """Heat [W] that the wall gives to the air, where the gas keeps account of it."""
         return 0.0
 
 
-class Process(Gas):
+class BarotropicGas(Gas):
     """Air that keeps to one process, so that its mass and volume alone give its pressure."""
 
     @abc.abstractmethod
@@ -170,7 +170,7 @@ class Process(Gas):
         pressure = self.pressure(content["air_mass"], volume, ambient)
         return Air(pressure, self.temperature(pressure, content["air_mass"], volume, ambient))
 
-    def content(self, pressure: Value, volume: Value, ambient: Ambient) -> dict[str, Value]:
+    def state_at(self, pressure: Value, volume: Value, ambient: Ambient) -> dict[str, Value]:
         return {"air_mass": self.air_mass(pressure, volume, ambient)}
 
     def rates(
@@ -178,16 +178,16 @@ class Process(Gas):
     ) -> dict[str, Value]:
         return {"air_mass": flow.mass}
 
-    def stored(self, content: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
+    def available_energy(self, content: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
         return self.energy(content["air_mass"], volume, ambient)
 
-    def carried(self, content: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
-        per_mass = autodiff.directional(lambda x: [self.energy(x[0], volume, ambient)], [content["air_mass"]], [1.0])
+    def energy_flow(self, content: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
+        per_mass = autodiff.jvp(lambda x: [self.energy(x[0], volume, ambient)], [content["air_mass"]], [1.0])
         return per_mass[0] * flow.mass
 
 
 @model
-class Isothermal(Process):
+class Isothermal(BarotropicGas):
     """Boyle-Mariotte: p V = m R T at the ambient temperature, as in the paper of Hosovsky et al."""
 
     def pressure(self, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
@@ -208,7 +208,7 @@ class Isothermal(Process):
 
 
 @model
-class Polytropic(Process):
+class Polytropic(BarotropicGas):
     """p / rho^n constant along the process, through the state of the ambient air.
 
         p = p_amb (m R T_amb / (p_amb V))^n,   so that   p' = n (R T m' - p V') / V   with T = p V / (m R)
@@ -250,7 +250,7 @@ class EnergyBalance(Gas):
     heat_transfer: float = parameter("W/K", "hA", "heat transfer between air and wall", bounds=(0.0, 1e5))
 
     def states(self, volume: Value, ambient: Ambient) -> tuple[StateVariable, ...]:
-        rest = self.content(ambient.pressure, volume, ambient)
+        rest = self.state_at(ambient.pressure, volume, ambient)
         return (
             StateVariable("air_mass", "kg", rest["air_mass"], "mass of the air"),
             StateVariable("internal_energy", "J", rest["internal_energy"], "internal energy of the air"),
@@ -259,29 +259,29 @@ class EnergyBalance(Gas):
     def air(self, content: Mapping[str, Value], volume: Value, ambient: Ambient) -> Air:
         energy = content["internal_energy"]
         temperature = energy / (content["air_mass"] * HEAT_AT_CONSTANT_VOLUME)
-        return Air((HEAT_RATIO - 1.0) * energy / volume, temperature)
+        return Air((HEAT_CAPACITY_RATIO - 1.0) * energy / volume, temperature)
 
-    def content(self, pressure: Value, volume: Value, ambient: Ambient) -> dict[str, Value]:
+    def state_at(self, pressure: Value, volume: Value, ambient: Ambient) -> dict[str, Value]:
         return {
             "air_mass": pressure * volume / (GAS_CONSTANT * ambient.temperature),
-            "internal_energy": pressure * volume / (HEAT_RATIO - 1.0),
+            "internal_energy": pressure * volume / (HEAT_CAPACITY_RATIO - 1.0),
         }
 
     def rates(
         self, content: Mapping[str, Value], air: Air, flow: Flow, volume_rate: Value, ambient: Ambient
     ) -> dict[str, Value]:
-        energy = flow.enthalpy - air.pressure * volume_rate + self.warmed(air, ambient)
+        energy = flow.enthalpy - air.pressure * volume_rate + self.heat_flow(air, ambient)
         return {"air_mass": flow.mass, "internal_energy": energy}
 
-    def stored(self, content: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
+    def available_energy(self, content: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
         return content["internal_energy"]
 
-    def carried(self, content: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
+    def energy_flow(self, content: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
         return flow.enthalpy
 
     def sound_speed(self, air: Air) -> Value:
         """That of adiabatic sound; a heat transfer that is large within a period brings it down to the isothermal."""
-        return ops.sqrt(HEAT_RATIO * GAS_CONSTANT * air.temperature)
+        return ops.sqrt(HEAT_CAPACITY_RATIO * GAS_CONSTANT * air.temperature)
 
-    def warmed(self, air: Air, ambient: Ambient) -> Value:
+    def heat_flow(self, air: Air, ambient: Ambient) -> Value:
         return self.heat_transfer * (ambient.temperature - air.temperature)

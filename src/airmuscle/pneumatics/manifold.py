@@ -6,21 +6,21 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from ..core.declaration import check_structure, model
 from ..core.errors import ParameterError
-from ..core.model import model, refuse_misplaced
 from ..core.ops import Value
-from ..core.variables import Input, StateVariable, outside, renamed, within
-from .circuit import SUPPLY, Circuit, Response
+from ..core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
+from .circuit import SUPPLY, Circuit, CircuitFlows
 from .fill_discharge import surroundings
-from .flow import through
+from .flow import orifice_flow
 from .gas import Air, Ambient
 from .orifice import Orifice
-from .supply import Shared, Source
-from .wrapper import Around
+from .supply import AirSource, SharedSupply
+from .wrapper import CircuitWrapper
 
 
 @model
-class Leaking(Around):
+class WithLeak(CircuitWrapper):
     """A circuit whose muscles also lose air to the surroundings through a leak each."""
 
     circuit: Circuit
@@ -32,12 +32,12 @@ class Leaking(Around):
     def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
         return self.circuit.own_settled(airs, ambient)
 
-    def draw(
+    def supplied_flow(
         self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
-    ) -> Response:  # fmt: skip
-        done = self.circuit.draw(inlet, airs, state, inputs, ambient)
-        lost = [through(self.leak, air, surroundings(ambient)) for air in airs]
+    ) -> CircuitFlows:  # fmt: skip
+        done = self.circuit.supplied_flow(inlet, airs, state, inputs, ambient)
+        lost = [orifice_flow(self.leak, air, surroundings(ambient)) for air in airs]
         flows = tuple(flow - leaking for flow, leaking in zip(done.flows, lost, strict=True))
         return dataclasses.replace(done, flows=flows, exhausted=sum(lost, done.exhausted))
 
@@ -46,12 +46,12 @@ class Leaking(Around):
 class Manifold(Circuit):
     """Several circuits on one supply, so that one that draws much starves the others; each has a name."""
 
-    supply: Source
+    supply: AirSource
     branches: tuple[Circuit, ...]
     names: tuple[str, ...]
 
     def check(self) -> None:
-        refuse_misplaced(self)
+        check_structure(self)
         for field, kind in (("branches", Circuit), ("names", str)):
             given = getattr(self, field)
             if not isinstance(given, tuple) or not all(isinstance(item, kind) for item in given):
@@ -65,9 +65,9 @@ class Manifold(Circuit):
                     "names the manifold's own."
                 )
         for name, branch in zip(self.names, self.branches, strict=True):
-            if not isinstance(branch.supply, Shared):
+            if not isinstance(branch.supply, SharedSupply):
                 raise ParameterError(
-                    f"Manifold: branch '{name}' has a supply of its own; give it Shared(), as the manifold feeds it."
+                    f"Manifold: branch '{name}' has a supply of its own; give it SharedSupply(), as the manifold feeds it."
                 )
 
     def _parts(self) -> Iterator[tuple[str, Circuit]]:
@@ -79,35 +79,35 @@ class Manifold(Circuit):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        return tuple(i for name, branch in self._parts() for i in renamed(name, branch.inputs))
+        return tuple(i for name, branch in self._parts() for i in add_prefix(name, branch.inputs))
 
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        return tuple(s for name, branch in self._parts() for s in renamed(name, branch.own_states(ambient)))
+        return tuple(s for name, branch in self._parts() for s in add_prefix(name, branch.own_states(ambient)))
 
     def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
         found: dict[str, Value] = {}
         left = list(airs)
         for name, branch in self._parts():
             mine, left = tuple(left[: branch.ports]), left[branch.ports :]
-            found |= outside(name, branch.own_settled(mine, ambient))
+            found |= with_prefix(name, branch.own_settled(mine, ambient))
         return found
 
-    def doubts(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+    def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
         found: dict[str, str] = {}
         for name, branch in self._parts():
-            found |= outside(name, branch.doubts(within(name, columns), ambient))
+            found |= with_prefix(name, branch.validity_warnings(select_prefix(name, columns), ambient))
         return found
 
-    def draw(
+    def supplied_flow(
         self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
-    ) -> Response:  # fmt: skip
-        total, left = Response(()), list(airs)
+    ) -> CircuitFlows:  # fmt: skip
+        total, left = CircuitFlows(()), list(airs)
         for name, branch in self._parts():
             mine, left = tuple(left[: branch.ports]), left[branch.ports :]
-            done = branch.draw(inlet, mine, within(name, state), within(name, inputs), ambient)
-            total = Response(
+            done = branch.supplied_flow(inlet, mine, select_prefix(name, state), select_prefix(name, inputs), ambient)
+            total = CircuitFlows(
                 total.flows + done.flows, total.drawn + done.drawn, total.exhausted + done.exhausted,
-                {**total.rates, **outside(name, done.rates)}, {**total.outputs, **outside(name, done.outputs)},
+                {**total.rates, **with_prefix(name, done.rates)}, {**total.outputs, **with_prefix(name, done.outputs)},
             )  # fmt: skip
         return total

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..core import ops
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from ..core.model import model, parameter
 from ..core.ops import Value
 from ..core.variables import Input, StateVariable
-from .circuit import Circuit, Response
+from .circuit import Circuit, CircuitFlows
 from .fill_discharge import surroundings
-from .flow import opened, through
-from .gas import STILL, Air, Ambient, Flow, absolute, gauge
+from .flow import orifice_flow, proportional_opening
+from .gas import NO_FLOW, Air, Ambient, Flow, absolute, gauge
 from .orifice import Orifice
-from .supply import Source
+from .supply import AirSource
 
 
 @model
-class Follower:
+class SecondOrderLag:
     """A second-order lag: x'' = w^2 (u - x) - 2 zeta w x', w = 2 pi f."""
 
     frequency: float = parameter("Hz", "f", "natural frequency", bounds=(0.1, 1e4))
@@ -40,10 +40,10 @@ class ProportionalValve(Circuit):
     Fill and discharge have an orifice each, so that their areas may differ.
     """
 
-    supply: Source
+    supply: AirSource
     fill: Orifice
     discharge: Orifice
-    spool: Follower
+    spool: SecondOrderLag
     overlap: float = parameter("1", "o", "overlap, share of the stroke", bounds=(-0.5, 0.9), default=0.0)
     muscles: int = 1
     """How many muscles it feeds, one or two."""
@@ -70,20 +70,20 @@ class ProportionalValve(Circuit):
 
     def opening(self, place: Value) -> Value:
         """Opening [1] of an edge with the spool at `place` towards it."""
-        return opened(place - self.overlap, 1.0 - self.overlap)
+        return proportional_opening(place - self.overlap, 1.0 - self.overlap)
 
-    def draw(
+    def supplied_flow(
         self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
-    ) -> Response:  # fmt: skip
-        place, flows, drawn, exhausted = state["spool"], [], STILL, STILL
+    ) -> CircuitFlows:  # fmt: skip
+        place, flows, drawn, exhausted = state["spool"], [], NO_FLOW, NO_FLOW
         for air, towards in zip(airs, (place, -place), strict=False):
-            incoming = through(self.fill, inlet, air, self.opening(towards))
-            outgoing = through(self.discharge, air, surroundings(ambient), self.opening(-towards))
+            incoming = orifice_flow(self.fill, inlet, air, self.opening(towards))
+            outgoing = orifice_flow(self.discharge, air, surroundings(ambient), self.opening(-towards))
             flows.append(incoming - outgoing)
             drawn, exhausted = drawn + incoming, exhausted + outgoing
         moving, pushed = self.spool.rates(place, state["spool_speed"], inputs["command"])
-        return Response(tuple(flows), drawn, exhausted, {"spool": moving, "spool_speed": pushed})
+        return CircuitFlows(tuple(flows), drawn, exhausted, {"spool": moving, "spool_speed": pushed})
 
 
 @model
@@ -96,16 +96,16 @@ class ProportionalRegulator(Circuit):
     open: near the set point it is slow, far from it its flow is that of the open orifice.
     """
 
-    supply: Source
+    supply: AirSource
     fill: Orifice
     discharge: Orifice
-    lag: Follower
+    lag: SecondOrderLag
     band: float = parameter("Pa", "B", "error at which it is fully open", bounds=(100.0, 1e6), default=2e4)
-    greatest: float = parameter("Pa", "u_max", "greatest set point", bounds=(1e3, 5e6), fitted=False, default=1e6)
+    max_setpoint: float = parameter("Pa", "u_max", "greatest set point", bounds=(1e3, 5e6), fitted=False, default=1e6)
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        return (Input("setpoint", "Pa", 0.0, self.greatest, "gauge pressure to regulate to"),)
+        return (Input("setpoint", "Pa", 0.0, self.max_setpoint, "gauge pressure to regulate to"),)
 
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         rate = 1e5 * 2.0 * ops.pi * self.lag.frequency
@@ -115,14 +115,14 @@ class ProportionalRegulator(Circuit):
     def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
         return {"regulated": gauge(airs[0].pressure, ambient), "regulated_rate": 0.0}
 
-    def draw(
+    def supplied_flow(
         self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
-    ) -> Response:  # fmt: skip
+    ) -> CircuitFlows:  # fmt: skip
         (air,) = airs
         error = absolute(state["regulated"], ambient) - air.pressure
-        incoming = through(self.fill, inlet, air, opened(error, self.band))
-        outgoing = through(self.discharge, air, surroundings(ambient), opened(-error, self.band))
+        incoming = orifice_flow(self.fill, inlet, air, proportional_opening(error, self.band))
+        outgoing = orifice_flow(self.discharge, air, surroundings(ambient), proportional_opening(-error, self.band))
         moving, pushed = self.lag.rates(state["regulated"], state["regulated_rate"], inputs["setpoint"])
         flow: Flow = incoming - outgoing
-        return Response((flow,), incoming, outgoing, {"regulated": moving, "regulated_rate": pushed})
+        return CircuitFlows((flow,), incoming, outgoing, {"regulated": moving, "regulated_rate": pushed})

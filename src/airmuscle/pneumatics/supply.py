@@ -6,23 +6,23 @@ import abc
 from collections.abc import Mapping
 
 from ..core import ops
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from ..core.model import model, parameter
 from ..core.ops import Value
-from ..core.variables import StateVariable, outside, renamed, within
-from .flow import opened, through
+from ..core.variables import StateVariable, add_prefix, select_prefix, with_prefix
+from .flow import orifice_flow, proportional_opening
 from .gas import Air, Ambient, Flow, Gas, Isothermal, absolute
 from .orifice import Orifice
 
 
-class Source(abc.ABC):
+class AirSource(abc.ABC):
     """A source of air with states of its own."""
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         """Its states; none, if its pressure does not change."""
         return ()
 
-    def settled(self, ambient: Ambient) -> dict[str, Value]:
+    def steady_state(self, ambient: Ambient) -> dict[str, Value]:
         """Its states where nothing has been drawn for long."""
         return {}
 
@@ -36,7 +36,7 @@ class Source(abc.ABC):
 
 
 @model
-class Supply(Source):
+class Supply(AirSource):
     """Air at a constant pressure and at ambient temperature."""
 
     pressure: float = parameter("Pa", "p_s", "gauge pressure of the supply", bounds=(-1e5, 5e6))
@@ -46,59 +46,59 @@ class Supply(Source):
 
 
 @model
-class Shared(Source):
+class SharedSupply(AirSource):
     """The supply of a branch in a `Manifold`, which feeds all its branches from one supply of its own."""
 
     def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
-        raise ParameterError("Shared() is the supply of a branch in a Manifold; it has no air of its own.")
+        raise ParameterError("SharedSupply() is the supply of a branch in a Manifold; it has no air of its own.")
 
 
-def refuse_shared(owner: str, supply: Source) -> None:
-    """Raise ParameterError for a Shared() where no manifold stands before it."""
-    if isinstance(supply, Shared):
+def check_not_shared(owner: str, supply: AirSource) -> None:
+    """Raise ParameterError for a SharedSupply() where no manifold stands before it."""
+    if isinstance(supply, SharedSupply):
         raise ParameterError(
-            f"{owner}: Shared() is the supply of a branch in a Manifold, which has one of its own; here give a Supply, "
+            f"{owner}: SharedSupply() is the supply of a branch in a Manifold, which has one of its own; here give a Supply, "
             "a Tank or a RegulatedSupply."
         )
 
 
 @model
-class Tank(Source):
+class Tank(AirSource):
     """A vessel that is fed through an orifice and sags while air is drawn faster than it comes in.
 
     m' = q_feed - q_drawn, pressure by the gas. It begins at the pressure of what feeds it; a feed of conductance 0
     leaves it to itself.
     """
 
-    supply: Source
+    supply: AirSource
     feed: Orifice
     volume: float = parameter("m3", "V_T", "volume of the tank", bounds=(1e-6, 1e2))
     gas: Gas = Isothermal()
 
     def check(self) -> None:
-        refuse_shared("Tank", self.supply)
+        check_not_shared("Tank", self.supply)
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        return (*self.gas.states(self.volume, ambient), *renamed("supply.", self.supply.states(ambient)))
+        return (*self.gas.states(self.volume, ambient), *add_prefix("supply.", self.supply.states(ambient)))
 
-    def settled(self, ambient: Ambient) -> dict[str, Value]:
-        before = self.supply.settled(ambient)
+    def steady_state(self, ambient: Ambient) -> dict[str, Value]:
+        before = self.supply.steady_state(ambient)
         pressure = self.supply.air(before, ambient).pressure
-        return {**self.gas.content(pressure, self.volume, ambient), **outside("supply.", before)}
+        return {**self.gas.state_at(pressure, self.volume, ambient), **with_prefix("supply.", before)}
 
     def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
         return self.gas.air(state, self.volume, ambient)
 
     def balance(self, state: Mapping[str, Value], drawn: Flow, ambient: Ambient) -> tuple[dict[str, Value], Flow]:
-        before, inside = within("supply.", state), self.air(state, ambient)
-        fed = through(self.feed, self.supply.air(before, ambient), inside)
+        before, inside = select_prefix("supply.", state), self.air(state, ambient)
+        fed = orifice_flow(self.feed, self.supply.air(before, ambient), inside)
         further, taken = self.supply.balance(before, fed, ambient)
         rates = self.gas.rates(state, inside, fed - drawn, 0.0, ambient)
-        return {**rates, **outside("supply.", further)}, taken
+        return {**rates, **with_prefix("supply.", further)}, taken
 
 
 @model
-class RegulatedSupply(Source):
+class RegulatedSupply(AirSource):
     """A pressure regulator in the line: it opens as its outlet falls below the pressure that it is set to.
 
         opening = clip((p_set - p)/B, 0, 1)
@@ -108,7 +108,7 @@ class RegulatedSupply(Source):
     set to, or at that of its supply where this is lower.
     """
 
-    supply: Source
+    supply: AirSource
     valve: Orifice
     pressure: float = parameter("Pa", "p_set", "gauge pressure that it is set to", bounds=(0.0, 2e6))
     band: float = parameter("Pa", "B", "droop from no flow to full flow", bounds=(100.0, 1e6), default=2e4)
@@ -116,23 +116,23 @@ class RegulatedSupply(Source):
     gas: Gas = Isothermal()
 
     def check(self) -> None:
-        refuse_shared("RegulatedSupply", self.supply)
+        check_not_shared("RegulatedSupply", self.supply)
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        return (*self.gas.states(self.volume, ambient), *renamed("supply.", self.supply.states(ambient)))
+        return (*self.gas.states(self.volume, ambient), *add_prefix("supply.", self.supply.states(ambient)))
 
-    def settled(self, ambient: Ambient) -> dict[str, Value]:
-        before = self.supply.settled(ambient)
+    def steady_state(self, ambient: Ambient) -> dict[str, Value]:
+        before = self.supply.steady_state(ambient)
         pressure = ops.minimum(absolute(self.pressure, ambient), self.supply.air(before, ambient).pressure)
-        return {**self.gas.content(pressure, self.volume, ambient), **outside("supply.", before)}
+        return {**self.gas.state_at(pressure, self.volume, ambient), **with_prefix("supply.", before)}
 
     def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
         return self.gas.air(state, self.volume, ambient)
 
     def balance(self, state: Mapping[str, Value], drawn: Flow, ambient: Ambient) -> tuple[dict[str, Value], Flow]:
-        before, inside = within("supply.", state), self.air(state, ambient)
-        opening = opened(absolute(self.pressure, ambient) - inside.pressure, self.band)
-        fed = through(self.valve, self.supply.air(before, ambient), inside, opening)
+        before, inside = select_prefix("supply.", state), self.air(state, ambient)
+        opening = proportional_opening(absolute(self.pressure, ambient) - inside.pressure, self.band)
+        fed = orifice_flow(self.valve, self.supply.air(before, ambient), inside, opening)
         further, taken = self.supply.balance(before, fed, ambient)
         rates = self.gas.rates(state, inside, fed - drawn, 0.0, ambient)
-        return {**rates, **outside("supply.", further)}, taken
+        return {**rates, **with_prefix("supply.", further)}, taken

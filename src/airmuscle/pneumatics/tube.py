@@ -6,16 +6,16 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ..core import ops
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from ..core.model import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
-from ..core.tree import rebuild
-from ..core.variables import StateVariable, outside, renamed, within
-from .conduit import Conduit
-from .flow import through
+from ..core.tree import unflatten
+from ..core.variables import StateVariable, add_prefix, select_prefix, with_prefix
+from .flow import orifice_flow
 from .gas import Air, Ambient, Flow, Gas, Isothermal
 from .orifice import Orifice
+from .tube_model import TubeModel
 from .valve import Valve
 
 ECKERSTEN = Reference(
@@ -55,12 +55,12 @@ class TubeOrifice(Orifice):
         return 474.0 * self.conductance / self.diameter**2
 
     def mass_flow(self, upstream: Value, downstream: Value, opening: Value, temperature: Value) -> Value:
-        valve = rebuild(_ANY, (self.conductance, self.critical_ratio, _ANY.laminar_ratio))
+        valve = unflatten(_ANY, (self.conductance, self.critical_ratio, _ANY.laminar_ratio))
         return valve.mass_flow(upstream, downstream, opening, temperature)
 
 
 @model
-class Tube(Conduit):
+class Tube(TubeModel):
     """A volume, and an orifice from it to the muscle; or `pieces` of them one after the other.
 
     `orifice` is the whole tube's. Each of n pieces has 1/n of the volume and sqrt(n) times the conductance, which is
@@ -80,18 +80,18 @@ class Tube(Conduit):
         return cls(TubeOrifice(length, diameter), ops.pi / 4.0 * diameter**2 * length, pieces, gas)
 
     def check(self) -> None:
-        refuse_pieces("Tube", self.pieces)
+        check_segment_count("Tube", self.pieces)
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         of_piece = self.gas.states(self.volume / self.pieces, ambient)
-        return tuple(state for name in self.names for state in renamed(name, of_piece))
+        return tuple(state for name in self.names for state in add_prefix(name, of_piece))
 
-    def settled(self, air: Air, ambient: Ambient) -> dict[str, Value]:
-        content = self.gas.content(air.pressure, self.volume / self.pieces, ambient)
-        return {name: value for prefix in self.names for name, value in outside(prefix, content).items()}
+    def steady_state(self, air: Air, ambient: Ambient) -> dict[str, Value]:
+        content = self.gas.state_at(air.pressure, self.volume / self.pieces, ambient)
+        return {name: value for prefix in self.names for name, value in with_prefix(prefix, content).items()}
 
-    def airs(self, state: Mapping[str, Value], ambient: Ambient) -> tuple[Air, ...]:
-        held = (within(name, state) for name in self.names)
+    def air_states(self, state: Mapping[str, Value], ambient: Ambient) -> tuple[Air, ...]:
+        held = (select_prefix(name, state) for name in self.names)
         return tuple(self.gas.air(content, self.volume / self.pieces, ambient) for content in held)
 
     def rates(
@@ -99,13 +99,13 @@ class Tube(Conduit):
     ) -> tuple[dict[str, Value], Flow]:
         rates: dict[str, Value] = {}
         for name, air, after in zip(self.names, airs, (*airs[1:], muscle), strict=True):
-            onward = through(self.orifice, air, after, self.pieces**0.5)
-            rates |= outside(name, self.gas.rates(within(name, state), air, flow - onward, 0.0, ambient))
+            onward = orifice_flow(self.orifice, air, after, self.pieces**0.5)
+            rates |= with_prefix(name, self.gas.rates(select_prefix(name, state), air, flow - onward, 0.0, ambient))
             flow = onward
         return rates, flow
 
 
-def refuse_pieces(owner: str, pieces: int) -> None:
+def check_segment_count(owner: str, pieces: int) -> None:
     """Raise ParameterError unless a tube is cut into 1 to 200 pieces."""
     if isinstance(pieces, bool) or not (isinstance(pieces, int) and 1 <= pieces <= 200):
         raise ParameterError(f"{owner}: pieces is {pieces!r}; give a whole number from 1 to 200.")

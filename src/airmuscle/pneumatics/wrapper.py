@@ -9,24 +9,24 @@ from typing import Any
 from ..core.variables import Input
 from .circuit import Circuit
 from .gas import Ambient
-from .supply import Source
+from .supply import AirSource
 
 
-class Around(Circuit, abc.ABC):
+class CircuitWrapper(Circuit, abc.ABC):
     """A circuit around another one."""
 
     circuit: Circuit
 
     @property
-    def supply(self) -> Source:  # type: ignore[override]  # the circuit's own
+    def supply(self) -> AirSource:  # type: ignore[override]  # the circuit's own
         return self.circuit.supply
 
     @property
     def ports(self) -> int:
         return self.circuit.ports
 
-    def doubts(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
-        return self.circuit.doubts(columns, ambient)
+    def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+        return self.circuit.validity_warnings(columns, ambient)
 
     @property
     def inputs(self) -> tuple[Input, ...]:

@@ -1,12 +1,12 @@
 """One run, measured or simulated: the same type, so that the two always compare."""
 
 from .columns import QUANTITIES, Quantity
+from .csv_reader import read_csv
+from .csv_writer import write_csv
 from .mapping import ColumnMapping
-from .read import read
-from .read_csv import read_csv
+from .reader import read
 from .recording import Recording
 from .thinning import BlockMeans, Decimation
-from .write_csv import write_csv
 
 __all__ = [
     "QUANTITIES",

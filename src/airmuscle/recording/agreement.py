@@ -23,7 +23,7 @@ FAR_APART = 50.0
 Forces are not compared so: a slack muscle is measured like a taut one."""
 
 
-def refuse_contradiction(recordings: Sequence[Recording]) -> None:
+def check_agreement(recordings: Sequence[Recording]) -> None:
     """Raise UnitError where two files hold the same numbers under units that differ; warn where it looks like it.
 
     Each message names both files and the column.

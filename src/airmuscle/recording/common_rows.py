@@ -37,9 +37,9 @@ def common_rows(
         raise ColumnError(f"{origin}: there is no channel with a row of numbers.")
     timed = [c for c in channels if c.time is not None]
     if not timed or all(_same_time(c, timed[0]) for c in channels):
-        _refuse_unequal(origin, channels)
+        _check_equal_lengths(origin, channels)
         return _table(origin, channels, timed[0].time if timed else None, (), remarks, row_word)
-    _refuse_untimed(origin, channels)
+    _check_timed(origin, channels)
     return _resampled(origin, channels, remarks, row_word)
 
 
@@ -50,7 +50,7 @@ def _same_time(one: Channel, other: Channel) -> bool:
     return one.time is None or bool(np.array_equal(one.time, other.time))
 
 
-def _refuse_unequal(origin: str, channels: Sequence[Channel]) -> None:
+def _check_equal_lengths(origin: str, channels: Sequence[Channel]) -> None:
     if len({len(c.values) for c in channels}) > 1:
         sizes = ", ".join(f"{c.name} {len(c.values)}" for c in channels)
         raise ColumnError(
@@ -59,7 +59,7 @@ def _refuse_unequal(origin: str, channels: Sequence[Channel]) -> None:
         )
 
 
-def _refuse_untimed(origin: str, channels: Sequence[Channel]) -> None:
+def _check_timed(origin: str, channels: Sequence[Channel]) -> None:
     without = [c.name for c in channels if c.time is None]
     if without:
         raise ColumnError(

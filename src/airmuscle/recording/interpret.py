@@ -12,12 +12,12 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ColumnError, UnitError, suggestion
-from ..core.units import AMBIENT_PRESSURE, Conversion, conversion
+from ..core.units import AMBIENT_PRESSURE, UnitConversion, conversion
 from .clock import seconds_from_clock
 from .columns import QUANTITIES
 from .constants import constant_of_column, stated_constants
 from .heading import SPELLINGS, Heading, known_name, read_heading
-from .plausible import refuse_implausible
+from .plausible import check_plausible
 from .recording import Recording
 from .table import Cells, RawTable
 
@@ -48,7 +48,7 @@ def interpret(
         else:
             note = _kept(table, heading, cells, columns)
         notes += [note] if note and note not in notes else []
-    refuse_implausible(table, columns, found.get("resting_length"), ambient, ordered=ordered)
+    check_plausible(table, columns, found.get("resting_length"), ambient, ordered=ordered)
     written = {h.name: h.unit for h in headings if h.known and h.unit}
     return Recording(columns, table.origin, found, tuple(notes), written)
 
@@ -68,9 +68,9 @@ def _headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
         Heading(h.text, h.name, stated.get(h.name, stated.get(h.text)) or below or h.unit, h.known)
         for h, below in zip(read, [*row, *[""] * (len(read) - len(row))], strict=False)
     ]
-    _refuse_twins(table, found)
+    _check_unique(table, found)
     if not any(heading.known for heading in found):
-        _refuse_all(table, found)
+        _check_any(table, found)
     return found
 
 
@@ -85,7 +85,7 @@ def _overruled(table: RawTable, headings: list[Heading]) -> list[str]:
     ]
 
 
-def _refuse_twins(table: RawTable, headings: list[Heading]) -> None:
+def _check_unique(table: RawTable, headings: list[Heading]) -> None:
     seen: dict[str, str] = {}
     for heading in headings:
         if heading.name in seen and heading.text:
@@ -96,7 +96,7 @@ def _refuse_twins(table: RawTable, headings: list[Heading]) -> None:
         seen[heading.name] = heading.text
 
 
-def _refuse_all(table: RawTable, headings: list[Heading]) -> None:
+def _check_any(table: RawTable, headings: list[Heading]) -> None:
     names = [heading.text for heading in headings]
     near = [n for name in names for n in difflib.get_close_matches(name.lower(), QUANTITIES, n=1)]
     hint = f" Did you mean '{near[0]}'?" if near else ""
@@ -124,20 +124,20 @@ def _in_si(table: RawTable, heading: Heading, cells: Cells, ambient: float) -> t
     return change(values), ""
 
 
-def _conversion(table: RawTable, heading: Heading, ambient: float) -> Conversion:
+def _conversion(table: RawTable, heading: Heading, ambient: float) -> UnitConversion:
     target = heading.target or "1"
     where = f"{table.origin}, column '{heading.text}'"
     usual = ", ".join(SPELLINGS[target])
     if heading.unit is None:
         if target == "1":
-            return Conversion(1.0)
+            return UnitConversion(1.0)
         raise UnitError(
             f"{where}: no unit is stated. Head it '{heading.name} [{SPELLINGS[target][1 % len(SPELLINGS[target])]}]' "
             f"or give units={{'{heading.name}': ...}}; usual are {usual}."
         )
     try:
         if target == "N" and _is_mass(heading.unit):
-            return Conversion(conversion(heading.unit, "kg").factor * STANDARD_GRAVITY)
+            return UnitConversion(conversion(heading.unit, "kg").factor * STANDARD_GRAVITY)
         return conversion(heading.unit, target, ambient=ambient, where=where)
     except UnitError as reason:
         cases = {spelling.lower(): spelling for spelling in SPELLINGS[target]}

@@ -10,8 +10,8 @@ import numpy as np
 
 from .raw_csv import parsed
 from .table import Cells, RawTable
-from .text_form import Head, Lines, TextForm, encoding_of, head_of, holds_something, is_comment
-from .thinning import Decimation, Thinning
+from .text_form import Lines, TextForm, TextHeader, encoding_of, head_of, holds_something, is_comment
+from .thinning import Decimation, Downsampling
 
 LARGE = 32_000_000
 """Files of more bytes than this are read in pieces (chosen: below it, the whole text fits anywhere)."""
@@ -30,7 +30,7 @@ def is_large(path: Path) -> bool:
 def large_csv(
     path: Path,
     form: TextForm = TextForm(),
-    thinning: Thinning = Decimation(),
+    thinning: Downsampling = Decimation(),
     progress: Progress | None = None,
 ) -> RawTable:
     """The table in a large text file, with no more rows than the thinning allows, which a note says.
@@ -57,7 +57,7 @@ def large_csv(
     return RawTable(path.name, head.headings, head.units, joined, np.array(rows), remarks=head.remarks, notes=notes)
 
 
-def _head(origin: str, beginning: bytes, encoding: str, form: TextForm) -> tuple[int, Head]:
+def _head(origin: str, beginning: bytes, encoding: str, form: TextForm) -> tuple[int, TextHeader]:
     """The number of the first line of numbers, and what stands above it."""
     text = beginning.decode(encoding, errors="replace").splitlines()[:-1]  # the last one may be cut
     lines = [(i, line) for i, line in enumerate(text, 1) if holds_something(line)]

@@ -14,7 +14,7 @@ CONTRACTIONS = (-0.5, 1.0)
 """Contractions that are believed (chosen): none reaches 1, and no muscle is stretched by half its length."""
 
 
-def refuse_implausible(
+def check_plausible(
     table: RawTable,
     columns: Mapping[str, Array],
     resting_length: float | None,
@@ -26,16 +26,16 @@ def refuse_implausible(
     for name, values in columns.items():
         quantity = name.rpartition(".")[2]
         if quantity == "time" and ordered:
-            _refuse_unordered(table, values)
+            _check_ordered(table, values)
         elif quantity == "pressure":
-            _refuse_vacuum(table, values, ambient)
+            _check_above_vacuum(table, values, ambient)
         elif quantity == "contraction":
-            _refuse_contraction(table, values, "contraction", "Is it in per cent? Then head it 'contraction [%]'.")
+            _check_contraction(table, values, "contraction", "Is it in per cent? Then head it 'contraction [%]'.")
         elif quantity == "length":
-            _refuse_length(table, values, resting_length)
+            _check_length(table, values, resting_length)
 
 
-def _refuse_unordered(table: RawTable, time: Array) -> None:
+def _check_ordered(table: RawTable, time: Array) -> None:
     late = np.diff(time) <= 0
     if late.any():
         row = int(np.argmax(late)) + 1
@@ -46,7 +46,7 @@ def _refuse_unordered(table: RawTable, time: Array) -> None:
         )
 
 
-def _refuse_vacuum(table: RawTable, pressure: Array, ambient: float) -> None:
+def _check_above_vacuum(table: RawTable, pressure: Array, ambient: float) -> None:
     below = ~(pressure + ambient > 0)
     if below.any():
         row = int(np.argmax(below))
@@ -56,7 +56,7 @@ def _refuse_vacuum(table: RawTable, pressure: Array, ambient: float) -> None:
         )
 
 
-def _refuse_contraction(table: RawTable, contraction: Array, what: str, remedy: str) -> None:
+def _check_contraction(table: RawTable, contraction: Array, what: str, remedy: str) -> None:
     low, high = CONTRACTIONS
     outside = ~((contraction > low) & (contraction < high))
     if outside.any():
@@ -66,12 +66,12 @@ def _refuse_contraction(table: RawTable, contraction: Array, what: str, remedy: 
         )
 
 
-def _refuse_length(table: RawTable, length: Array, resting_length: float | None) -> None:
+def _check_length(table: RawTable, length: Array, resting_length: float | None) -> None:
     if not (length > 0).all():
         row = int(np.argmin(length > 0))
         raise ColumnError(f"{table.place(row)}: length {length[row]:.6g} m; it must be greater than zero.")
     if resting_length is not None:
-        _refuse_contraction(
+        _check_contraction(
             table,
             (resting_length - length) / resting_length,
             f"with a resting length of {resting_length:.6g} m the length makes a contraction that is implausible:",

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.errors import ColumnError, FileError
 from .table import Cells, RawTable
-from .text_form import Head, Lines, TextForm, cells_of, encoding_of, head_of, holds_something, is_comment
+from .text_form import Lines, TextForm, TextHeader, cells_of, encoding_of, head_of, holds_something, is_comment
 
 _COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 _POINT_NUMBER = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
@@ -38,7 +38,7 @@ def _text(path: Path) -> str:
     return content.decode(encoding_of(content), errors="replace")
 
 
-def parsed(origin: str, head: Head, body: Lines, form: TextForm) -> tuple[Cells, ...]:
+def parsed(origin: str, head: TextHeader, body: Lines, form: TextForm) -> tuple[Cells, ...]:
     """The columns, by a fast parser where every cell is a number, otherwise cell by cell."""
     comma = form.decimal != "." and head.delimiter != "," and any("," in line for _, line in body)
     lines = [line.replace(",", ".") if comma else line for _, line in body]
@@ -53,7 +53,7 @@ def parsed(origin: str, head: Head, body: Lines, form: TextForm) -> tuple[Cells,
     return tuple(np.ascontiguousarray(column) for column in numbers.T)
 
 
-def _by_cells(origin: str, head: Head, body: Lines, comma: bool, decimal: str | None) -> tuple[Cells, ...]:
+def _by_cells(origin: str, head: TextHeader, body: Lines, comma: bool, decimal: str | None) -> tuple[Cells, ...]:
     rows = [cells_of(line, head.delimiter) for _, line in body]
     width = len(head.headings)
     for (line, _), row in zip(body, rows, strict=True):
@@ -66,7 +66,7 @@ def _by_cells(origin: str, head: Head, body: Lines, comma: bool, decimal: str | 
                 f"{hint} Lines that are no part of the table must begin with '#'."
             )
     if comma and decimal is None:
-        _refuse_two_decimal_signs(origin, body, rows)
+        _check_decimal_sign(origin, body, rows)
     return tuple(_numbers_or_texts([_pointed(row[i], decimal) for row in rows]) for i in range(width))
 
 
@@ -86,7 +86,7 @@ def _numbers_or_texts(cells: list[str]) -> Cells:
         return cells
 
 
-def _refuse_two_decimal_signs(origin: str, body: Lines, rows: list[list[str]]) -> None:
+def _check_decimal_sign(origin: str, body: Lines, rows: list[list[str]]) -> None:
     """`1,234` beside `0.5` may be a thousand or a bit more than one: refuse to guess."""
     found: dict[str, tuple[int, str]] = {}
     for (line, _), row in zip(body, rows, strict=True):

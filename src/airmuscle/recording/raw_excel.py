@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import ColumnError, FileError, suggestion
-from .lab_package import lab_package, opened
-from .layout import are_headings, refuse_headless, remark, unit_row
+from .header import are_headings, check_header, remark, unit_row
+from .optional_dependency import import_optional, lab_package
 from .table import Cells, RawTable
 
 Rows = list[tuple[int, list[Any]]]
@@ -25,13 +25,15 @@ def raw_excel(path: Path, sheet: str | None = None, *, headless: bool = False) -
     def read() -> dict[str, Rows]:
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
         try:
-            _refuse_missing(path, sheet, book.sheetnames)
+            _check_present(path, sheet, book.sheetnames)
             names = [w.title for w in book.worksheets] if sheet is None else [sheet]
             return {name: _filled(book[name].iter_rows(values_only=True)) for name in names}
         finally:
             book.close()
 
-    sheets = {name: rows for name, rows in opened(path, "an Excel workbook", read).items() if _holds_table(rows)}
+    sheets = {
+        name: rows for name, rows in import_optional(path, "an Excel workbook", read).items() if _holds_table(rows)
+    }
     if not sheets:
         raise FileError(f"{path.name}: no worksheet holds a table. A table has a row of headings and rows of numbers.")
     several = len(sheets) > 1
@@ -41,7 +43,7 @@ def raw_excel(path: Path, sheet: str | None = None, *, headless: bool = False) -
     )
 
 
-def _refuse_missing(path: Path, sheet: str | None, names: list[str]) -> None:
+def _check_present(path: Path, sheet: str | None, names: list[str]) -> None:
     if sheet is not None and sheet not in names:
         raise FileError(f"{path.name}: no sheet '{sheet}'; there are {', '.join(names)}.{suggestion(sheet, names)}")
 
@@ -65,13 +67,13 @@ def _table(origin: str, rows: Rows, headless: bool) -> RawTable:
     elif headless:
         headings, body = [str(n) for n in range(1, len(used) + 1)], rows[start:]
     else:
-        raise refuse_headless(f"{origin}, row {first}")
+        raise check_header(f"{origin}, row {first}")
     below = [_text(_cell(body[0][1], j)) for j in used] if body else []
     units = unit_row(headings, below)
     body = body[1:] if units else body
     if not body:
         raise FileError(f"{origin}: there are headings ({', '.join(headings)}) but no rows of numbers below them.")
-    _refuse_outside(origin, headings, used, body)
+    _check_inside(origin, headings, used, body)
     columns = tuple(_column([_cell(row, j) for _, row in body]) for j in used)
     return RawTable(origin, tuple(headings), units, columns, np.array([i for i, _ in body]), "row", remarks)
 
@@ -107,7 +109,7 @@ def _cell(row: list[Any], j: int) -> Any:
     return row[j] if j < len(row) else None
 
 
-def _refuse_outside(origin: str, headings: list[str], used: list[int], body: Rows) -> None:
+def _check_inside(origin: str, headings: list[str], used: list[int], body: Rows) -> None:
     for i, row in body:
         outside = [j for j, cell in enumerate(row) if cell not in (None, "") and j not in used]
         if outside:

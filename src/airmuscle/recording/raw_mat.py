@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core.errors import ColumnError, FileError, suggestion
 from .common_rows import Channel, common_rows
-from .lab_package import lab_package, opened
+from .optional_dependency import import_optional, lab_package
 from .table import RawTable
 
 _OWN = ("__header__", "__version__", "__globals__", "#refs#", "#subsystem#")
@@ -30,7 +30,7 @@ def raw_mat(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
             warnings.simplefilter("ignore")  # on objects it cannot read; what is missing then is said below
             return dict(pymatreader.read_mat(str(path)))
 
-    variables = {name: value for name, value in opened(path, "MATLAB", read).items() if name not in _OWN}
+    variables = {name: value for name, value in import_optional(path, "MATLAB", read).items() if name not in _OWN}
     found = dict(_groups("", variables))
     if group is not None and group not in found:
         there = f"there are {', '.join(name or '(no struct)' for name in found)}.{suggestion(group, found)}"

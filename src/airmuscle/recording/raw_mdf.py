@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.errors import FileError, suggestion
 from .common_rows import Channel, common_rows
-from .lab_package import lab_package, opened
+from .optional_dependency import import_optional, lab_package
 from .table import RawTable
 
 _TIME = 1
@@ -30,7 +30,7 @@ def raw_mdf(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
             chosen = [i for i, name in enumerate(names) if group in (None, name)]
             return (common_rows(path.name, list(_channels(file, chosen)), {}),)
 
-    return opened(path, "MDF", read)
+    return import_optional(path, "MDF", read)
 
 
 def _group_name(group: Any, index: int) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.errors import FileError, suggestion
 from .common_rows import Channel, common_rows
-from .lab_package import lab_package, opened
+from .optional_dependency import import_optional, lab_package
 from .table import RawTable
 
 
@@ -25,7 +25,7 @@ def raw_tdms(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
             several = len(chosen) > 1
             return tuple(_table(path, g, dict(file.properties), several) for g in chosen)
 
-    return opened(path, "TDMS", read)
+    return import_optional(path, "TDMS", read)
 
 
 def _chosen(path: Path, groups: dict[str, Any], name: str | None) -> list[Any]:

@@ -8,7 +8,7 @@ import dataclasses
 from collections.abc import Mapping
 
 from ..core.errors import FileError, ParameterError
-from .layout import are_headings, refuse_headless, remark, unit_row
+from .header import are_headings, check_header, remark, unit_row
 
 Lines = list[tuple[int, str]]
 """Lines of a file with their numbers, counted from 1."""
@@ -45,7 +45,7 @@ class TextForm:
 
 
 @dataclasses.dataclass(frozen=True)
-class Head:
+class TextHeader:
     """What stands above the numbers: headings, a row of units, remarks; and how cells are told apart."""
 
     headings: tuple[str, ...]
@@ -82,7 +82,7 @@ def cells_of(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
 
 
-def head_of(origin: str, lines: Lines, form: TextForm) -> Head:
+def head_of(origin: str, lines: Lines, form: TextForm) -> TextHeader:
     """The head of a table from its first lines, none of them empty. Raises FileError or ColumnError."""
     comments = [(i, line) for i, line in lines if is_comment(line)]
     body = [(i, line) for i, line in lines if not is_comment(line)]
@@ -96,7 +96,7 @@ def head_of(origin: str, lines: Lines, form: TextForm) -> Head:
     if len(body) <= above:
         raise FileError(f"{origin}: there are headings ({', '.join(headings)}) but no rows of numbers below them.")
     remarks = dict(found for _, line in comments if (found := remark(line)))
-    return Head(tuple(headings), units, remarks, delimiter, above)
+    return TextHeader(tuple(headings), units, remarks, delimiter, above)
 
 
 def _headings(origin: str, comments: Lines, body: Lines, delimiter: str, headless: bool) -> tuple[list[str], int]:
@@ -109,4 +109,4 @@ def _headings(origin: str, comments: Lines, body: Lines, delimiter: str, headles
         return above[-1], 0
     if headless:
         return [str(i) for i in range(1, len(cells) + 1)], 0
-    raise refuse_headless(f"{origin}, line {first}")
+    raise check_header(f"{origin}, line {first}")

@@ -14,7 +14,7 @@ from .table import Cells, RawTable
 
 
 @dataclasses.dataclass(frozen=True)
-class Thinning(abc.ABC):
+class Downsampling(abc.ABC):
     """At most `most_rows` rows are kept of a file that has more."""
 
     most_rows: int = 2_000_000
@@ -36,7 +36,7 @@ class Thinning(abc.ABC):
         """What the reader should know of it."""
 
 
-class Decimation(Thinning):
+class Decimation(Downsampling):
     """Every n-th row as it was measured: resolution and ends of the sensors stay visible, noise is not averaged."""
 
     def column(self, cells: Cells, step: int) -> Cells:
@@ -47,7 +47,7 @@ class Decimation(Thinning):
         return f"The file has {rows} rows; one in {step} is kept as measured, {kept} in all (most_rows)."
 
 
-class BlockMeans(Thinning):
+class BlockMeans(Downsampling):
     """Means of n rows: noise becomes less, glitches smear, clipping and resolution are no longer visible."""
 
     def column(self, cells: Cells, step: int) -> Cells:
@@ -62,7 +62,7 @@ class BlockMeans(Thinning):
         return f"The file has {rows} rows; each {step} are replaced by their mean, {kept} in all (most_rows)."
 
 
-def thinned(table: RawTable, thinning: Thinning) -> RawTable:
+def thinned(table: RawTable, thinning: Downsampling) -> RawTable:
     """The table with no more rows than the thinning allows."""
     step = thinning.step(len(table.rows))
     if step == 1:

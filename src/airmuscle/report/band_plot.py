@@ -38,7 +38,7 @@ _ROLES = {
 
 def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
     """Curves of the fitted law with 95 % bands, and half their width beside; None where no band can be told."""
-    from ..identify.band import band
+    from ..identify.confidence_bands import confidence_band
 
     answer, roles = fit.direction.quantity, _ROLES[fit.direction.quantity]
     levels = levels_of(fit.recording[roles.held], MOST)
@@ -47,7 +47,7 @@ def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
     for i, level in enumerate(levels):
         points = _along(fit, roles, float(level))
         try:
-            law, reading = (band(fit, points, level=LEVEL, reading=r) for r in (False, True))
+            law, reading = (confidence_band(fit, points, level=LEVEL, reading=r) for r in (False, True))
         except IdentificationError:
             return None
         colour = plotting.LINES[i % len(plotting.LINES)]

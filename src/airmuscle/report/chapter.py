@@ -17,7 +17,7 @@ HOLDS, DIFFERS, NOT_PRINTED = "holds", "differs", "not printed"
 
 
 @dataclasses.dataclass(frozen=True)
-class Printed(abc.ABC):
+class PublishedValue(abc.ABC):
     """What a paper prints for a claim, and how a reproduced number is held against it.
 
     Where a paper says only "low" or "comparable", the bound is `chosen`: then no number counts as published, and the
@@ -33,21 +33,21 @@ class Printed(abc.ABC):
         """Whether the reproduced number bears the claim out."""
 
 
-class Equal(Printed):
+class Equal(PublishedValue):
     """The reproduced number lies within the tolerance of the printed one."""
 
     def agrees(self, reproduced: float) -> bool:
         return abs(reproduced - self.value) <= self.tolerance
 
 
-class AtLeast(Printed):
+class AtLeast(PublishedValue):
     """The reproduced number reaches the printed one, less the tolerance."""
 
     def agrees(self, reproduced: float) -> bool:
         return reproduced >= self.value - self.tolerance
 
 
-class AtMost(Printed):
+class AtMost(PublishedValue):
     """The reproduced number does not pass the printed one, plus the tolerance."""
 
     def agrees(self, reproduced: float) -> bool:
@@ -64,7 +64,7 @@ class Claim:
 
     paper: str
     claim: str
-    printed: Printed | None
+    printed: PublishedValue | None
     reproduced: float | None
     unit: str
     note: str = ""

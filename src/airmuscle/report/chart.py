@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..characteristic.base import Characteristic, ContractionLaw
-from ..characteristic.box import Box
+from ..characteristic.validity_range import ValidityRange
 from ..core import plotting
 from ..core.arrays import Array
 from ..core.errors import PhysicsError
@@ -44,21 +44,24 @@ class Isobars:
     forces: Array
 
 
-def box_of(characteristic: Characteristic, stated: Box | None = None) -> Box | None:
-    """Where a law may be trusted: the stated box, else the one it was fitted on, else None."""
-    names = [field.name for field in dataclasses.fields(Box)]
+def validity_range_of(characteristic: Characteristic, stated: ValidityRange | None = None) -> ValidityRange | None:
+    """Where a law may be trusted: the stated validity range, else the one it was fitted on, else None."""
+    names = [field.name for field in dataclasses.fields(ValidityRange)]
     if stated is not None or not all(hasattr(characteristic, name) for name in names):
         return stated
-    return Box(*(getattr(characteristic, name) for name in names))
+    return ValidityRange(*(getattr(characteristic, name) for name in names))
 
 
 def isobars(
-    characteristic: Characteristic, box: Box | None = None, point: Point | None = None, pressures: Array | None = None
+    characteristic: Characteristic,
+    validity_range: ValidityRange | None = None,
+    point: Point | None = None,
+    pressures: Array | None = None,
 ) -> Isobars:
-    """The chart's curves, at round pressures over the box, or over the law's reach where there is none."""
+    """The chart's curves, at round pressures over the validity range, or over the law's reach where there is none."""
     if pressures is None:
-        pressures = _pressures(characteristic, box, point)
-    low, high = _contractions(characteristic, box, point, pressures)
+        pressures = _pressures(characteristic, validity_range, point)
+    low, high = _contractions(characteristic, validity_range, point, pressures)
     contractions = np.linspace(low, high, POINTS if characteristic.traceable else COARSE)
     forces = [_forces(characteristic, float(pressure), contractions) for pressure in pressures]
     return Isobars(pressures, contractions, np.array(forces))
@@ -77,25 +80,25 @@ def chart(
     characteristic: Characteristic,
     title: str,
     curves: Isobars,
-    box: Box | None = None,
+    validity_range: ValidityRange | None = None,
     point: Point | None = None,
     measured: Recording | None = None,
 ) -> Plot:
-    """The figure of the isobars; what lies outside the box is shaded, the working point marked and labelled.
+    """The figure of the isobars; what lies outside the validity range is shaded, the working point marked and labelled.
 
     `measured` points are drawn with the curve of their pressure.
     """
     figure, axes = plotting.new_figure()
     _draw_isobars(axes, curves, point, measured)
-    if box is not None:
-        _shade_outside(axes, box, curves)
+    if validity_range is not None:
+        _shade_outside(axes, validity_range, curves)
     if point is not None:
         _mark(axes, characteristic, curves, point)
     axes.set(
         xlabel="contraction [%]",
         ylabel="force [N]",
         xlim=(100 * curves.contractions[0], 100 * curves.contractions[-1]),
-        ylim=(0.0, 1.06 * _greatest_force(curves, point, measured)),
+        ylim=(0.0, 1.06 * _max_force(curves, point, measured)),
     )
     axes.set_title(textwrap.fill(title, 60), fontsize=9)
     plotting.legend_outside(axes, title="gauge pressure")
@@ -138,8 +141,8 @@ def _until_slack(forces: Array) -> Array:
     return np.where(after & (forces == 0.0), np.nan, forces)
 
 
-def _shade_outside(axes: Any, box: Box, curves: Isobars) -> None:
-    low, high = box.contraction
+def _shade_outside(axes: Any, validity_range: ValidityRange, curves: Isobars) -> None:
+    low, high = validity_range.contraction
     spans = [(curves.contractions[0], low), (high, curves.contractions[-1])]
     label = "outside the valid range"
     for start, end in spans:
@@ -148,7 +151,7 @@ def _shade_outside(axes: Any, box: Box, curves: Isobars) -> None:
             label = "_nolegend_"
 
 
-def _greatest_force(curves: Isobars, point: Point | None, measured: Recording | None) -> float:
+def _max_force(curves: Isobars, point: Point | None, measured: Recording | None) -> float:
     """The chart's height: all curves, unless a law grows beyond bounds somewhere, and certainly every point."""
     pulling = curves.forces[curves.forces > 0]
     usual = STEEPEST * float(np.median(pulling)) if pulling.size else 1.0
@@ -182,11 +185,11 @@ def _mark(axes: Any, characteristic: Characteristic, curves: Isobars, point: Poi
     )
 
 
-def _pressures(characteristic: Characteristic, box: Box | None, point: Point | None) -> Array:
-    """Round pressures over the box; where there is none, to twice the working point, or over the law's reach."""
-    if box is not None:
-        return _round_steps(*box.pressure)
-    low, high = characteristic.pressure_reach
+def _pressures(characteristic: Characteristic, validity_range: ValidityRange | None, point: Point | None) -> Array:
+    """Round pressures over the validity range; where there is none, to twice the working point, or over the law's reach."""
+    if validity_range is not None:
+        return _round_steps(*validity_range.pressure)
+    low, high = characteristic.pressure_range
     near = 2.0 * point.pressure if point is not None and point.pressure > low else high
     return _round_steps(low, min(near, high))
 
@@ -202,20 +205,20 @@ def _round_steps(low: float, high: float) -> Array:
 
 
 def _contractions(
-    characteristic: Characteristic, box: Box | None, point: Point | None, pressures: Array
+    characteristic: Characteristic, validity_range: ValidityRange | None, point: Point | None, pressures: Array
 ) -> tuple[float, float]:
-    """The chart's width: a tenth more than the box, or as far as the muscle pulls at any of the pressures."""
-    if box is not None:
-        low, high = box.contraction
+    """The chart's width: a tenth more than the validity range, or as far as the muscle pulls at any of the pressures."""
+    if validity_range is not None:
+        low, high = validity_range.contraction
         low, high = low - 0.1 * (high - low), high + 0.1 * (high - low)
     else:
-        low, high = characteristic.contraction_reach
+        low, high = characteristic.contraction_range
         grid = np.linspace(low, high, COARSE)
         forces = np.array([_forces(characteristic, float(pressure), grid) for pressure in pressures])
         pulling = np.flatnonzero((np.nan_to_num(forces) > 0).any(axis=0))
         if pulling.size:
             low, high = float(grid[pulling[0]]), float(grid[min(pulling[-1] + 2, COARSE - 1)])
-    reach = characteristic.contraction_reach
+    reach = characteristic.contraction_range
     low, high = max(low, reach[0]), min(high, reach[1])
     return (min(low, point.contraction), max(high, point.contraction)) if point else (low, high)
 
@@ -230,7 +233,7 @@ def _forces(characteristic: Characteristic, pressure: float, contractions: Array
 
 def _from_contractions(characteristic: ContractionLaw, pressure: float, contractions: Array) -> Array:
     """A law that gives contraction is asked at a range of forces, which needs no search, and read backwards."""
-    forces = np.linspace(*characteristic.force_reach, 4 * POINTS)
+    forces = np.linspace(*characteristic.force_range, 4 * POINTS)
     found = _wherever(lambda force: np.asarray(characteristic.contraction(pressure, force)), forces)
     known = np.isfinite(found)
     found, forces = found[known], forces[known]

@@ -10,7 +10,7 @@ from ..core.plotting import BLUE, LINES, MARKERS, legend_outside, new_figure
 from .chapter import Chapter, Plot, Table
 
 if TYPE_CHECKING:
-    from ..identify.compare import Comparison
+    from ..identify.model_selection import Comparison
     from ..identify.result import Fit
 
 _SHOWN = {"pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "force": (1.0, "N")}

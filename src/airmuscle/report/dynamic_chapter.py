@@ -16,11 +16,11 @@ from .uncertainty_chapter import NORMAL
 
 if TYPE_CHECKING:
     from ..identify.dynamic import DynamicFit
-    from ..identify.dynamic.profile import Profile
+    from ..identify.dynamic.profile import DynamicProfile
 
 
 def dynamic_chapters(
-    fit: DynamicFit, title: str, profiles: Sequence[Profile] = (), remarks: Sequence[str] = ()
+    fit: DynamicFit, title: str, profiles: Sequence[DynamicProfile] = (), remarks: Sequence[str] = ()
 ) -> list[Chapter]:
     """Estimates with what is not determined, profiles, and one chapter a record; `remarks` are on the records."""
     found = [_estimates(fit, title, remarks)]
@@ -32,7 +32,7 @@ def dynamic_chapters(
 def _estimates(fit: DynamicFit, title: str, remarks: Sequence[str]) -> Chapter:
     known = fit.identifiability
     said = [
-        f"Residuals of {fit.scatter:.3g} standard deviations of the sensors; {known.rank} of {known.singular.size} "
+        f"Residuals of {fit.residual_std:.3g} standard deviations of the sensors; {known.rank} of {known.singular.size} "
         f"unknowns off their bounds are determined; {fit.reached} of {fit.costs.size} starts came to this optimum.",
         *(f"{note[:1].upper()}{note[1:].rstrip('.')}." for note in fit.notes),
         *remarks,
@@ -65,7 +65,7 @@ def _numbers(fit: DynamicFit) -> Table:
             "parameter": [e.name for e in fit.estimates],
             "symbol": [e.label for e in fit.estimates],
             "value (SI)": [e.value for e in fit.estimates],
-            "2 sd (SI)": ["on bound" if e.on_bound else 2 * e.deviation for e in fit.estimates],
+            "2 sd (SI)": ["on bound" if e.on_bound else 2 * e.stderr for e in fit.estimates],
             "unit": ["" if e.unit == "1" else e.unit for e in fit.estimates],
             "meaning": [e.meaning for e in fit.estimates],
         },
@@ -91,7 +91,7 @@ def _correlations(fit: DynamicFit) -> Table:
     return Table("correlations", "Correlations", {"unknown": names, **columns}, shown=False)
 
 
-def _profiles(profiles: Sequence[Profile]) -> Chapter:
+def _profiles(profiles: Sequence[DynamicProfile]) -> Chapter:
     ends = [profile.interval for profile in profiles]
     columns: dict[str, Any] = {
         "parameter": [p.name for p in profiles],
@@ -109,7 +109,7 @@ def _profiles(profiles: Sequence[Profile]) -> Chapter:
     )
 
 
-def _curves(profiles: Sequence[Profile]) -> Any:
+def _curves(profiles: Sequence[DynamicProfile]) -> Any:
     columns = min(3, len(profiles))
     rows = -(-len(profiles) // columns)
     figure, axes = new_figure(rows, columns, width=2.5 * columns + 0.6, height=2.4 * rows + 0.4, squeeze=False)

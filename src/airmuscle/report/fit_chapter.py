@@ -46,7 +46,7 @@ def _parameters(fit: Fit) -> Table:
             "parameter": [e.name for e in fit.estimates],
             "symbol": [e.label for e in fit.estimates],
             "value (SI)": [e.value for e in fit.estimates],
-            "standard deviation (SI)": [e.deviation for e in fit.estimates],
+            "standard deviation (SI)": [e.stderr for e in fit.estimates],
             "unit": ["" if e.unit == "1" else e.unit for e in fit.estimates],
             "meaning": [e.meaning for e in fit.estimates],
         },
@@ -77,8 +77,8 @@ def _rows(fit: Fit) -> Table:
 
 def _isobars(fit: Fit, entry: Entry) -> Plot:
     """The isobars of the fitted law at pressures that were measured, with their points."""
-    curves = isobars(fit.model, entry.box, pressures=levels_of(fit.recording["pressure"], MOST_CURVES))
-    return chart(fit.model, entry.title, curves, entry.box, measured=fit.recording)
+    curves = isobars(fit.model, entry.validity_range, pressures=levels_of(fit.recording["pressure"], MOST_CURVES))
+    return chart(fit.model, entry.title, curves, entry.validity_range, measured=fit.recording)
 
 
 def _shape(fit: Fit) -> list[Table]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .chapter import Chapter
-from .pedigree import versions
+from .versions import versions
 from .wording import MARKS, number, published, rows, tally
 
 GREATEST_VECTOR = 600_000

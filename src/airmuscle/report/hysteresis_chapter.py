@@ -12,7 +12,7 @@ from .chapter import Chapter, Plot, Table
 from .parameters import parameter_table
 
 if TYPE_CHECKING:
-    from ..identify.hysteresis import HysteresisFit, Loop, LoopFit
+    from ..identify.hysteresis import HysteresisFit, HysteresisLoop, LoopFit
 
 
 def hysteresis_chapters(found: Sequence[LoopFit], creep: Sequence[str] = ()) -> list[Chapter]:
@@ -66,11 +66,11 @@ def _said(found: LoopFit, shown: HysteresisFit | None) -> list[str]:
     return [*said, *(f"{name} was not fitted: {why}" for name, why in found.failed.items())]
 
 
-def counted(loop: Loop) -> str:
+def counted(loop: HysteresisLoop) -> str:
     """How many rows of either branch count."""
-    from ..recording.segment import ways_along
+    from ..recording.segment import motion_direction
 
-    way = ways_along(loop.slide.path(loop.recording), loop.recording.columns.get("time"))
+    way = motion_direction(loop.slide.path(loop.recording), loop.recording.columns.get("time"))
     up, down = (int(np.count_nonzero((way == sign) & loop.chosen)) for sign in (1, -1))
     text = f"{up} rows on the way up and {down} on the way down count, of {len(loop.recording)}."
     if 10 * min(up, down) < max(up, down):
@@ -99,15 +99,15 @@ def _laws(found: LoopFit, suffix: str) -> Table:
     )
 
 
-def _measured(loop: Loop) -> Any:
+def _measured(loop: HysteresisLoop) -> Any:
     """Force over what is swept, by branch; rows that do not count are faint."""
     from ..recording.plot import scale
-    from ..recording.segment import ways_along
+    from ..recording.segment import motion_direction
 
     recording = loop.recording
     name = "contraction" if "contraction" in loop.run.swept or "length" in loop.run.swept else "pressure"
     factor, unit = scale(name)
-    way = ways_along(loop.slide.path(recording), recording.columns.get("time"))
+    way = motion_direction(loop.slide.path(recording), recording.columns.get("time"))
     figure, axes = new_figure(width=6.0, height=3.9)
     axes.plot(recording[name] * factor, recording["force"], color=BLACK, linewidth=0.5, alpha=0.3)
     for sign, colour, word in ((1, BLUE, "rising"), (-1, RED, "falling")):

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ..control.control_loop import ControlLoop
 from ..control.controller import relative_unit
-from ..control.inputs import Segments
-from ..control.loop import Loop
+from ..control.inputs import PiecewiseLinear
 from ..core.plotting import BLACK, BLUE, legend_below, new_figure
 from ..recording import Recording
 from ..recording.plot import scale
@@ -18,9 +18,9 @@ from .chapter import Plot, Table
 from .parameters import parameter_table
 
 
-def loop_plot(scenario: Scenario, loop: Loop, recording: Recording) -> Plot:
+def loop_plot(scenario: Scenario, loop: ControlLoop, recording: Recording) -> Plot:
     """Every set point as it was given, with its jumps, and the column that is to follow it."""
-    names = list(dict.fromkeys((*loop.controller.setpoints, *loop.controller.columns)))
+    names = list(dict.fromkeys((*loop.controller.setpoints, *loop.controller.measured_columns)))
     units = units_of_run(scenario.plant, scenario.start, loop)
     start, time = scenario.start_time, recording["time"]
     end = float(time[-1]) if time[-1] > start else start + scenario.duration
@@ -41,7 +41,7 @@ def loop_plot(scenario: Scenario, loop: Loop, recording: Recording) -> Plot:
     return Plot("loop", f"Set point and measurement; the controller looks every {loop.period:g} s.", figure)
 
 
-def corners(segments: Segments, start: float, i: int) -> tuple[Any, Any]:
+def corners(segments: PiecewiseLinear, start: float, i: int) -> tuple[Any, Any]:
     """Times and values at both ends of every piece, so that a jump is drawn upright."""
     starts = segments.starts(start)
     first = segments.values[:, i]
@@ -49,10 +49,10 @@ def corners(segments: Segments, start: float, i: int) -> tuple[Any, Any]:
     return np.column_stack([starts, segments.ends]).ravel(), np.column_stack([first, last]).ravel()
 
 
-def controller_table(scenario: Scenario, loop: Loop) -> Table:
+def controller_table(scenario: Scenario, loop: ControlLoop) -> Table:
     """The numbers of a controller, in the units that follow from what it measures and commands."""
     units = units_of_run(scenario.plant, scenario.start, loop)
-    y, u = (units.get(names[0]) or "1" for names in (loop.controller.columns, loop.controller.inputs))
+    y, u = (units.get(names[0]) or "1" for names in (loop.controller.measured_columns, loop.controller.inputs))
     table = parameter_table(
         loop.controller, "controller", f"Parameters of the controller, {type(loop.controller).__name__}"
     )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..control.driver import Driven
-from ..control.inputs import Command, Periodic, Schedule, Signal
-from ..control.loop import MEASURED, SETPOINT, TOLD, Loop
+from ..control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
+from ..control.driver import WithDrivers
+from ..control.inputs import InputSignal, Periodic, SampledSignal, Schedule
 from ..core.plotting import BLACK, BLUE, legend_below, new_figure
 from ..core.reference import cite
 from ..recording import Recording
@@ -28,7 +28,7 @@ MOST_CHANGES = 6
 def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
     """The chapter of a run, whole or as far as it came."""
     notes = "\n\n".join(_sentence(note) for note in recording.notes)
-    loop = scenario.command if isinstance(scenario.command, Loop) else None
+    loop = scenario.command if isinstance(scenario.command, ControlLoop) else None
     plots = [loop_plot(scenario, loop, recording)] if loop else []
     plots.append(Plot("run", f"{scenario.title}, simulated.", recording.plot(*_shown(recording))))
     if scenario.plant.inputs:
@@ -59,23 +59,25 @@ def _length(scenario: Scenario, recording: Recording) -> str:
 
 
 def _shown(recording: Recording) -> list[str]:
-    own = [name for name in recording if not name.startswith((SETPOINT, MEASURED, TOLD))]
+    own = [name for name in recording if not name.startswith((SETPOINT, MEASURED, COMMAND))]
     return [name for kind in SHOWN for name in own if name.rpartition(".")[2] == kind]
 
 
 def _inputs(scenario: Scenario, recording: Recording) -> Plot:
     """Every input as the plant had it, with its jumps, and behind it what a driver was told."""
     command, inputs = scenario.command, scenario.plant.inputs
-    if isinstance(command, Loop):
-        command = command.replayed(recording)
+    if isinstance(command, ControlLoop):
+        command = command.as_open_loop(recording)
     units = {given.name: "" if given.unit == "1" else f"\n[{given.unit}]" for given in scenario.plant.commands}
     start, reached = scenario.start_time, float(recording["time"][-1])
     end = reached if reached > start else start + scenario.duration
     had = command.segments(inputs, start, end - start)
-    shortened = had.ends.size > (MOST_PIECES if isinstance(command, Driven) else MOST_HELD)
+    shortened = had.ends.size > (MOST_PIECES if isinstance(command, WithDrivers) else MOST_HELD)
     if shortened:
         had = command.segments(inputs, start, float(had.ends[MOST_PIECES - 1]) - start)
-    told = command.inner.segments(inputs, start, float(had.ends[-1]) - start) if isinstance(command, Driven) else None
+    told = (
+        command.inner.segments(inputs, start, float(had.ends[-1]) - start) if isinstance(command, WithDrivers) else None
+    )
     figure, axes = new_figure(
         len(inputs), 1, height=0.9 + 0.9 * len(inputs), sharex=True, sharey=len(set(units.values())) == 1, squeeze=False
     )  # one height for all of one unit: openings are compared
@@ -102,21 +104,21 @@ def _settings(scenario: Scenario) -> tuple[tuple[str, str, str], ...]:
     )
 
 
-def in_words(command: Command | Loop) -> str:
+def in_words(command: InputSignal | ControlLoop) -> str:
     """A command in a sentence, however long its tables are."""
-    if isinstance(command, Loop):
+    if isinstance(command, ControlLoop):
         controller = command.controller
         looks = f"every {command.period:g} s {type(controller).__name__} commands {', '.join(controller.inputs)}"
-        others = Driven(command.beside, command.drivers) if command.drivers else command.beside
+        others = WithDrivers(command.other_inputs, command.drivers) if command.drivers else command.other_inputs
         return f"{looks}; set point: {in_words(command.setpoint)}; beside: {in_words(others)}"
-    if isinstance(command, Driven):
+    if isinstance(command, WithDrivers):
         chains = (f"{name} by {', '.join(map(str, chain))}" for name, chain in command.chains.items())
         return f"{in_words(command.inner)}; driven: {'; '.join(chains)}"
     if isinstance(command, Periodic):
         return f"every {command.period:g} s: {in_words(command.inner)}"
     if isinstance(command, Schedule):
         return "; ".join(_changes(name, rows, "from") for name, rows in command.changes.items()) or "none"
-    if isinstance(command, Signal):
+    if isinstance(command, SampledSignal):
         return "; ".join(_changes(name, rows, "at") for name, rows in command.points.items()) or "none"
     return str(command)
 

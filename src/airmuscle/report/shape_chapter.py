@@ -13,7 +13,7 @@ from .levels import levels_of
 
 if TYPE_CHECKING:
     from ..identify.result import Fit
-    from ..identify.surface.breaks import Break
+    from ..identify.surface.breaks import MonotonicityViolation
     from ..identify.surface.shape import ShapedFit
 
 CURVES = 5
@@ -28,7 +28,7 @@ def shape_chapter(shaped: ShapedFit, loose: Fit, free: int) -> Chapter:
         paper="shape",
         title="A force that keeps a muscle's shape",
         summary=f"The muscle file holds this surface: its force nowhere falls with pressure nor rises with contraction "
-        f"on its box{zero}. Its rms error is {shaped.rmse:.4g} N, against {shaped.unconstrained:.4g} N of the surface "
+        f"on its validity range{zero}. Its rms error is {shaped.rmse:.4g} N, against {shaped.unconstrained:.4g} N of the surface "
         f"without conditions, which {verdict}. Uncertainties and bands below are of the surface without conditions.",
         tables=(
             breaks_table(shaped.broken, "shape-loose", "Where the surface without conditions behaves as no muscle"),
@@ -39,7 +39,7 @@ def shape_chapter(shaped: ShapedFit, loose: Fit, free: int) -> Chapter:
     )
 
 
-def breaks_table(found: Sequence[Break], name: str, title: str) -> Table:
+def breaks_table(found: Sequence[MonotonicityViolation], name: str, title: str) -> Table:
     """The places where a law breaks a rule, largest first."""
     return Table(
         name,
@@ -50,7 +50,7 @@ def breaks_table(found: Sequence[Break], name: str, title: str) -> Table:
             "to [kPa]": [each.pressure[1] / 1e3 for each in found],
             "from [%]": [100 * each.across[0] for each in found],
             "to [%]": [100 * each.across[1] for each in found],
-            "share of the box [%]": [100 * each.share for each in found],
+            "share of the validity range [%]": [100 * each.share for each in found],
             "worst at [kPa]": [each.worst[0] / 1e3 for each in found],
             "worst at [%]": [100 * each.worst[1] for each in found],
         },

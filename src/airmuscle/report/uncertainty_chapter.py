@@ -11,8 +11,8 @@ from ..core.plotting import BLACK, BLUE, RED, legend_below, new_figure
 from .chapter import Chapter, Plot, Table
 
 if TYPE_CHECKING:
-    from ..identify.bootstrap import Bootstrap
-    from ..identify.profile import Profile
+    from ..identify.bootstrapping import Bootstrap
+    from ..identify.profile_likelihood import ProfileLikelihood
     from ..identify.result import Fit
 
 MOST_ROWS = 40
@@ -29,7 +29,7 @@ class Uncertainty:
 
     fit: Fit
     bootstrap: Bootstrap | None = None
-    profiles: tuple[Profile, ...] = ()
+    profiles: tuple[ProfileLikelihood, ...] = ()
 
     @property
     def asked(self) -> bool:
@@ -110,7 +110,7 @@ def _table(found: Uncertainty) -> Table:
     return Table("intervals", "95 % intervals", columns)
 
 
-def _end(profile: Profile | None, side: str) -> float | str:
+def _end(profile: ProfileLikelihood | None, side: str) -> float | str:
     if profile is None:
         return ""
     end = float(getattr(profile, side))
@@ -118,7 +118,7 @@ def _end(profile: Profile | None, side: str) -> float | str:
 
 
 def _figure(found: Uncertainty) -> Any:
-    shown = [i for i, e in enumerate(found.fit.estimates) if np.isfinite(e.deviation) and e.deviation > 0][:MOST_ROWS]
+    shown = [i for i, e in enumerate(found.fit.estimates) if np.isfinite(e.stderr) and e.stderr > 0][:MOST_ROWS]
     figure, axes = new_figure(width=6.4, height=1.6 + 0.24 * max(len(shown), 3))
     by_name = {profile.name: (profile.low, profile.high) for profile in found.profiles}
     ends = None if found.bootstrap is None else found.bootstrap.intervals()
@@ -126,9 +126,9 @@ def _figure(found: Uncertainty) -> Any:
         estimate = found.fit.estimates[i]
         ways = [((-NORMAL, NORMAL), BLACK, "standard deviation", 0.0)]
         if ends is not None:
-            ways.append((tuple((ends[i] - estimate.value) / estimate.deviation), BLUE, "bootstrap", 0.25))
+            ways.append((tuple((ends[i] - estimate.value) / estimate.stderr), BLUE, "bootstrap", 0.25))
         if estimate.name in by_name:
-            pair = (np.array(by_name[estimate.name]) - estimate.value) / estimate.deviation
+            pair = (np.array(by_name[estimate.name]) - estimate.value) / estimate.stderr
             ways.append((tuple(pair), RED, "profile", -0.25))
         for ends_of_it, colour, label, shift in ways:
             _interval(axes, ends_of_it, row + shift, colour, label)

@@ -16,7 +16,7 @@ from ..core import plotting
 from ..core.errors import FileError
 from .chapter import Chapter, Table
 from .html import page
-from .staged import staged
+from .output_folder import atomic_folder
 from .wording import rows
 
 REPORT = "report.html"
@@ -30,14 +30,14 @@ def write_report(
     `date` is printed on the page, today's if None. The same chapters give the same bytes in claims.json, data/
     and figures/. Raises FileError where the folder cannot be written.
     """
-    with staged(folder) as place:
+    with atomic_folder(folder) as place:
         fill(place, chapters, title=title, date=date)
     return Path(folder) / REPORT
 
 
 def fill(place: Path, chapters: Sequence[Chapter], *, title: str = "Report", date: datetime.date | None = None) -> None:
     """Write the report's files into a folder made by `staged`, beside whatever else a command puts there."""
-    _refuse_clashes(chapters)
+    _check_unique(chapters)
     try:
         for chapter in chapters:
             for plot in chapter.plots:
@@ -84,7 +84,7 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _refuse_clashes(chapters: Iterable[Chapter]) -> None:
+def _check_unique(chapters: Iterable[Chapter]) -> None:
     """Two figures or two tables of one name would overwrite each other."""
     for kind in ("plots", "tables"):
         names = [item.name for chapter in chapters for item in getattr(chapter, kind)]

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..characteristic.base import ContractionLaw
 from ..characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
-from ..identify.surface.basis import Chebyshev, LoadBox, conditioning
+from ..identify.surface.basis import Chebyshev, LoadRange, conditioning
 from ..identify.surface.exponential import linearised, nonlinear
 from ..recording import Recording
 from ..report.chapter import AtLeast, Chapter, Claim, Equal
@@ -57,7 +57,7 @@ def surface_claim(name: str, law: ContractionLaw, curves: PlaneCurves) -> Claim:
     if found.value is None:
         note = f"No index exists: SSE > SST, and 1 - SSE/SST = {found.explained:.4g} stands in its place."
     else:
-        note = f"Index over 15 even pressures of each curve, 0 to {curves.greatest_pressure / 1e5:g} bar."
+        note = f"Index over 15 even pressures of each curve, 0 to {curves.max_pressure / 1e5:g} bar."
     return Claim(
         PAPER,
         f"{name}: correlation index on the three plane curves, against the least that is printed for these",
@@ -70,7 +70,7 @@ def surface_claim(name: str, law: ContractionLaw, curves: PlaneCurves) -> Claim:
 
 def rank_claim(recording: Recording) -> Claim:
     """Whether the data determine the coefficients of equation (1)."""
-    found = conditioning(recording, Chebyshev(LoadBox.of_recording(recording)))
+    found = conditioning(recording, Chebyshev(LoadRange.of_recording(recording)))
     loads = np.unique(recording["force"]).size
     return Claim(
         PAPER,
@@ -111,7 +111,7 @@ def load_claim() -> Claim:
 def catalogue_claims(curves: PlaneCurves) -> tuple[Claim, ...]:
     """The catalogue that the paper prints, against its own text and its own measurements."""
     heaviest = max(curves.curves, key=lambda c: c.force)
-    pressures = np.linspace(0.0, curves.greatest_pressure, 351)
+    pressures = np.linspace(0.0, curves.max_pressure, 351)
     in_table = dict(zip(CATALOGUE_TABLE["diameter [mm]"], CATALOGUE_TABLE["load at 3.5 bar [kg]"], strict=True))
     in_text = dict(zip(CATALOGUE_TEXT["diameter [mm]"], CATALOGUE_TEXT["load [kg]"], strict=True))
     return (
@@ -130,7 +130,7 @@ def catalogue_claims(curves: PlaneCurves) -> tuple[Claim, ...]:
             100.0 * float(np.max(heaviest.contraction(pressures))),
             "%",
             f"The paper's own curve under {heaviest.force:g} N, a smaller load, at the best pressure up to "
-            f"{curves.greatest_pressure / 1e5:g} bar. The pressure meant in the text is not printed.",
+            f"{curves.max_pressure / 1e5:g} bar. The pressure meant in the text is not printed.",
         ),
     )
 

@@ -12,7 +12,7 @@ from ..characteristic.borzikova import PlaneCurves
 from ..core import autodiff
 from ..core.plotting import BLACK, BLUE, DASHES, LINES, MARKERS, ORANGE, RED, legend_outside, new_figure
 from ..core.units import bar
-from ..identify.surface.basis import LoadBox
+from ..identify.surface.basis import LoadRange
 from ..report.chapter import Plot
 from .borzikova_surfaces import EXPONENTIAL, MISPRINT_MENDED, MONOTONE, REPAIRED
 
@@ -86,7 +86,7 @@ def plane_curves(curves: PlaneCurves) -> Plot:
 def surface(curves: PlaneCurves, law: ContractionLaw) -> Plot:
     """Figure 5: the surface."""
     figure, axes = new_figure(height=4.4, subplot_kw={"projection": "3d", "computed_zorder": False})
-    pressure, force = LoadBox.of_law(law).grid(36, 31)
+    pressure, force = LoadRange.of_law(law).grid(36, 31)
     contraction = 100 * np.asarray(law.contraction(pressure, force))
     axes.plot_surface(
         pressure / bar, force, contraction, cmap="cividis", alpha=0.85, rstride=1, cstride=1,
@@ -117,7 +117,7 @@ def residuals(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Plot:
     left.set(xlabel=PRESSURE, ylabel="repaired direct - plane curve [%]")
     left.set_title("on the plane curves", fontsize=9)
     left.legend(loc="upper right", frameon=False, fontsize=8)
-    pressure, force = LoadBox.of_law(laws[REPAIRED]).grid(141, 141)
+    pressure, force = LoadRange.of_law(laws[REPAIRED]).grid(141, 141)
     difference = 100 * (laws[REPAIRED].contraction(pressure, force) - laws[EXPONENTIAL].contraction(pressure, force))
     limit = float(np.ceil(np.abs(difference).max()))
     filled = right.contourf(pressure / bar, force, difference, np.linspace(-limit, limit, 17), cmap="PuOr")
@@ -145,10 +145,10 @@ def impossible_places(laws: Mapping[str, ContractionLaw]) -> Plot:
     levels = np.arange(-5, 41, 5)
     for axes, name in zip(panels, names, strict=True):
         law = laws[name]
-        pressure, force = LoadBox.of_law(law).grid(201, 201)
+        pressure, force = LoadRange.of_law(law).grid(201, 201)
         contraction = 100 * np.asarray(law.contraction(pressure, force))
         for argument, sign, colour in ((1, 1.0, RED), (0, -1.0, BLUE)):
-            slope = sign * autodiff.slope(law, "contraction", pressure, force, wrt=argument)
+            slope = sign * autodiff.derivative(law, "contraction", pressure, force, wrt=argument)
             if (slope > 0).any():
                 axes.contourf(pressure / bar, force, slope, [0.0, np.inf], colors=[colour], alpha=0.3)
         lines = axes.contour(pressure / bar, force, contraction, levels, colors=BLACK, linewidths=0.7)
@@ -159,7 +159,7 @@ def impossible_places(laws: Mapping[str, ContractionLaw]) -> Plot:
     panels[0].set_ylabel(FORCE)
     _shades(figure)
     caption = (
-        "Contraction in per cent (lines) inside the box, and where a surface is impossible: red, contraction rises "
+        "Contraction in per cent (lines) inside the validity range, and where a surface is impossible: red, contraction rises "
         "with force; blue, it falls with pressure. The monotone fit has no such place."
     )
     return Plot("borzikova_monotonicity", caption, figure)
@@ -199,7 +199,7 @@ def monotone_fit(curves: PlaneCurves, law: ContractionLaw) -> Plot:
 
 
 def _pressures(curves: PlaneCurves) -> np.ndarray:
-    return np.linspace(0.0, curves.greatest_pressure, 351)
+    return np.linspace(0.0, curves.max_pressure, 351)
 
 
 def _markers(axes: Any, curves: PlaneCurves) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from ..characteristic.base import ContractionLaw
 from ..characteristic.borzikova import PlaneCurves
 from ..core.units import bar, percent
-from ..identify.surface.basis import Basis, Chebyshev, LoadBox, Monomials, conditioning
+from ..identify.surface.basis import Basis, Chebyshev, LoadRange, Monomials, conditioning
 from ..identify.surface.exponential import SurfaceFit, linearised, nonlinear
 from ..identify.surface.monotone import monotonicity_breaks
 from ..recording import Recording
@@ -75,7 +75,7 @@ def tables(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> tuple[Tab
 def curve_table(curves: PlaneCurves) -> Table:
     """Where the plane curves start, turn and end."""
     rows = curves.curves
-    end = curves.greatest_pressure
+    end = curves.max_pressure
     return Table(
         "borzikova_curves",
         "Plane curves: printed index, ends, and the pressures at which they turn",
@@ -124,7 +124,7 @@ def _rms_text(errors: np.ndarray) -> str:
 
 def exponent_table(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Table:
     """What the exponent of equation (1) is on the curves, and what the printed matrix would make of it."""
-    pressures = np.linspace(0.0, curves.greatest_pressure, 351)
+    pressures = np.linspace(0.0, curves.max_pressure, 351)
     printed, mended = laws[PRINTED], laws[REPAIRED]
     # the direct surface is this polynomial in per cent, so its contraction gives the sum
     return Table(
@@ -177,7 +177,7 @@ def procedure_table(data: Recording, saturation: float) -> Table:
     rms = [[*(pair[n].rms for pair in pairs.values()), means[n]] for n in (0, 1)]
     return Table(
         "borzikova_procedures",
-        "Linearised fit (the paper's) against least squares on k",
+        "LinearModel fit (the paper's) against least squares on k",
         {
             "data": names,
             "rms, linearised [%]": [f"{100 * r:.4f}" for r in rms[0]],
@@ -197,16 +197,16 @@ def _both(recording: Recording, saturation: float) -> tuple[SurfaceFit, SurfaceF
 
 def conditioning_table(data: Recording) -> Table:
     """How well the data determine the 15 coefficients, in four scalings and with a load left out."""
-    box = LoadBox.of_recording(data)
+    validity_range = LoadRange.of_recording(data)
     scalings: dict[str, Basis] = {
         "bar, N": Monomials(bar, 1.0),
         "Pa, N": Monomials(1.0, 1.0),
-        "p/p_max, F/F_max": Monomials(box.greatest_pressure, box.greatest_force),
-        "Chebyshev polynomials on the box": Chebyshev(box),
+        "p/p_max, F/F_max": Monomials(validity_range.max_pressure, validity_range.max_force),
+        "Chebyshev polynomials on the validity range": Chebyshev(validity_range),
     }
     found = {name: conditioning(data, basis) for name, basis in scalings.items()}
-    two_loads = data.rows(data["force"] < box.greatest_force)
-    found["the same, without the greatest load"] = conditioning(two_loads, Chebyshev(box))
+    two_loads = data.rows(data["force"] < validity_range.max_force)
+    found["the same, without the greatest load"] = conditioning(two_loads, Chebyshev(validity_range))
     return Table(
         "borzikova_conditioning",
         "Rank and condition of the 15 coefficients",
@@ -225,13 +225,13 @@ def break_table(laws: Mapping[str, ContractionLaw]) -> Table:
     kept = [name for name, breaks in judged.items() if not breaks]
     return Table(
         "borzikova_breaks",
-        "Where a surface breaks monotonicity inside its box",
+        "Where a surface breaks monotonicity inside its validity range",
         {
             "surface": [name for name, _ in found],
             "rule broken": [b.rule.words for _, b in found],
             "pressure [bar]": [f"{b.pressure[0] / bar:.2f} to {b.pressure[1] / bar:.2f}" for _, b in found],
             "force [N]": [f"{b.across[0]:.0f} to {b.across[1]:.0f}" for _, b in found],
-            "part of the box [%]": [f"{100 * b.share:.1f}" for _, b in found],
+            "part of the validity range [%]": [f"{100 * b.share:.1f}" for _, b in found],
             "most at [bar]": [f"{b.worst[0] / bar:.2f}" for _, b in found],
             "most at [N]": [f"{b.worst[1]:.0f}" for _, b in found],
         },
@@ -242,7 +242,7 @@ def break_table(laws: Mapping[str, ContractionLaw]) -> Table:
 def dip_table(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Table:
     """The least contraction that a surface has between the two greater loads."""
     loads = sorted(c.force for c in curves.curves)[-2:]
-    pressure, force = LoadBox(0.0, curves.greatest_pressure, loads[0], loads[1]).grid(351, 651)
+    pressure, force = LoadRange(0.0, curves.max_pressure, loads[0], loads[1]).grid(351, 651)
     names = list(USABLE)
     depths = [np.asarray(laws[name].contraction(pressure, force)) for name in names]
     places = [np.unravel_index(int(k.argmin()), k.shape) for k in depths]

@@ -13,7 +13,7 @@ from ..core.plotting import LINES, legend_outside, new_figure
 from ..core.reference import cite
 from ..geometry.base import Geometry
 from ..identify import Fit
-from ..identify.one_sided import measured_rank
+from ..identify.censored_least_squares import measured_rank
 from ..library import catalogue
 from ..report.chapter import Chapter, Claim, Equal, Plot, Table
 from . import hosovsky_causes as causing
@@ -45,7 +45,7 @@ def surface_claims(found: Fit) -> tuple[Claim, ...]:
 
 def surface_figure() -> Plot:
     """The surface's isobars through the measured points, as the paper's Fig. 2 shows its surface."""
-    law, data = surface(), catalogue.measured(MAPS[0])
+    law, data = surface(), catalogue.load_data(MAPS[0])
     figure, axes = new_figure()
     contraction = np.linspace(0.0, 0.26, 200)
     for i, pressure in enumerate((675e3, 525e3, 375e3, 250e3, 135e3)):
@@ -69,7 +69,7 @@ def coefficients() -> Table:
     }
     for name in MAPS:
         columns[f"{name} [N/bar^j]"] = [plain[name][power] for power in powers]
-    note = "F = Sum a_ij eps^i p^j with eps as a ratio and p gauge in bar; inside the box of its data only"
+    note = "F = Sum a_ij eps^i p^j with eps as a ratio and p gauge in bar; inside the validity range of its data only"
     return Table("hosovsky_coefficients", "The 21 coefficients in plain units", columns, note)
 
 
@@ -94,7 +94,7 @@ def chapter(numbers: Numbers | None = None, suspected: causing.Suspected | None 
             ranges,
             coefficients(),
             maxwell_table(numbers),
-            _left_boxes(fill, low, high),
+            _extrapolation(fill, low, high),
             *_series(fill, low, high),
         ),
         plots=(
@@ -117,12 +117,16 @@ def maxwell_table(numbers: Numbers) -> Table:
     for name in ("dmsp-20-300", "dmsp-10-250"):
         entry = catalogue.load(name)
         laws[f"Martens-Boblan 2017, {name}"] = (entry.characteristic, entry.muscle.geometry)
-    boxes = [
-        surface(MAPS[0]).box,
-        surface(MAPS[1]).box,
-        *(catalogue.load(n).box for n in ("dmsp-20-300", "dmsp-10-250")),
+    validity_ranges = [
+        surface(MAPS[0]).validity_range,
+        surface(MAPS[1]).validity_range,
+        *(catalogue.load(n).validity_range for n in ("dmsp-20-300", "dmsp-10-250")),
     ]
-    found = [maxwell_defect(law, volume, box) for (law, volume), box in zip(laws.values(), boxes, strict=True) if box]
+    found = [
+        maxwell_defect(law, volume, validity_range)
+        for (law, volume), validity_range in zip(laws.values(), validity_ranges, strict=True)
+        if validity_range
+    ]
     columns: dict[str, list[Any]] = {
         "muscle": list(laws),
         "greatest |dF/dp + dV/dL| [mm2]": [d.worst * 1e6 for d in found],
@@ -130,15 +134,15 @@ def maxwell_table(numbers: Numbers) -> Table:
         "at pressure [kPa]": [d.pressure / 1e3 for d in found],
         "at contraction [%]": [d.contraction * 100 for d in found],
     }
-    note = "where the muscle pulls, over the box of its data; the defect times an area of pressure and length is energy"
-    return Table("hosovsky_maxwell", "Maxwell defect of fitted muscles over their box", columns, note)
+    note = "where the muscle pulls, over the validity range of its data; the defect times an area of pressure and length is energy"
+    return Table("hosovsky_maxwell", "Maxwell defect of fitted muscles over their validity range", columns, note)
 
 
-def _left_boxes(fill: filling.Fill, low: releasing.Release, high: releasing.Release) -> Table:
-    """When and how far the runs left the box in which the surface has data."""
+def _extrapolation(fill: filling.Fill, low: releasing.Release, high: releasing.Release) -> Table:
+    """When and how far the runs left the validity range in which the surface has data."""
     runs = {"fill and discharge": fill.adaptive, f"release from {low.pressure / 1e3:g} kPa": low.run}
     runs[f"release from {high.pressure / 1e3:g} kPa"] = high.run
-    left = [(name, note) for name, run in runs.items() for note in run.notes if "outside the box" in note]
+    left = [(name, note) for name, run in runs.items() for note in run.notes if "outside the validity range" in note]
     columns = {"run": [name for name, _ in left], "what": [note for _, note in left]}
     return Table("hosovsky_boxes", "Where the runs left the data of the contractile surface", columns)
 

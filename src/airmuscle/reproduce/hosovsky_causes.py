@@ -16,7 +16,7 @@ from ..core.arrays import Array
 from ..core.plotting import DASHES, LINES, new_figure
 from ..muscle import CubicSpring, LaggingWall, LinearSpring, Spring, Wall
 from ..plant.plant import Plant
-from ..pneumatics import Conduit, DistributedTube, IndexedValve, Orifice, Tube, Valve
+from ..pneumatics import DistributedTube, IndexedValve, Orifice, Tube, TubeModel, Valve
 from ..pneumatics.gas import EnergyBalance, Gas, Polytropic
 from ..recording import Recording
 from ..report.chapter import Plot, Table
@@ -60,7 +60,7 @@ class Exchanged:
     spring: Spring | None = None
     wall: Wall | None = None
     valve: Orifice = MATRIX
-    tube: Conduit | None = None
+    tube: TubeModel | None = None
     braid_angle: float | None = None
     sensed: str = "pressure"
 
@@ -130,7 +130,7 @@ class Effect:
     delays: tuple[float, float]
     """By how much filling and discharging come later [s], at 90 % of their way in pressure."""
 
-    def greatest(self, column: str, phase: tuple[float, float]) -> float:
+    def largest(self, column: str, phase: tuple[float, float]) -> float:
         """The change that is largest in size within a phase, with its sign."""
         change = getattr(self, column)[(self.time >= phase[0]) & (self.time <= phase[1])]
         return float(change[np.argmax(np.abs(change))])
@@ -170,7 +170,7 @@ def table(found: tuple[Effect, ...]) -> Table:
     for column, unit, size in (("pressure", "kPa", 1e3), ("contraction", "% of length", 0.01)):
         for word, phase in phases:
             columns[f"{column}, {word}: greatest change [{unit}]"] = [
-                _shown(e.greatest(column, phase) / size) for e in found
+                _shown(e.largest(column, phase) / size) for e in found
             ]
     for i, (word, _) in enumerate(phases):
         columns[f"{word} later at 90 % [ms]"] = [_shown(round(e.delays[i] * 1e3, 3)) for e in found]
@@ -189,7 +189,7 @@ def _shown(value: float) -> float:
 
 def ratio(effect: Effect) -> float:
     """The greatest change of pressure while filling by that while discharging."""
-    return abs(effect.greatest("pressure", FILLING) / effect.greatest("pressure", DISCHARGING))
+    return abs(effect.largest("pressure", FILLING) / effect.largest("pressure", DISCHARGING))
 
 
 def figure(found: tuple[Effect, ...]) -> Plot:
@@ -248,4 +248,4 @@ def in_words(found: tuple[Effect, ...]) -> str:
 
 
 def _size(effect: Effect) -> float:
-    return abs(effect.greatest("pressure", FILLING))
+    return abs(effect.largest("pressure", FILLING))

@@ -11,7 +11,7 @@ from ..plant.plant import Plant
 from ..pneumatics import Valve
 from ..recording import Recording
 from ..report.chapter import AtMost, Claim, Equal, Plot
-from ..simulation.integrators import DormandPrince8, Method, Rodas4
+from ..simulation.integrators import DormandPrince8, Integrator, Rodas4
 from ..simulation.simulate import simulate
 from .hosovsky_plant import MATRIX, PAPER, Numbers, hanging, plant
 from .hosovsky_schedule import DISCHARGING, DURATION, FILLING, SCHEDULE
@@ -32,7 +32,7 @@ def run_fill(numbers: Numbers, valve: Valve = MATRIX) -> Fill:
     return Fill(system, _run(system, DormandPrince8(1e-4)), _run(system, Rodas4(1e-8)))
 
 
-def _run(system: Plant, method: Method) -> Recording:
+def _run(system: Plant, method: Integrator) -> Recording:
     return simulate(system, SCHEDULE, duration=DURATION, method=method)
 
 

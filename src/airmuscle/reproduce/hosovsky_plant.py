@@ -13,7 +13,7 @@ from ..library import catalogue
 from ..mechanism import HangingMass, Held, Mechanism
 from ..muscle import LinearDamper, LinearSpring, Muscle, RigidWall, Spring, Wall
 from ..plant.plant import Plant
-from ..pneumatics import Conduit, FillDischarge, Line, Orifice, Supply, Valve
+from ..pneumatics import FillDischarge, Orifice, Supply, TubeModel, Valve, WithTubes
 from ..pneumatics.gas import Ambient, Gas, Isothermal
 
 PAPER = "hosovsky"
@@ -80,14 +80,14 @@ class Numbers:
 @functools.cache
 def surface_fit(data: str = MAPS[0]) -> Fit:
     """The 21 coefficients fitted to a force map of the library; rows clamped at zero force are censored."""
-    return fit(ContractileSurface.blank(5, greatest_force=1e5), catalogue.measured(data))
+    return fit(ContractileSurface.blank(5, max_force=1e5), catalogue.load_data(data))
 
 
 def surface(data: str = MAPS[0]) -> ContractileSurface:
     """The fitted surface under the force compensator of the paper, 0..1200 N."""
     found = surface_fit(data).model
     assert isinstance(found, ContractileSurface)
-    return dataclasses.replace(found, greatest_force=1200.0)
+    return dataclasses.replace(found, max_force=1200.0)
 
 
 def muscle(numbers: Numbers, data: str = MAPS[0], spring: Spring | None = None) -> Muscle:
@@ -106,13 +106,13 @@ def plant(
     spring: Spring | None = None,
     wall: Wall | None = None,
     valve: Orifice = MATRIX,
-    tube: Conduit | None = None,
+    tube: TubeModel | None = None,
     data: str = MAPS[0],
 ) -> Plant:
     """Muscle, two valves with closed centre, load and gas; isothermal, no line, a rigid wall as in the paper."""
     valves = FillDischarge(Supply(FULL_PRESSURE), valve, valve)
     fed = dataclasses.replace(muscle(numbers, data, spring), wall=wall or RigidWall())
-    circuit = valves if tube is None else Line(valves, tube)
+    circuit = valves if tube is None else WithTubes(valves, tube)
     return Plant(fed, circuit, mechanism, gas or Isothermal(), Ambient())
 
 

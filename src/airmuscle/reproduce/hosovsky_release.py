@@ -29,7 +29,7 @@ class Release:
     pressure: float
     run: Recording
     initial_acceleration: float
-    greatest_contraction: float
+    max_contraction: float
     damping_ratio: float
     decay_rate: float
 
@@ -80,7 +80,7 @@ def compared(low: Release, high: Release) -> dict[str, float]:
 
     return {
         "acceleration": high.initial_acceleration - low.initial_acceleration,
-        "contraction": (high.greatest_contraction - low.greatest_contraction) * 100,
+        "contraction": (high.max_contraction - low.max_contraction) * 100,
         "relative damping": apart(high.damping_ratio, low.damping_ratio),
         "absolute damping": apart(high.decay_rate, low.decay_rate),
     }

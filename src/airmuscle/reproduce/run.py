@@ -1,4 +1,4 @@
-"""Runs the papers' chapters and writes their report."""
+"""RunSplit the papers' chapters and writes their report."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 from ..library.catalogue import complete
 from ..report.chapter import Chapter
-from ..report.staged import refuse_unwritable
+from ..report.output_folder import check_writable
 from ..report.write import write_report
 
 PAPERS: dict[str, str] = {
@@ -41,7 +41,7 @@ def reproduce(
     FileError, and what a chapter raises.
     """
     chosen = named(papers)
-    refuse_unwritable(folder)
+    check_writable(folder)
     chapters: list[Chapter] = []
     try:
         for name in chosen:

@@ -12,8 +12,8 @@ import numpy as np
 from ..characteristic.base import Characteristic
 from ..characteristic.exact_meridian import ExactMeridian
 from ..characteristic.saga2007 import RUBBER_TEST_STRAIN, Saga2007
-from ..core.errors import NoSolution
-from ..report.chapter import AtLeast, AtMost, Claim, Equal, Printed
+from ..core.errors import SolveError
+from ..report.chapter import AtLeast, AtMost, Claim, Equal, PublishedValue
 from .saga2007_muscle import (
     DEFAULT,
     LINES,
@@ -36,14 +36,14 @@ FIG_2 = (0.05, 0.10, 0.15, 0.20, 0.25)
 """The contractions that Fig. 2 shows."""
 
 
-def _claim(text: str, printed: Printed, found: float, unit: str, name: str, note: str) -> Claim:
+def _claim(text: str, printed: PublishedValue, found: float, unit: str, name: str, note: str) -> Claim:
     return Claim(PAPER, f"{text} [{name}]", printed, found, unit, note)
 
 
 def contraction_claim(law: Characteristic, name: str) -> Claim:
     """Claim 1: more than 35 % at 0.11 MPa, taken as unloaded."""
     found = reached(law, PRESSURE, 0.0)
-    end = found >= law.contraction_reach[1] * (1 - 1e-6)
+    end = found >= law.contraction_range[1] * (1 - 1e-6)
     note = "No load is stated; taken as none. "
     note += "The model asks for less than 0.11 MPa over all its reach and runs away." if end else ""
     note += "Even the exact meridian stays below." if isinstance(law, ExactMeridian) else ""
@@ -114,7 +114,7 @@ def strength_claims(law: Saga2007, name: str, force: float) -> tuple[Claim, ...]
     runs = [with_rings(law, n) for n in (0, 2)]
     try:
         points = [float(run.contraction(PRESSURE, force)) for run in runs]
-    except NoSolution:
+    except SolveError:
         note = "One of the two has no stable contraction at 0.11 MPa."
         return (Claim(PAPER, f"{text.format('strain')} [{where}]", AtMost(1.0), None, "1", note),)
     strains = [float(run.middle_strain(c)) for run, c in zip(runs, points, strict=True)]
@@ -167,7 +167,7 @@ def feed_forward_claim(law: Saga2007, name: str, force: float) -> Claim:
 def _returns(law: Saga2007, pressure: float, force: float, wanted: float) -> bool:
     try:
         return abs(float(law.contraction(pressure, force)) - wanted) < 1e-9
-    except NoSolution:
+    except SolveError:
         return False
 
 

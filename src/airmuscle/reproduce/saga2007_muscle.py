@@ -12,7 +12,7 @@ from ..characteristic.circle_virtual_work import CircleVirtualWork
 from ..characteristic.exact_meridian import ExactMeridian
 from ..characteristic.rubber import AlongArc, RubberLine
 from ..characteristic.saga2007 import LINE_A, LINE_B, Saga2007
-from ..core.errors import NoSolution
+from ..core.errors import SolveError
 from ..geometry.fibre_sum import EvenSpread
 from ..geometry.parabola import Parabola
 from ..geometry.pleated import PleatedTube
@@ -68,7 +68,7 @@ def reached(law: Characteristic, pressure: float, force: float) -> float:
 
     Zero where the tube stays straight, the end of the law's reach where the muscle runs away.
     """
-    low, high = law.contraction_reach
+    low, high = law.contraction_range
     grid = np.linspace(max(low, 1e-3), high * (1 - 1e-6), 150)
     needed = pressure_along(law, grid, force)
     enough = np.flatnonzero(needed <= pressure)
@@ -78,7 +78,7 @@ def reached(law: Characteristic, pressure: float, force: float) -> float:
         return float(high)
     try:
         return float(law.contraction(pressure, force))
-    except NoSolution:
+    except SolveError:
         return float(grid[enough[-1]])
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..characteristic.rubber import AlongArc, RubberIntegral, RubberLine
 from ..core import autodiff
 from ..core.arrays import Array
-from ..core.model import model
+from ..core.declaration import model
 from ..core.ops import Value
 from ..geometry.catenary import Catenary
 from ..geometry.circular_arc import CircularArc
@@ -61,7 +61,7 @@ class Stored:
 def _energy_growth(tube: FibreTube, rubber: RubberLine, contraction: Array) -> Array:
     """dU/deps [J] of one segment; the exact outline, which has no formula, by differences."""
     if isinstance(tube, StraightFibre):
-        return np.asarray(autodiff.slope(Stored(tube, rubber), "energy", contraction))
+        return np.asarray(autodiff.derivative(Stored(tube, rubber), "energy", contraction))
 
     if not (rubber.slope or rubber.intercept):
         return np.zeros_like(contraction)

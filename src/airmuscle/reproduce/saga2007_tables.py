@@ -110,7 +110,7 @@ def virtual_work(law: Saga2007, pressure: float, contraction: Any) -> Any:
     """(p dV/deps - dU/deps)/L_0 [N] with the volume and the rubber's energy of the law's own outline."""
     tube = law.geometry
     stored = saga2007_pairs.Stored(tube, law.rubber)
-    per_segment = autodiff.slope(stored, "energy", contraction)
+    per_segment = autodiff.derivative(stored, "energy", contraction)
     return (pressure * tube.volume_growth(contraction) - tube.segments * per_segment) / LENGTH
 
 

@@ -5,7 +5,7 @@ hold = [["0 s", 1]]                         inputs that the controller does not 
 [command.controller]
 model = "PID"                               a controller and its parameters, in any unit that fits where it stands
 measured = "pressure"                       a state or output of the plant
-commanded = "fill"                          an input; or { model = "Split", positive = "fill", negative = "discharge" }
+commanded = "fill"                          an input; or { model = "SplitRange", positive = "fill", negative = "discharge" }
 gain = "0.4 1/bar"
 integral_time = "300 ms"
 period = "5 ms"                             from one sample to the next
@@ -20,15 +20,15 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from ..control.control_loop import ControlLoop, check_present
 from ..control.controller import RELATIVE, Controller, relative_unit
-from ..control.inputs import Command
-from ..control.loop import Loop, refuse_absent
+from ..control.inputs import InputSignal
+from ..core.declaration import Parameter, parameters
 from ..core.errors import ParameterError
-from ..core.model import Parameter, parameters
 from ..core.variables import Input
 from ..library.build import build
+from ..library.location import Location, checked, finite, located_errors, number
 from ..library.models import model_class, model_names
-from ..library.place import Place, checked, finite, number, said_at
 from ..plant.columns import units_of
 from ..plant.plant import Plant
 from .inputs import command_from, drivers_from
@@ -44,7 +44,7 @@ def units_around(plant: Plant, start: Mapping[str, float]) -> dict[str, str]:
     return {name: units[name] for name in (*(s.name for s in plant.states), *outputs, *plant.inputs)}
 
 
-def loop_from(table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], place: Place) -> Loop:
+def loop_from(table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], place: Location) -> ControlLoop:
     """The loop that the table [command] with a controller describes; `units` are those of `units_around`.
 
     Raises ParameterError, UnitError, UnknownName, FileError or ColumnError.
@@ -61,13 +61,15 @@ def loop_from(table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], 
     setpoint = _setpoint(given["setpoint"], controller, units, at.inside("setpoint"))
     others = command_from(beside, plant.commands, place)
     drivers = drivers_from(table.get("drivers", {}), plant.inputs, place.inside("drivers"))
-    with said_at(at):
-        loop = Loop(controller, period, setpoint, others, drivers)
-        loop.refuse_misfit([name for name in units if name not in plant.inputs], plant.inputs)
+    with located_errors(at):
+        loop = ControlLoop(controller, period, setpoint, others, drivers)
+        loop.check_columns([name for name in units if name not in plant.inputs], plant.inputs)
     return loop
 
 
-def _controller(table: Mapping[str, Any], inputs: Sequence[str], units: Mapping[str, str], place: Place) -> Controller:
+def _controller(
+    table: Mapping[str, Any], inputs: Sequence[str], units: Mapping[str, str], place: Location
+) -> Controller:
     """The controller. Built twice: what it measures and commands says in which units its other numbers are."""
     relative: dict[str, Parameter] = {}
     if isinstance(table.get("model"), str):
@@ -77,8 +79,8 @@ def _controller(table: Mapping[str, Any], inputs: Sequence[str], units: Mapping[
             raise ParameterError(f"{place}: {cls.__name__} is no controller; there are {', '.join(known)}.")
         relative = {p.name: p for p in parameters(cls) if p.unit in RELATIVE and p.name in table}
     draft: Controller = checked(build({**table, **dict.fromkeys(relative, 1.0)}, place), Controller, place)
-    with said_at(place):
-        refuse_absent(draft, [name for name in units if name not in inputs], inputs)
+    with located_errors(place):
+        check_present(draft, [name for name in units if name not in inputs], inputs)
     if relative and len({units[name] for name in draft.inputs}) > 1:
         raise ParameterError(f"{place}: {' and '.join(draft.inputs)} have different units; name inputs of one kind.")
     numbers = {
@@ -91,11 +93,11 @@ def _controller(table: Mapping[str, Any], inputs: Sequence[str], units: Mapping[
 
 def _unit(declared: Parameter, controller: Controller, units: Mapping[str, str]) -> str:
     """The unit of a controller's parameter where it stands; "1" takes the place of one that is not known."""
-    y, u = (units.get(names[0]) or "1" for names in (controller.columns, controller.inputs))
+    y, u = (units.get(names[0]) or "1" for names in (controller.measured_columns, controller.inputs))
     return relative_unit(declared.unit, y, u)
 
 
-def _setpoint(given: Any, controller: Controller, units: Mapping[str, str], place: Place) -> Command:
+def _setpoint(given: Any, controller: Controller, units: Mapping[str, str], place: Location) -> InputSignal:
     names: Sequence[str] = controller.setpoints
     if not isinstance(given, Mapping):
         raise ParameterError(f'{place} is {given!r}; write {names[0]} = [["0 s", ...]] under it.')
@@ -106,7 +108,7 @@ def _setpoint(given: Any, controller: Controller, units: Mapping[str, str], plac
 
 
 def numbers_of(
-    table: Mapping[str, Any], loop: Loop, units: Mapping[str, str]
+    table: Mapping[str, Any], loop: ControlLoop, units: Mapping[str, str]
 ) -> Iterator[tuple[tuple[str | int, ...], str]]:
     """Where in the table [command.controller] numbers stand or may stand, and the unit of each, for studies."""
     for p in parameters(loop.controller):

@@ -39,17 +39,17 @@ import numpy as np
 
 from ..core import tree
 from ..core.errors import ParameterError
-from ..identify.dynamic import DynamicFit, Experiment, Start, StartTime, StartValue, fit_dynamic
+from ..identify.dynamic import DynamicFit, Experiment, InitialConditions, StartTime, StartValue, fit_dynamic
 from ..identify.dynamic.experiment import Own, Shared
 from ..library.build import build
 from ..library.catalogue import parsed
-from ..library.place import Place, checked, finite, refuse_unknown, said_at, text
+from ..library.location import Location, check_keys, checked, finite, located_errors, text
 from ..library.write import scenario_toml
 from ..plant.plant import Plant
 from ..recording import Recording, read
 from ..recording.columns import quantity_of
-from ..simulation.arguments import refuse_beyond_range
-from ..simulation.integrators import Method
+from ..simulation.arguments import check_input_range
+from ..simulation.integrators import Integrator
 from .inputs import command_from
 from .scenario import plant_from
 
@@ -75,7 +75,7 @@ class DynamicStudy:
     bounds: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     starts: int = 1
     seed: int = 0
-    method: Method | None = None
+    method: Integrator | None = None
 
     def fit(self) -> DynamicFit:
         """The numbers found; see `identify.dynamic.fit_dynamic`."""
@@ -107,8 +107,8 @@ def load_study(path: str | Path) -> DynamicStudy:
     """The study in a file. Raises FileError, ParameterError, UnitError, UnknownName or ColumnError, saying where."""
     file = Path(path)
     tables = parsed(file)
-    place = Place(str(file), "", file.parent)
-    refuse_unknown(tables, _TABLES, place)
+    place = Location(str(file), "", file.parent)
+    check_keys(tables, _TABLES, place)
     plant = plant_from(_table(tables, "plant", place), place.inside("plant"))
     observed = _observed(_table(tables, "observed", place), plant, place.inside("observed"))
     records = tables.get("record")
@@ -119,7 +119,7 @@ def load_study(path: str | Path) -> DynamicStudy:
         for i, row in enumerate(records, 1)
     ]
     wanted, at = _table(tables, "fit", place), place.inside("fit")
-    refuse_unknown(wanted, _FIT, at)
+    check_keys(wanted, _FIT, at)
     return DynamicStudy(
         title=text(tables, "title", place, needed=False) or file.stem,
         plant=plant,
@@ -135,7 +135,7 @@ def load_study(path: str | Path) -> DynamicStudy:
     )  # fmt: skip
 
 
-def _table(tables: Mapping[str, Any], key: str, place: Place, *, needed: bool = True) -> Mapping[str, Any]:
+def _table(tables: Mapping[str, Any], key: str, place: Location, *, needed: bool = True) -> Mapping[str, Any]:
     found = tables.get(key, None if needed else {})
     if not isinstance(found, Mapping):
         what = "is missing" if found is None else f"is {found!r}, no table"
@@ -143,26 +143,26 @@ def _table(tables: Mapping[str, Any], key: str, place: Place, *, needed: bool = 
     return found
 
 
-def _list(table: Mapping[str, Any], key: str, place: Place) -> list[Any]:
+def _list(table: Mapping[str, Any], key: str, place: Location) -> list[Any]:
     found = table.get(key, [])
     if not isinstance(found, list):
         raise ParameterError(f'{place}, {key} is {found!r}; write a list of paths, ["circuit.fill.conductance"].')
     return found
 
 
-def _whole(table: Mapping[str, Any], key: str, least: int, place: Place) -> int:
+def _whole(table: Mapping[str, Any], key: str, least: int, place: Location) -> int:
     found = table.get(key, least)
     if isinstance(found, bool) or not isinstance(found, int) or found < least:
         raise ParameterError(f"{place}, {key} is {found!r}; it must be a whole number, {least} or more.")
     return found
 
 
-def _method(table: Mapping[str, Any], place: Place) -> Method | None:
+def _method(table: Mapping[str, Any], place: Location) -> Integrator | None:
     given = table.get("method")
     if given is None:
         return None
     at = place.inside("method")
-    found: Method = checked(build({"model": given} if isinstance(given, str) else given, at), Method, at)
+    found: Integrator = checked(build({"model": given} if isinstance(given, str) else given, at), Integrator, at)
     return found
 
 
@@ -175,12 +175,12 @@ def _unit(name: str, plant: Plant) -> str:
     return _known_unit(name, plant) or "1"
 
 
-def _observed(table: Mapping[str, Any], plant: Plant, place: Place) -> dict[str, tuple[float, str]]:
+def _observed(table: Mapping[str, Any], plant: Plant, place: Location) -> dict[str, tuple[float, str]]:
     """Standard deviation and column of every output that was measured."""
     found = {}
     for name, given in table.items():
         entry = given if isinstance(given, Mapping) else {"deviation": given}
-        refuse_unknown(entry, ("deviation", "column"), place.inside(name))
+        check_keys(entry, ("deviation", "column"), place.inside(name))
         deviation = finite(entry.get("deviation"), _unit(name, plant), f"{place}, {name}")
         if not deviation > 0:
             raise ParameterError(f"{place}, {name} is {deviation:g}; a sensor's standard deviation is above zero.")
@@ -198,7 +198,7 @@ def _shared(given: Any, where: str) -> Shared:
     raise ParameterError(f"{where} holds {given!r}; each is a path in quotes, or a list of paths that share a value.")
 
 
-def _own(table: Mapping[str, Any], plant: Plant, place: Place) -> tuple[Own, ...]:
+def _own(table: Mapping[str, Any], plant: Plant, place: Location) -> tuple[Own, ...]:
     found: list[Own] = [_shared(item, f"{place}, own") for item in _list(table, "own", place)]
     if "start_time" in table:
         found.append(StartTime(_positive(table["start_time"], "s", f"{place}, start_time")))
@@ -214,11 +214,11 @@ def _positive(given: Any, unit: str, where: str) -> float:
     return found
 
 
-def _bounds(table: Mapping[str, Any], plant: Plant, place: Place) -> dict[str, tuple[float, float]]:
+def _bounds(table: Mapping[str, Any], plant: Plant, place: Location) -> dict[str, tuple[float, float]]:
     declared = {leaf.path: leaf.declared for leaf in tree.leaves(plant)}
     found = {}
     for path, given in table.items():
-        refuse_unknown({path: given}, tuple(declared), place)
+        check_keys({path: given}, tuple(declared), place)
         if not isinstance(given, list) or len(given) != 2:
             raise ParameterError(f"{place}, {path} is {given!r}; write the least and the greatest value, [1.01, 1.4].")
         low, high = (finite(end, declared[path].unit, f"{place}, {path}") for end in given)
@@ -236,7 +236,7 @@ class _Record:
     """One [[record]] of a file, and what of the file it shares."""
 
     row: Any
-    place: Place
+    place: Location
     tables: Mapping[str, Any]
     shared: Plant
 
@@ -244,7 +244,7 @@ class _Record:
         """The record as an experiment, and its command as written."""
         if not isinstance(self.row, Mapping):
             raise ParameterError(f"{self.place} is {self.row!r}; write [[record]] and its keys under it.")
-        refuse_unknown(self.row, _RECORD, self.place)
+        check_keys(self.row, _RECORD, self.place)
         plant = self.plant()
         table = dict(_table({**self.tables, **self.row}, "command", self.place, needed=False))
         if "file" in table:  # so that it can be written elsewhere
@@ -252,9 +252,9 @@ class _Record:
         recording, at = self.recording(observed), self.place.inside("command")
         start_time = finite(self.row.get("start_time", 0.0), "s", f"{self.place}, start_time")
         command = command_from(table, plant.commands, at)
-        with said_at(at):
+        with located_errors(at):
             length = max(float(recording["time"][-1]) - start_time, 1e-9)
-            refuse_beyond_range(plant, command.segments(plant.inputs, 0.0, length), 0.0)
+            check_input_range(plant, command.segments(plant.inputs, 0.0, length), 0.0)
         return Experiment(recording, command, self.start(plant, recording), start_time, plant), table
 
     def plant(self) -> Plant:
@@ -268,7 +268,7 @@ class _Record:
         told = {key: self.row[key] for key in ("mapping", "resting_length") if key in self.row}
         if "mapping" in told:
             told["mapping"] = self.place.folder / told["mapping"]
-        with said_at(self.place):
+        with located_errors(self.place):
             found = read(self.place.folder / name, **told)
             if len(found) != 1:
                 raise ParameterError(f"{name} holds {len(found)} runs; give a file for each record.")
@@ -287,7 +287,7 @@ class _Record:
             )
         return recording.rows(rows)
 
-    def start(self, plant: Plant, recording: Recording) -> Start:
+    def start(self, plant: Plant, recording: Recording) -> InitialConditions:
         """Rest at a pressure, or the state that is stated."""
         at = self.place.inside("start")
         given = dict(_table(self.row, "start", self.place, needed=False))
@@ -295,5 +295,9 @@ class _Record:
         sensed = [name for name in recording if name.rpartition(".")[2] == "pressure"]
         usual = float(np.median(recording[sensed[0]][:FIRST_ROWS])) if sensed else 0.0
         pressure = values.pop("pressure", usual)
-        with said_at(at):
-            return Start.held(plant, pressure, **values) if values else Start.at_rest(plant, pressure)
+        with located_errors(at):
+            return (
+                InitialConditions.held(plant, pressure, **values)
+                if values
+                else InitialConditions.at_rest(plant, pressure)
+            )

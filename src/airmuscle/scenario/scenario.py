@@ -27,21 +27,21 @@ from pathlib import Path
 from types import MappingProxyType, NoneType
 from typing import Any
 
-from ..analysis.equilibrium import equilibrium
+from ..analysis.equilibrium import find_equilibrium
 from ..characteristic.base import ForceLaw
-from ..control.driver import Driven
-from ..control.inputs import Command
-from ..control.loop import Loop
+from ..control.control_loop import ControlLoop
+from ..control.driver import WithDrivers
+from ..control.inputs import InputSignal
 from ..core.errors import ParameterError, suggestion
 from ..library.build import build
 from ..library.catalogue import load, parsed
 from ..library.entry import Entry
-from ..library.place import Place, checked, finite, refuse_unknown, said_at, text
+from ..library.location import Location, check_keys, checked, finite, located_errors, text
 from ..muscle import Muscle
 from ..plant.plant import Plant
 from ..recording import Recording
-from ..simulation.arguments import refuse_beyond_range
-from ..simulation.integrators import Method, Rodas4
+from ..simulation.arguments import check_input_range
+from ..simulation.integrators import Integrator, Rodas4
 from ..simulation.simulate import simulate
 from .controller import loop_from, units_around
 from .inputs import command_from
@@ -59,12 +59,12 @@ class Scenario:
 
     title: str
     plant: Plant
-    command: Command | Loop
+    command: InputSignal | ControlLoop
     duration: float
     start: dict[str, float]
     start_time: float = 0.0
     output: float | None = None
-    method: Method = dataclasses.field(default_factory=Rodas4)
+    method: Integrator = dataclasses.field(default_factory=Rodas4)
     columns: tuple[str, ...] = ()
     """What the file of the run holds beside the time; empty: everything."""
 
@@ -90,29 +90,29 @@ class Scenario:
 def load_scenario(path: str | Path) -> Scenario:
     """The scenario in a file. Raises FileError, ParameterError, UnitError or UnknownName, saying where."""
     file = Path(path)
-    return scenario_from(parsed(file), Place(str(file), "", file.parent))
+    return scenario_from(parsed(file), Location(str(file), "", file.parent))
 
 
 def scenario_from(
-    tables: Mapping[str, Any], place: Place, plant: Plant | None = None, rest: dict[str, float] | None = None
+    tables: Mapping[str, Any], place: Location, plant: Plant | None = None, rest: dict[str, float] | None = None
 ) -> Scenario:
     """The scenario that the tables of a file describe; a `plant` that is given stands for the table [plant], and a
     `rest` for the equilibrium that the run begins at."""
-    refuse_unknown(tables, TABLES, place)
+    check_keys(tables, TABLES, place)
     for key in ("plant", "run"):
         _table(tables.get(key), key, place)
     plant = plant or _plant(tables["plant"], place.inside("plant"))
     run, at = tables["run"], place.inside("run")
-    refuse_unknown(run, RUN, at)
+    check_keys(run, RUN, at)
     if "duration" not in run:
         raise ParameterError(f"{at}: 'duration' is missing; write it like duration = \"25 s\".")
     duration, start_time = _length(run, "duration", at), finite(run.get("start_time", 0.0), "s", f"{at}, start_time")
     table = _table(tables.get("command", {}), "command", place)
     start = _start(run.get("start", AMBIENT), plant, at.inside("start"), rest)
     command = _command(table, plant, start, duration, place.inside("command"))
-    shown = Driven(command.beside, command.drivers) if isinstance(command, Loop) else command
-    with said_at(place.inside("command")):
-        refuse_beyond_range(plant, shown.segments(plant.inputs, start_time, duration), start_time)
+    shown = WithDrivers(command.other_inputs, command.drivers) if isinstance(command, ControlLoop) else command
+    with located_errors(place.inside("command")):
+        check_input_range(plant, shown.segments(plant.inputs, start_time, duration), start_time)
     known = list(units_of_run(plant, start, command))
     return Scenario(
         title=text(tables, "title", place, needed=False) or Path(place.file).stem,
@@ -122,12 +122,12 @@ def scenario_from(
         start=start,
         start_time=start_time,
         output=_length(run, "output", at) if "output" in run else None,
-        method=_object(run["method"], Method, at.inside("method")) if "method" in run else Rodas4(),
+        method=_object(run["method"], Integrator, at.inside("method")) if "method" in run else Rodas4(),
         columns=_columns(_table(tables.get("output", {}), "output", place), known, place.inside("output")),
     )
 
 
-def _table(given: Any, key: str, place: Place) -> Mapping[str, Any]:
+def _table(given: Any, key: str, place: Location) -> Mapping[str, Any]:
     if not isinstance(given, Mapping):
         what = "is missing" if given is None else f"is {given!r}, no table; write [{key}] and its keys under it"
         raise ParameterError(f"{place}: the table [{key}] {what}.")
@@ -135,23 +135,23 @@ def _table(given: Any, key: str, place: Place) -> Mapping[str, Any]:
 
 
 def _command(
-    table: Mapping[str, Any], plant: Plant, start: Mapping[str, float], duration: float, place: Place
-) -> Command | Loop:
+    table: Mapping[str, Any], plant: Plant, start: Mapping[str, float], duration: float, place: Location
+) -> InputSignal | ControlLoop:
     if "controller" not in table:
         return command_from(table, plant.commands, place)
     loop = loop_from(table, plant, units_around(plant, start), place)
-    with said_at(place.inside("controller")):
-        loop.refuse_longer(duration)
+    with located_errors(place.inside("controller")):
+        loop.check_period(duration)
     return loop
 
 
-def units_of_run(plant: Plant, start: Mapping[str, float], command: Command | Loop) -> dict[str, str]:
+def units_of_run(plant: Plant, start: Mapping[str, float], command: InputSignal | ControlLoop) -> dict[str, str]:
     """The units of all columns that a run has; '' where none is known."""
     units = {"time": "s"} | units_around(plant, start)
-    return units | (command.units(units) if isinstance(command, Loop) else {})
+    return units | (command.units(units) if isinstance(command, ControlLoop) else {})
 
 
-def _length(table: Mapping[str, Any], key: str, place: Place) -> float:
+def _length(table: Mapping[str, Any], key: str, place: Location) -> float:
     """A length of time [s]."""
     found = finite(table[key], "s", f"{place}, {key}")
     if not found > 0:
@@ -159,7 +159,7 @@ def _length(table: Mapping[str, Any], key: str, place: Place) -> float:
     return found
 
 
-def _plant(table: Mapping[str, Any], place: Place) -> Plant:
+def _plant(table: Mapping[str, Any], place: Location) -> Plant:
     muscles = table.get("muscle")
     if muscles is None:
         raise ParameterError(f"{place}: 'muscle' is missing; name a library entry, a file, or write [plant.muscle].")
@@ -173,39 +173,39 @@ def _plant(table: Mapping[str, Any], place: Place) -> Plant:
     return plant
 
 
-def _muscle(given: Any, place: Place) -> Any:
+def _muscle(given: Any, place: Location) -> Any:
     if isinstance(given, Mapping):
         rest = {"model": "Muscle", **given}
         base = rest.pop("library", None)
         return build(rest, place, {} if base is None else _parts(_entry(base, place.inside("library")), rest, place))
     entry = _entry(given, place)
-    with said_at(place):
+    with located_errors(place):
         return entry.muscle
 
 
-def _entry(given: Any, place: Place) -> Entry:
+def _entry(given: Any, place: Location) -> Entry:
     if not isinstance(given, str):
         raise ParameterError(f"{place} is {given!r}; name a library entry or a muscle file.")
-    with said_at(place):
+    with located_errors(place):
         return load(place.folder / given if given.endswith(".toml") else given)
 
 
-def _parts(entry: Entry, replaced: Mapping[str, Any], place: Place) -> dict[str, Any]:
+def _parts(entry: Entry, replaced: Mapping[str, Any], place: Location) -> dict[str, Any]:
     """The parts of an entry that a table leaves as they are; what it lacks, such as a geometry, the table may give."""
     names = [f.name for f in dataclasses.fields(Muscle) if f.name not in ("contractile", "name")]
     parts = {"contractile": entry.characteristic, **{name: getattr(entry, name, None) for name in names}}
     if "contractile" in replaced:
-        del parts["box"]  # it tells where the law that is replaced was measured
+        del parts["validity_range"]  # it tells where the law that is replaced was measured
     left = {name: part for name, part in parts.items() if part is not None and name not in replaced}
     if not isinstance(left.get("contractile"), ForceLaw | NoneType):
         raise ParameterError(
             f"{place}: {entry.name} is {type(entry.characteristic).__name__}, which is not solved for the force; "
-            "a plant needs a ForceLaw. In Python, as_force_law(law, box) makes one."
+            "a plant needs a ForceLaw. In Python, as_force_law(law, validity range) makes one."
         )
     return left
 
 
-def pressure_of_rest(tables: Mapping[str, Any], place: Place) -> float | None:
+def pressure_of_rest(tables: Mapping[str, Any], place: Location) -> float | None:
     """Gauge pressure [Pa] in the muscles where a run begins at rest; None where it begins at another state."""
     given = tables["run"].get("start", AMBIENT)
     if not isinstance(given, Mapping) or set(given) - {"pressure"}:
@@ -213,24 +213,24 @@ def pressure_of_rest(tables: Mapping[str, Any], place: Place) -> float | None:
     return finite(given.get("pressure", 0.0), "Pa", f"{place.inside('run').inside('start')}, pressure")
 
 
-def _start(given: Any, plant: Plant, place: Place, rest: dict[str, float] | None) -> dict[str, float]:
+def _start(given: Any, plant: Plant, place: Location, rest: dict[str, float] | None) -> dict[str, float]:
     if not isinstance(given, Mapping):
         raise ParameterError(f'{place} is {given!r}; write start = {{ pressure = "0 bar" }}.')
     coordinates = {
         name: unit for c in plant.mechanism.coordinates for name, unit in ((c.name, c.unit), (c.speed, f"{c.unit}/s"))
     }
     kinds = {"pressure": "Pa", **coordinates}
-    refuse_unknown(given, tuple(kinds), place)
+    check_keys(given, tuple(kinds), place)
     values = {key: finite(value, kinds[key], f"{place}, {key}") for key, value in given.items()}
     pressure = values.pop("pressure", 0.0)
-    with said_at(place):
+    with located_errors(place):
         if values:
             return plant.state_at(pressure=pressure, **values)
-        return equilibrium(plant, pressure=pressure) if rest is None else rest
+        return find_equilibrium(plant, pressure=pressure) if rest is None else rest
 
 
-def _columns(table: Mapping[str, Any], known: Sequence[str], place: Place) -> tuple[str, ...]:
-    refuse_unknown(table, OUTPUT, place)
+def _columns(table: Mapping[str, Any], known: Sequence[str], place: Location) -> tuple[str, ...]:
+    check_keys(table, OUTPUT, place)
     given = table.get("columns", [])
     if not isinstance(given, list) or not all(isinstance(name, str) for name in given):
         raise ParameterError(f'{place}, columns is {given!r}; write columns = ["pressure", "force"].')
@@ -242,7 +242,7 @@ def _columns(table: Mapping[str, Any], known: Sequence[str], place: Place) -> tu
     return tuple(given)
 
 
-def _object(given: Any, kind: type[Any], place: Place) -> Any:
+def _object(given: Any, kind: type[Any], place: Location) -> Any:
     return checked(build({"model": given} if isinstance(given, str) else given, place), kind, place)
 
 

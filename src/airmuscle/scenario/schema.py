@@ -17,7 +17,7 @@ from typing import Any
 
 from ..control.controller import RELATIVE, Controller
 from ..control.driver import Driver
-from ..core.model import Parameter, parameters
+from ..core.declaration import Parameter, parameters
 from ..core.reference import Reference
 from ..library import read
 from ..library.models import model_class, model_names
@@ -25,7 +25,7 @@ from ..library.valve_catalogue import PATHS
 from ..muscle import Muscle
 from ..plant.plant import Plant
 from ..pneumatics.orifice import Orifice
-from ..simulation.integrators import Method
+from ..simulation.integrators import Integrator
 from . import controller, inputs, scenario
 
 Schema = dict[str, Any]
@@ -64,12 +64,12 @@ def muscle_schema() -> Schema:
     tables = {
         **dict.fromkeys(read._TEXTS, _TEXT),
         **{key: known.kind(cls) for key, cls in read._PARTS.items()},
-        "box": known.table(model_class("Box", "schema"), model_needed=False),
+        "validity_range": known.table(model_class("ValidityRange", "schema"), model_needed=False),
         "check": {"type": "array", "items": _table(check, ("quantity", "equals", "tolerance", "source"))},
         "reference": {"type": "array", "items": known.table(Reference, model_needed=None)},
     }
     return _whole(
-        "A muscle or a law in airmuscle", _only(tables, read._KEYS), ("title", "trust", "characteristic"), known
+        "A muscle or a law in airmuscle", _only(tables, read._KEYS), ("title", "provenance", "characteristic"), known
     )
 
 
@@ -185,7 +185,7 @@ def _command(known: _Models) -> Schema:
     each = {"anyOf": [driver, _table({"library": _TEXT}, ("library",))]}
     chain = {"anyOf": [*each["anyOf"], {"type": "array", "items": each}]}
     keys = {
-        "model": {"enum": ["Schedule", "Signal"]},
+        "model": {"enum": ["Schedule", "SampledSignal"]},
         "period": _quantity("s"),
         "file": _TEXT,
         "columns": {"type": "object", "additionalProperties": _TEXT},
@@ -216,6 +216,6 @@ def _run(known: _Models) -> Schema:
         "start_time": _quantity("s"),
         "output": _quantity("s", low=0.0),
         "start": {"type": "object", "additionalProperties": _quantity("m")},
-        "method": known.kind(Method),
+        "method": known.kind(Integrator),
     }
     return _table(_only(keys, scenario.RUN), ("duration",))

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..control.inputs import Segments
+from ..control.inputs import PiecewiseLinear
 from ..core.arrays import Array
-from ..core.model import model, parameter
+from ..core.declaration import model, parameter
 
 if TYPE_CHECKING:
-    from ..compile.program import Prepared
+    from ..compile.program import CompiledSystem
 
 
 REASONS = {
@@ -27,13 +27,13 @@ REASONS = {
     9: "a muscle enclosed nothing",
 }
 PAUSED, NOT_FINITE, TOO_MANY, INTERRUPTED, LESS_THAN_NONE, NO_COMMAND, NO_VOLUME = 1, 3, 4, 5, 7, 8, 9
-BUDGET = 100_000
+INTERRUPT_CHECK_STEPS = 100_000
 """Steps between two looks at whether the user wants to stop."""
-MOST_STEPS = 50_000_000
+MAX_STEPS = 50_000_000
 """Steps of one run, unless told otherwise."""
 
 
-class Course(NamedTuple):
+class RawSolution(NamedTuple):
     """What a method computed: rows reached of those asked for, where it stopped and why, and its counts."""
 
     rows: Array
@@ -54,7 +54,9 @@ class Stepper:
     trailing: tuple[Any, ...]
     work: Array
 
-    def run(self, segments: Segments, start: float, state: Array, times: Array, most_steps: int = MOST_STEPS) -> Course:
+    def run(
+        self, segments: PiecewiseLinear, start: float, state: Array, times: Array, most_steps: int = MAX_STEPS
+    ) -> RawSolution:
         """As Method.run."""
         y, rows = np.array(state, dtype=float), np.empty((times.size, state.size))
         rows.fill(np.nan)
@@ -62,51 +64,51 @@ class Stepper:
         status, middle = PAUSED, (y, segments.ends, segments.values, segments.slopes, times, rows)
         try:
             while status == PAUSED:
-                budget = min(BUDGET, most_steps - int(count[2]))
+                budget = min(INTERRUPT_CHECK_STEPS, most_steps - int(count[2]))
                 status = self.kernel(*self.leading, *middle, *self.trailing, clock, count, budget, self.work)
                 if status == PAUSED and count[2] >= most_steps:
                     status = TOO_MANY
         except KeyboardInterrupt:
             status = INTERRUPTED
-        return Course(rows, int(count[1]), float(clock[0]), y, int(status), int(count[2]), int(count[3]))
+        return RawSolution(rows, int(count[1]), float(clock[0]), y, int(status), int(count[2]), int(count[3]))
 
 
-class Method(abc.ABC):
+class Integrator(abc.ABC):
     """A numerical method for ordinary differential equations."""
 
     @abc.abstractmethod
-    def _kernel(self, prepared: Prepared) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
+    def _kernel(self, prepared: CompiledSystem) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
         """The kernel, its leading and its trailing arguments, and the length of its workspace."""
 
-    def stepper(self, prepared: Prepared) -> Stepper:
+    def stepper(self, prepared: CompiledSystem) -> Stepper:
         """The method at this system, for those who call it often: what does not change is made once."""
         kernel, leading, trailing, size = self._kernel(prepared)
         return Stepper(kernel, leading, trailing, np.zeros(max(size, 1)))
 
     def run(
-        self, prepared: Prepared, segments: Segments, start: float, state: Array, times: Array,
-        most_steps: int = MOST_STEPS,
-    ) -> Course:  # fmt: skip
+        self, prepared: CompiledSystem, segments: PiecewiseLinear, start: float, state: Array, times: Array,
+        most_steps: int = MAX_STEPS,
+    ) -> RawSolution:  # fmt: skip
         """Carry `state` (n,) from `start` through the segments; rows (N, n) at `times` (N,), which must rise."""
         return self.stepper(prepared).run(segments, start, state, times, most_steps)
 
 
 @model
-class Rodas4(Method):
+class Rodas4(Integrator):
     """Adaptive, for stiff plants, order four; the default. The absolute tolerance is rtol times the nominal size."""
 
     rtol: float = parameter("1", "rtol", "relative tolerance of a step", bounds=(1e-13, 0.1), default=1e-6)
 
-    def _kernel(self, prepared: Prepared) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
+    def _kernel(self, prepared: CompiledSystem) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
         from ..compile.cache.kernel import rodas4
 
         sizes, at = prepared.sizes, prepared.address
         addresses = (at["stage"], at["jac"], at["factor"], at["solve"], at["drift"], sizes.jacobian, sizes.factors)
         length = 11 * sizes.states + 2 * sizes.inputs + sizes.jacobian + sizes.factors
-        return rodas4, (*addresses, prepared.held), (self.rtol, self.rtol * prepared.nominal()), length
+        return rodas4, (*addresses, prepared.precomputed), (self.rtol, self.rtol * prepared.nominal()), length
 
 
-class Explicit(Method):
+class ExplicitRungeKutta(Integrator):
     """An explicit Runge-Kutta method of fixed step; its tableau is in the subclass. Stable only for small steps."""
 
     step: float
@@ -115,7 +117,7 @@ class Explicit(Method):
     def tableau(self) -> tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]:
         """Rows of the tableau below its first, and the weights."""
 
-    def _kernel(self, prepared: Prepared) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
+    def _kernel(self, prepared: CompiledSystem) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
         from ..compile.cache.kernel import fixed_step
 
         address, held = prepared.program.step(*self.tableau(), prepared.parameters)
@@ -123,7 +125,7 @@ class Explicit(Method):
 
 
 @model
-class RungeKutta4(Explicit):
+class RungeKutta4(ExplicitRungeKutta):
     """The classical method of order four (Kutta 1901)."""
 
     step: float = parameter("s", "h", "length of a step", bounds=(1e-9, 1e3))
@@ -133,7 +135,7 @@ class RungeKutta4(Explicit):
 
 
 @model
-class DormandPrince8(Explicit):
+class DormandPrince8(ExplicitRungeKutta):
     """RK8(7)13M of Prince and Dormand (1981), the weights of order eight: Simulink's ode8, which the third paper uses.
 
     Reference: Prince, P. J., Dormand, J. R., High order embedded Runge-Kutta formulae,

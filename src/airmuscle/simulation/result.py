@@ -9,37 +9,44 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..compile import System
-from ..control.inputs import Segments
+from ..control.inputs import PiecewiseLinear
 from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..muscle import INNER, SeriesSpring
 from ..plant.plant import Plant
 from ..recording import Recording
-from .diagnostics import at_end_of_reach, beyond_laws, stopped_where_impossible
-from .integrators import INTERRUPTED, REASONS, Course, Method
+from .diagnostics import geometry_limit_hint, truncate_at_invalid_row, validity_warnings
+from .integrators import INTERRUPTED, REASONS, Integrator, RawSolution
 
 if TYPE_CHECKING:
-    from ..compile.program import Prepared
+    from ..compile.program import CompiledSystem
 
 
-def _results(ready: Prepared, course: Course, segments: Segments, times: Array, start: float) -> tuple[Array, Array]:
+def _results(
+    ready: CompiledSystem, course: RawSolution, segments: PiecewiseLinear, times: Array, start: float
+) -> tuple[Array, Array]:
     """Outputs (N, K) and inputs (N, m) at the rows that were reached."""
     from ..compile.cache.kernel import evaluate
 
     states = np.ascontiguousarray(course.rows[: course.reached])
     inputs = np.ascontiguousarray(segments.inputs_at(times[: course.reached], start))
     results = np.empty((course.reached, ready.sizes.outputs))
-    evaluate(ready.address["outputs"], ready.held, states, inputs, results)
+    evaluate(ready.address["outputs"], ready.precomputed, states, inputs, results)
     return results, inputs
 
 
-def recorded(
-    ready: Prepared, course: Course, segments: Segments, times: Array, start: float, method: Method
-) -> tuple[Recording, Course]:
+def to_recording(
+    ready: CompiledSystem,
+    course: RawSolution,
+    segments: PiecewiseLinear,
+    times: Array,
+    start: float,
+    method: Integrator,
+) -> tuple[Recording, RawSolution]:
     """The rows that were reached, up to the first that cannot be, and the course up to there."""
     plant = ready.system
     results, inputs = _results(ready, course, segments, times, start)
-    course = stopped_where_impossible(ready, course, results, times)
+    course = truncate_at_invalid_row(ready, course, results, times)
     reached = course.reached
     states, results, inputs = course.rows[:reached], results[:reached], inputs[:reached]
     columns: dict[str, Any] = {"time": times[:reached]}
@@ -52,12 +59,12 @@ def recorded(
         constants = {"ambient": plant.ambient.pressure}
         if len(plant.muscles) == 1:
             constants["resting_length"] = plant.muscles[0].geometry.resting_length
-        notes += [f"gas: {plant.gas}", friction_in_words(plant), *outside_box(plant, columns)]
-        notes += beyond_laws(plant, columns) if reached else []
+        notes += [f"gas: {plant.gas}", describe_friction(plant), *extrapolation_warnings(plant, columns)]
+        notes += validity_warnings(plant, columns) if reached else []
     return Recording(columns, "simulation", constants, tuple(notes)), course
 
 
-def friction_in_words(plant: Plant) -> str:
+def describe_friction(plant: Plant) -> str:
     """What friction a plant's muscles have; the default is none, which a reader should know."""
     if not any(m.friction.states for m in plant.muscles):
         return "friction: off"
@@ -65,19 +72,25 @@ def friction_in_words(plant: Plant) -> str:
     return f"friction: {', '.join(words) if len(words) > 1 else plant.muscles[0].friction}"
 
 
-def outside_box(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
-    """When and how far a run left the box in which a muscle's characteristic has data, or the reach of a geometry."""
+def extrapolation_warnings(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
+    """When and how far a run left the validity range in which a muscle's characteristic has data, or the reach of a geometry."""
     found = []
     for prefix, muscle in zip(plant.prefixes, plant.muscles, strict=True):
         of_muscle = []
-        box = muscle.box or getattr(muscle.contractile, "box", None)
-        if box is not None:
-            left, doubt = f"{muscle.name} was outside the box of its characteristic", "nothing was measured there"
-            of_muscle += [("pressure", box.pressure, left, doubt), ("contraction", box.contraction, left, doubt)]
+        validity_range = muscle.validity_range or getattr(muscle.contractile, "validity_range", None)
+        if validity_range is not None:
+            left, doubt = (
+                f"{muscle.name} was outside the validity range of its characteristic",
+                "nothing was measured there",
+            )
+            of_muscle += [
+                ("pressure", validity_range.pressure, left, doubt),
+                ("contraction", validity_range.contraction, left, doubt),
+            ]
         own = INNER if isinstance(muscle.series, SeriesSpring) else "contraction"
         if f"{prefix}{own}" in columns:  # of a batch that may not be kept
             left, doubt = f"{muscle.name} was beyond the reach of its geometry", "no muscle can do this"
-            of_muscle.append((own, muscle.geometry.contraction_reach, left, doubt))
+            of_muscle.append((own, muscle.geometry.contraction_range, left, doubt))
         for name, bounds, left, doubt in of_muscle:
             found += _beyond(columns["time"], columns[f"{prefix}{name}"], name, bounds, left, doubt)
     return found
@@ -96,18 +109,20 @@ def _beyond(time: Array, values: Array, name: str, bounds: tuple[float, float], 
     ]
 
 
-def ended(plant: System, recording: Recording, course: Course, end: float, complete: bool) -> Recording:
+def raise_if_incomplete(
+    plant: System, recording: Recording, course: RawSolution, end: float, complete: bool
+) -> Recording:
     """The recording, and where the run ended early the reason in its notes; a `complete` run then raises instead."""
     if course.status == 0:
         return recording
-    told = problem(plant, course, end)
+    told = failure_message(plant, course, end)
     recording = dataclasses.replace(recording, notes=(*recording.notes, told))
     if complete:
         raise SimulationError(told, recording, interrupted=course.status == INTERRUPTED)
     return recording
 
 
-def problem(plant: System, course: Course, end: float) -> str:
+def failure_message(plant: System, course: RawSolution, end: float) -> str:
     """When, why and at which state a run ended early, and what to do."""
     state = ", ".join(f"{s.name} {v:.6g} {s.unit}" for s, v in zip(plant.states, course.state, strict=True))
     remedy = {
@@ -116,7 +131,7 @@ def problem(plant: System, course: Course, end: float) -> str:
         8: "Look at what the controller measured last, and at its parameters.",
     }.get(course.status, "Look at the last state: a parameter may be far from physical, or a fixed step too long.")
     if isinstance(plant, Plant) and course.status != INTERRUPTED:
-        remedy = at_end_of_reach(plant, course.state) or remedy
+        remedy = geometry_limit_hint(plant, course.state) or remedy
     return (
         f"the run ended at {course.time:.6g} of {end:.6g} s because {REASONS[course.status]}, after {course.steps} "
         f"steps, at {state}. {remedy}"

@@ -11,18 +11,18 @@ import numpy as np
 import numpy.typing as npt
 
 from ..compile import System
-from ..control.driver import Driven
-from ..control.inputs import Segments
-from ..control.loop import Loop, LoopMemory
+from ..control.control_loop import ControlLoop, ControlLoopState
+from ..control.driver import WithDrivers
+from ..control.inputs import PiecewiseLinear
 from ..core.arrays import Array
 from ..core.errors import ParameterError
 from ..plant.plant import Plant
-from ..plant.state import least_states
-from .arguments import output_times, refuse_beyond_range
-from .integrators import Method, Stepper
+from ..plant.state import state_lower_bounds
+from .arguments import check_input_range, output_times
+from .integrators import Integrator, Stepper
 
 if TYPE_CHECKING:
-    from ..compile.program import Prepared
+    from ..compile.program import CompiledSystem
 
 MOST_SAMPLES = 10_000_000
 """Samples of one run that fit a usual memory."""
@@ -30,20 +30,20 @@ NEAR = 1e-9
 """Share of a period within which two instants are one: rounding parts 3 * 0.1 from 0.3."""
 
 
-def columns_of(ready: Prepared) -> tuple[str, ...]:
+def columns_of(ready: CompiledSystem) -> tuple[str, ...]:
     """What a controller can measure at a system: its states and outputs."""
     return (*(s.name for s in ready.system.states), *ready.output_names)
 
 
-def ranges_of(plant: System, loop: Loop) -> dict[str, tuple[float, float]]:
+def ranges_of(plant: System, loop: ControlLoop) -> dict[str, tuple[float, float]]:
     """The least and greatest command of every input that the controller commands."""
-    declared = {i.name: (i.least, i.greatest) for i in plant.commands} if isinstance(plant, Plant) else {}
+    declared = {i.name: (i.minimum, i.maximum) for i in plant.commands} if isinstance(plant, Plant) else {}
     of_driver = dict.fromkeys(loop.drivers, (0.0, 1.0))
     return {name: ({**declared, **of_driver}).get(name, (-math.inf, math.inf)) for name in loop.controller.inputs}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Sampling:
+class SampledLoop:
     """A loop at a plant for one run.
 
     edges    (K + 1,) the beginnings of the pieces between samples, and the end of the run
@@ -53,47 +53,49 @@ class Sampling:
     times    rows; those of piece k begin at place cuts[k], and what drivers do adds instants
     """
 
-    loop: Loop
+    loop: ControlLoop
     stepper: Stepper
-    driven: Driven
+    driven: WithDrivers
     inputs: tuple[str, ...]
     places: list[int]
     ranges: Mapping[str, tuple[float, float]]
-    look: Callable[[Array, Array], dict[str, float]]
-    course: Segments
-    firsts: list[int]
-    setpoint: Segments
+    measure: Callable[[Array, Array], dict[str, float]]
+    inputs_in_time: PiecewiseLinear
+    segment_offsets: list[int]
+    setpoint: PiecewiseLinear
     start: float
     edges: Array
     sampled: bool
     times: Array
-    cuts: list[int]
-    least: Array
+    row_offsets: list[int]
+    lower_bounds: Array
 
     def before(self) -> Array:
         """The inputs before the first sample: those beside the controller as they begin, the others at zero."""
-        return np.array(self.course.values[0])
+        return np.array(self.inputs_in_time.values[0])
 
-    def told(self, k: int, commands: tuple[float, ...]) -> Segments:
+    def told(self, k: int, commands: tuple[float, ...]) -> PiecewiseLinear:
         """Piece k of the course with these commands held, before any driver."""
-        piece = slice(self.firsts[k], self.firsts[k + 1])
-        self.course.values[piece, self.places] = commands
-        return Segments(self.course.ends[piece], self.course.values[piece], self.course.slopes[piece])
+        piece = slice(self.segment_offsets[k], self.segment_offsets[k + 1])
+        self.inputs_in_time.values[piece, self.places] = commands
+        return PiecewiseLinear(
+            self.inputs_in_time.ends[piece], self.inputs_in_time.values[piece], self.inputs_in_time.slopes[piece]
+        )
 
 
-def sampling(
-    ready: Prepared, loop: Loop, memory: LoopMemory, start: float, duration: float, method: Method,
+def prepare_loop(
+    ready: CompiledSystem, loop: ControlLoop, memory: ControlLoopState, start: float, duration: float, method: Integrator,
     output: float | npt.ArrayLike | None,
-) -> Sampling:  # fmt: skip
+) -> SampledLoop:  # fmt: skip
     plant, inputs = ready.system, ready.system.inputs
     edges, sampled = _edges(loop.period, memory, start, start + duration)
-    driven = Driven(loop.beside, loop.drivers)
+    driven = WithDrivers(loop.other_inputs, loop.drivers)
     shown = driven.segments(inputs, start, duration)
-    shown.refuse_misshapen(len(inputs), start)
-    refuse_beyond_range(plant, shown, start)
+    shown.check_shape(len(inputs), start)
+    check_input_range(plant, shown, start)
     near = NEAR * loop.period
     places = [inputs.index(name) for name in loop.controller.inputs]
-    beside = _snapped(loop.beside.segments(inputs, start, duration), edges, near)
+    beside = _snapped(loop.other_inputs.segments(inputs, start, duration), edges, near)
     starts = np.unique(np.concatenate([edges[:-1], beside.starts(start)]))
     course = beside.cut_at(starts, start)
     course.values[:, places] = course.slopes[:, places] = 0.0
@@ -101,21 +103,21 @@ def sampling(
     times = output_times(output, start, duration, np.append(start, course.ends))
     setpoint = _snapped(loop.setpoint.segments(loop.controller.setpoints, start, duration), edges, near)
     cuts = np.searchsorted(times, edges, side="right")
-    return Sampling(
+    return SampledLoop(
         loop, method.stepper(ready), driven, inputs, places, ranges_of(plant, loop), _looking(ready, loop), course,
-        firsts.tolist(), setpoint, start, edges, sampled, times, [0, *cuts[1:].tolist()], least_states(plant),
+        firsts.tolist(), setpoint, start, edges, sampled, times, [0, *cuts[1:].tolist()], state_lower_bounds(plant),
     )  # fmt: skip
 
 
-def _edges(period: float, memory: LoopMemory, start: float, end: float) -> tuple[Array, bool]:
+def _edges(period: float, memory: ControlLoopState, start: float, end: float) -> tuple[Array, bool]:
     """Start, the sampling instants after it, and end of a run [s]; whether the start is a sampling instant itself."""
-    count, near = (end - memory.origin) / period - memory.taken, NEAR * period
+    count, near = (end - memory.origin) / period - memory.sample_count, NEAR * period
     if count > MOST_SAMPLES:
         raise ParameterError(
             f"a period of {period:g} s makes {count:.3g} samples; {MOST_SAMPLES} are allowed. Lengthen it, or simulate "
             "a shorter time."
         )
-    instants = memory.origin + period * (memory.taken + np.arange(max(math.ceil(count), 0) + 1))
+    instants = memory.origin + period * (memory.sample_count + np.arange(max(math.ceil(count), 0) + 1))
     if abs(start - memory.time) > near:
         raise ParameterError(
             f"the memory of the loop is of {memory.time:.10g} s, and the run begins at {start:.10g} s. Give the time "
@@ -125,19 +127,19 @@ def _edges(period: float, memory: LoopMemory, start: float, end: float) -> tuple
     return np.concatenate([[start], within, [end]]), bool(instants[0] <= start + near)
 
 
-def _snapped(segments: Segments, edges: Array, near: float) -> Segments:
+def _snapped(segments: PiecewiseLinear, edges: Array, near: float) -> PiecewiseLinear:
     """The segments, an end that is next to a sampling instant moved to it."""
     behind = np.clip(np.searchsorted(edges, segments.ends), 1, edges.size - 1)
     before, after = edges[behind - 1], edges[behind]
     nearest = np.where(segments.ends - before < after - segments.ends, before, after)
     ends = np.where(np.abs(nearest - segments.ends) <= near, nearest, segments.ends)
     kept = np.diff(ends, prepend=edges[0]) > 0
-    return Segments(ends[kept], segments.values[kept], segments.slopes[kept])
+    return PiecewiseLinear(ends[kept], segments.values[kept], segments.slopes[kept])
 
 
-def _looking(ready: Prepared, loop: Loop) -> Callable[[Array, Array], dict[str, float]]:
+def _looking(ready: CompiledSystem, loop: ControlLoop) -> Callable[[Array, Array], dict[str, float]]:
     """A function of state (n,) and inputs (m,) that gives the measured columns by name."""
-    names, states = loop.controller.columns, [s.name for s in ready.system.states]
+    names, states = loop.controller.measured_columns, [s.name for s in ready.system.states]
     if all(name in states for name in names):
         places = [(name, states.index(name)) for name in names]
         return lambda state, had: {name: float(state[i]) for name, i in places}
@@ -147,7 +149,7 @@ def _looking(ready: Prepared, loop: Loop) -> Callable[[Array, Array], dict[str, 
     wanted, outputs = [(name, known.index(name)) for name in names], ready.address["outputs"]
 
     def look(state: Array, had: Array) -> dict[str, float]:
-        evaluate(outputs, ready.held, state.reshape(1, -1), had.reshape(1, -1), results)
+        evaluate(outputs, ready.precomputed, state.reshape(1, -1), had.reshape(1, -1), results)
         values = state.tolist() + results[0].tolist()
         return {name: values[i] for name, i in wanted}
 

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from ..compile import StateVariable, System
 from ..core import autodiff, ops, tree
+from ..core.declaration import model, parameter
 from ..core.errors import ParameterError, suggestion
-from ..core.model import model, parameter
 from ..core.ops import Value
 
-LOOSER = 10.0
+TOLERANCE_FACTOR = 10.0
 """How much more a derivative times its scale may err than the state. Chosen: without any control derivatives are lost
 while the states rest, and at 1 the steps double."""
 
 
 @model
-class Sensitive:
+class WithSensitivities:
     """A system with s_k = dx/dtheta_k for every column k as further states, and its outputs' derivatives.
 
         s_k' = (df/dx) s_k + df/dtheta_k,    dy/dtheta_k = (dy/dx) s_k + dy/dtheta_k,    y' = (dy/dx) f
@@ -31,6 +31,8 @@ class Sensitive:
     `rates` and `outputs` are the law; what runs is printed from the inner system, all columns in one vector.
     """
 
+    from_file: ClassVar[bool] = False
+
     inner: System
     columns: tuple[tuple[str, ...], ...]
     scales: tuple[float, ...] = parameter("1", "theta_k", "size of a change of each column", fitted=False)
@@ -39,7 +41,7 @@ class Sensitive:
     def check(self) -> None:
         if not self.columns or len(self.scales) != len(self.columns):
             raise ParameterError(
-                f"Sensitive: {len(self.columns)} columns need as many scales, one at least, not {len(self.scales)}."
+                f"WithSensitivities: {len(self.columns)} columns need as many scales, one at least, not {len(self.scales)}."
             )
         known = [leaf.path for leaf in tree.leaves(self.inner)]
         for path in (path for group in self.columns for path in group):
@@ -79,7 +81,9 @@ class Sensitive:
         """The inner system's states, then for each of them the derivatives by every column."""
         inner = self.inner.states
         further = [
-            StateVariable(sensitivity(s.name, k), s.unit, LOOSER * s.nominal / scale, f"d {s.name} by column {k}")
+            StateVariable(
+                sensitivity(s.name, k), s.unit, TOLERANCE_FACTOR * s.nominal / scale, f"d {s.name} by column {k}"
+            )
             for s in inner
             for k, scale in enumerate(self.scales)
         ]

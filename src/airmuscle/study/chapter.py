@@ -9,9 +9,9 @@ import numpy as np
 
 from ..core.reference import cite
 from ..report.chapter import Chapter, Table
-from ..report.staged import staged
+from ..report.output_folder import atomic_folder
 from ..report.write import fill, save_table
-from .distributions import Levels, Variation
+from .distributions import LevelSet, Variation
 from .plots import plots
 from .result import StudyResult
 from .sensitivity import Indices
@@ -29,7 +29,7 @@ def write_study(result: StudyResult, folder: Path | str) -> Path:
     All of it appears, or nothing. Raises FileError where the folder cannot be written to.
     """
     study = result.study
-    with staged(folder) as place:
+    with atomic_folder(folder) as place:
         save_table(result.table(), place / RESULTS)
         if study.courses:
             times = {f"{name}_time": course.instants for name, course in study.courses.items()}
@@ -79,8 +79,8 @@ def varied_table(study: Study) -> Table:
             "number": [number.path for number in study.numbers],
             "unit": [number.unit for number in study.numbers],
             "values": [in_words(variation) for variation in study.variations],
-            "least": study.values.min(axis=0),
-            "greatest": study.values.max(axis=0),
+            "min": study.values.min(axis=0),
+            "max": study.values.max(axis=0),
             "followed by": [_followers(study, i) for i in range(len(study.numbers))],
         },
         "Values are SI.",
@@ -93,7 +93,7 @@ def _followers(study: Study, place: int) -> str:
 
 def in_words(variation: Variation) -> str:
     """A variation on one line."""
-    if not isinstance(variation, Levels):
+    if not isinstance(variation, LevelSet):
         return str(variation)
     if len(variation.values) > MOST_LEVELS:
         low, high = variation.ends
@@ -132,7 +132,7 @@ def reasons_table(result: StudyResult) -> Table:
     counted = Counter(result.reasons[i] for i in result.failed).most_common(MOST_REASONS)
     return Table(
         "failed",
-        "Runs that failed",
+        "RunSplit that failed",
         {
             "runs": [count for _, count in counted],
             "first": [result.reasons.index(reason) for reason, _ in counted],

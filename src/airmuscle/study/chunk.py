@@ -20,9 +20,9 @@ from ..core.arrays import Array
 from ..core.errors import FileError
 from ..recording import Recording
 from ..scenario.scenario import Scenario
-from .executors import refuse_stopped
+from .executors import check_running
 from .fingerprint import fingerprint, program
-from .simulate import REFUSALS, carried, reason
+from .runs import REFUSALS, reason, simulate_all
 from .study import Study, load_study
 
 _loaded: dict[tuple[str, str], Study] = {}
@@ -39,13 +39,13 @@ class Chunk:
 
 def identity(study: Study) -> str:
     """The fingerprint of a study together with the program that runs it."""
-    return fingerprint(program(), study.mark(), study.values)
+    return fingerprint(program(), study.fingerprint(), study.values)
 
 
 def name_of(study: Study, index: int) -> str:
     """The name of the file that keeps a chunk."""
     rows = study.rows(index)
-    return f"{fingerprint(program(), study.mark(), study.values[rows.start : rows.stop])}.npz"
+    return f"{fingerprint(program(), study.fingerprint(), study.values[rows.start : rows.stop])}.npz"
 
 
 def remember(study: Study) -> str:
@@ -81,13 +81,13 @@ def computed(study: Study, index: int) -> Chunk:
     )
     scenarios: dict[int, Scenario] = {}
     for place, (run, rest) in enumerate(zip(rows, study.rests(rows), strict=True)):
-        refuse_stopped()
+        check_running()
         try:
             scenarios[place] = study.scenario(run, rest)
         except REFUSALS as error:
             found.reasons[place] = reason(error)
-    for place, run_or_reason in zip(scenarios, carried(list(scenarios.values()), instants(study)), strict=True):
-        refuse_stopped()
+    for place, run_or_reason in zip(scenarios, simulate_all(list(scenarios.values()), instants(study)), strict=True):
+        check_running()
         if isinstance(run_or_reason, str):
             found.reasons[place] = run_or_reason
         else:

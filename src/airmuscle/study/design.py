@@ -15,11 +15,11 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ParameterError
-from .distributions import Levels, Variation
+from .distributions import LevelSet, Variation
 from .parse import key, whole
 
 MOST_RUNS = 10_000_000
-"""Runs of one study whose table fits a usual memory."""
+"""RunSplit of one study whose table fits a usual memory."""
 HALF_CELL = 2.0**-31
 """Half the distance of Sobol points of 30 bits; no share is nearer to 0 or 1, where normal values are infinite."""
 
@@ -52,7 +52,7 @@ class Grid(Design):
         return math.prod(len(self._levels(variation)) for variation in variations)
 
     def _levels(self, variation: Variation) -> tuple[float, ...]:
-        if not isinstance(variation, Levels):
+        if not isinstance(variation, LevelSet):
             raise ParameterError(
                 f"Grid: {variation} has no levels; give a list or a Range, or take a design that samples, like "
                 "LatinHypercube."
@@ -79,7 +79,7 @@ class Sampled(Design):
     def runs(self, variations: Sequence[Variation]) -> int:
         return self.count
 
-    def _refuse_no_power_of_two(self) -> None:
+    def _check_power_of_two(self) -> None:
         if self.count & (self.count - 1):
             below = 1 << (self.count.bit_length() - 1)
             raise ParameterError(
@@ -113,7 +113,7 @@ class Sobol(Sampled):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._refuse_no_power_of_two()
+        self._check_power_of_two()
 
     def _shares(self, variations: Sequence[Variation]) -> Array:
         return _sobol(len(variations), self.count, self.seed)
@@ -128,7 +128,7 @@ class Saltelli(Sampled):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._refuse_no_power_of_two()
+        self._check_power_of_two()
 
     def runs(self, variations: Sequence[Variation]) -> int:
         return self.count * (len(variations) + 2)

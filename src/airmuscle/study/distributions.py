@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ParameterError
-from ..library.place import Place, finite
+from ..library.location import Location, finite
 from .parse import chosen, difference, key, quantity, ratio, whole
 
 LEAST_SHARE = 1e-6
@@ -34,13 +34,13 @@ class Variation(abc.ABC):
 
 
 @dataclasses.dataclass(frozen=True)
-class Levels(Variation):
+class LevelSet(Variation):
     """Given values, each as likely as any other. In a file: a list."""
 
     values: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        _refuse_not_finite(self, *self.values)
+        _check_finite(self, *self.values)
         if not self.values:
             raise ParameterError("Levels: the list is empty; give at least one value.")
 
@@ -63,7 +63,7 @@ class Range:
     count: int = key(whole, "number of values")
 
     def __post_init__(self) -> None:
-        _refuse_not_finite(self, self.low, self.high)
+        _check_finite(self, self.low, self.high)
         if not 2 <= self.count <= 1_000_000 or self.low == self.high:
             raise ParameterError(
                 f"Range: {self.count} values from {self.low:g} to {self.high:g}; it takes two different ends, and 2 to "
@@ -71,9 +71,9 @@ class Range:
             )
 
     @property
-    def levels(self) -> Levels:
+    def levels(self) -> LevelSet:
         """The values themselves."""
-        return Levels(tuple(np.linspace(self.low, self.high, self.count).tolist()))
+        return LevelSet(tuple(np.linspace(self.low, self.high, self.count).tolist()))
 
 
 class Distribution(Variation):
@@ -100,8 +100,8 @@ class Uniform(Distribution):
     high: float = key(quantity, "greatest value")
 
     def __post_init__(self) -> None:
-        _refuse_not_finite(self, self.low, self.high)
-        _refuse_disorder(self, ("low", self.low), ("high", self.high))
+        _check_finite(self, self.low, self.high)
+        _check_order(self, ("low", self.low), ("high", self.high))
 
     def law(self) -> Any:
         from scipy import stats
@@ -117,8 +117,8 @@ class Normal(Distribution):
     deviation: float = key(difference, "standard deviation")
 
     def __post_init__(self) -> None:
-        _refuse_not_finite(self, self.mean, self.deviation)
-        _refuse_not_positive(self, "deviation", self.deviation)
+        _check_finite(self, self.mean, self.deviation)
+        _check_positive(self, "deviation", self.deviation)
 
     def law(self) -> Any:
         from scipy import stats
@@ -134,9 +134,9 @@ class LogNormal(Distribution):
     log_deviation: float = key(ratio, "standard deviation of the natural logarithm; about the relative one")
 
     def __post_init__(self) -> None:
-        _refuse_not_finite(self, self.median, self.log_deviation)
-        _refuse_not_positive(self, "median", self.median)
-        _refuse_not_positive(self, "log_deviation", self.log_deviation)
+        _check_finite(self, self.median, self.log_deviation)
+        _check_positive(self, "median", self.median)
+        _check_positive(self, "log_deviation", self.log_deviation)
 
     def law(self) -> Any:
         from scipy import stats
@@ -153,8 +153,8 @@ class Triangular(Distribution):
     high: float = key(quantity, "greatest value")
 
     def __post_init__(self) -> None:
-        _refuse_not_finite(self, self.low, self.mode, self.high)
-        _refuse_disorder(self, ("low", self.low), ("high", self.high))
+        _check_finite(self, self.low, self.mode, self.high)
+        _check_order(self, ("low", self.low), ("high", self.high))
         if not self.low <= self.mode <= self.high:
             raise ParameterError(f"Triangular: mode {self.mode:g} must lie within {self.low:g} to {self.high:g}.")
 
@@ -165,7 +165,7 @@ class Triangular(Distribution):
 
 
 def _inner(value: Any, unit: str, where: str) -> Distribution:
-    found: Distribution = chosen(value, DISTRIBUTIONS[:-1], Place(where, "", Path()), unit)
+    found: Distribution = chosen(value, DISTRIBUTIONS[:-1], Location(where, "", Path()), unit)
     return found
 
 
@@ -178,8 +178,8 @@ class Truncated(Variation):
     high: float = key(quantity, "greatest value")
 
     def __post_init__(self) -> None:
-        _refuse_not_finite(self, self.low, self.high)
-        _refuse_disorder(self, ("low", self.low), ("high", self.high))
+        _check_finite(self, self.low, self.high)
+        _check_order(self, ("low", self.low), ("high", self.high))
         if not isinstance(self.inner, Distribution):
             raise ParameterError(f"Truncated: {self.inner!r} is no distribution that can be cut.")
         below, above = self._shares()
@@ -206,12 +206,12 @@ class Truncated(Variation):
 DISTRIBUTIONS = (Uniform, Normal, LogNormal, Triangular, Truncated)
 
 
-def variation_from(given: Any, unit: str, place: Place) -> Variation:
+def variation_from(given: Any, unit: str, place: Location) -> Variation:
     """The variation that a list or a table of a study describes."""
     if isinstance(given, list):
         if not given:
             raise ParameterError(f"{place}: the list is empty; give at least one value.")
-        return Levels(tuple(finite(value, unit, f"{place}[{i}]") for i, value in enumerate(given)))
+        return LevelSet(tuple(finite(value, unit, f"{place}[{i}]") for i, value in enumerate(given)))
     if not isinstance(given, Mapping):
         raise ParameterError(
             f'{place} is {given!r}; write a list of values, or a distribution like {{ model = "Uniform", low = ..., '
@@ -221,17 +221,17 @@ def variation_from(given: Any, unit: str, place: Place) -> Variation:
     return found.levels if isinstance(found, Range) else found
 
 
-def _refuse_not_finite(thing: Any, *values: float) -> None:
+def _check_finite(thing: Any, *values: float) -> None:
     if not all(math.isfinite(value) for value in values):
         raise ParameterError(f"{thing}: every number must be finite.")
 
 
-def _refuse_not_positive(thing: Any, name: str, value: float) -> None:
+def _check_positive(thing: Any, name: str, value: float) -> None:
     if not value > 0:
         raise ParameterError(f"{type(thing).__name__}: {name} is {value:g}; it must be greater than zero.")
 
 
-def _refuse_disorder(thing: Any, first: tuple[str, float], second: tuple[str, float]) -> None:
+def _check_order(thing: Any, first: tuple[str, float], second: tuple[str, float]) -> None:
     if not first[1] < second[1]:
         raise ParameterError(
             f"{type(thing).__name__}: {first[0]} is {first[1]:g} and {second[0]} {second[1]:g}; {first[0]} must be the "

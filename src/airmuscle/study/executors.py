@@ -80,7 +80,7 @@ def _begin(stop: Any) -> None:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
-def refuse_stopped() -> None:
+def check_running() -> None:
     """Raise KeyboardInterrupt in a worker that is to stop."""
     if _stop is not None and _stop.is_set():
         raise KeyboardInterrupt

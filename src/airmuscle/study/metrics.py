@@ -27,7 +27,7 @@ class Window(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True)
-class Outcome(abc.ABC):
+class Metric(abc.ABC):
     """One thing that is kept of a column of every run, between two instants [s] or over the whole run."""
 
     column: str = key(word, "column of the run that is looked at")
@@ -50,7 +50,7 @@ class Outcome(abc.ABC):
         instants = np.concatenate([at[:1], time[inside], at[1:]])
         return Window(instants, np.interp(instants, time, values))
 
-    def refuse_outside(self, start: float, duration: float) -> None:
+    def check_range(self, start: float, duration: float) -> None:
         """Raise ParameterError where nothing of a run of `duration` from `start` on [s] is looked at."""
         if not max(self.begin, start) <= min(self.end, start + duration):
             raise ParameterError(
@@ -68,7 +68,7 @@ class Outcome(abc.ABC):
         """The outcome's unit, from the column's."""
 
 
-class Scalar(Outcome):
+class Scalar(Metric):
     """An outcome that is one number; NaN where the run does not have it."""
 
     def number(self, time: Array, values: Array) -> float:
@@ -185,7 +185,7 @@ class SettlingTime(Scalar):
 
 
 @dataclasses.dataclass(frozen=True)
-class Course(Outcome):
+class TimeSeries(Metric):
     """The whole column, on instants at equal distances; NaN where a run ended before."""
 
     every: float = key(seconds, "distance of the instants")
@@ -195,7 +195,7 @@ class Course(Outcome):
         if not 0 < self.every < math.inf:
             raise ParameterError(f"Course: every is {self.every:g} s; it must be positive and finite.")
 
-    def within(self, start: float, duration: float) -> Course:
+    def within(self, start: float, duration: float) -> TimeSeries:
         """The same with its window cut to a run, so that its instants are fixed. Raises ParameterError."""
         begin, end = max(self.begin, start), min(self.end, start + duration)
         if not begin < end or (end - begin) / self.every > 1_000_000:
@@ -221,7 +221,7 @@ class Course(Outcome):
 
 
 OUTCOMES = (
-    Final, Maximum, Minimum, Mean, RootMeanSquare, TimeToReach, Overshoot, SettlingTime, Course,
+    Final, Maximum, Minimum, Mean, RootMeanSquare, TimeToReach, Overshoot, SettlingTime, TimeSeries,
 )  # fmt: skip
 
 

@@ -11,8 +11,8 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..core.errors import ParameterError, UnknownName, suggestion
-from ..library.place import Place, finite, refuse_unknown, said_at
+from ..core.errors import ParameterError, UnknownNameError, suggestion
+from ..library.location import Location, check_keys, finite, located_errors
 
 Reader = Callable[[Any, str, str], Any]
 """Reads a value, given the unit at hand and where it stands."""
@@ -59,17 +59,17 @@ def word(value: Any, unit: str, where: str) -> str:
     return value
 
 
-def chosen(table: Any, kinds: tuple[type[Any], ...], place: Place, unit: str = "1") -> Any:
+def chosen(table: Any, kinds: tuple[type[Any], ...], place: Location, unit: str = "1") -> Any:
     """The object that a table names. Raises ParameterError, UnitError or UnknownName, saying where."""
     names = {kind.__name__: kind for kind in kinds}
     if not isinstance(table, Mapping) or not isinstance(table.get("model"), str):
         raise ParameterError(f"{place} is {table!r}; write a table with a model, one of {', '.join(names)}.")
     if table["model"] not in names:
         near = suggestion(table["model"], names)
-        raise UnknownName(f"{place}: no model '{table['model']}' here; there are {', '.join(names)}.{near}")
+        raise UnknownNameError(f"{place}: no model '{table['model']}' here; there are {', '.join(names)}.{near}")
     cls = names[table["model"]]
     fields = {f.name: f for f in dataclasses.fields(cls)}
-    refuse_unknown({k: v for k, v in table.items() if k != "model"}, tuple(fields), place)
+    check_keys({k: v for k, v in table.items() if k != "model"}, tuple(fields), place)
     for name, field in fields.items():
         if name not in table and field.default is dataclasses.MISSING:
             raise ParameterError(f"{place}: {cls.__name__} needs '{name}' ({field.metadata['meaning']}).")
@@ -78,5 +78,5 @@ def chosen(table: Any, kinds: tuple[type[Any], ...], place: Place, unit: str = "
         for name, field in fields.items()
         if name in table
     }
-    with said_at(place):
+    with located_errors(place):
         return cls(**values)

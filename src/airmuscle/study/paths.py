@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.equilibrium import equilibrium_of_each
-from ..control.loop import Loop
+from ..analysis.equilibrium import find_equilibrium_of_each
+from ..control.control_loop import ControlLoop
 from ..core.arrays import Array
+from ..core.declaration import parameters
 from ..core.errors import ParameterError, suggestion
-from ..core.model import parameters
 from ..core.tree import flatten, leaves, with_parameters
+from ..library.location import Location
 from ..library.models import model_class
-from ..library.place import Place
 from ..plant.plant import Plant
 from ..scenario.controller import numbers_of
 from ..scenario.scenario import Scenario, pressure_of_rest, scenario_from, units_of_run
@@ -32,7 +32,7 @@ Keys = tuple[str | int, ...]
 
 
 @dataclasses.dataclass(frozen=True)
-class Number:
+class ScenarioParameter:
     """One number of a scenario: its path, its unit, its bounds, and where it stands: a leaf's place, or keys."""
 
     path: str
@@ -42,22 +42,25 @@ class Number:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Source:
+class ScenarioTemplate:
     """The scenario of a study: its tables, where they stand, and what they describe before anything is varied."""
 
     tables: Mapping[str, Any]
-    place: Place
+    place: Location
     scenario: Scenario
 
-    def numbers(self) -> dict[str, Number]:
+    def numbers(self) -> dict[str, ScenarioParameter]:
         """Everything that can vary, by path."""
         plant, told = self.scenario.plant, self.tables.get("command", {})
-        found = [Number(leaf.path, leaf.declared.unit, leaf.declared.bounds, i) for i, leaf in enumerate(leaves(plant))]
+        found = [
+            ScenarioParameter(leaf.path, leaf.declared.unit, leaf.declared.bounds, i)
+            for i, leaf in enumerate(leaves(plant))
+        ]
         for keys, unit in (*_of_command(told, self.scenario), *_of_run(self.tables["run"], plant)):
-            found.append(Number(_spelt(keys), unit, (-math.inf, math.inf), keys))
+            found.append(ScenarioParameter(_spelt(keys), unit, (-math.inf, math.inf), keys))
         return {number.path: number for number in found}
 
-    def number(self, path: str, where: str) -> Number:
+    def number(self, path: str, where: str) -> ScenarioParameter:
         """The number of this path. Raises ParameterError, with the nearest one."""
         known = self.numbers()
         if path not in known:
@@ -65,10 +68,10 @@ class Source:
             raise ParameterError(f"{where}: the scenario has no number '{path}'.{near}")
         return known[path]
 
-    def rests(self, numbers: Sequence[Number], values: Array) -> list[dict[str, float] | None]:
+    def rests(self, numbers: Sequence[ScenarioParameter], values: Array) -> list[dict[str, float] | None]:
         """Where each of several runs with other values (R, d) begins, found for all at once; None for one that is to be
         asked alone. Values are not checked."""
-        from ..compile.program import prepared  # CasADi, which reading a study does not need
+        from ..compile.program import compile_system  # CasADi, which reading a study does not need
 
         plant, alone = self.scenario.plant, [None] * len(values)
         pressure = pressure_of_rest(self.tables, self.place)
@@ -79,12 +82,12 @@ class Source:
             if isinstance(number.at, int):
                 leaves_of_each[:, number.at] = column
         pressures, inputs = (pressure,) * len(plant.muscles), np.zeros(len(plant.inputs))
-        found = equilibrium_of_each(prepared(plant), leaves_of_each, pressures, inputs).states
+        found = find_equilibrium_of_each(compile_system(plant), leaves_of_each, pressures, inputs).states
         names = [s.name for s in plant.states]
         return [dict(zip(names, x, strict=True)) if np.isfinite(x).all() else None for x in found.tolist()]
 
     def changed(
-        self, numbers: Sequence[Number], values: Sequence[float], rest: dict[str, float] | None = None
+        self, numbers: Sequence[ScenarioParameter], values: Sequence[float], rest: dict[str, float] | None = None
     ) -> Scenario:
         """The scenario with other values, checked as if they stood in its file; the start is found anew unless it is
         given as `rests` finds it."""
@@ -103,7 +106,7 @@ class Source:
 def _of_command(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:
     units = units_of_run(scenario.plant, scenario.start, scenario.command)
     for name, given in table.items():
-        if isinstance(scenario.command, Loop) and name == "controller":
+        if isinstance(scenario.command, ControlLoop) and name == "controller":
             yield from ((("command", name, *keys), unit) for keys, unit in numbers_of(given, scenario.command, units))
         elif name == "period":
             yield ("command", name), "s"

@@ -78,7 +78,7 @@ class StudyResult:
 
 def _statistics(values: Array) -> dict[str, float]:
     there = values[np.isfinite(values)]
-    names = ("least", "5 %", "median", "95 %", "greatest")
+    names = ("min", "5 %", "median", "95 %", "max")
     quantiles = np.quantile(there, [0.0, 0.05, 0.5, 0.95, 1.0]) if there.size else np.full(5, np.nan)
     return {
         "runs": int(there.size),

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from ..core.errors import FileError, SimulationError
-from ..report.staged import refuse_unwritable
+from ..report.output_folder import check_writable
 from .chunk import Chunk, instants, name_of, read, remember, run_chunk, write
 from .result import StudyResult
-from .simulate import carried
+from .runs import simulate_all
 from .study import Study
 
 CHUNKS = "chunks"
@@ -33,7 +33,7 @@ def run_study(
     where a worker dies.
     """
     kept = Path(folder) / CHUNKS
-    refuse_unwritable(folder)
+    check_writable(folder)
     try:
         kept.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -90,7 +90,7 @@ def _read(file: Path) -> Chunk:
 
 def _nominal(study: Study) -> dict[str, float]:
     """The outcomes of the scenario as it stands; NaN where it does not run."""
-    (found,) = carried([study.source.scenario], instants(study))
+    (found,) = simulate_all([study.source.scenario], instants(study))
     if isinstance(found, str):
         return dict.fromkeys(study.scalars, np.nan)
     return {name: o.number(found["time"], found[o.column]) for name, o in study.scalars.items()}

@@ -29,18 +29,18 @@ import numpy.typing as npt
 
 from ..core.errors import ParameterError, suggestion
 from ..library.catalogue import parsed
-from ..library.place import Place, refuse_unknown, said_at, text
+from ..library.location import Location, check_keys, located_errors, text
 from ..scenario.scenario import Scenario, load_scenario, scenario_from, units_of_run
 from .design import DESIGNS, Design
 from .distributions import Variation, variation_from
 from .fingerprint import fingerprint
-from .metrics import OUTCOMES, Course, Outcome, Scalar
+from .metrics import OUTCOMES, Metric, Scalar, TimeSeries
 from .parse import chosen, whole
-from .paths import Number, Source
+from .paths import ScenarioParameter, ScenarioTemplate
 
 TABLES = ("title", "scenario", "chunk", "vary", "follow", "design", "outcome")
 CHUNK = 32
-"""Runs that are written together unless the study says otherwise (chosen)."""
+"""RunSplit that are written together unless the study says otherwise (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,13 +53,13 @@ class Study:
 
     title: str
     path: Path
-    source: Source
-    numbers: tuple[Number, ...]
+    source: ScenarioTemplate
+    numbers: tuple[ScenarioParameter, ...]
     variations: tuple[Variation, ...]
-    follow: tuple[tuple[Number, int], ...]
+    follow: tuple[tuple[ScenarioParameter, int], ...]
     design: Design
     values: npt.NDArray[np.float64]
-    outcomes: Mapping[str, Outcome]
+    outcomes: Mapping[str, Metric]
     chunk: int = CHUNK
 
     def __len__(self) -> int:
@@ -71,9 +71,9 @@ class Study:
         return {name: outcome for name, outcome in self.outcomes.items() if isinstance(outcome, Scalar)}
 
     @property
-    def courses(self) -> dict[str, Course]:
+    def courses(self) -> dict[str, TimeSeries]:
         """The outcomes that are whole columns."""
-        return {name: outcome for name, outcome in self.outcomes.items() if isinstance(outcome, Course)}
+        return {name: outcome for name, outcome in self.outcomes.items() if isinstance(outcome, TimeSeries)}
 
     @property
     def units(self) -> dict[str, str]:
@@ -91,7 +91,7 @@ class Study:
         return range(-(-len(self) // self.chunk))
 
     @property
-    def changing(self) -> tuple[Number, ...]:
+    def changing(self) -> tuple[ScenarioParameter, ...]:
         """All numbers that are not the same in every run."""
         return (*self.numbers, *(number for number, _ in self.follow))
 
@@ -108,7 +108,7 @@ class Study:
         """One of the runs. Raises ParameterError or PhysicsError where its values are not possible together."""
         return self.source.changed(self.changing, self.changes([run])[0].tolist(), rest)
 
-    def mark(self) -> str:
+    def fingerprint(self) -> str:
         """The fingerprint of all that the results depend on, but for the program."""
         scenario = dataclasses.replace(self.source.scenario, title="")
         tables = {name: table for name, table in self.source.tables.items() if name != "title"}
@@ -124,14 +124,14 @@ def load_study(path: str | Path) -> Study:
     """The study in a file. Raises FileError, ParameterError, UnitError or UnknownName, saying where."""
     file = Path(path)
     tables = parsed(file)
-    place = Place(str(file), "", file.parent)
-    refuse_unknown(tables, TABLES, place)
+    place = Location(str(file), "", file.parent)
+    check_keys(tables, TABLES, place)
     source = _source(tables.get("scenario"), place)
     varied = _table(tables, "vary", place)
     numbers = {key: source.number(key, str(place.inside("vary"))) for key in varied}
     variations = [_variation(varied[key], number, place) for key, number in numbers.items()]
     design: Design = chosen(tables.get("design"), DESIGNS, place.inside("design"))
-    with said_at(place.inside("design")):
+    with located_errors(place.inside("design")):
         values = design.values(variations)
     return Study(
         title=text(tables, "title", place, needed=False) or source.scenario.title,
@@ -147,20 +147,20 @@ def load_study(path: str | Path) -> Study:
     )
 
 
-def _source(given: Any, place: Place) -> Source:
+def _source(given: Any, place: Location) -> ScenarioTemplate:
     if isinstance(given, str):
         file = place.folder / given
-        with said_at(f"{place}, scenario"):
-            return Source(parsed(file), Place(str(file), "", file.parent), load_scenario(file))
+        with located_errors(f"{place}, scenario"):
+            return ScenarioTemplate(parsed(file), Location(str(file), "", file.parent), load_scenario(file))
     if not isinstance(given, Mapping):
         raise ParameterError(
             f'{place}: scenario is {given!r}; name a file, scenario = "fill.toml", or write the tables '
             "[scenario.plant], [scenario.command] and [scenario.run]."
         )
-    return Source(given, place.inside("scenario"), scenario_from(given, place.inside("scenario")))
+    return ScenarioTemplate(given, place.inside("scenario"), scenario_from(given, place.inside("scenario")))
 
 
-def _table(tables: Mapping[str, Any], key: str, place: Place) -> Mapping[str, Any]:
+def _table(tables: Mapping[str, Any], key: str, place: Location) -> Mapping[str, Any]:
     given = tables.get(key)
     if not isinstance(given, Mapping) or not given:
         what = "is missing" if given is None else "is empty" if given == {} else f"is {given!r}, no table"
@@ -168,8 +168,8 @@ def _table(tables: Mapping[str, Any], key: str, place: Place) -> Mapping[str, An
     return given
 
 
-def _variation(given: Any, number: Number, place: Place) -> Variation:
-    where = Place(f'{place}, [vary], "{number.path}"', "", place.folder)
+def _variation(given: Any, number: ScenarioParameter, place: Location) -> Variation:
+    where = Location(f'{place}, [vary], "{number.path}"', "", place.folder)
     found = variation_from(given, number.unit, where)
     low, high = number.bounds
     unit = "" if number.unit == "1" else f" {number.unit}"
@@ -179,7 +179,9 @@ def _variation(given: Any, number: Number, place: Place) -> Variation:
     return found
 
 
-def _follow(given: Any, source: Source, varied: list[str], place: Place) -> tuple[tuple[Number, int], ...]:
+def _follow(
+    given: Any, source: ScenarioTemplate, varied: list[str], place: Location
+) -> tuple[tuple[ScenarioParameter, int], ...]:
     if not isinstance(given, Mapping):
         raise ParameterError(f'{place} is {given!r}; write "path" = "path of a number that varies".')
     found = []
@@ -197,9 +199,9 @@ def _follow(given: Any, source: Source, varied: list[str], place: Place) -> tupl
     return tuple(found)
 
 
-def _outcomes(given: Mapping[str, Any], scenario: Scenario, place: Place) -> dict[str, Outcome]:
+def _outcomes(given: Mapping[str, Any], scenario: Scenario, place: Location) -> dict[str, Metric]:
     known = columns_of(scenario)
-    found: dict[str, Outcome] = {}
+    found: dict[str, Metric] = {}
     for name, table in given.items():
         column = table.get("column") if isinstance(table, Mapping) else None
         if isinstance(column, str) and column not in known:
@@ -208,9 +210,9 @@ def _outcomes(given: Mapping[str, Any], scenario: Scenario, place: Place) -> dic
                 f"{place.inside(name)}: a run has no column '{column}'; there are {', '.join(known)}.{near}"
             )
         outcome = chosen(table, OUTCOMES, place.inside(name), known.get(str(column), "1") or "1")
-        with said_at(place.inside(name)):
-            outcome.refuse_outside(scenario.start_time, scenario.duration)
-            if isinstance(outcome, Course):
+        with located_errors(place.inside(name)):
+            outcome.check_range(scenario.start_time, scenario.duration)
+            if isinstance(outcome, TimeSeries):
                 outcome = outcome.within(scenario.start_time, scenario.duration)
         found[name] = outcome
     return found

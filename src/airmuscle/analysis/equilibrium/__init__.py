@@ -1,13 +1,13 @@
 """Where a plant rests: the static states for given pressures in its muscles, or given masses of air."""
 
-from .equilibrium import Rest, equilibria, equilibrium
-from .many import equilibrium_of_each
+from .equilibrium import Equilibrium, find_equilibria, find_equilibrium
+from .many import find_equilibrium_of_each
 from .statics import given_inputs
 
 __all__ = [
-    "Rest",
-    "equilibria",
-    "equilibrium",
-    "equilibrium_of_each",
+    "Equilibrium",
+    "find_equilibria",
+    "find_equilibrium",
+    "find_equilibrium_of_each",
     "given_inputs",
 ]

@@ -7,10 +7,10 @@ import numpy as np
 from ...core.arrays import Array
 from .multi_dof import starts
 from .single_dof import grid
-from .statics import Static
+from .statics import StaticProblem
 
 
-def explanation(static: Static) -> str:
+def explanation(static: StaticProblem) -> str:
     """The forces at both ends of the reach; with several coordinates where the plant is nearest to balance."""
     if len(static.coordinates) == 1:
         x = grid(static)
@@ -29,12 +29,12 @@ def explanation(static: Static) -> str:
     )
 
 
-def _first_possible(static: Static, places: Array) -> float | None:
+def _first_possible(static: StaticProblem, places: Array) -> float | None:
     """The first of these coordinates at which a pressure holds the air."""
     return next((float(x) for x in places if np.isfinite(static.accelerations(static.place([x]))).all()), None)
 
 
-def _line(static: Static, x: Array) -> str:
+def _line(static: StaticProblem, x: Array) -> str:
     place = static.place(x)
     ports = static.plant.ports(static.state(place))
     pulls = ", ".join(
@@ -52,14 +52,14 @@ def _line(static: Static, x: Array) -> str:
     return f"{pulls}, and there accelerate {moving}"
 
 
-def _needed(static: Static, x: float) -> str:
+def _needed(static: StaticProblem, x: float) -> str:
     """What a single muscle would have to pull to hold the load; nothing for several muscles."""
     if len(static.plant.muscles) > 1:
         return ""
     state, mechanism = static.state(static.place([x])), static.plant.mechanism
     found = []
     for tension in (0.0, 1.0):
-        pulls = mechanism.pulls(state, [tension], static.lengths)
+        pulls = mechanism.generalised_forces(state, [tension], static.lengths)
         found.append(float(mechanism.acceleration(state, state, pulls, static.inputs)[static.coordinates[0].name]))
     slope = found[1] - found[0]
     return f" The load needs a pull of {-found[0] / slope:.6g} N." if slope else ""

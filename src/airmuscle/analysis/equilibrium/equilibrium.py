@@ -7,27 +7,27 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ...core.errors import NoEquilibrium
+from ...core.errors import EquilibriumError
 from ...plant.plant import Plant
 from .diagnosis import explanation
-from .many import equilibrium_of_each
+from .many import find_equilibrium_of_each
 from .multi_dof import places_of_several
 from .single_dof import places
 from .stability import is_stable
-from .statics import Given, Static
+from .statics import Given, StaticProblem
 
 
 @dataclasses.dataclass(frozen=True)
-class Rest:
+class Equilibrium:
     """One equilibrium: its state, and whether the mechanism returns to it after a small push."""
 
     state: dict[str, float]
     stable: bool
 
 
-def equilibria(
+def find_equilibria(
     plant: Plant, *, pressure: Given = None, air_mass: Given = None, inputs: Mapping[str, float] | None = None
-) -> tuple[Rest, ...]:
+) -> tuple[Equilibrium, ...]:
     """Every state at rest that is found, by rising coordinates, for what is given of each muscle's air.
 
     pressure   gauge pressure [Pa] of the muscle, a number for all or a tuple with one for each
@@ -42,20 +42,20 @@ def equilibria(
     it may miss a rest that none of them leads to. Raises ParameterError for what cannot be given, OutOfReach where a
     muscle cannot take a contraction that its mechanism holds it at.
     """
-    return _equilibria(Static(plant, pressure, air_mass, inputs))
+    return _equilibria(StaticProblem(plant, pressure, air_mass, inputs))
 
 
-def _equilibria(static: Static) -> tuple[Rest, ...]:
+def _equilibria(static: StaticProblem) -> tuple[Equilibrium, ...]:
     if not static.coordinates:
         found = [static.state({})]
     elif len(static.coordinates) == 1:
         found = [static.state(static.place([x])) for x in places(static)]
     else:
         found = [static.state(static.place(x)) for x in places_of_several(static)]
-    return tuple(Rest(state, is_stable(static, state)) for state in found)
+    return tuple(Equilibrium(state, is_stable(static, state)) for state in found)
 
 
-def equilibrium(
+def find_equilibrium(
     plant: Plant, *, pressure: Given = None, air_mass: Given = None, inputs: Mapping[str, float] | None = None
 ) -> dict[str, float]:
     """The stable state at rest whose muscles are nearest to full length, for what `equilibria` takes.
@@ -63,17 +63,17 @@ def equilibrium(
     Nearest is the smallest sum of squared contractions. Raises NoEquilibrium, which names the muscles and the forces,
     where no stable rest is found.
     """
-    static = Static(plant, pressure, air_mass, inputs)
+    static = StaticProblem(plant, pressure, air_mass, inputs)
     if not static.shut:
         inputs_here = np.array(list(static.inputs.values()))
-        (state,), (searched,) = equilibrium_of_each(
+        (state,), (searched,) = find_equilibrium_of_each(
             static.ready, static.ready.parameters[None], static.air, inputs_here
         )
         if np.isfinite(state).all():
             return dict(zip(static.names, state.tolist(), strict=True))
         if searched:
-            raise NoEquilibrium(explanation(static))
+            raise EquilibriumError(explanation(static))
     stable = [rest.state for rest in _equilibria(static) if rest.stable]
     if not stable:
-        raise NoEquilibrium(explanation(static))
+        raise EquilibriumError(explanation(static))
     return min(stable, key=static.contracted)

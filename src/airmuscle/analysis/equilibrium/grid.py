@@ -26,7 +26,7 @@ def grids(plants: SideBySide) -> Array:
 def _ends_of_straight(plants: SideBySide) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
     """Both ends of the reach (N,), and whether contractions are straight lines over the coordinate."""
     c, count = plants.coordinate, len(plants.parameters)
-    size, low, high = (np.array(np.broadcast_to(v, (count, 1))) for v in (c.nominal, c.least, c.greatest))
+    size, low, high = (np.array(np.broadcast_to(v, (count, 1))) for v in (c.nominal, c.lower_limit, c.upper_limit))
     straight = np.ones((count, 1), dtype=bool)
     at = [plants.contractions(k * size) for k in (0.0, 1.0, -3.0)]
     for zero, one, other, reach in zip(*at, plants.reach, strict=True):
@@ -42,7 +42,7 @@ def _ends_of_straight(plants: SideBySide) -> tuple[Array, Array, npt.NDArray[np.
 def _inside(plants: SideBySide) -> Array:
     """Of places spread evenly those within reach, and both ends of every stretch of them, the others at the end."""
     c, count = plants.coordinate, len(plants.parameters)
-    least, greatest = (np.broadcast_to(v, (count, 1))[:, 0] for v in (c.least, c.greatest))
+    least, greatest = (np.broadcast_to(v, (count, 1))[:, 0] for v in (c.lower_limit, c.upper_limit))
     with np.errstate(invalid="ignore"):
         x = np.linspace(least, greatest, PLACES, axis=1)
     inside = plants.within_reach(x)

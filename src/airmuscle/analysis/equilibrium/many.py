@@ -17,20 +17,22 @@ from .stability import are_stable
 from .vectorised import SideBySide
 
 if TYPE_CHECKING:
-    from ...compile.program import Prepared  # CasADi, which describing a plant does not need
+    from ...compile.program import CompiledSystem  # CasADi, which describing a plant does not need
 
 AT_ONCE = 500_000
 """Numbers in a table of states of plants side by side; more take memory and gain little (measured)."""
 
 
-class Found(NamedTuple):
+class EquilibriumTable(NamedTuple):
     """What was found of N plants: states (N, n), not a number where there is none, and whether that is certain (N,)."""
 
     states: Array
     searched: npt.NDArray[np.bool_]
 
 
-def equilibrium_of_each(ready: Prepared, parameters: Array, pressures: tuple[float, ...], inputs: Array) -> Found:
+def find_equilibrium_of_each(
+    ready: CompiledSystem, parameters: Array, pressures: tuple[float, ...], inputs: Array
+) -> EquilibriumTable:
     """The states that `equilibrium` finds for plants of one structure with parameters (N, P), all at once.
 
     The gauge pressures [Pa] of the muscles and the inputs (m,) are the same for all; `ready` is any of the plants.
@@ -40,7 +42,7 @@ def equilibrium_of_each(ready: Prepared, parameters: Array, pressures: tuple[flo
     plant, count = ready.system, len(parameters)
     assert isinstance(plant, Plant)
     size = len(plant.states)
-    found = Found(np.full((count, size), np.nan), np.zeros(count, dtype=bool))
+    found = EquilibriumTable(np.full((count, size), np.nan), np.zeros(count, dtype=bool))
     if len(plant.mechanism.coordinates) > 1:
         return found
     for begin in range(0, count, block := block_of(size)):
@@ -59,10 +61,10 @@ def block_of(states: int) -> int:
     return max(1, AT_ONCE // (PLACES * states))
 
 
-def _rests(plants: SideBySide) -> Found:
+def _rests(plants: SideBySide) -> EquilibriumTable:
     """Of each plant the stable rest nearest to full length."""
     rows, x, searched = _candidates(plants)
-    found = Found(np.full((len(plants.parameters), len(plants.names)), np.nan), searched)
+    found = EquilibriumTable(np.full((len(plants.parameters), len(plants.names)), np.nan), searched)
     if not rows.size:
         return found
     there = plants.of(rows)

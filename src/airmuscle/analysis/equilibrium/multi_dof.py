@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...core.arrays import Array
-from .statics import Static
+from .statics import StaticProblem
 
 STARTS = 60
 """Places from which the search begins, spread evenly over what the muscles can take."""
@@ -18,7 +18,7 @@ APART = 1e-6
 """Rests closer than this share of a coordinate's nominal size are one."""
 
 
-def places_of_several(static: Static) -> list[Array]:
+def places_of_several(static: StaticProblem) -> list[Array]:
     """Every place of balance that a start leads to, sorted by its coordinates."""
     sizes = np.array([c.nominal for c in static.coordinates])
     begun = [(x, static.accelerations(static.place(x))) for x in starts(static)]
@@ -31,7 +31,7 @@ def places_of_several(static: Static) -> list[Array]:
     return sorted(found, key=tuple)
 
 
-def starts(static: Static) -> Iterator[Array]:
+def starts(static: StaticProblem) -> Iterator[Array]:
     """Places within reach, from contractions of the muscles that are spread evenly (an additive recurrence)."""
     low, high = np.array(static.reach).T
     high = np.minimum(high, 0.5)  # further on a muscle is past its greatest volume
@@ -47,7 +47,7 @@ def starts(static: Static) -> Iterator[Array]:
             yield x
 
 
-def _place_of(static: Static, target: Array) -> Array:
+def _place_of(static: StaticProblem, target: Array) -> Array:
     """The coordinates whose contractions are nearest to these."""
     sizes = np.array([c.nominal for c in static.coordinates])
     x = np.zeros(sizes.size)
@@ -60,7 +60,7 @@ def _place_of(static: Static, target: Array) -> Array:
     return np.asarray(x)
 
 
-def _newton(static: Static, x: Array, f: Array, sizes: Array, balance: float) -> Array | None:
+def _newton(static: StaticProblem, x: Array, f: Array, sizes: Array, balance: float) -> Array | None:
     """The place of balance that Newton's method finds from x, with steps halved until the imbalance falls."""
     for _ in range(ITERATIONS):
         step = _step(static, x, f, sizes)
@@ -79,7 +79,7 @@ def _newton(static: Static, x: Array, f: Array, sizes: Array, balance: float) ->
     return None
 
 
-def _step(static: Static, x: Array, f: Array, sizes: Array) -> Array:
+def _step(static: StaticProblem, x: Array, f: Array, sizes: Array) -> Array:
     width = 1e-5
     slopes = np.empty((f.size, x.size))
     for k, nudge in enumerate(np.diag(width * sizes)):

@@ -19,17 +19,17 @@ CLOSE = 1e-13
 """Step that ends a search for a root, as a share of the way that it began with: what is left is far less (chosen)."""
 
 
-class Table(Protocol):
+class SingleDofPlants(Protocol):
     """Plants with one coordinate, each a row."""
 
-    def of(self, rows: Rows) -> Table:
+    def of(self, rows: Rows) -> SingleDofPlants:
         """Some of them, which may be repeated."""
 
     def accelerations(self, x: Array) -> Array:
         """Acceleration of the coordinate from rest, at one place of each (N,) or at several (N, K)."""
 
 
-def balances(plants: Table, x: Array, f: Array) -> tuple[Rows, Array]:
+def balances(plants: SingleDofPlants, x: Array, f: Array) -> tuple[Rows, Array]:
     """Every place of balance and the row of its plant, by row and place, from accelerations f (N, K) at rising x.
 
     They are where f is 0, of a stretch in balance its two ends; one between every two places of different sign; and a
@@ -52,7 +52,7 @@ def balances(plants: Table, x: Array, f: Array) -> tuple[Rows, Array]:
     return row[order], place[order]
 
 
-def _roots(plants: Table, f: Array, rows: Rows, low: Array, high: Array) -> tuple[Rows, Array]:
+def _roots(plants: SingleDofPlants, f: Array, rows: Rows, low: Array, high: Array) -> tuple[Rows, Array]:
     """The roots between places of different sign; where the function passes through infinity there is none."""
     if not rows.size:
         return rows, low
@@ -65,7 +65,7 @@ def _roots(plants: Table, f: Array, rows: Rows, low: Array, high: Array) -> tupl
     return rows[kept], root[kept]
 
 
-def between(plants: Table, low: Array, high: Array) -> Array:
+def between(plants: SingleDofPlants, low: Array, high: Array) -> Array:
     """The roots between places (R,) of different sign: false position, the end that stays halved (Illinois)."""
     search = _Search(np.arange(low.size), low, high, plants.accelerations(low), plants.accelerations(high), low)
     close = np.maximum(CLOSE * (high - low), np.spacing(np.maximum(np.abs(low), np.abs(high))))
@@ -128,7 +128,7 @@ def _nears_zero(f: Array) -> npt.NDArray[np.bool_]:
     return np.asarray(one_sign & (b <= np.minimum(a, c)) & (b < np.maximum(a, c)))
 
 
-def _pairs(plants: Table, f: Array, rows: Rows, x: Array, sign: Array) -> list[tuple[Rows, Array]]:
+def _pairs(plants: SingleDofPlants, f: Array, rows: Rows, x: Array, sign: Array) -> list[tuple[Rows, Array]]:
     """The two roots between three places x (3, R), where the function crosses zero there and comes back."""
     if not rows.size:
         return []

@@ -11,17 +11,17 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...plant.plant import Plant
-from .statics import Static
+from .statics import StaticProblem
 
 if TYPE_CHECKING:
-    from ...compile.program import Prepared, Program  # CasADi, which describing a plant does not need
+    from ...compile.program import CompiledSystem, Program  # CasADi, which describing a plant does not need
 
 MARGIN = 1e-9
 """Greatest real part of an eigenvalue, as a share of the greatest eigenvalue, that counts as none."""
 _functions: weakref.WeakKeyDictionary[Program, Any] = weakref.WeakKeyDictionary()
 
 
-def is_stable(static: Static, state: Mapping[str, float]) -> bool:
+def is_stable(static: StaticProblem, state: Mapping[str, float]) -> bool:
     """Whether no eigenvalue of the motion has a positive real part; see `are_stable`."""
     x = np.array([[state[n] for n in static.names]])
     inputs = np.array(list(static.inputs.values()))
@@ -29,7 +29,7 @@ def is_stable(static: Static, state: Mapping[str, float]) -> bool:
 
 
 def are_stable(
-    ready: Prepared, parameters: Array, states: Array, inputs: Array, *, shut: bool = False
+    ready: CompiledSystem, parameters: Array, states: Array, inputs: Array, *, shut: bool = False
 ) -> npt.NDArray[np.bool_]:
     """Whether no eigenvalue of the motion has a positive real part, for plants with parameters (R, P) at states (R, n).
 
@@ -69,7 +69,7 @@ def _kinds(plant: Plant) -> tuple[set[str], set[str]]:
 
 
 def _slopes(
-    ready: Prepared, free: list[int], parameters: Array, states: Array, inputs: Array
+    ready: CompiledSystem, free: list[int], parameters: Array, states: Array, inputs: Array
 ) -> tuple[Array, Array, Array]:
     """Rates of f free states by all (R, f, n), the volume of every muscle (R, k), and these by states (R, k, n)."""
     count, size = states.shape
@@ -79,7 +79,7 @@ def _slopes(
     return stacked[0], volumes.T, stacked[1]
 
 
-def _function(ready: Prepared, free: list[int]) -> Any:
+def _function(ready: CompiledSystem, free: list[int]) -> Any:
     """(x, u, p) -> (df/dx of what is free, V, dV/dx), differentiated once for a structure, which says what is free."""
     program, plant = ready.program, ready.system
     assert isinstance(plant, Plant)

@@ -8,10 +8,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ...control.inputs import refuse_unknown_input
+from ...control.inputs import check_input_names
 from ...core import ops
 from ...core.arrays import Array
-from ...core.errors import NoEquilibrium, ParameterError
+from ...core.errors import EquilibriumError, ParameterError
 from ...core.ops import Value
 from ...muscle import Muscle
 from ...plant.plant import Plant
@@ -24,13 +24,13 @@ GREATEST = 1e8
 """Greatest absolute pressure [Pa] that a mass of air is looked for at."""
 
 
-class Static:
+class StaticProblem:
     """What is given of a plant's air, and how the rest of its state follows from its coordinates."""
 
     def __init__(
         self, plant: Plant, pressure: Given, air_mass: Given, inputs: Mapping[str, float] | None = None
     ) -> None:
-        from ...compile.program import prepared  # CasADi, which describing a plant does not need
+        from ...compile.program import compile_system  # CasADi, which describing a plant does not need
 
         if (pressure is None) == (air_mass is None):
             raise ParameterError("equilibrium: give either the pressure [Pa] or the air_mass [kg] of the muscles.")
@@ -41,7 +41,7 @@ class Static:
         self.coordinates = plant.mechanism.coordinates
         self.names = [s.name for s in plant.states]
         self.speeds = [self.names.index(c.speed) for c in self.coordinates]
-        self.ready = prepared(plant)
+        self.ready = compile_system(plant)
         self.lengths = [float(length) for length in plant.resting_lengths]
         self._before = (0.0,) * len(self.air)  # pressures of the place before: the next are near
         self.reach = [reach_of(m) for m in plant.muscles]
@@ -78,7 +78,7 @@ class Static:
         """Acceleration of every coordinate from rest there: 0 where it rests, nan where no pressure holds the air."""
         try:
             state = self.state(q)
-        except NoEquilibrium:  # at the ends of its reach a muscle may have no volume
+        except EquilibriumError:  # at the ends of its reach a muscle may have no volume
             return np.full(len(self.coordinates), np.nan)
         return self.ready.rates([state[n] for n in self.names], list(self.inputs.values()))[self.speeds]
 
@@ -101,23 +101,23 @@ def _each(plant: Plant, name: str, pressure: Given, air_mass: Given) -> tuple[fl
 def given_inputs(plant: Plant, inputs: Mapping[str, float] | None) -> dict[str, float]:
     """Every input of a plant, 0 unless given. Raises ParameterError for an unknown name or one beyond its range."""
     given = dict(inputs or {})
-    refuse_unknown_input(list(given), plant.inputs)
+    check_input_names(list(given), plant.inputs)
     for command in plant.commands:
         value = given.get(command.name, 0.0)
         if isinstance(value, str) or not np.ndim(value) == 0:
             raise ParameterError(f"the input '{command.name}' is {value!r}; it must be one number, in SI units.")
-        if not command.least <= value <= command.greatest:
+        if not command.minimum <= value <= command.maximum:
             unit = "" if command.unit == "1" else f" {command.unit}"
             raise ParameterError(
-                f"the input '{command.name}' is {value:g}{unit}; allowed are {command.least:g} to "
-                f"{command.greatest:g}{unit} ({command.meaning})."
+                f"the input '{command.name}' is {value:g}{unit}; allowed are {command.minimum:g} to "
+                f"{command.maximum:g}{unit} ({command.meaning})."
             )
     return {name: float(given.get(name, 0.0)) for name in plant.inputs}
 
 
 def reach_of(muscle: Muscle) -> tuple[Value, Value]:
     """The contractions [1] between which a rest of a muscle is looked for."""
-    low, high = muscle.geometry.contraction_reach
+    low, high = muscle.geometry.contraction_range
     low = ops.maximum(low, STRETCHED)
     margin = 1e-9 * (high - low)
     return low + margin, high - margin
@@ -135,7 +135,7 @@ def pressure_of(plant: Plant, muscle: Muscle, air_mass: float, contraction: floa
         p = gauge(math.exp(x), plant.ambient)
         own = muscle.settled(p, contraction)
         volume = muscle.volume(muscle.inner_contraction(contraction, own), own)
-        held = float(plant.gas.content(math.exp(x), volume, plant.ambient)["air_mass"])
+        held = float(plant.gas.state_at(math.exp(x), volume, plant.ambient)["air_mass"])
         return math.log(held / air_mass) if held > 0 else -math.inf
 
     a = math.log(absolute(guess, plant.ambient))
@@ -150,7 +150,7 @@ def pressure_of(plant: Plant, muscle: Muscle, air_mass: float, contraction: floa
         a, b, at_a = b, b - at_b * (b - a) / (at_b - at_a), at_b
     low, high = 0.0, math.log(GREATEST)
     if not excess(low) < 0 < excess(high):
-        raise NoEquilibrium(
+        raise EquilibriumError(
             f"{muscle.name} cannot hold {air_mass:g} kg of air at a contraction of {contraction:.1%}: no pressure "
             f"below {GREATEST:g} Pa belongs to it."
         )

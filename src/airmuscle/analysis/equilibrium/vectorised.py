@@ -18,7 +18,7 @@ from ...pneumatics.gas import absolute
 from .statics import reach_of
 
 if TYPE_CHECKING:
-    from ...compile.program import Prepared  # CasADi, which describing a plant does not need
+    from ...compile.program import CompiledSystem  # CasADi, which describing a plant does not need
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class SideBySide:
     columns     the plant with an array (N, 1) in place of every leaf
     """
 
-    ready: Prepared
+    ready: CompiledSystem
     parameters: Array
     held: Array
     pressures: tuple[float, ...]
@@ -41,9 +41,11 @@ class SideBySide:
     columns: Plant
 
     @classmethod
-    def of_plants(cls, ready: Prepared, parameters: Array, pressures: tuple[float, ...], inputs: Array) -> SideBySide:
+    def of_plants(
+        cls, ready: CompiledSystem, parameters: Array, pressures: tuple[float, ...], inputs: Array
+    ) -> SideBySide:
         """The plants that have these parameters (N, P)."""
-        held = np.array([ready.program.held(row) for row in np.ascontiguousarray(parameters)])
+        held = np.array([ready.program.precompute(row) for row in np.ascontiguousarray(parameters)])
         plant = ready.system
         assert isinstance(plant, Plant)
         return cls(ready, parameters, held, pressures, inputs, _columns(plant, parameters))
@@ -73,7 +75,7 @@ class SideBySide:
         """Which plants (N,) take these inputs and pressures."""
         found = np.array(np.broadcast_to(True, (len(self.parameters), 1)))
         for command, value in zip(self.columns.commands, self.inputs, strict=True):
-            found &= (command.least <= value) & (value <= command.greatest)
+            found &= (command.minimum <= value) & (value <= command.maximum)
         for p in self.pressures:
             found &= np.asarray(absolute(p, self.columns.ambient)) > 0.0
         return found[:, 0]
@@ -97,7 +99,7 @@ class SideBySide:
         known: dict[str, Value] = {n: v for c in plant.mechanism.coordinates for n, v in ((c.name, x), (c.speed, 0.0))}
         possible = np.ones(x.shape, dtype=bool)
         for eps, muscle in zip(self.contractions(x), plant.muscles, strict=True):
-            low, high = muscle.geometry.contraction_reach
+            low, high = muscle.geometry.contraction_range
             possible &= (eps >= low) & (eps <= high)
         state, volumes = plant.settled_muscles(self.pressures, known)
         for volume in volumes:
@@ -123,4 +125,4 @@ def _columns(plant: Plant, parameters: Array) -> Plant:
     """The plant with an array (N, 1) for every leaf, also of one plant: so it rests where it would beside others, to
     the last digit, which a power of numbers would not be.
     """
-    return tree.rebuild(plant, [column[:, None].copy() for column in parameters.T])
+    return tree.unflatten(plant, [column[:, None].copy() for column in parameters.T])

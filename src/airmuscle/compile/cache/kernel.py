@@ -86,17 +86,17 @@ class Kernel:
         with _compiling:
             if self._loaded is not None:
                 return
-            code = store.found(self.name, kinds)
+            code = store.load(self.name, kinds)
             if code is None:
                 announce(self.name)
-                code = store.keep(self.name, kinds, self._made(kinds, arguments))
+                code = store.save(self.name, kinds, self._made(kinds, arguments))
             self._only_numba = not code
             self._loaded = _in_memory(code, kinds, arguments) if code else None
 
     def _made(self, kinds: tuple[str, ...], arguments: tuple[Any, ...]) -> bytes:
-        from .object_code import made
+        from .object_code import build
 
-        return made(self.numba, kinds, arguments)
+        return build(self.numba, kinds, arguments)
 
 
 def _kinds(arguments: tuple[Any, ...]) -> tuple[str, ...] | None:
@@ -113,9 +113,9 @@ def _kinds(arguments: tuple[Any, ...]) -> tuple[str, ...] | None:
 
 
 def _in_memory(code: bytes, kinds: tuple[str, ...], arguments: tuple[Any, ...]) -> _Loaded:
-    from .object_code import loaded
+    from .object_code import load_engine
 
-    engine = loaded(code)
+    engine = load_engine(code)
     row = struct.Struct("=" + "q" * len(DTYPES) + "".join(k if len(k) == 1 else "q" for k in kinds))
     return _Loaded(_ENTRY(engine.get_function_address("entry")), row.pack, tuple(map(type, arguments)), engine)
 

@@ -12,7 +12,7 @@ _C_LIBRARY = frozenset({"sqrt", "ceil", "floor", "memset", "memcpy", "memmove"})
 _NOTHING_OF_PYTHON = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
-def loaded(code: bytes) -> Any:
+def load_engine(code: bytes) -> Any:
     """An engine that holds the machine code; its function is `entry`."""
     import llvmlite.binding as llvm
 
@@ -22,7 +22,7 @@ def loaded(code: bytes) -> Any:
     return engine
 
 
-def made(kernel: Any, kinds: Sequence[str], arguments: Sequence[Any]) -> bytes:
+def build(kernel: Any, kinds: Sequence[str], arguments: Sequence[Any]) -> bytes:
     """Machine code of a kernel of numba's for arguments of these kinds; nothing where it cannot do without numba.
 
     It cannot where it allocates or raises, returns something else than a status, or calls what neither LLVM nor the

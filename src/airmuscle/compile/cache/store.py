@@ -21,7 +21,7 @@ _KERNELS = _HERE.parent / "kernels"
 _SIZE = hashlib.sha256().digest_size
 
 
-def found(name: str, kinds: Sequence[str]) -> bytes | None:
+def load(name: str, kinds: Sequence[str]) -> bytes | None:
     """The machine code that is kept of a kernel for arguments of these kinds."""
     file = _file(name, kinds)
     for folder in _folders():
@@ -35,7 +35,7 @@ def found(name: str, kinds: Sequence[str]) -> bytes | None:
     return None
 
 
-def keep(name: str, kinds: Sequence[str], code: bytes) -> bytes:
+def save(name: str, kinds: Sequence[str], code: bytes) -> bytes:
     """Keep the machine code in the first folder that can be written to, and return it."""
     content = _origin() + hashlib.sha256(code).digest() + code
     for folder in _folders():

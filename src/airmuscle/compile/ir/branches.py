@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import casadi
 
 from .instructions import MAXIMUM, MINIMUM, SELECT, Code, Instruction, Operand
-from .scheduling import Apart, Gates, Item, in_order
+from .scheduling import Gates, IndependentGroup, Item, in_order
 
 ZERO, ONE = ("c", 0.0), ("c", 1.0)
 STEADY, COMMANDED, VARYING = range(3)
@@ -127,7 +127,7 @@ class _Search:
     """Case by case, what is superfluous in it, if that is worth a branch."""
 
     def __init__(self, code: Code, early: frozenset[Operand]) -> None:
-        self.apart = Apart({}, {})
+        self.apart = IndependentGroup({}, {})
         self._early = early
         self._line = {line.result: line for line in code.body}
         self._users: dict[Operand, list[Instruction]] = {}

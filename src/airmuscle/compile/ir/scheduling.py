@@ -14,7 +14,7 @@ ZERO = ("c", 0.0)
 
 
 @dataclasses.dataclass(frozen=True)
-class Skippable:
+class Branch:
     """Instructions that need not run where all gates are zero; what those results that others use are then."""
 
     gates: Gates
@@ -22,19 +22,19 @@ class Skippable:
     instead: tuple[tuple[Operand, Operand], ...]
 
 
-Item = Instruction | Skippable
+Item = Instruction | Branch
 _Piece = tuple[Gates, bool]
 
 
 @dataclasses.dataclass(frozen=True)
-class Apart:
+class IndependentGroup:
     """Which results need not be computed where their gates are zero, and what is known of them then."""
 
     gates: dict[Operand, Gates]
     instead: dict[Operand, Operand]
 
 
-def in_order(code: Code, apart: Apart, early: frozenset[Operand]) -> list[Item]:
+def in_order(code: Code, apart: IndependentGroup, early: frozenset[Operand]) -> list[Item]:
     """All instructions, each after what it needs and else as they were; a piece stands before its first user.
 
     What is computed long before it is needed would wait in memory. What is `early` shares no piece with the rest.
@@ -93,7 +93,7 @@ def _turns(code: Code, items: Sequence[Item]) -> list[float]:
 class _Pieces:
     """The pieces that results set apart fall into: as few as what they need of others allows."""
 
-    def __init__(self, code: Code, apart: Apart, early: frozenset[Operand]) -> None:
+    def __init__(self, code: Code, apart: IndependentGroup, early: frozenset[Operand]) -> None:
         self._code, self._apart, self._early = code, apart, early
         self._wanted = {operand for _, _, operand in code.outputs} | set(apart.instead.values())
         self._wanted.update(gate for gates in apart.gates.values() for gate in gates)
@@ -114,7 +114,7 @@ class _Pieces:
             if left and not ready:
                 raise TraceError("instructions wait for each other; this is a fault of the program, please report it.")
             for (gates, _), body in ready.items():
-                items.append(Skippable(gates, tuple(body), self._seen(body)))
+                items.append(Branch(gates, tuple(body), self._seen(body)))
                 self._done.update(line.result for line in body)
             left = [line for line in left if line.result not in self._done]
         return items

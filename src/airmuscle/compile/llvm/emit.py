@@ -10,8 +10,8 @@ import casadi
 from ...core.errors import TraceError
 from ..ir.branches import COMMANDED, STEADY, VARYING, skipping
 from ..ir.instructions import MAXIMUM, MINIMUM, SELECT, Code, Instruction, Operand
-from ..ir.scheduling import Item, Skippable
-from .types import DOUBLE, Number
+from ..ir.scheduling import Branch, Item
+from .types import DOUBLE, LlvmType
 
 FLAGS = "nsz arcp contract reassoc afn"
 """Fast arithmetic that keeps NaN and infinity: a failed step must still show (never nnan, ninf)."""
@@ -33,14 +33,14 @@ DECLARED = "".join(f"declare double @{name}(double)\n" for name in _OF_ONE) + "d
 """Functions that printed ones may call, as LLVM wants to know them."""
 
 
-class Block:
+class FunctionBody:
     """The lines of one LLVM function under construction; what is computed once is not computed again.
 
     Every value is a `number`. In lanes, functions that LLVM has not are called by the names in `needed`, which
     `elementary` prints.
     """
 
-    def __init__(self, scalars: Sequence[str] = (), number: Number = DOUBLE) -> None:
+    def __init__(self, scalars: Sequence[str] = (), number: LlvmType = DOUBLE) -> None:
         self.lines: list[str] = []
         self.scalars = frozenset(scalars)
         self.number = number
@@ -190,7 +190,7 @@ class Block:
 
 
 def computed(
-    block: Block, code: Code, inputs: Sequence[str], held: Mapping[Operand, int], given: Mapping[Operand, str]
+    block: FunctionBody, code: Code, inputs: Sequence[str], held: Mapping[Operand, int], given: Mapping[Operand, str]
 ) -> dict[tuple[int, int], str]:
     """Append code to a block: `inputs` name the arrays, `held` says what stands in `c`, `given` what is known.
 
@@ -212,7 +212,7 @@ def with_gates(
 
 
 def run(
-    block: Block,
+    block: FunctionBody,
     body: Sequence[Item],
     inputs: Sequence[str],
     held: Mapping[Operand, int],
@@ -226,10 +226,10 @@ def run(
 
 
 def append(
-    block: Block, line: Item, inputs: Sequence[str], held: Mapping[Operand, int], values: dict[Operand, str]
+    block: FunctionBody, line: Item, inputs: Sequence[str], held: Mapping[Operand, int], values: dict[Operand, str]
 ) -> None:
     """Append one instruction, or some that may be skipped, and add the names of results to `values`."""
-    if isinstance(line, Skippable):
+    if isinstance(line, Branch):
         instead = {operand: value_of(block, value, inputs, held, values) for operand, value in line.instead}
         gates = [value_of(block, gate, inputs, held, values) for gate in line.gates]
         values |= block.unless_zero(gates, lambda: run(block, line.body, inputs, held, values), instead)
@@ -239,7 +239,11 @@ def append(
 
 
 def value_of(
-    block: Block, operand: Operand, inputs: Sequence[str], held: Mapping[Operand, int], values: Mapping[Operand, str]
+    block: FunctionBody,
+    operand: Operand,
+    inputs: Sequence[str],
+    held: Mapping[Operand, int],
+    values: Mapping[Operand, str],
 ) -> str:
     """The name of an operand's value, which is loaded if it stands in an array."""
     if operand in values:
@@ -252,7 +256,11 @@ def value_of(
 
 
 def hand_over(
-    block: Block, once: Sequence[Instruction], handed: Sequence[Operand], inputs: Sequence[str], places: dict[str, int]
+    block: FunctionBody,
+    once: Sequence[Instruction],
+    handed: Sequence[Operand],
+    inputs: Sequence[str],
+    places: dict[str, int],
 ) -> dict[Operand, int]:
     """Append the parameters-only part of a function, and say where in `c` its results stand.
 
@@ -269,13 +277,13 @@ def hand_over(
     return held
 
 
-def function(name: str, arguments: Sequence[str], block: Block, attributes: str = "nounwind") -> str:
+def function(name: str, arguments: Sequence[str], block: FunctionBody, attributes: str = "nounwind") -> str:
     """The LLVM text of a function that returns nothing; arrays are pointers that do not overlap."""
     signature = ", ".join(f"double %{a}" if a in block.scalars else f"ptr noalias nocapture %{a}" for a in arguments)
     return f"define void @{name}({signature}) {attributes} {{\n" + "\n".join(block.lines) + "\n  ret void\n}\n"
 
 
-def function_of_values(name: str, arguments: Sequence[str], block: Block, number: Number, value: str) -> str:
+def function_of_values(name: str, arguments: Sequence[str], block: FunctionBody, number: LlvmType, value: str) -> str:
     """The LLVM text of a function within a module, which takes and returns values."""
     signature = ", ".join(f"{number.text} {a}" for a in arguments)
     head = f"define internal {number.text} @{name}({signature}) nounwind {{\n"

@@ -8,7 +8,7 @@ from ..target import native
 from .emit import DECLARED
 
 
-def compiled(text: str) -> Any:
+def jit_compile(text: str) -> Any:
     """Machine code of LLVM text; the returned engine must stay alive as long as its addresses are used."""
     import llvmlite.binding as llvm
 

@@ -7,7 +7,7 @@ import struct
 
 
 @dataclasses.dataclass(frozen=True)
-class Number:
+class LlvmType:
     """`lanes` numbers of `bits` each, which LLVM computes together: double, <32 x double>, <32 x float>."""
 
     bits: int = 64
@@ -61,4 +61,4 @@ class Number:
         return element if self.lanes == 1 else f"<{self.lanes} x {element}>"
 
 
-DOUBLE = Number()
+DOUBLE = LlvmType()

@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 
-from .emit import Block, function_of_values
-from .types import Number
+from .emit import FunctionBody, function_of_values
+from .types import LlvmType
 
 LN2_HIGH, LN2_LOW = 0.693147180559890330187, 5.497923018708371e-14
 """ln 2 in two parts; the first ends in zeros, so that its product with an exponent is exact."""
@@ -30,11 +30,11 @@ ROUNDER = 1.5 * 2.0**52
 LEAST_NORMAL = 2.0**-1022
 
 
-class _Exact(Block):
+class _Exact(FunctionBody):
     """Arithmetic in double lanes that is done as written: nothing reordered, no NaN or zero assumed away."""
 
     def __init__(self, lanes: int) -> None:
-        super().__init__((), Number(64, lanes))
+        super().__init__((), LlvmType(64, lanes))
 
     def add(self, a: str, b: str) -> str:
         return self.put(f"fadd {self.number.text} {a}, {b}")
@@ -214,9 +214,9 @@ class _Exact(Block):
         ]
 
 
-def definition(name: str, count: int, number: Number) -> str:
+def definition(name: str, count: int, number: LlvmType) -> str:
     """The LLVM text of a function of the C library, of one or two arguments, in lanes."""
-    double = Number(64, number.lanes)
+    double = LlvmType(64, number.lanes)
     if number != double:
         return _in_double(name, count, number, double)
     block, arguments = _Exact(number.lanes), [f"%{a}" for a in "xy"[:count]]
@@ -237,7 +237,7 @@ def definition(name: str, count: int, number: Number) -> str:
     return before + function_of_values(number.function(name), arguments, block, number, value)
 
 
-def _in_double(name: str, count: int, number: Number, double: Number) -> str:
+def _in_double(name: str, count: int, number: LlvmType, double: LlvmType) -> str:
     """A function of shorter numbers by that of doubles, which is printed with it."""
     block, arguments = _Exact(number.lanes), [f"%{a}" for a in "xy"[:count]]
     wide = [block.put(f"fpext {number.text} {a} to {double.text}") for a in arguments]
@@ -247,8 +247,8 @@ def _in_double(name: str, count: int, number: Number, double: Number) -> str:
     return definition(name, count, double) + function_of_values(number.function(name), arguments, block, number, value)
 
 
-def _lane_by_lane(name: str, as_name: str, arguments: Sequence[str], number: Number) -> str:
-    block, found = Block((), number), "poison"
+def _lane_by_lane(name: str, as_name: str, arguments: Sequence[str], number: LlvmType) -> str:
+    block, found = FunctionBody((), number), "poison"
     for i in range(number.lanes):
         given = [block.put(f"extractelement {number.text} {a}, i32 {i}") for a in arguments]
         value = block.put(f"call double @{name}({', '.join(f'double {a}' for a in given)})")
@@ -256,10 +256,12 @@ def _lane_by_lane(name: str, as_name: str, arguments: Sequence[str], number: Num
     return function_of_values(as_name, arguments, block, number, found)
 
 
-def declarations(numbers: Collection[Number]) -> str:
+def declarations(numbers: Collection[LlvmType]) -> str:
     """LLVM's own functions that the printer and this file call, on these numbers and on as many doubles."""
     text = ""
-    for kind in sorted({*numbers, *(Number(64, number.lanes) for number in numbers)}, key=lambda k: (k.bits, k.lanes)):
+    for kind in sorted(
+        {*numbers, *(LlvmType(64, number.lanes) for number in numbers)}, key=lambda k: (k.bits, k.lanes)
+    ):
         for name, count in (("sqrt", 1), ("fabs", 1), ("rint", 1), ("copysign", 2), ("fma", 3)):
             text += f"declare {kind.text} @{kind.intrinsic(name)}({', '.join([kind.text] * count)})\n"
         if kind.bits == 64:

@@ -2,15 +2,15 @@
 
 from .experiment import Experiment, StartTime, StartValue
 from .fit import fit_dynamic
-from .identifiable import identifiable
+from .identifiability import identifiable
+from .initial_conditions import InitialConditions
 from .result import DynamicFit
 from .sensing import where_sensed
-from .start import Start
 
 __all__ = [
     "DynamicFit",
     "Experiment",
-    "Start",
+    "InitialConditions",
     "StartTime",
     "StartValue",
     "fit_dynamic",

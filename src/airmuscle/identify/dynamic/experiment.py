@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...compile import System
-from ...control.inputs import Command, refuse_no_command
+from ...control.inputs import InputSignal, check_input_signal
 from ...core import tree
 from ...core.errors import ParameterError, suggestion
 from ...recording import Recording
 from ...recording.recording import header
-from .start import Start
+from .initial_conditions import InitialConditions
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -25,13 +25,13 @@ class Experiment:
     """
 
     recording: Recording
-    command: Command
-    start: Start
+    command: InputSignal
+    start: InitialConditions
     start_time: float = 0.0
     plant: System | None = None
 
     def __post_init__(self) -> None:
-        refuse_no_command(self.command)
+        check_input_signal(self.command)
 
 
 @dataclasses.dataclass(frozen=True)

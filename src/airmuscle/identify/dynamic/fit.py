@@ -11,20 +11,20 @@ import numpy as np
 from ...compile import System
 from ...core.arrays import Array
 from ...core.errors import IdentificationError, ParameterError
-from ...simulation.integrators import Method, Rodas4
+from ...simulation.integrators import Integrator, Rodas4
 from ..result import Estimate
-from .course import Course, observations
-from .descent import Search
 from .experiment import Experiment, Own, Shared, unknowns
-from .identifiable import Identifiability, identifiable
-from .problem import MOST, Problem
+from .identifiability import Identifiability, identifiable
+from .levenberg_marquardt import LevenbergMarquardt
+from .problem import MOST, DynamicFitProblem
+from .record_model import RecordModel, observations
 from .result import DynamicFit
 
 CORRELATED = 0.3
 """Correlation of neighbouring residuals from which on they are called model error, not noise; chosen."""
 
 FIRST_LOOK, HOPELESS = 20, 1000.0
-"""Runs after which a start whose sum of squares is so many times the least of all is left where it stands; chosen.
+"""RunSplit after which a start whose sum of squares is so many times the least of all is left where it stands; chosen.
 
 In nine problems of 40 to 100 starts, what came to the best optimum was within that of it after 14 runs at most."""
 
@@ -39,7 +39,7 @@ def fit_dynamic(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     starts: int = 1,
     seed: int = 0,
-    method: Method | None = None,
+    method: Integrator | None = None,
 ) -> DynamicFit:
     """Find parameters of a plant by weighted least squares over all records, with exact sensitivities.
 
@@ -59,9 +59,9 @@ def fit_dynamic(
         raise ParameterError("fit_dynamic needs at least one record, one observed quantity and one start.")
     wanted = unknowns(plant, experiments, free, own, bounds or {})
     method = method or Rodas4()
-    courses = tuple(Course(plant, e, i, wanted, observed, method) for i, e in enumerate(experiments))
-    problem = Problem(courses, wanted, np.array(list(observed.values()), dtype=float))
-    _refuse_too_little(problem)
+    courses = tuple(RecordModel(plant, e, i, wanted, observed, method) for i, e in enumerate(experiments))
+    problem = DynamicFitProblem(courses, wanted, np.array(list(observed.values()), dtype=float))
+    _check_row_count(problem)
     outcomes = sorted(_solved(problem, spread(problem, starts, seed)), key=lambda outcome: outcome[1])
     best, cost = outcomes[0]
     if not np.isfinite(cost):
@@ -70,7 +70,7 @@ def fit_dynamic(
     return _result(problem, best, np.array([c for _, c in outcomes]))
 
 
-def _solved(problem: Problem, begins: Sequence[Array]) -> list[tuple[Array, float]]:
+def _solved(problem: DynamicFitProblem, begins: Sequence[Array]) -> list[tuple[Array, float]]:
     """The least squares from every start, on all cores: the kernels leave Python to the others while they run."""
     if len(begins) == 1:
         return [problem.solve(begins[0])]
@@ -85,12 +85,12 @@ def _solved(problem: Problem, begins: Sequence[Array]) -> list[tuple[Array, floa
         pool.shutdown(cancel_futures=True)
 
 
-def _searched(search: Search, most: int) -> Search:
+def _searched(search: LevenbergMarquardt, most: int) -> LevenbergMarquardt:
     search.run(most)
     return search
 
 
-def _refuse_too_little(problem: Problem) -> None:
+def _check_row_count(problem: DynamicFitProblem) -> None:
     count = observations(problem.courses)
     if count <= len(problem.unknowns):
         raise IdentificationError(
@@ -100,7 +100,7 @@ def _refuse_too_little(problem: Problem) -> None:
         raise ParameterError("the standard deviation of an observed quantity must be positive, in SI.")
 
 
-def spread(problem: Problem, count: int, seed: int) -> list[Array]:
+def spread(problem: DynamicFitProblem, count: int, seed: int) -> list[Array]:
     """The plant's own values, then a Latin hypercube, even in the logarithm where the range is positive."""
     own = np.array([u.value for u in problem.unknowns])
     rng, cells = np.random.default_rng(seed), count - 1
@@ -113,7 +113,7 @@ def spread(problem: Problem, count: int, seed: int) -> list[Array]:
     return [own / problem.scales, *(np.column_stack(columns) / problem.scales)]
 
 
-def _result(problem: Problem, scaled: Array, costs: Array) -> DynamicFit:
+def _result(problem: DynamicFitProblem, scaled: Array, costs: Array) -> DynamicFit:
     errors, slopes = problem.residuals(scaled)
     low, high = problem.bounds
     near = 1e-6 * np.maximum(np.abs(scaled), 1.0)
@@ -137,7 +137,9 @@ def _result(problem: Problem, scaled: Array, costs: Array) -> DynamicFit:
     )
 
 
-def _notes(problem: Problem, errors: Array, found: Identifiability, estimates: Sequence[Estimate]) -> tuple[str, ...]:
+def _notes(
+    problem: DynamicFitProblem, errors: Array, found: Identifiability, estimates: Sequence[Estimate]
+) -> tuple[str, ...]:
     notes = [str(open_one) for open_one in found.undetermined]
     for estimate in estimates:
         if estimate.on_bound:

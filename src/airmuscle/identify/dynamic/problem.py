@@ -10,12 +10,12 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError
-from .course import MOST_STEPS, Course, stacked
-from .descent import Search, descended
 from .experiment import Unknown
+from .levenberg_marquardt import LevenbergMarquardt, descended
+from .record_model import MOST_STEPS, RecordModel, stacked
 
 MOST = 200
-"""Runs after which any start is left where it stands."""
+"""RunSplit after which any start is left where it stands."""
 
 
 FEW_STEPS, MANY = 10_000, 20
@@ -23,10 +23,10 @@ FEW_STEPS, MANY = 10_000, 20
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Problem:
+class DynamicFitProblem:
     """Residuals over unknowns in units of their scales."""
 
-    courses: tuple[Course, ...]
+    courses: tuple[RecordModel, ...]
     unknowns: tuple[Unknown, ...]
     deviations: Array
 
@@ -57,9 +57,9 @@ class Problem:
         whole[loose] = found.x
         return whole, found.cost
 
-    def search(self, scaled: Array) -> Search:
+    def search(self, scaled: Array) -> LevenbergMarquardt:
         """The search from a start, which can be left and taken up again."""
-        return Search(*self._asked(scaled, range(scaled.size)))
+        return LevenbergMarquardt(*self._asked(scaled, range(scaled.size)))
 
     def _asked(self, scaled: Array, loose: Sequence[int]) -> tuple[_Guarded, Array, Array, Array]:
         """Residuals over the loose unknowns, their start and their bounds."""
@@ -73,7 +73,7 @@ class _Guarded:
     Nor where a run takes far more steps than the best one so far, which comes of plants far from anything physical.
     """
 
-    def __init__(self, problem: Problem, scaled: Array, loose: Sequence[int]) -> None:
+    def __init__(self, problem: DynamicFitProblem, scaled: Array, loose: Sequence[int]) -> None:
         self._problem, self._scaled, self._loose = problem, scaled, loose
         self._least, self._most_steps = np.inf, MOST_STEPS
 

@@ -19,7 +19,7 @@ BETTER = 0.1
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Profile:
+class DynamicProfile:
     """One estimate's values, rising, and the growth of the sum of squares there, in variances of the residuals."""
 
     name: str
@@ -53,13 +53,13 @@ class Profile:
         return f"{self.name} [{self.unit}], 95 % from {low} to {high}; growth of the sum of squares:{rows}{better}"
 
 
-def profile(fit: DynamicFit, name: str, points: int) -> Profile:
+def profile(fit: DynamicFit, name: str, points: int) -> DynamicProfile:
     """The profile of one estimate at `points` values to either side, from the optimum outwards."""
     problem = fit.problem
     k = [e.name for e in fit.estimates].index(fit[name].name)
     best = fit.values / problem.scales
-    (low, high), variance = (bound[k] for bound in problem.bounds), max(fit.scatter, 1e-300) ** 2
-    deviation = fit.estimates[k].deviation / problem.scales[k]
+    (low, high), variance = (bound[k] for bound in problem.bounds), max(fit.residual_std, 1e-300) ** 2
+    deviation = fit.estimates[k].stderr / problem.scales[k]
     span = min(high - low, 2.0 * abs(best[k]) or 1.0)
     reach = min(REACH * deviation, span) if np.isfinite(deviation) else span
     rows = [(best[k], fit.costs[0], best)]
@@ -77,4 +77,4 @@ def profile(fit: DynamicFit, name: str, points: int) -> Profile:
     growth = np.array([(cost - fit.costs[0]) / variance for _, cost, _ in rows])
     values = np.array([place for place, _, _ in rows]) * problem.scales[k]
     others = np.array([at for _, _, at in rows]) * problem.scales
-    return Profile(fit.estimates[k].name, fit.estimates[k].unit, values, growth, others)
+    return DynamicProfile(fit.estimates[k].name, fit.estimates[k].unit, values, growth, others)

@@ -14,23 +14,23 @@ from ...core.errors import ParameterError, suggestion
 from ...recording import Recording
 from ..result import Estimate
 from .experiment import Unknown
-from .identifiable import Identifiability
+from .identifiability import Identifiability
 
 if TYPE_CHECKING:
-    from .problem import Problem
-    from .profile import Profile
+    from .problem import DynamicFitProblem
+    from .profile import DynamicProfile
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class DynamicFit:
     """Parameters of a plant found from records of its motion; `print` it."""
 
-    problem: Problem
+    problem: DynamicFitProblem
     estimates: tuple[Estimate, ...]
     correlations: Array
     """Of the estimates, in their order, shape (P, P)."""
     identifiability: Identifiability
-    scatter: float
+    residual_std: float
     """Standard deviation of the residuals in units of the sensors' deviations, N - P in the denominator."""
     costs: Array
     """Sum of squared residuals that every start came to, least first; infinite where a start failed."""
@@ -79,7 +79,7 @@ class DynamicFit:
         """Root mean square of an observed quantity's residuals in one record, in its own unit."""
         return float(np.sqrt(np.nanmean(self.residuals(record)[name] ** 2)))
 
-    def profile(self, name: str, points: int = 9) -> Profile:
+    def profile(self, name: str, points: int = 9) -> DynamicProfile:
         """How the sum of squares grows as one estimate is held at other values and all others are found anew."""
         from .profile import profile
 
@@ -99,7 +99,7 @@ class DynamicFit:
             lines.append(f"record {i + 1}, {course.experiment.recording.origin}: rms {parts} (SI)")
         found = self.identifiability
         lines.append(
-            f"residuals {self.scatter:.3g} sensor deviations; rank {found.rank} of {found.singular.size} off bounds"
+            f"residuals {self.residual_std:.3g} sensor deviations; rank {found.rank} of {found.singular.size} off bounds"
         )
         lines.append(f"{self.reached} of {self.costs.size} starts came to the same optimum")
         return lines
@@ -108,4 +108,4 @@ class DynamicFit:
 def _twice(estimate: Estimate) -> Any:
     if estimate.on_bound:
         return "on bound"
-    return f"{2 * estimate.deviation:.3g}" if np.isfinite(estimate.deviation) else "unknown"
+    return f"{2 * estimate.stderr:.3g}" if np.isfinite(estimate.stderr) else "unknown"

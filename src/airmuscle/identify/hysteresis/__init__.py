@@ -2,8 +2,8 @@
 
 from .creep import Creep, fit_creep
 from .fit import Given, OnContraction, OnPressure, PolynomialCurve, candidates, fit_hysteresis
-from .holds import Hold, holds
-from .loops import Loop, LoopFit, find_loops, fit_loop
+from .holds import Hold, find_holds
+from .loops import HysteresisLoop, LoopFit, find_loops, fit_loop
 from .result import HysteresisFit
 
 __all__ = [
@@ -11,15 +11,15 @@ __all__ = [
     "Given",
     "Hold",
     "HysteresisFit",
-    "Loop",
+    "HysteresisLoop",
     "LoopFit",
     "OnContraction",
     "OnPressure",
     "PolynomialCurve",
     "candidates",
+    "find_holds",
     "find_loops",
     "fit_creep",
     "fit_hysteresis",
     "fit_loop",
-    "holds",
 ]

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...core.arrays import Array
+from ...core.declaration import model, parameter
 from ...core.errors import IdentificationError, ParameterError
-from ...core.model import model, parameter
 from ...recording import Recording
 from .evidence import effective_rows, f_test
 from .result import RARE

@@ -13,13 +13,13 @@ import numpy.typing as npt
 from ...characteristic.base import Characteristic
 from ...core import tree
 from ...core.arrays import Array
+from ...core.declaration import model, parameter
 from ...core.errors import IdentificationError
-from ...core.model import model, parameter
 from ...core.tree import Leaf
 from ...friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, PrandtlIshlinskii
 from ...recording import Recording
-from ...recording.segment import ways_along
-from .result import MILLIMETRES, Axis, Course, HysteresisFit, judged
+from ...recording.segment import motion_direction
+from .result import MILLIMETRES, Axis, HysteresisFit, LoopSeries, judged
 
 Mask = npt.NDArray[np.bool_]
 
@@ -151,17 +151,17 @@ def fit_hysteresis(
     return judged(found, len(free), run, other)
 
 
-def course(recording: Recording, static: StaticCurve, slide: Slide, chosen: Mask | None) -> Course:
+def course(recording: Recording, static: StaticCurve, slide: Slide, chosen: Mask | None) -> LoopSeries:
     """A run as a fit of friction sees it."""
     goal = recording["force"] - static.known(recording)
     rows = np.isfinite(goal) if chosen is None else np.asarray(chosen, dtype=bool) & np.isfinite(goal)
     time = recording.columns.get("time")
     path = slide.path(recording)
-    way = ways_along(path, time)
-    return Course(recording.origin, path, time, goal, static.columns(recording), rows, way, slide.axis)
+    way = motion_direction(path, time)
+    return LoopSeries(recording.origin, path, time, goal, static.columns(recording), rows, way, slide.axis)
 
 
-def _linear(friction: Any, run: Course) -> Friction:
+def _linear(friction: Any, run: LoopSeries) -> Friction:
     """Stiffnesses of elements with given limits: least squares without a search, none of them negative."""
     from scipy.optimize import lsq_linear
 
@@ -176,7 +176,7 @@ def _linear(friction: Any, run: Course) -> Friction:
     return changed
 
 
-def _searched(friction: Friction, run: Course) -> Friction:
+def _searched(friction: Friction, run: LoopSeries) -> Friction:
     """Least squares over the free parameters; the static curve is solved for at every step."""
     from scipy.optimize import least_squares
 
@@ -188,7 +188,7 @@ def _searched(friction: Friction, run: Course) -> Friction:
         values = [leaf.value for leaf in all_leaves]
         for i, scale, coordinate in zip(free, scales, x, strict=True):
             values[i] = scale.value(float(coordinate))
-        return tree.rebuild(friction, values)
+        return tree.unflatten(friction, values)
 
     start = [s.start for s in scales]
     bounds = ([s.low for s in scales], [s.high for s in scales])

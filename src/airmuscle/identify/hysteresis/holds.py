@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...recording import Recording
-from ...recording.segment import Stretch, plateaus
+from ...recording.segment import Interval, find_plateaus
 from ...recording.segment.runs import BAND
 from ...recording.segment.sensor import noise_of
 from ...recording.segment.stretch import level_stretches
@@ -24,14 +24,14 @@ STILL = 5e-4
 class Hold:
     """Rows of a hold, and which quantity creeps in it: the contraction under a load, the force at a length."""
 
-    stretch: Stretch
+    stretch: Interval
     quantity: str
 
 
-def holds(recording: Recording) -> Iterator[Hold]:
+def find_holds(recording: Recording) -> Iterator[Hold]:
     """The holds of a recording among its plateaus of pressure; none without time."""
     force, contraction = recording["force"], recording["contraction"]
-    for plateau in plateaus(recording):
+    for plateau in find_plateaus(recording):
         if len(plateau.stretch) >= FEWEST and np.ptp(force[plateau.stretch.rows]) <= BAND * np.abs(force).max():
             yield Hold(plateau.stretch, "contraction")
             continue
@@ -41,8 +41,8 @@ def holds(recording: Recording) -> Iterator[Hold]:
                 yield Hold(still, "force")
 
 
-def _arrived(values: Array, level: Stretch) -> Stretch:
+def _arrived(values: Array, level: Interval) -> Interval:
     """The stretch without the rows on the way to its level and away from it."""
     inside = values[level.rows]
     near = np.flatnonzero(np.abs(inside - np.median(inside)) <= max(STILL / 10.0, 4.0 * noise_of(inside)))
-    return Stretch(level.start + int(near[0]), level.start + int(near[-1]) + 1) if near.size else Stretch(0, 0)
+    return Interval(level.start + int(near[0]), level.start + int(near[-1]) + 1) if near.size else Interval(0, 0)

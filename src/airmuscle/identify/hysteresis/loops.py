@@ -10,7 +10,16 @@ import numpy as np
 from ...characteristic.base import Characteristic
 from ...core.errors import IdentificationError
 from ...recording import Recording
-from ...recording.segment import ISOBARIC, ISOMETRIC, Run, Sensor, quasi_static, runs, sensors, ways_along
+from ...recording.segment import (
+    ISOBARIC,
+    ISOMETRIC,
+    Run,
+    Sensor,
+    estimate_sensors,
+    find_runs,
+    motion_direction,
+    quasi_static_rows,
+)
 from ...recording.segment.runs import BAND, STROKE
 from .fit import (
     Given,
@@ -28,7 +37,7 @@ from .result import HysteresisFit
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Loop:
+class HysteresisLoop:
     """One run that goes up and down: what is held, what rubs, the curve without friction, and the rows that count."""
 
     recording: Recording
@@ -53,7 +62,7 @@ class Loop:
 class LoopFit:
     """All friction laws on one loop, the most telling first, and those that could not be fitted, with the reason."""
 
-    loop: Loop
+    loop: HysteresisLoop
     fits: tuple[HysteresisFit, ...]
     failed: Mapping[str, str]
 
@@ -74,7 +83,7 @@ def find_loops(
     characteristic: Characteristic | None = None,
     degree: int = 3,
     all_rows: bool = False,
-) -> tuple[Loop, ...]:
+) -> tuple[HysteresisLoop, ...]:
     """The loops in recordings, one for each kind and level; a second run at a level is the judge of the first.
 
     The curve without friction is a polynomial in what is swept, found along with the friction, or the
@@ -82,7 +91,7 @@ def find_loops(
     pressure and length are quiet. Raises IdentificationError for a run that does not come back, or is neither
     isobaric nor isometric while no characteristic is given.
     """
-    sensed, found = sensors(recordings), list[Loop]()
+    sensed, found = estimate_sensors(recordings), list[HysteresisLoop]()
     for recording in recordings:
         loop = _loop(recording, sensed, characteristic, degree, all_rows)
         twin = next((i for i, other in enumerate(found) if _same(other.run, loop.run)), None)
@@ -95,8 +104,8 @@ def find_loops(
 
 def _loop(
     recording: Recording, sensed: Mapping[str, Sensor], law: Characteristic | None, degree: int, all_rows: bool
-) -> Loop:
-    longest = max(runs(recording, sensed), key=lambda run: len(run.stretch))
+) -> HysteresisLoop:
+    longest = max(find_runs(recording, sensed), key=lambda run: len(run.stretch))
     slide: Slide = OnPressure() if longest.kind is ISOMETRIC else OnContraction()
     if law is not None:
         static: StaticCurve = Given(law)
@@ -108,8 +117,8 @@ def _loop(
             "no curve in one of them stands for the muscle without friction. Give its characteristic."
         )
     chosen = _counting(recording, sensed, all_rows)
-    _refuse_one_way(recording, ways_along(slide.path(recording), recording.columns.get("time")), chosen)
-    return Loop(recording, longest, slide, static, chosen)
+    _check_two_directions(recording, motion_direction(slide.path(recording), recording.columns.get("time")), chosen)
+    return HysteresisLoop(recording, longest, slide, static, chosen)
 
 
 def _counting(recording: Recording, sensed: Mapping[str, Sensor], all_rows: bool) -> Mask:
@@ -117,10 +126,10 @@ def _counting(recording: Recording, sensed: Mapping[str, Sensor], all_rows: bool
     pulls = (force > 0) & np.isfinite(force)
     if "force" in sensed:
         pulls &= sensed["force"].sides(force) == 0
-    return pulls if all_rows else pulls & quasi_static(recording, sensed)
+    return pulls if all_rows else pulls & quasi_static_rows(recording, sensed)
 
 
-def _refuse_one_way(recording: Recording, way: np.ndarray, chosen: Mask) -> None:
+def _check_two_directions(recording: Recording, way: np.ndarray, chosen: Mask) -> None:
     for direction, word in ((1, "rises"), (-1, "falls")):
         rows, counting = np.count_nonzero(way == direction), np.count_nonzero((way == direction) & chosen)
         if not counting:
@@ -139,7 +148,7 @@ def _same(one: Run, other: Run) -> bool:
     return abs(one.value - other.value) <= band
 
 
-def fit_loop(loop: Loop, *, elements: int = 8, progress: Callable[[str], None] | None = None) -> LoopFit:
+def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str], None] | None = None) -> LoopFit:
     """Every friction law fitted to a loop, by AICc. `progress` is called with the name of each law."""
     plain = course(loop.recording, loop.static, loop.slide, loop.chosen)
     fits, failed = list[HysteresisFit](), dict[str, str]()

@@ -31,8 +31,8 @@ def winding(travel: float) -> Array:
 
 def plot_loops(friction: Friction, axis: Axis = MILLIMETRES) -> Any:
     """Force over displacement of a friction law: from rest, around the outer loop, through two inner ones."""
-    path = winding(friction.travel or 1e-3)
-    force = friction.replay(path)
+    path = winding(friction.presliding_distance or 1e-3)
+    force = friction.force_along(path)
     parts = [("outer loop", ROWS, len(path)), ("from rest", 0, ROWS + 1)]
     parts += [("inner loops" if i == 0 else "", a * ROWS, b * ROWS + 1) for i, (a, b) in enumerate(INNER)]
     outer = force.copy()
@@ -54,7 +54,7 @@ def plot_hysteresis(fit: HysteresisFit) -> Any:
     left = run.goal - run.columns @ fit.coefficients
     figure, (upper, lower) = new_figure(2, 1, width=6.0, height=5.6, sharex=True)
     path = run.path * run.axis.factor
-    force = -fit.friction.replay(run.path, run.time)
+    force = -fit.friction.force_along(run.path, run.time)
     upper.plot(path[run.rows], left[run.rows], "o", color=LINES[0], alpha=0.5, label="measured, less static curve")
     upper.plot(path, force, color=LINES[1], label=f"{type(fit.friction).__name__}, along the whole path")
     upper.set_ylabel("force [N]")

@@ -30,7 +30,7 @@ MILLIMETRES = Axis("displacement [mm]", 1e3)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Course:
+class LoopSeries:
     """One run as the fit sees it: the path, the force that the static columns and the friction shall explain."""
 
     origin: str
@@ -40,19 +40,19 @@ class Course:
     columns: Array
     rows: npt.NDArray[np.bool_]
     """Where errors count."""
-    way: Array
+    direction: Array
     """1 where the path rises, -1 where it falls."""
     axis: Axis = MILLIMETRES
 
     def coefficients(self, friction: Friction | None) -> Array:
         """Of the static columns, best beside this friction, or without any."""
-        goal = self.goal if friction is None else self.goal + friction.replay(self.path, self.time)
+        goal = self.goal if friction is None else self.goal + friction.force_along(self.path, self.time)
         return np.asarray(np.linalg.lstsq(self.columns[self.rows], goal[self.rows], rcond=None)[0])
 
     def errors(self, friction: Friction | None, coefficients: Array) -> Array:
         """Measured less modelled force [N], every row."""
         missing = self.goal - self.columns @ coefficients
-        return missing if friction is None else missing + friction.replay(self.path, self.time)
+        return missing if friction is None else missing + friction.force_along(self.path, self.time)
 
     def remainder(self, friction: Friction | None) -> Array:
         """Errors of the chosen rows, with the best static coefficients."""
@@ -82,7 +82,7 @@ class HysteresisFit:
     repeat_rmse: float
     plain_repeat_rmse: float
     repeatability: float
-    course: Course
+    course: LoopSeries
 
     @property
     def unsettled(self) -> tuple[str, ...]:
@@ -141,19 +141,19 @@ class HysteresisFit:
         return "\n".join([f"{type(self.friction).__name__} fitted to {self.course.origin}", *lines, self.verdict])
 
 
-def judged(friction: Friction, free: int, run: Course, repeat: Course | None) -> HysteresisFit:
+def judged(friction: Friction, free: int, run: LoopSeries, repeat: LoopSeries | None) -> HysteresisFit:
     """A fitted friction, beside the static curve alone."""
     with_it, without = run.coefficients(friction), run.coefficients(None)
     errors, plain = run.errors(friction, with_it)[run.rows], run.errors(None, without)[run.rows]
     square, plain_square = float(np.mean(errors**2)), float(np.mean(plain**2))
     rows, base = effective_rows(errors), run.columns.shape[1]
-    path, way = run.path[run.rows], run.way[run.rows]
+    path, way = run.path[run.rows], run.direction[run.rows]
     again = plain_again = floor = float("nan")
     if repeat is not None:
         again = _rms(repeat.remainder(friction))
         plain_again = _rms(repeat.remainder(None))
         other = repeat.errors(None, without)[repeat.rows]
-        beside = (repeat.path[repeat.rows], other, repeat.way[repeat.rows])
+        beside = (repeat.path[repeat.rows], other, repeat.direction[repeat.rows])
         floor = _rms(branches.repeat_difference(path, plain, way, *beside)) / np.sqrt(2)
     return HysteresisFit(
         friction=friction,

@@ -16,35 +16,35 @@ from ...core.units import bar
 from ...recording import Recording
 
 
-class LoadBox(NamedTuple):
+class LoadRange(NamedTuple):
     """A rectangle of gauge pressure [Pa] and load [N]."""
 
-    least_pressure: float
-    greatest_pressure: float
-    least_force: float
-    greatest_force: float
+    min_pressure: float
+    max_pressure: float
+    min_force: float
+    max_force: float
 
     @classmethod
-    def of_recording(cls, recording: Recording) -> LoadBox:
-        """The smallest box that holds every row."""
+    def of_recording(cls, recording: Recording) -> LoadRange:
+        """The smallest validity range that holds every row."""
         p, f = recording["pressure"], recording["force"]
         return cls(float(p.min()), float(p.max()), float(f.min()), float(f.max()))
 
     @classmethod
-    def of_law(cls, law: Characteristic) -> LoadBox:
-        """The box in which a law answers."""
-        return cls(*law.pressure_reach, *law.force_reach)
+    def of_law(cls, law: Characteristic) -> LoadRange:
+        """The validity range in which a law answers."""
+        return cls(*law.pressure_range, *law.force_range)
 
     def scaled(self, pressure: Array, force: Array) -> tuple[Array, Array]:
-        """Pressure and force as numbers that run from -1 to 1 on the box."""
-        x = 2 * (pressure - self.least_pressure) / (self.greatest_pressure - self.least_pressure) - 1
-        y = 2 * (force - self.least_force) / (self.greatest_force - self.least_force) - 1
+        """Pressure and force as numbers that run from -1 to 1 on the validity range."""
+        x = 2 * (pressure - self.min_pressure) / (self.max_pressure - self.min_pressure) - 1
+        y = 2 * (force - self.min_force) / (self.max_force - self.min_force) - 1
         return x, y
 
     def grid(self, pressures: int, forces: int) -> tuple[Array, Array]:
-        """Even points over the box, edges included, as two arrays of shape (pressures, forces)."""
-        p = np.linspace(self.least_pressure, self.greatest_pressure, pressures)
-        f = np.linspace(self.least_force, self.greatest_force, forces)
+        """Even points over the validity range, edges included, as two arrays of shape (pressures, forces)."""
+        p = np.linspace(self.min_pressure, self.max_pressure, pressures)
+        f = np.linspace(self.min_force, self.max_force, forces)
         return np.broadcast_to(p[:, None], (pressures, forces)), np.broadcast_to(f, (pressures, forces))
 
 
@@ -70,23 +70,25 @@ class Monomials(Basis):
 
 @dataclasses.dataclass(frozen=True)
 class Chebyshev(Basis):
-    """T_i(x) T_j(y), with x and y running from -1 to 1 on a box: nearly orthogonal there."""
+    """T_i(x) T_j(y), with x and y running from -1 to 1 on a validity range: nearly orthogonal there."""
 
-    box: LoadBox
+    validity_range: LoadRange
 
     def columns(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
-        return np.asarray(chebyshev.chebvander2d(*self.box.scaled(pressure, force), [pressure_degree, force_degree]))
+        return np.asarray(
+            chebyshev.chebvander2d(*self.validity_range.scaled(pressure, force), [pressure_degree, force_degree])
+        )
 
     def in_bar_and_newton(self, coefficients: Array, pressure_degree: int, force_degree: int) -> Array:
         """The same sum as coefficients of p^i F^j in bar and newton, in the same order."""
-        box = self.box
-        by_pressure = _monomials(box.least_pressure / bar, box.greatest_pressure / bar, pressure_degree)
-        by_force = _monomials(box.least_force, box.greatest_force, force_degree)
+        validity_range = self.validity_range
+        by_pressure = _monomials(validity_range.min_pressure / bar, validity_range.max_pressure / bar, pressure_degree)
+        by_force = _monomials(validity_range.min_force, validity_range.max_force, force_degree)
         table = coefficients.reshape(pressure_degree + 1, force_degree + 1)
         return (by_pressure @ table @ by_force.T).ravel()
 
 
-@functools.lru_cache(maxsize=64)  # a bootstrap refits one box a thousand times
+@functools.lru_cache(maxsize=64)  # a bootstrap refits one validity range a thousand times
 def _monomials(low: float, high: float, degree: int) -> Array:
     """Column i holds the coefficients of T_i, scaled to low..high, by the powers of the unscaled variable."""
     powers = np.zeros((degree + 1, degree + 1))

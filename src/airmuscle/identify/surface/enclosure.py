@@ -1,4 +1,4 @@
-"""Least squares under conditions on a polynomial's slopes that hold at every point of a box.
+"""Least squares under conditions on a polynomial's slopes that hold at every point of a validity range.
 
 A polynomial lies between the least and the greatest of its Bernstein coefficients on a cell. Slopes whose
 coefficients all have the right sign on every cell so have it everywhere, and not on a grid alone.

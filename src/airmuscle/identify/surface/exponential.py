@@ -1,7 +1,7 @@
 """The procedure of Borzikova et al., for any muscle: measured k become k = k_max (1 - exp v(p, F)).
 
 `linearised` is the paper's way, a spreadsheet's: v is fitted to ln(1 - k/k_max). `nonlinear` is least squares
-on k itself. Both work in Chebyshev polynomials on the box of the data and hand the coefficients over in bar
+on k itself. Both work in Chebyshev polynomials on the validity range of the data and hand the coefficients over in bar
 and newton.
 """
 
@@ -16,7 +16,7 @@ from ...core.arrays import Array
 from ...core.errors import IdentificationError
 from ...recording import Recording
 from ..correlation_index import CorrelationIndex, correlation_index
-from .basis import Chebyshev, Conditioning, LoadBox
+from .basis import Chebyshev, Conditioning, LoadRange
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,7 +30,7 @@ class SurfaceFit:
     """Points that the procedure could not use: k >= k_max has no logarithm."""
     rms: float
     """Root mean square of the errors in contraction [1]."""
-    greatest_error: float
+    max_error: float
     """The greatest error in contraction [1], without its sign."""
     index: CorrelationIndex
     conditioning: Conditioning
@@ -38,7 +38,7 @@ class SurfaceFit:
     def __str__(self) -> str:
         left_out = f", {self.dropped} of them not used (k >= k_max)" if self.dropped else ""
         return (
-            f"{self.procedure}: rms {self.rms:.4%}, at most {self.greatest_error:.4%}, {self.index} over "
+            f"{self.procedure}: rms {self.rms:.4%}, at most {self.max_error:.4%}, {self.index} over "
             f"{self.points} points{left_out}; {self.conditioning}"
         )
 
@@ -58,16 +58,16 @@ class SurfaceProblem:
     @classmethod
     def of(cls, recording: Recording, saturation: float, pressure_degree: int, force_degree: int) -> SurfaceProblem:
         """The problem that a recording poses. Raises IdentificationError where it cannot be solved."""
-        _refuse_unusable(recording, pressure_degree, force_degree)
+        _check_usable(recording, pressure_degree, force_degree)
         pressure, force = recording["pressure"], recording["force"]
-        basis = Chebyshev(LoadBox.of_recording(recording))
+        basis = Chebyshev(LoadRange.of_recording(recording))
         columns = basis.columns(pressure, force, pressure_degree, force_degree)
         contraction = recording["contraction"]
         problem = cls(recording, saturation, pressure_degree, force_degree, basis, columns, contraction)
-        problem.refuse_undetermined(columns)
+        problem.check_determined(columns)
         return problem
 
-    def refuse_undetermined(self, columns: Array) -> None:
+    def check_determined(self, columns: Array) -> None:
         """Raise IdentificationError where these rows of the design leave coefficients open."""
         found = Conditioning.of(columns)
         if found.rank < found.coefficients:
@@ -96,7 +96,7 @@ class SurfaceProblem:
         """The fit that these Chebyshev coefficients of v are."""
         degrees = (self.pressure_degree, self.force_degree)
         plain = self.basis.in_bar_and_newton(coefficients, *degrees)
-        law = BorzikovaExponential(tuple(plain), *self.basis.box, *degrees, saturation=self.saturation)
+        law = BorzikovaExponential(tuple(plain), *self.basis.validity_range, *degrees, saturation=self.saturation)
         modelled = np.asarray(law.contraction(self.recording["pressure"], self.recording["force"]))
         errors = modelled - self.contraction
         return SurfaceFit(
@@ -105,7 +105,7 @@ class SurfaceProblem:
             points=len(self.recording),
             dropped=dropped,
             rms=float(np.sqrt(np.mean(errors**2))),
-            greatest_error=float(np.abs(errors).max()),
+            max_error=float(np.abs(errors).max()),
             index=correlation_index(self.contraction, modelled),
             conditioning=Conditioning.of(self.columns),
         )
@@ -121,7 +121,7 @@ def linearised(
     """
     problem = SurfaceProblem.of(recording, saturation, pressure_degree, force_degree)
     usable = problem.contraction < saturation
-    problem.refuse_undetermined(problem.columns[usable])
+    problem.check_determined(problem.columns[usable])
     targets = np.log(1.0 - problem.contraction[usable] / saturation)
     coefficients = np.linalg.lstsq(problem.columns[usable], targets, rcond=None)[0]
     return problem.fit(np.asarray(coefficients, dtype=float), "linearised least squares", int((~usable).sum()))
@@ -157,8 +157,8 @@ def nonlinear(
     return problem.fit(np.asarray(found.x), "nonlinear least squares")
 
 
-def _refuse_unusable(recording: Recording, pressure_degree: int, force_degree: int) -> None:
-    """Raise IdentificationError for rows that are no numbers, too few rows, or a box without extent."""
+def _check_usable(recording: Recording, pressure_degree: int, force_degree: int) -> None:
+    """Raise IdentificationError for rows that are no numbers, too few rows, or a validity range without extent."""
     for name in ("pressure", "force", "contraction"):
         bad = np.flatnonzero(~np.isfinite(recording[name]))
         if bad.size:

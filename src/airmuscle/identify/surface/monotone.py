@@ -1,9 +1,9 @@
-"""Where a contraction surface is impossible, and a fit that is possible everywhere on its box.
+"""Where a contraction surface is impossible, and a fit that is possible everywhere on its validity range.
 
 Under more load a muscle cannot be shorter, and under more pressure it cannot be longer: k must not rise with
 F nor fall with p. As k = k_max (1 - exp v) falls with v, and v is linear in its coefficients, that is a set
 of linear inequalities; written for the Bernstein coefficients of the slopes of v on a few cells, which
-enclose the slopes, they hold at every point of the box and not on a grid alone.
+enclose the slopes, they hold at every point of the validity range and not on a grid alone.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from ...characteristic.base import ContractionLaw
 from ...core.arrays import Array
 from ...core.errors import IdentificationError
 from ...recording import Recording
-from .basis import LoadBox
-from .breaks import Break, Rule, breaks_of
+from .basis import LoadRange
+from .breaks import MonotonicityViolation, Rule, breaks_of
 from .enclosure import constrained, enclosure
 from .exponential import SurfaceFit, SurfaceProblem
 
 MARGIN = 1e-9
-"""Least slope of v on the box scaled to -1..1, so that rounding turns no level stretch round; chosen."""
+"""Least slope of v on the validity range scaled to -1..1, so that rounding turns no level stretch round; chosen."""
 
 
 RISES_WITH_FORCE = Rule("contraction rises with force", "contraction", 1, 1.0)
@@ -29,14 +29,14 @@ FALLS_WITH_PRESSURE = Rule("contraction falls with pressure", "contraction", 0, 
 
 
 def monotonicity_breaks(
-    law: ContractionLaw, box: LoadBox | None = None, points: tuple[int, int] = (201, 201)
-) -> tuple[Break, ...]:
-    """The places in a box where k rises with F or falls with p, largest first.
+    law: ContractionLaw, validity_range: LoadRange | None = None, points: tuple[int, int] = (201, 201)
+) -> tuple[MonotonicityViolation, ...]:
+    """The places in a validity range where k rises with F or falls with p, largest first.
 
-    Without a box it is the law's own. Exact slopes are looked at on `points` even pressures and forces, edges included.
+    Without a validity range it is the law's own. Exact slopes are looked at on `points` even pressures and forces, edges included.
     """
-    box = box or LoadBox.of_law(law)
-    return breaks_of(law, (RISES_WITH_FORCE, FALLS_WITH_PRESSURE), *box.grid(*points))
+    validity_range = validity_range or LoadRange.of_law(law)
+    return breaks_of(law, (RISES_WITH_FORCE, FALLS_WITH_PRESSURE), *validity_range.grid(*points))
 
 
 def monotone(
@@ -50,7 +50,7 @@ def monotone(
     """Fit k by least squares among the surfaces that never rise with F nor fall with p.
 
     `recording` has pressure [Pa], force [N] and contraction [1]; `saturation` is k_max [1]. The slopes are
-    enclosed on `cells` parts of the box in pressure and force; more of them cost time and lose less.
+    enclosed on `cells` parts of the validity range in pressure and force; more of them cost time and lose less.
     Gauss-Newton steps, each a least-squares problem under linear inequalities. Raises IdentificationError.
     """
     problem = SurfaceProblem.of(recording, saturation, pressure_degree, force_degree)
@@ -66,7 +66,7 @@ def monotone(
         step = next((s for s in shorter if _squares(problem, found + s) <= errors @ errors), 0.0 * step)
         found = found + step
         if np.abs(step).max() < 1e-10:
-            return problem.fit(found, "nonlinear least squares, monotone on the box")
+            return problem.fit(found, "nonlinear least squares, monotone on the validity range")
     raise IdentificationError(
         f"{recording.origin}: the monotone fit did not settle in 200 steps. Lower a degree, or fewer cells."
     )
@@ -78,7 +78,7 @@ def _squares(problem: SurfaceProblem, coefficients: Array) -> float:
 
 
 def slope_constraints(pressure_degree: int, force_degree: int, cells: tuple[int, int]) -> Array:
-    """Rows g: v with Chebyshev coefficients c falls with p and rises with F on the box if all g @ c >= 0.
+    """Rows g: v with Chebyshev coefficients c falls with p and rises with F on the validity range if all g @ c >= 0.
 
     They are the Bernstein coefficients of -dv/dx and dv/dy on every cell; a polynomial lies between the least
     and the greatest of its Bernstein coefficients, so the condition suffices. It is nearly necessary on small

@@ -1,7 +1,7 @@
 """A force surface that a muscle can have: force not falling with pressure, nor rising with contraction.
 
 Both are linear in the coefficients of a surface. Written for the Bernstein coefficients of its slopes on a few
-cells, which enclose the slopes, the inequalities hold at every point of the box and not on a grid alone.
+cells, which enclose the slopes, the inequalities hold at every point of the validity range and not on a grid alone.
 """
 
 from __future__ import annotations
@@ -13,34 +13,36 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from ...characteristic.base import ForceLaw
-from ...characteristic.box import Box
 from ...characteristic.contractile_surface import ContractileSurface, exponents
+from ...characteristic.validity_range import ValidityRange
 from ...core.arrays import Array
 from ...core.errors import IdentificationError
 from ...recording import Recording
-from ..fit import fit
 from ..result import Fit
-from .breaks import Break, Rule, breaks_of
+from ..static_fit import fit
+from .breaks import MonotonicityViolation, Rule, breaks_of
 from .enclosure import constrained, enclosure
 
 _MARGIN = 1e-9
-"""Least slope on the box scaled to -1..1, in parts of the greatest force, so that rounding turns none round; chosen."""
+"""Least slope on the validity range scaled to -1..1, in parts of the greatest force, so that rounding turns none round; chosen."""
 FALLS_WITH_PRESSURE = Rule("force falls with pressure", "force", 0, -1.0)
 RISES_WITH_CONTRACTION = Rule("force rises with contraction", "force", 1, 1.0)
 
 
-def shape_breaks(law: ForceLaw, box: Box, *, points: int = 101) -> tuple[Break, ...]:
-    """The places of a box where a muscle's force falls with pressure or rises with contraction, largest first."""
-    sides = (np.linspace(*box.pressure, points), np.linspace(*box.contraction, points))
+def shape_breaks(
+    law: ForceLaw, validity_range: ValidityRange, *, points: int = 101
+) -> tuple[MonotonicityViolation, ...]:
+    """The places of a validity range where a muscle's force falls with pressure or rises with contraction, largest first."""
+    sides = (np.linspace(*validity_range.pressure, points), np.linspace(*validity_range.contraction, points))
     return breaks_of(law, (FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION), *np.meshgrid(*sides, indexing="ij"))
 
 
-def broken_by(fit: Fit, *, points: int = 101) -> tuple[Break, ...]:
-    """The places in the data's box where a fitted law breaks a rule; none for laws that are no closed-form force."""
+def broken_by(fit: Fit, *, points: int = 101) -> tuple[MonotonicityViolation, ...]:
+    """The places in the data's validity range where a fitted law breaks a rule; none for laws that are no closed-form force."""
     law = fit.model
     if not isinstance(law, ForceLaw) or not law.traceable or not all(low < high for low, high in fit.ranges.values()):
         return ()
-    return shape_breaks(law, fit.box, points=points)
+    return shape_breaks(law, fit.validity_range, points=points)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,7 +54,7 @@ class ShapedFit:
     """Root mean square error over the fitted rows [N]."""
     unconstrained: float
     """The same without conditions [N]: what they cost is the difference."""
-    broken: tuple[Break, ...]
+    broken: tuple[MonotonicityViolation, ...]
     """Where the surface without conditions breaks a rule."""
 
 
@@ -63,14 +65,14 @@ def fit_shaped(
     free: Recording | None = None,
     cells: tuple[int, int] = (6, 6),
 ) -> ShapedFit:
-    """Fit a surface by least squares among those whose force never falls with p nor rises with eps on the box.
+    """Fit a surface by least squares among those whose force never falls with p nor rises with eps on the validity range.
 
     `free` holds points (pressure, contraction) at which the muscle hangs free: there the force is made zero. The
-    slopes are enclosed on `cells` parts of the box in pressure and contraction; more of them cost time and lose less.
+    slopes are enclosed on `cells` parts of the validity range in pressure and contraction; more of them cost time and lose less.
     Rows that the fit without conditions counts are counted. Raises IdentificationError where no surface can be so.
     """
     runs = [recording] if isinstance(recording, Recording) else list(recording)
-    if free is not None:  # as slack points they only widen the box
+    if free is not None:  # as slack points they only widen the validity range
         runs.append(free.with_columns(force=np.zeros(len(free))))
     loose = fit(surface, runs)
     law = loose.model
@@ -85,7 +87,7 @@ def fit_shaped(
     found = basis @ constrained(matrix @ basis, goal / scale, rows @ basis, _MARGIN if free is None else 0.0)
     model = dataclasses.replace(law, coefficients=tuple(float(a) for a in scale * found))
     errors = matrix @ (scale * found) - goal
-    return ShapedFit(model, float(np.sqrt(np.mean(errors**2))), loose.rmse, shape_breaks(law, law.box))
+    return ShapedFit(model, float(np.sqrt(np.mean(errors**2))), loose.rmse, shape_breaks(law, law.validity_range))
 
 
 def _through(law: ContractileSurface, free: Recording | None) -> Array:
@@ -105,7 +107,7 @@ def _through(law: ContractileSurface, free: Recording | None) -> Array:
 
 
 def shape_constraints(degree: int, cells: tuple[int, int]) -> Array:
-    """Rows g: a surface keeps its shape on the box if all g @ coefficients >= 0; `cells` by pressure, contraction."""
+    """Rows g: a surface keeps its shape on the validity range if all g @ coefficients >= 0; `cells` by pressure, contraction."""
     chosen = [j * (degree + 1) + i for i, j in exponents(degree)]
     rises = np.kron(_enclosure(degree, cells[0], slope=True), _enclosure(degree, cells[1], slope=False))
     falls = -np.kron(_enclosure(degree, cells[0], slope=False), _enclosure(degree, cells[1], slope=True))

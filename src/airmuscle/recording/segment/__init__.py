@@ -1,15 +1,15 @@
 """What a recording consists of: runs, branches, plateaus, transients, glitches, and what its sensors can tell."""
 
-from .branches import Branch, branches, directions, ways_along
-from .findings import Finding, refuse_unswept
+from .branches import Branch, directions, find_branches, motion_direction
+from .findings import Finding, check_swept
 from .inspection import Inspection, inspect, inspect_all
-from .outliers import Outlier, outliers
-from .plateaus import Plateau, plateau_points, plateaus
-from .quasi_static import quasi_static
-from .runs import AT_REST, FREE, ISOBARIC, ISOMETRIC, ISOTONIC, Run, runs
-from .sampling import Sampling, sampling
-from .sensor import Sensor, sensors
-from .stretch import Stretch
+from .outliers import Outlier, find_outliers
+from .plateaus import Plateau, find_plateaus, plateau_points
+from .quasi_static import quasi_static_rows
+from .runs import AT_REST, FREE, ISOBARIC, ISOMETRIC, ISOTONIC, Run, find_runs
+from .sampling import Sampling, analyse_sampling
+from .sensor import Sensor, estimate_sensors
+from .stretch import Interval
 
 __all__ = [
     "AT_REST",
@@ -20,23 +20,23 @@ __all__ = [
     "Branch",
     "Finding",
     "Inspection",
+    "Interval",
     "Outlier",
     "Plateau",
     "Run",
     "Sampling",
     "Sensor",
-    "Stretch",
-    "branches",
+    "analyse_sampling",
+    "check_swept",
     "directions",
+    "estimate_sensors",
+    "find_branches",
+    "find_outliers",
+    "find_plateaus",
+    "find_runs",
     "inspect",
     "inspect_all",
-    "outliers",
+    "motion_direction",
     "plateau_points",
-    "plateaus",
-    "quasi_static",
-    "refuse_unswept",
-    "runs",
-    "sampling",
-    "sensors",
-    "ways_along",
+    "quasi_static_rows",
 ]

@@ -18,7 +18,7 @@ from ...core.arrays import Array
 from ..recording import Recording
 from .sampling import row_count
 from .sensor import Sensor
-from .stretch import Stretch, running_median
+from .stretch import Interval, running_median
 
 SWING = 0.05
 """The part of the range by which the pressure must come back before it has turned (chosen)."""
@@ -32,7 +32,7 @@ LEAVES = 0.25
 class Branch:
     """Rows on which the muscle is inflating (direction 1) or deflating (-1), with pressures at both ends [Pa]."""
 
-    stretch: Stretch
+    stretch: Interval
     direction: int
     start_pressure: float
     end_pressure: float
@@ -43,7 +43,7 @@ class Branch:
         return "inflating" if self.direction > 0 else "deflating"
 
 
-def branches(recording: Recording, sensor: Sensor | None = None, *, swing: float = SWING) -> tuple[Branch, ...]:
+def find_branches(recording: Recording, sensor: Sensor | None = None, *, swing: float = SWING) -> tuple[Branch, ...]:
     """The branches of a recording in their order; none where the pressure does not move or is not there.
 
     A turn needs `swing` of the pressure's range and ten deviations of the sensor. Without time, the order of the rows
@@ -56,7 +56,7 @@ def branches(recording: Recording, sensor: Sensor | None = None, *, swing: float
     return tuple(_branch(calm, stretch, direction) for stretch, direction in found)
 
 
-def ways_along(values: Array, time: Array | None = None, *, swing: float = SWING) -> Array:
+def motion_direction(values: Array, time: Array | None = None, *, swing: float = SWING) -> Array:
     """By row of any path: 1 where it rises, -1 where it falls, told as branches are told from the pressure.
 
     0 throughout where it does not move.
@@ -72,14 +72,14 @@ def _without_spikes(values: Array, time: Array | None) -> Array:
     return values if time is None else running_median(values, 2 * row_count(SPIKE / 2.0, time, 1) + 1)
 
 
-def _ways(calm: Array, least: float) -> list[tuple[Stretch, int]]:
+def _ways(calm: Array, least: float) -> list[tuple[Interval, int]]:
     """The stretches between turns, each with its direction; none where all stays within `least`."""
     if not len(calm) or not float(np.ptp(calm)) > least:
         return []
     turns = list(_turns(calm, least))
     starts = [0, *(row for row, _ in turns[1:]), len(calm)]
     pairs = zip(itertools.pairwise(starts), turns, strict=True)
-    return [(Stretch(a, b), direction) for (a, b), (_, direction) in pairs]
+    return [(Interval(a, b), direction) for (a, b), (_, direction) in pairs]
 
 
 def _turns(pressure: Array, least: float) -> Iterator[tuple[int, int]]:
@@ -109,7 +109,7 @@ def _leaves(values: list[float], extreme: int, here: int, direction: int, least:
     return last + 1
 
 
-def _branch(pressure: Array, stretch: Stretch, direction: int) -> Branch:
+def _branch(pressure: Array, stretch: Interval, direction: int) -> Branch:
     return Branch(stretch, direction, float(pressure[stretch.start]), float(pressure[stretch.stop - 1]))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ...core.errors import ColumnError
 from ..columns import quantity_of
 from ..recording import Recording
-from .quasi_static import quasi_static
+from .quasi_static import quasi_static_rows
 from .runs import AT_REST, KINDS, Run
 from .sampling import Sampling
 from .sensor import Sensor
@@ -46,7 +46,7 @@ def findings(
     return tuple(sorted(everything, key=lambda finding: not finding.serious))
 
 
-def refuse_unswept(recording: Recording, found: tuple[Run, ...]) -> None:
+def check_swept(recording: Recording, found: tuple[Run, ...]) -> None:
     """Raise ColumnError where nothing in a recording is swept, or it is not the run that it is said to be."""
     for finding in _of_runs(recording, found):
         if finding.serious:
@@ -76,7 +76,7 @@ def _of_time(recording: Recording, timing: Sampling | None) -> Iterator[Finding]
 
 def _of_sensors(recording: Recording, sensed: Mapping[str, Sensor]) -> Iterator[Finding]:
     for name, sensor in sensed.items():
-        for end, word in ((sensor.least, "least"), (sensor.greatest, "greatest")):
+        for end, word in ((sensor.lower_limit, "lowest"), (sensor.upper_limit, "highest")):
             if name not in recording.columns or not np.isfinite(end):
                 continue
             count = int(np.count_nonzero(np.abs(recording[name] - end) <= 0.25 * sensor.resolution))
@@ -127,7 +127,7 @@ def _of_length(recording: Recording, timing: Sampling | None, sensed: Mapping[st
     if reach <= WITHIN_NOISE * (sensed["pressure"].deviation if "pressure" in sensed else 0.0):
         return
     last = pressure[-max(len(pressure) // 10, 3) :]
-    calm = quasi_static(recording, sensed)
+    calm = quasi_static_rows(recording, sensed)
     if reach > 0 and not calm[-1] and abs(last[-1] - last[0]) > UNSETTLED * reach:
         yield Finding(
             f"the record ends while the pressure still changes ({abs(last[-1] - last[0]) / 1e3:.4g} kPa in the last "

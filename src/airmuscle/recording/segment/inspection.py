@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..recording import Recording
-from .branches import Branch, agreement, branches
+from .branches import Branch, agreement, find_branches
 from .findings import Finding, findings
-from .outliers import Outlier, outliers
-from .plateaus import Plateau, plateaus
-from .quasi_static import quasi_static
-from .runs import Run, runs
-from .sampling import Sampling, sampling
-from .sensor import Sensor, sensors
+from .outliers import Outlier, find_outliers
+from .plateaus import Plateau, find_plateaus
+from .quasi_static import quasi_static_rows
+from .runs import Run, find_runs
+from .sampling import Sampling, analyse_sampling
+from .sensor import Sensor, estimate_sensors
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -43,20 +43,20 @@ class Inspection:
 
 def inspect(recording: Recording, sensed: Mapping[str, Sensor] | None = None) -> Inspection:
     """What a recording holds. `sensed` are the sensors of the rig, where several recordings show them better."""
-    known = {**sensors(recording), **{n: s for n, s in (sensed or {}).items() if n in recording.columns}}
-    timing = sampling(recording)
-    found = runs(recording, known)
+    known = {**estimate_sensors(recording), **{n: s for n, s in (sensed or {}).items() if n in recording.columns}}
+    timing = analyse_sampling(recording)
+    found = find_runs(recording, known)
     ordered = timing is None or not (timing.repeats or timing.backward)
-    turned = branches(recording, known.get("pressure"))
+    turned = find_branches(recording, known.get("pressure"))
     return Inspection(
         recording,
         timing,
         known,
         found,
         turned,
-        plateaus(recording, known) if ordered else (),
-        outliers(recording, known),
-        float(quasi_static(recording, known).mean()) if len(recording) else 0.0,
+        find_plateaus(recording, known) if ordered else (),
+        find_outliers(recording, known),
+        float(quasi_static_rows(recording, known).mean()) if len(recording) else 0.0,
         agreement(recording, turned) if turned else None,
         findings(recording, timing, known, found),
     )
@@ -64,5 +64,5 @@ def inspect(recording: Recording, sensed: Mapping[str, Sensor] | None = None) ->
 
 def inspect_all(recordings: Sequence[Recording]) -> tuple[Inspection, ...]:
     """The inspections of recordings from one rig, whose sensors are estimated together."""
-    together = sensors(recordings)
+    together = estimate_sensors(recordings)
     return tuple(inspect(recording, together) for recording in recordings)

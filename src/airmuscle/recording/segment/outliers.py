@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core.arrays import Array
 from ..recording import Recording
-from .sensor import Sensor, sensors
+from .sensor import Sensor, estimate_sensors
 
 DEVIATIONS = 8.0
 """How many deviations make a glitch (chosen: noise with long tails reaches five or six)."""
@@ -34,13 +34,13 @@ class Outlier:
     deviations: float
 
 
-def outliers(recording: Recording, sensed: Mapping[str, Sensor] | None = None) -> tuple[Outlier, ...]:
+def find_outliers(recording: Recording, sensed: Mapping[str, Sensor] | None = None) -> tuple[Outlier, ...]:
     """The suspected glitches of a recording in time; without time, neighbours say nothing and none is listed."""
     if "time" not in recording or len(recording) < 2 * REACH + 2:
         return ()
     return tuple(
         found
-        for name, sensor in (sensed or sensors(recording)).items()
+        for name, sensor in (sensed or estimate_sensors(recording)).items()
         if name in recording.columns
         for found in _glitches(name, recording[name], sensor)
     )

@@ -9,10 +9,10 @@ import numpy as np
 
 from ...core.arrays import Array
 from ..recording import Recording
-from .quasi_static import CHANGE, quasi_static
+from .quasi_static import CHANGE, quasi_static_rows
 from .sampling import row_count
-from .sensor import Sensor, sensors
-from .stretch import Stretch, level_stretches, true_stretches
+from .sensor import Sensor, estimate_sensors
+from .stretch import Interval, level_stretches, true_stretches
 
 LEAST = 0.2
 """The shortest plateau [s] (chosen)."""
@@ -24,12 +24,12 @@ FEWEST = 3
 class Plateau:
     """Where a plateau is, and for each column its median and the standard deviation of that mean [SI]."""
 
-    stretch: Stretch
+    stretch: Interval
     values: Mapping[str, float]
     deviations: Mapping[str, float]
 
 
-def plateaus(
+def find_plateaus(
     recording: Recording, sensed: Mapping[str, Sensor] | None = None, *, least: float = LEAST
 ) -> tuple[Plateau, ...]:
     """The plateaus of the pressure among the quasi-static rows; none without time, and none on a slow ramp.
@@ -38,12 +38,12 @@ def plateaus(
     """
     if "time" not in recording or "pressure" not in recording or len(recording) < FEWEST:
         return ()
-    pressure, sensed = recording["pressure"], sensed or sensors(recording)
+    pressure, sensed = recording["pressure"], sensed or estimate_sensors(recording)
     band = max(2.0 * CHANGE * float(np.ptp(pressure)), 8.0 * sensed["pressure"].deviation)
     fewest = max(FEWEST, row_count(least, recording["time"], FEWEST))
     return tuple(
         _plateau(recording, stretch)
-        for calm in true_stretches(quasi_static(recording, sensed))
+        for calm in true_stretches(quasi_static_rows(recording, sensed))
         for stretch in level_stretches(pressure, band, within=calm)
         if len(stretch) >= fewest and not _runs_through(pressure[stretch.rows], band)
     )
@@ -54,7 +54,7 @@ def _runs_through(pressure: Array, band: float) -> bool:
     return bool(abs(np.median(pressure[-third:]) - np.median(pressure[:third])) > 0.4 * band)
 
 
-def _plateau(recording: Recording, stretch: Stretch) -> Plateau:
+def _plateau(recording: Recording, stretch: Interval) -> Plateau:
     rows = {name: recording[name][stretch.rows] for name in recording}
     values = {name: float(np.median(values)) for name, values in rows.items()}
     count = np.sqrt(len(stretch))

@@ -63,7 +63,7 @@ def _mark_glitches(axis: Any, seen: Inspection, name: str, across: Any, values: 
 
 
 def _mark_ends(axis: Any, sensor: Sensor, values: Any, factor: float) -> None:
-    for end in (sensor.least, sensor.greatest):
+    for end in (sensor.lower_limit, sensor.upper_limit):
         if np.isfinite(end) and values.size:
             axis.axhline(end * factor, color=ORANGE, linestyle="--", linewidth=1.0)
             axis.annotate("cut off", (0.995, end * factor), xycoords=("axes fraction", "data"), ha="right", va="bottom",

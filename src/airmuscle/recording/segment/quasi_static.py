@@ -14,7 +14,7 @@ import numpy as np
 from ...core.arrays import Array
 from ..recording import Recording
 from .sampling import row_count
-from .sensor import Sensor, sensors
+from .sensor import Sensor, estimate_sensors
 from .stretch import Mask
 
 SETTLING = 0.1
@@ -22,7 +22,7 @@ CHANGE = 0.01
 _MOVING = ("pressure", "contraction", "length", "position")
 
 
-def quasi_static(
+def quasi_static_rows(
     recording: Recording,
     sensed: Mapping[str, Sensor] | None = None,
     *,
@@ -35,7 +35,7 @@ def quasi_static(
         return calm
     time = recording["time"]
     width = row_count(settling, time, 1)
-    sensed = sensed or sensors(recording)
+    sensed = sensed or estimate_sensors(recording)
     for name in recording:
         if name.rpartition(".")[2] in _MOVING and name in sensed:
             calm &= ~_moves(recording[name], width, change, sensed[name])

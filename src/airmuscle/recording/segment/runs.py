@@ -1,4 +1,4 @@
-"""Runs: stretches of a recording in which one quantity is held while others sweep.
+"""RunSplit: stretches of a recording in which one quantity is held while others sweep.
 
 Held pressure is an isobaric run, held length or contraction an isometric one, held force an isotonic one. Held means
 within `BAND` of the greatest value (within `STROKE` of contraction), or within what the sensor's noise explains. A file
@@ -15,8 +15,8 @@ import numpy as np
 
 from ...core.arrays import Array
 from ..recording import Recording
-from .sensor import Sensor, sensors
-from .stretch import Stretch, level_stretches
+from .sensor import Sensor, estimate_sensors
+from .stretch import Interval, level_stretches
 
 BAND = 0.02
 """Part of its greatest value within which a quantity counts as held (chosen)."""
@@ -49,19 +49,19 @@ KINDS = (ISOBARIC, ISOMETRIC, ISOTONIC)
 class Run:
     """Rows of one kind; `column` is held at `value` [SI], `swept` are the columns that change."""
 
-    stretch: Stretch
+    stretch: Interval
     kind: Kind
     column: str | None
     value: float | None
     swept: tuple[str, ...]
 
 
-def runs(recording: Recording, sensed: Mapping[str, Sensor] | None = None) -> tuple[Run, ...]:
+def find_runs(recording: Recording, sensed: Mapping[str, Sensor] | None = None) -> tuple[Run, ...]:
     """The runs of a recording; one of kind FREE where nothing is held, none of an empty recording."""
     if not len(recording):
         return ()
-    bands = _bands(recording, sensed or sensors(recording))
-    whole = _run(recording, Stretch(0, len(recording)), bands)
+    bands = _bands(recording, sensed or estimate_sensors(recording))
+    whole = _run(recording, Interval(0, len(recording)), bands)
     if whole.kind is not FREE:
         return (whole,)
     split = [found for kind in KINDS if (found := _levels(recording, kind, bands))]
@@ -89,7 +89,7 @@ def _least_band(recording: Recording, name: str) -> float:
     return greatest * (STROKE if name == "length" else BAND)
 
 
-def _run(recording: Recording, stretch: Stretch, bands: dict[str, float]) -> Run:
+def _run(recording: Recording, stretch: Interval, bands: dict[str, float]) -> Run:
     """The run that a stretch is. Where two quantities are held, the pressure names it before length and force."""
     names = {kind: name for kind in KINDS if (name := _column(recording, kind))}
     held = [kind for kind, name in names.items() if _spread(recording[name][stretch.rows]) <= bands[name]]
@@ -101,7 +101,7 @@ def _run(recording: Recording, stretch: Stretch, bands: dict[str, float]) -> Run
     return _held(recording, stretch, held[0], names[held[0]], swept)
 
 
-def _held(recording: Recording, stretch: Stretch, kind: Kind, name: str, swept: tuple[str, ...]) -> Run:
+def _held(recording: Recording, stretch: Interval, kind: Kind, name: str, swept: tuple[str, ...]) -> Run:
     return Run(stretch, kind, name, float(np.median(recording[name][stretch.rows])), swept)
 
 

@@ -44,7 +44,7 @@ class Sampling:
         return 1.0 / self.step if self.step > 0 else float("nan")
 
 
-def sampling(recording: Recording) -> Sampling | None:
+def analyse_sampling(recording: Recording) -> Sampling | None:
     """The sampling of a recording; None where it has no time, or fewer than two rows."""
     if "time" not in recording or len(recording) < 2:
         return None

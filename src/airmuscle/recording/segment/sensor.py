@@ -37,17 +37,17 @@ _IGNORED = ("time", "branch", "fill", "discharge", "held")
 class Sensor:
     """A column's sensor in the column's SI unit: resolution (0 where none shows), noise, and its two ends.
 
-    `least` and `greatest` are readings at which it is cut off, infinite where it is not; `at_least` and
-    `at_greatest` count the rows that stand there.
+    `lower_limit` and `upper_limit` are readings at which it is cut off, infinite where it is not; `at_lower_limit` and
+    `at_upper_limit` count the rows that stand there.
     """
 
     name: str
     resolution: float
     noise: float
-    least: float = -math.inf
-    greatest: float = math.inf
-    at_least: int = 0
-    at_greatest: int = 0
+    lower_limit: float = -math.inf
+    upper_limit: float = math.inf
+    at_lower_limit: int = 0
+    at_upper_limit: int = 0
 
     @property
     def deviation(self) -> float:
@@ -57,10 +57,10 @@ class Sensor:
     def sides(self, values: Array) -> Array:
         """By row: 0 measured, 1 cut off below (the truth is less), -1 cut off above."""
         near = 0.25 * self.resolution
-        return (values <= self.least + near) * 1.0 - (values >= self.greatest - near) * 1.0
+        return (values <= self.lower_limit + near) * 1.0 - (values >= self.upper_limit - near) * 1.0
 
 
-def sensors(recordings: Recording | Sequence[Recording]) -> Mapping[str, Sensor]:
+def estimate_sensors(recordings: Recording | Sequence[Recording]) -> Mapping[str, Sensor]:
     """The sensors behind the columns of a recording, or of several that come from one rig.
 
     Ends show better in several: one run may hardly reach an end. Resolution and noise are the median of the runs.

@@ -14,7 +14,7 @@ Mask = npt.NDArray[np.bool_]
 
 
 @dataclasses.dataclass(frozen=True)
-class Stretch:
+class Interval:
     """Rows `start` to before `stop`, counted from 0."""
 
     start: int
@@ -29,19 +29,19 @@ class Stretch:
         return slice(self.start, self.stop)
 
 
-def true_stretches(mask: Mask) -> list[Stretch]:
+def true_stretches(mask: Mask) -> list[Interval]:
     """The stretches in which a mask is true."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
-    return [Stretch(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [Interval(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def level_stretches(values: Array, band: float, *, within: Stretch | None = None) -> Iterator[Stretch]:
+def level_stretches(values: Array, band: float, *, within: Interval | None = None) -> Iterator[Interval]:
     """The longest stretches, from the front, whose values all fit into a band of this width."""
-    whole = within or Stretch(0, len(values))
+    whole = within or Interval(0, len(values))
     start = whole.start
     while start < whole.stop:
         stop = _leaves_band(values[: whole.stop], start, band)
-        yield Stretch(start, stop)
+        yield Interval(start, stop)
         start = stop
 
 

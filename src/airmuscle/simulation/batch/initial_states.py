@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ...analysis.equilibrium import equilibrium, equilibrium_of_each, given_inputs
+from ...analysis.equilibrium import find_equilibrium, find_equilibrium_of_each, given_inputs
 from ...analysis.equilibrium.many import block_of
 from ...compile import System
 from ...core.arrays import Array
 from ...core.errors import ParameterError, PhysicsError, suggestion
 from ...plant.plant import Plant
-from ...plant.state import less_than_none
+from ...plant.state import has_negative_mass
 from .variations import Variations
 
 
@@ -47,7 +47,7 @@ def given_starts(system: System, start: Mapping[str, npt.ArrayLike], count: int)
         wrong = np.flatnonzero(~np.isfinite(found[:, i]))
         if wrong.size:
             raise ParameterError(f"start, row {wrong[0]}: '{name}' is {found[wrong[0], i]}; it must be finite.")
-    for row, i in np.argwhere(less_than_none(system, found)):
+    for row, i in np.argwhere(has_negative_mass(system, found)):
         raise ParameterError(f"start, row {row}: '{names[i]}' is {found[row, i]:g}; there is no less air than none.")
     return found
 
@@ -58,20 +58,20 @@ def resting_starts(variations: Variations, advanced: Callable[[int], None]) -> t
     A circuit without states does not matter to it, so plants that differ in nothing else share it. `advanced` is told
     how many are done.
     """
-    from ...compile.program import prepared  # CasADi, which describing a plant does not need
+    from ...compile.program import compile_system  # CasADi, which describing a plant does not need
 
     plant = variations.system
     if not isinstance(plant, Plant):
         raise ParameterError(f"simulate_batch: give the start of {type(plant).__name__}, a value for each state.")
     given_inputs(plant, None)  # refused where an input cannot be 0
     rows, shared = _different(plant, variations)
-    ready, pressures = prepared(plant), (0.0,) * len(plant.muscles)
+    ready, pressures = compile_system(plant), (0.0,) * len(plant.muscles)
     inputs, names = np.zeros(len(plant.inputs)), [s.name for s in plant.states]
     states, reasons = np.full((rows.size, len(names)), np.nan), dict[int, str]()
     each = block_of(len(names))
     for begin in range(0, rows.size, each):
         part = rows[begin : begin + each]
-        found = equilibrium_of_each(ready, variations.table(part), pressures, inputs)
+        found = find_equilibrium_of_each(ready, variations.table(part), pressures, inputs)
         states[begin : begin + each] = found.states
         for i in np.flatnonzero(~np.isfinite(found.states).all(axis=1)):
             state = _rest(variations.one(int(part[i])), names)
@@ -98,7 +98,7 @@ def _different(plant: Plant, variations: Variations) -> tuple[npt.NDArray[np.int
 def _rest(plant: System, names: list[str]) -> Array | str:
     assert isinstance(plant, Plant)
     try:
-        state = equilibrium(plant, pressure=0.0)
+        state = find_equilibrium(plant, pressure=0.0)
     except PhysicsError as error:
         return f"it has no equilibrium to start from: {error}"
     return np.array([state[name] for name in names])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import dataclasses
 
-from ...compile.llvm.types import Number
+from ...compile.llvm.types import LlvmType
 
 BITS = 1024
 """Size of a row of plants side by side: two of the widest registers, which take turns."""
@@ -16,7 +16,7 @@ class Precision(abc.ABC):
 
     @property
     @abc.abstractmethod
-    def number(self) -> Number:
+    def number(self) -> LlvmType:
         """The printed number, in lanes."""
 
     @property
@@ -30,8 +30,8 @@ class Double(Precision):
     """Sixteen digits, as everywhere; the default."""
 
     @property
-    def number(self) -> Number:
-        return Number(64, BITS // 64)
+    def number(self) -> LlvmType:
+        return LlvmType(64, BITS // 64)
 
     @property
     def note(self) -> str:
@@ -43,8 +43,8 @@ class Single(Precision):
     """Seven digits a number: half the memory and about twice as fast, for methods of fixed step."""
 
     @property
-    def number(self) -> Number:
-        return Number(32, BITS // 32)
+    def number(self) -> LlvmType:
+        return LlvmType(32, BITS // 32)
 
     @property
     def note(self) -> str:

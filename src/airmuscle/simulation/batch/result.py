@@ -14,9 +14,9 @@ from ...core.arrays import Array
 from ...core.errors import ColumnError, suggestion
 from ...plant.plant import Plant
 from ...recording import Recording
-from ..diagnostics import beyond_laws
+from ..diagnostics import validity_warnings
 from ..integrators import REASONS
-from ..result import friction_in_words, outside_box
+from ..result import describe_friction, extrapolation_warnings
 from .variations import Variations
 
 NOT_STARTED = 6
@@ -24,7 +24,7 @@ WORDS = {**REASONS, NOT_STARTED: "it had no start"}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Batch:
+class BatchSolution:
     """N plants that were run together.
 
     time     (T,) instants [s] of the columns, the same for all
@@ -92,10 +92,10 @@ class Batch:
             constants = {"ambient": system.ambient.pressure}
             if len(system.muscles) == 1:
                 constants["resting_length"] = system.muscles[0].geometry.resting_length
-            notes += [f"gas: {system.gas}", friction_in_words(system)]
+            notes += [f"gas: {system.gas}", describe_friction(system)]
             if all(f"{p}{name}" in columns for p in system.prefixes for name in ("pressure", "contraction")):
-                notes += outside_box(system, columns)
-            notes += beyond_laws(system, columns) if self.reached[index] else []
+                notes += extrapolation_warnings(system, columns)
+            notes += validity_warnings(system, columns) if self.reached[index] else []
         if self.status[index]:
             notes.append(self.reason(index))
         return Recording(columns, "simulation", constants, tuple(notes))

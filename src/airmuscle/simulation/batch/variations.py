@@ -39,7 +39,7 @@ class Variations:
 
     def one(self, index: int) -> System:
         """One of the systems."""
-        return tree.rebuild(self.system, self.parameters(index).tolist())
+        return tree.unflatten(self.system, self.parameters(index).tolist())
 
     def nominal(self) -> Array:
         """The size (N, n) of each state below which its relative error no longer matters, for every system."""
@@ -58,9 +58,9 @@ class Variations:
         leaves: list[Any] = tree.flatten(self.system).tolist()
         for place, column in zip(self.places, self.values.T, strict=True):
             leaves[place] = column.view(Column)
-        return tree.rebuild(self.system, leaves)
+        return tree.unflatten(self.system, leaves)
 
-    def refuse_inconsistent(self) -> None:
+    def check_consistent(self) -> None:
         """Raise ParameterError, naming the row, where parameters of a model do not go together."""
         for part in _checking(self.as_columns()):
             if not _has_column(part):
@@ -70,7 +70,7 @@ class Variations:
             except (TypeError, ValueError, AirmuscleError):  # rows differ, or one of them is refused: row by row
                 of_row = _rows_of(part)
                 for row in range(len(self.values)):
-                    _refuse_row(row, part if of_row is None else of_row(row))
+                    _check_row(row, part if of_row is None else of_row(row))
 
 
 class Column(np.ndarray):
@@ -83,7 +83,7 @@ class Column(np.ndarray):
         return bool(answers.any())
 
 
-def _refuse_row(row: int, part: Any) -> None:
+def _check_row(row: int, part: Any) -> None:
     try:
         part.check()
     except ParameterError as error:
@@ -163,7 +163,7 @@ def variations_of(system: System, given: Mapping[str, npt.ArrayLike], count: int
         raise ParameterError("simulate_batch: there are no plants; give at least one row.")
     table = np.column_stack(columns) if columns else np.empty((count, 0))
     found = Variations(system, tuple(given), np.array([leaves[p][0] for p in given], dtype=np.intp), table)
-    found.refuse_inconsistent()
+    found.check_consistent()
     return found
 
 

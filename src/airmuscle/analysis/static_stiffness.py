@@ -1,0 +1,123 @@
+"""The two stiffnesses of a muscle and of what it moves: at constant pressure, and with shut valves."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from ..core import autodiff
+from ..core.ops import Value
+from ..muscle import Muscle, SeriesSpring
+from ..plant.muscle_state import MuscleState
+from ..plant.plant import Plant
+from ..plant.state import check_state, state_vector
+from ..pneumatics.gas import NO_FLOW, gauge
+
+
+class StiffnessPair(NamedTuple):
+    """The same stiffness while the pressure stays what it is, and while the air is shut in; the unit is the owner's."""
+
+    constant_pressure: float
+    shut_valves: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Stiffness:
+    """Stiffnesses of a plant at one state.
+
+    muscles      of every muscle by its name, -dF/deps [N]
+    per_metre    the same by length, dF/dL [N/m]
+    coordinates  what the muscles give every coordinate against its own motion, -dQ/dq [N/m, N m/rad], with the
+                 change of their arms; the mechanism's own springs and weights are not in it
+    """
+
+    muscles: Mapping[str, StiffnessPair]
+    per_metre: Mapping[str, StiffnessPair]
+    coordinates: Mapping[str, StiffnessPair]
+
+
+def stiffness(plant: Plant, state: Mapping[str, float]) -> Stiffness:
+    """Both stiffnesses of a plant at a state: exact derivatives of its laws.
+
+        k_p = -dF/deps,   k_m = k_p - (dF/dp) (dp/deps),   dp/deps by the gas with no flow and no heat
+                                                          (polytropic: -n p_abs/V dV/deps)
+
+    With shut valves a muscle that is pulled takes up pressure, and is stiffer. Isothermal and polytropic air follow
+    their process; with EnergyBalance the pull is too quick for heat, so adiabatic, and a slow one is that of
+    Isothermal. A series spring stands in series: 1/k = 1/k_inside + 1/k_SE. Friction, creep and wall do not move. A
+    slack muscle has none. Raises ParameterError for an unknown or missing name and for what cannot be, OutOfReach where
+    a muscle cannot take its contraction.
+    """
+    state_vector(plant, state)
+    check_state(plant, state)
+    ports = plant.ports(state)
+    found = [_of_muscle(plant, muscle, port) for muscle, port in zip(plant.muscles, ports, strict=True)]
+    names = [m.name for m in plant.muscles]
+    lengths = [float(length) for length in plant.resting_lengths]
+    per_metre = [StiffnessPair(*(k / length for k in both)) for both, length in zip(found, lengths, strict=True)]
+    coordinates = {
+        c.name: StiffnessPair(*(_against(plant, state, ports, ks, c.name) for ks in zip(*found, strict=True)))
+        for c in plant.mechanism.coordinates
+    }
+    return Stiffness(
+        dict(zip(names, found, strict=True)), dict(zip(names, per_metre, strict=True)), coordinates
+    )  # fmt: skip
+
+
+def _of_muscle(plant: Plant, muscle: Muscle, port: MuscleState) -> StiffnessPair:
+    by_pressure, by_contraction = _slopes(muscle, port)
+    squeezed = _pressure_growth(plant, muscle, port)
+    inside = (0.0 - by_contraction, 0.0 - by_contraction - by_pressure * squeezed)
+    if not isinstance(muscle.series, SeriesSpring):
+        return StiffnessPair(*inside)
+    stretched = float(port.inner_contraction) > float(port.contraction)
+    spring = muscle.series.stiffness * muscle.geometry.resting_length if stretched else 0.0
+    return StiffnessPair(*(k * spring / (k + spring) if spring else 0.0 for k in inside))
+
+
+def _slopes(muscle: Muscle, port: MuscleState) -> tuple[float, float]:
+    """dF/dp and dF/deps of the muscle without its series spring."""
+    at = [float(port.pressure), float(port.inner_contraction)]
+
+    def tension(x: Sequence[Value]) -> list[Value]:
+        return [muscle.tension(x[0], x[1])]
+
+    along = [autodiff.jvp(tension, at, direction)[0] for direction in ([1.0, 0.0], [0.0, 1.0])]
+    return float(along[0]), float(along[1])
+
+
+def _pressure_growth(plant: Plant, muscle: Muscle, port: MuscleState) -> float:
+    """dp/deps [Pa] of the air shut in: its pressure by volume and by what the gas law makes of its content."""
+    content = {s.name: port.states[s.name] for s in plant.gas.states(port.volume, plant.ambient)}
+    names = list(content)
+    growth = muscle.geometry.volume_growth(port.inner_contraction)
+    moved, still = (plant.gas.rates(content, port.air, NO_FLOW, rate, plant.ambient) for rate in (growth, 0.0))
+
+    def pressure(x: Sequence[Value]) -> list[Value]:
+        air = plant.gas.air(dict(zip(names, x[1:], strict=True)), x[0], plant.ambient)
+        return [gauge(air.pressure, plant.ambient)]
+
+    at = [float(v) for v in (port.volume, *content.values())]
+    along = [float(growth), *(float(moved[n] - still[n]) for n in names)]
+    return float(autodiff.jvp(pressure, at, along)[0])
+
+
+def _against(
+    plant: Plant, state: Mapping[str, float], ports: Sequence[MuscleState], stiffnesses: Sequence[float], name: str
+) -> float:
+    """-dQ/dq of one coordinate, with tensions that fall along these stiffnesses."""
+    mechanism, lengths = plant.mechanism, plant.resting_lengths
+    names = [c.name for c in mechanism.coordinates]
+
+    def pull(x: Sequence[Value]) -> list[Value]:
+        q = dict(zip(names, x, strict=True))
+        contractions = mechanism.contractions(q, lengths)
+        tensions = [
+            port.tension - k * (contraction - port.contraction)
+            for port, k, contraction in zip(ports, stiffnesses, contractions, strict=True)
+        ]
+        return [mechanism.generalised_forces(q, tensions, lengths)[name]]
+
+    at = [float(state[n]) for n in names]
+    return -float(autodiff.jvp(pull, at, [float(n == name) for n in names])[0])
