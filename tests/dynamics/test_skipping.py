@@ -11,14 +11,13 @@ import dataclasses
 import random
 from typing import Any
 
-import casadi
 import numpy as np
 import pytest
 from filling import hanging
 
 from airmuscle.compile import StateVariable
 from airmuscle.compile.ir.branches import COMMANDED, STEADY, VARYING, skipping
-from airmuscle.compile.ir.instructions import MAXIMUM, MINIMUM, SELECT, Code, Instruction, Operand
+from airmuscle.compile.ir.instructions import Code, Instruction, Operand, Operation
 from airmuscle.compile.ir.scheduling import Branch
 from airmuscle.compile.llvm import emit
 from airmuscle.compile.program import Program, compile_system
@@ -31,31 +30,31 @@ from airmuscle.simulation.batch import simulate_batch
 from airmuscle.simulation.integrators import RungeKutta4
 
 BINARY = (
-    casadi.OP_ADD,
-    casadi.OP_SUB,
-    casadi.OP_MUL,
-    casadi.OP_LE,
-    casadi.OP_LT,
-    casadi.OP_IF_ELSE_ZERO,
-    MAXIMUM,
-    MINIMUM,
+    Operation.ADD,
+    Operation.SUBTRACT,
+    Operation.MULTIPLY,
+    Operation.LESS_EQUAL,
+    Operation.LESS,
+    Operation.MASK,
+    Operation.MAXIMUM,
+    Operation.MINIMUM,
 )
-UNARY = (casadi.OP_NEG, casadi.OP_SQ, casadi.OP_NOT, casadi.OP_FABS, casadi.OP_SQRT)
+UNARY = (Operation.NEGATE, Operation.SQUARE, Operation.NOT, Operation.ABS, Operation.SQRT)
 MEANING: dict[int, Any] = {
-    casadi.OP_ADD: lambda a, b: a + b,
-    casadi.OP_SUB: lambda a, b: a - b,
-    casadi.OP_MUL: lambda a, b: a * b,
-    casadi.OP_LE: lambda a, b: float(a <= b),
-    casadi.OP_LT: lambda a, b: float(a < b),
-    casadi.OP_IF_ELSE_ZERO: lambda a, b: b if a else 0.0,
-    MAXIMUM: max,
-    MINIMUM: min,
-    casadi.OP_NEG: lambda a: -a,
-    casadi.OP_SQ: lambda a: a * a,
-    casadi.OP_NOT: lambda a: float(not a),
-    casadi.OP_FABS: abs,
-    casadi.OP_SQRT: lambda a: abs(a) ** 0.5,
-    SELECT: lambda a, b, c: b if a else c,
+    Operation.ADD: lambda a, b: a + b,
+    Operation.SUBTRACT: lambda a, b: a - b,
+    Operation.MULTIPLY: lambda a, b: a * b,
+    Operation.LESS_EQUAL: lambda a, b: float(a <= b),
+    Operation.LESS: lambda a, b: float(a < b),
+    Operation.MASK: lambda a, b: b if a else 0.0,
+    Operation.MAXIMUM: max,
+    Operation.MINIMUM: min,
+    Operation.NEGATE: lambda a: -a,
+    Operation.SQUARE: lambda a: a * a,
+    Operation.NOT: lambda a: float(not a),
+    Operation.ABS: abs,
+    Operation.SQRT: lambda a: abs(a) ** 0.5,
+    Operation.SELECT: lambda a, b, c: b if a else c,
 }
 """Every operation on numbers that stay small and finite."""
 GRAPHS = 2000
@@ -81,14 +80,14 @@ def drawn(rng: random.Random) -> Code:
         elif kind < 6:
             put(rng.choice(UNARY), pick())
         elif kind < 8:
-            put(SELECT, put(casadi.OP_LE, pick(), pick()), pick(), pick())
+            put(Operation.SELECT, put(Operation.LESS_EQUAL, pick(), pick()), pick(), pick())
         else:
             number, ends = pick(), [("c", -1.0), ("c", 1.0)]
-            low = put(MAXIMUM, *rng.sample([number, ends[0]], 2))
-            clamped = put(MINIMUM, *rng.sample([low, ends[1]], 2))
-            put(casadi.OP_SUB, *rng.sample([number, clamped], 2))
-            put(casadi.OP_LE, ends[1], low)
-            put(casadi.OP_LE, ends[0], number)
+            low = put(Operation.MAXIMUM, *rng.sample([number, ends[0]], 2))
+            clamped = put(Operation.MINIMUM, *rng.sample([low, ends[1]], 2))
+            put(Operation.SUBTRACT, *rng.sample([number, clamped], 2))
+            put(Operation.LESS_EQUAL, ends[1], low)
+            put(Operation.LESS_EQUAL, ends[0], number)
     wanted = rng.sample(known[len(LEAVES) :], rng.randint(1, 4))
     return Code(tuple(body), tuple((0, i, operand) for i, operand in enumerate(wanted)))
 
@@ -117,7 +116,7 @@ def computed(items: Any, leaves: dict[Operand, float]) -> tuple[Values, int]:
         inner = Values(values)
         for line in item.body if isinstance(item, Branch) else [item]:
             number = MEANING[line.operation](*(inner[a] for a in line.arguments))
-            inner[line.result] = float(np.clip(number, -1e3, 1e3)) if line.operation == casadi.OP_SQ else number
+            inner[line.result] = float(np.clip(number, -1e3, 1e3)) if line.operation == Operation.SQUARE else number
             count += 1
         seen = [result for result, _ in item.instead] if isinstance(item, Branch) else [item.result]
         values.update({result: inner[result] for result in seen})

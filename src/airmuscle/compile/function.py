@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import casadi
-
 from .functions import Printer
 from .llvm.jit import jit_compile
 
@@ -17,6 +15,8 @@ class Function:
     """
 
     def __init__(self, inputs: dict[str, Any], outputs: dict[str, Any]) -> None:
+        import casadi
+
         rows = {name: casadi.densify(casadi.vec(casadi.SX(value).T)) for name, value in outputs.items()}
         printer = Printer()
         printer.add("function", inputs, rows)

@@ -6,8 +6,6 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import casadi
-
 from ..core import autodiff
 from ..core.errors import TraceError
 from ..core.system import System
@@ -36,6 +34,8 @@ class TracedSystem:
 
 def trace_system(system: System) -> TracedSystem:
     """Call a system once with symbols; raises TraceError where that does not give finite expressions."""
+    import casadi
+
     model, p = autodiff.symbolic(system)
     names = [s.name for s in system.states]
     x, u = casadi.SX.sym("x", len(names)), casadi.SX.sym("u", len(system.inputs))
@@ -143,6 +143,8 @@ def implicit_module(t: TracedSystem) -> tuple[str, ArraySizes]:
     drift(x, u, c, w, f)         (df/du) w, the rates' own slope in time while inputs move at w
     outputs(x, u, c, o)
     """
+    import casadi
+
     size = t.x.shape[0]
     slopes, places, slots = _rates_and_slopes(t)
     lu = Factors(places, slots, size)
@@ -180,6 +182,8 @@ def explicit_module(t: TracedSystem, a: Sequence[Sequence[float]], b: Sequence[f
 
     `a` are the rows of the tableau below its first, `b` its weights; nodes are the row sums. Inputs move at w.
     """
+    import casadi
+
     rates = casadi.Function("rates", [t.x, t.u, t.p], [t.f])
     h = casadi.SX.sym("h")
     slopes: list[Any] = []

@@ -11,8 +11,6 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import casadi
-
 from ..core.system import Differentiated
 from .functions import PARAMETERS, ArraySizes, Printer, TracedSystem, trace_system
 from .ir.instructions import Code, Operand, finished, recorded
@@ -50,6 +48,8 @@ class TangentSystem:
 
 def tangent_system(system: Differentiated) -> TangentSystem:
     """The inner system of a differentiated one, traced, with what is observed as its outputs."""
+    import casadi
+
     inner, names = trace_system(system.inner), [s.name for s in system.inner.states]
     found = {
         **{n: inner.x[i] for i, n in enumerate(names)},
@@ -131,6 +131,8 @@ def implicit_module(t: TangentSystem) -> tuple[str, ArraySizes]:
     J holds the distinct non-zeros of the inner df/dx, then dJ of those that change, K numbers each; A the factors of
     the inner d I - J, then the same dJ, because `solve` and `stage` need it: (d I - J) dk = db + dJ k.
     """
+    import casadi
+
     inner, printer, step = t.inner, Printer(), _Step(t)
     step.print_rates(printer)
     step.print_factor(printer)

@@ -13,9 +13,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-import casadi
-
-from .instructions import MAXIMUM, MINIMUM, SELECT, Code, Instruction, Operand
+from .instructions import Code, Instruction, Operand, Operation
 from .scheduling import Gates, IndependentGroup, Item, in_order
 
 ZERO, ONE = ("c", 0.0), ("c", 1.0)
@@ -23,15 +21,15 @@ STEADY, COMMANDED, VARYING = range(3)
 """What parameters are, what a command decides, and what has to do with states."""
 WORTH, WORTH_OF_CHOICES = 8, 30
 """Operations that must be saved for a branch to pay; more where the states decide how often (measured)."""
-_SLOW = {casadi.OP_DIV, casadi.OP_INV, casadi.OP_SQRT}
+_SLOW = {Operation.DIVIDE, Operation.INVERSE, Operation.SQRT}
 _SIMPLE = {
-    casadi.OP_ADD, casadi.OP_SUB, casadi.OP_MUL, casadi.OP_NEG, casadi.OP_SQ, casadi.OP_TWICE, casadi.OP_FABS,
-    casadi.OP_LE, casadi.OP_LT, casadi.OP_EQ, casadi.OP_NE, casadi.OP_NOT, casadi.OP_AND, casadi.OP_OR,
-    casadi.OP_IF_ELSE_ZERO, casadi.OP_ASSIGN, casadi.OP_FMIN, casadi.OP_FMAX, SELECT, MAXIMUM, MINIMUM,
+    Operation.ADD, Operation.SUBTRACT, Operation.MULTIPLY, Operation.NEGATE, Operation.SQUARE, Operation.TWICE, Operation.ABS,
+    Operation.LESS_EQUAL, Operation.LESS, Operation.EQUAL, Operation.NOT_EQUAL, Operation.NOT, Operation.AND, Operation.OR,
+    Operation.MASK, Operation.ASSIGN, Operation.FMIN, Operation.FMAX, Operation.SELECT, Operation.MAXIMUM, Operation.MINIMUM,
 }  # fmt: skip
-_KEEP_ZERO = (casadi.OP_NEG, casadi.OP_SQ, casadi.OP_TWICE, casadi.OP_FABS, casadi.OP_SQRT, casadi.OP_ASSIGN)
-_CHOICES = (casadi.OP_IF_ELSE_ZERO, SELECT)
-_EXTREMES = (MAXIMUM, MINIMUM)
+_KEEP_ZERO = (Operation.NEGATE, Operation.SQUARE, Operation.TWICE, Operation.ABS, Operation.SQRT, Operation.ASSIGN)
+_CHOICES = (Operation.MASK, Operation.SELECT)
+_EXTREMES = (Operation.MAXIMUM, Operation.MINIMUM)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,11 +65,11 @@ def _cases(body: Sequence[Instruction], comparisons: _Comparisons, level: Callab
     conditions: dict[Operand, None] = {}
     for line in body:
         levels[line.result] = max(of(a) for a in line.arguments)
-        if line.operation == casadi.OP_MUL:
+        if line.operation == Operation.MULTIPLY:
             commands.update((a, None) for a in line.arguments if of(a) == COMMANDED)
         if levels[line.result] < VARYING:
             continue
-        if line.operation == casadi.OP_SUB:
+        if line.operation == Operation.SUBTRACT:
             clamps += comparisons.inside(line)
         if line.operation in _CHOICES and line.arguments[0] in levels:
             conditions[line.arguments[0]] = None
@@ -84,8 +82,8 @@ class _Comparisons:
 
     def __init__(self, body: Sequence[Instruction]) -> None:
         self._line = {line.result: line for line in body}
-        self._not_above = {line.arguments: line.result for line in body if line.operation == casadi.OP_LE}
-        self._below = {line.arguments: line.result for line in body if line.operation == casadi.OP_LT}
+        self._not_above = {line.arguments: line.result for line in body if line.operation == Operation.LESS_EQUAL}
+        self._below = {line.arguments: line.result for line in body if line.operation == Operation.LESS}
 
     def _of(self, gates: Gates, ordered: Iterable[tuple[Operand, Operand]], facts: dict[Operand, Operand]) -> _Case:
         """With the gates at zero each `low` is not above its `high`.
@@ -116,7 +114,7 @@ class _Comparisons:
                     break
                 inner = near[0]
                 bound = line.arguments[line.arguments[0] == inner]
-                ordered.append((bound, inner) if line.operation == MAXIMUM else (inner, bound))
+                ordered.append((bound, inner) if line.operation == Operation.MAXIMUM else (inner, bound))
                 facts[clamped], clamped = number, inner
             if facts and clamped == number:
                 return [self._of((difference.result,), ordered, facts)]
@@ -202,29 +200,29 @@ class _Search:
         """Whether it helps to know a result: a sum that is one of its parts is better computed."""
         if operand not in self._line or operand in self.apart.gates:
             return False
-        return value[0] == "c" or self._line[operand].operation == SELECT
+        return value[0] == "c" or self._line[operand].operation == Operation.SELECT
 
 
 def _cost(line: Instruction) -> int:
     return 1 if line.operation in _SIMPLE else 8 if line.operation in _SLOW else 20
 
 
-def _value(operation: int, x: Sequence[Operand]) -> Operand | None:
+def _value(operation: Operation, x: Sequence[Operand]) -> Operand | None:
     """What an operation gives if that is a constant or one of its operands whatever the others are; else None."""
     zero, one = ZERO in x, ONE in x
-    if operation in (casadi.OP_MUL, casadi.OP_AND):
+    if operation in (Operation.MULTIPLY, Operation.AND):
         return ZERO if zero else x[x[0] == ONE] if one else None
-    if operation == casadi.OP_ADD:
+    if operation == Operation.ADD:
         return x[x[0] == ZERO] if zero else None
-    if operation == casadi.OP_SUB:
+    if operation == Operation.SUBTRACT:
         return ZERO if x[0] == x[1] else x[0] if x[1] == ZERO else None
-    if operation == casadi.OP_DIV or operation in _KEEP_ZERO:
+    if operation == Operation.DIVIDE or operation in _KEEP_ZERO:
         return ZERO if x[0] == ZERO else None
-    if operation == casadi.OP_NOT:
+    if operation == Operation.NOT:
         return {ZERO: ONE, ONE: ZERO}.get(x[0])
-    if operation == casadi.OP_IF_ELSE_ZERO:
+    if operation == Operation.MASK:
         return ZERO if zero else x[1] if x[0] == ONE else None
-    if operation == SELECT:
+    if operation == Operation.SELECT:
         return x[2] if x[0] == ZERO else x[1] if x[0] == ONE or x[1] == x[2] else None
     if operation in _EXTREMES:
         return x[0] if x[0] == x[1] else None

@@ -3,22 +3,81 @@
 from __future__ import annotations
 
 import dataclasses
+import enum
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import casadi
+from ...core.errors import TraceError
 
 Operand = tuple[Any, ...]
 """("t", k) the result of instruction k, ("c", value) a constant, ("in", argument, index) an input."""
 
-SELECT, MAXIMUM, MINIMUM = -1, -2, -3
-"""Our own operations: (condition, when true, when false), which CasADi spells with two masks and a sum; and the
-selection of the larger or smaller of two numbers, (a, b), for which processors have one instruction."""
+
+class Operation(enum.IntEnum):
+    """Operations of an instruction list; all but the last three have the meaning that CasADi gives them.
+
+    MASK(condition, x) is x where the condition is not zero, else 0. SELECT(condition, a, b) is a where the condition
+    is not zero, else b. MAXIMUM and MINIMUM select one of two numbers, as one machine instruction does.
+    """
+
+    ASSIGN = enum.auto()
+    ADD = enum.auto()
+    SUBTRACT = enum.auto()
+    MULTIPLY = enum.auto()
+    DIVIDE = enum.auto()
+    NEGATE = enum.auto()
+    SQUARE = enum.auto()
+    TWICE = enum.auto()
+    INVERSE = enum.auto()
+    SQRT = enum.auto()
+    ABS = enum.auto()
+    SIGN = enum.auto()
+    POWER = enum.auto()
+    CONSTANT_POWER = enum.auto()
+    EXP = enum.auto()
+    LOG = enum.auto()
+    LOG1P = enum.auto()
+    EXPM1 = enum.auto()
+    SIN = enum.auto()
+    COS = enum.auto()
+    TAN = enum.auto()
+    ASIN = enum.auto()
+    ACOS = enum.auto()
+    ATAN = enum.auto()
+    SINH = enum.auto()
+    COSH = enum.auto()
+    TANH = enum.auto()
+    ASINH = enum.auto()
+    FMIN = enum.auto()
+    FMAX = enum.auto()
+    LESS = enum.auto()
+    LESS_EQUAL = enum.auto()
+    EQUAL = enum.auto()
+    NOT_EQUAL = enum.auto()
+    NOT = enum.auto()
+    AND = enum.auto()
+    OR = enum.auto()
+    MASK = enum.auto()
+    SELECT = enum.auto()
+    MAXIMUM = enum.auto()
+    MINIMUM = enum.auto()
+
+
+_CASADI_NAMES = {
+    Operation.SUBTRACT: "SUB", Operation.MULTIPLY: "MUL", Operation.DIVIDE: "DIV", Operation.NEGATE: "NEG",
+    Operation.SQUARE: "SQ", Operation.INVERSE: "INV", Operation.ABS: "FABS", Operation.POWER: "POW",
+    Operation.CONSTANT_POWER: "CONSTPOW", Operation.LESS: "LT", Operation.LESS_EQUAL: "LE", Operation.EQUAL: "EQ",
+    Operation.NOT_EQUAL: "NE", Operation.MASK: "IF_ELSE_ZERO",
+}  # fmt: skip
+"""Names that CasADi spells otherwise, without their prefix OP_."""
+_OWN = (Operation.SELECT, Operation.MAXIMUM, Operation.MINIMUM)
+_COMPARE = (Operation.LESS_EQUAL, Operation.LESS)
 
 CALLED = frozenset({
-    casadi.OP_EXP, casadi.OP_LOG, casadi.OP_SIN, casadi.OP_COS, casadi.OP_TAN, casadi.OP_ATAN, casadi.OP_SINH,
-    casadi.OP_COSH, casadi.OP_TANH, casadi.OP_ASINH, casadi.OP_ASIN, casadi.OP_ACOS, casadi.OP_LOG1P, casadi.OP_EXPM1,
-    casadi.OP_POW, casadi.OP_CONSTPOW,
+    Operation.EXP, Operation.LOG, Operation.SIN, Operation.COS, Operation.TAN, Operation.ATAN, Operation.SINH,
+    Operation.COSH, Operation.TANH, Operation.ASINH, Operation.ASIN, Operation.ACOS, Operation.LOG1P, Operation.EXPM1,
+    Operation.POWER, Operation.CONSTANT_POWER,
 })  # fmt: skip
 """The operations for which a function of the C library is called."""
 
@@ -27,7 +86,7 @@ CALLED = frozenset({
 class Instruction:
     """`result = operation(arguments)`, once each."""
 
-    operation: int
+    operation: Operation
     result: Operand
     arguments: tuple[Operand, ...]
 
@@ -40,6 +99,17 @@ class Code:
     outputs: tuple[tuple[int, int, Operand], ...]
 
 
+@functools.cache
+def _casadi_operations() -> dict[int, Operation]:
+    """Operations by CasADi's number."""
+    import casadi
+
+    named = {
+        operation: _CASADI_NAMES.get(operation, operation.name) for operation in Operation if operation not in _OWN
+    }
+    return {getattr(casadi, f"OP_{name}"): operation for operation, name in named.items()}
+
+
 def instructions(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
     """The instructions that compute the non-zeros of `outputs` (CasADi SX) from `inputs`."""
     return finished(recorded(inputs, outputs))
@@ -47,22 +117,27 @@ def instructions(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
 
 def recorded(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
     """The instructions as CasADi has them, the larger and smaller of two still as choices, which have derivatives."""
+    import casadi
+
+    operations = _casadi_operations()
     function = casadi.Function("code", list(inputs), casadi.cse(list(outputs)))
     current: dict[int, Operand] = {}
     body: list[Instruction] = []
     results: list[tuple[int, int, Operand]] = []
     for k in range(function.n_instructions()):
-        operation = function.instruction_id(k)
+        code = function.instruction_id(k)
         target, source = function.instruction_output(k), function.instruction_input(k)
-        if operation == casadi.OP_CONST:
+        if code == casadi.OP_CONST:
             current[target[0]] = ("c", function.instruction_constant(k))
-        elif operation == casadi.OP_INPUT:
+        elif code == casadi.OP_INPUT:
             current[target[0]] = ("in", source[0], source[1])
-        elif operation == casadi.OP_OUTPUT:
+        elif code == casadi.OP_OUTPUT:
             results.append((target[0], target[1], current[source[0]]))
         else:
             name = ("t", len(body))
-            body.append(Instruction(operation, name, tuple(current[i] for i in source)))
+            if code not in operations:
+                raise TraceError(f"CasADi operation {code} is not supported; write the law over airmuscle.core.ops.")
+            body.append(Instruction(operations[code], name, tuple(current[i] for i in source)))
             current[target[0]] = name
     return Code(tuple(_selects(body)), tuple(results))
 
@@ -73,32 +148,36 @@ def finished(code: Code) -> Code:
     by_result = {line.result: line for line in body}
     chosen: list[Instruction] = []
     for line in body:
-        if line.operation == casadi.OP_IF_ELSE_ZERO:
+        if line.operation == Operation.MASK:
             chosen += _extreme_of_zero(line, by_result)
         else:
-            chosen.append(_extreme(line, by_result) if line.operation == SELECT else line)
+            chosen.append(_extreme(line, by_result) if line.operation == Operation.SELECT else line)
     return _without_unused(chosen, code.outputs)
 
 
 def _selects(body: Sequence[Instruction]) -> list[Instruction]:
-    """Each sum of a mask and its opposite mask as one SELECT."""
+    """Each sum of a mask and its opposite mask as one Operation.SELECT."""
     by_result = {line.result: line for line in body}
 
     def mask(operand: Operand) -> Instruction | None:
         line = by_result.get(operand)
-        return line if line is not None and line.operation == casadi.OP_IF_ELSE_ZERO else None
+        return line if line is not None and line.operation == Operation.MASK else None
 
     def negated(operand: Operand) -> Operand | None:
         line = by_result.get(operand)
-        return line.arguments[0] if line is not None and line.operation == casadi.OP_NOT else None
+        return line.arguments[0] if line is not None and line.operation == Operation.NOT else None
 
     chosen = []
     for line in body:
-        first, second = (mask(a) for a in line.arguments) if line.operation == casadi.OP_ADD else (None, None)
+        first, second = (mask(a) for a in line.arguments) if line.operation == Operation.ADD else (None, None)
         if first and second and negated(second.arguments[0]) == first.arguments[0]:
-            line = Instruction(SELECT, line.result, (first.arguments[0], first.arguments[1], second.arguments[1]))
+            line = Instruction(
+                Operation.SELECT, line.result, (first.arguments[0], first.arguments[1], second.arguments[1])
+            )
         elif first and second and negated(first.arguments[0]) == second.arguments[0]:
-            line = Instruction(SELECT, line.result, (second.arguments[0], second.arguments[1], first.arguments[1]))
+            line = Instruction(
+                Operation.SELECT, line.result, (second.arguments[0], second.arguments[1], first.arguments[1])
+            )
         chosen.append(line)
     return chosen
 
@@ -111,33 +190,33 @@ def _extreme_of_zero(line: Instruction, by_result: Mapping[Operand, Instruction]
     """
     (condition, masked), zero = line.arguments, ("c", 0.0)
     test, product = by_result.get(condition), by_result.get(masked)
-    opposite = test is not None and test.operation == casadi.OP_NOT
+    opposite = test is not None and test.operation == Operation.NOT
     if test is not None and opposite:
         test = by_result.get(test.arguments[0])
-    if test is None or test.operation not in (casadi.OP_LE, casadi.OP_LT) or zero not in test.arguments:
+    if test is None or test.operation not in _COMPARE or zero not in test.arguments:
         return [line]
     number = test.arguments[test.arguments[0] == zero]
     larger = (test.arguments[0] == zero) != opposite
     pair = (zero, number) if opposite else (number, zero)
-    extreme = Instruction(MAXIMUM if larger else MINIMUM, line.result, pair)
+    extreme = Instruction(Operation.MAXIMUM if larger else Operation.MINIMUM, line.result, pair)
     if number == masked:
         return [extreme]
-    if product is None or product.operation != casadi.OP_MUL or number not in product.arguments:
+    if product is None or product.operation != Operation.MULTIPLY or number not in product.arguments:
         return [line]
     other = product.arguments[product.arguments[0] == number]
     extreme = Instruction(extreme.operation, ("t", "extreme of", line.result), pair)
-    return [extreme, Instruction(casadi.OP_MUL, line.result, (extreme.result, other))]
+    return [extreme, Instruction(Operation.MULTIPLY, line.result, (extreme.result, other))]
 
 
 def _extreme(line: Instruction, by_result: Mapping[Operand, Instruction]) -> Instruction:
-    """A SELECT of the larger or smaller of the two that its condition compares, as what it is."""
+    """A Operation.SELECT of the larger or smaller of the two that its condition compares, as what it is."""
     condition, a, b = line.arguments
     test = by_result.get(condition)
-    if test is not None and test.operation in (casadi.OP_LE, casadi.OP_LT):
+    if test is not None and test.operation in _COMPARE:
         if test.arguments == (b, a):
-            return Instruction(MAXIMUM, line.result, (a, b))
+            return Instruction(Operation.MAXIMUM, line.result, (a, b))
         if test.arguments == (a, b):
-            return Instruction(MINIMUM, line.result, (a, b))
+            return Instruction(Operation.MINIMUM, line.result, (a, b))
     return line
 
 
@@ -166,12 +245,12 @@ def hoisted(code: Code, parameter_input: int) -> tuple[Code, tuple[Instruction, 
     once: list[Instruction] = []
     always: list[Instruction] = []
     for line in code.body:
-        if line.operation == casadi.OP_DIV and depends(line.arguments[0]) and not depends(line.arguments[1]):
-            inverse = Instruction(casadi.OP_INV, ("t", "inverse of", line.arguments[1]), line.arguments[1:])
+        if line.operation == Operation.DIVIDE and depends(line.arguments[0]) and not depends(line.arguments[1]):
+            inverse = Instruction(Operation.INVERSE, ("t", "inverse of", line.arguments[1]), line.arguments[1:])
             if inverse.result not in varies:
                 once.append(inverse)
                 varies[inverse.result] = False
-            line = Instruction(casadi.OP_MUL, line.result, (line.arguments[0], inverse.result))
+            line = Instruction(Operation.MULTIPLY, line.result, (line.arguments[0], inverse.result))
         varies[line.result] = any(depends(a) for a in line.arguments)
         (always if varies[line.result] else once).append(line)
     used = [a for line in always for a in line.arguments] + [operand for _, _, operand in code.outputs]

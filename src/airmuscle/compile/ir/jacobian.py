@@ -12,16 +12,22 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Iterable, Sequence
 
-import casadi
-
 from ...core.errors import TraceError
-from .instructions import SELECT, Instruction, Operand
+from .instructions import Instruction, Operand, Operation
 
 Row = dict[Operand, Operand]
 """The derivatives of one result by the inputs that it depends on."""
 ZERO, ONE, LESS, TWO, HALF = (("c", value) for value in (0.0, 1.0, -1.0, 2.0, 0.5))
-_COMMUTE = (casadi.OP_ADD, casadi.OP_MUL)
-_CONDITIONS = (casadi.OP_LE, casadi.OP_LT, casadi.OP_EQ, casadi.OP_NE, casadi.OP_NOT, casadi.OP_AND, casadi.OP_OR)
+_COMMUTE = (Operation.ADD, Operation.MULTIPLY)
+_CONDITIONS = (
+    Operation.LESS_EQUAL,
+    Operation.LESS,
+    Operation.EQUAL,
+    Operation.NOT_EQUAL,
+    Operation.NOT,
+    Operation.AND,
+    Operation.OR,
+)
 
 
 class Tape:
@@ -29,14 +35,14 @@ class Tape:
 
     def __init__(self, body: Iterable[Instruction]) -> None:
         self.body = list(body)
-        self._known: dict[tuple[int, tuple[Operand, ...]], Operand] = {}
+        self._known: dict[tuple[Operation, tuple[Operand, ...]], Operand] = {}
         self._masks: set[Operand] = set()
         for line in self.body:
             self._note(line)
 
     def _note(self, line: Instruction) -> None:
         self._known[line.operation, line.arguments] = line.result
-        product = line.operation == casadi.OP_IF_ELSE_ZERO and line.arguments[1] in self._masks
+        product = line.operation == Operation.MASK and line.arguments[1] in self._masks
         if line.operation in _CONDITIONS or product:
             self._masks.add(line.result)
 
@@ -44,7 +50,7 @@ class Tape:
         """Go on from where another one that began as this stands."""
         self.body, self._known, self._masks = longer.body, longer._known, longer._masks
 
-    def put(self, operation: int, *arguments: Operand) -> Operand:
+    def put(self, operation: Operation, *arguments: Operand) -> Operand:
         """The result of an operation, which is appended unless it is known."""
         if operation in _COMMUTE and (operation, arguments[::-1]) in self._known:
             arguments = arguments[::-1]
@@ -56,11 +62,11 @@ class Tape:
 
     def add(self, a: Operand, b: Operand) -> Operand:
         """a + b."""
-        return a if b == ZERO else b if a == ZERO else self.put(casadi.OP_ADD, a, b)
+        return a if b == ZERO else b if a == ZERO else self.put(Operation.ADD, a, b)
 
     def negative(self, a: Operand) -> Operand:
         """-a."""
-        return ("c", -a[1]) if a[0] == "c" else self.put(casadi.OP_NEG, a)
+        return ("c", -a[1]) if a[0] == "c" else self.put(Operation.NEGATE, a)
 
     def times(self, a: Operand, b: Operand) -> Operand:
         """a b; where one is a condition, the other or zero, so that an infinite slope not taken does no harm."""
@@ -70,11 +76,11 @@ class Tape:
             return ("c", a[1] * b[1])
         if a in (ZERO, ONE, LESS):
             return ZERO if a == ZERO else b if a == ONE else self.negative(b)
-        return self.put(casadi.OP_IF_ELSE_ZERO if a in self._masks else casadi.OP_MUL, a, b)
+        return self.put(Operation.MASK if a in self._masks else Operation.MULTIPLY, a, b)
 
     def inverse(self, a: Operand) -> Operand:
         """1/a."""
-        return self.put(casadi.OP_INV, a)
+        return self.put(Operation.INVERSE, a)
 
 
 Rule = Callable[[Tape, tuple[Operand, ...], Operand], tuple[Operand, ...]]
@@ -83,53 +89,53 @@ Rule = Callable[[Tape, tuple[Operand, ...], Operand], tuple[Operand, ...]]
 def _power(t: Tape, x: tuple[Operand, ...], r: Operand) -> tuple[Operand, ...]:
     base, exponent = x
     less = ("c", exponent[1] - 1.0) if exponent[0] == "c" else t.add(exponent, LESS)
-    by_base = t.times(exponent, t.put(casadi.OP_POW, base, less))
-    return by_base, ZERO if exponent[0] == "c" else t.times(r, t.put(casadi.OP_LOG, base))
+    by_base = t.times(exponent, t.put(Operation.POWER, base, less))
+    return by_base, ZERO if exponent[0] == "c" else t.times(r, t.put(Operation.LOG, base))
 
 
 def _root_of_one_more(t: Tape, x: Operand, sign: Operand, shift: Operand) -> Operand:
     """1/sqrt(shift + sign x^2)."""
-    square = t.times(sign, t.put(casadi.OP_SQ, x))
-    return t.inverse(t.put(casadi.OP_SQRT, t.add(shift, square)))
+    square = t.times(sign, t.put(Operation.SQUARE, x))
+    return t.inverse(t.put(Operation.SQRT, t.add(shift, square)))
 
 
 def _chosen(t: Tape, first: Operand) -> tuple[Operand, ...]:
-    return first, t.put(casadi.OP_NOT, first)
+    return first, t.put(Operation.NOT, first)
 
 
-_RULES: dict[int, Rule] = {
-    casadi.OP_ADD: lambda t, x, r: (ONE, ONE),
-    casadi.OP_SUB: lambda t, x, r: (ONE, LESS),
-    casadi.OP_MUL: lambda t, x, r: (x[1], x[0]),
-    casadi.OP_DIV: lambda t, x, r: (t.inverse(x[1]), t.negative(t.times(r, t.inverse(x[1])))),
-    casadi.OP_NEG: lambda t, x, r: (LESS,),
-    casadi.OP_SQ: lambda t, x, r: (t.put(casadi.OP_TWICE, x[0]),),
-    casadi.OP_TWICE: lambda t, x, r: (TWO,),
-    casadi.OP_INV: lambda t, x, r: (t.negative(t.put(casadi.OP_SQ, r)),),
-    casadi.OP_SQRT: lambda t, x, r: (t.times(HALF, t.inverse(r)),),
-    casadi.OP_FABS: lambda t, x, r: (t.put(casadi.OP_SIGN, x[0]),),
-    casadi.OP_EXP: lambda t, x, r: (r,),
-    casadi.OP_LOG: lambda t, x, r: (t.inverse(x[0]),),
-    casadi.OP_SIN: lambda t, x, r: (t.put(casadi.OP_COS, x[0]),),
-    casadi.OP_COS: lambda t, x, r: (t.negative(t.put(casadi.OP_SIN, x[0])),),
-    casadi.OP_TAN: lambda t, x, r: (t.add(ONE, t.put(casadi.OP_SQ, r)),),
-    casadi.OP_ATAN: lambda t, x, r: (t.inverse(t.add(ONE, t.put(casadi.OP_SQ, x[0]))),),
-    casadi.OP_SINH: lambda t, x, r: (t.put(casadi.OP_COSH, x[0]),),
-    casadi.OP_COSH: lambda t, x, r: (t.put(casadi.OP_SINH, x[0]),),
-    casadi.OP_TANH: lambda t, x, r: (t.add(ONE, t.negative(t.put(casadi.OP_SQ, r))),),
-    casadi.OP_ASINH: lambda t, x, r: (_root_of_one_more(t, x[0], ONE, ONE),),
-    casadi.OP_ASIN: lambda t, x, r: (_root_of_one_more(t, x[0], LESS, ONE),),
-    casadi.OP_ACOS: lambda t, x, r: (t.negative(_root_of_one_more(t, x[0], LESS, ONE)),),
-    casadi.OP_LOG1P: lambda t, x, r: (t.inverse(t.add(ONE, x[0])),),
-    casadi.OP_EXPM1: lambda t, x, r: (t.add(ONE, r),),
-    casadi.OP_POW: _power,
-    casadi.OP_CONSTPOW: _power,
-    casadi.OP_FMAX: lambda t, x, r: _chosen(t, t.put(casadi.OP_LE, x[1], x[0])),
-    casadi.OP_FMIN: lambda t, x, r: _chosen(t, t.put(casadi.OP_LE, x[0], x[1])),
-    casadi.OP_IF_ELSE_ZERO: lambda t, x, r: (ZERO, x[0]),
-    SELECT: lambda t, x, r: (ZERO, x[0], t.put(casadi.OP_NOT, x[0])),
-    casadi.OP_ASSIGN: lambda t, x, r: (ONE,),
-    **{operation: lambda t, x, r: (ZERO,) * len(x) for operation in (*_CONDITIONS, casadi.OP_SIGN)},
+_RULES: dict[Operation, Rule] = {
+    Operation.ADD: lambda t, x, r: (ONE, ONE),
+    Operation.SUBTRACT: lambda t, x, r: (ONE, LESS),
+    Operation.MULTIPLY: lambda t, x, r: (x[1], x[0]),
+    Operation.DIVIDE: lambda t, x, r: (t.inverse(x[1]), t.negative(t.times(r, t.inverse(x[1])))),
+    Operation.NEGATE: lambda t, x, r: (LESS,),
+    Operation.SQUARE: lambda t, x, r: (t.put(Operation.TWICE, x[0]),),
+    Operation.TWICE: lambda t, x, r: (TWO,),
+    Operation.INVERSE: lambda t, x, r: (t.negative(t.put(Operation.SQUARE, r)),),
+    Operation.SQRT: lambda t, x, r: (t.times(HALF, t.inverse(r)),),
+    Operation.ABS: lambda t, x, r: (t.put(Operation.SIGN, x[0]),),
+    Operation.EXP: lambda t, x, r: (r,),
+    Operation.LOG: lambda t, x, r: (t.inverse(x[0]),),
+    Operation.SIN: lambda t, x, r: (t.put(Operation.COS, x[0]),),
+    Operation.COS: lambda t, x, r: (t.negative(t.put(Operation.SIN, x[0])),),
+    Operation.TAN: lambda t, x, r: (t.add(ONE, t.put(Operation.SQUARE, r)),),
+    Operation.ATAN: lambda t, x, r: (t.inverse(t.add(ONE, t.put(Operation.SQUARE, x[0]))),),
+    Operation.SINH: lambda t, x, r: (t.put(Operation.COSH, x[0]),),
+    Operation.COSH: lambda t, x, r: (t.put(Operation.SINH, x[0]),),
+    Operation.TANH: lambda t, x, r: (t.add(ONE, t.negative(t.put(Operation.SQUARE, r))),),
+    Operation.ASINH: lambda t, x, r: (_root_of_one_more(t, x[0], ONE, ONE),),
+    Operation.ASIN: lambda t, x, r: (_root_of_one_more(t, x[0], LESS, ONE),),
+    Operation.ACOS: lambda t, x, r: (t.negative(_root_of_one_more(t, x[0], LESS, ONE)),),
+    Operation.LOG1P: lambda t, x, r: (t.inverse(t.add(ONE, x[0])),),
+    Operation.EXPM1: lambda t, x, r: (t.add(ONE, r),),
+    Operation.POWER: _power,
+    Operation.CONSTANT_POWER: _power,
+    Operation.FMAX: lambda t, x, r: _chosen(t, t.put(Operation.LESS_EQUAL, x[1], x[0])),
+    Operation.FMIN: lambda t, x, r: _chosen(t, t.put(Operation.LESS_EQUAL, x[0], x[1])),
+    Operation.MASK: lambda t, x, r: (ZERO, x[0]),
+    Operation.SELECT: lambda t, x, r: (ZERO, x[0], t.put(Operation.NOT, x[0])),
+    Operation.ASSIGN: lambda t, x, r: (ONE,),
+    **{operation: lambda t, x, r: (ZERO,) * len(x) for operation in (*_CONDITIONS, Operation.SIGN)},
 }  # fmt: skip
 
 
@@ -187,7 +193,7 @@ def _graph(
         needed.update(line.arguments)
         if line.operation not in _RULES:
             raise TraceError(
-                f"CasADi operation {line.operation} has no derivative; write the law over airmuscle.core.ops."
+                f"operation {line.operation.name} has no derivative; write the law over airmuscle.core.ops."
             )
         row: Row = {}
         partials = _RULES[line.operation](tape, line.arguments, line.result)

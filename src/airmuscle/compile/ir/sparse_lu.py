@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import casadi
-
 Place = tuple[int, int]
 
 
@@ -19,6 +17,8 @@ def distinct(expressions: Sequence[Any]) -> tuple[Any, tuple[int, ...]]:
 
     A system with its sensitivities repeats one block along the diagonal: it is computed and factorised once.
     """
+    import casadi
+
     merged = casadi.cse(casadi.vertcat(*expressions)) if expressions else casadi.SX(0, 1)
     first: dict[int, int] = {}
     slots = tuple(first.setdefault(merged[i].element_hash(), len(first)) for i in range(len(expressions)))
@@ -32,6 +32,8 @@ class Factors:
     """
 
     def __init__(self, places: Sequence[Place], slots: Sequence[int], size: int) -> None:
+        import casadi
+
         self.j, self.d = casadi.SX.sym("j", max(slots, default=-1) + 1), casadi.SX.sym("d")
         a: dict[Place, Any] = {(i, i): self.d for i in range(size)}
         for slot, place in zip(slots, places, strict=True):
@@ -59,6 +61,8 @@ class Factors:
 
 def _factorise(a: dict[Place, Any], order: Sequence[int]) -> None:
     """Put L below the diagonal of the given order, U above it, and the inverse of D on it."""
+    import casadi
+
     for n, k in enumerate(order):
         later = order[n + 1 :]
         a[k, k] = 1 / a[k, k]

@@ -5,11 +5,9 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping, Sequence
 
-import casadi
-
 from ...core.errors import TraceError
 from ..ir.branches import COMMANDED, STEADY, VARYING, skipping
-from ..ir.instructions import MAXIMUM, MINIMUM, SELECT, Code, Instruction, Operand
+from ..ir.instructions import Code, Instruction, Operand, Operation
 from ..ir.scheduling import Branch, Item
 from .types import DOUBLE, LlvmType
 
@@ -19,15 +17,15 @@ FLAGS = "nsz arcp contract reassoc afn"
 LEVEL = {"u": COMMANDED, "w": STEADY, "h": STEADY}
 """Which arguments do not vary with the states: inputs, their slopes, and the step."""
 
-_BINARY = {casadi.OP_ADD: "fadd", casadi.OP_SUB: "fsub", casadi.OP_MUL: "fmul", casadi.OP_DIV: "fdiv"}
-_INTRINSICS = {casadi.OP_SQRT: "sqrt", casadi.OP_FABS: "fabs"}
+_BINARY = {Operation.ADD: "fadd", Operation.SUBTRACT: "fsub", Operation.MULTIPLY: "fmul", Operation.DIVIDE: "fdiv"}
+_INTRINSICS = {Operation.SQRT: "sqrt", Operation.ABS: "fabs"}
 _CALLS = {
-    casadi.OP_EXP: "exp", casadi.OP_LOG: "log", casadi.OP_SIN: "sin", casadi.OP_COS: "cos", casadi.OP_TAN: "tan",
-    casadi.OP_ATAN: "atan", casadi.OP_SINH: "sinh", casadi.OP_COSH: "cosh", casadi.OP_TANH: "tanh",
-    casadi.OP_ASINH: "asinh", casadi.OP_ASIN: "asin", casadi.OP_ACOS: "acos", casadi.OP_LOG1P: "log1p",
-    casadi.OP_EXPM1: "expm1",
+    Operation.EXP: "exp", Operation.LOG: "log", Operation.SIN: "sin", Operation.COS: "cos", Operation.TAN: "tan",
+    Operation.ATAN: "atan", Operation.SINH: "sinh", Operation.COSH: "cosh", Operation.TANH: "tanh",
+    Operation.ASINH: "asinh", Operation.ASIN: "asin", Operation.ACOS: "acos", Operation.LOG1P: "log1p",
+    Operation.EXPM1: "expm1",
 }  # fmt: skip
-_COMPARISONS = {casadi.OP_LE: "ole", casadi.OP_LT: "olt", casadi.OP_EQ: "oeq", casadi.OP_NE: "une"}
+_COMPARISONS = {Operation.LESS_EQUAL: "ole", Operation.LESS: "olt", Operation.EQUAL: "oeq", Operation.NOT_EQUAL: "une"}
 _OF_ONE = (*sorted(_CALLS.values()), *(DOUBLE.intrinsic(name) for name in _INTRINSICS.values()))
 DECLARED = "".join(f"declare double @{name}(double)\n" for name in _OF_ONE) + "declare double @pow(double, double)\n"
 """Functions that printed ones may call, as LLVM wants to know them."""
@@ -149,7 +147,7 @@ class FunctionBody:
             self.lines.append(f"  {joined[operand]} = phi {number.text} {ways}")
         return joined
 
-    def operate(self, operation: int, x: Sequence[str]) -> str:
+    def operate(self, operation: Operation, x: Sequence[str]) -> str:
         """The printed form of one CasADi operation on values; raises TraceError for one that is not known."""
         kind, one, zero = self.number.text, self.constant(1.0), self.constant(0.0)
         if operation in _BINARY:
@@ -161,31 +159,29 @@ class FunctionBody:
         if operation in _COMPARISONS:
             return self.choose(_COMPARISONS[operation], x[0], x[1], one, zero)
         simple = {
-            casadi.OP_NEG: lambda: self.put(f"fneg {FLAGS} {kind} {x[0]}"),
-            casadi.OP_SQ: lambda: self.put(f"fmul {FLAGS} {kind} {x[0]}, {x[0]}"),
-            casadi.OP_TWICE: lambda: self.put(f"fadd {FLAGS} {kind} {x[0]}, {x[0]}"),
-            casadi.OP_INV: lambda: self.put(f"fdiv {FLAGS} {kind} {one}, {x[0]}"),
-            casadi.OP_POW: lambda: self.power(x[0], x[1]),
-            casadi.OP_CONSTPOW: lambda: self.power(x[0], x[1]),
-            casadi.OP_NOT: lambda: self.choose("oeq", x[0], zero, one, zero),
-            casadi.OP_AND: lambda: self.put(f"fmul {kind} {x[0]}, {x[1]}"),
-            casadi.OP_OR: lambda: self.choose("une", self.put(f"fadd {kind} {x[0]}, {x[1]}"), zero, one, zero),
-            casadi.OP_FMIN: lambda: self.choose("olt", x[0], x[1], x[0], x[1]),
-            casadi.OP_FMAX: lambda: self.choose("ogt", x[0], x[1], x[0], x[1]),
+            Operation.NEGATE: lambda: self.put(f"fneg {FLAGS} {kind} {x[0]}"),
+            Operation.SQUARE: lambda: self.put(f"fmul {FLAGS} {kind} {x[0]}, {x[0]}"),
+            Operation.TWICE: lambda: self.put(f"fadd {FLAGS} {kind} {x[0]}, {x[0]}"),
+            Operation.INVERSE: lambda: self.put(f"fdiv {FLAGS} {kind} {one}, {x[0]}"),
+            Operation.POWER: lambda: self.power(x[0], x[1]),
+            Operation.CONSTANT_POWER: lambda: self.power(x[0], x[1]),
+            Operation.NOT: lambda: self.choose("oeq", x[0], zero, one, zero),
+            Operation.AND: lambda: self.put(f"fmul {kind} {x[0]}, {x[1]}"),
+            Operation.OR: lambda: self.choose("une", self.put(f"fadd {kind} {x[0]}, {x[1]}"), zero, one, zero),
+            Operation.FMIN: lambda: self.choose("olt", x[0], x[1], x[0], x[1]),
+            Operation.FMAX: lambda: self.choose("ogt", x[0], x[1], x[0], x[1]),
             # strict: of two equal numbers either is the larger, and this is what the processor's instruction does
-            MINIMUM: lambda: self.choose("olt", x[0], x[1], x[0], x[1]),
-            MAXIMUM: lambda: self.choose("ogt", x[0], x[1], x[0], x[1]),
-            casadi.OP_IF_ELSE_ZERO: lambda: self.choose("une", x[0], zero, x[1], zero),
-            casadi.OP_SIGN: lambda: self.choose(
+            Operation.MINIMUM: lambda: self.choose("olt", x[0], x[1], x[0], x[1]),
+            Operation.MAXIMUM: lambda: self.choose("ogt", x[0], x[1], x[0], x[1]),
+            Operation.MASK: lambda: self.choose("une", x[0], zero, x[1], zero),
+            Operation.SIGN: lambda: self.choose(
                 "ogt", x[0], zero, one, self.choose("olt", x[0], zero, self.constant(-1.0), zero)
             ),
-            SELECT: lambda: self.choose("une", x[0], zero, x[1], x[2]),
-            casadi.OP_ASSIGN: lambda: x[0],
+            Operation.SELECT: lambda: self.choose("une", x[0], zero, x[1], x[2]),
+            Operation.ASSIGN: lambda: x[0],
         }  # fmt: skip
         if operation not in simple:
-            raise TraceError(
-                f"CasADi operation {operation} has no printed form; write the law over airmuscle.core.ops."
-            )
+            raise TraceError(f"operation {operation.name} has no LLVM form; write the law over airmuscle.core.ops.")
         return simple[operation]()
 
 
