@@ -123,7 +123,7 @@ def test_that_of_a_coordinate_is_the_slope_of_the_pull_with_the_same_air(mechani
         h, pulls = 1e-6 * c.nominal, []
         for sign in (1, -1):
             moved = {**state, c.name: state[c.name] + sign * h}
-            tensions = [float(port.tension) for port in plant.ports(moved)]
+            tensions = [float(port.tension) for port in plant.muscle_states(moved)]
             pulls.append(mechanism.generalised_forces(moved, tensions, plant.resting_lengths)[c.name])
         assert found[c.name].shut_valves == pytest.approx(-(pulls[0] - pulls[1]) / (2 * h), rel=1e-5)
         assert found[c.name].shut_valves > found[c.name].constant_pressure

@@ -112,7 +112,7 @@ def test_no_air_and_no_enthalpy_is_lost_or_made(name, seed):
     system = CIRCUITS[name]
     state, inputs = shaken(system, seed)
     rates = system.rates(state, inputs)
-    done = system.responses(system.ports(state), state, inputs)
+    done = system.circuit_flows(system.muscle_states(state), state, inputs)
     for ending, part in (("air_mass", "mass"), ("internal_energy", "enthalpy")):
         held = [float(rates[s.name]) for s in system.states if s.name.endswith(ending)]
         drawn = sum(float(getattr(r.drawn, part)) for r in done)
@@ -124,7 +124,7 @@ def test_no_air_and_no_enthalpy_is_lost_or_made(name, seed):
 @pytest.mark.parametrize("name", sorted(set(CIRCUITS) - LEAKING))
 def test_a_settled_circuit_with_everything_shut_stays_as_it_is(name):
     system = CIRCUITS[name]
-    rates = system.rates(system.state_at(pressure=2e5), {i.name: 0.0 for i in system.commands})
+    rates = system.rates(system.state_at(pressure=2e5), {i.name: 0.0 for i in system.input_variables})
     assert [s.name for s in system.states if abs(float(rates[s.name])) > 1e-9 * s.nominal] == []
 
 
@@ -157,7 +157,7 @@ def test_overlap_is_a_dead_zone_and_the_edges_have_areas_of_their_own(place, fil
     circuit = ProportionalValve(Supply(6e5), VALVE, NARROW, SPOOL, 0.2)
     system = plant(circuit, Isothermal())
     start = system.state_at(pressure=2e5) | {"spool": place}
-    (done,) = system.responses(system.ports(start), start, {"command": 0.0})
+    (done,) = system.circuit_flows(system.muscle_states(start), start, {"command": 0.0})
     temperature, inside = AMBIENT.temperature, 2e5 + AMBIENT.pressure
     into = fill * VALVE.mass_flow(6e5 + AMBIENT.pressure, inside, 1.0, temperature)
     out = discharge * NARROW.mass_flow(inside, AMBIENT.pressure, 1.0, temperature)
@@ -169,7 +169,7 @@ def test_underlap_leaks_in_the_middle():
     circuit = ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, -0.2)
     system = plant(circuit)
     start = system.state_at(pressure=2e5)
-    (done,) = system.responses(system.ports(start), start, {"command": 0.0})
+    (done,) = system.circuit_flows(system.muscle_states(start), start, {"command": 0.0})
     assert done.drawn.mass > 0
     assert done.exhausted.mass > 0
 
@@ -178,8 +178,8 @@ def test_the_second_port_does_the_opposite():
     circuit = ProportionalValve(Supply(6e5), VALVE, NARROW, SPOOL, 0.1, 2)
     system = plant(circuit, Isothermal(), count=2)
     start = system.state_at(pressure=2e5) | {"spool": 0.5}
-    (done,) = system.responses(system.ports(start), start, {"command": 0.0})
-    mirrored = system.responses(system.ports(start), start | {"spool": -0.5}, {"command": 0.0})[0]
+    (done,) = system.circuit_flows(system.muscle_states(start), start, {"command": 0.0})
+    mirrored = system.circuit_flows(system.muscle_states(start), start | {"spool": -0.5}, {"command": 0.0})[0]
     assert done.flows[0].mass == mirrored.flows[1].mass > 0
     assert done.flows[1].mass == mirrored.flows[0].mass < 0
 
@@ -249,7 +249,7 @@ def test_a_regulated_supply_droops_in_proportion_to_the_flow():
     end = {s.name: run[s.name][-1] for s in system.states}
     outlet = source.air({"air_mass": end["supply.air_mass"]}, AMBIENT).pressure
     droop = 5e5 + AMBIENT.pressure - outlet
-    (done,) = system.responses(system.ports(end), end, {"fill": 1.0, "discharge": 0.0})
+    (done,) = system.circuit_flows(system.muscle_states(end), end, {"fill": 1.0, "discharge": 0.0})
     full = WIDE.mass_flow(8e5 + AMBIENT.pressure, outlet, 1.0, AMBIENT.temperature)
     assert done.exhausted.mass == pytest.approx(droop / 2e4 * full, rel=1e-5)
     assert 100.0 < droop < 2e4

@@ -117,7 +117,7 @@ def test_what_is_optional_has_the_defaults_of_the_page(tmp_path: Path):
     assert (scenario.title, scenario.output, scenario.method) == ("scenario", None, Rodas4())
     assert scenario.plant.gas == Polytropic()
     assert scenario.command == Schedule({})
-    assert scenario.plant.ports(scenario.start)[0].pressure == pytest.approx(0.0, abs=1e-6)
+    assert scenario.plant.muscle_states(scenario.start)[0].pressure == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -272,11 +272,11 @@ def test_a_muscle_of_the_library_keeps_the_box_of_its_law(tmp_path: Path):
 
 def test_the_start_is_rest_at_a_pressure_or_a_state(tmp_path: Path):
     at_rest = load_scenario(written(tmp_path))
-    assert at_rest.plant.ports(at_rest.start)[0].tension == pytest.approx(5 * 9.80665)
+    assert at_rest.plant.muscle_states(at_rest.start)[0].tension == pytest.approx(5 * 9.80665)
     given = ('start = { pressure = "1 bar" }', 'start = { pressure = "2 bar", position = "10 mm", speed = "5 cm/s" }')
     state = load_scenario(written(tmp_path, given)).start
     assert (state["position"], state["speed"]) == (0.01, 0.05)
-    assert at_rest.plant.ports(state)[0].pressure == pytest.approx(2e5)
+    assert at_rest.plant.muscle_states(state)[0].pressure == pytest.approx(2e5)
 
 
 def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):

@@ -51,7 +51,7 @@ def stiffness(plant: Plant, state: Mapping[str, float]) -> Stiffness:
     """
     state_vector(plant, state)
     check_state(plant, state)
-    ports = plant.ports(state)
+    ports = plant.muscle_states(state)
     found = [_of_muscle(plant, muscle, port) for muscle, port in zip(plant.muscles, ports, strict=True)]
     names = [m.name for m in plant.muscles]
     lengths = [float(length) for length in plant.resting_lengths]

@@ -133,14 +133,14 @@ class Printer:
 
 
 def implicit_module(t: TracedSystem) -> tuple[str, ArraySizes]:
-    """What an implicit method needs: rhs, jac, factor, solve, stage, drift and outputs.
+    """What an implicit method needs: rhs, jac, factor, solve, stage, df_dt and outputs.
 
     rhs(x, u, c, f)              f = rates
     jac(x, u, c, f, J)           rates, and the non-zeros of df/dx, equal ones once
     factor(J, d, A)              LU of d I - J
     solve(A, b, y)               y = (d I - J)^-1 b
     stage(x, u, c, A, g, k)      k = (d I - J)^-1 (f(x, u) + g)
-    drift(x, u, c, w, f)         (df/du) w, the rates' own slope in time while inputs move at w
+    df_dt(x, u, c, w, f)         (df/du) w, the rates' own slope in time while inputs move at w
     outputs(x, u, c, o)
     """
     import casadi
@@ -157,8 +157,8 @@ def implicit_module(t: TracedSystem) -> tuple[str, ArraySizes]:
     printer.add("factor", {"J": lu.j, "d": lu.d}, {"A": lu.values}, ["d"])
     printer.add("solve", {"A": a, "b": b}, {"y": casadi.vertcat(*solve)})
     printer.add("stage", {**point, "A": a, "g": g}, {"k": casadi.vertcat(*stage)})
-    drift = casadi.densify(casadi.jtimes(t.f, t.u, t.w) if t.u.numel() else casadi.SX(size, 1))
-    printer.add("drift", {**point, "w": t.w}, {"f": drift})
+    df_dt = casadi.densify(casadi.jtimes(t.f, t.u, t.w) if t.u.numel() else casadi.SX(size, 1))
+    printer.add("df_dt", {**point, "w": t.w}, {"f": df_dt})
     printer.add("outputs", point, {"o": t.o})
     sizes = ArraySizes(size, t.u.shape[0], t.p.shape[0], printer.held, lu.j.numel(), lu.values.numel(), t.o.shape[0])
     return printer.module(), sizes

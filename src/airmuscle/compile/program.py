@@ -1,4 +1,4 @@
-"""A system ready to run: machine code shared by all of its structure, and its own parameters."""
+"""Compiled systems: machine code shared by all systems of one structure, and what belongs to one system."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import ctypes
 import dataclasses
 import functools
 import threading
+import weakref
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ..core import tree
+from ..core.arrays import Array
 from ..core.system import Differentiated, System
 from . import functions, sensitivities, sensitivities_explicit
 from .functions import ArraySizes, TracedSystem
@@ -20,7 +21,9 @@ from .functions_simd import lanes_module
 from .llvm.jit import jit_compile
 from .llvm.types import LlvmType
 
-_FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "drift", "outputs")
+Tableau = tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]
+"""Rows of an explicit Runge-Kutta tableau below its first, and its weights."""
+_FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "df_dt", "outputs")
 
 
 class Program:
@@ -38,64 +41,104 @@ class Program:
         self.output_names = self._form.output_names
         self._engine = jit_compile(text)
         self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
-        self._prepare = _preparing(self._engine)
+        self._prepare = _prepare_function(self._engine)
         self._steps: dict[Any, tuple[Any, int]] = {}
-        self._compiling = threading.Lock()  # of two threads that ask for a step, one makes it: an engine must not go
+        self._compiling = threading.Lock()  # of two threads that need a step, one compiles it: an engine must stay
 
     @functools.cached_property
     def traced(self) -> TracedSystem:
         """The system's own rates and outputs as expressions, also of a differentiated one."""
         return self._form if isinstance(self._form, TracedSystem) else functions.trace_system(self._system)
 
-    def precompute(self, parameters: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """What the functions need of a set of parameters, computed once."""
+    def precompute(self, parameters: Array) -> Array:
+        """Values that the functions need of a set of parameters, computed once."""
         return self._prepare(parameters, self.sizes.held)
 
-    def step(
-        self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...], parameters: npt.NDArray[np.float64]
-    ) -> tuple[int, npt.NDArray[np.float64]]:
-        """The address of an explicit step of this tableau, and what it needs of the parameters."""
+    def step(self, tableau: Tableau, parameters: Array) -> tuple[int, Array]:
+        """The address of an explicit step with this tableau, and the values that it needs of the parameters."""
         with self._compiling:
-            if (a, b) not in self._steps:
-                text, held = self._printed_step(a, b)
-                self._steps[a, b] = jit_compile(text), held
-        engine, held = self._steps[a, b]
-        return int(engine.get_function_address("step")), _preparing(engine)(parameters, held)
+            if tableau not in self._steps:
+                text, size = self._step_module(tableau)
+                self._steps[tableau] = jit_compile(text), size
+        engine, size = self._steps[tableau]
+        return int(engine.get_function_address("step")), _prepare_function(engine)(parameters, size)
 
-    def _printed_step(self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...]) -> tuple[str, int]:
+    def _step_module(self, tableau: Tableau) -> tuple[str, int]:
         if isinstance(self._form, sensitivities.TangentSystem):
-            return sensitivities_explicit.explicit_module(self._form, a, b)
-        return functions.explicit_module(self._form, a, b)
+            return sensitivities_explicit.explicit_module(self._form, *tableau)
+        return functions.explicit_module(self._form, *tableau)
 
-    def lanes(
-        self, a: tuple[tuple[float, ...], ...], b: tuple[float, ...], number: LlvmType
-    ) -> tuple[tuple[int, int, int], int]:
-        """The addresses of `prepare`, the explicit step and `outputs` in lanes, and how long `c` must be."""
+    def lanes(self, tableau: Tableau, number: LlvmType) -> tuple[tuple[int, int, int], int]:
+        """The addresses of `prepare`, the explicit step and `outputs` in lanes, and the length of `c`."""
         with self._compiling:
-            if (a, b, number) not in self._steps:
-                text, held = lanes_module(self.traced, a, b, number)
-                self._steps[a, b, number] = jit_compile(text), held
-        engine, held = self._steps[a, b, number]
+            if (tableau, number) not in self._steps:
+                text, size = lanes_module(self.traced, *tableau, number)
+                self._steps[tableau, number] = jit_compile(text), size
+        engine, size = self._steps[tableau, number]
         prepare, step, outputs = (int(engine.get_function_address(n)) for n in ("prepare", "step", "outputs"))
-        return (prepare, step, outputs), held
+        return (prepare, step, outputs), size
 
 
 _PREPARE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 
 
-def _preparing(engine: Any) -> Callable[[npt.NDArray[np.float64], int], npt.NDArray[np.float64]]:
-    """What a set of parameters leaves for functions of this machine code, so many numbers."""
+def _prepare_function(engine: Any) -> Callable[[Array, int], Array]:
+    """The function `prepare` of an engine: from parameters to so many values for its other functions."""
     function = _PREPARE(engine.get_function_address("prepare"))
 
-    def prepare(parameters: npt.NDArray[np.float64], size: int) -> npt.NDArray[np.float64]:
-        handed = np.zeros(max(size, 1))
-        function(parameters.ctypes.data, handed.ctypes.data)
-        return handed
+    def prepare(parameters: Array, size: int) -> Array:
+        values = np.zeros(max(size, 1))
+        function(parameters.ctypes.data, values.ctypes.data)
+        return values
 
     return prepare
 
 
-_programs: dict[Any, Program] = {}
+class Description:
+    """Everything that a run needs to know of one system, derived once and kept as long as the system lives."""
+
+    def __init__(self, system: System) -> None:
+        self.program = _program(system)
+        self.parameters = tree.flatten(system)
+        self.precomputed = self.program.precompute(self.parameters)
+        states, inputs = system.states, system.input_variables
+        self.state_names = tuple(s.name for s in states)
+        self.input_names = tuple(i.name for i in inputs)
+        self.output_names = self.program.output_names
+        self.nominal = np.array([s.nominal for s in states])
+        self.lower_bounds = np.array(system.state_lower_bounds, dtype=float)
+        self.input_minimum = np.array([i.minimum for i in inputs])
+        self.input_maximum = np.array([i.maximum for i in inputs])
+        positive = set(system.positive_outputs)
+        self.positive_outputs = np.array([i for i, n in enumerate(self.output_names) if n in positive], dtype=np.intp)
+        self.constants = dict(system.constants)
+        self.remarks = system.describe()
+        self.default_state: Array | None = None
+        """The default initial state, once it has been found."""
+        self.integrators: dict[Any, list[Any]] = {}
+        """Integrators bound to this system that no run uses at present, by their integrator."""
+
+
+_programs: dict[tree.Structure, Program] = {}
+_descriptions: dict[int, tuple[weakref.ref[System], Description]] = {}
+
+
+def _program(system: System) -> Program:
+    structure = tree.structure(system)
+    if structure not in _programs:
+        _programs[structure] = Program(system)
+    return _programs[structure]
+
+
+def describe(system: System) -> Description:
+    """The description of a system, which is kept as long as the system lives."""
+    key = id(system)
+    stored = _descriptions.get(key)
+    if stored is not None and stored[0]() is system:
+        return stored[1]
+    description = Description(system)
+    _descriptions[key] = weakref.ref(system, lambda _: _descriptions.pop(key, None)), description
+    return description
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -104,10 +147,11 @@ class CompiledSystem:
 
     system: System
     program: Program
-    parameters: npt.NDArray[np.float64]
-    precomputed: npt.NDArray[np.float64]
-    known_nominal: npt.NDArray[np.float64] | None = None
-    """The nominal sizes of the states, where they are not to be asked of the system."""
+    parameters: Array
+    precomputed: Array
+    nominal: Array
+    """The size of each state below which its relative error no longer matters."""
+    description: Description
 
     @property
     def sizes(self) -> ArraySizes:
@@ -124,21 +168,18 @@ class CompiledSystem:
         """The outputs, in the order of their vector."""
         return self.program.output_names
 
-    def nominal(self) -> npt.NDArray[np.float64]:
-        """The size of each state below which its relative error no longer matters."""
-        return np.array([s.nominal for s in self.system.states]) if self.known_nominal is None else self.known_nominal
+    def at(self, parameters: Array, nominal: Array) -> CompiledSystem:
+        """The same system with other parameters and nominal sizes, for callers that change them often."""
+        precomputed = self.program.precompute(parameters)
+        return dataclasses.replace(self, parameters=parameters, precomputed=precomputed, nominal=nominal)
 
-    def at(self, parameters: npt.NDArray[np.float64], nominal: npt.NDArray[np.float64]) -> CompiledSystem:
-        """The same system with other parameters, its nominal sizes given: for those who change them often."""
-        return CompiledSystem(self.system, self.program, parameters, self.program.precompute(parameters), nominal)
-
-    def call(self, name: str, *arrays: npt.NDArray[np.float64] | float) -> None:
-        """Call one printed function by hand; arrays are passed by address, floats by value."""
+    def call(self, name: str, *arrays: Array | float) -> None:
+        """Call one compiled function; arrays are passed by address, floats by value."""
         kinds = [ctypes.c_double if isinstance(a, float) else ctypes.c_void_p for a in arrays]
         values = [a if isinstance(a, float) else a.ctypes.data for a in arrays]
         ctypes.CFUNCTYPE(None, *kinds)(self.address[name])(*values)
 
-    def rates(self, state: Sequence[float], inputs: Sequence[float]) -> npt.NDArray[np.float64]:
+    def rates(self, state: Sequence[float], inputs: Sequence[float]) -> Array:
         """The compiled rates at a state vector (n,) under inputs (m,)."""
         x, u = np.array(state, dtype=float), np.array(inputs, dtype=float)
         f = np.empty(self.sizes.states)
@@ -147,10 +188,6 @@ class CompiledSystem:
 
 
 def compile_system(system: System) -> CompiledSystem:
-    """The system with compiled functions. Another parameter set of the same structure costs nothing."""
-    key = tree.structure(system)
-    if key not in _programs:
-        _programs[key] = Program(system)
-    program = _programs[key]
-    parameters = tree.flatten(system)
-    return CompiledSystem(system, program, parameters, program.precompute(parameters))
+    """The system with compiled functions, at no cost where one of the same structure was compiled before."""
+    known = describe(system)
+    return CompiledSystem(system, known.program, known.parameters, known.precomputed, known.nominal, known)

@@ -2,13 +2,15 @@
 
 from .control_loop import ControlLoop, ControlLoopState
 from .controller import Controller, Measurement
-from .driver import PWM, Driver, SolenoidDriver, WithDrivers
-from .inputs import ZERO_INPUT, InputSignal, Periodic, PiecewiseLinear, SampledSignal, Schedule
+from .driver import PWM, Driver, SolenoidDriver
+from .inputs import ZERO_INPUT, InputSignal, Periodic, SampledSignal, Schedule
 from .on_off import OnOffController
 from .pid import PID
+from .piecewise_linear import PiecewiseLinear
 from .siso import SisoController
 from .split_range import SplitRange
 from .trajectory import Trajectory, spline_trajectory
+from .with_drivers import WithDrivers
 
 __all__ = [
     "PID",

@@ -1,27 +1,36 @@
-"""A loop: a controller at a plant, how often it looks, what it is to follow, and what stands around it."""
+"""ControlLoop: a sampled controller at a plant, with its sample time, set points, other inputs and drivers."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from ..core.errors import ParameterError, suggestion
+from ..recording.recording import Recording
 from .controller import Controller
-from .driver import Driver, WithDrivers, column, merge_inputs
-from .inputs import ZERO_INPUT, InputSignal, PiecewiseLinear, Schedule, check_input_names, check_input_signal
-
-if TYPE_CHECKING:
-    from ..recording import Recording
+from .driver import Driver
+from .inputs import ZERO_INPUT, InputSignal, Schedule, check_input_names, check_input_signal
+from .piecewise_linear import PiecewiseLinear, merge_columns
+from .with_drivers import WithDrivers
 
 COMMAND, SETPOINT, MEASURED = "command.", "setpoint.", "measured."
-"""How the columns of a recording begin that hold what a controller commanded, was to follow, and measured."""
+"""Prefixes of the columns of a recording that hold commands, set points and measurements of a controller."""
 
 
 class ControlLoopState(NamedTuple):
-    """A loop at one moment: the controller's memory, when the loop began and which moment it is [s], the samples taken
-    so far, what was measured and commanded at the last, the inputs that the plant had, and the drivers' memories."""
+    """A control loop at one instant.
+
+    controller      the controller's memory
+    origin, time    when the loop began, and this instant [s]
+    sample_count    samples so far
+    measured, commanded    values of the last sample
+    applied_inputs  the plant's inputs just before this instant
+    drivers         the drivers' states
+    """
 
     controller: Any
     origin: float
@@ -35,13 +44,14 @@ class ControlLoopState(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class ControlLoop:
-    """A sampled loop: every `period` [s], from the beginning of a run on, the controller measures and commands.
+    """A sampled control loop: every `period` [s], from the start of a run on, the controller measures and commands.
 
-    setpoint  a Command whose names are the controller's set points, `Schedule({"pressure": ((0, 1e5), (2, 3e5))})`
-    beside    a Command for the inputs that the controller does not command; they rest unless given
-    drivers   what stands between command and opening, as in Driven; a command to one is within 0 and 1
+    setpoint      an InputSignal whose names are the controller's set points,
+                  `Schedule({"pressure": ((0, 1e5), (2, 3e5))})`
+    other_inputs  an InputSignal for the inputs that the controller does not command; zero by default
+    drivers       between commands and openings, as in WithDrivers; the command of a driver is within 0 and 1
 
-    Between two samples a command is held. It is cut off at the range that the plant declares for its input.
+    Between two samples a command is held. It is limited to the range that the plant declares for its input.
     """
 
     controller: Controller
@@ -66,30 +76,29 @@ class ControlLoop:
         named = self.setpoint.names
         if named is not None and set(named) != set(controller.setpoints):
             raise ParameterError(
-                f"ControlLoop.setpoint names {', '.join(named) or 'nothing'}; {type(controller).__name__} follows "
-                f"{', '.join(controller.setpoints)}."
+                f"ControlLoop.setpoint names {', '.join(named) or 'nothing'}; the set points of "
+                f"{type(controller).__name__} are {', '.join(controller.setpoints)}."
             )
         twice = [name for name in self.other_inputs.names or () if name in controller.inputs]
         if twice:
-            raise ParameterError(f"the input '{twice[0]}' is commanded by the controller, and beside it too.")
+            raise ParameterError(f"the input '{twice[0]}' is commanded by the controller and by other_inputs.")
 
     def init(self, start: float) -> ControlLoopState:
-        """The memory of a loop that begins at `start` [s]: nothing measured yet, every driver at rest."""
-        drivers = WithDrivers(self.other_inputs, self.drivers).init(start)
-        told = (0.0,) * len(self.controller.inputs)
+        """The state of a loop that begins at `start` [s]: no sample yet, every driver at rest."""
+        controller = self.controller
         return ControlLoopState(
-            self.controller.init(),
-            start,
-            start,
-            0,
-            (math.nan,) * len(self.controller.measured_columns),
-            told,
-            (),
-            drivers,
+            controller=controller.init(),
+            origin=start,
+            time=start,
+            sample_count=0,
+            measured=(math.nan,) * len(controller.measured_columns),
+            commanded=(0.0,) * len(controller.inputs),
+            applied_inputs=(),
+            drivers=WithDrivers(self.other_inputs, self.drivers).init(start),
         )
 
     def check_columns(self, columns: Sequence[str], inputs: Sequence[str]) -> None:
-        """Raise ParameterError, with the nearest name, for what a plant with these columns and inputs does not have."""
+        """Raise ParameterError, with the nearest name, for a column or input that the plant does not have."""
         check_present(self.controller, columns, inputs)
         check_input_names((*(self.other_inputs.names or ()), *self.drivers), inputs)
 
@@ -97,12 +106,12 @@ class ControlLoop:
         """Raise ParameterError where a run of `duration` [s] ends before the second sample."""
         if self.period > duration:
             raise ParameterError(
-                f"the controller looks every {self.period:g} s, and the run lasts {duration:g} s: it would look only "
-                "once. Shorten the period, or simulate longer."
+                f"the sample time of the controller is {self.period:g} s, longer than the run of {duration:g} s. "
+                "Shorten the sample time, or simulate longer."
             )
 
     def units(self, known: Mapping[str, str]) -> dict[str, str]:
-        """The units of the columns that a recording has because of the loop, from those of the plant's columns."""
+        """The units of the columns that the loop adds to a recording, from those of the plant's columns."""
         kinds = (
             (SETPOINT, self.controller.setpoints),
             (MEASURED, self.controller.measured_columns),
@@ -111,33 +120,34 @@ class ControlLoop:
         return {f"{kind}{name}": known.get(name, "") for kind, names in kinds for name in names}
 
     def describe(self, units: Mapping[str, str]) -> str:
-        """Who measures, commands and follows what, and how often; `units` by the names of columns and inputs."""
-        with_unit = {name: f"{name} [{unit}]" if unit else name for name, unit in units.items()}
+        """Controller, sample time, controlled and manipulated variables; `units` by the names of columns and inputs."""
+        with_unit = {name: f"{name} [{unit}]" if unit not in ("", "1") else name for name, unit in units.items()}
         measured, commanded = (
             ", ".join(with_unit.get(name, name) for name in names)
             for names in (self.controller.measured_columns, self.controller.inputs)
         )
         return (
-            f"every {self.period:g} s {measured} is measured and {commanded} commanded by {_in_words(self.controller)}"
+            f"{_describe_controller(self.controller)}, sample time {_milliseconds(self.period)}, measured {measured}, "
+            f"commanded {commanded}"
         )
 
     def as_open_loop(self, recording: Recording) -> InputSignal:
-        """What the controller commanded in a run that was recorded whole, as a command that knows no controller.
+        """The commands of a complete recorded run as an input signal without a controller.
 
-        It gives the same run: to draw what drivers made of it, or to run something else under the same command.
+        It gives the same run: to plot the outputs of the drivers, or to simulate another plant with the same commands.
         """
         time = recording["time"].tolist()
-        told = {name: recording[f"{COMMAND}{name}"].tolist() for name in self.controller.inputs}
+        commands = {name: recording[f"{COMMAND}{name}"].tolist() for name in self.controller.inputs}
         changes = {
             name: tuple((time[i], v) for i, v in enumerate(values) if i == 0 or v != values[i - 1])
-            for name, values in told.items()
+            for name, values in commands.items()
         }
-        command = Beside(Schedule(changes), self.other_inputs)
-        return WithDrivers(command, self.drivers) if self.drivers else command
+        signal = CombinedSignal(Schedule(changes), self.other_inputs)
+        return WithDrivers(signal, self.drivers) if self.drivers else signal
 
 
 def check_present(controller: Controller, columns: Sequence[str], inputs: Sequence[str]) -> None:
-    """Raise ParameterError, with the nearest name, for what a plant with these columns and inputs does not have."""
+    """Raise ParameterError, with the nearest name, for a column or input that the plant does not have."""
     for name in controller.measured_columns:
         if name not in columns:
             raise ParameterError(
@@ -148,8 +158,8 @@ def check_present(controller: Controller, columns: Sequence[str], inputs: Sequen
 
 
 @dataclasses.dataclass(frozen=True)
-class Beside(InputSignal):
-    """The inputs that `inner` names as it says, the others as `other` does."""
+class CombinedSignal(InputSignal):
+    """The inputs that `inner` names from `inner`, all others from `other`."""
 
     inner: InputSignal
     other: InputSignal
@@ -160,19 +170,23 @@ class Beside(InputSignal):
         return None if other is None else (*(self.inner.names or ()), *other)
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        inner, other = (command.segments(inputs, start, duration) for command in (self.inner, self.other))
-        return merge_inputs(
-            other, {inputs.index(name): column(inner, inputs.index(name)) for name in self.inner.names or ()}, start
-        )
+        inner, other = (signal.segments(inputs, start, duration) for signal in (self.inner, self.other))
+        own = self.inner.names or ()
+        columns = [(inner if name in own else other).column(i) for i, name in enumerate(inputs)]
+        if not columns:
+            return other
+        ends, values, slopes = merge_columns(columns, start)
+        shape = (len(ends), len(inputs))
+        return PiecewiseLinear(np.array(ends), np.array(values).reshape(shape), np.array(slopes).reshape(shape))
 
 
-def _in_words(controller: Controller) -> str:
-    """A controller and its fields; numbers without the last digits, which a change of unit leaves."""
-    told = []
-    fields: tuple[dataclasses.Field[Any], ...] = ()
-    if dataclasses.is_dataclass(controller):
-        fields = dataclasses.fields(controller)
-    for field in fields:
-        value = getattr(controller, field.name)
-        told.append(f"{field.name}={value:.12g}" if isinstance(value, float) else f"{field.name}={value!r}")
-    return f"{type(controller).__name__}({', '.join(told)})"
+def _milliseconds(seconds: float) -> str:
+    return f"{seconds * 1e3:.4g} ms" if seconds < 1 else f"{seconds:.4g} s"
+
+
+def _describe_controller(controller: Controller) -> str:
+    """A controller and its fields; floats with twelve digits, which hides the rounding of a unit conversion."""
+    names = [field.name for field in dataclasses.fields(controller)] if dataclasses.is_dataclass(controller) else []
+    values = [(name, getattr(controller, name)) for name in names]
+    texts = [f"{name}={value:.12g}" if isinstance(value, float) else f"{name}={value!r}" for name, value in values]
+    return f"{type(controller).__name__}({', '.join(texts)})"

@@ -1,4 +1,4 @@
-"""Controllers: what looks at a plant at sampling instants, and says what its inputs are to be until the next."""
+"""Controller (interface): a sampled controller, from measured columns to commanded inputs."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 RELATIVE = ("u", "y", "u/y")
-"""Units of a controller's parameters that follow from where it stands: u that of the input which it commands, y that of
-the column which it measures. In Python such a number is SI; a file gives it in any unit that fits: `"0.4 1/bar"`."""
+"""Units of a controller's parameters that follow from the loop: u is the unit of the commanded input, y that of the
+measured column. In Python such a number is SI; a file gives it in any unit that fits: `"0.4 1/bar"`."""
 
 
 class Measurement(NamedTuple):
-    """What a controller is given at a sampling instant, by name and in SI: the columns that it measures, their set
-    points, and the least and greatest value of each input that it commands (of one with a driver, 0 and 1)."""
+    """Input of a controller at a sampling instant, by name and in SI: the measured columns, their set points, and the
+    range (minimum, maximum) of every commanded input; of one with a driver 0 to 1."""
 
     columns: Mapping[str, float]
     setpoints: Mapping[str, float]
@@ -21,22 +21,22 @@ class Measurement(NamedTuple):
 
 
 class Controller(abc.ABC):
-    """A sampled controller: a frozen model with a memory that is a value, so that the same run is the same twice."""
+    """A sampled controller: a frozen model with a memory that is a value, so that runs are reproducible."""
 
     @property
     @abc.abstractmethod
     def measured_columns(self) -> tuple[str, ...]:
-        """The states and outputs of the plant that it measures."""
+        """The measured states and outputs of the plant."""
 
     @property
     @abc.abstractmethod
     def setpoints(self) -> tuple[str, ...]:
-        """What it is told to follow; a set point named as a column is in that column's unit."""
+        """The set points; one that is named as a column has that column's unit."""
 
     @property
     @abc.abstractmethod
     def inputs(self) -> tuple[str, ...]:
-        """The inputs of the plant that it commands."""
+        """The commanded inputs of the plant."""
 
     @abc.abstractmethod
     def init(self) -> Any:
@@ -44,14 +44,15 @@ class Controller(abc.ABC):
 
     @abc.abstractmethod
     def step(self, memory: Any, measurement: Measurement, dt: float) -> tuple[Mapping[str, float], Any]:
-        """The command of every input until the next sample, `dt` [s] later, and the memory to give to that one.
+        """The command of every input until the next sample, `dt` [s] later, and the memory for that sample.
 
-        What lies beyond the range of an input is cut off afterwards; a controller that integrates must know of it.
+        Commands are limited to the ranges of the inputs afterwards; a controller with integral action must account for
+        it.
         """
 
 
 def relative_unit(unit: str, measured: str, commanded: str) -> str:
-    """A declared unit, where it is one of RELATIVE with the units y and u put in: `u/y` is `1/Pa`, say."""
+    """A declared unit, with the units y and u inserted where it is one of RELATIVE: `u/y` is `1/Pa`, say."""
     if unit == "u/y":
         if measured in ("1", commanded):
             return commanded if measured == "1" else "1"

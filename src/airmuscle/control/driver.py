@@ -1,121 +1,110 @@
-"""Drivers: what stands between a command and an opening. Dead times, ramps and pulses become instants beforehand.
+"""Drivers between the command of an input and the opening of its valve: solenoids and pulse width modulation.
 
-A driver has a memory, a named tuple of numbers, because what was switched may still be on its way: carried along, a
-run in many steps is the run in one. At the start of a run every driver is at rest: coil without current, valve shut,
-carrier at the beginning of a period.
+A driver has a state, a named tuple of numbers, because what was switched may still be pending: carried along, a run in
+many steps equals the run in one. At the start of a run every driver is at rest: no current in the coil, valve closed,
+carrier at the start of a period.
 """
 
 from __future__ import annotations
 
 import abc
-import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
-from ..core.arrays import Array
 from ..core.declaration import INFINITY, model, parameter
 from ..core.errors import ParameterError
-from .inputs import InputSignal, PiecewiseLinear, check_input_names, check_input_signal
+from .piecewise_linear import Segment
 
 THRESHOLD = 0.5
-"""A coil carries current while its command is at least this (chosen)."""
-MOST_PERIODS = 10_000_000
-"""Periods of a carrier in one run that fit a usual memory."""
-_SAME = 1e-12
-"""An opening this near its end has reached it: what rounding leaves makes no segment of its own."""
+"""The coil of a solenoid carries current while its command is at least this (chosen)."""
+MAX_PERIODS = 10_000_000
+"""Periods of a carrier in one run."""
+_ARRIVED = 1e-12
+"""An opening this close to its target has reached it: rounding makes no segment of its own."""
 
 
 class Driver(abc.ABC):
-    """What turns one input's command into what its valve does."""
+    """Conversion of the command of one input into the opening of its valve."""
 
     @abc.abstractmethod
     def init(self, start: float) -> Any:
-        """The memory of a driver at rest at `start` [s]."""
+        """The state of a driver at rest at `start` [s]."""
 
     @abc.abstractmethod
-    def step(self, memory: Any, signal: PiecewiseLinear, start: float) -> tuple[PiecewiseLinear, Any]:
-        """What comes out for a signal of one input from `start` to its end, and the memory there.
+    def step(self, state: Any, command: Sequence[Segment], start: float) -> tuple[list[Segment], Any]:
+        """The opening for a command from `start` [s] to its end, and the state there.
 
-        Nothing depends on what the signal does later: cut at any instant, it gives the same course.
+        The opening at an instant does not depend on later commands: split at any instant, the result is the same.
         """
 
 
 class SolenoidState(NamedTuple):
-    """An on/off valve at one moment: current in the coil 0 or 1, the instant [s] at which the plunger will follow it
-    (infinite when nothing is pending), where the plunger is heading, 0 or 1, and the opening it has."""
+    """A solenoid valve at one instant: current in the coil 0 or 1, the instant [s] at which the plunger will respond
+    (infinite when nothing is pending), the target of the plunger, 0 or 1, and the opening."""
 
     coil: float
     pending: float
-    heading: float
+    target: float
     opening: float
 
 
 @model
 class SolenoidDriver(Driver):
-    """A solenoid valve that answers late and moves at a finite speed.
+    """A solenoid valve with dead times and a finite speed of the plunger.
 
     The coil carries current while the command is at least 0.5 (chosen). The plunger follows the coil after the delay of
-    the new direction, if the coil still holds it then: a pulse no longer than the opening delay never opens the valve,
-    a gap no longer than the closing delay never shuts it. It then moves at constant speed, 1/ramp, until it arrives or
-    is called back, which again takes the delay: a pulse a little longer than the opening delay opens in part. The
-    field of a coil is taken to be gone at once, so that a swallowed pulse leaves nothing behind.
+    the new direction, if the coil is still in that state: a pulse no longer than the opening delay never opens the
+    valve, a gap no longer than the closing delay never closes it. It then moves at constant speed, 1/ramp, until it
+    arrives or is reversed, which again takes the delay: a pulse a little longer than the opening delay opens partly.
+    The magnetic field is assumed to decay at once, so that a pulse that was too short has no effect.
     """
 
     opening_delay: float = parameter("s", "t_on", "from current to the first motion", bounds=(0.0, 10.0), default=0.0)
     closing_delay: float = parameter("s", "t_off", "from no current to motion", bounds=(0.0, 10.0), default=0.0)
-    opening_ramp: float = parameter("s", "T_on", "from shut to open, in motion", bounds=(0.0, 10.0), default=0.0)
-    closing_ramp: float = parameter("s", "T_off", "from open to shut, in motion", bounds=(0.0, 10.0), default=0.0)
+    opening_ramp: float = parameter("s", "T_on", "from closed to open, in motion", bounds=(0.0, 10.0), default=0.0)
+    closing_ramp: float = parameter("s", "T_off", "from open to closed, in motion", bounds=(0.0, 10.0), default=0.0)
 
     def init(self, start: float) -> SolenoidState:
-        return SolenoidState(coil=0.0, pending=INFINITY, heading=0.0, opening=0.0)
+        return SolenoidState(coil=0.0, pending=INFINITY, target=0.0, opening=0.0)
 
     def step(
-        self, memory: SolenoidState, signal: PiecewiseLinear, start: float
-    ) -> tuple[PiecewiseLinear, SolenoidState]:
-        end = float(signal.ends[-1])
-        switched, currents = _switchings(signal, start, memory.coil)
-        coil = float(currents[-1]) if currents.size else memory.coil
-        due = np.append(memory.pending, switched + np.where(currents > 0, self.opening_delay, self.closing_delay))
-        held = np.append(switched, INFINITY) > due
-        pending = float(due[-1]) if due[-1] >= end else INFINITY
-        moves = held & (due < end)
-        instants, headings = _changes(due[moves], np.append(memory.coil, currents)[moves], memory.heading)
-        heading = float(headings[-1]) if headings.size else memory.heading
-        edges, targets = np.concatenate([[start], instants, [end]]), np.append(memory.heading, headings)
-        openings = self._openings(edges, targets, memory.opening)
-        return self._motion(edges, targets, openings), SolenoidState(coil, pending, heading, float(openings[-1]))
+        self, state: SolenoidState, command: Sequence[Segment], start: float
+    ) -> tuple[list[Segment], SolenoidState]:
+        end = command[-1][0]
+        coil, pending, target, opening = state
+        openings: list[Segment] = []
+        edge = start
+        for instant, current in (*_switchings(command, start, coil), (INFINITY, coil)):
+            if pending < min(instant, end) and coil != target:  # the plunger responds before the coil switches again
+                opening = self._move(openings, edge, pending, target, opening)
+                edge, target = pending, coil
+            if instant == INFINITY:
+                break
+            coil = current
+            pending = instant + (self.opening_delay if current > 0 else self.closing_delay)
+        opening = self._move(openings, edge, end, target, opening)
+        return openings, SolenoidState(coil, pending if pending >= end else INFINITY, target, opening)
 
-    def _openings(self, edges: Array, targets: Array, opening: float) -> Array:
-        """The opening at every edge, a target being held between two."""
-        found = [opening]
-        for length, target in zip(np.diff(edges).tolist(), targets.tolist(), strict=True):
-            ramp = self.opening_ramp if target > opening else self.closing_ramp
-            left = abs(target - opening) - (length / ramp if ramp > 0 else INFINITY)
-            opening = target if left <= _SAME else target + math.copysign(left, opening - target)
-            found.append(opening)
-        return np.array(found)
-
-    def _motion(self, edges: Array, targets: Array, openings: Array) -> PiecewiseLinear:
-        """Straight lines through the openings at the edges: from each a motion, then rest where it arrived."""
-        before, after, begins = openings[:-1], openings[1:], edges[:-1]
-        ramps = np.where(targets > before, self.opening_ramp, self.closing_ramp)
-        lasts = np.where(after == targets, ramps * np.abs(targets - before), INFINITY)
-        arrivals = np.minimum(begins + lasts, edges[1:])
-        moving, resting = arrivals > begins, edges[1:] > arrivals
-        slopes = np.zeros_like(before)
-        np.divide(after - before, arrivals - begins, out=slopes, where=moving)
-        starts = np.column_stack([begins, arrivals])[kept := np.column_stack([moving, resting])]
-        values, rates = np.column_stack([before, after])[kept], np.column_stack([slopes, np.zeros_like(slopes)])[kept]
-        return PiecewiseLinear(np.append(starts[1:], edges[-1]), values[:, None], rates[:, None])
+    def _move(self, openings: list[Segment], begin: float, end: float, target: float, opening: float) -> float:
+        """Append the motion towards the target from `begin` to `end` and the rest after it; the opening at the end."""
+        if not begin < end:
+            return opening
+        ramp = self.opening_ramp if target > opening else self.closing_ramp
+        distance = abs(target - opening)
+        left = distance - ((end - begin) / ramp if ramp > 0 else INFINITY)
+        after = target if left <= _ARRIVED else target + math.copysign(left, opening - target)
+        arrival = min(begin + (ramp * distance if after == target else INFINITY), end)
+        if arrival > begin:
+            openings.append((arrival, opening, (after - opening) / (arrival - begin)))
+        if end > arrival:
+            openings.append((end, after, 0.0))
+        return after
 
 
 class PwmState(NamedTuple):
-    """A pulse width modulator at one moment: when its carrier began [s], how many periods have begun since, and when
-    the pulse of the last of them ends [s] (infinite when it fills its period, minus infinite when it has none)."""
+    """A pulse width modulator at one instant: start of its carrier [s], number of periods that have begun, and the end
+    of the pulse of the last of them [s] (infinite when it fills its period, minus infinite when there is none)."""
 
     origin: float
     begun: float
@@ -124,10 +113,10 @@ class PwmState(NamedTuple):
 
 @model
 class PWM(Driver):
-    """Pulse width modulation: the command at the beginning of a period is the part of the period that is on.
+    """Pulse width modulation: the command at the start of a period is the part of the period that is on.
 
-    What would be shorter than the smallest pulse is left out, and a gap that would be shorter is filled, so that the
-    mean of a period differs from the command by at most smallest pulse times frequency.
+    A pulse shorter than the smallest pulse is omitted, and a gap shorter than it is filled, so that the mean of a
+    period differs from the command by at most the smallest pulse times the frequency.
     """
 
     frequency: float = parameter("1/s", "f_c", "frequency of the carrier", bounds=(1e-3, 1e6))
@@ -137,140 +126,74 @@ class PWM(Driver):
         if self.smallest_pulse * self.frequency > 0.5:
             raise ParameterError(
                 f"PWM.smallest_pulse is {self.smallest_pulse:g} s, more than half of the carrier's period of "
-                f"{1 / self.frequency:g} s: no pulse would leave room for a gap. Lower the frequency."
+                f"{1 / self.frequency:g} s: no pulse would leave time for a gap. Lower the frequency."
             )
 
     def init(self, start: float) -> PwmState:
         return PwmState(origin=start, begun=0.0, pulse_end=-INFINITY)
 
-    def step(self, memory: PwmState, signal: PiecewiseLinear, start: float) -> tuple[PiecewiseLinear, PwmState]:
-        end, period = float(signal.ends[-1]), 1.0 / self.frequency
-        starts = self._periods(memory, start, end)
-        widths = period * np.clip(signal.inputs_at(starts, start)[:, 0], 0.0, 1.0)
-        least = max(self.smallest_pulse, 1e-9 * period, 4 * float(np.spacing(end)))
-        pulse_ends = np.where(widths < least, -INFINITY, np.where(period - widths < least, INFINITY, starts + widths))
-        later = PwmState(memory.origin, memory.begun + starts.size, float(np.append(memory.pulse_end, pulse_ends)[-1]))
-        if starts.size == 0 or starts[0] > start:  # the rest of a period that began earlier
-            starts, pulse_ends = np.append(start, starts), np.append(memory.pulse_end, pulse_ends)
-        on = pulse_ends > starts
-        kept = np.column_stack([np.ones_like(on), on & (pulse_ends < end)])
-        instants = np.column_stack([starts, pulse_ends])[kept]
-        levels = np.column_stack([on, np.zeros_like(on)])[kept].astype(float)
-        instants, levels = _changes(instants, levels, before=-1.0)
-        ends = np.append(instants[1:], end)
-        return PiecewiseLinear(ends, levels[:, None], np.zeros((ends.size, 1))), later
+    def step(self, state: PwmState, command: Sequence[Segment], start: float) -> tuple[list[Segment], PwmState]:
+        end, period = command[-1][0], 1.0 / self.frequency
+        smallest = max(self.smallest_pulse, 1e-9 * period, 4 * math.ulp(end))
+        levels: list[tuple[float, float]] = []  # instant, level from then on
+        pulse_end, count = state.pulse_end, 0
+        _add_pulse(levels, start, pulse_end, end)
+        for begin, duty in _values_at(command, start, self._periods(state, start, end)):
+            width = period * min(max(duty, 0.0), 1.0)
+            pulse_end = -INFINITY if width < smallest else INFINITY if period - width < smallest else begin + width
+            if count == 0 and begin == start:
+                levels.clear()
+            _add_pulse(levels, begin, pulse_end, end)
+            count += 1
+        pulses = [(instant, level) for i, (instant, level) in enumerate(levels) if not i or level != levels[i - 1][1]]
+        ends = [*(instant for instant, _ in pulses[1:]), end]
+        later = PwmState(state.origin, state.begun + count, pulse_end)
+        return [(e, level, 0.0) for e, (_, level) in zip(ends, pulses, strict=True)], later
 
-    def _periods(self, memory: PwmState, start: float, end: float) -> Array:
-        """The beginnings [s] of the periods that begin before `end`."""
-        count = (end - memory.origin) * self.frequency - memory.begun
-        if count > MOST_PERIODS:
+    def _periods(self, state: PwmState, start: float, end: float) -> Iterator[float]:
+        """The starts [s] of the periods that begin before `end`."""
+        count = (end - state.origin) * self.frequency - state.begun
+        if count > MAX_PERIODS:
             raise ParameterError(
-                f"a carrier of {self.frequency:g} Hz has {count:.3g} periods in {end - start:g} s; {MOST_PERIODS} are "
+                f"a carrier of {self.frequency:g} Hz has {count:.3g} periods in {end - start:g} s; {MAX_PERIODS} are "
                 "allowed. Simulate a shorter time, or the mean of the pulses."
             )
-        starts = memory.origin + (memory.begun + np.arange(max(math.ceil(count) + 1, 0))) / self.frequency
-        # one that begins where rounding alone keeps it before the end belongs to what is commanded from there on
-        return np.asarray(np.maximum(starts[starts < end - 4 * np.spacing(abs(end))], start))
+        # a period that begins where rounding alone keeps it before the end belongs to the command from there on
+        last = end - 4 * math.ulp(abs(end))
+        for i in range(max(math.ceil(count) + 1, 0)):
+            begin = state.origin + (state.begun + i) / self.frequency
+            if begin < last:
+                yield max(begin, start)
 
 
-def _switchings(signal: PiecewiseLinear, start: float, coil: float) -> tuple[Array, Array]:
-    """When the current of a coil changes [s], and to what; `coil` is what it was before."""
-    begins, value, slope = signal.starts(start), signal.values[:, 0], signal.slopes[:, 0]
-    first, last = value >= THRESHOLD, value + slope * (signal.ends - begins) >= THRESHOLD
-    crossings = begins + np.divide(THRESHOLD - value, slope, out=np.zeros_like(value), where=first != last)
-    crossings = np.minimum(crossings, signal.ends)
-    return _changes(np.column_stack([begins, crossings]).ravel(), np.column_stack([first, last]).ravel(), coil)
+def _add_pulse(levels: list[tuple[float, float]], begin: float, pulse_end: float, end: float) -> None:
+    """Append the level at `begin`, and the end of a pulse that ends before `end`."""
+    on = pulse_end > begin
+    levels.append((begin, 1.0 if on else 0.0))
+    if on and pulse_end < end:
+        levels.append((pulse_end, 0.0))
 
 
-def _changes(instants: Array, levels: npt.NDArray[Any], before: float) -> tuple[Array, Array]:
-    """Only those instants at which the level becomes another one; `before` is the level until the first."""
-    levels = np.asarray(levels, dtype=float)
-    kept = np.diff(levels, prepend=before) != 0
-    return instants[kept], levels[kept]
+def _values_at(command: Sequence[Segment], start: float, times: Iterator[float]) -> Iterator[tuple[float, float]]:
+    """Rising times [s] with the value of a command there; where two segments meet, that of the later one."""
+    k, last, begin = 0, len(command) - 1, start
+    for time in times:
+        while k < last and command[k][0] <= time:
+            begin = command[k][0]
+            k += 1
+        _, value, slope = command[k]
+        yield time, value + (time - begin) * slope
 
 
-@dataclasses.dataclass(frozen=True)
-class WithDrivers(InputSignal):
-    """A command whose inputs, some or all, pass through drivers: one each, or several in the order of the signal.
-
-    `WithDrivers(Signal({"fill": ...}), {"fill": (PWM(50), SolenoidDriver(opening_delay=5e-3))})`. Inputs without a driver do as they
-    are told at once. Raises ParameterError where the command of a driver leaves 0 to 1.
-    """
-
-    inner: InputSignal
-    drivers: Mapping[str, Driver | tuple[Driver, ...]]
-
-    def __post_init__(self) -> None:
-        check_input_signal(self.inner)
-        if not isinstance(self.drivers, Mapping):
-            raise ParameterError(f"the drivers are {self.drivers!r}; name the inputs: {{'fill': SolenoidDriver(...)}}.")
-        for name, chain in self.chains.items():
-            for driver in chain:
-                if not isinstance(driver, Driver):
-                    raise ParameterError(
-                        f"the driver of '{name}' is {driver!r}; write SolenoidDriver(...), PWM(...) or several."
-                    )
-
-    @property
-    def names(self) -> tuple[str, ...] | None:
-        return self.inner.names
-
-    @property
-    def chains(self) -> dict[str, tuple[Driver, ...]]:
-        """The drivers of each input, in the order of the signal."""
-        return {name: given if isinstance(given, tuple) else (given,) for name, given in self.drivers.items()}
-
-    def init(self, start: float) -> dict[str, tuple[Any, ...]]:
-        """The memories of the drivers of each input, at rest at `start` [s]."""
-        return {name: tuple(driver.init(start) for driver in chain) for name, chain in self.chains.items()}
-
-    def step(
-        self, memory: Mapping[str, tuple[Any, ...]], inputs: Sequence[str], start: float, duration: float
-    ) -> tuple[PiecewiseLinear, dict[str, tuple[Any, ...]]]:
-        """The command from `start` on for `duration` [s], and the memories then: give them to the next step."""
-        check_input_names(list(self.drivers), inputs)
-        return self.apply_drivers(memory, self.inner.segments(inputs, start, duration), inputs, start)
-
-    def apply_drivers(
-        self, memory: Mapping[str, tuple[Any, ...]], told: PiecewiseLinear, inputs: Sequence[str], start: float
-    ) -> tuple[PiecewiseLinear, dict[str, tuple[Any, ...]]]:
-        """What the drivers make of a course of all inputs that is told from `start` on, and the memories at its end."""
-        columns, later = {}, {}
-        for name, chain in self.chains.items():
-            signal, memories = column(told, inputs.index(name)), []
-            _check_command_range(name, signal, start)
-            for driver, remembered in zip(chain, memory[name], strict=True):
-                signal, now = driver.step(remembered, signal, start)
-                memories.append(now)
-            columns[inputs.index(name)], later[name] = signal, tuple(memories)
-        return merge_inputs(told, columns, start), later
-
-    def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        return self.step(self.init(start), inputs, start, duration)[0]
-
-
-def column(segments: PiecewiseLinear, i: int) -> PiecewiseLinear:
-    """The course of one input alone."""
-    return PiecewiseLinear(segments.ends, segments.values[:, i : i + 1], segments.slopes[:, i : i + 1])
-
-
-def _check_command_range(name: str, signal: PiecewiseLinear, start: float) -> None:
-    last = signal.values + signal.slopes * (signal.ends - signal.starts(start))[:, None]
-    for values in (signal.values[:, 0], last[:, 0]):
-        beyond = (values < -1e-9) | (values > 1 + 1e-9)
-        if beyond.any():
-            row = int(np.argmax(beyond))
-            raise ParameterError(
-                f"the driver of '{name}' is told {values[row]:g} before {signal.ends[row]:g} s; allowed are 0 to 1."
-            )
-
-
-def merge_inputs(told: PiecewiseLinear, columns: Mapping[int, PiecewiseLinear], start: float) -> PiecewiseLinear:
-    """One course of all inputs, those in `columns` replaced, cut wherever any of them is."""
-    if not columns:
-        return told
-    courses = [columns.get(i) or column(told, i) for i in range(told.values.shape[1])]
-    starts = np.unique(np.concatenate([np.array([start]), *(course.starts(start) for course in courses)]))
-    cut = [course.cut_at(starts, start) for course in courses]
-    ends = np.append(starts[1:], told.ends[-1])
-    return PiecewiseLinear(ends, np.hstack([c.values for c in cut]), np.hstack([c.slopes for c in cut]))
+def _switchings(command: Sequence[Segment], start: float, coil: float) -> Iterator[tuple[float, float]]:
+    """Instants [s] at which the current of a coil changes, and the new current; `coil` is the current before."""
+    begin = start
+    for end, value, slope in command:
+        first, last = value >= THRESHOLD, value + slope * (end - begin) >= THRESHOLD
+        if first != (coil > 0):
+            coil = float(first)
+            yield begin, coil
+        if last != first:
+            coil = float(last)
+            yield min(begin + (THRESHOLD - value) / slope, end), coil
+        begin = end

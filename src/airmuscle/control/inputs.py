@@ -1,99 +1,61 @@
-"""Commands in time: what opens valves and latches. Between two instants every input is linear in time."""
+"""Input signals: what the inputs of a plant do in time; between two instants every input is linear in time."""
 
 from __future__ import annotations
 
 import abc
+import bisect
 import dataclasses
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from ..core.arrays import Array
 from ..core.declaration import as_float
 from ..core.errors import ParameterError, suggestion
+from ..recording.recording import Recording
+from .piecewise_linear import PiecewiseLinear
 
-if TYPE_CHECKING:
-    from ..recording import Recording
-
-MOST_INSTANTS = 10_000_000
-"""Instants of one command that fit a usual memory."""
-COARSEST, MOST_POINTS = 64, 100_000
-"""Lines that a function is followed by at first, and points at most."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class PiecewiseLinear:
-    """A command cut at its instants: ends (S,), inputs at each start (S, m), and their slopes [1/s] (S, m)."""
-
-    ends: Array
-    values: Array
-    slopes: Array
-
-    def inputs_at(self, times: Array, start: float) -> Array:
-        """The inputs (N, m) at times (N,); at an instant those that begin there."""
-        starts = self.starts(start)
-        index = np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
-        return np.asarray(self.values[index] + (times - starts[index])[:, None] * self.slopes[index])
-
-    def starts(self, start: float) -> Array:
-        """Where each segment begins (S,)."""
-        return np.concatenate([[start], self.ends[:-1]])
-
-    def check_shape(self, inputs: int, start: float) -> None:
-        """Raise ParameterError unless ends rise from `start` [s] and every segment has all inputs, all finite.
-
-        A kernel reads what it is told is there, so this stands before it.
-        """
-        ends, values, slopes = (np.asarray(a, dtype=float) for a in (self.ends, self.values, self.slopes))
-        shape = (ends.size, inputs)
-        if ends.ndim != 1 or not ends.size or values.shape != shape or slopes.shape != shape:
-            raise ParameterError(
-                f"segments have ends {ends.shape}, values {values.shape} and slopes {slopes.shape}; for {inputs} "
-                f"inputs they must be (S,), (S, {inputs}) and (S, {inputs}), with one segment at least."
-            )
-        if not (np.isfinite(ends).all() and np.isfinite(values).all() and np.isfinite(slopes).all()):
-            raise ParameterError("segments hold a number that is not finite.")
-        if not (np.diff(ends, prepend=start) > 0).all():
-            raise ParameterError(f"segments must end in rising order after {start:g} s; they end at {ends.tolist()} s.")
-
-    def cut_at(self, starts: Array, start: float) -> PiecewiseLinear:
-        """The same course with segments that begin at other instants (R,), in rising order, the first not before
-        `start`; within them it must have no instant of its own."""
-        index = np.maximum(np.searchsorted(self.starts(start), starts, side="right") - 1, 0)
-        ends = np.append(starts[1:], self.ends[-1])
-        return PiecewiseLinear(ends, self.inputs_at(starts, start), self.slopes[index])
+MAX_INSTANTS = 10_000_000
+"""Instants of one run that fit a usual memory."""
+MAX_POINTS = 100_000
+"""Points of a sampled function."""
+INITIAL_LINES = 64
+"""Straight lines that a sampled function is first approximated by (chosen)."""
 
 
 class InputSignal(abc.ABC):
-    """What the inputs of a plant do in time."""
+    """The inputs of a plant as functions of time."""
 
     @abc.abstractmethod
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        """The command for these inputs from `start` on, cut so that every input is linear within a segment."""
+        """These inputs from `start` [s] on, split so that every input is linear within a segment.
+
+        Raises ParameterError for an input that the plant does not have.
+        """
 
     @property
     def names(self) -> tuple[str, ...] | None:
-        """The inputs that it speaks of; None where it does not say."""
+        """The inputs that the signal names; None where it does not say."""
         return None
 
 
 def check_input_signal(given: object) -> None:
-    """Raise ParameterError for what is no Command, as a dictionary is."""
+    """Raise ParameterError for anything that is not an InputSignal, such as a dictionary."""
     if not isinstance(given, InputSignal):
-        raise ParameterError(f"the command is {given!r}; give a Schedule, a Signal or another Command.")
+        raise ParameterError(f"the input is {given!r}; give a Schedule, a SampledSignal or another InputSignal.")
 
 
 NO_INPUT = "the plant has no input"
 
 
-def check_input_names(given: Sequence[str], inputs: Sequence[str], lacks: str = NO_INPUT) -> None:
+def check_input_names(given: Sequence[str], inputs: Sequence[str], prefix: str = NO_INPUT) -> None:
     """Raise ParameterError, with the nearest name, for a name that is no input of the plant."""
     for name in given:
         if name not in inputs:
             known = ", ".join(inputs) or "none"
-            raise ParameterError(f"{lacks} '{name}'; there are {known}.{suggestion(name, inputs)}")
+            raise ParameterError(f"{prefix} '{name}'; there are {known}.{suggestion(name, inputs)}")
 
 
 def _check_mapping(kind: str, given: object, example: str = "((5, 1), (15, 0))") -> None:
@@ -106,18 +68,24 @@ def _pairs(kind: str, name: str, given: Sequence[tuple[float, float]]) -> list[t
         return [(as_float("a time", time), as_float("a value", value)) for time, value in given]
     except (TypeError, ValueError, ParameterError):
         raise ParameterError(
-            f"the {kind} of '{name}' is {given!r}; write pairs of time [s] and value, ((5, 1), (15, 0))."
+            f"the {kind} of '{name}' is {str(given)[:80]}; write pairs of time [s] and value, ((5, 1), (15, 0))."
         ) from None
 
 
-def _check_order(kind: str, word: str, name: str, times: Sequence[float]) -> None:
-    if any(b <= a for a, b in itertools.pairwise(times)):
-        raise ParameterError(f"the {kind} of '{name}' must name its {word} in rising order; it has {times}.")
+def _check_points(kind: str, noun: str, name: str, points: Sequence[tuple[float, float]]) -> None:
+    """Raise ParameterError unless all numbers are finite and times rise."""
+    if points and not np.isfinite(points).all():
+        raise ParameterError(f"the {kind} of '{name}' holds a number that is not finite: {str(points)[:80]}.")
+    for i, (a, b) in enumerate(itertools.pairwise(time for time, _ in points)):
+        if b <= a:
+            raise ParameterError(
+                f"the {kind} of '{name}' must list its {noun} in rising order; number {i + 2}, {b:g} s, follows {a:g} s."
+            )
 
 
 @dataclasses.dataclass(frozen=True)
 class Schedule(InputSignal):
-    """Piecewise constant inputs, each a sequence of (instant [s], value from then on); before the first it is 0.
+    """Piecewise constant inputs, each a sequence of (instant [s], value from then on); 0 before the first instant.
 
     `Schedule({"fill": ((5, 1), (15, 0)), "discharge": ((19, 1),)})`
     """
@@ -128,26 +96,29 @@ class Schedule(InputSignal):
 
     def __post_init__(self) -> None:
         _check_mapping("schedule", self.changes)
-        for name, given in self.changes.items():
-            changes = _pairs("schedule", name, given)
-            if changes and not np.isfinite(changes).all():
-                raise ParameterError(f"the schedule of '{name}' holds a number that is not finite: {changes}.")
-            _check_order("schedule", "instants", name, [time for time, _ in changes])
+        changes = {name: _pairs("schedule", name, given) for name, given in self.changes.items()}
+        for name, pairs in changes.items():
+            _check_points("schedule", "instants", name, pairs)
+        object.__setattr__(self, "_changes", changes)
 
     @property
     def names(self) -> tuple[str, ...]:
         return tuple(self.changes)
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        check_input_names(list(self.changes), inputs)
+        changes: dict[str, list[tuple[float, float]]] = self._changes  # type: ignore[attr-defined]
+        if any(name not in inputs for name in changes):
+            check_input_names(list(changes), inputs)
         end = start + duration
-        instants = {time for changes in self.changes.values() for time, _ in changes if start < time < end}
-        starts = np.array([start, *sorted(instants)])
-        values = np.zeros((starts.size, len(inputs)))
+        starts = [start, *sorted({t for pairs in changes.values() for t, _ in pairs if start < t < end})]
+        values = np.zeros((len(starts), len(inputs)))
         for i, name in enumerate(inputs):
-            times, levels = np.array([(-np.inf, 0.0), *self.changes.get(name, ())], dtype=float).T
-            values[:, i] = levels[np.searchsorted(times, starts, side="right") - 1]
-        return PiecewiseLinear(np.append(starts[1:], end), values, np.zeros_like(values))
+            pairs = changes.get(name)
+            if pairs:
+                times = [t for t, _ in pairs]
+                levels = [0.0, *(v for _, v in pairs)]
+                values[:, i] = [levels[bisect.bisect_right(times, t)] for t in starts]
+        return PiecewiseLinear(np.array([*starts[1:], end]), values, np.zeros(values.shape))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -159,12 +130,12 @@ class SampledSignal(InputSignal):
     points: Mapping[str, Sequence[tuple[float, float]]]
 
     def __post_init__(self) -> None:
-        _check_mapping("signal", self.points)
+        _check_mapping("sampled signal", self.points)
         for name, given in self.points.items():
-            points = _pairs("signal", name, given)
-            if not points or not np.isfinite(points).all():
-                raise ParameterError(f"the signal of '{name}' must be finite points (time, value); it is {points}.")
-            _check_order("signal", "times", name, [time for time, _ in points])
+            points = _pairs("sampled signal", name, given)
+            if not points:
+                raise ParameterError(f"the sampled signal of '{name}' has no points; write pairs of time [s] and value.")
+            _check_points("sampled signal", "times", name, points)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -172,14 +143,14 @@ class SampledSignal(InputSignal):
 
     @classmethod
     def recorded(cls, recording: Recording, columns: Mapping[str, str]) -> SampledSignal:
-        """What was measured, as a command: for each input the column of the recording that it follows.
+        """Columns of a recording as inputs: for each input the column that it follows, in SI.
 
-        `Signal.recorded(read_csv("bench.csv"), {"fill": "fill"})`; the values are those of the recording, in SI.
+        `SampledSignal.recorded(read_csv("bench.csv"), {"fill": "fill"})`
         """
-        from ..recording import Recording
-
         if not isinstance(recording, Recording):
-            raise ParameterError(f"Signal.recorded: {recording!r} is no Recording; give what read_csv or read returns.")
+            raise ParameterError(
+                f"SampledSignal.recorded: {str(recording)[:80]} is no Recording; give what read_csv or read returns."
+            )
         _check_mapping("recorded signal", columns, "'column'")
         times = recording["time"].tolist()
         return cls({name: tuple(zip(times, recording[c].tolist(), strict=True)) for name, c in columns.items()})
@@ -189,22 +160,23 @@ class SampledSignal(InputSignal):
         cls, functions: Mapping[str, Callable[[float], float]], *, duration: float, start: float = 0.0,
         error: float = 1e-4,
     ) -> SampledSignal:  # fmt: skip
-        """Functions of time [s], followed to within `error` by straight lines that are halved until they do.
+        """Functions of time [s], approximated to within `error` by straight lines that are bisected until they are.
 
-        Each line is held against its function at a quarter, a half and three quarters of it, and none is longer than
-        1/64 of the duration (chosen); what a function does between those points is not seen. Raises ParameterError for
-        a function that 100 000 points do not follow, for one that jumps (give that one as a Schedule), and for one that
+        Each line is compared with its function at a quarter, a half and three quarters of it, and none is longer than
+        1/64 of the duration (chosen); what a function does between these points is not seen. Raises ParameterError for
+        a function that 100 000 points do not approximate, for one that jumps (give it as a Schedule), and for one that
         does not return a finite number.
         """
         _check_mapping("sampled signal", functions, "lambda t: 0.5")
-        duration, start = as_float("Signal.sampled: duration", duration), as_float("Signal.sampled: start", start)
-        error = as_float("Signal.sampled: error", error)
-        return cls({name: _followed(name, f, start, start + duration, error) for name, f in functions.items()})
+        duration = as_float("SampledSignal.sampled: duration", duration)
+        start = as_float("SampledSignal.sampled: start", start)
+        error = as_float("SampledSignal.sampled: error", error)
+        return cls({name: _approximate(name, f, start, start + duration, error) for name, f in functions.items()})
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
         check_input_names(list(self.points), inputs)
         end = start + duration
-        corners = {time for points in self.points.values() for time, _ in points if start < time < end}
+        corners = {float(time) for points in self.points.values() for time, _ in points if start < time < end}
         ends = np.array([*sorted(corners), end])
         edges = np.concatenate([[start], ends])
         values = np.zeros((edges.size, len(inputs)))
@@ -215,50 +187,51 @@ class SampledSignal(InputSignal):
         return PiecewiseLinear(ends, values[:-1], np.diff(values, axis=0) / np.diff(edges)[:, None])
 
 
-def _followed(
+def _approximate(
     name: str, function: Callable[[float], float], start: float, end: float, error: float
 ) -> tuple[tuple[float, float], ...]:
-    """Points on a function whose connecting lines stay within `error` of it."""
+    """Points of a function whose connecting lines stay within `error` of it."""
     if not (0 < error < np.inf and -np.inf < start < end < np.inf):
         raise ParameterError(
-            f"the signal of '{name}': from {start!r} to {end!r} s within {error!r}; an error above 0 is needed, and a "
-            "duration above 0."
+            f"the sampled signal of '{name}': from {start!r} to {end!r} s within {error!r}; the error and the duration "
+            "must be greater than 0."
         )
-    times = np.linspace(start, end, COARSEST + 1)
-    values = _values(name, function, times)
+    times = np.linspace(start, end, INITIAL_LINES + 1)
+    values = _evaluate(name, function, times)
     while True:
         lengths = np.diff(times)
         between = times[:-1] + np.array([[0.25], [0.5], [0.75]]) * lengths
-        found = _values(name, function, between.ravel()).reshape(between.shape)
-        away = np.abs(found - np.interp(between, times, values)).max(axis=0)
-        at = np.flatnonzero(away > error)
+        exact = _evaluate(name, function, between.ravel()).reshape(between.shape)
+        errors = np.abs(exact - np.interp(between, times, values)).max(axis=0)
+        at = np.flatnonzero(errors > error)
         if at.size == 0:
             return tuple(zip(times.tolist(), values.tolist(), strict=True))
-        if times.size + at.size > MOST_POINTS or lengths[at].min() < 1e-9 * (end - start):
+        if times.size + at.size > MAX_POINTS or lengths[at].min() < 1e-9 * (end - start):
             raise ParameterError(
-                f"the signal of '{name}' is not followed to {error:g} by {times.size} points: it differs by "
-                f"{away.max():g} at {times[np.argmax(away)]:g} s. Allow a larger error; give what jumps as a Schedule."
+                f"the sampled signal of '{name}' is not approximated to {error:g} by {times.size} points: the error is "
+                f"{errors.max():g} at {times[np.argmax(errors)]:g} s. Allow a larger error; give a function that jumps "
+                "as a Schedule."
             )
-        times, values = np.insert(times, at + 1, between[1, at]), np.insert(values, at + 1, found[1, at])
+        times, values = np.insert(times, at + 1, between[1, at]), np.insert(values, at + 1, exact[1, at])
 
 
-def _values(name: str, function: Callable[[float], float], times: Array) -> Array:
+def _evaluate(name: str, function: Callable[[float], float], times: Array) -> Array:
     """A function of time at times (N,). Raises ParameterError where it gives no finite number."""
     if not callable(function):
-        raise ParameterError(f"the signal of '{name}' is {function!r}; give a function of time [s].")
+        raise ParameterError(f"the sampled signal of '{name}' is {function!r}; give a function of time [s].")
     values = np.empty(times.size)
     for i, time in enumerate(times.tolist()):
-        values[i] = as_float(f"the signal of '{name}' at {time:g} s", function(time))
+        values[i] = as_float(f"the sampled signal of '{name}' at {time:g} s", function(time))
         if not np.isfinite(values[i]):
-            raise ParameterError(f"the signal of '{name}' is {values[i]} at {time:g} s; it must be finite.")
+            raise ParameterError(f"the sampled signal of '{name}' is {values[i]} at {time:g} s; it must be finite.")
     return values
 
 
 @dataclasses.dataclass(frozen=True)
 class Periodic(InputSignal):
-    """The first `period` [s] of another command, from its time 0 on, over and over, before time 0 too.
+    """The first `period` [s] of another input signal, from its time 0 on, repeated for all times.
 
-    Drivers go around it, `WithDrivers(Periodic(...), ...)`: inside it they would begin anew with every period.
+    Drivers are wrapped around it, `WithDrivers(Periodic(...), ...)`: inside they would start anew in every period.
     """
 
     inner: InputSignal
@@ -276,19 +249,19 @@ class Periodic(InputSignal):
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
         once, end = self.inner.segments(inputs, 0.0, self.period), start + duration
         first, last = np.floor(start / self.period), np.ceil(end / self.period)
-        if (last - first) * once.ends.size > MOST_INSTANTS:
+        if (last - first) * once.ends.size > MAX_INSTANTS:
             raise ParameterError(
-                f"a command of {once.ends.size} pieces every {self.period:g} s makes more than {MOST_INSTANTS} "
+                f"an input of {once.ends.size} segments every {self.period:g} s makes more than {MAX_INSTANTS} "
                 f"instants in {duration:g} s. Simulate a shorter time."
             )
         begins, size = self.period * np.arange(first, last), (int(last - first), 1)
         starts = (begins[:, None] + once.starts(0.0)).ravel()
         rounding = 4 * np.spacing(max(abs(start), self.period))
-        starts[np.abs(starts - start) <= rounding] = start  # 3 * 0.1 is more than 0.3: no piece of 1e-17 s
+        starts[np.abs(starts - start) <= rounding] = start  # 3 * 0.1 is more than 0.3: no segment of 1e-17 s
         whole = PiecewiseLinear(np.append(starts[1:], end), np.tile(once.values, size), np.tile(once.slopes, size))
         within = starts[(starts > start) & (starts < end)]
-        return whole.cut_at(np.append(start, within), float(starts[0]))
+        return whole.split_at(np.append(start, within), float(starts[0]))
 
 
 ZERO_INPUT = Schedule({})
-"""Every input stays at zero: valves shut, latch open."""
+"""Every input is zero: valves closed, latch open."""

@@ -1,4 +1,4 @@
-"""On or off: the two-point controller with hysteresis."""
+"""OnOffController: two-position control with hysteresis."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from .split_range import Commanded, commands, range_of
 
 @model
 class OnOffController(SisoController):
-    """The greatest command from y < r - H/2 on, the least from y > r + H/2 on, and the last one in between.
+    """The maximum command from y < r - H/2 on, the minimum from y > r + H/2 on, unchanged in between.
 
-    r set point, y measurement, H width of the hysteresis. For an input that raises what is measured; it begins with
-    the least command. With Split it fills, or else discharges. What it measures swings by more than H: valve, air and
-    load go on after a switching, and it looks at samples only.
+    r set point, y measurement, H width of the hysteresis. For an input that raises the measured column; the first
+    command is the minimum. With SplitRange it fills or discharges. The measured column oscillates by more than H:
+    valve, air and load continue to move after a switching, and switching takes place at samples only.
     Reference: Åström and Hägglund (1995), chapter 3, on-off control.
     """
 
@@ -35,7 +35,7 @@ class OnOffController(SisoController):
         return False
 
     def step(self, memory: bool, measurement: Measurement, dt: float) -> tuple[dict[str, float], bool]:
-        above = measurement.columns[self.measured] - measurement.setpoints[self.measured]
-        on = above < -self.hysteresis / 2 or (memory and not above > self.hysteresis / 2)
-        least, greatest = range_of(self.commanded, measurement.ranges)
-        return commands(self.commanded, greatest if on else least), on
+        error = measurement.columns[self.measured] - measurement.setpoints[self.measured]
+        on = error < -self.hysteresis / 2 or (memory and not error > self.hysteresis / 2)
+        minimum, maximum = range_of(self.commanded, measurement.ranges)
+        return commands(self.commanded, maximum if on else minimum), on

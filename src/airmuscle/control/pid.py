@@ -1,4 +1,4 @@
-"""PID in the standard form, with filtered derivative, weighted set point, anti-windup and a start without a jump."""
+"""PID controller in standard form: derivative filter, set-point weights, anti-windup, bumpless start."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ASTROM_HAGGLUND1995 = Reference(
 
 
 class PIDMemory(NamedTuple):
-    """A PID controller between two samples: whether it has begun, its integral and derivative parts [u], and the
+    """A PID controller between two samples: whether it has started, its integral and derivative parts [u], and the
     weighted error of the derivative at the last sample [y]."""
 
     started: bool
@@ -39,13 +39,13 @@ class PID(SisoController):
     the samples t_k, h apart, I goes by forward and D by backward differences, e = r - y:
 
         D_k     = T_d/(T_d + N h) D_(k-1) + K T_d N/(T_d + N h) ((c r - y)_k - (c r - y)_(k-1))
-        v_k     = K (b r_k - y_k) + I_k + D_k,      u_k = v_k cut off at the range of the input
+        v_k     = K (b r_k - y_k) + I_k + D_k,      u_k = v_k limited to the range of the input
         I_(k+1) = I_k + K h/T_i e_k + min(h/T_t, 1) (u_k - v_k)
 
-    The last term is anti-windup by back-calculation: while u is cut off, I follows with the time constant T_t. Where
-    T_t is 0 it is sqrt(T_i T_d), or T_i without derivative action. The start is bumpless: I_0 is such that the first
-    command is u_0, and D_0 = 0. Without integral action (T_i = 0) u_0 is a constant bias. A gain below zero is for
-    an input that lowers what is measured.
+    The last term is anti-windup by back-calculation: while u is limited, I follows with the time constant T_t. Where
+    T_t is 0 it is sqrt(T_i T_d), or T_i without derivative action. The start is bumpless: I_0 is chosen so that the
+    first command is u_0, and D_0 = 0. Without integral action (T_i = 0) u_0 is a constant bias. A negative gain is
+    for an input that lowers the measured column.
     Reference: Åström and Hägglund (1995), chapter 3.
     """
 
@@ -57,13 +57,13 @@ class PID(SisoController):
     integral_time: float = parameter("s", "T_i", "integral time; 0: no integral", bounds=(0.0, 1e6), default=0.0)
     derivative_time: float = parameter("s", "T_d", "derivative time; 0: no derivative", bounds=(0.0, 1e6), default=0.0)
     derivative_filter: float = parameter(
-        "1", "N", "greatest gain of the derivative, in K", bounds=(1.0, 1e3), default=10.0
+        "1", "N", "maximum gain of the derivative, in K", bounds=(1.0, 1e3), default=10.0
     )
     setpoint_weight: float = parameter(
-        "1", "b", "of the set point in the proportional part", bounds=(0.0, 1.0), default=1.0
+        "1", "b", "set-point weight of the proportional part", bounds=(0.0, 1.0), default=1.0
     )
-    derivative_weight: float = parameter("1", "c", "of the set point in the derivative", bounds=(0.0, 1.0), default=0.0)
-    tracking_time: float = parameter("s", "T_t", "of the anti-windup; 0: by the rule", bounds=(0.0, 1e6), default=0.0)
+    derivative_weight: float = parameter("1", "c", "set-point weight of the derivative", bounds=(0.0, 1.0), default=0.0)
+    tracking_time: float = parameter("s", "T_t", "tracking time of the anti-windup; 0: by the rule", bounds=(0.0, 1e6), default=0.0)
     initial_output: float = parameter("u", "u_0", "first command; without integral action the bias", default=0.0)
 
     def init(self) -> PIDMemory:
@@ -75,19 +75,19 @@ class PID(SisoController):
         weighted = self.derivative_weight * setpoint - measured
         if memory.started:
             integral = memory.integral
-            held = self.derivative_time + self.derivative_filter * dt
-            pushed = self.gain * self.derivative_filter * (weighted - memory.weighted)
-            derivative = self.derivative_time / held * (memory.derivative + pushed)
+            filtered = self.derivative_time + self.derivative_filter * dt
+            increment = self.gain * self.derivative_filter * (weighted - memory.weighted)
+            derivative = self.derivative_time / filtered * (memory.derivative + increment)
         else:
             integral = self.initial_output - proportional if self.integral_time > 0 else self.initial_output
             derivative = 0.0
         wanted = proportional + integral + derivative
-        least, greatest = range_of(self.commanded, measurement.ranges)
-        given = min(max(wanted, least), greatest)
+        minimum, maximum = range_of(self.commanded, measurement.ranges)
+        limited = min(max(wanted, minimum), maximum)
         if self.integral_time > 0:
             integral += self.gain * dt / self.integral_time * (setpoint - measured)
-            integral += min(dt / self._tracking(), 1.0) * (given - wanted)
-        return commands(self.commanded, given), PIDMemory(True, integral, derivative, weighted)
+            integral += min(dt / self._tracking(), 1.0) * (limited - wanted)
+        return commands(self.commanded, limited), PIDMemory(True, integral, derivative, weighted)
 
     def _tracking(self) -> float:
         """The time constant [s] of the anti-windup."""

@@ -1,4 +1,4 @@
-"""Controllers that follow one column, by one input or by two that work against each other."""
+"""SisoController: base class of controllers of one column, by one input or by two in split range."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from .split_range import Commanded, inputs_of
 
 
 class SisoController(Controller):
-    """A controller that compares one column with its set point: `measured` names it, `commanded` what it acts on."""
+    """A controller that compares one column, `measured`, with its set point; `commanded` is what it manipulates."""
 
     measured: str
     commanded: Commanded

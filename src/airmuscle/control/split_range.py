@@ -1,4 +1,4 @@
-"""What a controller of one output commands: an input, or two that work against each other."""
+"""Split-range control: one controller output to one or two inputs."""
 
 from __future__ import annotations
 
@@ -10,34 +10,34 @@ from ..core.errors import ParameterError
 
 @model
 class SplitRange:
-    """Split range: a command u > 0 goes to one input, -u for u < 0 to another, as with a valve to fill and one to
-    discharge; each is zero while the other is not. u reaches from minus the one's greatest value to the other's."""
+    """Split range: a positive output u goes to one input, -u of a negative one to another, such as a fill and a
+    discharge valve; the other input is zero. u is between minus the maximum of the one and the maximum of the other."""
 
     positive: str
     negative: str
 
     def check(self) -> None:
         if self.positive == self.negative:
-            raise ParameterError(f"SplitRange: both sides are '{self.positive}'; name two inputs.")
+            raise ParameterError(f"SplitRange: both inputs are '{self.positive}'; name two inputs.")
 
 
 Commanded = str | SplitRange
 
 
 def inputs_of(commanded: Commanded) -> tuple[str, ...]:
-    """The inputs that are commanded."""
+    """The commanded inputs."""
     return (commanded,) if isinstance(commanded, str) else (commanded.positive, commanded.negative)
 
 
 def range_of(commanded: Commanded, ranges: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
-    """The least and greatest command, from those of the inputs."""
+    """The range of a controller output, from those of the inputs."""
     if isinstance(commanded, str):
         return ranges[commanded]
     return -ranges[commanded.negative][1], ranges[commanded.positive][1]
 
 
-def commands(commanded: Commanded, value: float) -> dict[str, float]:
-    """A command as values of the inputs."""
+def commands(commanded: Commanded, output: float) -> dict[str, float]:
+    """The values of the inputs for a controller output."""
     if isinstance(commanded, str):
-        return {commanded: value}
-    return {commanded.positive: max(value, 0.0), commanded.negative: max(-value, 0.0)}
+        return {commanded: output}
+    return {commanded.positive: max(output, 0.0), commanded.negative: max(-output, 0.0)}

@@ -13,7 +13,7 @@ AirmuscleError
 │   └── NoEquilibrium        a plant that cannot rest: names the muscle and the forces
 ├── TraceError               a law that cannot be traced into a program
 ├── IdentificationError      data that cannot determine what is asked
-└── SimulationError          a run that ended early; `.recording` holds what it has
+└── SimulationError          a run that ended early; `.solution` is what was computed
 
 AirmuscleWarning             works, but not as expected: a Python warning, not an error
 """
@@ -82,15 +82,20 @@ class IdentificationError(AirmuscleError):
 
 
 class SimulationError(AirmuscleError):
-    """A run that ended early; `.recording` is a Recording of what it computed until then, or None.
+    """A run that ended early; `.solution` is what was computed until then, or None.
 
-    `.interrupted` says that it was the user who ended it.
+    `.recording` is the recording of the solution, `.interrupted` says whether the user ended the run.
     """
 
-    def __init__(self, message: str, recording: Any = None, *, interrupted: bool = False) -> None:
+    def __init__(self, message: str, solution: Any = None, *, interrupted: bool = False) -> None:
         super().__init__(message)
-        self.recording = recording
+        self.solution = solution
         self.interrupted = interrupted
+
+    @property
+    def recording(self) -> Any:
+        """The rows that were computed, or None."""
+        return None if self.solution is None else self.solution.recording
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

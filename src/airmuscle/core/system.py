@@ -1,54 +1,112 @@
-"""What can be turned into a program: named states, named inputs, rates and outputs written over `ops`."""
+"""System: ordinary differential equations with named states, inputs and outputs, written over `ops`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Protocol, runtime_checkable
+import abc
+from collections.abc import Mapping, Sequence
+from typing import Any
 
+from .diagnostics import Columns, Diagnostic
 from .ops import Value
-from .variables import StateVariable
+from .variables import Input, StateVariable
 
 
-class System(Protocol):
-    """Ordinary differential equations of a frozen model; its declared leaves are the program's parameters.
+class System(abc.ABC):
+    """Ordinary differential equations x' = f(x, u, t) of a frozen model; its declared parameters are the program's.
 
     Every mapping is keyed by the names that `states` and `inputs` list. Rates must be continuous in the states.
+    A system of your own declares the four abstract members; the others have defaults.
     """
 
     @property
+    @abc.abstractmethod
     def states(self) -> tuple[StateVariable, ...]:
         """The states, in the order of their vector."""
 
     @property
+    @abc.abstractmethod
     def inputs(self) -> tuple[str, ...]:
         """The names of the inputs, each linear in time between instants."""
 
+    @abc.abstractmethod
     def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> Mapping[str, Value]:
         """The time derivative of every state."""
 
+    @abc.abstractmethod
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> Mapping[str, Value]:
         """Further quantities of interest at a state."""
 
+    @property
+    def input_variables(self) -> tuple[Input, ...]:
+        """The inputs with their units and ranges; without bounds by default."""
+        infinity = float("inf")
+        return tuple(Input(name, "", -infinity, infinity, "") for name in self.inputs)
 
-@runtime_checkable
-class Differentiated(System, Protocol):
+    @property
+    def output_units(self) -> Mapping[str, str]:
+        """The units of outputs whose unit does not follow from their name."""
+        return {}
+
+    @property
+    def state_lower_bounds(self) -> Sequence[float]:
+        """The smallest possible value of every state; a run that falls below is aborted."""
+        return [-float("inf")] * len(self.states)
+
+    @property
+    def positive_outputs(self) -> Sequence[str]:
+        """Outputs that must be positive, such as volumes; a run in which one is not is aborted."""
+        return ()
+
+    @property
+    def constants(self) -> Mapping[str, float | str]:
+        """Constants of a recording of this system, such as the resting length [m]."""
+        return {}
+
+    @property
+    def equilibrium_plant(self) -> Any:
+        """The Plant whose static equilibrium is the default initial state; None where a run must be given one."""
+        return None
+
+    def extend_state(self, state: Mapping[str, float]) -> dict[str, float]:
+        """The system's state from that of its `equilibrium_plant`."""
+        return dict(state)
+
+    def check_state(self, state: Mapping[str, float]) -> None:  # noqa: B027 - every state is possible by default
+        """Raise ParameterError or GeometryLimitError for a state that is impossible; names and signs were checked."""
+
+    def describe(self) -> tuple[Diagnostic, ...]:
+        """Assumptions of the model that the reader of a result must know."""
+        return ()
+
+    def diagnose(self, columns: Columns) -> list[Diagnostic]:
+        """What a run, its columns (N,) by name, did beyond the validity of the model."""
+        return []
+
+    def failure_hint(self, state: Mapping[str, float]) -> str:
+        """What to do about a run that ended early at this state; empty where nothing particular can be said."""
+        return ""
+
+
+class Differentiated(System):
     """A system that carries another's states, then their derivatives along columns, state by state.
 
-    It is a System like any other; its program is printed from the inner one, which costs less than its own rates.
+    It is a System like any other; its program is generated from the inner one, which costs less than its own rates.
     """
 
-    @property
-    def inner(self) -> System:
-        """The system whose states come first."""
+    inner: System
+    """The system whose states come first."""
 
     @property
+    @abc.abstractmethod
     def places(self) -> tuple[tuple[int, ...], ...]:
-        """For every column the places among the inner leaves that move together."""
+        """For every column the indices of the inner parameters that vary together."""
 
     @property
+    @abc.abstractmethod
     def observed_names(self) -> tuple[str, ...]:
         """Inner states and outputs that are given as outputs."""
 
     @property
+    @abc.abstractmethod
     def output_names(self) -> tuple[str, ...]:
         """Values of what is observed, the derivatives of each, their slopes in time."""

@@ -1,6 +1,7 @@
 """Plant: one or more muscles with their pneumatic circuits, a mechanism, a gas and the ambient air."""
 
-from .energy_balance import WithEnergyMeters
-from .plant import Plant, total_air
+from .energy_balance import WithEnergyMeters, total_air
+from .muscle_state import MuscleState
+from .plant import Plant
 
-__all__ = ["Plant", "WithEnergyMeters", "total_air"]
+__all__ = ["MuscleState", "Plant", "WithEnergyMeters", "total_air"]

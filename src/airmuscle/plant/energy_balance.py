@@ -1,42 +1,44 @@
-"""Books: a plant that also integrates what its parts take and give, so that each balance can be checked."""
+"""WithEnergyMeters: a plant that also integrates the power of its parts, so that its energy balances can be checked."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from ..core.declaration import model
+from ..core.diagnostics import Columns, Diagnostic
 from ..core.ops import Value
-from ..core.variables import StateVariable
+from ..core.system import System
+from ..core.variables import Input, StateVariable
+from ..friction import NoFriction
 from ..muscle import Muscle, SeriesSpring
 from .muscle_state import MuscleState
-from .plant import Plant, total_air
+from .plant import Plant
 
 _METERS = (
     StateVariable("work_of_tension", "J", 1.0, "work of all tensions on the mechanism"),
     StateVariable("work_of_air", "J", 1.0, "work of the air on its enclosures, against their absolute pressure"),
-    StateVariable("energy_of_flow", "J", 1.0, "energy that came into the muscles with the air"),
-    StateVariable("heat_to_air", "J", 1.0, "heat that the walls gave to the air in the muscles"),
-    StateVariable("damping_heat", "J", 1.0, "work that the dampers turned into heat"),
+    StateVariable("energy_of_flow", "J", 1.0, "energy that flowed into the muscles with the air"),
+    StateVariable("heat_to_air", "J", 1.0, "heat from the walls to the air in the muscles"),
+    StateVariable("damping_heat", "J", 1.0, "work dissipated by the dampers"),
     StateVariable("work_of_contractile", "J", 1.0, "work of the contractile elements"),
-    StateVariable("element_work", "J", 1.0, "work done against springs, creep and end stops: heat, and what they hold"),
+    StateVariable("element_work", "J", 1.0, "work done on springs, creep and end stops: dissipated, and stored"),
     StateVariable("mechanism_loss", "J", 1.0, "work that the mechanism lost to its dampers, stops and drives"),
-    StateVariable("air_supplied", "kg", 1e-3, "air that came from outside the plant"),
-    StateVariable("air_exhausted", "kg", 1e-3, "air that went to the surroundings"),
+    StateVariable("air_supplied", "kg", 1e-3, "air mass that entered the plant"),
+    StateVariable("air_exhausted", "kg", 1e-3, "air mass that left the plant to the surroundings"),
 )
-_FRICTION = StateVariable("friction_work", "J", 1.0, "work done against friction: heat, and what its bristles hold")
+_FRICTION = StateVariable("friction_work", "J", 1.0, "work done against friction: dissipated, and stored in bristles")
 
 
 @model
-class WithEnergyMeters:
-    """A plant with meters as further states, and its energies and its air as outputs.
+class WithEnergyMeters(System):
+    """A plant with meters as further states, and its energies and its air mass as outputs.
 
-    Four books must close. Mechanical: kinetic + potential energy grow by `work_of_tension`, which counts the push of an
-    end stop, less `mechanism_loss`, as long as a latch moves only from rest. Muscle: `work_of_contractile` is
+    Four balances must close. Mechanical: kinetic + potential energy grow by `work_of_tension`, which includes the push
+    of an end stop, less `mechanism_loss`, as long as a latch moves only from rest. Muscle: `work_of_contractile` is
     `work_of_tension` + `damping_heat` + `element_work` + `friction_work` (where there is friction), as long as no
-    muscle hangs slack: a slack one passes nothing on. Air: `air_energy`, of the air in the muscles, grows by
-    `energy_of_flow` + `heat_to_air` less `work_of_air`. Mass: `air_total`, of all air, grows by `air_supplied` less
-    `air_exhausted`.
+    muscle is slack. Air: `air_energy`, of the air in the muscles, grows by `energy_of_flow` + `heat_to_air` less
+    `work_of_air`. Mass: `air_total`, of all air, grows by `air_supplied` less `air_exhausted`.
     """
 
     from_file: ClassVar[bool] = False
@@ -46,7 +48,7 @@ class WithEnergyMeters:
     @property
     def meters(self) -> tuple[StateVariable, ...]:
         """Every meter."""
-        return (*_METERS, _FRICTION) if any(m.friction.states for m in self.plant.muscles) else _METERS
+        return (*_METERS, _FRICTION) if any(_has_friction(m) for m in self.plant.muscles) else _METERS
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
@@ -58,29 +60,77 @@ class WithEnergyMeters:
         """The plant's inputs."""
         return self.plant.inputs
 
-    def reset(self, state: Mapping[str, float]) -> dict[str, float]:
+    @property
+    def input_variables(self) -> tuple[Input, ...]:
+        """The plant's inputs."""
+        return self.plant.input_variables
+
+    @property
+    def output_units(self) -> Mapping[str, str]:
+        """The units of the plant's outputs, of energies [J] and of the air mass [kg]."""
+        energies = dict.fromkeys(("kinetic_energy", "potential_energy", "air_energy"), "J")
+        return {**self.plant.output_units, **energies, "air_total": "kg"}
+
+    @property
+    def state_lower_bounds(self) -> Sequence[float]:
+        """Those of the plant; meters have none."""
+        return [*self.plant.state_lower_bounds, *(-float("inf") for _ in self.meters)]
+
+    @property
+    def positive_outputs(self) -> Sequence[str]:
+        """The plant's volumes."""
+        return self.plant.positive_outputs
+
+    @property
+    def constants(self) -> Mapping[str, float | str]:
+        """The plant's constants."""
+        return self.plant.constants
+
+    @property
+    def equilibrium_plant(self) -> Plant:
+        """The plant, whose equilibrium with all meters at zero is the default initial state."""
+        return self.plant
+
+    def extend_state(self, state: Mapping[str, float]) -> dict[str, float]:
         """A state of the plant with every meter at zero."""
         return {**state, **{meter.name: 0.0 for meter in self.meters}}
+
+    def check_state(self, state: Mapping[str, float]) -> None:
+        """As the plant's."""
+        self.plant.check_state(state)
+
+    def describe(self) -> tuple[Diagnostic, ...]:
+        """As the plant's."""
+        return self.plant.describe()
+
+    def diagnose(self, columns: Columns) -> list[Diagnostic]:
+        """As the plant's."""
+        return self.plant.diagnose(columns)
+
+    def failure_hint(self, state: Mapping[str, float]) -> str:
+        """As the plant's."""
+        return self.plant.failure_hint(state)
 
     def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
         """The plant's rates, and the power that each meter integrates."""
         plant = self.plant
-        ports = plant.ports(state)
+        muscles = plant.muscle_states(state)
         powers: dict[str, Value] = dict.fromkeys((meter.name for meter in self.meters), 0.0)
-        responses = plant.responses(ports, state, inputs)
-        flows = [flow for response in responses for flow in response.flows]
-        for muscle, port, flow in zip(plant.muscles, ports, flows, strict=True):
-            powers["work_of_tension"] += port.tension * port.speed
-            powers["work_of_air"] += port.air.pressure * port.volume_rate
-            powers["energy_of_flow"] += plant.gas.energy_flow(port.states, flow, port.volume, plant.ambient)
-            powers["heat_to_air"] += plant.gas.heat_flow(port.air, plant.ambient)
-            for name, power in _muscle_powers(muscle, port).items():
+        circuits = plant.circuit_flows(muscles, state, inputs)
+        flows = [flow for circuit in circuits for flow in circuit.flows]
+        for part, muscle, flow in zip(plant.muscles, muscles, flows, strict=True):
+            powers["work_of_tension"] += muscle.tension * muscle.speed
+            powers["work_of_air"] += muscle.air.pressure * muscle.volume_rate
+            powers["energy_of_flow"] += plant.gas.energy_flow(muscle.states, flow, muscle.volume, plant.ambient)
+            powers["heat_to_air"] += plant.gas.heat_flow(muscle.air, plant.ambient)
+            for name, power in _muscle_powers(part, muscle).items():
                 powers[name] += power
-        pulls = plant.mechanism.generalised_forces(state, [port.tension for port in ports], plant.resting_lengths)
-        powers["mechanism_loss"] += plant.mechanism.dissipated_power(state, state, pulls, inputs)
-        for response in responses:
-            powers["air_supplied"] += response.drawn.mass
-            powers["air_exhausted"] += response.exhausted.mass
+        tensions = [muscle.tension for muscle in muscles]
+        forces = plant.mechanism.generalised_forces(state, tensions, plant.resting_lengths)
+        powers["mechanism_loss"] += plant.mechanism.dissipated_power(state, state, forces, inputs)
+        for circuit in circuits:
+            powers["air_supplied"] += circuit.drawn.mass
+            powers["air_exhausted"] += circuit.exhausted.mass
         return {**plant.rates(state, inputs), **powers}
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Any]:
@@ -91,27 +141,36 @@ class WithEnergyMeters:
             **plant.outputs(state, inputs),
             "kinetic_energy": plant.mechanism.kinetic_energy(state, state),
             "potential_energy": plant.mechanism.potential_energy(state),
-            "air_energy": sum(self._stored(port) for port in plant.ports(state)),
+            "air_energy": sum(self._available_energy(muscle) for muscle in plant.muscle_states(state)),
             "air_total": total_air(own),
         }
 
-    def _stored(self, port: MuscleState) -> Value:
-        return self.plant.gas.available_energy(port.states, port.volume, self.plant.ambient)
+    def _available_energy(self, muscle: MuscleState) -> Value:
+        return self.plant.gas.available_energy(muscle.states, muscle.volume, self.plant.ambient)
 
 
-def _muscle_powers(muscle: Muscle, port: MuscleState) -> dict[str, Value]:
-    """What the elements inside a muscle give and take [W]."""
-    pressure, inner, speed = port.pressure, port.inner_contraction, port.inner_speed
-    length = muscle.geometry.resting_length
-    against = muscle.spring.force(pressure, inner, length) + muscle.stop.force(inner, speed, length)
-    if muscle.creep.states:
-        against = against + muscle.creep.force(port.states)
-    held = against * speed
-    if isinstance(muscle.series, SeriesSpring):
-        held = held + port.tension * (speed - port.speed)
-    found = {
-        "work_of_contractile": muscle.contractile.force(pressure, inner) * speed,
-        "element_work": held,
-        "damping_heat": muscle.damper.force(pressure, inner, speed) * speed,
+def total_air(state: Mapping[str, Any]) -> Value:
+    """Mass of all air in a plant [kg]: that of its muscles, tubes and tanks."""
+    return sum(value for name, value in state.items() if name.endswith("air_mass"))
+
+
+def _has_friction(muscle: Muscle) -> bool:
+    return not isinstance(muscle.friction, NoFriction)
+
+
+def _muscle_powers(part: Muscle, muscle: MuscleState) -> dict[str, Value]:
+    """Power that the elements of a muscle deliver and absorb [W]."""
+    pressure, inner, speed = muscle.pressure, muscle.inner_contraction, muscle.inner_speed
+    length = part.geometry.resting_length
+    opposing = part.spring.force(pressure, inner, length) + part.stop.force(inner, speed, length)
+    if part.creep.states:
+        opposing = opposing + part.creep.force(muscle.states)
+    absorbed = opposing * speed
+    if isinstance(part.series, SeriesSpring):
+        absorbed = absorbed + muscle.tension * (speed - muscle.speed)
+    powers = {
+        "work_of_contractile": part.contractile.force(pressure, inner) * speed,
+        "element_work": absorbed,
+        "damping_heat": part.damper.force(pressure, inner, speed) * speed,
     }
-    return {**found, "friction_work": port.friction * speed} if muscle.friction.states else found
+    return {**powers, "friction_work": muscle.friction * speed} if _has_friction(part) else powers

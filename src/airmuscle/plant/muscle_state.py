@@ -1,4 +1,4 @@
-"""A muscle as a plant sees it: what its air and its pull are at one moment."""
+"""MuscleState: the pneumatic and mechanical state of a muscle at one instant."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from ..pneumatics.gas import Air, Ambient, Gas, gauge
 
 
 class MuscleState(NamedTuple):
-    """One muscle at one moment: contraction [1], shortening speed [m/s], volume [m3], pressures [Pa], forces [N].
+    """One muscle at one instant: contraction [1], shortening speed [m/s], volume [m3], pressures [Pa], forces [N].
 
-    `inner_contraction` and `inner_speed` are those of the contractile part, which differ from the fittings' beside a
-    series spring. `states` are the muscle's own and those of its air, by their own names; `rates` those of the former.
+    `inner_contraction` and `inner_speed` are those of the contractile part, which behind a series spring differ from
+    the fittings'. `states` are the muscle's own and those of its air, by their own names; `rates` those of the former.
     """
 
     contraction: Value

@@ -43,6 +43,15 @@ class Recording:
             values.setflags(write=False)
         object.__setattr__(self, "columns", arrays)
 
+    @classmethod
+    def from_arrays(
+        cls, columns: Mapping[str, Array], origin: str, constants: Mapping[str, float | str], notes: tuple[str, ...]
+    ) -> Recording:
+        """A recording of read-only vectors of one length, which are not checked again."""
+        recording = object.__new__(cls)
+        recording.__dict__.update(columns=columns, origin=origin, constants=constants, notes=notes, units={})
+        return recording
+
     def __getitem__(self, name: str) -> Array:
         """A column by its name; `contraction` and `length` follow from each other when L0 is known."""
         if name in self.columns:

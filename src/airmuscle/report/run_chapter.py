@@ -68,7 +68,7 @@ def _inputs(scenario: Scenario, recording: Recording) -> Plot:
     command, inputs = scenario.command, scenario.plant.inputs
     if isinstance(command, ControlLoop):
         command = command.as_open_loop(recording)
-    units = {given.name: "" if given.unit == "1" else f"\n[{given.unit}]" for given in scenario.plant.commands}
+    units = {given.name: "" if given.unit == "1" else f"\n[{given.unit}]" for given in scenario.plant.input_variables}
     start, reached = scenario.start_time, float(recording["time"][-1])
     end = reached if reached > start else start + scenario.duration
     had = command.segments(inputs, start, end - start)

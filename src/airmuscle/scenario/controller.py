@@ -59,7 +59,7 @@ def loop_from(table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], 
     beside = {key: value for key, value in table.items() if key not in ("controller", "drivers")}
     period = finite(given["period"], "s", f"{at}, period")
     setpoint = _setpoint(given["setpoint"], controller, units, at.inside("setpoint"))
-    others = command_from(beside, plant.commands, place)
+    others = command_from(beside, plant.input_variables, place)
     drivers = drivers_from(table.get("drivers", {}), plant.inputs, place.inside("drivers"))
     with located_errors(at):
         loop = ControlLoop(controller, period, setpoint, others, drivers)

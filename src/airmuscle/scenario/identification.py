@@ -251,7 +251,7 @@ class _Record:
             table["file"] = str((self.place.folder / str(table["file"])).resolve())
         recording, at = self.recording(observed), self.place.inside("command")
         start_time = finite(self.row.get("start_time", 0.0), "s", f"{self.place}, start_time")
-        command = command_from(table, plant.commands, at)
+        command = command_from(table, plant.input_variables, at)
         with located_errors(at):
             length = max(float(recording["time"][-1]) - start_time, 1e-9)
             check_input_range(plant, command.segments(plant.inputs, 0.0, length), 0.0)

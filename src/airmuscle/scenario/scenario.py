@@ -138,7 +138,7 @@ def _command(
     table: Mapping[str, Any], plant: Plant, start: Mapping[str, float], duration: float, place: Location
 ) -> InputSignal | ControlLoop:
     if "controller" not in table:
-        return command_from(table, plant.commands, place)
+        return command_from(table, plant.input_variables, place)
     loop = loop_from(table, plant, units_around(plant, start), place)
     with located_errors(place.inside("controller")):
         loop.check_period(duration)

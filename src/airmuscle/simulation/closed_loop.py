@@ -1,196 +1,212 @@
-"""A plant with a controller through time: from one sampling instant to the next, each met exactly."""
+"""Simulation of a control loop: from one sampling instant to the next, each met exactly."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ..compile import System
-from ..control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop, ControlLoopState
+from ..control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoopState
 from ..control.controller import Measurement
-from ..control.inputs import PiecewiseLinear
+from ..control.driver import Driver
+from ..control.piecewise_linear import PiecewiseLinear, merge_columns
+from ..control.with_drivers import WithDrivers, apply_drivers
 from ..core.arrays import Array
+from ..core.diagnostics import Diagnostic, DiagnosticCode
 from ..core.errors import ParameterError
-from ..plant.columns import units_of
-from ..plant.plant import Plant
-from ..plant.state import check_state, state_vector
-from ..recording import Recording
-from .arguments import check_duration, default_initial_state, default_integrator, merge_output_times
-from .integrators import INTERRUPTED, LESS_THAN_NONE, NO_COMMAND, NOT_FINITE, Integrator, RawSolution
-from .result import raise_if_incomplete, to_recording
-from .sampled_loop import SampledLoop, columns_of, prepare_loop
+from ..core.status import Status
+from ..plant.units import column_units
+from .buffers import Buffer
+from .integrators import RawSolution
+from .output_times import merge_output_times
+from .problem import Problem
+from .rows import evaluate_rows, make_recording, truncate_at_invalid_row
+from .sampled_loop import SampledLoop, prepare_loop
+from .solution import Solution, Statistics
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class ClosedLoopResult:
-    """A run with a controller, and where it can be taken up: `simulate_closed_loop(..., start=run.state, start_time=run.time,
-    memory=run.memory)`. Of a run that ended early this is the sampling instant before its end."""
+def solve_closed_loop(problem: Problem) -> Solution:
+    """The solution of a problem with a ControlLoop, and the state from which the run can be continued.
 
-    recording: Recording
-    time: float
-    state: Mapping[str, float]
-    memory: ControlLoopState
-
-
-def simulate_closed_loop(
-    plant: System,
-    loop: ControlLoop,
-    *,
-    duration: float,
-    start: Mapping[str, float] | None = None,
-    start_time: float = 0.0,
-    memory: ControlLoopState | None = None,
-    method: Integrator | None = None,
-    output: float | npt.ArrayLike | None = None,
-    complete: bool = True,
-) -> ClosedLoopResult:
-    """As `simulate`, with a Loop: its recording, and the state and memory with which the run goes on.
-
-    The recording also holds `setpoint.`, `measured.` and `command.` columns: the set points in time, and what the
-    controller measured and commanded at the last sample. Every sampling instant is a row. What it measures at an
-    instant are the values that come before its command: an output that jumps with an input has not jumped yet.
-
-    Cut at a sampling instant and taken up again, a run is the run in one, to the last bit; cut between two, to the
-    tolerance of its method. Raises ParameterError for a column or input that the plant lacks, a period that is longer
-    than the run, and a memory that belongs to another instant.
+    The recording also has `setpoint.`, `measured.` and `command.` columns: the set points in time, and the controller's
+    measurements and commands at the last sample. Every sampling instant is a row. Measurements are taken just before
+    the command of the same instant: an output that jumps with an input has not jumped yet. Split at a sampling instant
+    and continued, a run equals the run in one, to the last bit; split between two, to the integrator's tolerance.
     """
-    duration, start_time = check_duration(duration, start_time)
-    from ..compile.program import compile_system
-
-    if start is None:
-        start = default_initial_state(plant)
-    method, ready = default_integrator(method), compile_system(plant)
-    loop.check_columns(columns_of(ready), plant.inputs)
-    state = state_vector(plant, start)
-    if isinstance(plant, Plant):
-        check_state(plant, start)
-    if memory is None:
-        loop.check_period(duration)
-        memory = loop.init(start_time)
-    closed = prepare_loop(ready, loop, memory, start_time, duration, method, output)
-    done = _integrate(closed, memory, state)
-    segments, course, times = _concatenate(done, len(plant.inputs))
-    recording, course = to_recording(ready, course, segments, times, start_time, method)
-    recording = _with_controller(recording, closed, done, units_of(plant, ready.output_names))
-    recording = raise_if_incomplete(plant, recording, course, start_time + duration, complete)
-    names = [s.name for s in plant.states]
-    return ClosedLoopResult(recording, done.time, dict(zip(names, done.state.tolist(), strict=True)), done.memory)
+    loop = problem.input
+    control_state = problem.control_state or loop.init(problem.start_time)  # type: ignore[union-attr]
+    run = _Run(problem, prepare_loop(problem, control_state), control_state)
+    run.integrate()
+    return _solution(problem, run)
 
 
-class _Interval(NamedTuple):
-    """What was carried between two samples: inputs, states at rows, and what the controller had seen and told."""
+class _Run:
+    """A control loop being simulated: rows and segments so far, and the state at the last completed interval."""
 
-    segments: PiecewiseLinear
-    course: RawSolution
-    times: Array
-    seen: tuple[float, ...]
-    told: tuple[float, ...]
+    def __init__(self, problem: Problem, prepared: SampledLoop, control_state: ControlLoopState) -> None:
+        self.problem, self.prepared, self.control_state = problem, prepared, control_state
+        compiled, integrator = problem.compiled, problem.integrator
+        assert integrator is not None
+        self.bound = integrator.bind(compiled)
+        self.bound.state[:] = problem.initial_vector
+        n, m = compiled.sizes.states, compiled.sizes.inputs
+        segments = prepared.inputs.ends.size
+        self.ends, self.values, self.slopes = Buffer(None, segments), Buffer(m, segments), Buffer(m, segments)
+        self.times, self.rows = Buffer(None, prepared.times.size), Buffer(n, prepared.times.size)
+        self.samples: list[tuple[tuple[float, ...], tuple[float, ...]]] = []
+        self.applied = np.array(control_state.applied_inputs or prepared.inputs.values[0])
+        self.status, self.time = Status.DONE, problem.start_time
+        self.state = self.bound.state.copy()
+        self.stopped_at = problem.start_time
+        self.kept_segments = 0
+        loop = prepared.loop
+        self.chains: dict[str, tuple[Driver, ...]] = WithDrivers(loop.other_inputs, loop.drivers).chains
+        self.driven = {name: compiled.description.input_names.index(name) for name in self.chains}
 
+    def integrate(self) -> None:
+        """Sample and integrate from edge to edge, until the end or until an interval fails."""
+        prepared, edges = self.prepared, self.prepared.edges
+        for k in range(len(edges) - 1):
+            try:
+                state = self.control_state
+                if k or prepared.sampled:
+                    state, self.status = self._sample(state, prepared.setpoints[k])
+                    if self.status:
+                        return
+                state = self._integrate_interval(state, k)
+            except KeyboardInterrupt:
+                self._discard_interval()
+                self.status = Status.INTERRUPTED
+                return
+            self.samples.append((state.measured, state.commanded))
+            self.kept_segments = self.ends.size
+            if self.status:
+                return
+            self.time, self.state[:] = edges[k + 1], self.bound.state
+            self.control_state = state._replace(time=edges[k + 1], applied_inputs=tuple(self.applied.tolist()))
 
-class _Outcome(NamedTuple):
-    """What was carried, how it ended, and from where it can go on."""
-
-    pieces: list[_Interval]
-    status: int
-    time: float
-    state: Array
-    memory: ControlLoopState
-
-
-def _integrate(closed: SampledLoop, memory: ControlLoopState, state: Array) -> _Outcome:
-    """The loop from edge to edge, until the end or until a piece fails."""
-    pieces: list[_Interval] = []
-    edges, setpoints = closed.edges.tolist(), closed.setpoint.inputs_at(closed.edges[:-1], closed.start).tolist()
-    had = np.array(memory.applied_inputs) if memory.applied_inputs else closed.before()
-    time, last, status = closed.start, memory, 0
-    for k in range(len(edges) - 1):
+    def _sample(self, state: ControlLoopState, setpoints: list[float]) -> tuple[ControlLoopState, Status]:
+        """The state after a sample, with the new commands; and whether they can be applied."""
+        prepared, loop = self.prepared, self.prepared.loop
+        controller = loop.controller
+        columns = prepared.measure(self.bound.state, self.applied)
+        measured = tuple(columns.values())
+        if not all(map(math.isfinite, measured)):
+            return state, Status.NOT_FINITE
+        measurement = Measurement(columns, dict(zip(controller.setpoints, setpoints, strict=True)), prepared.ranges)
+        commands, memory = controller.step(state.controller, measurement, loop.period)
         try:
-            if k or closed.sampled:
-                memory, status = _sampled(closed, last, state, had, setpoints[k])
-                if status:
-                    break
-            piece, memory = _piece(closed, memory, state, edges[k], k)
-        except KeyboardInterrupt:
-            status = INTERRUPTED
-            break
-        pieces.append(piece)
-        course, segments = piece.course, piece.segments
-        status = LESS_THAN_NONE if course.status == 0 and (course.state < closed.lower_bounds).any() else course.status
-        if status:
-            break
-        begin = segments.ends[-2] if segments.ends.size > 1 else edges[k]
-        had = segments.values[-1] + segments.slopes[-1] * (edges[k + 1] - begin)
-        time, state, last = edges[k + 1], course.state, memory
-    return _Outcome(pieces, status, time, state, last._replace(time=time, applied_inputs=tuple(had.tolist())))
+            commanded = tuple(
+                [min(max(0.0 + commands[name], low), high) for name, (low, high) in prepared.ranges.items()]
+            )
+        except (KeyError, TypeError, ValueError):
+            raise ParameterError(
+                f"{type(controller).__name__} commands {commands!r}; it must give a number for each of "
+                f"{', '.join(controller.inputs)}."
+            ) from None
+        if not all(map(math.isfinite, commanded)):
+            return state, Status.NON_FINITE_COMMAND
+        count = state.sample_count + 1
+        return ControlLoopState(
+            memory, state.origin, state.time, count, measured, commanded, state.applied_inputs, state.drivers
+        ), Status.DONE
+
+    def _integrate_interval(self, state: ControlLoopState, k: int) -> ControlLoopState:
+        """Integrate interval k under the commands of a state; the state with those of the drivers at its end."""
+        prepared, begin, end = self.prepared, self.prepared.edges[k], self.prepared.edges[k + 1]
+        first, last = prepared.segment_offsets[k : k + 2]
+        inputs = prepared.inputs
+        inputs.values[first:last, prepared.commanded] = state.commanded
+        times = prepared.times[prepared.row_offsets[k] : prepared.row_offsets[k + 1]]
+        if self.chains:
+            part = PiecewiseLinear(inputs.ends[first:last], inputs.values[first:last], inputs.slopes[first:last])
+            columns = [part.column(i) for i in range(inputs.values.shape[1])]
+            drivers = apply_drivers(self.chains, state.drivers, columns, self.driven, begin)
+            ends, values, slopes = merge_columns(columns, begin)
+            state = state._replace(drivers=drivers)
+            if len(ends) > 1:
+                times = merge_output_times(times, np.array(ends), prepared.loop.period)
+        else:
+            ends, values, slopes = inputs.ends[first:last], inputs.values[first:last], inputs.slopes[first:last]
+        self._append(ends, values, slopes, times, last - first if not self.chains else len(ends))
+        self._run_interval(begin, end)
+        return state
+
+    def _append(self, ends: Any, values: Any, slopes: Any, times: Array, count: int) -> None:
+        """Append the segments and the times of an interval to the buffers."""
+        self.first_segment, self.first_row = self.ends.size, self.times.size
+        for buffer, new in ((self.ends, ends), (self.values, values), (self.slopes, slopes)):
+            buffer.reserve(count)
+            target = buffer.array[buffer.size : buffer.size + count]
+            target.reshape(-1)[:] = new if isinstance(new, list) else new.reshape(-1)
+            buffer.size += count
+        self.times.reserve(times.size)
+        self.times.array[self.times.size : self.times.size + times.size] = times
+        self.times.size += times.size
+        self.rows.reserve(times.size)
+
+    def _discard_interval(self) -> None:
+        """Forget an interval that was interrupted, so that the run can be continued from its beginning."""
+        self.times.size = self.rows.size
+        for buffer in (self.ends, self.values, self.slopes):
+            buffer.size = min(buffer.size, self.kept_segments)
+        self.stopped_at, self.bound.state[:] = self.time, self.state
+
+    def _run_interval(self, begin: float, end: float) -> None:
+        """Integrate through the segments that were appended last, and fill the rows."""
+        count = self.ends.size - self.first_segment
+        wanted = self.times.size - self.first_row
+        s, r = self.first_segment, self.first_row
+        addresses = (self.ends.at(s), self.values.at(s), self.slopes.at(s))
+        result = self.bound.run_part(begin, addresses, count, self.times.at(r), self.rows.at(r), wanted)
+        self.status, reached, self.stopped_at = result
+        self.rows.size = r + reached
+        if reached < wanted:
+            self.times.size = self.rows.size
+        if self.status == Status.DONE:
+            state = self.bound.state
+            if any(state[i] < bound for i, bound in self.prepared.lower_bounds):
+                self.status = Status.NEGATIVE_AIR_MASS
+            last = self.ends.size - 1
+            start = float(self.ends.array[last - 1]) if count > 1 else begin
+            self.applied = self.values.array[last] + self.slopes.array[last] * (end - start)
 
 
-def _sampled(
-    closed: SampledLoop, memory: ControlLoopState, state: Array, had: Array, setpoints: Sequence[float]
-) -> tuple[ControlLoopState, int]:
-    """The memory after a sample, with what is commanded from now on; and whether it can be."""
-    controller = closed.loop.controller
-    columns = closed.measure(state, had)
-    if not all(map(math.isfinite, columns.values())):
-        return memory, NOT_FINITE
-    measurement = Measurement(columns, dict(zip(controller.setpoints, setpoints, strict=True)), closed.ranges)
-    commands, inner = controller.step(memory.controller, measurement, closed.loop.period)
-    try:
-        told = tuple([min(max(0.0 + commands[name], low), high) for name, (low, high) in closed.ranges.items()])
-    except (KeyError, TypeError, ValueError):
-        raise ParameterError(
-            f"{type(controller).__name__} commands {commands!r}; it must give a number for each of "
-            f"{', '.join(controller.inputs)}."
-        ) from None
-    if not all(map(math.isfinite, told)):
-        return memory, NO_COMMAND
-    seen = tuple(columns.values())
-    return memory._replace(controller=inner, sample_count=memory.sample_count + 1, measured=seen, commanded=told), 0
-
-
-def _piece(
-    closed: SampledLoop, memory: ControlLoopState, state: Array, begin: float, k: int
-) -> tuple[_Interval, ControlLoopState]:
-    """The plant from one edge, at `begin`, to the next under what is commanded."""
-    segments = closed.told(k, memory.commanded)
-    times = closed.times[closed.row_offsets[k] : closed.row_offsets[k + 1]]
-    if closed.loop.drivers:
-        segments, drivers = closed.driven.apply_drivers(memory.drivers, segments, closed.inputs, begin)
-        memory = memory._replace(drivers=drivers)
-        if segments.ends.size > 1:
-            times = merge_output_times(times, segments.ends, closed.loop.period)
-    course = closed.stepper.run(segments, begin, state, times)
-    return _Interval(segments, course, times, memory.measured, memory.commanded), memory
-
-
-def _concatenate(done: _Outcome, inputs: int) -> tuple[PiecewiseLinear, RawSolution, Array]:
-    """All pieces as one course of the inputs, one of the states, and its rows."""
-    segments, courses = [piece.segments for piece in done.pieces], [piece.course for piece in done.pieces]
-    of_inputs = PiecewiseLinear(
-        np.concatenate([np.empty(0), *(s.ends for s in segments)]),
-        np.concatenate([np.empty((0, inputs)), *(s.values for s in segments)]),
-        np.concatenate([np.empty((0, inputs)), *(s.slopes for s in segments)]),
+def _solution(problem: Problem, run: _Run) -> Solution:
+    """The rows of all intervals as one solution."""
+    compiled, prepared, integrator = problem.compiled, run.prepared, problem.integrator
+    segments = PiecewiseLinear(run.ends.rows, run.values.rows, run.slopes.rows)
+    times, states = run.times.rows, run.rows.rows
+    begun = bool(run.samples)
+    at, state = (run.stopped_at, run.bound.state.copy()) if begun else (run.time, run.state)
+    raw = RawSolution(states, times.size, at, state, run.status, *run.bound.step_counts)
+    if not segments.ends.size:  # the run ended before its first interval
+        shape = (1, compiled.sizes.inputs)
+        segments = PiecewiseLinear(np.array([problem.end_time]), np.zeros(shape), np.zeros(shape))
+    table = evaluate_rows(compiled, states, times, segments, problem.start_time)
+    raw, table = truncate_at_invalid_row(compiled, raw, table, times)
+    units = column_units(problem.system, compiled.output_names)
+    note = f"controlled by {prepared.loop.describe(units)}"
+    remark = Diagnostic(DiagnosticCode.CONTROLLER, type(prepared.loop.controller).__name__, note)
+    more = _controller_columns(problem, run, times[: raw.reached])
+    recording, diagnostics = make_recording(
+        compiled, raw, table, times, integrator, problem.end_time, more, (remark,)
     )
-    times = np.concatenate([np.empty(0), *(p.times[: p.course.reached] for p in done.pieces)])
-    rows = np.concatenate([np.empty((0, done.state.size)), *(c.rows[: c.reached] for c in courses)])
-    time, state = (courses[-1].time, courses[-1].state) if courses else (done.time, done.state)
-    steps, rejected = (sum(getattr(c, name) for c in courses) for name in ("steps", "rejected"))
-    return of_inputs, RawSolution(rows, times.size, time, state, done.status, steps, rejected), times
+    final = dict(zip(compiled.description.state_names, run.state.tolist(), strict=True))
+    statistics = Statistics(raw.steps, raw.rejected)
+    return Solution(problem, recording, raw.status, statistics, diagnostics, run.time, final, run.control_state)
 
 
-def _with_controller(recording: Recording, closed: SampledLoop, done: _Outcome, units: Mapping[str, str]) -> Recording:
-    """The recording with set points, measurements and commands, and a note of who commanded."""
-    controller, time = closed.loop.controller, recording["time"]
-    at = np.clip(np.searchsorted(closed.edges, time, side="right") - 1, 0, max(len(done.pieces) - 1, 0))
-    setpoints = closed.setpoint.inputs_at(time, closed.start)
+def _controller_columns(problem: Problem, run: _Run, times: Array) -> dict[str, Array]:
+    """Set points in time; measurements and commands of the last sample at every row."""
+    prepared, controller = run.prepared, run.prepared.loop.controller
+    intervals = np.searchsorted(np.array(prepared.edges), times, side="right") - 1
+    intervals = np.clip(intervals, 0, max(len(run.samples) - 1, 0))
+    setpoints = prepared.setpoint_signal.inputs_at(times, problem.start_time)
     columns = {f"{SETPOINT}{name}": setpoints[:, i] for i, name in enumerate(controller.setpoints)}
-    seen, told = ([getattr(piece, kind) for piece in done.pieces] for kind in ("seen", "told"))
-    for start, names, values in ((MEASURED, controller.measured_columns, seen), (COMMAND, controller.inputs, told)):
-        of_pieces = np.array(values, dtype=float).reshape(-1, len(names))
-        columns |= {f"{start}{name}": of_pieces[at, i] for i, name in enumerate(names)}
-    note = f"controlled: {closed.loop.describe(units)}"
-    return dataclasses.replace(recording.with_columns(**columns), notes=(note, *recording.notes))
+    kinds = ((MEASURED, controller.measured_columns), (COMMAND, controller.inputs))
+    for kind, (prefix, names) in enumerate(kinds):
+        values = np.array([sample[kind] for sample in run.samples], dtype=float).reshape(-1, len(names))
+        columns |= {f"{prefix}{name}": values[intervals, i] for i, name in enumerate(names)}
+    return columns

@@ -1,136 +1,209 @@
-"""How a plant is carried through time: the methods a user chooses between, each a thin caller of one kernel."""
+"""Integrators: numerical methods for ordinary differential equations, each a thin caller of one kernel."""
 
 from __future__ import annotations
 
 import abc
-import dataclasses
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..compile.cache.kernel import Kernel, fixed_step, rodas4
+from ..compile.program import CompiledSystem, Tableau
 from ..control.inputs import PiecewiseLinear
 from ..core.arrays import Array
 from ..core.declaration import model, parameter
+from ..core.errors import ParameterError
+from ..core.status import Status
 
-if TYPE_CHECKING:
-    from ..compile.program import CompiledSystem
-
-
-REASONS = {
-    0: "done",
-    2: "the step became too small",
-    3: "a rate or an output is not finite",
-    4: "it took more steps than allowed",
-    5: "it was interrupted",
-    7: "there was less air than none",
-    8: "the controller gave a command that is not finite",
-    9: "a muscle enclosed nothing",
-}
-PAUSED, NOT_FINITE, TOO_MANY, INTERRUPTED, LESS_THAN_NONE, NO_COMMAND, NO_VOLUME = 1, 3, 4, 5, 7, 8, 9
 INTERRUPT_CHECK_STEPS = 100_000
-"""Steps between two looks at whether the user wants to stop."""
+"""Steps between two checks whether the user wants to stop."""
 MAX_STEPS = 50_000_000
-"""Steps of one run, unless told otherwise."""
+"""Steps of one run, by default."""
+_PAUSED, _TOO_MANY = Status.PAUSED.value, Status.TOO_MANY_STEPS.value
 
 
 class RawSolution(NamedTuple):
-    """What a method computed: rows reached of those asked for, where it stopped and why, and its counts."""
+    """What an integrator computed: rows (N, n), how many were reached, where and why it stopped, and its counts."""
 
     rows: Array
     reached: int
     time: float
     state: Array
-    status: int
+    status: Status
     steps: int
     rejected: int
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Stepper:
-    """A method at one system: the kernel, its leading and trailing arguments, and its workspace. For one thread."""
+class Binding(NamedTuple):
+    """What binds an integrator to a system: kernel, arguments before and after those of a run, workspace size."""
 
-    kernel: Any
+    kernel: Kernel
     leading: tuple[Any, ...]
     trailing: tuple[Any, ...]
-    work: Array
+    work: int
+
+
+class BoundIntegrator:
+    """An integrator bound to one compiled system, with its workspace. For one thread at a time."""
+
+    def __init__(self, integrator: Integrator, compiled: CompiledSystem) -> None:
+        binding, sizes = integrator.binding(compiled), compiled.sizes
+        self.state, self._clock, self._count = np.zeros(sizes.states), np.zeros(3), np.zeros(4, dtype=np.int64)
+        self._end, self._inputs, slopes = np.ones(1), np.zeros((1, sizes.inputs)), np.zeros((1, sizes.inputs))
+        no_rows = np.zeros(0), np.zeros((0, sizes.states))
+        work = np.zeros(max(binding.work, 1))
+        run = (self.state, self._end, self._inputs, slopes, *no_rows)
+        end = (self._clock, self._count, INTERRUPT_CHECK_STEPS, work)
+        self._kernel = binding.kernel.bind(*binding.leading, *run, *binding.trailing, *end)
+        self._first = len(binding.leading) + 1
+        self._budget = len(binding.leading) + len(run) + len(binding.trailing) + 2
 
     def run(
-        self, segments: PiecewiseLinear, start: float, state: Array, times: Array, most_steps: int = MAX_STEPS
-    ) -> RawSolution:
-        """As Method.run."""
-        y, rows = np.array(state, dtype=float), np.empty((times.size, state.size))
-        rows.fill(np.nan)
-        clock, count = np.array([start, 0.0, start]), np.zeros(4, dtype=np.int64)
-        status, middle = PAUSED, (y, segments.ends, segments.values, segments.slopes, times, rows)
+        self, segments: PiecewiseLinear, start: float, state: Array, times: Array, max_steps: int = MAX_STEPS,
+        rows: Array | None = None,
+    ) -> RawSolution:  # fmt: skip
+        """Integrate from `state` (n,) at `start` [s] through the segments; rows (N, n) at rising `times` (N,)."""
+        rows = np.empty((times.size, self.state.size)) if rows is None else rows
+        self.state[:] = state
+        for i, argument in enumerate((segments.ends, segments.values, segments.slopes, times, rows), self._first):
+            self._kernel.replace(i, argument)
+        return self._solve(start, rows, max_steps)
+
+    def hold(self, state: Array, inputs: Array, duration: float) -> Status:
+        """Advance `state` (n,) in place by `duration` [s] with the inputs (m,) held. Not to be mixed with `run`."""
+        self.state[:] = state
+        self._inputs[0] = inputs
+        self._end[0] = duration
+        self._clock[:] = 0.0
+        self._count[:] = 0
+        status = self._kernel()
+        if status == _PAUSED:
+            status = self._continue(status, MAX_STEPS)
+        state[:] = self.state
+        return Status(status)
+
+    def run_part(
+        self, begin: float, segments: tuple[int, int, int], count: int, times: int, rows: int, wanted: int
+    ) -> tuple[Status, int, float]:
+        """Go on from `self.state` at `begin` [s] through `count` segments: how it ended, rows reached, where.
+
+        Ends, values and slopes of the segments, times and rows are given by the addresses of their first numbers.
+        """
+        for i, address in enumerate(segments, self._first):
+            self._kernel.point(i, address, count)
+        self._kernel.point(self._first + 3, times, wanted)
+        self._kernel.point(self._first + 4, rows, wanted)
+        self._clock[:] = begin, 0.0, begin
+        self._count[0] = self._count[1] = 0
+        before = int(self._count[2])
+        status = self._kernel()
+        if status == _PAUSED:
+            status = self._continue(status, before + MAX_STEPS)
+            self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
+        return Status(status), int(self._count[1]), float(self._clock[0])
+
+    @property
+    def step_counts(self) -> tuple[int, int]:
+        """Accepted and rejected steps since the counts were last reset."""
+        return int(self._count[2]), int(self._count[3])
+
+    def _solve(self, start: float, rows: Array, max_steps: int) -> RawSolution:
+        clock, count = self._clock, self._count
+        clock[:] = start, 0.0, start
+        count[:] = 0
+        if max_steps < INTERRUPT_CHECK_STEPS:
+            self._kernel.replace(self._budget, max_steps)
         try:
-            while status == PAUSED:
-                budget = min(INTERRUPT_CHECK_STEPS, most_steps - int(count[2]))
-                status = self.kernel(*self.leading, *middle, *self.trailing, clock, count, budget, self.work)
-                if status == PAUSED and count[2] >= most_steps:
-                    status = TOO_MANY
+            status = self._kernel()
+            if status == _PAUSED:
+                status = self._continue(status, max_steps)
         except KeyboardInterrupt:
-            status = INTERRUPTED
-        return RawSolution(rows, int(count[1]), float(clock[0]), y, int(status), int(count[2]), int(count[3]))
+            status = Status.INTERRUPTED.value
+        self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
+        _, reached, steps, rejected = count.tolist()
+        rows[reached:] = np.nan
+        return RawSolution(rows, reached, float(clock[0]), self.state.copy(), Status(status), steps, rejected)
+
+    def _continue(self, status: int, max_steps: int) -> int:
+        """Go on where the kernel paused so that an interruption can be noticed."""
+        while status == _PAUSED:
+            left = max_steps - int(self._count[2])
+            if left <= 0:
+                return _TOO_MANY
+            self._kernel.replace(self._budget, min(INTERRUPT_CHECK_STEPS, left))
+            status = self._kernel()
+        return status
 
 
 class Integrator(abc.ABC):
     """A numerical method for ordinary differential equations."""
 
     @abc.abstractmethod
-    def _kernel(self, prepared: CompiledSystem) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
-        """The kernel, its leading and its trailing arguments, and the length of its workspace."""
+    def binding(self, compiled: CompiledSystem) -> Binding:
+        """Kernel, arguments and workspace for a system."""
 
-    def stepper(self, prepared: CompiledSystem) -> Stepper:
-        """The method at this system, for those who call it often: what does not change is made once."""
-        kernel, leading, trailing, size = self._kernel(prepared)
-        return Stepper(kernel, leading, trailing, np.zeros(max(size, 1)))
+    def bind(self, compiled: CompiledSystem) -> BoundIntegrator:
+        """The integrator at this system, for callers that run it often."""
+        return BoundIntegrator(self, compiled)
 
     def run(
-        self, prepared: CompiledSystem, segments: PiecewiseLinear, start: float, state: Array, times: Array,
-        most_steps: int = MAX_STEPS,
+        self, compiled: CompiledSystem, segments: PiecewiseLinear, start: float, state: Array, times: Array,
+        max_steps: int = MAX_STEPS,
     ) -> RawSolution:  # fmt: skip
-        """Carry `state` (n,) from `start` through the segments; rows (N, n) at `times` (N,), which must rise."""
-        return self.stepper(prepared).run(segments, start, state, times, most_steps)
+        """Integrate from `state` (n,) at `start` [s] through the segments; rows (N, n) at rising `times` (N,)."""
+        return self.bind(compiled).run(segments, start, state, times, max_steps)
 
 
 @model
 class Rodas4(Integrator):
-    """Adaptive, for stiff plants, order four; the default. The absolute tolerance is rtol times the nominal size."""
+    """Rosenbrock method of order four for stiff systems, adaptive; the default.
+
+    The absolute tolerance of a state is the relative one times its nominal size.
+    Reference: Hairer and Wanner, Solving Ordinary Differential Equations II, 1996, section VI.4, method RODAS.
+    """
 
     rtol: float = parameter("1", "rtol", "relative tolerance of a step", bounds=(1e-13, 0.1), default=1e-6)
 
-    def _kernel(self, prepared: CompiledSystem) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
-        from ..compile.cache.kernel import rodas4
-
-        sizes, at = prepared.sizes, prepared.address
-        addresses = (at["stage"], at["jac"], at["factor"], at["solve"], at["drift"], sizes.jacobian, sizes.factors)
-        length = 11 * sizes.states + 2 * sizes.inputs + sizes.jacobian + sizes.factors
-        return rodas4, (*addresses, prepared.precomputed), (self.rtol, self.rtol * prepared.nominal()), length
+    def binding(self, compiled: CompiledSystem) -> Binding:
+        sizes, at = compiled.sizes, compiled.address
+        addresses = (at["stage"], at["jac"], at["factor"], at["solve"], at["df_dt"], sizes.jacobian, sizes.factors)
+        work = 11 * sizes.states + 2 * sizes.inputs + sizes.jacobian + sizes.factors
+        return Binding(rodas4, (*addresses, compiled.precomputed), (self.rtol, self.rtol * compiled.nominal), work)
 
 
 class ExplicitRungeKutta(Integrator):
-    """An explicit Runge-Kutta method of fixed step; its tableau is in the subclass. Stable only for small steps."""
+    """An explicit Runge-Kutta method of fixed step size, stable only for small steps; a subclass has its tableau."""
 
     step: float
 
     @abc.abstractmethod
-    def tableau(self) -> tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]:
+    def tableau(self) -> Tableau:
         """Rows of the tableau below its first, and the weights."""
 
-    def _kernel(self, prepared: CompiledSystem) -> tuple[Any, tuple[Any, ...], tuple[Any, ...], int]:
-        from ..compile.cache.kernel import fixed_step
+    def binding(self, compiled: CompiledSystem) -> Binding:
+        address, precomputed = compiled.program.step(self.tableau(), compiled.parameters)
+        work = compiled.sizes.states + 2 * compiled.sizes.inputs
+        return Binding(fixed_step, (address, precomputed), (self.step,), work)
 
-        address, held = prepared.program.step(*self.tableau(), prepared.parameters)
-        return fixed_step, (address, held), (self.step,), prepared.sizes.states + 2 * prepared.sizes.inputs
+
+def default_integrator(integrator: Integrator | None) -> Integrator:
+    """The given integrator, or the default. Raises ParameterError for anything else, such as a name."""
+    if integrator is None:
+        return Rodas4()
+    if not isinstance(integrator, Integrator):
+        raise ParameterError(
+            f"the integrator is {integrator!r}; give Rodas4(), RungeKutta4(step) or DormandPrince8(step)."
+        )
+    return integrator
 
 
 @model
 class RungeKutta4(ExplicitRungeKutta):
     """The classical method of order four (Kutta 1901)."""
 
-    step: float = parameter("s", "h", "length of a step", bounds=(1e-9, 1e3))
+    step: float = parameter("s", "h", "step size", bounds=(1e-9, 1e3))
 
-    def tableau(self) -> tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]:
+    def tableau(self) -> Tableau:
         return ((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 
 
@@ -142,9 +215,9 @@ class DormandPrince8(ExplicitRungeKutta):
     J. Computational and Applied Mathematics 7(1):67-75, 1981, table 2.
     """
 
-    step: float = parameter("s", "h", "length of a step", bounds=(1e-9, 1e3))
+    step: float = parameter("s", "h", "step size", bounds=(1e-9, 1e3))
 
-    def tableau(self) -> tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]:
+    def tableau(self) -> Tableau:
         return _RK8_ROWS, _RK8_WEIGHTS
 
 

@@ -1,156 +1,145 @@
-"""A loop at a plant for one run: all that does not change from sample to sample, made once."""
+"""SampledLoop: a control loop prepared for one run; everything that does not change from sample to sample."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from ..compile import System
+from ..compile.cache.kernel import evaluate
+from ..compile.program import CompiledSystem
 from ..control.control_loop import ControlLoop, ControlLoopState
-from ..control.driver import WithDrivers
-from ..control.inputs import PiecewiseLinear
+from ..control.inputs import InputSignal
+from ..control.piecewise_linear import PiecewiseLinear
+from ..control.with_drivers import WithDrivers
 from ..core.arrays import Array
 from ..core.errors import ParameterError
-from ..plant.plant import Plant
-from ..plant.state import state_lower_bounds
-from .arguments import check_input_range, output_times
-from .integrators import Integrator, Stepper
+from .output_times import output_times
+from .problem import Problem, check_input_range
 
-if TYPE_CHECKING:
-    from ..compile.program import CompiledSystem
-
-MOST_SAMPLES = 10_000_000
+MAX_SAMPLES = 10_000_000
 """Samples of one run that fit a usual memory."""
-NEAR = 1e-9
-"""Share of a period within which two instants are one: rounding parts 3 * 0.1 from 0.3."""
-
-
-def columns_of(ready: CompiledSystem) -> tuple[str, ...]:
-    """What a controller can measure at a system: its states and outputs."""
-    return (*(s.name for s in ready.system.states), *ready.output_names)
-
-
-def ranges_of(plant: System, loop: ControlLoop) -> dict[str, tuple[float, float]]:
-    """The least and greatest command of every input that the controller commands."""
-    declared = {i.name: (i.minimum, i.maximum) for i in plant.commands} if isinstance(plant, Plant) else {}
-    of_driver = dict.fromkeys(loop.drivers, (0.0, 1.0))
-    return {name: ({**declared, **of_driver}).get(name, (-math.inf, math.inf)) for name in loop.controller.inputs}
+_CLOSE = 1e-9
+"""Part of a sample time within which two instants are one: rounding separates 3 * 0.1 from 0.3."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SampledLoop:
-    """A loop at a plant for one run.
+    """A control loop prepared for one run.
 
-    edges    (K + 1,) the beginnings of the pieces between samples, and the end of the run
-    sampled  whether the first piece begins with a sample: a run that was cut between two does not
-    course   what the inputs are told, cut at the edges; those that are commanded are filled in as the run goes.
-             Piece k of it begins at place firsts[k]
-    times    rows; those of piece k begin at place cuts[k], and what drivers do adds instants
+    edges      (K + 1,) start of the run, sampling instants, end of the run [s]
+    sampled    whether the first interval begins with a sample: not when a run continues between two samples
+    inputs     segments of all inputs, split at the edges; commanded inputs are filled in during the run. Those of
+               interval k begin at index segment_offsets[k]
+    setpoints  at the start of every interval
+    times      output times; those of interval k begin at index row_offsets[k], and drivers add instants
+    measure    measured columns by name, from the state (n,) and the inputs (m,)
+    ranges     minimum and maximum of every commanded input
     """
 
     loop: ControlLoop
-    stepper: Stepper
-    driven: WithDrivers
-    inputs: tuple[str, ...]
-    places: list[int]
-    ranges: Mapping[str, tuple[float, float]]
-    measure: Callable[[Array, Array], dict[str, float]]
-    inputs_in_time: PiecewiseLinear
-    segment_offsets: list[int]
-    setpoint: PiecewiseLinear
-    start: float
-    edges: Array
+    edges: list[float]
     sampled: bool
+    inputs: PiecewiseLinear
+    segment_offsets: list[int]
+    commanded: list[int]
+    setpoint_signal: PiecewiseLinear
+    setpoints: list[list[float]]
     times: Array
     row_offsets: list[int]
-    lower_bounds: Array
-
-    def before(self) -> Array:
-        """The inputs before the first sample: those beside the controller as they begin, the others at zero."""
-        return np.array(self.inputs_in_time.values[0])
-
-    def told(self, k: int, commands: tuple[float, ...]) -> PiecewiseLinear:
-        """Piece k of the course with these commands held, before any driver."""
-        piece = slice(self.segment_offsets[k], self.segment_offsets[k + 1])
-        self.inputs_in_time.values[piece, self.places] = commands
-        return PiecewiseLinear(
-            self.inputs_in_time.ends[piece], self.inputs_in_time.values[piece], self.inputs_in_time.slopes[piece]
-        )
+    measure: Callable[[Array, Array], dict[str, float]]
+    ranges: Mapping[str, tuple[float, float]]
+    lower_bounds: list[tuple[int, float]]
 
 
-def prepare_loop(
-    ready: CompiledSystem, loop: ControlLoop, memory: ControlLoopState, start: float, duration: float, method: Integrator,
-    output: float | npt.ArrayLike | None,
-) -> SampledLoop:  # fmt: skip
-    plant, inputs = ready.system, ready.system.inputs
-    edges, sampled = _edges(loop.period, memory, start, start + duration)
-    driven = WithDrivers(loop.other_inputs, loop.drivers)
-    shown = driven.segments(inputs, start, duration)
-    shown.check_shape(len(inputs), start)
-    check_input_range(plant, shown, start)
-    near = NEAR * loop.period
-    places = [inputs.index(name) for name in loop.controller.inputs]
-    beside = _snapped(loop.other_inputs.segments(inputs, start, duration), edges, near)
-    starts = np.unique(np.concatenate([edges[:-1], beside.starts(start)]))
-    course = beside.cut_at(starts, start)
-    course.values[:, places] = course.slopes[:, places] = 0.0
-    firsts = np.append(np.searchsorted(starts, edges[:-1]), starts.size)
-    times = output_times(output, start, duration, np.append(start, course.ends))
-    setpoint = _snapped(loop.setpoint.segments(loop.controller.setpoints, start, duration), edges, near)
-    cuts = np.searchsorted(times, edges, side="right")
+def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
+    """The control loop of a problem, prepared for its run."""
+    loop, compiled, start = problem.input, problem.compiled, problem.start_time
+    assert isinstance(loop, ControlLoop)
+    known, duration = compiled.description, problem.duration
+    names = known.input_names
+    edges, sampled = _edges(loop.period, state, start, problem.end_time)
+    close = _CLOSE * loop.period
+    others = _snap(loop.other_inputs, names, edges, close)
+    _check_other_inputs(compiled, loop, start, duration)
+    starts = np.unique(np.concatenate([edges[:-1], others.starts(start)]))
+    inputs = others.split_at(starts, start)
+    commanded = [names.index(name) for name in loop.controller.inputs]
+    inputs.values[:, commanded] = inputs.slopes[:, commanded] = 0.0
+    segment_offsets = np.append(np.searchsorted(starts, edges[:-1]), starts.size)
+    times = output_times(problem.output_times, start, duration, np.append(start, inputs.ends))
+    setpoint = _snap(loop.setpoint, loop.controller.setpoints, edges, close)
+    row_offsets = np.searchsorted(times, edges, side="right")
+    bounds = known.lower_bounds.tolist()
     return SampledLoop(
-        loop, method.stepper(ready), driven, inputs, places, ranges_of(plant, loop), _looking(ready, loop), course,
-        firsts.tolist(), setpoint, start, edges, sampled, times, [0, *cuts[1:].tolist()], state_lower_bounds(plant),
+        loop, edges.tolist(), sampled, inputs, segment_offsets.tolist(), commanded, setpoint,
+        setpoint.inputs_at(edges[:-1], start).tolist(), times, [0, *row_offsets[1:].tolist()],
+        _measurement(compiled, loop), _ranges(compiled, loop),
+        [(i, bound) for i, bound in enumerate(bounds) if bound > -math.inf],
     )  # fmt: skip
 
 
-def _edges(period: float, memory: ControlLoopState, start: float, end: float) -> tuple[Array, bool]:
+def _check_other_inputs(compiled: CompiledSystem, loop: ControlLoop, start: float, duration: float) -> None:
+    """Raise ParameterError where an input that the controller does not command is beyond its range."""
+    shown = WithDrivers(loop.other_inputs, loop.drivers).segments(compiled.description.input_names, start, duration)
+    shown.check_shape(len(compiled.description.input_names), start)
+    check_input_range(compiled, shown, start)
+
+
+def _ranges(compiled: CompiledSystem, loop: ControlLoop) -> dict[str, tuple[float, float]]:
+    """Minimum and maximum of every commanded input; of one with a driver 0 and 1."""
+    declared = {i.name: (i.minimum, i.maximum) for i in compiled.system.input_variables}
+    with_driver = dict.fromkeys(loop.drivers, (0.0, 1.0))
+    return {name: ({**declared, **with_driver})[name] for name in loop.controller.inputs}
+
+
+def _edges(period: float, state: ControlLoopState, start: float, end: float) -> tuple[Array, bool]:
     """Start, the sampling instants after it, and end of a run [s]; whether the start is a sampling instant itself."""
-    count, near = (end - memory.origin) / period - memory.sample_count, NEAR * period
-    if count > MOST_SAMPLES:
+    count, close = (end - state.origin) / period - state.sample_count, _CLOSE * period
+    if count > MAX_SAMPLES:
         raise ParameterError(
-            f"a period of {period:g} s makes {count:.3g} samples; {MOST_SAMPLES} are allowed. Lengthen it, or simulate "
-            "a shorter time."
+            f"a sample time of {period:g} s makes {count:.3g} samples; {MAX_SAMPLES} are allowed. Lengthen it, or "
+            "simulate a shorter time."
         )
-    instants = memory.origin + period * (memory.sample_count + np.arange(max(math.ceil(count), 0) + 1))
-    if abs(start - memory.time) > near:
+    instants = state.origin + period * (state.sample_count + np.arange(max(math.ceil(count), 0) + 1))
+    if abs(start - state.time) > close:
         raise ParameterError(
-            f"the memory of the loop is of {memory.time:.10g} s, and the run begins at {start:.10g} s. Give the time "
-            "that was returned with it."
+            f"the control_state is that of {state.time:.10g} s, and the run begins at {start:.10g} s. Give the time that "
+            "was returned with it."
         )
-    within = instants[(instants > start + near) & (instants < end - near)]
-    return np.concatenate([[start], within, [end]]), bool(instants[0] <= start + near)
+    within = instants[(instants > start + close) & (instants < end - close)]
+    return np.concatenate([[start], within, [end]]), bool(instants[0] <= start + close)
 
 
-def _snapped(segments: PiecewiseLinear, edges: Array, near: float) -> PiecewiseLinear:
-    """The segments, an end that is next to a sampling instant moved to it."""
+def _snap(signal: InputSignal, names: tuple[str, ...], edges: Array, close: float) -> PiecewiseLinear:
+    """The segments of a signal; an end that is close to a sampling instant is moved to it."""
+    start = float(edges[0])
+    segments = signal.segments(names, start, float(edges[-1]) - start)
     behind = np.clip(np.searchsorted(edges, segments.ends), 1, edges.size - 1)
     before, after = edges[behind - 1], edges[behind]
     nearest = np.where(segments.ends - before < after - segments.ends, before, after)
-    ends = np.where(np.abs(nearest - segments.ends) <= near, nearest, segments.ends)
+    ends = np.where(np.abs(nearest - segments.ends) <= close, nearest, segments.ends)
     kept = np.diff(ends, prepend=edges[0]) > 0
     return PiecewiseLinear(ends[kept], segments.values[kept], segments.slopes[kept])
 
 
-def _looking(ready: CompiledSystem, loop: ControlLoop) -> Callable[[Array, Array], dict[str, float]]:
+def _measurement(compiled: CompiledSystem, loop: ControlLoop) -> Callable[[Array, Array], dict[str, float]]:
     """A function of state (n,) and inputs (m,) that gives the measured columns by name."""
-    names, states = loop.controller.measured_columns, [s.name for s in ready.system.states]
-    if all(name in states for name in names):
-        places = [(name, states.index(name)) for name in names]
-        return lambda state, had: {name: float(state[i]) for name, i in places}
-    from ..compile.cache.kernel import evaluate
+    known, names = compiled.description, loop.controller.measured_columns
+    if all(name in known.state_names for name in names):
+        indices = [(name, known.state_names.index(name)) for name in names]
+        return lambda state, inputs: {name: float(state[i]) for name, i in indices}
+    sizes = compiled.sizes
+    x, u, y = np.zeros((1, sizes.states)), np.zeros((1, sizes.inputs)), np.empty((1, sizes.outputs))
+    run = evaluate.bind(compiled.address["outputs"], compiled.precomputed, x, u, y)
+    columns = (*known.state_names, *known.output_names)
+    wanted = [(name, columns.index(name) - sizes.states) for name in names]
 
-    known, results = columns_of(ready), np.empty((1, ready.sizes.outputs))
-    wanted, outputs = [(name, known.index(name)) for name in names], ready.address["outputs"]
+    def measure(state: Array, inputs: Array) -> dict[str, float]:
+        x[0], u[0] = state, inputs
+        run()
+        return {name: float(y[0, i] if i >= 0 else state[i]) for name, i in wanted}
 
-    def look(state: Array, had: Array) -> dict[str, float]:
-        evaluate(outputs, ready.precomputed, state.reshape(1, -1), had.reshape(1, -1), results)
-        values = state.tolist() + results[0].tolist()
-        return {name: values[i] for name, i in wanted}
-
-    return look
+    return measure

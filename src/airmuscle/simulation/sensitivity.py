@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from ..compile import StateVariable, System
 from ..core import autodiff, ops, tree
 from ..core.declaration import model, parameter
 from ..core.errors import ParameterError, suggestion
 from ..core.ops import Value
+from ..core.system import Differentiated, System
+from ..core.variables import Input, StateVariable
 
 TOLERANCE_FACTOR = 10.0
 """How much more a derivative times its scale may err than the state. Chosen: without any control derivatives are lost
@@ -17,7 +18,7 @@ while the states rest, and at 1 the steps double."""
 
 
 @model
-class WithSensitivities:
+class WithSensitivities(Differentiated):
     """A system with s_k = dx/dtheta_k for every column k as further states, and its outputs' derivatives.
 
         s_k' = (df/dx) s_k + df/dtheta_k,    dy/dtheta_k = (dy/dx) s_k + dy/dtheta_k,    y' = (dy/dx) f
@@ -93,6 +94,17 @@ class WithSensitivities:
     def inputs(self) -> tuple[str, ...]:
         """The inner system's inputs."""
         return self.inner.inputs
+
+    @property
+    def input_variables(self) -> tuple[Input, ...]:
+        """The inner system's inputs."""
+        return self.inner.input_variables
+
+    @property
+    def state_lower_bounds(self) -> Sequence[float]:
+        """Those of the inner system; derivatives have none."""
+        further = len(self.states) - len(self.inner.states)
+        return [*self.inner.state_lower_bounds, *([-float("inf")] * further)]
 
     def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
         """The inner rates, and the variational equation of every column."""

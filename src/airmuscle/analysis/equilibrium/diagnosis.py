@@ -36,7 +36,7 @@ def _first_possible(static: StaticProblem, places: Array) -> float | None:
 
 def _line(static: StaticProblem, x: Array) -> str:
     place = static.place(x)
-    ports = static.plant.ports(static.state(place))
+    ports = static.plant.muscle_states(static.state(place))
     pulls = ", ".join(
         f"{m.name} pulls {float(port.tension) + 0.0:.6g} N at {round(float(port.pressure) / 1e3, 6) + 0.0:.6g} kPa "
         f"and a contraction of {float(port.contraction):.1%}"

@@ -102,7 +102,7 @@ def given_inputs(plant: Plant, inputs: Mapping[str, float] | None) -> dict[str, 
     """Every input of a plant, 0 unless given. Raises ParameterError for an unknown name or one beyond its range."""
     given = dict(inputs or {})
     check_input_names(list(given), plant.inputs)
-    for command in plant.commands:
+    for command in plant.input_variables:
         value = given.get(command.name, 0.0)
         if isinstance(value, str) or not np.ndim(value) == 0:
             raise ParameterError(f"the input '{command.name}' is {value!r}; it must be one number, in SI units.")

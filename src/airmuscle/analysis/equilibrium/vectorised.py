@@ -74,7 +74,7 @@ class SideBySide:
     def allowed(self) -> npt.NDArray[np.bool_]:
         """Which plants (N,) take these inputs and pressures."""
         found = np.array(np.broadcast_to(True, (len(self.parameters), 1)))
-        for command, value in zip(self.columns.commands, self.inputs, strict=True):
+        for command, value in zip(self.columns.input_variables, self.inputs, strict=True):
             found &= (command.minimum <= value) & (value <= command.maximum)
         for p in self.pressures:
             found &= np.asarray(absolute(p, self.columns.ambient)) > 0.0
@@ -101,10 +101,10 @@ class SideBySide:
         for eps, muscle in zip(self.contractions(x), plant.muscles, strict=True):
             low, high = muscle.geometry.contraction_range
             possible &= (eps >= low) & (eps <= high)
-        state, volumes = plant.settled_muscles(self.pressures, known)
+        state, volumes = plant.settle_muscles(self.pressures, known)
         for volume in volumes:
             possible &= np.asarray(volume) > 0.0
-        state = plant.filled(self.pressures, volumes, state)
+        state = plant.fill_muscles(self.pressures, volumes, state)
         found = np.empty((*x.shape, len(self.names)))
         for i, name in enumerate(self.names):
             found[..., i] = state[name]
@@ -113,7 +113,6 @@ class SideBySide:
 
     def accelerations(self, x: Array) -> Array:
         """Acceleration of the coordinate from rest at places (N,) or (N, K); not a number where a plant cannot be."""
-        from ...compile.cache.kernel import rates_of_each
 
         states = self.states(x.reshape(len(x), -1))
         rates = np.empty_like(states)

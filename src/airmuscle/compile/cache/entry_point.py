@@ -1,25 +1,25 @@
-"""The entry of a compiled kernel, as LLVM text: one pointer comes in, and the kernel's many arguments come out.
+"""Entry point of a compiled kernel, as LLVM text: `i64 entry(i64 *slots)`, a C signature.
 
-The pointer is that of a row of slots of eight bytes: the addresses of the two dtypes that an array may have, then the
-kernel's arguments, numbers as they are and arrays as the addresses of their Python objects. numba's functions take an
-array apart into what holds it alive, its number of items, their size, its data, its shape and its strides.
+Each argument of the kernel takes slots of eight bytes in turn: a whole number or a float its value, an array the address
+of its first element and then its dimensions. The kernel itself was compiled by numba, whose functions take an array as
+its owner, its number of items, their size, its data, its shape and its strides; all arrays are C-contiguous.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from . import numpy_layout
-
-REFUSED = -(1 << 62)
-"""What the entry returns where an array is not of the kind that the kernel was compiled for."""
-DTYPES = "qd"
-"""The letters of the dtypes, whole numbers and floats of eight bytes, in the order of their slots."""
 _NUMBERS = {"q": "i64", "d": "double"}
+_ITEM_SIZES = {"q": 8, "d": 8, "f": 4}
 
 
-def parts(names: Sequence[str], kinds: Sequence[str]) -> Iterator[str]:
-    """The arguments of a function of numba's, by the names that it gives them."""
+def slot_count(kind: str) -> int:
+    """Slots of an argument of this kind: "q" whole number, "d" float, "d2" array of doubles, "f1" of singles."""
+    return 1 + int(kind[1:] or 0)
+
+
+def numba_arguments(names: Sequence[str], kinds: Sequence[str]) -> Iterator[str]:
+    """The argument names of a function compiled by numba."""
     for name, kind in zip(names, kinds, strict=True):
         if kind in _NUMBERS:
             yield f"arg.{name}"
@@ -28,56 +28,43 @@ def parts(names: Sequence[str], kinds: Sequence[str]) -> Iterator[str]:
         yield from (f"arg.{name}.{part}.{i}" for part in (5, 6) for i in range(int(kind[1:])))
 
 
-def entry(function: str, kinds: Sequence[str]) -> str:
-    """`i64 entry(ptr slots)`: the status that `function` returns, or REFUSED."""
-    looks, reads, passed, fit = [], [], ["ptr %status", "ptr null"], "true"
-    for slot, kind in enumerate(kinds, len(DTYPES)):
+def entry_point(function: str, kinds: Sequence[str]) -> str:
+    """LLVM text of the entry point, which returns the status that `function` returns."""
+    lines = ["%status = alloca i64", "store i64 0, ptr %status"]
+    passed = ["ptr %status", "ptr null"]
+    slot = 0
+    for i, kind in enumerate(kinds):
+        x = f"%x{i}"
         if kind in _NUMBERS:
-            reads += _loaded(f"%x{slot}", _NUMBERS[kind], "%slots", 8 * slot)
-            passed.append(f"{_NUMBERS[kind]} %x{slot}")
-            continue
-        looks += [*_looked_at(slot, kind), f"%fit{slot} = and i1 {fit}, %x{slot}.is"]
-        reads += _taken_apart(f"%x{slot}", int(kind[1:]))
-        passed += [f"ptr null, ptr null, i64 %x{slot}.items, i64 8, ptr %x{slot}.data"]
-        passed += [f"i64 %x{slot}.{part}{i}" for part in ("shape", "strides") for i in range(int(kind[1:]))]
-        fit = f"%fit{slot}"
-    lines = [
-        *("%status = alloca i64", *looks, f"br i1 {fit}, label %fits, label %refused"),
-        *("fits:", *reads, f'call i32 @"{function}"({", ".join(passed)})'),
-        *("%found = load i64, ptr %status", "ret i64 %found", "refused:", f"ret i64 {REFUSED}"),
-    ]
+            lines += _load(x, _NUMBERS[kind], slot)
+            passed.append(f"{_NUMBERS[kind]} {x}")
+        else:
+            dimensions = int(kind[1:])
+            item = _ITEM_SIZES[kind[0]]
+            lines += _load_array(x, dimensions, item, slot)
+            passed.append(f"ptr null, ptr null, i64 {x}.items, i64 {item}, ptr {x}.data")
+            passed += [f"i64 {x}.shape{k}" for k in range(dimensions)]
+            passed += [f"i64 {x}.stride{k}" for k in range(dimensions)]
+        slot += slot_count(kind)
+    lines += [f'call i32 @"{function}"({", ".join(passed)})', "%result = load i64, ptr %status", "ret i64 %result"]
     return "\n".join(["define i64 @entry(ptr %slots) {", *lines, "}\n"])
 
 
-def _loaded(name: str, kind: str, base: str, offset: int) -> list[str]:
-    return [f"{name}.at = getelementptr i8, ptr {base}, i64 {offset}", f"{name} = load {kind}, ptr {name}.at"]
-
-
-def _looked_at(slot: int, kind: str) -> list[str]:
-    """Whether an array has the dtype and the dimensions, and lies as one block that may be written to."""
-    x = f"%x{slot}"
+def _load(name: str, kind: str, slot: int) -> list[str]:
     return [
-        *_loaded(x, "ptr", "%slots", 8 * slot),
-        *_loaded(f"{x}.dtype", "i64", x, numpy_layout.DTYPE),
-        *_loaded(f"{x}.asked", "i64", "%slots", 8 * DTYPES.index(kind[0])),
-        f"{x}.same = icmp eq i64 {x}.dtype, {x}.asked",
-        *_loaded(f"{x}.flags", "i32", x, numpy_layout.FLAGS),
-        f"{x}.bits = and i32 {x}.flags, {numpy_layout.PLAIN}",
-        f"{x}.plain = icmp eq i32 {x}.bits, {numpy_layout.PLAIN}",
-        *_loaded(f"{x}.dimensions", "i32", x, numpy_layout.DIMENSIONS),
-        f"{x}.full = icmp eq i32 {x}.dimensions, {kind[1:]}",
-        f"{x}.both = and i1 {x}.same, {x}.plain",
-        f"{x}.is = and i1 {x}.both, {x}.full",
+        f"{name}.at = getelementptr i8, ptr %slots, i64 {8 * slot}",
+        f"{name} = load {kind}, ptr {name}.at",
     ]
 
 
-def _taken_apart(x: str, dimensions: int) -> list[str]:
-    lines, items = _loaded(f"{x}.data", "ptr", x, numpy_layout.DATA), "1"
-    for part, offset in (("shape", numpy_layout.SHAPE), ("strides", numpy_layout.STRIDES)):
-        lines += _loaded(f"{x}.{part}", "ptr", x, offset)
-        for i in range(dimensions):
-            lines += _loaded(f"{x}.{part}{i}", "i64", f"{x}.{part}", 8 * i)
-    for i in range(dimensions):
-        lines.append(f"{x}.items{i} = mul i64 {items}, {x}.shape{i}")
-        items = f"{x}.items{i}"
-    return [*lines, f"{x}.items = mul i64 {items}, 1"]
+def _load_array(x: str, dimensions: int, item: int, slot: int) -> list[str]:
+    """Data, shape, and from these the strides and the number of items."""
+    lines = _load(f"{x}.data", "ptr", slot)
+    for k in range(dimensions):
+        lines += _load(f"{x}.shape{k}", "i64", slot + 1 + k)
+    stride = str(item)
+    for k in reversed(range(dimensions)):
+        lines.append(f"{x}.stride{k} = add i64 {stride}, 0")
+        lines.append(f"{x}.size{k} = mul i64 {stride}, {x}.shape{k}")
+        stride = f"{x}.size{k}"
+    return [*lines, f"{x}.items = sdiv i64 {stride}, {item}"]

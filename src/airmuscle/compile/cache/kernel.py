@@ -1,124 +1,131 @@
-"""A kernel as its callers see it: machine code that is kept on this machine and runs without a start of numba.
+"""Kernel: a numerical kernel by its name, compiled once per machine and called without importing numba.
 
-numba takes 0.35 s to start, SciPy's linear algebra among it, before it runs what it compiled on another day. So a
-kernel is compiled by numba once, its machine code is `kept` as a file, and every later process loads that alone. What
-it is not compiled for, as an array that is not contiguous, goes to numba as ever.
+numba takes 0.35 s to import before it runs what it compiled on another day. So a kernel is compiled by numba once, its
+machine code is stored (`store`), and every later process loads that alone. It is called with addresses and lengths.
 """
 
 from __future__ import annotations
 
+import ctypes
 import importlib
-import struct
 import threading
-from ctypes import CFUNCTYPE, c_char_p, c_int64
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ...core.errors import FileError
-from . import numpy_layout, store
-from .announce import announce, announce_compilation
-from .entry_point import DTYPES, REFUSED
+from . import store
+from .announce import announce
+from .entry_point import slot_count
+from .object_code import build, load_engine
 
-_DTYPES = {"q": np.dtype(np.int64), "d": np.dtype(np.float64)}
-_FIRST_SLOTS = tuple(id(_DTYPES[letter]) for letter in DTYPES)
-_NUMBERS = {int: "q", float: "d"}
+_ITEMS = {np.dtype(np.int64): "q", np.dtype(np.float64): "d", np.dtype(np.float32): "f"}
 _compiling = threading.RLock()
-_ENTRY = CFUNCTYPE(c_int64, c_char_p)
+_ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 
 
-class _Loaded(NamedTuple):
-    """Machine code, how its arguments are packed, their types, and what must live as long as it is called."""
+def address_of(array: Any) -> int:
+    """The address of the first element of a C-contiguous, writeable array."""
+    return ctypes.addressof(ctypes.c_char.from_buffer(array)) if array.size else 0
 
-    run: Any
-    pack: Any
-    types: tuple[type[Any], ...]
-    engine: Any
+
+def _kind(argument: Any) -> str:
+    """The kind of an argument: "q", "d", or the letter of an array's items with its dimensions."""
+    if type(argument) is float:
+        return "d"
+    if type(argument) is int:
+        return "q"
+    return f"{_ITEMS[argument.dtype]}{argument.ndim}"
 
 
 class Kernel:
-    """A kernel that returns a status or nothing, by the name of it and of its module."""
+    """A kernel that returns a status, by its name and that of its module in `compile.kernels`."""
 
     def __init__(self, name: str, module: str = "") -> None:
-        self.name = name
-        self.module = module or name
-        self._loaded: _Loaded | None = None
-        self._only_numba = False
+        self.name, self.module = name, module or name
+        self._entries: dict[tuple[str, ...], Any] = {}
 
-    def __call__(self, *arguments: Any) -> Any:
-        """Run it on whole numbers, floats and arrays of both."""
-        if self._loaded is None and not self._only_numba:
-            self._load(arguments)
-        loaded = self._loaded
-        if loaded is not None and tuple(map(type, arguments)) == loaded.types:
-            slots = [id(a) if type(a) is np.ndarray else a for a in arguments]
-            status = loaded.run(loaded.pack(*_FIRST_SLOTS, *slots))
-            if status != REFUSED:
-                return status
-        return self._by_numba(arguments)
+    def bind(self, *arguments: Any) -> BoundKernel:
+        """The kernel with whole numbers, floats and C-contiguous arrays of int64, float64 or float32 as its arguments."""
+        return BoundKernel(self, arguments)
 
-    def _by_numba(self, arguments: tuple[Any, ...]) -> Any:
-        kernel = self.numba
-        announce_compilation(kernel)
-        return kernel(*arguments)
+    def __call__(self, *arguments: Any) -> int:
+        """Run it once."""
+        return self.bind(*arguments)()
 
     @property
     def numba(self) -> Any:
-        """The kernel as it is written, which numba compiles for whatever it is called with.
+        """The kernel as it is written, which numba compiles for whatever it is called with."""
+        return getattr(importlib.import_module(f"...kernels.{self.module}", __name__), self.name)
 
-        Raises FileError where there is no folder to keep it in.
-        """
-        try:
-            return getattr(importlib.import_module(f"...kernels.{self.module}", __name__), self.name)
-        except RuntimeError as error:
-            if "cannot cache" not in str(error):
-                raise
-            raise FileError(
-                "there is no folder to keep compiled code in: neither the program's own nor the user's cache can be "
-                "written to. Name one that can be in the environment variable NUMBA_CACHE_DIR."
-            ) from None
+    def entry(self, kinds: tuple[str, ...]) -> Any:
+        """The machine code for arguments of these kinds, as a function of the address of slots; None without it."""
+        if kinds not in self._entries:
+            with _compiling:
+                if kinds not in self._entries:
+                    self._entries[kinds] = self._load(kinds)
+        loaded = self._entries[kinds]
+        return loaded and loaded[0]
 
-    def _load(self, arguments: tuple[Any, ...]) -> None:
-        """Find or make the machine code for arguments of these kinds; where there is none, numba is left."""
-        kinds = _kinds(arguments)
-        if kinds is None or not numpy_layout.as_known():
-            return
-        with _compiling:
-            if self._loaded is not None:
-                return
-            code = store.load(self.name, kinds)
-            if code is None:
-                announce(self.name)
-                code = store.save(self.name, kinds, self._made(kinds, arguments))
-            self._only_numba = not code
-            self._loaded = _in_memory(code, kinds, arguments) if code else None
-
-    def _made(self, kinds: tuple[str, ...], arguments: tuple[Any, ...]) -> bytes:
-        from .object_code import build
-
-        return build(self.numba, kinds, arguments)
+    def _load(self, kinds: tuple[str, ...]) -> tuple[Any, Any] | None:
+        """The entry point and the engine that must live as long."""
+        code = store.load(self.name, kinds)
+        if code is None:
+            announce(self.name)
+            code = store.save(self.name, kinds, build(self.numba, kinds))
+        if not code:
+            return None
+        engine = load_engine(code)
+        return _ENTRY(engine.get_function_address("entry")), engine
 
 
-def _kinds(arguments: tuple[Any, ...]) -> tuple[str, ...] | None:
-    """The letter of each number and array, the latter's dimensions behind it; nothing if one is of another kind."""
-    found = []
-    for a in arguments:
-        if type(a) in _NUMBERS:
-            found.append(_NUMBERS[type(a)])
-        elif type(a) is np.ndarray and a.flags.num & numpy_layout.PLAIN == numpy_layout.PLAIN:
-            found += [f"{letter}{a.ndim}" for letter, dtype in _DTYPES.items() if a.dtype is dtype]
-    if len(found) < len(arguments):
-        return None
-    return tuple(found)
+class BoundKernel:
+    """A kernel with its arguments, to be run many times; arrays are passed by address and kept alive.
+
+    Between two runs the contents of arrays may change, and arguments may be replaced by others of their kind.
+    """
+
+    __slots__ = ("_address", "_arguments", "_floats", "_kinds", "_numba", "_offsets", "_run", "_slots")
+
+    def __init__(self, kernel: Kernel, arguments: tuple[Any, ...]) -> None:
+        self._kinds = tuple(map(_kind, arguments))
+        counts = list(map(slot_count, self._kinds))
+        self._offsets = [sum(counts[:i]) for i in range(len(counts))]
+        self._slots = (ctypes.c_int64 * sum(counts))()
+        self._floats = (ctypes.c_double * sum(counts)).from_buffer(self._slots)
+        self._address = ctypes.addressof(self._slots)
+        self._arguments = list(arguments)
+        for index, argument in enumerate(arguments):
+            self.replace(index, argument)
+        entry = kernel.entry(self._kinds)
+        self._run: Any = entry
+        self._numba: Any = None if entry else kernel.numba
+
+    def replace(self, index: int, argument: Any) -> None:
+        """Take another argument of the same kind in place of number `index`."""
+        self._arguments[index] = argument
+        kind, offset = self._kinds[index], self._offsets[index]
+        if kind == "d":
+            self._floats[offset] = argument
+        elif kind == "q":
+            self._slots[offset] = argument
+        else:
+            self._slots[offset] = address_of(argument)
+            for i, length in enumerate(argument.shape, offset + 1):
+                self._slots[i] = length
+
+    def point(self, index: int, address: int, length: int) -> None:
+        """Let array number `index` begin at another address and have another first dimension, within a live array."""
+        offset = self._offsets[index]
+        self._slots[offset] = address
+        self._slots[offset + 1] = length
+
+    def __call__(self) -> int:
+        """Run the kernel; its status."""
+        if self._numba is None:
+            return int(self._run(self._address))
+        return int(self._numba(*self._arguments) or 0)
 
 
-def _in_memory(code: bytes, kinds: tuple[str, ...], arguments: tuple[Any, ...]) -> _Loaded:
-    from .object_code import load_engine
-
-    engine = load_engine(code)
-    row = struct.Struct("=" + "q" * len(DTYPES) + "".join(k if len(k) == 1 else "q" for k in kinds))
-    return _Loaded(_ENTRY(engine.get_function_address("entry")), row.pack, tuple(map(type, arguments)), engine)
-
-
-rodas4, fixed_step, evaluate = Kernel("rodas4"), Kernel("fixed_step"), Kernel("evaluate")
-rates_of_each = Kernel("rates_of_each", "rates")
+rodas4, fixed_step, lanes = Kernel("rodas4"), Kernel("fixed_step"), Kernel("lanes")
+evaluate, evaluate_rates, record = Kernel("evaluate"), Kernel("evaluate_rates", "rates"), Kernel("record")
+newton = Kernel("newton")

@@ -1,4 +1,4 @@
-"""From a kernel that numba compiled to machine code that stands by itself, and from a file back into memory."""
+"""Machine code of a kernel: compiled by numba to code that needs no numba, and loaded again from its bytes."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..target import native
-from .entry_point import entry, parts
+from .entry_point import entry_point, numba_arguments
 
 _C_LIBRARY = frozenset({"sqrt", "ceil", "floor", "memset", "memcpy", "memmove"})
-_NOTHING_OF_PYTHON = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_STANDALONE = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 def load_engine(code: bytes) -> Any:
-    """An engine that holds the machine code; its function is `entry`."""
+    """An execution engine that holds the machine code; its function is `entry`."""
     import llvmlite.binding as llvm
 
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), native(3))
@@ -22,35 +22,42 @@ def load_engine(code: bytes) -> Any:
     return engine
 
 
-def build(kernel: Any, kinds: Sequence[str], arguments: Sequence[Any]) -> bytes:
-    """Machine code of a kernel of numba's for arguments of these kinds; nothing where it cannot do without numba.
+def build(kernel: Any, kinds: Sequence[str]) -> bytes:
+    """Machine code of a numba kernel for arguments of these kinds; empty where the kernel cannot do without numba.
 
-    It cannot where it allocates or raises, returns something else than a status, or calls what neither LLVM nor the
-    C library has. Neither can a kernel of a numba that takes arguments apart in another way than `entry` knows.
+    That is where it allocates or raises, returns something else than a status, or calls what neither LLVM nor the
+    C library provides; or with a version of numba that passes arrays in another way than `entry_point` knows.
     """
     import llvmlite.binding as llvm
     import numba
     from numba.core.errors import NumbaError
 
     options = {name: value for name, value in kernel.targetoptions.items() if name != "nopython"}
-    alone = numba.njit(**options, **_NOTHING_OF_PYTHON)(kernel.py_func)
-    signature = tuple(map(numba.typeof, arguments))
+    standalone = numba.njit(**options, **_STANDALONE)(kernel.py_func)
+    signature = tuple(_numba_type(kind) for kind in kinds)
     try:
-        alone.compile(signature)
+        standalone.compile(signature)
     except NumbaError:
         return b""
-    text, returned = alone.inspect_llvm(signature), {s.return_type for s in alone.nopython_signatures}
+    text, returned = standalone.inspect_llvm(signature), {s.return_type for s in standalone.nopython_signatures}
     functions = [f for f in llvm.parse_assembly(text).functions if not f.is_declaration]
-    known = ["retptr", "excinfo", *parts(kernel.py_func.__code__.co_varnames[: len(kinds)], kinds)]
-    if [[a.name for a in f.arguments] for f in functions] != [known] or text.count("%excinfo") > 1:
-        return b""  # taken apart otherwise, or it raises
+    expected = ["retptr", "excinfo", *numba_arguments(kernel.py_func.__code__.co_varnames[: len(kinds)], kinds)]
+    if [[a.name for a in f.arguments] for f in functions] != [expected] or text.count("%excinfo") > 1:
+        return b""  # arrays are passed in another way, or it raises
     if not returned <= {numba.int64, numba.none}:
         return b""
-    return _emitted(f"{text}\n{entry(functions[0].name, kinds)}", functions[0].name)
+    return _emit(f"{text}\n{entry_point(functions[0].name, kinds)}", functions[0].name)
 
 
-def _emitted(text: str, inner: str) -> bytes:
-    """Machine code of what `entry` needs of a module; nothing where that is not all in there."""
+def _numba_type(kind: str) -> Any:
+    import numba
+
+    item = {"q": numba.int64, "d": numba.float64, "f": numba.float32}[kind[0]]
+    return numba.types.Array(item, int(kind[1:]), "C") if len(kind) > 1 else item
+
+
+def _emit(text: str, inner: str) -> bytes:
+    """Machine code of `entry` and what it needs of a module; empty where that is not all in the module."""
     import llvmlite.binding as llvm
 
     module, machine = llvm.parse_assembly(text), native(3)
@@ -58,8 +65,8 @@ def _emitted(text: str, inner: str) -> bytes:
     passes = llvm.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()
     passes.run(module, llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options()))
-    asked = [v.name for v in (*module.functions, *module.global_variables) if v.is_declaration]
-    if any(not name.startswith("llvm.") and name not in _C_LIBRARY for name in asked):
+    declared = [v.name for v in (*module.functions, *module.global_variables) if v.is_declaration]
+    if any(not name.startswith("llvm.") and name not in _C_LIBRARY for name in declared):
         return b""
     code: bytes = machine.emit_object(module)
     return code

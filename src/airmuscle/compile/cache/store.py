@@ -1,8 +1,9 @@
-"""Machine code of kernels as files: where it is kept, and how it is known to be that of these very sources.
+"""Kernel cache: machine code as files in a private folder of the user, verified before it is used.
 
-The folders are those of numba's own cache: the one that NUMBA_CACHE_DIR names, or else beside the sources, or else the
-user's. A file begins with what it was made from and with its own checksum, so that code of other sources or versions,
-or a file cut short, is made anew.
+The folder is `AIRMUSCLE_CACHE_DIR`, or else `airmuscle/kernels` in the user's cache folder. It must belong to the user,
+and nobody else may write to it, because what is in it is executed; otherwise it is not used, and kernels are compiled
+anew in every process. A file begins with a hash of what it was compiled from and a hash of its contents, so that code
+of other sources or versions, or a damaged file, is compiled anew.
 """
 
 from __future__ import annotations
@@ -12,70 +13,113 @@ import hashlib
 import importlib.util
 import os
 import pathlib
+import stat
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+import warnings
+from collections.abc import Sequence
 
-_HERE = pathlib.Path(__file__).parent
-_KERNELS = _HERE.parent / "kernels"
-_SIZE = hashlib.sha256().digest_size
+from ...core.errors import AirmuscleWarning
+
+_PACKAGE = pathlib.Path(__file__).parents[1]
+_SOURCES = (*sorted((_PACKAGE / "kernels").glob("*.py")), *sorted((_PACKAGE / "cache").glob("*.py")))
+_HASH = hashlib.sha256().digest_size
+_POSIX = hasattr(os, "getuid")
 
 
 def load(name: str, kinds: Sequence[str]) -> bytes | None:
-    """The machine code that is kept of a kernel for arguments of these kinds."""
-    file = _file(name, kinds)
-    for folder in _folders():
-        try:
-            content = (folder / file).read_bytes()
-        except OSError:
-            continue
-        made_from, checksum, code = content[:_SIZE], content[_SIZE : 2 * _SIZE], content[2 * _SIZE :]
-        if made_from == _origin() and checksum == hashlib.sha256(code).digest():
-            return code
-    return None
+    """The stored machine code of a kernel for arguments of these kinds; None where there is none that is valid."""
+    folder = cache_folder()
+    content = None if folder is None else _read(folder / _file_name(name, kinds))
+    if content is None:
+        return None
+    origin, checksum, code = content[:_HASH], content[_HASH : 2 * _HASH], content[2 * _HASH :]
+    return code if origin == _origin() and checksum == hashlib.sha256(code).digest() else None
 
 
 def save(name: str, kinds: Sequence[str], code: bytes) -> bytes:
-    """Keep the machine code in the first folder that can be written to, and return it."""
-    content = _origin() + hashlib.sha256(code).digest() + code
-    for folder in _folders():
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            temporary = folder / f"{_file(name, kinds)}.{os.getpid()}.{threading.get_ident()}"
-            temporary.write_bytes(content)
-            os.replace(temporary, folder / _file(name, kinds))
-        except OSError:
-            continue
-        break
+    """Store the machine code, if there is a folder for it, and return it."""
+    folder = cache_folder()
+    if folder is None:
+        return code
+    target = folder / _file_name(name, kinds)
+    temporary = target.with_suffix(f".{os.getpid()}.{threading.get_ident()}")
+    try:
+        temporary.write_bytes(_origin() + hashlib.sha256(code).digest() + code)
+        os.replace(temporary, target)
+    except OSError as error:
+        _warn_once(f"{folder} cannot be written to ({error.strerror or error})")
     return code
 
 
-def _folders() -> Iterator[pathlib.Path]:
-    named = os.environ.get("NUMBA_CACHE_DIR")
+def cache_folder() -> pathlib.Path | None:
+    """The folder of the kernel cache, made if it is missing; None, with one warning, where none is private."""
+    try:
+        folder = _chosen_folder()
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        state = folder.stat()
+    except (OSError, RuntimeError) as error:  # RuntimeError: the user has no home folder
+        _warn_once(f"there is no cache folder ({error})")
+        return None
+    if _POSIX and (state.st_uid != os.getuid() or state.st_mode & (stat.S_IWGRP | stat.S_IWOTH)):
+        _warn_once(f"other users may write to {folder}")
+        return None
+    return folder
+
+
+def _chosen_folder() -> pathlib.Path:
+    named = os.environ.get("AIRMUSCLE_CACHE_DIR")
     if named:
-        yield pathlib.Path(named) / "airmuscle"
-        return
-    yield _HERE / "__pycache__"
-    of_user = {"win32": os.environ.get("LOCALAPPDATA"), "darwin": "~/Library/Caches"}
-    folder = of_user.get(sys.platform) or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    yield pathlib.Path(folder).expanduser() / "airmuscle"
+        return pathlib.Path(named)
+    defaults = {"win32": os.environ.get("LOCALAPPDATA"), "darwin": "~/Library/Caches"}
+    root = defaults.get(sys.platform) or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    return pathlib.Path(root).expanduser() / "airmuscle" / "kernels"
 
 
-def _file(name: str, kinds: Sequence[str]) -> str:
-    """A name of its own for each processor and each kind of arguments, so that none drives out the other."""
+def _read(path: pathlib.Path) -> bytes | None:
+    """The contents of a regular file that belongs to the user and that nobody else may write to."""
+    try:
+        with open(os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)), "rb") as file:
+            state = os.fstat(file.fileno())
+            private = not _POSIX or (
+                state.st_uid == os.getuid() and not state.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+            )
+            return file.read() if private and stat.S_ISREG(state.st_mode) else None
+    except OSError:
+        return None
+
+
+@functools.cache
+def _warn_once(reason: str) -> None:
+    """Warn that compiled kernels are not stored."""
+    warnings.warn(
+        f"compiled kernels are not stored: {reason}. Every process compiles them anew, which takes some seconds. Name a "
+        "private folder in the environment variable AIRMUSCLE_CACHE_DIR.",
+        AirmuscleWarning,
+        stacklevel=2,
+    )
+
+
+@functools.cache
+def _processor() -> str:
     import llvmlite.binding as llvm
 
-    key = f"{','.join(kinds)} {llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
+    return f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
+
+
+def _file_name(name: str, kinds: Sequence[str]) -> str:
+    """A name for each processor and each kind of arguments, so that none replaces the other."""
+    key = f"{','.join(kinds)} {_processor()}"
     return f"{name}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.code"
 
 
 @functools.cache
 def _origin() -> bytes:
-    """What machine code is made from: the sources of the kernels and of what keeps them, numba and LLVM."""
+    """Hash of what machine code is compiled from: the sources of kernels and cache, numba and LLVM."""
     import llvmlite
 
     numba = importlib.util.find_spec("numba")
     version = pathlib.Path(numba.origin).with_name("_version.py") if numba and numba.origin else None
-    parts = [path.read_bytes() for folder in (_HERE, _KERNELS) for path in sorted(folder.glob("*.py"))]
+    parts = [path.read_bytes() for path in _SOURCES]
     parts += [version.read_bytes() if version and version.exists() else b"", llvmlite.__version__.encode()]
     return hashlib.sha256(b"\0".join(parts)).digest()

@@ -1,4 +1,4 @@
-"""How a kernel calls a function that it knows by address alone."""
+"""Calls of compiled functions by address from kernels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A printed function of state and inputs, called row by row."""
+"""Kernel: a compiled function of state and inputs at every row."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numba
 from .calls import invoke, pointer
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@numba.njit(error_model="numpy", nogil=True)
 def evaluate(function: Any, c: Any, states: Any, inputs: Any, results: Any) -> None:
     """Fill results (N, k) with function(x, u, c, o) at states (N, n) and inputs (N, m), all C-contiguous."""
     for row in range(states.shape[0]):

@@ -1,7 +1,7 @@
-"""Fixed steps of a printed one-step method; the last step of a segment is shortened so that its end is met exactly.
+"""Fixed steps of a one-step method; the last step of a segment is shortened so that its end is met exactly.
 
-A row that falls between two steps is reached by a step of its own, which the run does not continue from:
-the solution never depends on where it is looked at.
+A row between two steps is reached by a separate step from which the run does not continue, so that the solution does
+not depend on the output times.
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ from typing import Any
 import numba
 import numpy as np
 
+from ...core.status import Status
 from .calls import invoke, pointer
 
-DONE, PAUSED, STEP_TOO_SMALL, NOT_FINITE = 0, 1, 2, 3
+DONE, PAUSED, NOT_FINITE = Status.DONE.value, Status.PAUSED.value, Status.NOT_FINITE.value
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
+@numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
 def fixed_step(
     step: Any, c: Any, y: Any, ends: Any, values: Any, slopes: Any, times: Any, rows: Any,
     length: Any, clock: Any, count: Any, budget: Any, work: Any,

@@ -13,18 +13,20 @@ from typing import Any
 import numba
 import numpy as np
 
+from ...core.status import Status
 from .calls import invoke, pointer
 
-DONE, NOT_FINITE, INTERRUPTED = 0, 3, 5
-MOST_AT_ONCE = 10_000
-"""Steps between two looks at whether the caller wants to stop."""
+DONE, NOT_FINITE, INTERRUPTED = Status.DONE.value, Status.NOT_FINITE.value, Status.INTERRUPTED.value
+MAX_UNINTERRUPTED = 10_000
+"""Steps between two checks whether the caller wants to stop."""
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@numba.njit(error_model="numpy", nogil=True)
 def lanes(
     prepare: Any, step: Any, outputs: Any, p: Any, c: Any, y: Any, other: Any, u: Any, base: Any, w: Any, h: Any,
     o: Any, ends: Any, values: Any, slopes: Any, first: Any, last: Any, begin: Any, length: Any, times: Any,
     chosen: Any, rows: Any, final: Any, status: Any, stop: Any,
+    segment: Any, ended: Any, done: Any, total: Any, start: Any,
 ) -> Any:  # fmt: skip
     """Carry the states `y` (n, W) of W systems from `begin` through their segments; DONE or INTERRUPTED.
 
@@ -36,15 +38,14 @@ def lanes(
     times, chosen         (T,) instants in rising order, (C,) columns: states, then outputs, then inputs
     rows, final, status   (C, W, T), (W, n), (W,): what is found
     stop                  (1,): the caller sets it to something else than 0 to end this early
+    segment .. start      (W,): workspace
     """
     n, width = y.shape
     m = values.shape[1]
     k = o.shape[0]
-    segment, done, total, start = np.empty(width, np.int64), np.zeros(width), np.empty(width), np.full(width, begin)
-    ended = np.zeros(width, np.bool_)
     moving = False
     for lane in range(width):
-        segment[lane] = first[lane]
+        segment[lane], ended[lane], done[lane], start[lane] = first[lane], 0, 0.0, begin
     invoke(prepare, (pointer(p), pointer(c)))
     at_c, at_u, at_w, at_h, at_o = pointer(c), pointer(u), pointer(w), pointer(h), pointer(o)
     at_y, at_other = pointer(y), pointer(other)
@@ -62,21 +63,21 @@ def lanes(
                 moving = False
                 for lane in range(width):
                     s = segment[lane]
-                    ended[lane] = s >= last[lane]
+                    ended[lane] = 1 if s >= last[lane] else 0
                     s = min(s, last[lane] - 1)
                     total[lane] = np.ceil((ends[s] - start[lane]) / length - 1e-6)
                     for i in range(m):
                         base[i, lane] = values[s, i]
                         w[i, lane] = slopes[s, i]
-                        if ended[lane]:
+                        if ended[lane] != 0:
                             base[i, lane] += (ends[s] - (begin if s == first[lane] else ends[s - 1])) * slopes[s, i]
                             w[i, lane] = 0.0
                         moving = moving or w[i, lane] != 0.0
                         u[i, lane] = base[i, lane]
                 entered = False
-            common = float(MOST_AT_ONCE)
+            common = float(MAX_UNINTERRUPTED)
             for lane in range(width):
-                full = -1.0 if ended[lane] else total[lane] - 1.0 - done[lane]
+                full = -1.0 if ended[lane] != 0 else total[lane] - 1.0 - done[lane]
                 before = np.floor((instant - start[lane]) / length + 1e-9) - done[lane]
                 common = min(common, full, before)
             if common > 0.0:
@@ -100,7 +101,7 @@ def lanes(
             any_steps = False
             for lane in range(width):
                 h[0, lane] = 0.0
-                if ended[lane]:
+                if ended[lane] != 0:
                     continue
                 end = ends[segment[lane]]
                 closing = done[lane] + 1.0 >= total[lane]
@@ -132,7 +133,7 @@ def lanes(
         for lane in range(width):
             h[0, lane] = 0.0
             ahead = instant - (start[lane] + done[lane] * length)
-            if not ended[lane] and ahead > 1e-9 * length:
+            if ended[lane] == 0 and ahead > 1e-9 * length:
                 h[0, lane] = ahead
                 between = True
         if moving:

@@ -6,32 +6,36 @@ from typing import Any
 
 import numba
 
+from ...core.status import Status
 from .calls import invoke, pointer
 
-FOUND, SINGULAR, NOT_FINITE, TOO_MANY = 0, 1, 2, 3
-MOST, FAR, NEAR = 50, 10.0, 1e-11
+DONE, SINGULAR = Status.DONE.value, Status.SINGULAR.value
+NOT_FINITE, NOT_CONVERGED = Status.NOT_FINITE.value, Status.NOT_CONVERGED.value
+MAX_ITERATIONS, MAX_STEP, TOLERANCE = 50, 10.0, 1e-11
 """Iterations; the longest step and the step that ends the search, both in sizes of the unknowns."""
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def root(function: Any, p: Any, target: Any, sizes: Any, x: Any, values: Any, by_x: Any, by_p: Any, work: Any) -> Any:
+@numba.njit(nogil=True, error_model="numpy")
+def newton(
+    function: Any, p: Any, target: Any, sizes: Any, x: Any, values: Any, by_x: Any, by_p: Any, a: Any, b: Any
+) -> Any:
     """Move `x` (n,) to the root; `values` (n,), `by_x` (n, n) and `by_p` (n, m) hold what the function gave last.
 
     function(x, p, values, by_x, by_p)  its address
-    work  (n n + n,): the caller owns it
-    Returns a status code; work[0] is the last step in sizes.
+    a, b  (n, n), (n,): workspace
+    Returns a status; b[0] is the last step in sizes.
     """
     n = x.shape[0]
-    a, b = work[: n * n].reshape(n, n), work[n * n :]
-    status = TOO_MANY
-    for _ in range(MOST):
+    status = NOT_CONVERGED
+    step = 0.0
+    for _ in range(MAX_ITERATIONS):
         invoke(function, (pointer(x), pointer(p), pointer(values), pointer(by_x), pointer(by_p)))
         for i in range(n):
-            greatest = 0.0
+            largest = 0.0
             for k in range(n):
                 a[i, k] = by_x[i, k] * sizes[k]
-                greatest = max(greatest, abs(a[i, k]))
-            scale = 1.0 / greatest if greatest > 0.0 else 1.0
+                largest = max(largest, abs(a[i, k]))
+            scale = 1.0 / largest if largest > 0.0 else 1.0
             b[i] = (target[i] - values[i]) * scale
             for k in range(n):
                 a[i, k] *= scale
@@ -58,13 +62,13 @@ def root(function: Any, p: Any, target: Any, sizes: Any, x: Any, values: Any, by
             step = max(step, abs(b[i]))
         if not step < 1e300:
             return NOT_FINITE
-        share = min(1.0, FAR / max(step, 1e-300))
+        share = min(1.0, MAX_STEP / max(step, 1e-300))
         large = 1.0
         for i in range(n):
             x[i] += share * sizes[i] * b[i]
             large = max(large, abs(x[i] / sizes[i]))
-        if step < NEAR * large:
-            status = FOUND
+        if step < TOLERANCE * large:
+            status = DONE
             break
-    work[0] = step
+    b[0] = step
     return status

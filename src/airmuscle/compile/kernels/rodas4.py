@@ -3,8 +3,6 @@
 Hairer and Wanner, Solving Ordinary Differential Equations II (1996), section VI.4, method RODAS. Stiffly accurate,
 L-stable, six stages with one factorisation. Inputs are linear within a segment; the method carries their slope,
 without which it falls to order one. The end of a segment is met exactly.
-
-The constants stand in this file because the kernel's cache on disk knows only the file it was compiled from.
 """
 
 from __future__ import annotations
@@ -14,9 +12,11 @@ from typing import Any
 
 import numba
 
+from ...core.status import Status
 from .calls import invoke, pointer
 
-DONE, PAUSED, STEP_TOO_SMALL, NOT_FINITE = 0, 1, 2, 3
+DONE, PAUSED = Status.DONE.value, Status.PAUSED.value
+STEP_TOO_SMALL, NOT_FINITE = Status.STEP_TOO_SMALL.value, Status.NOT_FINITE.value
 
 GAMMA = 0.25
 A21 = 1.544
@@ -40,15 +40,15 @@ H31, H32, H33, H34, H35 = (
 )  # fmt: skip
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
+@numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
 def rodas4(
-    stage: Any, jac: Any, factor: Any, solve: Any, drift: Any, jacobian_size: Any, factor_size: Any,
+    stage: Any, jac: Any, factor: Any, solve: Any, df_dt: Any, jacobian_size: Any, factor_size: Any,
     c: Any, y: Any, ends: Any, values: Any, slopes: Any, times: Any, rows: Any,
     relative: Any, absolute: Any, clock: Any, count: Any, budget: Any, work: Any,
 ) -> Any:  # fmt: skip
     """Advance `y` (n,) through the segments, and write the states at `times` into `rows`; a status code.
 
-    stage .. drift  addresses of the printed functions; `c` what they need of the parameters
+    stage .. df_dt  addresses of the printed functions; `c` what they need of the parameters
     ends, values, slopes  (S,), (S, m), (S, m): end of each segment, inputs at its start, their slopes
     clock  (3,): time, next step (0: to be found), start of the current segment
     count  (4,): segment, next row, steps, rejected steps
@@ -94,7 +94,7 @@ def rodas4(
                 u[i] = values[segment, i] + (t - start) * w[i]
             invoke(jac, (at_y, at_u, at_c, at_f, at_j))
             if moving:
-                invoke(drift, (at_y, at_u, at_c, at_w, at_ft))
+                invoke(df_dt, (at_y, at_u, at_c, at_w, at_ft))
             if h <= 0.0:
                 size = 0.0
                 rate = 0.0

@@ -1,8 +1,8 @@
-"""Thousands of plants at once: other parameters, other starts, other commands, one pass over all cores."""
+"""Batches: thousands of plants of one structure with different parameters, initial states and inputs, on all cores."""
 
 from .precision import Double, Precision, Single
-from .result import BatchSolution
-from .simulate_batch import simulate_batch
+from .run import simulate_batch
+from .solution import BatchSolution
 
 __all__ = [
     "BatchSolution",

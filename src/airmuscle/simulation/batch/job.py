@@ -1,4 +1,4 @@
-"""What every way of running a batch needs to know, and where it puts what it finds."""
+"""BatchJob: the arguments shared by all execution back ends of a batch, and where results are written."""
 
 from __future__ import annotations
 
@@ -10,27 +10,31 @@ import numpy as np
 import numpy.typing as npt
 
 from ...compile.program import CompiledSystem
-from ...control.inputs import PiecewiseLinear
+from ...control.piecewise_linear import PiecewiseLinear
 from ...core.arrays import Array
-from ...plant.state import state_lower_bounds
-from ..integrators import INTERRUPTED, LESS_THAN_NONE, REASONS, Integrator, RawSolution
+from ...core.status import Status
+from ..integrators import Integrator, RawSolution
+from ..rows import evaluate_rows
 from .variations import Variations
+
+NOT_RUN = -1
+"""Status of a plant that has not been run yet."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BatchJob:
-    """N plants to be run: starts (N, n), the segments of each, and the rows and columns that are kept.
+    """N plants to be simulated: initial states (N, n), segments of the inputs of each, rows and columns to be kept.
 
-    Found are `columns` (N, T) by name, `final` (N, n), `status` (N,), how many rows were `reached` (N,), and in words
-    the `reasons` of those that failed.
+    Results are written into `columns` (N, T) by name, `final` (N, n), `status` (N,), the number of rows `reached` (N,),
+    and `reasons`, which say why plants failed.
     """
 
-    ready: CompiledSystem
+    compiled: CompiledSystem
     variations: Variations
-    method: Integrator
-    starts: Array
+    integrator: Integrator
+    initial_states: Array
     segments: tuple[PiecewiseLinear, ...]
-    begin: float
+    start_time: float
     duration: float
     times: Array
     columns: dict[str, npt.NDArray[Any]]
@@ -42,74 +46,70 @@ class BatchJob:
 
     @functools.cached_property
     def names(self) -> tuple[str, ...]:
-        """Everything that can be kept: states, then outputs, then inputs."""
-        system = self.ready.system
-        return (*(s.name for s in system.states), *self.ready.output_names, *system.inputs)
+        """All columns that can be kept: states, then outputs, then inputs."""
+        known = self.compiled.description
+        return (*known.state_names, *known.output_names, *known.input_names)
 
     @functools.cached_property
-    def chosen(self) -> npt.NDArray[np.int64]:
-        """Where the columns to be kept, which must be known by now, stand among `names`."""
+    def kept(self) -> npt.NDArray[np.int64]:
+        """Indices of the columns to be kept among `names`."""
         return np.array([self.names.index(name) for name in self.columns], dtype=np.int64)
 
-    @functools.cached_property
+    @property
     def lower_bounds(self) -> Array:
-        """What each state (n,) may be at least."""
-        return state_lower_bounds(self.ready.system)
+        """The smallest possible value of each state (n,)."""
+        return self.compiled.description.lower_bounds
 
     def run_single(self, index: int) -> None:
-        """Run one plant by itself, exactly as `simulate` would, and put its rows and its end in place."""
-        one = self.ready.at(self.variations.parameters(index), self.nominal[index])
-        course = self.method.run(one, self.segments[index], self.begin, self.starts[index], self.times)
-        self._put(index, one, self._stopped_without_air(course))
+        """Simulate one plant alone, exactly as `simulate` would, and write its results."""
+        one = self.compiled.at(self.variations.parameters(index), self.nominal[index])
+        raw = self.integrator.run(
+            one, self.segments[index], self.start_time, self.initial_states[index], self.times
+        )
+        self._write(index, one, self._truncate(raw))
 
-    def _stopped_without_air(self, course: RawSolution) -> RawSolution:
-        """The course up to the first row with less air than none, as `simulate` ends it."""
-        rows = np.vstack([course.rows[: course.reached], course.state])
-        bad = np.flatnonzero((rows < self.lower_bounds).any(axis=1))
-        if not bad.size:
-            return course
-        row = int(bad[0])
-        time = float(self.times[row]) if row < course.reached else course.time
-        return course._replace(reached=row, time=time, state=rows[row], status=LESS_THAN_NONE)
+    def _truncate(self, raw: RawSolution) -> RawSolution:
+        """The solution up to the first row with a negative air mass, as `simulate` ends it."""
+        rows = np.vstack([raw.rows[: raw.reached], raw.state])
+        invalid = np.flatnonzero((rows < self.lower_bounds).any(axis=1))
+        if not invalid.size:
+            return raw
+        row = int(invalid[0])
+        time = float(self.times[row]) if row < raw.reached else raw.time
+        return raw._replace(reached=row, time=time, state=rows[row], status=Status.NEGATIVE_AIR_MASS)
 
-    def _put(self, index: int, one: CompiledSystem, course: RawSolution) -> None:
-        from ...compile.cache.kernel import evaluate
-
-        reached = course.reached
-        states = np.ascontiguousarray(course.rows[:reached])
-        inputs = np.ascontiguousarray(self.segments[index].inputs_at(self.times[:reached], self.begin))
-        results = np.empty((reached, one.sizes.outputs))
-        chosen, size = self.chosen, states.shape[1]
-        if ((chosen >= size) & (chosen < size + results.shape[1])).any():
-            evaluate(one.address["outputs"], one.precomputed, states, inputs, results)
-        table = (states, results, inputs)
-        places = [(i, j) for i, part in enumerate(table) for j in range(part.shape[1])]
-        for place, column in zip(chosen, self.columns.values(), strict=True):
+    def _write(self, index: int, one: CompiledSystem, raw: RawSolution) -> None:
+        reached = raw.reached
+        states = np.ascontiguousarray(raw.rows[:reached])
+        table = evaluate_rows(one, states, self.times[:reached], self.segments[index], self.start_time)
+        parts = (states, table.outputs, table.inputs)
+        places = [(i, j) for i, part in enumerate(parts) for j in range(part.shape[1])]
+        for place, column in zip(self.kept, self.columns.values(), strict=True):
             part, j = places[place]
-            with np.errstate(over="ignore"):  # a column of single precision, which then says so
-                column[index, :reached] = table[part][:, j]
+            with np.errstate(over="ignore"):  # a column in single precision
+                column[index, :reached] = parts[part][:, j]
             column[index, reached:] = np.nan
-        self.final[index], self.status[index], self.reached[index] = course.state, course.status, reached
-        if course.status:
-            self.reasons[index] = self._in_words(course)
+        self.final[index], self.status[index], self.reached[index] = raw.state, raw.status, reached
+        if raw.status:
+            self.reasons[index] = self._reason(raw)
 
-    def _in_words(self, course: RawSolution) -> str:
-        states = self.ready.system.states
-        at = ", ".join(f"{s.name} {v:.6g} {s.unit}" for s, v in zip(states, course.state, strict=True))
+    def _reason(self, raw: RawSolution) -> str:
+        states = self.compiled.system.states
+        at = ", ".join(f"{s.name} {v:.4g} {s.unit}" for s, v in zip(states, raw.state, strict=True))
         return (
-            f"the run ended at {course.time:.6g} of {self.begin + self.duration:.6g} s because "
-            f"{REASONS[course.status]}, after {course.steps} steps, at {at}"
+            f"the run ended at {raw.time:.6g} of {self.start_time + self.duration:.6g} s because "
+            f"{raw.status.message}, after {raw.steps} steps, at {at}"
         )
 
-    def mark_not_run(self, index: int, status: int, reason: str | None = None) -> None:
-        """Put in place that a plant was not run."""
+    def mark_not_run(self, index: int, status: Status, reason: str | None = None) -> None:
+        """Write that a plant was not simulated."""
         self.status[index], self.final[index], self.reached[index] = status, np.nan, 0
         for column in self.columns.values():
             column[index] = np.nan
         if reason is not None:
             self.reasons[index] = reason
 
-    def unfinished(self, indices: npt.NDArray[np.intp]) -> None:
-        """Put in place that the user stopped before these were run."""
-        for index in indices:
-            self.mark_not_run(int(index), INTERRUPTED)
+    def mark_interrupted(self) -> None:
+        """Write that the plants that have not been run were left out because the user stopped."""
+        for index in np.flatnonzero(self.status == NOT_RUN):
+            self.mark_not_run(int(index), Status.INTERRUPTED)

@@ -1,4 +1,4 @@
-"""Plants in lanes: blocks of them through the printed step together, a thread a core."""
+"""Lanes: blocks of plants through one vectorised step together, one thread per core."""
 
 from __future__ import annotations
 
@@ -8,132 +8,125 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ...compile.cache.kernel import lanes
 from ...core.errors import ParameterError
-from ..integrators import LESS_THAN_NONE, NOT_FINITE, REASONS, ExplicitRungeKutta
+from ...core.status import Status
+from ..integrators import ExplicitRungeKutta
 from .job import BatchJob
 from .precision import Precision
 from .thread_pool import Queue
 
 ALIGNMENT = 64
-"""Bytes: what the printed loads and stores state."""
+"""Alignment of vectors in memory, in bytes."""
 
 
 class LaneBlock:
-    """The arrays of one thread, in which a block of lanes is run; it owns them as long as a kernel knows them."""
+    """The arrays of one thread for a block of lanes; it owns them as long as a kernel uses their addresses."""
 
-    def __init__(self, task: BatchJob, precision: Precision) -> None:
-        number, sizes = precision.number, task.ready.sizes
-        self.kind = np.float64 if number.bits == 64 else np.float32
-        assert isinstance(task.method, ExplicitRungeKutta)
-        self.addresses, held = task.ready.program.lanes(*task.method.tableau(), number)
+    def __init__(self, job: BatchJob, precision: Precision) -> None:
+        number, sizes = precision.number, job.compiled.sizes
+        self.dtype = np.float64 if number.bits == 64 else np.float32
+        assert isinstance(job.integrator, ExplicitRungeKutta)
+        self.addresses, precomputed = job.compiled.program.lanes(job.integrator.tableau(), number)
         n, m, width = sizes.states, sizes.inputs, number.lanes
-        lengths = (sizes.parameters, held, n, n, m, m, m, 1, sizes.outputs)
-        self.arrays = aligned(lengths, width, self.kind)
-        self.chosen = np.concatenate([task.chosen, _air(task)])
-        self.rows = np.empty((self.chosen.size, width, task.times.size), self.kind)
-        self.final = np.empty((width, n), self.kind)
+        lengths = (sizes.parameters, precomputed, n, n, m, m, m, 1, sizes.outputs)
+        self.arrays = aligned_arrays(lengths, width, self.dtype)
+        self.kept = np.concatenate([job.kept, _bounded_states(job)])
+        self.rows = np.empty((self.kept.size, width, job.times.size), self.dtype)
+        self.final = np.empty((width, n), self.dtype)
         self.status = np.empty(width, dtype=np.int64)
+        self.counters = (np.empty(width, np.int64), np.empty(width, np.int64), *(np.empty(width) for _ in range(3)))
         self.width = width
 
 
-def _air(task: BatchJob) -> npt.NDArray[np.int64]:
-    """States that may not be less than none; their rows are judged, and forgotten."""
-    return np.flatnonzero(np.isfinite(task.lower_bounds)).astype(np.int64)
+def _bounded_states(job: BatchJob) -> npt.NDArray[np.int64]:
+    """States with a lower bound; their rows are checked after the run and not kept."""
+    return np.flatnonzero(np.isfinite(job.lower_bounds)).astype(np.int64)
 
 
-def aligned(lengths: tuple[int, ...], width: int, kind: Any) -> list[npt.NDArray[Any]]:
-    """Arrays (length, width), each beginning at a multiple of ALIGNMENT bytes; empty ones have an address too."""
-    size = np.dtype(kind).itemsize
+def aligned_arrays(lengths: tuple[int, ...], width: int, dtype: Any) -> list[npt.NDArray[Any]]:
+    """Arrays (length, width), each at a multiple of ALIGNMENT bytes; empty ones have an address too."""
+    size = np.dtype(dtype).itemsize
     room = np.zeros((sum(lengths) + len(lengths)) * width * size + ALIGNMENT * (len(lengths) + 1), np.uint8)
-    place, found = -room.ctypes.data % ALIGNMENT, []
+    place, arrays = -room.ctypes.data % ALIGNMENT, []
     for length in lengths:
-        found.append(room[place : place + length * width * size].view(kind).reshape(length, width))
+        arrays.append(room[place : place + length * width * size].view(dtype).reshape(length, width))
         place += -(-length * width * size // ALIGNMENT) * ALIGNMENT
-    return found
+    return arrays
 
 
-class PiecewiseLinearTable:
-    """The segments of all plants, one after the other, and where those of each stand; equal commands share theirs."""
+class SegmentTable:
+    """The segments of all plants, one after the other, and the range of those of each; equal inputs share theirs."""
 
-    def __init__(self, task: BatchJob) -> None:
-        of_object = {id(segments): segments for segments in task.segments}
-        different, number = list(of_object.values()), {key: i for i, key in enumerate(of_object)}
-        self.ends = np.concatenate([s.ends for s in different])
-        self.values = np.ascontiguousarray(np.concatenate([s.values for s in different]))
-        self.slopes = np.ascontiguousarray(np.concatenate([s.slopes for s in different]))
-        ends = np.cumsum([s.ends.size for s in different])
-        mine = np.array([number[key] for key in map(id, task.segments)])
-        self.first, self.last = np.append(0, ends)[mine], ends[mine]
+    def __init__(self, job: BatchJob) -> None:
+        by_identity = {id(segments): segments for segments in job.segments}
+        distinct, number = list(by_identity.values()), {key: i for i, key in enumerate(by_identity)}
+        self.ends = np.concatenate([s.ends for s in distinct])
+        self.values = np.ascontiguousarray(np.concatenate([s.values for s in distinct]))
+        self.slopes = np.ascontiguousarray(np.concatenate([s.slopes for s in distinct]))
+        ends = np.cumsum([s.ends.size for s in distinct])
+        own = np.array([number[key] for key in map(id, job.segments)])
+        self.first, self.last = np.append(0, ends)[own], ends[own]
 
 
-def blocks(
-    task: BatchJob, precision: Precision, active: npt.NDArray[np.intp], cores: int
+def lane_workers(
+    job: BatchJob, precision: Precision, active: npt.NDArray[np.intp], cores: int
 ) -> tuple[Queue, list[Callable[[int], Any]], int]:
-    """The queue of blocks of the active plants, a worker a core, and how many plants a piece of work has."""
-    from ...compile.cache.announce import announce_compilation
-    from ...compile.kernels.lanes import lanes
+    """The queue of blocks of the active plants, one worker per core, and the number of plants in a block."""
+    table, first = SegmentTable(job), LaneBlock(job, precision)
+    count = -(-active.size // first.width)
+    queue = Queue(count)
+    blocks = [first, *(LaneBlock(job, precision) for _ in range(min(cores, count) - 1))]
 
-    announce_compilation(lanes)
-    table, first = PiecewiseLinearTable(task), LaneBlock(task, precision)
-    pieces = -(-active.size // first.width)
-    queue = Queue(pieces)
-    rooms = [first, *(LaneBlock(task, precision) for _ in range(min(cores, pieces) - 1))]
+    def worker(block: LaneBlock) -> Callable[[int], Any]:
+        return lambda i: _run(job, table, block, active[i * block.width : (i + 1) * block.width], queue.stop)
 
-    def worker(room: LaneBlock) -> Callable[[int], Any]:
-        return lambda piece: _run(task, table, room, active[piece * room.width : (piece + 1) * room.width], queue.stop)
-
-    return queue, [worker(room) for room in rooms], first.width
+    return queue, [worker(block) for block in blocks], first.width
 
 
 def _run(
-    task: BatchJob,
-    table: PiecewiseLinearTable,
-    room: LaneBlock,
-    plants: npt.NDArray[np.intp],
-    stop: npt.NDArray[np.int64],
+    job: BatchJob, table: SegmentTable, block: LaneBlock, plants: npt.NDArray[np.intp], stop: npt.NDArray[np.int64]
 ) -> None:
-    """One block: parameters and starts in, rows and ends out. Lanes that are left over repeat its last plant."""
-    from ...compile.kernels.lanes import INTERRUPTED, lanes
-
-    method, variations = task.method, task.variations
-    assert isinstance(method, ExplicitRungeKutta)
-    lane_of = np.concatenate([plants, np.full(room.width - plants.size, plants[-1], dtype=np.intp)])
-    p, y = room.arrays[0], room.arrays[2]
-    p[:] = task.ready.parameters[:, None]
-    p[variations.places] = variations.values[lane_of].T
-    y[:] = task.starts[lane_of].T
+    """Simulate one block. Unused lanes repeat its last plant."""
+    integrator, variations = job.integrator, job.variations
+    assert isinstance(integrator, ExplicitRungeKutta)
+    lane = np.concatenate([plants, np.full(block.width - plants.size, plants[-1], dtype=np.intp)])
+    p, y = block.arrays[0], block.arrays[2]
+    p[:] = job.compiled.parameters[:, None]
+    p[variations.places] = variations.values[lane].T
+    y[:] = job.initial_states[lane].T
     ended = lanes(
-        *room.addresses, *room.arrays, table.ends, table.values, table.slopes, table.first[lane_of],
-        table.last[lane_of], task.begin, method.step, task.times, room.chosen, room.rows, room.final, room.status,
-        stop,
+        *block.addresses, *block.arrays, table.ends, table.values, table.slopes, table.first[lane], table.last[lane],
+        job.start_time, integrator.step, job.times, block.kept, block.rows, block.final, block.status, stop,
+        *block.counters,
     )  # fmt: skip
-    if ended == INTERRUPTED:
+    if ended == Status.INTERRUPTED:
         return
-    for j, column in enumerate(task.columns.values()):
-        column[plants] = room.rows[j, : plants.size]
-    task.final[plants] = room.final[: plants.size]
-    task.status[plants], task.reached[plants] = room.status[: plants.size], task.times.size
-    least = task.lower_bounds
-    airless: npt.NDArray[np.bool_] = np.any(task.final[plants] < least, axis=1)
-    for rows, i in zip(room.rows[len(task.columns) :], _air(task), strict=True):
-        airless |= np.any(rows[: plants.size] < least[i], axis=1)
-    for index, without_air in zip(plants, airless, strict=True):
-        if without_air or task.status[index]:
-            _explain(task, int(index), room.kind, LESS_THAN_NONE if without_air else NOT_FINITE)
+    for j, column in enumerate(job.columns.values()):
+        column[plants] = block.rows[j, : plants.size]
+    job.final[plants] = block.final[: plants.size]
+    job.status[plants], job.reached[plants] = block.status[: plants.size], job.times.size
+    bounds = job.lower_bounds
+    below: npt.NDArray[np.bool_] = np.any(job.final[plants] < bounds, axis=1)
+    for rows, i in zip(block.rows[len(job.columns) :], _bounded_states(job), strict=True):
+        below |= np.any(rows[: plants.size] < bounds[i], axis=1)
+    for index, negative in zip(plants, below, strict=True):
+        if negative or job.status[index]:
+            _explain(job, int(index), block.dtype, Status.NEGATIVE_AIR_MASS if negative else Status.NOT_FINITE)
 
 
-def _explain(task: BatchJob, index: int, kind: Any, status: int) -> None:
-    """A plant that failed in its lane is run again alone, for the rows that it reached, the time and the reason."""
-    task.run_single(index)
-    if task.status[index] == 0:
-        what = "in single precision, though not in double" if kind == np.float32 else "in its lane, though not alone"
-        task.mark_not_run(index, status, f"{REASONS[status]} {what}")
+def _explain(job: BatchJob, index: int, dtype: Any, status: Status) -> None:
+    """Simulate a plant that failed in its lane once more alone, for the rows that it reached, the time and the reason."""
+    job.run_single(index)
+    if job.status[index] == Status.DONE:
+        where = "in single precision, but not in double" if dtype == np.float32 else "in its lane, but not alone"
+        job.mark_not_run(index, status, f"{status.message} {where}")
 
 
-def check_precision(precision: Precision, task_method: object) -> None:
-    """Raise ParameterError for a precision that a method cannot compute in."""
-    if precision.number.bits != 64 and not isinstance(task_method, ExplicitRungeKutta):
+def check_precision(precision: Precision, integrator: object) -> None:
+    """Raise ParameterError for a precision that an integrator cannot compute in."""
+    if precision.number.bits != 64 and not isinstance(integrator, ExplicitRungeKutta):
         raise ParameterError(
-            f"simulate_batch: {type(task_method).__name__} chooses its steps in double precision; {precision} goes "
-            "with methods of fixed step, as RungeKutta4(1e-3)."
+            f"simulate_batch: {type(integrator).__name__} chooses its steps in double precision; {precision} requires "
+            "an integrator of fixed step, such as RungeKutta4(1e-3)."
         )

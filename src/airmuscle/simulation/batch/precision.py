@@ -1,4 +1,4 @@
-"""How many digits a batch computes with."""
+"""Precision of a batch: single or double."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ import dataclasses
 from ...compile.llvm.types import LlvmType
 
 BITS = 1024
-"""Size of a row of plants side by side: two of the widest registers, which take turns."""
+"""Size of a vector of lanes: two of the widest registers, which alternate."""
 
 
 class Precision(abc.ABC):
-    """The numbers that lanes are made of."""
+    """The floating-point format of a batch in lanes."""
 
     @property
     @abc.abstractmethod
     def number(self) -> LlvmType:
-        """The printed number, in lanes."""
+        """The LLVM type of a vector of lanes."""
 
     @property
     @abc.abstractmethod
     def note(self) -> str:
-        """What a reader of the results should know; empty where nothing."""
+        """A remark for the reader of the results; empty where there is none."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Double(Precision):
-    """Sixteen digits, as everywhere; the default."""
+    """Double precision, sixteen digits; the default."""
 
     @property
     def number(self) -> LlvmType:
@@ -40,7 +40,7 @@ class Double(Precision):
 
 @dataclasses.dataclass(frozen=True)
 class Single(Precision):
-    """Seven digits a number: half the memory and about twice as fast, for methods of fixed step."""
+    """Single precision, seven digits: half the memory and about twice as fast, for integrators of fixed step."""
 
     @property
     def number(self) -> LlvmType:
@@ -48,4 +48,4 @@ class Single(Precision):
 
     @property
     def note(self) -> str:
-        return "single precision: rounding adds up over a run; expect about four digits"
+        return "single precision: rounding errors accumulate over a run; expect about four correct digits"

@@ -1,0 +1,65 @@
+"""Diagnostic: what the reader of a result must know, by code and subject, with the rows it concerns and a hint."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+from collections.abc import Iterator, Mapping
+
+from .arrays import Array
+
+
+class DiagnosticCode(enum.StrEnum):
+    """Kinds of diagnostics."""
+
+    INTEGRATOR = "integrator"
+    MODEL = "model"
+    CONTROLLER = "controller"
+    EXTRAPOLATION = "extrapolation"
+    GEOMETRY_LIMIT = "geometry limit"
+    COMPONENT = "component"
+    INCOMPLETE = "incomplete"
+
+
+@dataclasses.dataclass(frozen=True)
+class Diagnostic:
+    """One remark on a result.
+
+    code     its kind
+    subject  what it is about: a muscle, a component, the run
+    text     the remark, a sentence without its full stop
+    rows     how many rows of the recording it concerns; 0 where it concerns the result as a whole
+    hint     what to do about it; empty where there is nothing to do
+    """
+
+    code: DiagnosticCode
+    subject: str
+    text: str
+    rows: int = 0
+    hint: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.text}. {self.hint}" if self.hint else self.text
+
+
+class Columns(Mapping[str, Array]):
+    """Columns (N,) of a run by name, with the smallest and largest value of each."""
+
+    def __init__(self, columns: Mapping[str, Array], limits: Mapping[str, tuple[float, float]] | None = None) -> None:
+        self._columns, self._limits = columns, limits or {}
+
+    def __getitem__(self, name: str) -> Array:
+        return self._columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+    def limits(self, name: str) -> tuple[float, float]:
+        """The smallest and largest value of a column that has rows."""
+        if name in self._limits:
+            return self._limits[name]
+        values = self._columns[name]
+        return float(values.min()), float(values.max())

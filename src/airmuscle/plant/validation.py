@@ -1,0 +1,71 @@
+"""Validation of a plant's parts: their kinds, their numbers, their names, closed-form laws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..core.declaration import check_structure
+from ..core.errors import ParameterError, TraceError
+from ..mechanism import Mechanism
+from ..muscle import Muscle
+from ..pneumatics import Circuit
+from ..pneumatics.gas import Ambient, Gas
+from ..pneumatics.supply import check_not_shared
+
+
+def check_parts(
+    muscles: Sequence[Muscle], circuit: Any, circuits: Sequence[Circuit], mechanism: Mechanism, gas: Gas,
+    ambient: Ambient,
+) -> None:  # fmt: skip
+    """Raise ParameterError where the parts are no plant, TraceError where a law is not closed-form."""
+    parts: list[tuple[str, Any, type[Any]]] = [("mechanism", mechanism, Mechanism), ("gas", gas, Gas)]
+    parts += [("ambient", ambient, Ambient)]
+    parts += [("muscle", m, Muscle) for m in muscles] + [("circuit", c, Circuit) for c in circuits]
+    for field, part, kind in parts:
+        _check_kind(field, part, kind)
+    _check_closed_form(muscles)
+    check_structure((tuple(muscles), tuple(circuits), mechanism))
+    for each in circuits:
+        check_not_shared(f"Plant: its {type(each).__name__}", each.supply)
+    _check_counts(muscles, circuit, circuits, mechanism)
+
+
+def check_unique(names: Sequence[str]) -> None:
+    """Raise ParameterError where two states or inputs share a name."""
+    for name in (n for n in names if names.count(n) > 1):
+        raise ParameterError(f"Plant: two of its parts use the name '{name}'; rename one of them.")
+
+
+def _check_kind(field: str, part: Any, kind: type[Any]) -> None:
+    if isinstance(part, kind):
+        return
+    hint = " Put several into a tuple." if isinstance(part, list) else ""
+    hint = f" It has one: give its .{field}." if hasattr(part, field) else hint
+    raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {str(part)[:80]}.{hint}")
+
+
+def _check_closed_form(muscles: Sequence[Muscle]) -> None:
+    for muscle in muscles:
+        for part in (muscle.contractile, muscle.geometry):
+            if not part.traceable:
+                raise TraceError(
+                    f"{type(part).__name__} of {muscle.name} is not closed-form and cannot be part of a plant. Use "
+                    "as_force_law(law, validity_range) for a characteristic, as_polynomial(geometry) for a geometry."
+                )
+
+
+def _check_counts(muscles: Sequence[Muscle], circuit: Any, circuits: Sequence[Circuit], mechanism: Mechanism) -> None:
+    names = [m.name for m in muscles]
+    if not names:
+        raise ParameterError("Plant: it has no muscle; give one, or a tuple of them.")
+    ports = sum(c.ports for c in circuits)
+    if ports != len(names):
+        raise ParameterError(f"Plant: its circuits feed {ports} muscles; {len(names)} are given.")
+    if mechanism.muscles not in (None, len(names)):
+        owner = type(mechanism).__name__
+        raise ParameterError(f"Plant: {owner} takes {mechanism.muscles} muscles; {len(names)} are given.")
+    if isinstance(circuit, tuple) and any(c.ports != 1 for c in circuits):
+        raise ParameterError("Plant: give a circuit that feeds several muscles alone, not in a tuple.")
+    if len(set(names)) < len(names):
+        raise ParameterError(f"Plant: muscles need different names; they are {names}.")

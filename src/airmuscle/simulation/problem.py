@@ -1,0 +1,152 @@
+"""Problem: a system, its input, initial state, duration, output times and integrator, checked as a whole."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from ..analysis.equilibrium import find_equilibrium
+from ..compile.program import CompiledSystem, compile_system
+from ..control.control_loop import ControlLoop, ControlLoopState
+from ..control.inputs import InputSignal, check_input_signal
+from ..control.piecewise_linear import PiecewiseLinear
+from ..core.arrays import Array
+from ..core.declaration import as_float
+from ..core.errors import ParameterError
+from ..core.system import System
+from ..plant.state import check_system, state_vector
+from .integrators import Integrator, default_integrator
+from .output_times import output_times
+
+_SLACK = 1e-9
+"""Part of an input's range by which it may be exceeded through rounding."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Problem:
+    """An initial value problem: a system under an input for `duration` [s].
+
+    system         any System: a Plant, or a user-defined one
+    input          an InputSignal such as a Schedule, or a ControlLoop
+    initial_state  values by state; by default a Plant's equilibrium at ambient pressure
+    start_time     [s]
+    output_times   spacing [s] or times [s] of the rows; by default 1/1000 of the run, but at most 10 ms. The instants of
+                   the input are always among the rows, with the inputs that begin there
+    integrator     Rodas4(rtol=1e-6) by default
+    control_state  state of the control loop, to continue a run
+
+    Raises ParameterError for an input or state that the system does not have, an input beyond its range, a duration
+    that is not positive, and wrong types.
+    """
+
+    system: System
+    input: InputSignal | ControlLoop
+    duration: float
+    initial_state: Mapping[str, float] | None = None
+    start_time: float = 0.0
+    output_times: float | npt.ArrayLike | None = None
+    integrator: Integrator | None = None
+    control_state: ControlLoopState | None = None
+
+    def __post_init__(self) -> None:
+        check_system("simulate", self.system)
+        object.__setattr__(self, "duration", as_float("simulate: duration", self.duration))
+        object.__setattr__(self, "start_time", as_float("simulate: start_time", self.start_time))
+        object.__setattr__(self, "integrator", default_integrator(self.integrator))
+        self._check_time()
+        if isinstance(self.input, ControlLoop):
+            known = self.compiled.description
+            self.input.check_columns((*known.state_names, *known.output_names), known.input_names)
+            if self.control_state is None:
+                self.input.check_period(self.duration)
+        else:
+            check_input_signal(self.input)
+            check_input_range(self.compiled, self.segments, self.start_time)
+        if self.initial_state is not None:
+            _ = self.initial_vector
+
+    def _check_time(self) -> None:
+        if not 0 < self.duration < float("inf"):
+            raise ParameterError(f"simulate: duration is {self.duration!r} s; it must be positive and finite.")
+        if not self.start_time + self.duration > self.start_time:
+            raise ParameterError(
+                f"simulate: start_time is {self.start_time!r} s; a duration of {self.duration!r} s is lost in rounding."
+            )
+
+    @property
+    def end_time(self) -> float:
+        """End of the run [s]."""
+        return self.start_time + self.duration
+
+    @functools.cached_property
+    def compiled(self) -> CompiledSystem:
+        """The compiled system."""
+        return compile_system(self.system)
+
+    @functools.cached_property
+    def segments(self) -> PiecewiseLinear:
+        """The input signal of an open-loop run."""
+        assert isinstance(self.input, InputSignal)
+        inputs = self.compiled.description.input_names
+        segments = self.input.segments(inputs, self.start_time, self.duration)
+        segments.check_shape(len(inputs), self.start_time)
+        return segments
+
+    @functools.cached_property
+    def times(self) -> Array:
+        """Output times (N,) [s] of an open-loop run."""
+        return output_times(self.output_times, self.start_time, self.duration, self.segments.ends)
+
+    @functools.cached_property
+    def initial_vector(self) -> Array:
+        """The initial state (n,), given or the default."""
+        if self.initial_state is None:
+            return default_state(self.compiled)
+        vector = state_vector(self.system, self.initial_state)
+        self.system.check_state(self.initial_state)
+        return vector
+
+
+def default_state(compiled: CompiledSystem) -> Array:
+    """The default initial state (n,): a Plant's equilibrium at ambient pressure, found once for a system.
+
+    Raises ParameterError for a system that has none, EquilibriumError for a plant without a stable equilibrium.
+    """
+    known, system = compiled.description, compiled.system
+    if known.default_state is None:
+        plant = system.equilibrium_plant
+        if plant is None:
+            raise ParameterError(
+                f"simulate: give the initial_state of {type(system).__name__}, a value for each state."
+            )
+        known.default_state = state_vector(system, system.extend_state(find_equilibrium(plant, pressure=0.0)))
+    return known.default_state
+
+
+def check_input_range(compiled: CompiledSystem, segments: PiecewiseLinear, start: float) -> None:
+    """Raise ParameterError where an input is beyond its range."""
+    known = compiled.description
+    if not len(known.input_names):
+        return
+    minimum, maximum = known.input_minimum, known.input_maximum
+    with np.errstate(invalid="ignore"):
+        slack = np.nan_to_num(_SLACK * (maximum - minimum), posinf=0.0)
+    low, high = minimum - slack, maximum + slack
+    values, slopes = segments.values, segments.slopes
+    tables = [values]
+    if slopes.any():
+        tables.append(values + slopes * (segments.ends - segments.starts(start))[:, None])
+    for table in tables:
+        if (table.min(axis=0) >= low).all() and (table.max(axis=0) <= high).all():
+            continue
+        row, column = np.argwhere((table < low) | (table > high))[0]
+        variable = compiled.system.input_variables[column]
+        unit = "" if variable.unit in ("", "1") else f" {variable.unit}"
+        raise ParameterError(
+            f"the input '{variable.name}' is {table[row, column]:g}{unit} before {segments.ends[row]:g} s; it must be "
+            f"within {variable.minimum:g} to {variable.maximum:g}{unit} ({variable.meaning})."
+        )

@@ -1,0 +1,179 @@
+"""Simulation of a problem, and the short ways in: `simulate` and `advance`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from ..compile.program import CompiledSystem, compile_system
+from ..control.control_loop import ControlLoop
+from ..control.inputs import InputSignal, Schedule
+from ..control.piecewise_linear import PiecewiseLinear
+from ..core.arrays import Array
+from ..core.declaration import as_float
+from ..core.errors import ParameterError, SimulationError
+from ..core.status import Status
+from ..core.system import System
+from ..plant.state import check_system, state_vector
+from ..recording import Recording
+from .closed_loop import solve_closed_loop
+from .integrators import BoundIntegrator, Integrator, default_integrator
+from .problem import Problem, check_input_range
+from .rows import early_end, evaluate_rows, make_recording, truncate_at_invalid_row
+from .solution import Solution, Statistics
+
+
+def solve(problem: Problem) -> Solution:
+    """The solution of a problem; a run that ended early is returned as far as it was computed, with its status."""
+    return solve_closed_loop(problem) if isinstance(problem.input, ControlLoop) else _solve_open_loop(problem)
+
+
+def _solve_open_loop(problem: Problem) -> Solution:
+    compiled, integrator = problem.compiled, problem.integrator
+    assert integrator is not None
+    segments, times = problem.segments, problem.times
+    bound = borrow(compiled, integrator)
+    raw = bound.run(segments, problem.start_time, problem.initial_vector, times)
+    give_back(compiled, integrator, bound)
+    reached = raw.reached
+    table = evaluate_rows(compiled, raw.rows[:reached], times[:reached], segments, problem.start_time)
+    raw, table = truncate_at_invalid_row(compiled, raw, table, times)
+    recording, diagnostics = make_recording(compiled, raw, table, times, integrator, problem.end_time, {})
+    final = dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
+    statistics = Statistics(raw.steps, raw.rejected)
+    return Solution(problem, recording, raw.status, statistics, diagnostics, raw.time, final)
+
+
+def borrow(compiled: CompiledSystem, integrator: Integrator) -> BoundIntegrator:
+    """An integrator bound to a system: one that no other run uses, or a new one."""
+    idle = compiled.description.integrators.get(integrator)
+    return idle.pop() if idle else integrator.bind(compiled)
+
+
+def give_back(compiled: CompiledSystem, integrator: Integrator, bound: BoundIntegrator) -> None:
+    """Keep a bound integrator for the next run."""
+    compiled.description.integrators.setdefault(integrator, []).append(bound)
+
+
+def simulate(
+    plant: System,
+    input: InputSignal | ControlLoop,
+    *,
+    duration: float,
+    initial_state: Mapping[str, float] | None = None,
+    start_time: float = 0.0,
+    output_times: float | npt.ArrayLike | None = None,
+    integrator: Integrator | None = None,
+    complete: bool = True,
+) -> Recording:
+    """Simulate a plant for `duration` [s]; its states, outputs and inputs as a Recording.
+
+    plant          any System: a Plant, or a user-defined one
+    input          an InputSignal such as a Schedule, or a ControlLoop
+    initial_state  values by state; by default a Plant's equilibrium at ambient pressure
+    output_times   spacing [s] or times [s] of the rows; by default 1/1000 of the run, but at most 10 ms. The instants of
+                   the input are always among the rows, with the inputs that begin there
+    integrator     Rodas4(rtol=1e-6) by default
+    complete       whether a run that ends early raises SimulationError (its `.recording` holds what was computed);
+                   otherwise that part is returned, with the reason in its notes
+
+    The short form of `solve(Problem(...)).recording`. The result does not depend on `output_times`. Raises
+    ParameterError for an input or state that the plant does not have.
+    """
+    solution = solve(Problem(plant, input, duration, initial_state, start_time, output_times, integrator))
+    return (solution.raise_if_incomplete() if complete else solution).recording
+
+
+def advance(
+    plant: System,
+    state: Mapping[str, float],
+    inputs: Mapping[str, float] | PiecewiseLinear,
+    dt: float,
+    integrator: Integrator | None = None,
+    *,
+    start_time: float = 0.0,
+) -> dict[str, float]:
+    """The state of a plant `dt` [s] later, with the inputs held.
+
+    Inputs that vary meanwhile are given as PiecewiseLinear from `start_time` on:
+    `segments, states = WithDrivers(signal, drivers).step(states, plant.inputs, start_time, dt)`. For many steps of one
+    plant, `compiled(plant).step(state, inputs, dt)` on arrays is quicker. Raises SimulationError where the step fails,
+    ParameterError for an unknown name or an input beyond its range.
+    """
+    check_system("advance", plant)
+    dt, start_time = as_float("advance: dt", dt), as_float("advance: start_time", start_time)
+    if not 0 < dt < float("inf"):
+        raise ParameterError(f"advance: dt is {dt!r} s; it must be positive and finite.")
+    compiled, integrator = compile_system(plant), default_integrator(integrator)
+    segments = _segments(compiled, inputs, start_time, dt)
+    bound = borrow(compiled, integrator)
+    raw = bound.run(segments, start_time, state_vector(plant, state), _NO_TIMES)
+    give_back(compiled, integrator, bound)
+    if raw.status == Status.DONE and (raw.state < compiled.description.lower_bounds).any():
+        raw = raw._replace(status=Status.NEGATIVE_AIR_MASS)
+    if raw.status != Status.DONE:
+        raise SimulationError(str(early_end(compiled, raw, start_time + dt)))
+    return dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
+
+
+_NO_TIMES = np.empty(0)
+
+
+def _segments(
+    compiled: CompiledSystem, inputs: Mapping[str, float] | PiecewiseLinear, start: float, dt: float
+) -> PiecewiseLinear:
+    """The inputs of one step, checked."""
+    known = compiled.description
+    if isinstance(inputs, PiecewiseLinear):
+        inputs.check_shape(len(known.input_names), start)
+        if abs(float(inputs.ends[-1]) - start - dt) > 1e-9 * dt:
+            raise ParameterError(
+                f"advance: the segments end at {inputs.ends[-1]:g} s; start_time + dt is {start + dt:g} s."
+            )
+        segments = inputs
+    elif isinstance(inputs, Mapping):
+        hold = Schedule({name: ((start, value),) for name, value in inputs.items()})
+        segments = hold.segments(known.input_names, start, dt)
+    else:
+        raise ParameterError(f"advance: inputs are {str(inputs)[:80]}; give a value for each name, or PiecewiseLinear.")
+    check_input_range(compiled, segments, start)
+    return segments
+
+
+class CompiledPlant:
+    """A plant compiled for repeated steps on arrays, without allocation: controllers, other simulators, learning.
+
+    state_names, input_names, output_names    order of the arrays
+    """
+
+    def __init__(self, plant: System, integrator: Integrator | None = None) -> None:
+        check_system("compiled", plant)
+        self.plant, self.integrator = plant, default_integrator(integrator)
+        self._compiled = compile_system(plant)
+        known = self._compiled.description
+        self.state_names, self.input_names = known.state_names, known.input_names
+        self.output_names = known.output_names
+        self._bound = self.integrator.bind(self._compiled)
+
+    def state(self, values: Mapping[str, float]) -> Array:
+        """The state (n,) of values by name, checked."""
+        return state_vector(self.plant, values)
+
+    def step(self, state: Array, inputs: Array, dt: float) -> Array:
+        """Advance `state` (n,) in place by `dt` [s] with `inputs` (m,) held, and return it.
+
+        Inputs are not checked against their ranges. Raises SimulationError where the step fails; `state` is then where
+        it failed.
+        """
+        status = self._bound.hold(state, inputs, dt)
+        if status is not Status.DONE:
+            names = ", ".join(f"{n} {v:.4g}" for n, v in zip(self.state_names, state.tolist(), strict=True))
+            raise SimulationError(f"a step of {dt:g} s failed because {status.message}, at {names}.")
+        return state
+
+
+def compiled(plant: System, integrator: Integrator | None = None) -> CompiledPlant:
+    """A handle for repeated steps of one plant on arrays: `handle.step(state, inputs, dt)`."""
+    return CompiledPlant(plant, integrator)

@@ -1,0 +1,73 @@
+"""Solution: the recording of a run with its status, statistics, diagnostics, final state and references."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+from ..control.control_loop import ControlLoopState
+from ..core.diagnostics import Diagnostic
+from ..core.errors import SimulationError
+from ..core.reference import Reference, cite
+from ..core.status import Status
+from ..recording import Recording
+from .problem import Problem
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class Statistics(NamedTuple):
+    """Accepted and rejected steps of an integrator."""
+
+    steps: int
+    rejected_steps: int
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Solution:
+    """The solution of a Problem, as far as it was computed.
+
+    recording      states, outputs and inputs at the output times; its notes are the diagnostics
+    status         how the run ended
+    statistics     steps of the integrator
+    diagnostics    what the reader must know: assumptions, extrapolation, an early end
+    final_time     [s], and
+    final_state    by state: the end of the run, or where it failed; of a control loop the last sampling instant from
+                   which the run can be continued
+    control_state  of a control loop, for a Problem that continues the run
+    """
+
+    problem: Problem
+    recording: Recording
+    status: Status
+    statistics: Statistics
+    diagnostics: tuple[Diagnostic, ...]
+    final_time: float
+    final_state: Mapping[str, float]
+    control_state: ControlLoopState | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run reached its end."""
+        return self.status == Status.DONE
+
+    @property
+    def references(self) -> list[Reference]:
+        """Sources of the models, of the integrator and of the controller."""
+        return cite((self.problem.system, self.problem.input, self.problem.integrator))
+
+    def raise_if_incomplete(self) -> Solution:
+        """The solution itself; raises SimulationError, which carries it, where the run ended early."""
+        if self.complete:
+            return self
+        message = str(self.diagnostics[-1])
+        raise SimulationError(message, self, interrupted=self.status == Status.INTERRUPTED)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The recording as a data frame."""
+        return self.recording.to_pandas()
+
+    def __repr__(self) -> str:
+        return f"Solution({self.status.name}, {self.statistics.steps} steps, {self.recording!r})"
