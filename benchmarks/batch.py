@@ -154,7 +154,7 @@ def in_lanes(
     """The batch by `simulate_batch`; ends (3, N)."""
     named = dict(zip((s.name for s in plant.states), start.tolist(), strict=True))
     found = simulate_batch(
-        plant, parameters, COMMAND, duration=seconds, start=named, method=RungeKutta4(STEP), keep=(), cores=cores,
+        plant, parameters, COMMAND, duration=seconds, initial_states=named, integrator=RungeKutta4(STEP), keep=(), cores=cores,
         precision=precision,
     )  # fmt: skip
     return np.array([found.final[s.name] for s in plant.states])

@@ -17,9 +17,10 @@ from joints import joint, joint_start
 
 from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.characteristic.contractile_surface import ContractileSurface
-from airmuscle.compile import System
-from airmuscle.control.inputs import PiecewiseLinear, Schedule
+from airmuscle.control.inputs import Schedule
+from airmuscle.control.piecewise_linear import PiecewiseLinear
 from airmuscle.core import ops
+from airmuscle.core.system import System
 from airmuscle.geometry.braid import Braid
 from airmuscle.mechanism import HangingMass
 from airmuscle.muscle import LinearSpring, Muscle, PressureDamper

@@ -11,8 +11,10 @@ from measure import Section, interleaved, of_time, show
 from new_plant import fresh
 
 from airmuscle.compile.program import compile_system
-from airmuscle.control.driver import PWM, WithDrivers
-from airmuscle.control.inputs import PiecewiseLinear, Schedule
+from airmuscle.control.driver import PWM
+from airmuscle.control.inputs import Schedule
+from airmuscle.control.piecewise_linear import PiecewiseLinear
+from airmuscle.control.with_drivers import WithDrivers
 from airmuscle.plant.plant import Plant
 from airmuscle.simulation.integrators import Rodas4
 

@@ -11,9 +11,10 @@ from typing import Any
 
 from airmuscle.characteristic.clamped import Clamped
 from airmuscle.characteristic.virtual_work import VirtualWork
-from airmuscle.compile import StateVariable
 from airmuscle.core import ops
 from airmuscle.core.declaration import model, parameter
+from airmuscle.core.system import System
+from airmuscle.core.variables import StateVariable
 from airmuscle.geometry.braid import Braid
 from airmuscle.muscle import LinearDamper, LinearSpring, Muscle
 from airmuscle.pneumatics import Supply, Valve
@@ -31,7 +32,7 @@ def chosen_muscle() -> Muscle:
 
 
 @model
-class Joint:
+class Joint(System):
     """Six states: angle, its speed, and the air in each muscle and in the tube before it; isothermal."""
 
     muscle: Muscle

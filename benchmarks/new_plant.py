@@ -14,9 +14,9 @@ from typing import Any
 from filling import hanging, runs
 from measure import Bar, Section, interleaved, of_time, show
 
-from airmuscle.compile import System
 from airmuscle.compile.program import Program, compile_system
 from airmuscle.core import autodiff
+from airmuscle.core.system import System
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.simulation.integrators import DormandPrince8

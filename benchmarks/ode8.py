@@ -16,7 +16,7 @@ from measure import Bar, Section, Times, interleaved, of_time, show
 from rodas4 import kernel
 
 from airmuscle.compile.program import compile_system
-from airmuscle.control.inputs import PiecewiseLinear
+from airmuscle.control.piecewise_linear import PiecewiseLinear
 from airmuscle.muscle import Muscle
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge

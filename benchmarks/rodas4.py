@@ -14,8 +14,8 @@ from several_rates import several
 
 from airmuscle.compile.kernels.calls import invoke, pointer
 from airmuscle.compile.program import CompiledSystem, compile_system
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
-from airmuscle.simulation.simulate import simulate
 
 RTOL = 1e-6
 BY_HAND: dict[int, Callable[[Any], Callable[[Sequence[float]], Rates]]] = {
@@ -101,7 +101,7 @@ def kernel(run: Run, ready: CompiledSystem, method: Rodas4 | None = None) -> Cal
 
 def whole(run: Run) -> Callable[[], Any]:
     """The call that a user makes: start checked, outputs evaluated, a Recording made."""
-    return lambda: simulate(run.system, run.command, duration=DURATION, start=run.start, output=SPACING)
+    return lambda: simulate(run.system, run.command, duration=DURATION, initial_state=run.start, output_times=SPACING)
 
 
 def refuse_other_equations(run: Run, ready: CompiledSystem) -> float:

@@ -16,15 +16,16 @@ from airmuscle.compile.functions import trace_system
 from airmuscle.compile.ir.instructions import MAXIMUM, MINIMUM, SELECT, Code, Operand, instructions
 from airmuscle.compile.kernels.evaluate import evaluate
 from airmuscle.compile.program import compile_system
-from airmuscle.control.inputs import PiecewiseLinear, Schedule
+from airmuscle.control.inputs import Schedule
+from airmuscle.control.piecewise_linear import PiecewiseLinear
 from airmuscle.core import tree
 from airmuscle.identify.dynamic import Experiment, InitialConditions
 from airmuscle.identify.dynamic.experiment import unknowns
 from airmuscle.identify.dynamic.problem import DynamicFitProblem
 from airmuscle.identify.dynamic.record_model import RecordModel
 from airmuscle.plant.plant import Plant
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Integrator, Rodas4, RungeKutta4
-from airmuscle.simulation.simulate import simulate
 
 FREE = (
     "circuit.fill.conductance",
@@ -78,7 +79,7 @@ class Case(NamedTuple):
 def case() -> Case:
     """The record that both benchmarks of identification use."""
     plant, rng = hanging(), np.random.default_rng(1)
-    run = simulate(plant, COMMAND, duration=DURATION, output=SPACING)
+    run = simulate(plant, COMMAND, duration=DURATION, output_times=SPACING)
     noisy = {name: run[name] + size * rng.standard_normal(len(run)) for name, size in SENSORS.items()}
     return Case(plant, Experiment(run.with_columns(**noisy), COMMAND, InitialConditions.at_rest(plant, 0.0)))
 

@@ -16,8 +16,8 @@ from airmuscle.muscle import Muscle
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import DistributedTube, FillDischarge, Supply, Tube, Valve, WithTubes
 from airmuscle.pneumatics.gas import Air, Isothermal
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
-from airmuscle.simulation.simulate import simulate
 
 PICTURE = Path(__file__).parent / "images" / "tubes.png"
 DIAMETER, PRESSURE = 4e-3, 6e5
@@ -36,7 +36,9 @@ def fill(tube: Tube | DistributedTube, conductance: float, duration: float = 0.6
     plant = Plant(Muscle(VirtualWork(braid), braid), circuit, Isometric(0.1), Isothermal())
     start = plant.state_at(pressure=0.0)
     opened = Schedule({"fill": ((0.0, 1.0),)})
-    return simulate(plant, opened, duration=duration, start=start, method=Rodas4(1e-6), output=spacing)
+    return simulate(
+        plant, opened, duration=duration, initial_state=start, integrator=Rodas4(1e-6), output_times=spacing
+    )
 
 
 def lumped(length: float, pieces: int) -> Tube:

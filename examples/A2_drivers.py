@@ -6,7 +6,8 @@ python examples/A2_drivers.py        writes drivers.png where it is run
 import numpy as np
 
 import airmuscle as am
-from airmuscle.control.driver import PWM, SolenoidDriver, WithDrivers
+from airmuscle.control.driver import PWM, SolenoidDriver
+from airmuscle.control.with_drivers import WithDrivers
 from airmuscle.core.plotting import BLACK, LINES, legend_outside, new_figure, save
 from airmuscle.units import ms
 

@@ -10,7 +10,8 @@ from dataclasses import replace
 import airmuscle as am
 from airmuscle.analysis.linear_model import linearise
 from airmuscle.analysis.static_stiffness import stiffness
-from airmuscle.control.driver import SolenoidDriver, WithDrivers
+from airmuscle.control.driver import SolenoidDriver
+from airmuscle.control.with_drivers import WithDrivers
 from airmuscle.mechanism import AntagonisticJoint
 from airmuscle.pneumatics import ProportionalValve, SecondOrderLag, Tube, WithTubes
 from airmuscle.units import bar, degree, kPa, mm, ms
@@ -30,7 +31,7 @@ print(f"stiffness {both.constant_pressure:.0f} N m/rad, with shut valves {both.s
 
 told = am.Schedule({"command": ((0.1, 0.6), (0.3, 0.0)), "held": ((0, 1), (0.1, 0))})
 command = WithDrivers(told, {"held": SolenoidDriver(opening_delay=10 * ms, closing_delay=25 * ms)})
-run = am.simulate(plant, command, duration=2.0, start=rest)
+run = am.simulate(plant, command, duration=2.0, initial_state=rest)
 moves = run["time"][abs(run["angle"] - run["angle"][0]) > 0.1 * degree][0]
 print(f"brake released and valve opened at 100 ms: moves from {moves / ms:.0f} ms on")
 print(f"turns to {run['angle'].max() / degree:.1f} degrees and ends at {run['angle'][-1] / degree:.1f}")

@@ -36,7 +36,7 @@ pairs = (("PID, proportional valve", servo, smooth), ("two-point, on/off valves"
 for i, (name, circuit, loop) in enumerate(pairs):
     plant = am.Plant(muscle, circuit, am.HangingMass(10.0))
     start = am.find_equilibrium(plant, pressure=0.8 * bar)
-    run = am.simulate(plant, loop, duration=6.0, start=start)
+    run = am.simulate(plant, loop, duration=6.0, initial_state=start)
     late = (run["time"] > 5.0) & (run["time"] < 6.0)
     away = abs(run["position"] - run["setpoint.position"])[late].max()
     print(f"{name}: at most {away / mm:.2f} mm away in the last second")

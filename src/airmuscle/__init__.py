@@ -10,19 +10,22 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from . import characteristic, geometry, units
+from .analysis import linearise
 from .analysis.equilibrium import find_equilibrium
-from .control.inputs import SampledSignal, Schedule
+from .control import PID, ControlLoop, SampledSignal, Schedule
 from .core.errors import AirmuscleError
 from .core.reference import Reference, cite
+from .core.status import Status
+from .core.system import System
 from .library.catalogue import list_library, load, load_data, save
-from .mechanism import HangingMass, Held, Isometric, Mechanism
+from .mechanism import HangingMass, Isometric, Mechanism
 from .muscle import LinearDamper, LinearSpring, Muscle
 from .plant.plant import Plant
 from .pneumatics import Circuit, FillDischarge, Supply, Valve
 from .pneumatics.gas import Ambient, Isothermal, Polytropic
 from .recording import Recording, read, read_csv, write_csv
-from .simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
-from .simulation.simulate import advance, simulate
+from .simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, Solution, advance, compiled, simulate, solve
+from .simulation.batch import simulate_batch
 
 if TYPE_CHECKING:
     from .identify.result import Fit
@@ -31,14 +34,15 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "PID",
     "AirmuscleError",
     "Ambient",
     "Circuit",
+    "ControlLoop",
     "DormandPrince8",
     "FillDischarge",
     "Fit",
     "HangingMass",
-    "Held",
     "Isometric",
     "Isothermal",
     "LinearDamper",
@@ -47,20 +51,26 @@ __all__ = [
     "Muscle",
     "Plant",
     "Polytropic",
+    "Problem",
     "Recording",
     "Reference",
     "Rodas4",
     "RungeKutta4",
     "SampledSignal",
     "Schedule",
+    "Solution",
+    "Status",
     "Supply",
+    "System",
     "Valve",
     "advance",
     "characteristic",
     "cite",
+    "compiled",
     "find_equilibrium",
     "fit",
     "geometry",
+    "linearise",
     "list_library",
     "load",
     "load_data",
@@ -68,6 +78,8 @@ __all__ = [
     "read_csv",
     "save",
     "simulate",
+    "simulate_batch",
+    "solve",
     "units",
     "write_csv",
 ]

@@ -13,21 +13,22 @@ import numpy as np
 import pytest
 from joints import chosen_muscle, joint, joint_start
 
-from airmuscle.compile import StateVariable
 from airmuscle.control.inputs import ZERO_INPUT, SampledSignal, Schedule
 from airmuscle.core import ops, tree
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import ColumnError, FileError, GeometryLimitError, ParameterError
+from airmuscle.core.system import System
+from airmuscle.core.variables import StateVariable
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.pneumatics.gas import Isothermal
 from airmuscle.reproduce.hosovsky_plant import Numbers, hanging
 from airmuscle.reproduce.hosovsky_plant import plant as third_paper
+from airmuscle.simulation import simulate
 from airmuscle.simulation.batch import BatchSolution, Single, simulate_batch, thread_pool, variations
 from airmuscle.simulation.integrators import DormandPrince8, ExplicitRungeKutta, Rodas4, RungeKutta4
 from airmuscle.simulation.sensitivity import WithSensitivities, sensitivity
-from airmuscle.simulation.simulate import simulate
 
 PULSE = Schedule({"fill": ((0.0303, 1), (0.2, 0)), "discharge": ((0.31, 1), (0.42, 0))})
 JOINT_PULSE = Schedule({"left.fill": ((0.02, 1), (0.07, 0)), "right.discharge": ((0.0217, 1), (0.07, 0))})
@@ -83,11 +84,15 @@ def greatest_difference(found: BatchSolution, index, run):
 def test_a_lane_agrees_with_the_plant_alone(name, method):
     """To 1e-12 of the size of each column after thousands of steps, in 19 lanes, which is not a multiple of a block."""
     plant, varied, start, command = CASES[name]
-    found = simulate_batch(plant, around(varied, 19), command, duration=0.5, start=start, method=method, output=0.0037)
+    found = simulate_batch(
+        plant, around(varied, 19), command, duration=0.5, initial_states=start, integrator=method, output_times=0.0037
+    )
     assert not found.failed.size
     assert len(found) == 19
     for index in (0, 7, 15, 16, 18):
-        run = simulate(found.plant(index), command, duration=0.5, start=start, method=method, output=0.0037)
+        run = simulate(
+            found.plant(index), command, duration=0.5, initial_state=start, integrator=method, output_times=0.0037
+        )
         assert list(found.columns) == [n for n in run if n != "time"]
         assert greatest_difference(found, index, run) < 1e-12
     np.testing.assert_array_equal(found.time, run["time"])
@@ -96,18 +101,20 @@ def test_a_lane_agrees_with_the_plant_alone(name, method):
 @pytest.mark.parametrize("method", [FAST, Rodas4()], ids=["RK4", "Rodas4"])
 def test_plants_with_commands_of_their_own_meet_their_own_instants(method):
     plant, start, count = plain(), plain().state_at(pressure=1e5, position=0.002), 20
-    found = simulate_batch(plant, {}, pulses(count), duration=0.4, start=start, method=method, output=0.0033)
+    found = simulate_batch(
+        plant, {}, pulses(count), duration=0.4, initial_states=start, integrator=method, output_times=0.0033
+    )
     for index, command in enumerate(pulses(count)):
-        run = simulate(plant, command, duration=0.4, start=start, method=method, output=0.0033)
+        run = simulate(plant, command, duration=0.4, initial_state=start, integrator=method, output_times=0.0033)
         assert greatest_difference(found, index, run) < (1e-12 if method is FAST else 1e-300)
 
 
 def test_an_adaptive_batch_is_simulate_itself():
     """Bit for bit, with the plant's own nominal sizes, and its own equilibrium as the start."""
     varied = around({"mechanism.mass": 5.0, "muscle.geometry.radius": 0.01, "ambient.pressure": 1e5}, 5)
-    found = simulate_batch(plain(), varied, PULSE, duration=0.5, output=0.01)
+    found = simulate_batch(plain(), varied, PULSE, duration=0.5, output_times=0.01)
     for index in range(5):
-        run = simulate(found.plant(index), PULSE, duration=0.5, output=0.01)
+        run = simulate(found.plant(index), PULSE, duration=0.5, output_times=0.01)
         for name in run:
             np.testing.assert_array_equal(found.recording(index)[name], run[name])
         for s in plain().states:
@@ -118,20 +125,22 @@ def test_a_result_depends_neither_on_threads_nor_on_neighbours():
     start, varied = plain().state_at(pressure=1e5), around({"mechanism.mass": 10.0, "mechanism.gravity": 9.8}, 70)
     for method in (FAST, Rodas4(1e-5)):
         runs = [
-            simulate_batch(plain(), varied, PULSE, duration=0.3, start=start, method=method, cores=cores)
+            simulate_batch(plain(), varied, PULSE, duration=0.3, initial_states=start, integrator=method, cores=cores)
             for cores in (1, 2, 5)
         ]
         for name, column in runs[0].columns.items():
             assert all(np.array_equal(column, other[name]) for other in runs[1:])
         backwards = {path: column[::-1] for path, column in varied.items()}
-        other = simulate_batch(plain(), backwards, PULSE, duration=0.3, start=start, method=method)
+        other = simulate_batch(plain(), backwards, PULSE, duration=0.3, initial_states=start, integrator=method)
         np.testing.assert_array_equal(other["pressure"][::-1], runs[0]["pressure"])
 
 
 def test_rows_do_not_change_the_solution():
     start, varied = plain().state_at(pressure=1e5), around({"mechanism.mass": 10.0}, 3)
     ends = [
-        simulate_batch(plain(), varied, PULSE, duration=0.4, start=start, method=FAST, output=output, keep=keep)
+        simulate_batch(
+            plain(), varied, PULSE, duration=0.4, initial_states=start, integrator=FAST, output_times=output, keep=keep
+        )
         for output, keep in ((0.4, None), (0.00077, ("pressure",)), (0.01, ()))
     ]
     for other in ends[1:]:
@@ -143,8 +152,10 @@ def test_rows_do_not_change_the_solution():
 
 def test_one_plant_is_a_batch_too():
     start = plain().state_at(pressure=1e5)
-    found = simulate_batch(plain(), {"mechanism.mass": [8.0]}, PULSE, duration=0.3, start=start, method=FAST)
-    run = simulate(found.plant(0), PULSE, duration=0.3, start=start, method=FAST)
+    found = simulate_batch(
+        plain(), {"mechanism.mass": [8.0]}, PULSE, duration=0.3, initial_states=start, integrator=FAST
+    )
+    run = simulate(found.plant(0), PULSE, duration=0.3, initial_state=start, integrator=FAST)
     assert greatest_difference(found, 0, run) < 1e-12
 
 
@@ -152,7 +163,7 @@ def test_single_precision_keeps_four_digits_and_says_so():
     """The weight's speed is small and its rounding adds up: all columns are held to their greatest value."""
     start, varied = plain().state_at(pressure=1e5, position=0.002), around({"mechanism.mass": 10.0}, 33)
     double, single = (
-        simulate_batch(plain(), varied, PULSE, duration=0.4, start=start, method=FAST, **more)
+        simulate_batch(plain(), varied, PULSE, duration=0.4, initial_states=start, integrator=FAST, **more)
         for more in ({}, {"precision": Single()})
     )
     assert "expect about four digits" in single.notes[-1]
@@ -163,11 +174,11 @@ def test_single_precision_keeps_four_digits_and_says_so():
         assert error < 1e-4, name
     assert np.abs(single["pressure"] - double["pressure"]).max() > 0
     with pytest.raises(ParameterError, match="Rodas4 chooses its steps in double precision"):
-        simulate_batch(plain(), varied, PULSE, duration=0.4, start=start, precision=Single())
+        simulate_batch(plain(), varied, PULSE, duration=0.4, initial_states=start, precision=Single())
 
 
 @model
-class Functions:
+class Functions(System):
     """Every function of ops that has a form of its own in lanes, or is taken lane by lane, in a system."""
 
     power: float = parameter("1", "m", "exponent", default=0.7)
@@ -191,11 +202,17 @@ def test_a_system_of_ones_own_with_every_function():
     push = SampledSignal({"push": ((0.0, 0.0), (0.5, 1.0), (1.0, -0.5))})
     start = {"x": np.linspace(-1, 1, 21), "y": 0.3}
     found = simulate_batch(
-        Functions(), {"power": np.linspace(0.2, 1, 21)}, push, duration=1.0, start=start, method=FAST, output=0.0137
+        Functions(),
+        {"power": np.linspace(0.2, 1, 21)},
+        push,
+        duration=1.0,
+        initial_states=start,
+        integrator=FAST,
+        output_times=0.0137,
     )
     for index in range(0, 21, 4):
         one = {"x": start["x"][index], "y": 0.3}
-        run = simulate(found.plant(index), push, duration=1.0, start=one, method=FAST, output=0.0137)
+        run = simulate(found.plant(index), push, duration=1.0, initial_state=one, integrator=FAST, output_times=0.0137)
         assert greatest_difference(found, index, run) < 1e-12
 
 
@@ -207,9 +224,13 @@ def test_sensitivities_come_in_the_same_pass(method):
     masses = np.linspace(8.0, 12.0, count)
     start = plain().state_at(pressure=1e5, position=0.002)
     still = {**start, **{sensitivity(s.name, 0): 0.0 for s in plain().states}}
-    found = simulate_batch(system, {f"inner.{path}": masses}, PULSE, duration=0.3, start=still, method=method, keep=())
+    found = simulate_batch(
+        system, {f"inner.{path}": masses}, PULSE, duration=0.3, initial_states=still, integrator=method, keep=()
+    )
     beside = [
-        simulate_batch(plain(), {path: masses + d}, PULSE, duration=0.3, start=start, method=method, keep=())
+        simulate_batch(
+            plain(), {path: masses + d}, PULSE, duration=0.3, initial_states=start, integrator=method, keep=()
+        )
         for d in (-step, step)
     ]
     by_difference = (beside[1].final["position"] - beside[0].final["position"]) / (2 * step)
@@ -226,13 +247,15 @@ def thick_and_thin(count, thin):
 
 def test_a_plant_that_fails_does_not_stop_the_others():
     start = plain().state_at(pressure=1e5, position=0.002, speed=0.1)
-    found = simulate_batch(plain(), thick_and_thin(20, {3, 17}), PULSE, duration=0.3, start=start, method=FAST)
+    found = simulate_batch(
+        plain(), thick_and_thin(20, {3, 17}), PULSE, duration=0.3, initial_states=start, integrator=FAST
+    )
     assert list(found.failed) == [3, 17]
     assert found.status[3] == 3
     assert "because a rate or an output is not finite" in found.reason(17)
     assert found.reason(4) == "done"
     assert np.isfinite(found["pressure"][4]).all()
-    alone = simulate(found.plant(3), PULSE, duration=0.3, start=start, method=FAST, complete=False)
+    alone = simulate(found.plant(3), PULSE, duration=0.3, initial_state=start, integrator=FAST, complete=False)
     part = found.recording(3)
     assert 0 < len(part) < found.time.size
     np.testing.assert_array_equal(part["position"], alone["position"])
@@ -261,7 +284,7 @@ def test_air_below_none_on_the_way_is_seen_in_a_lane_as_alone(keep):
 
 
 def test_a_plant_without_an_equilibrium_is_reported():
-    found = simulate_batch(plain(), {"mechanism.mass": [4.0, 1e5, 5.0]}, ZERO_INPUT, duration=0.1, method=FAST)
+    found = simulate_batch(plain(), {"mechanism.mass": [4.0, 1e5, 5.0]}, ZERO_INPUT, duration=0.1, integrator=FAST)
     assert list(found.failed) == [1]
     assert "it has no equilibrium to start from: HangingMass finds no rest" in found.reason(1)
     assert np.isnan(found["pressure"][1]).all()
@@ -278,9 +301,9 @@ def test_plants_that_differ_in_their_circuit_alone_share_the_search_for_rest(mon
         lambda ready, table, *more: asked.append(len(table)) or search(ready, table, *more),
     )
     varied = around({"circuit.fill.conductance": 5e-9}, 6)
-    simulate_batch(plain(), varied, ZERO_INPUT, duration=0.1, method=FAST)
+    simulate_batch(plain(), varied, ZERO_INPUT, duration=0.1, integrator=FAST)
     assert asked == [1]
-    simulate_batch(plain(), {**varied, "mechanism.mass": [4, 5, 4, 4, 6, 5]}, ZERO_INPUT, duration=0.1, method=FAST)
+    simulate_batch(plain(), {**varied, "mechanism.mass": [4, 5, 4, 4, 6, 5]}, ZERO_INPUT, duration=0.1, integrator=FAST)
     assert asked == [1, 3]
 
 
@@ -300,7 +323,7 @@ def test_plants_that_differ_in_their_circuit_alone_share_the_search_for_rest(mon
 )
 def test_variations_that_cannot_be_are_refused(varied, message):
     with pytest.raises(ParameterError, match=message):
-        simulate_batch(plain(), varied, PULSE, duration=0.1, method=FAST)
+        simulate_batch(plain(), varied, PULSE, duration=0.1, integrator=FAST)
 
 
 def test_parameters_that_do_not_go_together_name_the_row():
@@ -308,7 +331,7 @@ def test_parameters_that_do_not_go_together_name_the_row():
     varied = {"muscle.contractile.min_pressure": [-1e4, -1e4, 7e5]}
     assert any(leaf.path == next(iter(varied)) for leaf in tree.leaves(law))
     with pytest.raises(ParameterError, match=r"variations, row 2: "):
-        simulate_batch(law, varied, PULSE, duration=0.1, method=FAST)
+        simulate_batch(law, varied, PULSE, duration=0.1, integrator=FAST)
 
 
 def test_so_do_those_of_a_model_whose_numbers_stand_in_a_list():
@@ -322,12 +345,17 @@ def test_so_do_those_of_a_model_whose_numbers_stand_in_a_list():
 
     with pytest.raises(ParameterError, match=r"variations, row 1: Rising: 3 is not below 2"):
         simulate_batch(
-            Rising(), {"weights[0]": [1.0, 3.0]}, ZERO_INPUT, duration=0.1, start={"x": 0.0, "y": 0.0}, method=FAST
+            Rising(),
+            {"weights[0]": [1.0, 3.0]},
+            ZERO_INPUT,
+            duration=0.1,
+            initial_states={"x": 0.0, "y": 0.0},
+            integrator=FAST,
         )
 
 
 @model
-class Growing:
+class Growing(System):
     """x' = r x between two bounds that must not cross."""
 
     rate: float = parameter("1/s", "r", "rate", default=1.0)
@@ -359,7 +387,9 @@ def test_a_check_whose_answer_differs_from_row_to_row_is_asked_row_by_row():
 
 def test_a_number_too_large_for_single_precision_is_reported():
     start = {"x": [1.0, 3e38]}
-    found = simulate_batch(Growing(), {}, ZERO_INPUT, duration=1.0, start=start, method=FAST, precision=Single())
+    found = simulate_batch(
+        Growing(), {}, ZERO_INPUT, duration=1.0, initial_states=start, integrator=FAST, precision=Single()
+    )
     assert list(found.failed) == [1]
     assert found.reason(1) == "a rate or an output is not finite in single precision, though not in double"
     assert np.isnan(found["x"][1]).all()
@@ -403,7 +433,7 @@ def test_everything_else_that_cannot_be_is_refused(tmp_path):
     refused("precision: it is <class .*Single'>; give Double", precision=Single)
     refused("cores is 'all'; it must be a whole number", cores="all")
     with pytest.raises(ParameterError, match=r"simulate_batch: Muscle.* is no plant; give Plant"):
-        simulate_batch(chosen_muscle(), {}, PULSE, duration=0.1, start=start)
+        simulate_batch(chosen_muscle(), {}, PULSE, duration=0.1, initial_states=start)
     refused("cores is 0; it must be a whole number from 1 on", cores=0)
     (tmp_path / "there").mkdir()
     refused("there: it exists already", FileError, into=tmp_path / "there")
@@ -449,8 +479,8 @@ def test_a_column_of_a_strange_name_has_a_file(tmp_path):
         {"scales[0]": [9.0, 10.0]},
         PULSE,
         duration=0.1,
-        start=still,
-        method=FAST,
+        initial_states=still,
+        integrator=FAST,
         keep=(name,),
         into=tmp_path / "out",
     )
@@ -467,7 +497,7 @@ def test_an_error_on_the_way_leaves_nothing_behind(tmp_path, monkeypatch):
     monkeypatch.setattr(BatchJob, "run_single", fails)
     with pytest.raises(ZeroDivisionError):
         simulate_batch(
-            plain(), {"mechanism.mass": [9.0, 10.0]}, PULSE, duration=0.1, start=plain().state_at(pressure=0.0),
+            plain(), {"mechanism.mass": [9.0, 10.0]}, PULSE, duration=0.1, initial_states=plain().state_at(pressure=0.0),
             into=tmp_path / "out",
         )  # fmt: skip
     assert list(tmp_path.iterdir()) == []
@@ -506,8 +536,8 @@ def test_an_interruption_keeps_what_is_done(tmp_path, monkeypatch, method, where
 
 def test_the_recording_of_one_is_that_of_simulate():
     start = plain().state_at(pressure=1e5)
-    found = simulate_batch(plain(), {"mechanism.mass": [9.0, 10.0]}, PULSE, duration=0.2, start=start)
-    run = simulate(found.plant(1), PULSE, duration=0.2, start=start)
+    found = simulate_batch(plain(), {"mechanism.mass": [9.0, 10.0]}, PULSE, duration=0.2, initial_states=start)
+    run = simulate(found.plant(1), PULSE, duration=0.2, initial_state=start)
     one = found.recording(1)
     assert list(one) == list(run)
     assert one.constants == run.constants

@@ -20,8 +20,8 @@ from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, FillDischarge, Supply, Valve
 from airmuscle.pneumatics.gas import Ambient, Isothermal, Polytropic
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4
-from airmuscle.simulation.simulate import simulate
 
 VALVE = Valve(2.6167e-9, 0.433)
 CIRCUIT = FillDischarge(Supply(548675.0), VALVE, VALVE)
@@ -37,7 +37,7 @@ def release_plant(gas):
 @pytest.mark.parametrize("gas", GASES, ids=repr)
 def test_the_air_mass_is_constant_while_the_valves_are_shut(gas, rtol):
     plant = release_plant(gas)
-    run = simulate(plant, RELEASE, duration=3.0, start=plant.state_at(pressure=3e5), method=Rodas4(rtol))
+    run = simulate(plant, RELEASE, duration=3.0, initial_state=plant.state_at(pressure=3e5), integrator=Rodas4(rtol))
     assert np.ptp(run["position"]) > 0.005
     np.testing.assert_allclose(run["air_mass"], run["air_mass"][0], rtol=1e-12)
 
@@ -47,9 +47,9 @@ def test_both_energy_books_close(gas):
     """A fill, a shut phase with oscillation and a discharge, as one run at rtol 1e-10."""
     plant = Plant(chosen_muscle(), CIRCUIT, HangingMass(10.0), gas)
     metered = WithEnergyMeters(plant)
-    start = metered.reset(plant.state_at(pressure=1.5e5, position=0.0))
+    start = metered.extend_state(plant.state_at(pressure=1.5e5, position=0.0))
     command = Schedule({"fill": ((0.3, 1), (0.8, 0)), "discharge": ((1.5, 1), (1.8, 0))})
-    run = simulate(metered, command, duration=2.5, start=start, method=Rodas4(1e-10))
+    run = simulate(metered, command, duration=2.5, initial_state=start, integrator=Rodas4(1e-10))
 
     mechanical = run["kinetic_energy"] + run["potential_energy"]
     turned_over = np.abs(run["work_of_tension"]).max()
@@ -73,7 +73,9 @@ def test_the_energy_of_the_air_falls_with_volume_by_its_pressure(gas):
 
 def test_the_latch_holds_until_it_is_released():
     plant = release_plant(Isothermal())
-    run = simulate(plant, RELEASE, duration=1.0, start=plant.state_at(pressure=3e5), method=DormandPrince8(1e-4))
+    run = simulate(
+        plant, RELEASE, duration=1.0, initial_state=plant.state_at(pressure=3e5), integrator=DormandPrince8(1e-4)
+    )
     before = run["time"] < 0.5
     assert (run["position"][before] == 0).all()
     assert (run["acceleration"][before] == 0).all()
@@ -84,7 +86,7 @@ def test_the_latch_holds_until_it_is_released():
 def test_an_equilibrium_stays_where_it_is():
     plant = Plant(chosen_muscle(), CIRCUIT, HangingMass(10.0))
     start = find_equilibrium(plant, pressure=3e5)
-    run = simulate(plant, Schedule({}), duration=2.0, start=start, method=Rodas4(1e-10))
+    run = simulate(plant, Schedule({}), duration=2.0, initial_state=start, integrator=Rodas4(1e-10))
     np.testing.assert_allclose(run["position"], start["position"], atol=1e-12)
     assert run["force"][0] == pytest.approx(10.0 * 9.80665, rel=1e-12)
 
@@ -104,7 +106,7 @@ def test_a_plant_that_cannot_rest_names_the_muscle_and_the_forces():
 
 def test_an_isometric_muscle_only_builds_up_tension():
     plant = Plant(chosen_muscle(), CIRCUIT, Isometric(0.05), Isothermal())
-    run = simulate(plant, Schedule({"fill": ((0.0, 1.0),)}), duration=5.0, start=plant.state_at(pressure=0.0))
+    run = simulate(plant, Schedule({"fill": ((0.0, 1.0),)}), duration=5.0, initial_state=plant.state_at(pressure=0.0))
     assert (run["contraction"] == 0.05).all()
     assert run["pressure"][-1] == pytest.approx(548675.0, abs=1.0)
     assert run["force"][-1] > run["force"][0]
@@ -113,7 +115,9 @@ def test_an_isometric_muscle_only_builds_up_tension():
 
 def test_a_muscle_never_pushes():
     plant = Plant(chosen_muscle(), ClosedChamber(), HangingMass(1.0))
-    run = simulate(plant, Schedule({}), duration=1.0, start=plant.state_at(pressure=1e5, position=0.05, speed=0.3))
+    run = simulate(
+        plant, Schedule({}), duration=1.0, initial_state=plant.state_at(pressure=1e5, position=0.05, speed=0.3)
+    )
     assert run["force"].min() == 0.0
 
 
@@ -133,7 +137,7 @@ def test_an_unknown_coordinate_or_input_is_refused_with_what_there_is():
     with pytest.raises(ParameterError, match="no coordinate 'angle'; there are position, speed"):
         plant.state_at(pressure=0.0, angle=1.0)
     with pytest.raises(ParameterError, match=r"no input 'fil'; there are fill, discharge\. Did you mean 'fill'\?"):
-        simulate(plant, Schedule({"fil": ((0.0, 1.0),)}), duration=1.0, start=plant.state_at(pressure=0.0))
+        simulate(plant, Schedule({"fil": ((0.0, 1.0),)}), duration=1.0, initial_state=plant.state_at(pressure=0.0))
 
 
 def test_a_run_says_when_and_how_far_it_left_what_was_measured():
@@ -143,12 +147,12 @@ def test_a_run_says_when_and_how_far_it_left_what_was_measured():
     damped = replace(muscle, damper=LinearDamper(300.0))
     plant = Plant(damped, CIRCUIT, HangingMass(10.0))
     start = find_equilibrium(plant, pressure=0.0)
-    run = simulate(plant, Schedule({"fill": ((0.5, 1.0),)}), duration=4.0, start=start)
+    run = simulate(plant, Schedule({"fill": ((0.5, 1.0),)}), duration=4.0, initial_state=start)
     (pressure, contraction) = [note for note in run.notes if "outside the validity range" in note]
     assert re.search(
         r"was outside the validity range of its characteristic in pressure \(35 to 675 kPa\) in \d+% of the rows, by at most 35 kPa",
         pressure,
     )
     assert re.search(r"in contraction \(1\.333 to 26 %\).*nothing was measured there", contraction)
-    inside = simulate(plant, Schedule({}), duration=1.0, start=find_equilibrium(plant, pressure=4e5))
+    inside = simulate(plant, Schedule({}), duration=1.0, initial_state=find_equilibrium(plant, pressure=4e5))
     assert not [note for note in inside.notes if "outside the validity range" in note]

@@ -19,8 +19,7 @@ from scipy.linalg import expm
 from scipy.signal import cont2discrete
 
 from airmuscle.analysis.linear_model import linearise
-from airmuscle.compile import StateVariable
-from airmuscle.compile.program import compile_system
+from airmuscle.compile.program import Description
 from airmuscle.control import PID, OnOffController, SplitRange
 from airmuscle.control.control_loop import ControlLoop
 from airmuscle.control.controller import Controller
@@ -29,13 +28,15 @@ from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import ParameterError, SimulationError
 from airmuscle.core.reference import cite
+from airmuscle.core.status import Status
+from airmuscle.core.system import System
+from airmuscle.core.variables import StateVariable
 from airmuscle.mechanism import HangingMass, Held, Isometric
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, ProportionalRegulator, ProportionalValve, SecondOrderLag, Supply, Valve
 from airmuscle.pneumatics.gas import Isothermal
-from airmuscle.simulation.closed_loop import simulate_closed_loop
-from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
-from airmuscle.simulation.simulate import simulate
+from airmuscle.simulation import Problem, simulate, solve
+from airmuscle.simulation.integrators import BoundIntegrator, DormandPrince8, Rodas4, RungeKutta4
 
 VALVE = Valve(2.6e-9, 0.4)
 TICK = 2.0**-6
@@ -44,7 +45,7 @@ FINE = Rodas4(1e-11)
 
 
 @model
-class Lag:
+class Lag(System):
     """x' = (u + w - x)/tau, with y = 2 x + u as an output: what jumps with its input."""
 
     time_constant: float = parameter("s", "tau", "time constant", default=0.3)
@@ -68,6 +69,12 @@ LAG_PI = PID("x", "u", gain=1.5, integral_time=0.2, setpoint_weight=0.6)
 STEP = Schedule({"x": ((0.0, 0.0), (0.5, 1.0))})
 
 
+def solution(plant, loop, *, duration, complete=True, **problem):
+    """The solution of a problem; a run that ends early raises unless it need not be complete."""
+    solved = solve(Problem(plant, loop, duration, **problem))
+    return solved.raise_if_incomplete() if complete else solved
+
+
 def lifting(circuit=None, mass=5.0):
     return Plant(chosen_muscle(), circuit or FillDischarge(Supply(5e5), VALVE, VALVE), HangingMass(mass))
 
@@ -82,7 +89,7 @@ VALVES = PID("pressure", SplitRange("fill", "discharge"), gain=1.5e-5, integral_
 def test_a_loop_at_a_linear_system_is_its_discretisation():
     """x_(k+1) = a x_k + (1 - a) u_k with a = exp(-h/tau), u = K (b r - x) + I, I_(k+1) = I + K h/T_i (r - x)."""
     h, a, k = 0.05, np.exp(-0.05 / 0.3), 1.5
-    run = simulate(Lag(), ControlLoop(LAG_PI, h, STEP), duration=3.0, start={"x": 0.2}, method=FINE)
+    run = simulate(Lag(), ControlLoop(LAG_PI, h, STEP), duration=3.0, initial_state={"x": 0.2}, integrator=FINE)
     x, integral, expected = 0.2, k * 0.2, []
     for i in range(60):
         r = 1.0 if i >= 10 else 0.0
@@ -98,7 +105,7 @@ def test_between_samples_a_held_command_meets_a_driven_disturbance():
     """With w linear in time x follows the exact solution of x' = (u + w - x)/tau over every period."""
     h, tau = 0.05, 0.3
     disturbed = ControlLoop(LAG_PI, h, STEP, other_inputs=SampledSignal({"w": ((0.0, 0.0), (0.5, 0.0), (1.5, 2.0))}))
-    run = simulate(Lag(), disturbed, duration=1.5, start={"x": 0.0}, method=FINE)
+    run = simulate(Lag(), disturbed, duration=1.5, initial_state={"x": 0.0}, integrator=FINE)
     at = np.searchsorted(run["time"], h * np.arange(31) - 1e-9)
     whole = np.array([[-1 / tau, 1 / tau, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])  # of x, u + w, its slope
     for begin, end in itertools.pairwise(at):
@@ -111,8 +118,8 @@ def test_for_small_steps_a_loop_is_that_of_the_linearised_plant():
     """What is left is quadratic in the step: half the step, a quarter of it."""
     valve = ProportionalValve(Supply(5e5), VALVE, VALVE, SecondOrderLag(20.0, 0.7), overlap=-0.3)
     plant = Plant(chosen_muscle(), valve, Isometric(0.05), Isothermal())
-    rest = simulate_closed_loop(plant, ControlLoop(PID("pressure", "command", 0.0), 0.5, Schedule({"pressure": ()})), duration=20.0,
-                    start=plant.state_at(pressure=1e5), method=FINE).state  # fmt: skip
+    rest = solution(plant, ControlLoop(PID("pressure", "command", 0.0), 0.5, Schedule({"pressure": ()})), duration=20.0,
+                    initial_state=plant.state_at(pressure=1e5), integrator=FINE).final_state  # fmt: skip
     linear = linearise(plant, rest, {"command": 0.0})
     middle = float(plant.outputs(rest, {"command": 0.0})["pressure"])
     row = linear.outputs.index("pressure")
@@ -123,7 +130,7 @@ def test_for_small_steps_a_loop_is_that_of_the_linearised_plant():
         loop = ControlLoop(
             PID("pressure", "command", k, t_i), h, Schedule({"pressure": ((0.0, middle), (h / 2, middle + step))})
         )
-        run = simulate(plant, loop, duration=50 * h, start=rest, method=FINE)
+        run = simulate(plant, loop, duration=50 * h, initial_state=rest, integrator=FINE)
         x, integral, expected = np.zeros(len(linear.states)), 0.0, []
         for i in range(50):
             y = float(linear.C[row] @ x)
@@ -141,7 +148,7 @@ def test_for_small_steps_a_loop_is_that_of_the_linearised_plant():
 def test_every_sampling_instant_is_met_exactly(method):
     """No row is missing, what was measured is what the column held then, and the command changes nowhere else."""
     h = 0.03
-    run = simulate(lifting(), ControlLoop(VALVES, h, PRESSURE), duration=1.0, method=method, output=0.007)
+    run = simulate(lifting(), ControlLoop(VALVES, h, PRESSURE), duration=1.0, integrator=method, output_times=0.007)
     instants = h * np.arange(34)
     assert np.isin(instants, run["time"]).all()
     at = np.searchsorted(run["time"], instants)
@@ -157,26 +164,30 @@ def test_rows_do_not_change_the_solution():
     loop = ControlLoop(VALVES, TICK, PRESSURE, drivers={"fill": (PWM(30.0), SolenoidDriver(3e-3, 2e-3))})
     plant, found = lifting(), []
     for output in (None, 0.5, 1e-3, [0.1, 0.15]):
-        run = simulate_closed_loop(plant, loop, duration=1.0, output=output)
+        run = solution(plant, loop, duration=1.0, output_times=output)
         at = np.isin(run.recording["time"], TICK * np.arange(64))
         assert at.sum() == 64
         found.append(
-            (run.state, run.memory, *(run.recording[name][at].tolist() for name in ("pressure", "command.fill")))
+            (
+                run.final_state,
+                run.control_state,
+                *(run.recording[name][at].tolist() for name in ("pressure", "command.fill")),
+            )
         )
     assert found[0] == found[1] == found[2] == found[3]
 
 
 def test_the_same_run_is_the_same_twice():
     loop = ControlLoop(VALVES, TICK, PRESSURE, drivers={"fill": PWM(30.0)})
-    one, two = (simulate_closed_loop(lifting(), loop, duration=0.5) for _ in range(2))
-    assert (one.state, one.memory) == (two.state, two.memory)
+    one, two = (solution(lifting(), loop, duration=0.5) for _ in range(2))
+    assert (one.final_state, one.control_state) == (two.final_state, two.control_state)
     assert all(np.array_equal(one.recording[name], two.recording[name]) for name in one.recording)
 
 
 def test_what_jumps_with_its_input_is_measured_before_it_jumps():
     """u_k = K (r - y_k), y_k = 2 x_k + u_(k-1): the controller has not commanded u_k yet."""
     loop = ControlLoop(PID("y", "u", 0.5), 0.1, Schedule({"y": ((0.0, 1.0),)}))
-    run = simulate(Lag(), loop, duration=1.0, start={"x": 0.0}, method=FINE)
+    run = simulate(Lag(), loop, duration=1.0, initial_state={"x": 0.0}, integrator=FINE)
     a, x, u = np.exp(-0.1 / 0.3), 0.0, 0.0
     for i in np.searchsorted(run["time"], 0.1 * np.arange(10) - 1e-9):
         assert run["measured.y"][i] == pytest.approx(2 * x + u, abs=1e-9)
@@ -193,7 +204,7 @@ def test_a_set_point_that_changes_at_a_sampling_instant_is_seen_there(period, pl
         off.add(float(np.sign(k * period - at)))
         wanted, beside = Schedule({"x": ((at, 1.0),)}), Schedule({"w": ((at, 1.0),)})
         loop = ControlLoop(PID("x", "u", 1.0), period, wanted, beside)
-        run = simulate(Lag(), loop, duration=60 * period, start={"x": 0.0}, output=60 * period)
+        run = simulate(Lag(), loop, duration=60 * period, initial_state={"x": 0.0}, output_times=60 * period)
         first = int(np.flatnonzero(run["command.u"])[0])
         assert run["time"][first] == pytest.approx(at, abs=1e-9)
         assert (run["w"][first - 1], run["w"][first], run["setpoint.x"][first]) == (0.0, 1.0, 1.0)
@@ -215,7 +226,7 @@ def test_a_command_is_cut_off_at_the_range_of_its_input():
         (valve, "command", (0.0, 1.0), {"command": PWM(100.0)}),  # what a driver takes
     ):
         loop, plant = ControlLoop(PID("pressure", name, 1e3), TICK, PRESSURE, drivers=drivers), lifting(circuit)
-        run = simulate(plant, loop, duration=1.0, start=plant.state_at(pressure=2e5))
+        run = simulate(plant, loop, duration=1.0, initial_state=plant.state_at(pressure=2e5))
         assert set(run[f"command.{name}"]) == set(range_of_it)
 
 
@@ -247,7 +258,7 @@ def test_a_controller_that_knows_no_range_is_cut_off_too():
 def test_pulses_in_step_with_the_samples_are_as_wide_as_commanded():
     """A carrier's period that begins with a sample has that sample's command, however k/50 and k x 0.02 are rounded."""
     loop = ControlLoop(VALVES, 0.02, Periodic(PRESSURE, 1.0), drivers={"fill": PWM(50.0), "discharge": PWM(50.0)})
-    run = simulate(lifting(), loop, duration=20.0, output=20.0)
+    run = simulate(lifting(), loop, duration=20.0, output_times=20.0)
     edges = 0.02 * np.arange(1001)
     edges[-1] = 20.0
     at = np.searchsorted(run["time"], edges - 1e-9)
@@ -289,7 +300,7 @@ def test_position_is_followed_and_what_is_beside_goes_on():
         SampledSignal({"position": ((0.0, 0.0), (2.0, 0.02))}),
         other_inputs=Schedule({"held": ((0, 1), (0.5, 0))}),
     )
-    run = simulate(plant, loop, duration=5.0, start=plant.state_at(pressure=1e5))
+    run = simulate(plant, loop, duration=5.0, initial_state=plant.state_at(pressure=1e5))
     early = run["time"] < 0.5
     assert np.ptp(run["position"][early]) == 0.0
     assert np.array_equal(run["held"], early.astype(float))
@@ -304,32 +315,38 @@ def test_position_is_followed_and_what_is_beside_goes_on():
 def test_a_run_cut_at_its_samples_is_the_run_in_one_to_the_last_bit(cuts):
     drivers = {"fill": (PWM(30.0), SolenoidDriver(9e-3, 7e-3, 4e-3, 2e-3)), "discharge": SolenoidDriver(20e-3, 20e-3)}
     loop, plant = ControlLoop(VALVES, TICK, PRESSURE, drivers=drivers), lifting()
-    whole = simulate_closed_loop(plant, loop, duration=1.0, start=plant.state_at(pressure=1e5))
+    whole = solution(plant, loop, duration=1.0, initial_state=plant.state_at(pressure=1e5))
     state, memory, time = plant.state_at(pressure=1e5), None, 0.0
     for cut in [TICK * n for n in sorted({*cuts, 64})]:
-        part = simulate_closed_loop(plant, loop, duration=cut - time, start=state, start_time=time, memory=memory)
-        state, memory, time = part.state, part.memory, part.time
-    assert (state, memory) == (whole.state, whole.memory)
+        part = solution(plant, loop, duration=cut - time, initial_state=state, start_time=time, control_state=memory)
+        state, memory, time = part.final_state, part.control_state, part.final_time
+    assert (state, memory) == (whole.final_state, whole.control_state)
 
 
 @pytest.mark.parametrize("cut", [0.001, 0.5 - TICK / 3, 0.5 + TICK / 3])
 def test_a_run_cut_between_two_samples_goes_on_with_what_was_commanded(cut):
     loop, plant, start = ControlLoop(VALVES, TICK, PRESSURE), lifting(), lifting().state_at(pressure=1e5)
-    whole = simulate_closed_loop(plant, loop, duration=1.0, start=start, method=FINE)
+    whole = solution(plant, loop, duration=1.0, initial_state=start, integrator=FINE)
     if cut < TICK:
-        with pytest.raises(ParameterError, match="it would look only once"):
-            simulate_closed_loop(plant, loop, duration=cut, start=start)
+        with pytest.raises(ParameterError, match="longer than the run of 0.001 s"):
+            solution(plant, loop, duration=cut, initial_state=start)
         return
-    first = simulate_closed_loop(plant, loop, duration=cut, start=start, method=FINE)
-    short = simulate_closed_loop(
-        plant, loop, duration=1e-4, start=first.state, start_time=first.time, memory=first.memory, method=FINE
+    first = solution(plant, loop, duration=cut, initial_state=start, integrator=FINE)
+    short = solution(
+        plant,
+        loop,
+        duration=1e-4,
+        initial_state=first.final_state,
+        start_time=first.final_time,
+        control_state=first.control_state,
+        integrator=FINE,
     )
-    second = simulate_closed_loop(plant, loop, duration=1.0 - short.time, start=short.state, start_time=short.time,
-                      memory=short.memory, method=FINE)  # fmt: skip
+    second = solution(plant, loop, duration=1.0 - short.final_time, initial_state=short.final_state, start_time=short.final_time,
+                      control_state=short.control_state, integrator=FINE)  # fmt: skip
     assert second.recording["command.fill"][0] == first.recording["command.fill"][-1]
     assert second.recording["measured.pressure"][0] == first.recording["measured.pressure"][-1]
-    assert second.memory.sample_count == whole.memory.sample_count == 64
-    assert second.state == pytest.approx(whole.state, rel=1e-7, abs=1e-9)
+    assert second.control_state.sample_count == whole.control_state.sample_count == 64
+    assert second.final_state == pytest.approx(whole.final_state, rel=1e-7, abs=1e-9)
 
 
 def test_what_was_commanded_gives_the_same_run_without_a_controller():
@@ -337,8 +354,10 @@ def test_what_was_commanded_gives_the_same_run_without_a_controller():
     plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), Held(HangingMass(10.0)))
     loop = ControlLoop(VALVES, TICK, PRESSURE, Schedule({"held": ((0, 1), (0.1, 0))}), drivers)
     start = plant.state_at(pressure=1e5)
-    run = simulate(plant, loop, duration=1.0, start=start, method=FINE)
-    again = simulate(plant, loop.as_open_loop(run), duration=1.0, start=start, method=FINE, output=run["time"])
+    run = simulate(plant, loop, duration=1.0, initial_state=start, integrator=FINE)
+    again = simulate(
+        plant, loop.as_open_loop(run), duration=1.0, initial_state=start, integrator=FINE, output_times=run["time"]
+    )
     at = np.isin(again["time"], run["time"])
     assert at.sum() == len(run)
     for name in ("pressure", "position", "fill", "held"):
@@ -351,23 +370,23 @@ def test_what_was_commanded_gives_the_same_run_without_a_controller():
 HUGE = FillDischarge(Supply(5e5), Valve(9e-6, 0.3), Valve(9e-6, 0.3))
 
 
-@pytest.mark.parametrize(("gas", "reason"), [(None, "not finite"), (Isothermal(), "less air than none")])
+@pytest.mark.parametrize(("gas", "reason"), [(None, "not finite"), (Isothermal(), "an air mass became negative")])
 def test_a_loop_that_fails_returns_what_it_has(gas, reason):
     """Huge valves empty the muscle within one step of a fixed method."""
     plant = Plant(chosen_muscle(), HUGE, HangingMass(10.0), *([gas] if gas else []))
     falling = Schedule({"pressure": ((0.0, 3e5), (0.1, 0.0))})
     loop = ControlLoop(PID("pressure", SplitRange("fill", "discharge"), 1.0), 0.02, falling)
-    told = {"duration": 1.0, "start": plant.state_at(pressure=3e5), "method": RungeKutta4(0.01)}
+    told = {"duration": 1.0, "initial_state": plant.state_at(pressure=3e5), "integrator": RungeKutta4(0.01)}
     with pytest.raises(SimulationError, match=rf"ended at .* because .*{reason}.*at air_mass") as caught:
-        simulate_closed_loop(plant, loop, **told)
+        solution(plant, loop, **told)
     run = caught.value.recording
     assert 3 <= len(run) < 101
     assert all(np.isfinite(run[name]).all() for name in run)
     assert (run["pressure"] >= -101325.0).all()
-    kept = simulate_closed_loop(plant, loop, **told, complete=False)
+    kept = solution(plant, loop, **told, complete=False)
     assert reason in kept.recording.notes[-1]
-    assert kept.time <= kept.recording["time"][-1] + 1e-12
-    assert kept.state["air_mass"] > 0.0, "where it can go on from"
+    assert kept.final_time <= kept.recording["time"][-1] + 1e-12
+    assert kept.final_state["air_mass"] > 0.0, "where it can go on from"
 
 
 @pytest.mark.parametrize("given", [{"fill": np.nan}, {"fill": np.inf - np.inf}])
@@ -399,42 +418,50 @@ def test_a_loop_that_is_interrupted_can_be_taken_up():
         simulate(plant, loop, duration=1.0)
     assert caught.value.interrupted
     assert caught.value.recording["time"][-1] == 30 * TICK
-    run = simulate_closed_loop(plant, loop, duration=1.0, complete=False)
-    assert (run.time, run.memory.sample_count) == (30 * TICK, 30)
+    run = solution(plant, loop, duration=1.0, complete=False)
+    assert (run.final_time, run.control_state.sample_count) == (30 * TICK, 30)
     patient = dataclasses.replace(loop, controller=Wild(99, None))
-    rest = simulate_closed_loop(
-        plant, patient, duration=1.0 - run.time, start=run.state, start_time=run.time, memory=run.memory
+    rest = solution(
+        plant,
+        patient,
+        duration=1.0 - run.final_time,
+        initial_state=run.final_state,
+        start_time=run.final_time,
+        control_state=run.control_state,
     )
-    assert rest.state == simulate_closed_loop(plant, patient, duration=1.0).state
+    assert rest.final_state == solution(plant, patient, duration=1.0).final_state
 
 
 def test_a_loop_that_is_interrupted_within_a_piece_goes_on_from_the_sample_before(monkeypatch):
-    from airmuscle.simulation.integrators import Stepper
-
-    stepped, run = Stepper.run, iter(range(100))
+    integrate, run = BoundIntegrator.run_part, iter(range(100))
     loop, plant = ControlLoop(VALVES, TICK, PRESSURE, drivers={"fill": PWM(30.0)}), lifting()
-    whole = simulate_closed_loop(plant, loop, duration=1.0)
+    whole = solution(plant, loop, duration=1.0)
 
     def interrupted(self, *given):
-        course = stepped(self, *given)
-        return course._replace(status=5, reached=min(course.reached, 1)) if next(run) == 20 else course
+        status, reached, time = integrate(self, *given)
+        return (Status.INTERRUPTED, min(reached, 1), time) if next(run) == 20 else (status, reached, time)
 
-    monkeypatch.setattr(Stepper, "run", interrupted)
-    part = simulate_closed_loop(plant, loop, duration=1.0, complete=False)
+    monkeypatch.setattr(BoundIntegrator, "run_part", interrupted)
+    part = solution(plant, loop, duration=1.0, complete=False)
     monkeypatch.undo()
     assert "interrupted" in part.recording.notes[-1]
-    assert (part.time, part.memory.time, part.memory.sample_count) == (20 * TICK, 20 * TICK, 20)
-    rest = simulate_closed_loop(
-        plant, loop, duration=1.0 - part.time, start=part.state, start_time=part.time, memory=part.memory
+    assert (part.final_time, part.control_state.time, part.control_state.sample_count) == (20 * TICK, 20 * TICK, 20)
+    rest = solution(
+        plant,
+        loop,
+        duration=1.0 - part.final_time,
+        initial_state=part.final_state,
+        start_time=part.final_time,
+        control_state=part.control_state,
     )
-    assert (rest.state, rest.memory) == (whole.state, whole.memory)
+    assert (rest.final_state, rest.control_state) == (whole.final_state, whole.control_state)
 
 
 # What is made once
 
 
 def test_what_does_not_change_is_made_once(monkeypatch):
-    """Twice the samples ask for the plant's states, its program and the method's workspace as often as once."""
+    """After the first run of a plant it is neither described nor bound to its integrator again, however long the run."""
     counted: dict[str, int] = {}
 
     def counting(name, function):
@@ -444,18 +471,17 @@ def test_what_does_not_change_is_made_once(monkeypatch):
 
         return counts
 
+    monkeypatch.setattr(Rodas4, "binding", counting("binding", Rodas4.binding))
+    monkeypatch.setattr(Description, "__init__", counting("description", Description.__init__))
     plant, start = lifting(), lifting().state_at(pressure=1e5)
-    simulate(plant, ControlLoop(VALVES, TICK, PRESSURE), duration=0.1, start=start)  # compiles
-    monkeypatch.setattr(Plant, "states", property(counting("states", Plant.states.fget)))
-    monkeypatch.setattr(Rodas4, "_kernel", counting("kernel", Rodas4._kernel))
-    monkeypatch.setattr("airmuscle.compile.program.compile_system", counting("prepared", compile_system))
-    found = []
+    loop = ControlLoop(VALVES, TICK, PRESSURE)
+    simulate(plant, loop, duration=0.1, initial_state=start)
+    assert counted["binding"] == 1
+    assert counted["description"] >= 1
+    counted.clear()
     for duration in (0.5, 1.0):
-        counted.clear()
-        simulate(plant, ControlLoop(VALVES, TICK, PRESSURE), duration=duration, start=start)
-        found.append(dict(counted))
-    assert found[0] == found[1]
-    assert found[0]["kernel"] == found[0]["prepared"] == 1
+        simulate(plant, loop, duration=duration, initial_state=start)
+    assert counted == {}
 
 
 # What is recorded, and what is refused
@@ -464,9 +490,8 @@ def test_what_does_not_change_is_made_once(monkeypatch):
 def test_the_recording_says_who_commanded_what():
     loop = ControlLoop(VALVES, TICK, PRESSURE)
     run = simulate(lifting(), loop, duration=0.5)
-    assert run.notes[0].startswith(
-        "controlled: every 0.015625 s pressure [Pa] is measured and fill [1], discharge [1] commanded by PID(measured='pr"
-    )
+    assert run.notes[0].startswith("controlled by PID(measured='pressure', commanded=SplitRange(positive='fill'")
+    assert run.notes[0].endswith("sample time 15.62 ms, measured pressure [Pa], commanded fill, discharge")
     heads = list(run.to_pandas())
     assert {"setpoint.pressure [Pa]", "measured.pressure [Pa]", "command.fill [1]", "command.discharge [1]"} <= set(
         heads
@@ -485,11 +510,11 @@ def test_a_period_that_cannot_be_is_refused(period):
     ("changed", "message"),
     [
         ({"controller": 3}, "ControlLoop.controller is 3; give a PID"),
-        ({"setpoint": {"pressure": 1e5}}, "the command is {'pressure'"),
-        ({"setpoint": Schedule({"presure": ()})}, "ControlLoop.setpoint names presure; PID follows pressure"),
-        ({"setpoint": Schedule({})}, "ControlLoop.setpoint names nothing; PID follows pressure"),
+        ({"setpoint": {"pressure": 1e5}}, "the input is {'pressure'"),
+        ({"setpoint": Schedule({"presure": ()})}, "ControlLoop.setpoint names presure; the set points of PID are pressure"),
+        ({"setpoint": Schedule({})}, "ControlLoop.setpoint names nothing; the set points of PID are pressure"),
         ({"setpoint": Periodic(Schedule({"force": ()}), 1.0)}, "ControlLoop.setpoint names force"),
-        ({"other_inputs": Schedule({"fill": ((0, 1),)})}, "'fill' is commanded by the controller, and beside it too"),
+        ({"other_inputs": Schedule({"fill": ((0, 1),)})}, "'fill' is commanded by the controller and by other_inputs"),
         ({"drivers": {"fill": 3}}, "the driver of 'fill' is 3"),
     ],
 )
@@ -507,8 +532,8 @@ def test_a_loop_that_cannot_be_is_refused(changed, message):
         (ControlLoop(VALVES, 0.01, PRESSURE, drivers={"vent": PWM(50.0)}), "no input 'vent'; there are fill, discharge"),
         (ControlLoop(VALVES, 0.01, PRESSURE, Schedule({"vent": ()})), "no input 'vent'"),
         (ControlLoop(PID("pressure", "fill", 1.0), 0.01, PRESSURE, Schedule({"discharge": ((0.05, 2.0),)})), "'discharge' is 2 before"),
-        (ControlLoop(VALVES, 1.5, PRESSURE), r"looks every 1.5 s, and the run lasts 1 s: it would look only once"),
-        (ControlLoop(VALVES, 1e-8, PRESSURE), r"a period of 1e-08 s makes 1e\+08 samples; 10000000 are allowed"),
+        (ControlLoop(VALVES, 1.5, PRESSURE), r"looks every 1.5 s, and the run lasts 1 s: longer than the run of 0.001 s"),
+        (ControlLoop(VALVES, 1e-8, PRESSURE), r"a sample time of 1e-08 s makes 1e\+08 samples; 10000000 are allowed"),
     ],
 )  # fmt: skip
 def test_a_loop_that_does_not_fit_its_plant_is_refused(loop, message):
@@ -519,11 +544,18 @@ def test_a_loop_that_does_not_fit_its_plant_is_refused(loop, message):
 @pytest.mark.parametrize("start_time", [0.0, 0.9, 1.2])
 def test_a_memory_belongs_to_its_instant(start_time):
     loop, plant = ControlLoop(VALVES, 0.1, PRESSURE), lifting()
-    run = simulate_closed_loop(plant, loop, duration=1.0)
+    run = solution(plant, loop, duration=1.0)
     with pytest.raises(
-        ParameterError, match=r"the memory of the loop is of 1 s, and the run begins at .* Give the time"
+        ParameterError, match=r"the control_state is that of 1 s, and the run begins at .* Give the time"
     ):
-        simulate_closed_loop(plant, loop, duration=1.0, start=run.state, start_time=start_time, memory=run.memory)
+        solution(
+            plant,
+            loop,
+            duration=1.0,
+            initial_state=run.final_state,
+            start_time=start_time,
+            control_state=run.control_state,
+        )
 
 
 def test_a_batch_and_an_experiment_refuse_a_loop():
@@ -534,7 +566,7 @@ def test_a_batch_and_an_experiment_refuse_a_loop():
     loop, plant = ControlLoop(VALVES, 0.1, PRESSURE), lifting()
     for given in (loop, [loop, loop]):
         with pytest.raises(
-            ParameterError, match=r"simulate_batch: a Loop is no command known beforehand.*simulate_closed_loop"
+            ParameterError, match=r"simulate_batch: the input must be known beforehand.*ControlLoop"
         ):
             simulate_batch(plant, {"mechanism.mass": [9.0, 10.0]}, given, duration=1.0)
     run = simulate(plant, loop, duration=0.2)

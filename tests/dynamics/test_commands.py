@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle import Recording, read_csv
-from airmuscle.control.inputs import Periodic, PiecewiseLinear, SampledSignal, Schedule
+from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
+from airmuscle.control.piecewise_linear import PiecewiseLinear
 from airmuscle.core.errors import ColumnError, ParameterError
 
 

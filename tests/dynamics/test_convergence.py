@@ -19,8 +19,8 @@ from airmuscle.muscle import CreepElements, CubicSpring, LaggingWall, LinearDamp
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, DistributedTube, FillDischarge, Supply, Valve, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Polytropic
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
-from airmuscle.simulation.simulate import simulate
 
 BRAID = Braid(0.01, 0.4363, 0.2)
 HEAT = EnergyBalance(0.5)
@@ -53,7 +53,9 @@ def test_states_at_common_instants_are_bit_for_bit_the_same(method):
     common = np.array([0.0313, 0.0777, 0.1, 0.123456789, 0.31, 0.4])
     grids = [common, np.linspace(0.0, 0.4, 1001), np.linspace(0.0, 0.4, 37), np.array([0.4])]
     runs = [
-        simulate(plant, command, duration=0.4, start=start, method=method, output=np.union1d(common, grid))
+        simulate(
+            plant, command, duration=0.4, initial_state=start, integrator=method, output_times=np.union1d(common, grid)
+        )
         for grid in grids
     ]
     for run in runs:
@@ -70,7 +72,8 @@ def test_the_last_state_does_not_know_how_often_it_was_looked_at():
     command = SampledSignal({"fill": ((0.0, 0.0), (0.1, 1.0), (0.2, 0.0))})
     for method in METHODS:
         ends = [
-            simulate(plant, command, duration=0.4, start=start, method=method, output=output) for output in (0.4, 1e-4)
+            simulate(plant, command, duration=0.4, initial_state=start, integrator=method, output_times=output)
+            for output in (0.4, 1e-4)
         ]
         assert [ends[0][s.name][-1] for s in plant.states] == [ends[1][s.name][-1] for s in plant.states]
 
@@ -82,7 +85,9 @@ def course(name, method, duration=0.32):
     """The states at 40 instants, by their nominal sizes, and the number of steps."""
     plant = SMOOTH[name]
     start = plant.state_at(pressure=3e5, position=0.025, speed=0.02)
-    run = simulate(plant, ZERO_INPUT, duration=duration, start=start, method=method, output=duration / 40)
+    run = simulate(
+        plant, ZERO_INPUT, duration=duration, initial_state=start, integrator=method, output_times=duration / 40
+    )
     steps = int(run.notes[0].split(": ")[1].split()[0])
     assert run["force"].min() > 10.0  # taut
     for flow in ("tube1.flow", "tube2.flow"):  # laminar

@@ -28,10 +28,12 @@ from airmuscle import (
     load,
     simulate,
 )
-from airmuscle.control.driver import PWM, SolenoidDriver, WithDrivers
-from airmuscle.control.inputs import PiecewiseLinear, SampledSignal, Schedule
+from airmuscle.control.driver import PWM, SolenoidDriver
+from airmuscle.control.inputs import SampledSignal, Schedule
+from airmuscle.control.piecewise_linear import PiecewiseLinear
+from airmuscle.control.with_drivers import WithDrivers
 from airmuscle.core.errors import ParameterError
-from airmuscle.simulation.simulate import output_times
+from airmuscle.simulation import output_times
 
 INPUTS = ("other", "fill")
 TICK = 2.0**-10
@@ -326,7 +328,7 @@ def test_the_plant_meets_every_instant_of_a_driver():
     command = WithDrivers(
         Schedule({"fill": ((0.1, 1),)}), {"fill": SolenoidDriver(opening_delay=5e-3, opening_ramp=2e-3)}
     )
-    run = simulate(plant(), command, duration=0.3, method=Rodas4(1e-8), output=0.1)
+    run = simulate(plant(), command, duration=0.3, integrator=Rodas4(1e-8), output_times=0.1)
     assert run["time"] == pytest.approx([0.0, 0.1, 0.105, 0.107, 0.2, 0.3])
     assert run["fill"] == pytest.approx([0, 0, 0, 1, 1, 1])
     assert run["pressure"][:3] == pytest.approx(0.0, abs=1e-6), "no air before the plunger moves"
@@ -343,7 +345,7 @@ def test_stepping_with_the_memory_of_the_drivers_is_the_whole_run():
     )
     state = plant.state_at(pressure=1e5)
     method = Rodas4(1e-10)
-    whole = simulate(plant, command, duration=0.3, start=state, method=method, output=0.3)
+    whole = simulate(plant, command, duration=0.3, initial_state=state, integrator=method, output_times=0.3)
     memory, dt = command.init(0.0), 0.3 / 37
     for i in range(37):
         segments, memory = command.step(memory, plant.inputs, i * dt, dt)

@@ -36,7 +36,7 @@ from airmuscle.muscle import CreepElements, LaggingWall, SeriesSpring
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, FillDischarge, ProportionalValve, SecondOrderLag, Supply, Valve
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
-from airmuscle.simulation.simulate import simulate
+from airmuscle.simulation import simulate
 
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))
 VALVE = Valve(2.6e-8, 0.433)
@@ -81,7 +81,7 @@ def test_at_an_equilibrium_nothing_moves(name, gas):
     for rest in find_equilibria(plant, pressure=3e5):
         assert np.abs(rates(plant, rest.state)).max() < 1e-6
     state = find_equilibrium(plant, pressure=3e5)
-    run = simulate(plant, ZERO_INPUT, duration=1.0, start=state)
+    run = simulate(plant, ZERO_INPUT, duration=1.0, initial_state=state)
     for c in plant.mechanism.coordinates:
         np.testing.assert_allclose(run[c.name], state[c.name], atol=1e-6 * c.nominal)
 
@@ -204,12 +204,14 @@ def test_a_joint_may_stand_with_shut_valves_that_falls_at_constant_pressure():
     assert (at_pressure.stable, shut.stable) == (False, True)
 
     pushed = {**shut.state, "angle": 0.01}
-    stands = simulate(plant, ZERO_INPUT, duration=10.0, start=pushed)
+    stands = simulate(plant, ZERO_INPUT, duration=10.0, initial_state=pushed)
     assert abs(stands["angle"][-1]) < 1e-3
 
     wide = FillDischarge(Supply(2e5), Valve(1e-6, 0.433), Valve(1e-6, 0.433))
     fed = replace(plant, circuit=(wide, wide))
-    falls = simulate(fed, Schedule({"left.fill": ((0, 1),), "right.fill": ((0, 1),)}), duration=0.6, start=pushed)
+    falls = simulate(
+        fed, Schedule({"left.fill": ((0, 1),), "right.fill": ((0, 1),)}), duration=0.6, initial_state=pushed
+    )
     assert falls["angle"][-1] > 0.1
 
 

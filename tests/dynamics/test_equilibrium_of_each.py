@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from airmuscle.analysis.equilibrium.grid import grids
+from airmuscle.analysis.equilibrium.vectorised import SideBySide
 from bumpy import Bumpy
 from joints import chosen_muscle
 from plants import BRAID, EXAMPLES, TWO_VALVES, of, pulled
 
 from airmuscle.analysis.equilibrium import find_equilibria, find_equilibrium, find_equilibrium_of_each
-from airmuscle.analysis.equilibrium.grid import grids
 from airmuscle.analysis.equilibrium.single_dof import grid
 from airmuscle.analysis.equilibrium.statics import StaticProblem
-from airmuscle.analysis.equilibrium.vectorised import SideBySide
 from airmuscle.characteristic import MartensBoblan2017, VirtualWork
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import ZERO_INPUT
@@ -242,7 +242,7 @@ def test_several_coordinates_are_asked_alone():
     assert not of_each.searched.any()
     assert np.isnan(of_each.states).all()
     batch = simulate_batch(pulled(MusclesInSeries(HangingMass(1.0), (0.05,)), 2), {"mechanism.inner.mass": [1.0, 1.1]}, ZERO_INPUT,
-                           duration=2e-3, method=FAST)  # fmt: skip
+                           duration=2e-3, integrator=FAST)  # fmt: skip
     for i in range(2):
         alone = find_equilibrium(batch.plant(i), pressure=0.0)
         np.testing.assert_allclose(batch["position"][i, 0], alone["position"], rtol=1e-12)
@@ -297,7 +297,7 @@ def test_an_input_that_one_of_them_refuses_is_asked_alone():
 
 def starts_of(plant, variations):
     """Where the plants of a batch begin, by state (N,), and why some do not."""
-    batch = simulate_batch(plant, variations, ZERO_INPUT, duration=1e-3, method=FAST)
+    batch = simulate_batch(plant, variations, ZERO_INPUT, duration=1e-3, integrator=FAST)
     return {s.name: batch[s.name][:, 0] for s in plant.states}, batch
 
 

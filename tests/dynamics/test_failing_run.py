@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from airmuscle.simulation.result import extrapolation_warnings
 from joints import chosen_muscle
 
 from airmuscle.analysis.linear_model import linearise
 from airmuscle.analysis.static_stiffness import stiffness
 from airmuscle.compile.program import compile_system
-from airmuscle.control.inputs import PiecewiseLinear, Schedule
+from airmuscle.control.inputs import Schedule
+from airmuscle.control.piecewise_linear import PiecewiseLinear
 from airmuscle.core.errors import AirmuscleError, SimulationError
 from airmuscle.mechanism import HangingMass, Held, MusclesInSeries, WithEndStops
 from airmuscle.mechanism.contact import HuntCrossley
@@ -20,10 +22,9 @@ from airmuscle.plant.plant import Plant
 from airmuscle.plant.state import state_vector
 from airmuscle.pneumatics import FillDischarge, Manifold, SharedSupply, Supply, Tube, Valve, WithLeak, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.simulation import advance, simulate
 from airmuscle.simulation.batch import simulate_batch
 from airmuscle.simulation.integrators import LESS_THAN_NONE, TOO_MANY, Rodas4, RungeKutta4
-from airmuscle.simulation.result import extrapolation_warnings
-from airmuscle.simulation.simulate import advance, simulate
 
 HUGE = Valve(9e-6, 0.3)
 VALVE = Valve(2.6e-9, 0.4)
@@ -37,12 +38,12 @@ def test_a_fixed_step_that_is_too_long_is_not_called_a_result():
     with pytest.raises(
         SimulationError, match=r"ended at .* because .*not finite.*air_mass .*fixed step too long"
     ) as caught:
-        simulate(plant, FILL, duration=1.0, start=start, method=RungeKutta4(0.01))
+        simulate(plant, FILL, duration=1.0, initial_state=start, integrator=RungeKutta4(0.01))
     part = caught.value.recording
     assert 3 <= len(part) < 101
     for name in part:
         assert np.isfinite(part[name]).all(), name
-    kept = simulate(plant, FILL, duration=1.0, start=start, method=RungeKutta4(0.01), complete=False)
+    kept = simulate(plant, FILL, duration=1.0, initial_state=start, integrator=RungeKutta4(0.01), complete=False)
     assert len(kept) == len(part)
     assert "not finite" in kept.notes[-1]
 
@@ -57,11 +58,11 @@ def test_a_load_that_tears_a_muscle_out_of_its_reach_is_named_as_the_cause(mecha
     plant = Plant(muscles, (FillDischarge(Supply(5e5), VALVE, HUGE),) * len(muscles), mechanism, gas)
     empty = Schedule({name: ((0.0, 1.0),) for name in plant.inputs if name.endswith("discharge")})
     with pytest.raises(SimulationError, match=r"upper had come to a contraction of -10.*put Stopped around") as caught:
-        simulate(plant, empty, duration=2.0, start=plant.state_at(pressure=0.0))
+        simulate(plant, empty, duration=2.0, initial_state=plant.state_at(pressure=0.0))
     assert len(caught.value.recording) > 1
     if len(muscles) == 1:
         held = replace(plant, mechanism=WithEndStops(mechanism, -0.015, 0.05, HuntCrossley(1e8)))
-        assert simulate(held, empty, duration=2.0, start=held.state_at(pressure=0.0))["time"][-1] == 2.0
+        assert simulate(held, empty, duration=2.0, initial_state=held.state_at(pressure=0.0))["time"][-1] == 2.0
 
 
 def isothermal(valve=VALVE):
@@ -73,13 +74,13 @@ def test_isothermal_air_of_negative_mass_has_a_pressure_and_yet_ends_the_run():
     plant, discharge, method = isothermal(HUGE), Schedule({"discharge": ((0.02, 1.0),)}), RungeKutta4(0.01)
     start = plant.state_at(pressure=3e5)
     with pytest.raises(SimulationError, match=r"because there was less air than none.*a fixed step too long") as caught:
-        simulate(plant, discharge, duration=0.2, start=start, method=method)
+        simulate(plant, discharge, duration=0.2, initial_state=start, integrator=method)
     assert (caught.value.recording["air_mass"] >= 0.0).all()
     assert (caught.value.recording["pressure"] >= -101325.0).all()
     with pytest.raises(SimulationError, match="less air than none"):
         advance(plant, start, {"discharge": 1.0}, 0.01, method)
     batch = simulate_batch(
-        plant, {"mechanism.mass": [10.0, 11.0]}, discharge, duration=0.05, start=start, method=method
+        plant, {"mechanism.mass": [10.0, 11.0]}, discharge, duration=0.05, initial_states=start, integrator=method
     )
     assert (batch.status == LESS_THAN_NONE).all()
     assert "less air than none" in batch.reason(1)
@@ -107,7 +108,7 @@ REACH = chosen_muscle().geometry.contraction_range
 )
 def test_a_state_that_cannot_be_is_refused_wherever_one_is_given(state, message):
     plant = isothermal()
-    for act in (lambda: simulate(plant, FILL, duration=0.1, start=state), lambda: linearise(plant, state),
+    for act in (lambda: simulate(plant, FILL, duration=0.1, initial_state=state), lambda: linearise(plant, state),
                 lambda: stiffness(plant, state)):  # fmt: skip
         with pytest.raises(AirmuscleError, match=message):
             act()
@@ -168,7 +169,7 @@ def test_what_a_step_is_told_is_of_its_kind():
 
 
 def test_a_batch_has_no_more_plants_than_it_has():
-    batch = simulate_batch(isothermal(), {}, [FILL, FILL], duration=0.01, start=STATE, keep=())
+    batch = simulate_batch(isothermal(), {}, [FILL, FILL], duration=0.01, initial_states=STATE, keep=())
     assert batch.reason(-1) == batch.reason(1) == "done"
     with pytest.raises(AirmuscleError, match="there is no plant 2; there are 0 to 1"):
         batch.reason(2)
@@ -182,7 +183,7 @@ def test_a_batch_has_no_more_plants_than_it_has():
         ({"variations": {3: [1]}}, "no parameter"),
     ):
         with pytest.raises(AirmuscleError, match=message):
-            simulate_batch(isothermal(), command=FILL, duration=0.1,
+            simulate_batch(isothermal(), input=FILL, duration=0.1,
                            **{"variations": {"mechanism.mass": [9.0]}, "start": STATE, **given})  # fmt: skip
 
 
@@ -234,7 +235,7 @@ def test_a_run_says_where_no_muscle_can_be():
     plant = isothermal()
     thrown = r"because a muscle enclosed nothing.* contraction of 10\d\.\d+%, where its geometry ends"
     with pytest.raises(SimulationError, match=thrown) as caught:
-        simulate(plant, Schedule({}), duration=0.1, start={**STATE, "speed": 100.0})
+        simulate(plant, Schedule({}), duration=0.1, initial_state={**STATE, "speed": 100.0})
     assert (caught.value.recording["volume"] > 0).all()
     assert 1 < len(caught.value.recording) < 101
     columns = {"time": np.array([0.0, 1.0]), "pressure": np.zeros(2), "contraction": np.array([0.0, -0.2])}
@@ -245,7 +246,7 @@ def test_a_run_says_where_no_muscle_can_be():
     series = replace(plant, muscle=replace(plant.muscle, damper=LinearDamper(50.0), series=SeriesSpring(3e4)))
     (note,) = extrapolation_warnings(series, columns | {"inner_contraction": np.array([-0.2, 0.0])})
     assert "in inner_contraction" in note
-    calm = simulate(plant, Schedule({}), duration=0.1, start=STATE)
+    calm = simulate(plant, Schedule({}), duration=0.1, initial_state=STATE)
     assert not [note for note in calm.notes if "reach" in note]
 
 

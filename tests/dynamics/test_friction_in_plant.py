@@ -23,8 +23,8 @@ from airmuscle.mechanism.base import Coordinate, Mechanism
 from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4
-from airmuscle.simulation.simulate import simulate
 
 VALVE = Valve(3e-10, 0.433)
 CIRCUIT = FillDischarge(Supply(548675.0), VALVE, VALVE)
@@ -51,7 +51,9 @@ def loops_of(friction, duration=9.0, output=2e-3, method=None):
     """Fill, discharge and fill again, from rest at 150 kPa."""
     plant = plant_with(friction)
     start = find_equilibrium(plant, pressure=1.5e5)
-    return simulate(plant, LOOPS, duration=duration, start=start, output=output, method=method or Rodas4(1e-7))
+    return simulate(
+        plant, LOOPS, duration=duration, initial_state=start, output_times=output, integrator=method or Rodas4(1e-7)
+    )
 
 
 @model
@@ -131,8 +133,8 @@ def test_a_load_stands_lower_on_the_way_up_than_on_the_way_down():
 def test_the_books_close_and_friction_gives_nothing():
     """Mechanical: kinetic and potential energy grow by the work of the tension; friction keeps what it took."""
     metered = WithEnergyMeters(plant_with(SLIP))
-    start = metered.reset(find_equilibrium(metered.plant, pressure=1.5e5))
-    run = simulate(metered, LOOPS, duration=9.0, start=start, method=Rodas4(1e-9))
+    start = metered.extend_state(find_equilibrium(metered.plant, pressure=1.5e5))
+    run = simulate(metered, LOOPS, duration=9.0, initial_state=start, integrator=Rodas4(1e-9))
     mechanical = run["kinetic_energy"] + run["potential_energy"]
     np.testing.assert_allclose(mechanical - mechanical[0], run["work_of_tension"], atol=1e-6)
     stored = sum(0.5 * k * run[f"bristle{i}"] ** 2 for i, k in enumerate(SLIP.stiffnesses, 1))
@@ -152,7 +154,7 @@ def test_bristles_carry_the_name_of_their_muscle():
     start = plant.state_at(pressure=(2e5, 2e5))
     assert [start[n] for n in list(by_name)[4:]] == [0.0] * 4
     command = Schedule({"left.fill": ((0.0, 1.0), (0.8, 0.0))})
-    run = simulate(plant, command, duration=1.0, start=start)
+    run = simulate(plant, command, duration=1.0, initial_state=start)
     assert np.abs(run["left.friction"]).max() > 1.0
     assert np.sign(run["left.friction"][10]) == -np.sign(run["right.friction"][10])
     assert any(note.startswith("friction: left MaxwellSlip(") and "right Dahl(" in note for note in run.notes)

@@ -21,8 +21,8 @@ from airmuscle.compile.cache.kernel import Kernel
 from airmuscle.compile.cache.object_code import build
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import Schedule
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4
-from airmuscle.simulation.simulate import simulate
 
 CASE = runs()[3]
 READY = compile_system(CASE.system)
@@ -70,7 +70,7 @@ def test_a_run_is_bit_for_bit_that_of_numba(method, monkeypatch):
     ramps = Schedule({"fill": ((0.5, 1.0), (1.5, 0.0)), "discharge": ((2.0, 0.7),)})
 
     def run():
-        return simulate(CASE.system, ramps, duration=3.0, start=CASE.start, method=method)
+        return simulate(CASE.system, ramps, duration=3.0, initial_state=CASE.start, integrator=method)
 
     by_code = run()
     monkeypatch.setattr(Kernel, "__call__", lambda self, *given: self.numba(*given))

@@ -8,17 +8,18 @@ import pytest
 from joints import chosen_muscle, joint, joint_start
 from scipy.integrate import solve_ivp
 
-from airmuscle.compile import StateVariable
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import ZERO_INPUT, SampledSignal, Schedule
 from airmuscle.core import ops
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import SimulationError
+from airmuscle.core.system import System
+from airmuscle.core.variables import StateVariable
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.simulation import advance, simulate
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
-from airmuscle.simulation.simulate import advance, simulate
 
 
 def hanging() -> Plant:
@@ -73,7 +74,7 @@ def test_plants_of_every_size_agree_with_scipy(size):
     plant, start, command, duration = CASES[size]
     assert len(plant.states) == size
     times, expected = scipy_solution(plant, start, command, duration)
-    run = simulate(plant, command, duration=duration, start=start, method=Rodas4(1e-10), output=times)
+    run = simulate(plant, command, duration=duration, initial_state=start, integrator=Rodas4(1e-10), output_times=times)
     rows = np.isin(run["time"], times)
     for i, state in enumerate(plant.states):
         size_of = max(np.abs(expected[:, i]).max(), state.nominal)
@@ -94,7 +95,7 @@ def test_the_printed_rates_are_the_rates(size):
 
 
 @model
-class Pendulum:
+class Pendulum(System):
     """A smooth system with a moving input, stiff in one state; no kinks."""
 
     stiffness: float = parameter("1", "k", "of the restoring sine", default=4.0)
@@ -118,13 +119,13 @@ PUSH = SampledSignal({"push": ((0.0, 0.0), (1.0, 1.0), (2.0, -0.5))})
 
 
 def end_error(method, exact, command=PUSH):
-    run = simulate(Pendulum(), command, duration=2.0, start=START, method=method, output=1.0)
+    run = simulate(Pendulum(), command, duration=2.0, initial_state=START, integrator=method, output_times=1.0)
     return max(abs(run[n][-1] - exact[n]) for n in START)
 
 
 @pytest.fixture(scope="module")
 def exact():
-    run = simulate(Pendulum(), PUSH, duration=2.0, start=START, method=Rodas4(1e-13), output=1.0)
+    run = simulate(Pendulum(), PUSH, duration=2.0, initial_state=START, integrator=Rodas4(1e-13), output_times=1.0)
     return {n: run[n][-1] for n in START}
 
 
@@ -139,7 +140,7 @@ def test_rodas4_converges_at_order_four_with_a_moving_input(exact):
     """Without the slope of the input it would be of order one. Steps are those its control takes."""
     errors, steps = [], []
     for rtol in (1e-4, 1e-6, 1e-8):
-        run = simulate(Pendulum(), PUSH, duration=2.0, start=START, method=Rodas4(rtol), output=1.0)
+        run = simulate(Pendulum(), PUSH, duration=2.0, initial_state=START, integrator=Rodas4(rtol), output_times=1.0)
         errors.append(max(abs(run[n][-1] - exact[n]) for n in START))
         steps.append(int(run.notes[0].split(": ")[1].split()[0]))
     order = np.diff(np.log(errors)) / -np.diff(np.log(steps))
@@ -150,8 +151,8 @@ def test_rodas4_converges_at_order_four_with_a_moving_input(exact):
 def test_the_solution_does_not_depend_on_the_output():
     plant, start, command, duration = CASES[3]
     for method in (Rodas4(1e-6), DormandPrince8(1e-4)):
-        few = simulate(plant, command, duration=duration, start=start, method=method, output=[0.5])
-        many = simulate(plant, command, duration=duration, start=start, method=method, output=1e-3)
+        few = simulate(plant, command, duration=duration, initial_state=start, integrator=method, output_times=[0.5])
+        many = simulate(plant, command, duration=duration, initial_state=start, integrator=method, output_times=1e-3)
         for name in ("position", "air_mass"):
             assert few[name][-1] == many[name][-1]
         assert few["position"][few["time"] == 0.5] == pytest.approx(
@@ -160,14 +161,16 @@ def test_the_solution_does_not_depend_on_the_output():
 
 
 def test_rows_between_fixed_steps_are_as_exact_as_the_steps():
-    run = simulate(Pendulum(), PUSH, duration=2.0, start=START, method=DormandPrince8(0.05), output=0.0173)
-    fine = simulate(Pendulum(), PUSH, duration=2.0, start=START, method=Rodas4(1e-12), output=0.0173)
+    run = simulate(
+        Pendulum(), PUSH, duration=2.0, initial_state=START, integrator=DormandPrince8(0.05), output_times=0.0173
+    )
+    fine = simulate(Pendulum(), PUSH, duration=2.0, initial_state=START, integrator=Rodas4(1e-12), output_times=0.0173)
     np.testing.assert_allclose(run["angle"], fine["angle"], atol=1e-9)
 
 
 def test_instants_are_rows_and_belong_to_what_begins_there():
     plant, start, command, duration = CASES[3]
-    run = simulate(plant, command, duration=duration, start=start, output=0.3)
+    run = simulate(plant, command, duration=duration, initial_state=start, output_times=0.3)
     for instant, opening in ((0.2, 1.0), (1.0, 0.0)):
         row = np.flatnonzero(run["time"] == instant)
         assert row.size == 1
@@ -177,7 +180,9 @@ def test_instants_are_rows_and_belong_to_what_begins_there():
 def test_advance_is_the_seam_of_simulate():
     plant, _, _, _ = CASES[3]
     start = plant.state_at(pressure=1e5, position=0.005)
-    run = simulate(plant, Schedule({"fill": ((0.0, 1.0),)}), duration=0.05, start=start, method=Rodas4(1e-9))
+    run = simulate(
+        plant, Schedule({"fill": ((0.0, 1.0),)}), duration=0.05, initial_state=start, integrator=Rodas4(1e-9)
+    )
     state = start
     for _ in range(5):
         state = advance(plant, state, {"fill": 1.0}, 0.01, Rodas4(1e-9))
@@ -185,7 +190,7 @@ def test_advance_is_the_seam_of_simulate():
 
 
 @model
-class Explodes:
+class Explodes(System):
     """y' = y^2 leaves every number behind at t = 1."""
 
     inputs = ()
@@ -206,10 +211,18 @@ def test_a_run_that_fails_returns_what_it_has(method):
     with pytest.raises(
         SimulationError, match=r"the run ended at (0\.99\d*|1) of 2 s because .*, after \d+ steps, at y "
     ) as caught:
-        simulate(Explodes(), ZERO_INPUT, duration=2.0, start={"y": 1.0}, method=method, output=0.1)
+        simulate(Explodes(), ZERO_INPUT, duration=2.0, initial_state={"y": 1.0}, integrator=method, output_times=0.1)
     kept = caught.value.recording
     np.testing.assert_allclose(kept["y"][:10], 1 / (1 - kept["time"][:10]), rtol=1e-4)
-    again = simulate(Explodes(), ZERO_INPUT, duration=2.0, start={"y": 1.0}, method=method, output=0.1, complete=False)
+    again = simulate(
+        Explodes(),
+        ZERO_INPUT,
+        duration=2.0,
+        initial_state={"y": 1.0},
+        integrator=method,
+        output_times=0.1,
+        complete=False,
+    )
     assert len(again) == len(kept)
     assert "the run ended" in again.notes[-1]
 

@@ -33,8 +33,8 @@ from airmuscle.pneumatics import (
     WithTubes,
 )
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
-from airmuscle.simulation.simulate import simulate
 
 GASES = [Isothermal(), Polytropic(1.2), EnergyBalance(0.2), EnergyBalance(0.0)]
 MUSCLE = chosen_muscle()
@@ -100,20 +100,20 @@ CASES = {
 @pytest.mark.parametrize(("circuit", "load", "command", "pressure", "duration", "most"), CASES.values(), ids=CASES)
 def test_a_plant_at_its_limits_runs_through(circuit, load, command, pressure, duration, most, gas):
     plant = Plant(MUSCLE, circuit, load, gas)
-    run = simulate(plant, command, duration=duration, start=pushed(plant, pressure))
+    run = simulate(plant, command, duration=duration, initial_state=pushed(plant, pressure))
     in_limits(run, most)
 
 
 def test_an_emptied_muscle_ends_at_the_pressure_of_the_surroundings():
     plant = Plant(MUSCLE, WithLeak(ClosedChamber(), Valve(1e-10, 0.3)), LOAD)
-    run = simulate(plant, ZERO_INPUT, duration=3600.0, start=find_equilibrium(plant, pressure=4e5))
+    run = simulate(plant, ZERO_INPUT, duration=3600.0, initial_state=find_equilibrium(plant, pressure=4e5))
     assert run["pressure"][-1] == pytest.approx(0.0, abs=1.0)
     assert run["mass_flow"][-1] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_vacuum_leaves_what_the_supply_has():
     plant = Plant(MUSCLE, valves(-0.98e5), LOAD)
-    run = simulate(plant, OPEN, duration=60.0, start=find_equilibrium(plant, pressure=0.0))
+    run = simulate(plant, OPEN, duration=60.0, initial_state=find_equilibrium(plant, pressure=0.0))
     assert run["pressure"][-1] == pytest.approx(-0.98e5, abs=50.0)
     assert run["force"].min() >= 0.0
 
@@ -122,7 +122,9 @@ def test_at_no_flow_and_shut_valves_the_air_stays_but_for_rounding():
     for name in ("no flow through a valve of conductance zero", "shut valves for an hour"):
         circuit, load, command, pressure, duration, _ = CASES[name]
         plant = Plant(MUSCLE, circuit, load)
-        run = simulate(plant, command, duration=duration, start=plant.state_at(pressure=pressure, position=0.01))
+        run = simulate(
+            plant, command, duration=duration, initial_state=plant.state_at(pressure=pressure, position=0.01)
+        )
         assert np.ptp(run["air_mass"]) <= 1e-15 * run["air_mass"][0]
 
 
@@ -131,7 +133,9 @@ def test_a_joint_between_equal_pressures_stays_where_it_is(rtol):
     muscles = tuple(replace(MUSCLE, name=name, friction=Dahl(1e5, 5.0)) for name in ("left", "right"))
     valve = ProportionalValve(Supply(3e5), VALVE, VALVE, SecondOrderLag(50.0), 0.05, muscles=2)
     plant = Plant(muscles, valve, AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12))
-    run = simulate(plant, ZERO_INPUT, duration=600.0, start=find_equilibrium(plant, pressure=3e5), method=Rodas4(rtol))
+    run = simulate(
+        plant, ZERO_INPUT, duration=600.0, initial_state=find_equilibrium(plant, pressure=3e5), integrator=Rodas4(rtol)
+    )
     assert all(np.isfinite(run[name]).all() for name in run)
     assert steps_of(run) <= 60
     np.testing.assert_allclose(run["angle"], 0.0, atol=1e-9)
@@ -142,5 +146,7 @@ def test_a_joint_between_equal_pressures_stays_where_it_is(rtol):
 def test_a_thousand_switchings_at_equal_pressures_cost_a_few_steps_each():
     plant = Plant(MUSCLE, valves(2e5), LOAD)
     changes = tuple((0.01 * k, float(k % 2)) for k in range(1, 1001))
-    run = simulate(plant, Schedule({"fill": changes}), duration=10.1, start=find_equilibrium(plant, pressure=2e5))
+    run = simulate(
+        plant, Schedule({"fill": changes}), duration=10.1, initial_state=find_equilibrium(plant, pressure=2e5)
+    )
     in_limits(run, 3100)

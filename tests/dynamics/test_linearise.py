@@ -30,8 +30,8 @@ from airmuscle.pneumatics import (
     WithTubes,
 )
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
-from airmuscle.simulation.simulate import simulate
 
 VALVE = Valve(2.6e-9, 0.433)
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))
@@ -91,7 +91,9 @@ def test_it_follows_a_small_step_of_the_simulated_plant():
     errors = []
     for step in (4e-4, 2e-4):
         command = Schedule({"fill": ((0.0, step),)})
-        run = simulate(HANGING, command, duration=0.3, start=start, output=times, method=Rodas4(1e-12))
+        run = simulate(
+            HANGING, command, duration=0.3, initial_state=start, output_times=times, integrator=Rodas4(1e-12)
+        )
         _, linear, _ = lsim(found.to_scipy(), np.full((61, 1), step), times)
         moved = np.column_stack([run[n] - run[n][0] for n in found.outputs])
         assert moved[-1, 1] > 10.0

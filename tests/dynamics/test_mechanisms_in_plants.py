@@ -46,8 +46,8 @@ from airmuscle.pneumatics import (
     WithTubes,
 )
 from airmuscle.pneumatics.gas import GAS_CONSTANT, EnergyBalance, Isothermal, Polytropic
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
-from airmuscle.simulation.simulate import simulate
 
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))
 VALVE = Valve(2.6e-8, 0.433)
@@ -78,12 +78,12 @@ def pair(mechanism, gas=Polytropic(1.2), circuit=CIRCUIT):
 def test_the_energy_book_closes_with_what_is_lost(mechanism):
     """Fill one muscle, then the other, then let both out a little; at rtol 1e-10."""
     plant = WithEnergyMeters(pair(mechanism))
-    start = plant.reset(find_equilibrium(plant.plant, pressure=2e5))
+    start = plant.extend_state(find_equilibrium(plant.plant, pressure=2e5))
     command = Schedule({
         "left.fill": ((0.1, 1.0), (0.2, 0.0)), "right.fill": ((0.4, 1.0), (0.5, 0.0)),
         "left.discharge": ((0.9, 1.0), (0.94, 0.0)), "right.discharge": ((1.1, 1.0), (1.14, 0.0)),
     })  # fmt: skip
-    run = simulate(plant, command, duration=1.4, start=start, method=Rodas4(1e-10))
+    run = simulate(plant, command, duration=1.4, initial_state=start, integrator=Rodas4(1e-10))
     mechanical = run["kinetic_energy"] + run["potential_energy"]
     book = run["work_of_tension"] - run["mechanism_loss"]
     size = np.abs(run["work_of_tension"]).max()
@@ -98,7 +98,9 @@ def test_the_energy_book_closes_with_what_is_lost(mechanism):
 def test_stops_hold_between_their_ends_but_for_the_depth_of_the_contact():
     """At rest against the stop the contact carries what the muscle pulls beyond the spring."""
     plant = Plant(LEFT, CIRCUIT, MECHANISMS["stopped"])
-    run = simulate(plant, Schedule({"fill": ((0.0, 1.0),)}), duration=3.0, start=find_equilibrium(plant, pressure=0.0))
+    run = simulate(
+        plant, Schedule({"fill": ((0.0, 1.0),)}), duration=3.0, initial_state=find_equilibrium(plant, pressure=0.0)
+    )
     depth = run["position"][-1] - 0.02
     assert 0.0 < depth < 2e-3
     carried = run["force"][-1] - 500.0 * run["position"][-1]
@@ -116,7 +118,14 @@ def test_a_prescribed_motion_is_followed_exactly():
     motion = spline_trajectory(times, places)
     plant = Plant(chosen_muscle(), CIRCUIT, PrescribedMotion())
     start = plant.state_at(pressure=3e5, **motion.start)
-    run = simulate(plant, motion.command, duration=times[-1] - times[0], start_time=times[0], start=start, output=times)
+    run = simulate(
+        plant,
+        motion.command,
+        duration=times[-1] - times[0],
+        start_time=times[0],
+        initial_state=start,
+        output_times=times,
+    )
     np.testing.assert_allclose(np.interp(times, run["time"], run["position"]), places, atol=1e-9)
     assert run["speed"][0] == 0.0
     assert run["speed"][-1] == pytest.approx(0.0, abs=1e-9)
@@ -138,8 +147,8 @@ def test_the_drive_takes_up_what_the_muscle_works():
     plant = WithEnergyMeters(Plant(chosen_muscle(), CIRCUIT, PrescribedMotion(), Isothermal()))
     motion = spline_trajectory([0.0, 0.5, 1.0], [0.0, 0.02, 0.005])
     command = SampledSignal({**motion.command.points, "fill": ((0.2, 0.0), (0.4, 0.5), (0.6, 0.0))})
-    start = plant.reset(plant.plant.state_at(pressure=2e5, **motion.start))
-    run = simulate(plant, command, duration=1.0, start=start, method=Rodas4(1e-10))
+    start = plant.extend_state(plant.plant.state_at(pressure=2e5, **motion.start))
+    run = simulate(plant, command, duration=1.0, initial_state=start, integrator=Rodas4(1e-10))
     np.testing.assert_allclose(run["mechanism_loss"], run["work_of_tension"], atol=1e-9)
     assert np.abs(run["work_of_tension"]).max() > 1.0
 
@@ -195,8 +204,8 @@ def test_the_joint_of_a_plant_is_the_joint_written_by_hand():
 
     command = Schedule({"left.fill": ((0.1, 1.0), (0.4, 0.0)), "right.discharge": ((0.2, 1.0), (0.5, 0.0))})
     method, start = Rodas4(1e-9), joint_start(system)
-    by_hand = simulate(system, command, duration=1.5, start=start, method=method)
-    run = simulate(plant, command, duration=1.5, start=of_plant(start), method=method)
+    by_hand = simulate(system, command, duration=1.5, initial_state=start, integrator=method)
+    run = simulate(plant, command, duration=1.5, initial_state=of_plant(start), integrator=method)
     assert np.ptp(run["angle"]) > 0.2
     np.testing.assert_allclose(run["angle"], by_hand["angle"], atol=1e-7)
     np.testing.assert_allclose(run["left.tube.air_mass"], by_hand["left.tube_mass"], rtol=1e-6)
@@ -242,7 +251,7 @@ def test_the_tubes_of_one_circuit_for_all_are_called_by_their_muscles():
     assert of_tubes == [f"{side}.tube{i}.air_mass" for side in ("left", "right") for i in (1, 2)]
     start = plant.state_at(pressure=(2e5, 3e5))
     assert start["left.tube1.air_mass"] / start["right.tube1.air_mass"] == pytest.approx(301.325 / 401.325)
-    run = simulate(plant, Schedule({"command": ((0.0, 1.0),)}), duration=0.02, start=start)
+    run = simulate(plant, Schedule({"command": ((0.0, 1.0),)}), duration=0.02, initial_state=start)
     assert run["left.tube1.pressure"][-1] > run["left.tube2.pressure"][-1] > run["left.pressure"][-1] > 2e5
     assert run["right.tube1.pressure"][-1] < run["right.tube2.pressure"][-1] < run["right.pressure"][-1]
 
@@ -255,7 +264,7 @@ def test_a_run_says_where_air_ran_too_fast_for_a_distributed_tube(nested):
     circuit = Manifold(Supply(6e5), tuple(feeds), ("left", "right")) if nested else tuple(feeds)
     plant = Plant((LEFT, RIGHT), circuit, JOINT, Isothermal())
     command = Schedule({"left.fill": ((0.0, 1.0),), "right.fill": ((0.0, 1.0),)})
-    found = simulate(plant, command, duration=0.02, start=plant.state_at(pressure=0.0), method=Rodas4(1e-5))
+    found = simulate(plant, command, duration=0.02, initial_state=plant.state_at(pressure=0.0), integrator=Rodas4(1e-5))
     doubts = [note for note in found.notes if "times the speed of sound" in note]
     assert {note.partition(":")[0] for note in doubts} <= {f"left.tube{i}" for i in (1, 2, 3)}
     speeds = {
@@ -268,7 +277,7 @@ def test_a_run_says_where_air_ran_too_fast_for_a_distributed_tube(nested):
     greatest = {i: float(abs(speed).max() / np.sqrt(GAS_CONSTANT * 293.15)) for i, speed in speeds.items()}
     assert len(doubts) == sum(share > 1 / 3 for share in greatest.values()) > 0
     assert f"air ran at up to {greatest[3]:.2g} times the speed of sound" in doubts[-1]
-    still = simulate(plant, ZERO_INPUT, duration=0.02, start=plant.state_at(pressure=0.0))
+    still = simulate(plant, ZERO_INPUT, duration=0.02, initial_state=plant.state_at(pressure=0.0))
     assert not [note for note in still.notes if "times the speed of sound" in note]
 
 
@@ -286,7 +295,11 @@ def test_one_five_port_valve_turns_a_joint_to_either_side():
     start = find_equilibrium(plant, pressure=2.5e5)
     runs = [
         simulate(
-            plant, Schedule({"command": ((0.1, sign), (0.25, 0.0))}), duration=2.0, start=start, method=Rodas4(1e-9)
+            plant,
+            Schedule({"command": ((0.1, sign), (0.25, 0.0))}),
+            duration=2.0,
+            initial_state=start,
+            integrator=Rodas4(1e-9),
         )
         for sign in (0.6, -0.6)
     ]
@@ -313,7 +326,11 @@ def test_a_chain_of_equal_muscles_swings_as_one_of_their_length():
     chain = pair(MusclesInSeries(HangingMass(20.0), (1e-3,)), Isothermal(), ClosedChamber())
     start = find_equilibrium(chain, pressure=3e5)
     run = simulate(
-        chain, ZERO_INPUT, duration=0.5, start={**start, "speed": 0.2, "node1.speed": 0.1}, method=Rodas4(1e-9)
+        chain,
+        ZERO_INPUT,
+        duration=0.5,
+        initial_state={**start, "speed": 0.2, "node1.speed": 0.1},
+        integrator=Rodas4(1e-9),
     )
     assert np.ptp(run["position"]) > 5e-3
     np.testing.assert_allclose(run["left.force"], run["right.force"], atol=0.05)

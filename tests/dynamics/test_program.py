@@ -14,11 +14,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airmuscle.compile import StateVariable
 from airmuscle.compile.program import compile_system
 from airmuscle.core import autodiff, ops
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import ParameterError, TraceError
+from airmuscle.core.system import System
+from airmuscle.core.variables import StateVariable
 
 FORMULAS = {
     "arithmetic": lambda x, y: (x + 2 * y) * (x - y) / (4 + y * y) - x,
@@ -34,7 +35,7 @@ FORMULAS = {
 
 
 @model
-class Formula:
+class Formula(System):
     """One formula of two states and a parameter, as a system, so that it goes through the whole printer."""
 
     formula: str
@@ -95,7 +96,7 @@ def test_the_printed_jacobian_solves_the_shifted_system():
 
 
 @model
-class Silent:
+class Silent(System):
     """What a law must not do: math.nan stands for math.sqrt or float() of a symbol, which make it silently."""
 
     inputs = ()

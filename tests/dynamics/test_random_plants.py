@@ -62,7 +62,7 @@ from airmuscle.pneumatics import (
     WithTubes,
 )
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
-from airmuscle.simulation.simulate import simulate
+from airmuscle.simulation import simulate
 
 MOST_STEPS = 20_000
 
@@ -187,8 +187,8 @@ def judged(seed):
     plant = drawer.plant()
     command = drawer.command(plant)
     metered = WithEnergyMeters(plant)
-    start = metered.reset(plant.state_at(pressure=drawer.one_of(0.0, 1e5, 3e5)))
-    run = simulate(metered, command, duration=1.5, start=start, output=5e-3, complete=False)
+    start = metered.extend_state(plant.state_at(pressure=drawer.one_of(0.0, 1e5, 3e5)))
+    run = simulate(metered, command, duration=1.5, initial_state=start, output_times=5e-3, complete=False)
     for name in run:
         assert np.isfinite(run[name]).all(), name
     counts = run.notes[0].split(": ")[1].split()
@@ -199,7 +199,7 @@ def judged(seed):
     assert found["mechanical"] < 1e-4
     if run["time"][-1] < 1.5:  # the plant itself says why
         torn = simulate(
-            plant, command, duration=1.5, start={s.name: start[s.name] for s in plant.states}, complete=False
+            plant, command, duration=1.5, initial_state={s.name: start[s.name] for s in plant.states}, complete=False
         )
         assert any("its geometry" in note for note in torn.notes), torn.notes
 

@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 from filling import hanging, runs
 
-from airmuscle.compile import StateVariable
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import SampledSignal, Schedule
 from airmuscle.core import ops, tree
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import ParameterError
+from airmuscle.core.system import System
+from airmuscle.core.variables import StateVariable
 from airmuscle.simulation.integrators import Rodas4, RungeKutta4
 from airmuscle.simulation.sensitivity import WithSensitivities, sensitivity
 
@@ -51,7 +52,7 @@ FORMULAS = {
 
 
 @model
-class Formula:
+class Formula(System):
     """One formula of two states and a parameter, as a system."""
 
     formula: str
@@ -71,7 +72,7 @@ class Formula:
 
 
 @model
-class Decay:
+class Decay(System):
     """x' = -a x + b u, z' = a x: with u = 1, x = (x0 - b/a) exp(-a t) + b/a."""
 
     a: float = parameter("1/s", "a", "rate of decay", default=1.5)
@@ -90,7 +91,7 @@ class Decay:
 
 
 @model
-class Swing:
+class Swing(System):
     """x' = v, v' = u x - a sin x - b v sqrt(1 + v^2): smooth everywhere."""
 
     a: float = parameter("1/s2", "a", "pull back", default=3.0)

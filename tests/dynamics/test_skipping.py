@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from filling import hanging
 
-from airmuscle.compile import StateVariable
 from airmuscle.compile.ir.branches import COMMANDED, STEADY, VARYING, skipping
 from airmuscle.compile.ir.instructions import Code, Instruction, Operand, Operation
 from airmuscle.compile.ir.scheduling import Branch
@@ -24,6 +23,8 @@ from airmuscle.compile.program import Program, compile_system
 from airmuscle.control.inputs import Schedule
 from airmuscle.core import ops
 from airmuscle.core.declaration import model, parameter
+from airmuscle.core.system import System
+from airmuscle.core.variables import StateVariable
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, ThreePosition, Valve
 from airmuscle.simulation.batch import simulate_batch
@@ -202,7 +203,7 @@ def _call(program: Program, name: str, *arrays: Any) -> None:
 
 
 @model
-class Gated:
+class Gated(System):
     """A rate whose flow is NaN unless its input is zero."""
 
     scale: float = parameter("1", "a", "any factor", default=1.0)
@@ -235,7 +236,12 @@ def test_a_lane_that_skips_does_not_see_its_neighbours() -> None:
     opens = [n % 3 == 0 for n in range(16)]
     commands = [Schedule({"opening": ((0.1, 1.0 if opened else 0.0),)}) for opened in opens]
     batch = simulate_batch(
-        Gated(), {"scale": np.ones(16)}, commands, duration=0.5, start={"level": 1.0}, method=RungeKutta4(1e-2)
+        Gated(),
+        {"scale": np.ones(16)},
+        commands,
+        duration=0.5,
+        initial_states={"level": 1.0},
+        integrator=RungeKutta4(1e-2),
     )
     ended = np.asarray(batch.final["level"])
     np.testing.assert_array_equal(np.isfinite(ended), ~np.array(opens))

@@ -23,8 +23,8 @@ from airmuscle.muscle import LinearSpring, Muscle, SeriesSpring
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber
 from airmuscle.pneumatics.gas import HEAT_CAPACITY_RATIO, EnergyBalance, Isothermal, Polytropic, absolute
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
-from airmuscle.simulation.simulate import simulate
 
 BRAID = Braid(0.01, 0.4363, 0.2)
 MUSCLE = Muscle(VirtualWork(BRAID), BRAID, LinearSpring(3000.0))
@@ -43,7 +43,9 @@ def pulled(gas, pressure=3e5, contraction=0.12):
     if "internal_energy" in start:  # put there without heat, as its content in the middle is
         before, after = (BRAID.volume(x / 0.2) for x in (middle, middle + amplitude))
         start["internal_energy"] *= (before / after) ** (HEAT_CAPACITY_RATIO - 1)
-    run = simulate(plant, motion.command, duration=4.0, start=start, method=Rodas4(1e-11), output=0.01)
+    run = simulate(
+        plant, motion.command, duration=4.0, initial_state=start, integrator=Rodas4(1e-11), output_times=0.01
+    )
     return plant, run
 
 

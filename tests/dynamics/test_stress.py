@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.control.driver import SolenoidDriver, WithDrivers
+from airmuscle.control.driver import SolenoidDriver
 from airmuscle.control.inputs import Schedule
+from airmuscle.control.with_drivers import WithDrivers
 from airmuscle.friction import LuGre, MaxwellSlip
 from airmuscle.mechanism import HangingMass
 from airmuscle.mechanism.contact import HuntCrossley
@@ -21,8 +22,8 @@ from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import DistributedTube, FillDischarge, RegulatedSupply, Supply, Tank, Tube, Valve, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
-from airmuscle.simulation.simulate import simulate
 
 SWITCHINGS = 10_000
 
@@ -70,10 +71,14 @@ def switched(rng, count=SWITCHINGS):
 def run_of(seed, rtol):
     plant, (command, duration) = drawn(seed)
     metered = WithEnergyMeters(plant)
-    start = metered.reset(plant.state_at(pressure=1e5, position=0.0))
+    start = metered.extend_state(plant.state_at(pressure=1e5, position=0.0))
     segments = command.segments(plant.inputs, 0.0, duration)
     assert segments.ends.size > SWITCHINGS
-    return plant, simulate(metered, command, duration=duration, start=start, method=Rodas4(rtol), output=2e-3), segments
+    return (
+        plant,
+        simulate(metered, command, duration=duration, initial_state=start, integrator=Rodas4(rtol), output_times=2e-3),
+        segments,
+    )
 
 
 def turned_over(column):
@@ -143,8 +148,8 @@ def series(seed):
 def test_a_series_spring_and_a_tube_with_inertia_keep_the_books_as_well():
     plant = series(1)
     metered, (command, duration) = WithEnergyMeters(plant), switched(np.random.default_rng(1), 400)
-    start = metered.reset(plant.state_at(pressure=1e5, position=0.0))
-    run = simulate(metered, command, duration=duration, start=start, method=Rodas4(1e-6), output=1e-3)
+    start = metered.extend_state(plant.state_at(pressure=1e5, position=0.0))
+    run = simulate(metered, command, duration=duration, initial_state=start, integrator=Rodas4(1e-6), output_times=1e-3)
     found = gaps(run)
     assert max(found["mass"], found["air"]) < 1e-11
     assert found["mechanical"] < 1e-6

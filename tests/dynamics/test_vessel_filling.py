@@ -23,8 +23,8 @@ from airmuscle.muscle import Muscle
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import CheckValve, FillDischarge, IndexedValve, Orifice, Supply, Valve
 from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, Ambient, Isothermal
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
-from airmuscle.simulation.simulate import simulate
 
 SOURCE, T0, CONDUCTANCE = 7e5, 293.15, 1e-9
 AMBIENT = Ambient(100e3, T0)
@@ -41,8 +41,8 @@ def filled(valve: Orifice, start: float, duration: float):
         plant,
         Schedule({"fill": ((0.0, 1.0),)}),
         duration=duration,
-        start=plant.state_at(pressure=start - AMBIENT.pressure),
-        method=Rodas4(rtol=1e-9),
+        initial_state=plant.state_at(pressure=start - AMBIENT.pressure),
+        integrator=Rodas4(rtol=1e-9),
     )
     return run["time"], run["pressure"] + AMBIENT.pressure
 

@@ -31,8 +31,8 @@ from airmuscle.muscle import Muscle, SwellingWall
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Tube, Valve, WithLeak, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Polytropic
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import INTERRUPTED, Rodas4
-from airmuscle.simulation.simulate import simulate
 
 FILL = Schedule({"fill": ((0.1, 1.0), (1.0, 0.0)), "discharge": ((1.3, 1.0),)})
 SENSORS = {"pressure": 500.0, "position": 5e-5}
@@ -70,7 +70,7 @@ def truth(plant, name):
 
 
 def recorded(plant, seed, shift=0.0):
-    run = simulate(plant, FILL, duration=2.0, output=0.01)
+    run = simulate(plant, FILL, duration=2.0, output_times=0.01)
     run = run.with_columns(time=run["time"] + shift)
     return Experiment(noisy(run, seed, **SENSORS), FILL, InitialConditions.at_rest(plant, 0.0), 0.0)
 
@@ -84,7 +84,7 @@ def rigid_plant():
 def rigid_fill(plant, seed=3):
     command = Schedule({"fill": ((0.0, 1.0),)})
     start = InitialConditions.held(plant, 0.0)
-    run = simulate(plant, command, duration=1.0, start=plant.state_at(pressure=0.0), output=0.005)
+    run = simulate(plant, command, duration=1.0, initial_state=plant.state_at(pressure=0.0), output_times=0.005)
     return Experiment(noisy(run, seed, pressure=300.0), command, start)
 
 
@@ -199,7 +199,7 @@ def test_a_profile_of_what_is_not_determined_is_open():
 def test_the_start_pressure_is_a_nuisance():
     plant = rigid_plant()
     command = Schedule({"fill": ((0.0, 1.0),)})
-    run = simulate(plant, command, duration=0.5, start=plant.state_at(pressure=40e3), output=0.005)
+    run = simulate(plant, command, duration=0.5, initial_state=plant.state_at(pressure=40e3), output_times=0.005)
     wrong = Experiment(noisy(run, 1, pressure=300.0), command, InitialConditions.held(plant, 36e3))
     fit = fit_dynamic(
         plant, [wrong], free=("circuit.fill.conductance",), own=(StartValue("pressure", 8e3),),
@@ -235,7 +235,7 @@ def free_muscle(lag=0.2, tube=3e-5):
 
 
 def free_fill(plant, sensed, seed=2, first=1e4):
-    run = simulate(plant, OPEN, duration=2.0, start=plant.state_at(pressure=first), output=0.005)
+    run = simulate(plant, OPEN, duration=2.0, initial_state=plant.state_at(pressure=first), output_times=0.005)
     return Experiment(noisy(run, seed, **{sensed: 500.0}), OPEN, InitialConditions.held(plant, first))
 
 
@@ -291,7 +291,7 @@ def test_the_heat_through_the_wall_is_found_from_the_pressure_of_a_fill_and_a_ho
     """After the valve shuts the warm air cools, and its pressure falls with a time constant m c_v/(hA)."""
     plant = dataclasses.replace(rigid_plant(), gas=EnergyBalance(0.5))
     command, start = Schedule({"fill": ((0.0, 1.0), (0.4, 0.0))}), InitialConditions.held(plant, 0.0)
-    run = simulate(plant, command, duration=1.5, start=plant.state_at(pressure=0.0), output=0.005)
+    run = simulate(plant, command, duration=1.5, initial_state=plant.state_at(pressure=0.0), output_times=0.005)
     record = Experiment(noisy(run, 4, pressure=300.0), command, start)
     free = ("gas.heat_transfer", "circuit.fill.conductance")
     guess = changed(plant, gas__heat_transfer=3.0, circuit__fill__conductance=0.8)
@@ -305,7 +305,7 @@ def test_a_leak_is_found_from_a_hold_with_shut_valves():
     plant = rigid_plant()
     plant = dataclasses.replace(plant, circuit=WithLeak(plant.circuit, Valve(2e-11, 0.3)))
     rest, start = Schedule({}), InitialConditions.held(plant, 3e5)
-    run = simulate(plant, rest, duration=10.0, start=plant.state_at(pressure=3e5), output=0.05)
+    run = simulate(plant, rest, duration=10.0, initial_state=plant.state_at(pressure=3e5), output_times=0.05)
     record = Experiment(noisy(run, 8, pressure=300.0), rest, start)
     guess = changed(plant, circuit__leak__conductance=4.0)
     fit = fit_dynamic(guess, [record], free=("circuit.leak.conductance",), observed={"pressure": 300.0},

@@ -40,8 +40,8 @@ from airmuscle.pneumatics import (
     WithTubes,
 )
 from airmuscle.pneumatics.gas import Ambient, EnergyBalance, Isothermal
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
-from airmuscle.simulation.simulate import simulate
 
 AMBIENT = Ambient()
 VALVE, WIDE, NARROW = Valve(1e-8, 0.4), Valve(5e-8, 0.4), Valve(2e-9, 0.3)
@@ -136,7 +136,9 @@ def spool_course(overlap=0.0, follower=SPOOL, to=0.6, duration=0.3):
     system = plant(valve, Isothermal())
     start = system.state_at(pressure=2e5)
     command = Schedule({"command": ((0.0, to),)})
-    return system, simulate(system, command, duration=duration, start=start, method=Rodas4(1e-9), output=1e-3)
+    return system, simulate(
+        system, command, duration=duration, initial_state=start, integrator=Rodas4(1e-9), output_times=1e-3
+    )
 
 
 @pytest.mark.parametrize("damping", [0.2, 0.7, 1.0, 3.0])
@@ -192,7 +194,7 @@ def test_a_regulator_reaches_its_set_point_up_and_down_and_no_faster_than_its_or
     system = plant(circuit, Isothermal())
     start = system.state_at(pressure=1e5)
     command = Schedule({"setpoint": ((0.0, 1e5), (0.1, 4e5), (1.2, 1.5e5))})
-    run = simulate(system, command, duration=3.0, start=start, method=Rodas4(1e-8))
+    run = simulate(system, command, duration=3.0, initial_state=start, integrator=Rodas4(1e-8))
     up, down = run["time"] < 1.2, run["time"] >= 1.2
     assert run["pressure"][up][-1] == pytest.approx(4e5, abs=200.0)
     assert run["pressure"][-1] == pytest.approx(1.5e5, abs=200.0)
@@ -206,7 +208,7 @@ def test_a_regulator_with_a_leak_stays_below_its_set_point_within_its_band():
     circuit = WithLeak(ProportionalRegulator(Supply(7e5), VALVE, VALVE, SecondOrderLag(50.0), 2e4), Valve(3e-9, 0.4))
     system = plant(circuit, Isothermal())
     command = Schedule({"setpoint": ((0.0, 3e5),)})
-    run = simulate(system, command, duration=4.0, start=system.state_at(pressure=0.0))
+    run = simulate(system, command, duration=4.0, initial_state=system.state_at(pressure=0.0))
     assert 3e5 - 2e4 < run["pressure"][-1] < 3e5 - 1e3
 
 
@@ -222,7 +224,7 @@ def test_a_set_point_beyond_the_range_is_refused():
 def test_a_tank_sags_while_air_is_drawn_and_recovers():
     system = plant(FillDischarge(Tank(Supply(6e5), Valve(3e-10, 0.4), 5e-4), VALVE, VALVE), Isothermal())
     start = system.state_at(pressure=0.0)
-    run = simulate(system, Schedule({"fill": ((0.5, 1), (1.5, 0))}), duration=40.0, start=start)
+    run = simulate(system, Schedule({"fill": ((0.5, 1), (1.5, 0))}), duration=40.0, initial_state=start)
     tank_pressure = run["supply.air_mass"] * 287.05 * AMBIENT.temperature / 5e-4 - AMBIENT.pressure
     assert tank_pressure[0] == pytest.approx(6e5)
     assert tank_pressure.min() < 5.2e5
@@ -233,7 +235,9 @@ def test_a_tank_left_to_itself_shares_its_air_with_the_muscle():
     """m R T = p1 V1 + p2 V2 isothermally; with the first law the energy is shared as well, U1 + U2."""
     for gas in (Isothermal(), ADIABATIC):
         system = plant(FillDischarge(Tank(Supply(6e5), Valve(0.0, 0.4), 5e-4, gas), VALVE, VALVE), gas)
-        run = simulate(system, Schedule({"fill": ((0.0, 1),)}), duration=20.0, start=system.state_at(pressure=0.0))
+        run = simulate(
+            system, Schedule({"fill": ((0.0, 1),)}), duration=20.0, initial_state=system.state_at(pressure=0.0)
+        )
         volume = system.muscles[0].geometry.volume(0.05)
         shared = (6e5 * 5e-4) / (5e-4 + volume)
         assert run["pressure"][-1] == pytest.approx(shared, abs=50.0)
@@ -245,7 +249,7 @@ def test_a_regulated_supply_droops_in_proportion_to_the_flow():
     """Steady: what the outlet gives is opening times what its valve passes, opening = (p_set - p)/B."""
     source = RegulatedSupply(Supply(8e5), WIDE, 5e5, 2e4)
     system = plant(WithLeak(FillDischarge(source, WIDE, VALVE), NARROW), Isothermal())
-    run = simulate(system, Schedule({"fill": ((0.0, 1.0),)}), duration=5.0, start=system.state_at(pressure=4e5))
+    run = simulate(system, Schedule({"fill": ((0.0, 1.0),)}), duration=5.0, initial_state=system.state_at(pressure=4e5))
     end = {s.name: run[s.name][-1] for s in system.states}
     outlet = source.air({"air_mass": end["supply.air_mass"]}, AMBIENT).pressure
     droop = 5e5 + AMBIENT.pressure - outlet
@@ -272,16 +276,16 @@ def test_branches_starve_each_other_on_one_tank():
     volume, start = system.muscles[0].geometry.volume(0.05), system.state_at(pressure=0.0)
     for greedy, filled in ((0.0, 1), (1.0, 2)):
         command = Schedule({"patient.fill": ((0.0, 1.0),), "greedy.fill": ((0.0, greedy),)})
-        run = simulate(system, command, duration=5.0, start=start)
+        run = simulate(system, command, duration=5.0, initial_state=start)
         assert run["m1.pressure"][-1] == pytest.approx(6e5 * 2e-4 / (2e-4 + filled * volume), abs=20.0)
         assert run["m0.pressure"][-1] == pytest.approx(greedy * run["m1.pressure"][-1], abs=20.0)
 
 
 def test_a_manifold_books_what_its_branches_draw():
     metered = WithEnergyMeters(CIRCUITS["manifold"])
-    start = metered.reset(metered.plant.state_at(pressure=1e5))
+    start = metered.extend_state(metered.plant.state_at(pressure=1e5))
     command = Schedule({"arm.command": ((0.0, 0.8), (0.3, -0.5)), "hand.fill": ((0.1, 1.0), (0.4, 0.0))})
-    run = simulate(metered, command, duration=0.6, start=start, method=Rodas4(1e-9))
+    run = simulate(metered, command, duration=0.6, initial_state=start, integrator=Rodas4(1e-9))
     grown = run["air_total"] - run["air_total"][0]
     np.testing.assert_allclose(grown, run["air_supplied"] - run["air_exhausted"], atol=1e-13)
     assert run["air_exhausted"][-1] > 1e-5
@@ -317,6 +321,6 @@ def test_what_cannot_be_is_refused_with_what_can(make, message):
 def test_a_muscle_that_leaks_empties_to_the_surroundings_and_rests_there():
     system = plant(WithLeak(ClosedChamber(), NARROW), Isothermal(), mechanism=HangingMass(1.0))
     start = system.state_at(pressure=3e5, position=0.02)
-    run = simulate(system, ZERO_INPUT, duration=60.0, start=start)
+    run = simulate(system, ZERO_INPUT, duration=60.0, initial_state=start)
     assert run["pressure"][-1] == pytest.approx(0.0, abs=20.0)
     assert np.isfinite(run["position"]).all()

@@ -28,8 +28,8 @@ from airmuscle.pneumatics.gas import (
     Isothermal,
     Polytropic,
 )
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
-from airmuscle.simulation.simulate import simulate
 
 AMBIENT = Ambient()
 WARM, SUPPLY = AMBIENT.temperature, 650e3
@@ -49,7 +49,9 @@ def charge(gas, absolute=AMBIENT.pressure, duration=1.0, rtol=1e-9):
     plant = vessel(gas)
     start = plant.state_at(pressure=absolute - AMBIENT.pressure)
     command = Schedule({"fill": ((0.0, 1.0),)})
-    return simulate(plant, command, duration=duration, start=start, method=Rodas4(rtol), output=duration / 200)
+    return simulate(
+        plant, command, duration=duration, initial_state=start, integrator=Rodas4(rtol), output_times=duration / 200
+    )
 
 
 def independent(heat_transfer, times):
@@ -105,7 +107,9 @@ def test_a_discharging_vessel_cools_along_the_adiabat():
     """Air that leaves takes c_p T along: T/T0 = (p/p0)^((gamma - 1)/gamma)."""
     plant = vessel(EnergyBalance(0.0))
     start = plant.state_at(pressure=5e5)
-    run = simulate(plant, Schedule({"discharge": ((0.0, 1.0),)}), duration=1.0, start=start, method=Rodas4(1e-10))
+    run = simulate(
+        plant, Schedule({"discharge": ((0.0, 1.0),)}), duration=1.0, initial_state=start, integrator=Rodas4(1e-10)
+    )
     p = run["pressure"] + AMBIENT.pressure
     np.testing.assert_allclose(run["temperature"], WARM * (p / p[0]) ** (0.4 / 1.4), rtol=1e-8)
     assert run["temperature"][-1] < 180.0

@@ -39,8 +39,8 @@ from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, FillDischarge, Supply, Valve
 from airmuscle.pneumatics.gas import Isothermal
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
-from airmuscle.simulation.simulate import simulate
 
 pressures, speeds = st.floats(-1e5, 8e5), st.floats(-2, 2)
 DAMPERS = [
@@ -100,7 +100,7 @@ def test_creep_relaxes_after_a_step_as_a_maxwell_element():
     plant = Plant(muscle, ClosedChamber(), Isometric(0.05), Isothermal())
     step = 1e-3
     start = plant.state_at(pressure=3e5, creep1=step, creep2=step)
-    run = simulate(plant, ZERO_INPUT, duration=5.0, start=start, method=Rodas4(1e-9))
+    run = simulate(plant, ZERO_INPUT, duration=5.0, initial_state=start, integrator=Rodas4(1e-9))
     t = run["time"]
     settled = muscle.tension(3e5, 0.05)
     expected = settled - step * (2e4 * np.exp(-t / 0.2) + 1e4 * np.exp(-t / 3.0))
@@ -112,7 +112,7 @@ def test_a_creeping_muscle_goes_on_to_contract_and_ends_where_it_would_without_c
     creeping = replace(plain, muscle=replace(chosen_muscle(), creep=CreepElements((2e4,), (0.3,))))
     ends = []
     for plant in (plain, creeping):
-        run = simulate(plant, ZERO_INPUT, duration=6.0, start=plant.state_at(pressure=4e5, position=0.03))
+        run = simulate(plant, ZERO_INPUT, duration=6.0, initial_state=plant.state_at(pressure=4e5, position=0.03))
         ends.append(run["position"])
     assert ends[1][-1] == pytest.approx(ends[0][-1], abs=1e-6)
     assert abs(ends[1][100] - ends[1][-1]) > 1e-4
@@ -149,9 +149,9 @@ def test_the_air_in_a_lagging_wall_counts_and_its_work_is_booked():
     muscle = replace(chosen_muscle(), wall=LaggingWall(5e-11, 0.05))
     valve = Valve(5e-9, 0.4)
     metered = WithEnergyMeters(Plant(muscle, FillDischarge(Supply(5e5), valve, valve), HangingMass(15.0)))
-    start = metered.reset(metered.plant.state_at(pressure=2e5))
+    start = metered.extend_state(metered.plant.state_at(pressure=2e5))
     command = Schedule({"fill": ((0.1, 1), (0.4, 0)), "discharge": ((0.8, 1), (1.0, 0))})
-    run = simulate(metered, command, duration=1.5, start=start, method=Rodas4(1e-9))
+    run = simulate(metered, command, duration=1.5, initial_state=start, integrator=Rodas4(1e-9))
     assert np.ptp(run["wall_volume"]) > 1e-5
     expected = run["energy_of_flow"] - run["work_of_air"]
     size = np.abs(run["energy_of_flow"]).max()
@@ -193,9 +193,9 @@ def test_an_end_stop_ends_the_way_and_the_book_of_the_load_still_closes():
     muscle = replace(chosen_muscle(), stop=STOP)
     valve = Valve(2e-8, 0.4)
     metered = WithEnergyMeters(Plant(muscle, FillDischarge(Supply(6e5), valve, valve), HangingMass(5.0)))
-    start = metered.reset(metered.plant.state_at(pressure=1e5))
+    start = metered.extend_state(metered.plant.state_at(pressure=1e5))
     command = Schedule({"fill": ((0.05, 1), (0.5, 0)), "discharge": ((0.7, 1), (0.9, 0))})
-    run = simulate(metered, command, duration=1.0, start=start, method=Rodas4(1e-10), output=1e-3)
+    run = simulate(metered, command, duration=1.0, initial_state=start, integrator=Rodas4(1e-10), output_times=1e-3)
     assert 0.1 < run["contraction"].max() < 0.11
     assert run["force"].min() < 0.0
     energy = run["kinetic_energy"] + run["potential_energy"]
@@ -238,7 +238,7 @@ def test_a_stiff_series_spring_tends_to_the_rigid_muscle():
         plant = Plant(muscle, FillDischarge(Supply(5e5), valve, valve), HangingMass(20.0))
         start = plant.state_at(pressure=3e5, position=0.01)
         command = Schedule({"fill": ((0.2, 1), (0.5, 0))})
-        courses.append(simulate(plant, command, duration=1.0, start=start, method=Rodas4(1e-8))["position"])
+        courses.append(simulate(plant, command, duration=1.0, initial_state=start, integrator=Rodas4(1e-8))["position"])
     apart = [np.abs(course - courses[0]).max() for course in courses[1:]]
     assert apart[0] > 1e-4
     assert apart[1] / apart[0] == pytest.approx(0.1, rel=0.15)
@@ -248,7 +248,9 @@ def test_a_slack_series_spring_pulls_nothing_and_pushes_nothing():
     muscle = in_series()
     assert muscle.pull(5e5, 0.05, 0.1, 0.0, {"inner_contraction": 0.05}).tension == 0.0
     plant = Plant(muscle, ClosedChamber(), HangingMass(1.0))
-    run = simulate(plant, ZERO_INPUT, duration=1.0, start=plant.state_at(pressure=1e5, position=0.05, speed=0.5))
+    run = simulate(
+        plant, ZERO_INPUT, duration=1.0, initial_state=plant.state_at(pressure=1e5, position=0.05, speed=0.5)
+    )
     assert run["force"].min() == 0.0
 
 
@@ -260,9 +262,9 @@ def test_the_books_of_load_muscle_and_air_close_with_everything_in_it():
     )  # fmt: skip
     valve = Valve(2e-8, 0.4)
     metered = WithEnergyMeters(Plant(muscle, FillDischarge(Supply(6e5), valve, valve), HangingMass(20.0)))
-    start = metered.reset(metered.plant.state_at(pressure=2e5, position=0.005))
+    start = metered.extend_state(metered.plant.state_at(pressure=2e5, position=0.005))
     command = Schedule({"fill": ((0.1, 1), (0.6, 0)), "discharge": ((0.8, 1), (1.1, 0))})
-    run = simulate(metered, command, duration=1.5, start=start, method=Rodas4(1e-9))
+    run = simulate(metered, command, duration=1.5, initial_state=start, integrator=Rodas4(1e-9))
     assert run["inner_contraction"].max() > 0.1
     given_out = run["work_of_tension"] + run["damping_heat"] + run["element_work"] + run["friction_work"]
     np.testing.assert_allclose(run["work_of_contractile"], given_out, atol=1e-6)

@@ -32,8 +32,8 @@ from airmuscle.pneumatics.gas import (
     Isothermal,
     Polytropic,
 )
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
-from airmuscle.simulation.simulate import simulate
 
 AMBIENT = Ambient()
 WARM = AMBIENT.temperature
@@ -189,7 +189,12 @@ def shock_tube(tube, gas, duration):
     plant = Plant(chosen_muscle(), WithTubes(FillDischarge(Supply(2.1e5), wide, wide), tube), Isometric(0.05), gas)
     start = plant.state_at(pressure=2e5)
     return simulate(
-        plant, Schedule({"fill": ((0.0, 1.0),)}), duration=duration, start=start, method=Rodas4(1e-6), output=1e-5
+        plant,
+        Schedule({"fill": ((0.0, 1.0),)}),
+        duration=duration,
+        initial_state=start,
+        integrator=Rodas4(1e-6),
+        output_times=1e-5,
     )
 
 
@@ -225,7 +230,7 @@ def test_a_lumped_tube_knows_no_delay_and_both_agree_once_the_waves_are_gone():
         start = plant.state_at(pressure=0.0)
         times = np.concatenate([np.arange(0.0, 0.02, 1e-4), np.arange(0.02, 1.0, 1e-3)])
         courses[type(tube).__name__] = simulate(
-            plant, Schedule({"fill": ((0.0, 1.0),)}), duration=1.0, start=start, output=times
+            plant, Schedule({"fill": ((0.0, 1.0),)}), duration=1.0, initial_state=start, output_times=times
         )
     lumped, distributed = courses["Tube"], courses["DistributedTube"]
     early = np.searchsorted(lumped["time"], 0.5 * length / 290.0)

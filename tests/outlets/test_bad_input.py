@@ -450,4 +450,4 @@ def test_without_a_place_for_compiled_code_the_remedy_is_named(plant: Plant, mon
     monkeypatch.setattr("airmuscle.compile.cache.kernel.importlib", SimpleNamespace(import_module=absent))
     monkeypatch.setattr(Kernel, "__call__", lambda kernel, *arguments: kernel._by_numba(arguments))
     with pytest.raises(FileError, match=r"no folder to keep compiled code in.* environment variable NUMBA_CACHE_DIR"):
-        simulate(plant, Schedule({}), duration=1.0, method=RungeKutta4(1e-3))
+        simulate(plant, Schedule({}), duration=1.0, integrator=RungeKutta4(1e-3))

@@ -21,8 +21,9 @@ from typer.testing import CliRunner
 from airmuscle.cli.app import app
 from airmuscle.control import PID, OnOffController, SplitRange
 from airmuscle.control.control_loop import ControlLoop
-from airmuscle.control.driver import PWM, SolenoidDriver, WithDrivers
+from airmuscle.control.driver import PWM, SolenoidDriver
 from airmuscle.control.inputs import ZERO_INPUT, Periodic, SampledSignal, Schedule
+from airmuscle.control.with_drivers import WithDrivers
 from airmuscle.core.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownNameError
 from airmuscle.report.run_chapter import in_words, run_chapter
 from airmuscle.scenario.scenario import load_scenario

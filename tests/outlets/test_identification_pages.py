@@ -19,7 +19,7 @@ from airmuscle.pneumatics.gas import Polytropic
 from airmuscle.recording import Recording, write_csv
 from airmuscle.reproduce.hosovsky_plant import Numbers, hanging
 from airmuscle.reproduce.hosovsky_plant import plant as third_paper
-from airmuscle.simulation.simulate import simulate
+from airmuscle.simulation import simulate
 
 DOCS = Path(__file__).parents[2] / "docs"
 LAW = load("dmsp-20-300").characteristic
@@ -52,7 +52,7 @@ def test_the_code_on_static_identification_runs(tmp_path, monkeypatch, capsys):
 def test_the_code_on_dynamic_identification_runs(capsys):
     plant = replace(third_paper(Numbers(), hanging(Numbers())), gas=Polytropic(1.2))
     command = Schedule({"fill": ((0.1, 1.0), (0.8, 0.0)), "discharge": ((1.0, 1.0),)})
-    exact = simulate(plant, command, duration=1.5, output=0.01)
+    exact = simulate(plant, command, duration=1.5, output_times=0.01)
     rng = np.random.default_rng(4)
     noise = {"pressure": 500.0, "position": 5e-5}
     records = [

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.control.driver import PWM, WithDrivers
+from airmuscle.control.driver import PWM
 from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
+from airmuscle.control.with_drivers import WithDrivers
 from airmuscle.report.run_chapter import MOST_PIECES, in_words, run_chapter
 from airmuscle.scenario.scenario import load_scenario
 

@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.control.driver import PWM, SolenoidDriver, WithDrivers
+from airmuscle.control.driver import PWM, SolenoidDriver
 from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
+from airmuscle.control.with_drivers import WithDrivers
 from airmuscle.core.errors import (
     AirmuscleError,
     ColumnError,

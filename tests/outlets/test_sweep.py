@@ -29,7 +29,7 @@ from airmuscle.cli.interruption import check_interrupted, deferred_sigint
 from airmuscle.core.errors import AirmuscleError, FileError, InputError, SimulationError
 from airmuscle.report.write import save_table
 from airmuscle.scenario.scenario import load_scenario
-from airmuscle.simulation.simulate import simulate
+from airmuscle.simulation import simulate
 from airmuscle.study import chunk, dask_cluster, fingerprint, load_study, processes, run_study
 from airmuscle.study.chapter import study_chapter, write_study
 from airmuscle.study.design import DESIGNS
@@ -266,7 +266,7 @@ def test_the_result_does_not_depend_on_the_size_of_a_chunk(folder: Path):
 def test_a_run_is_what_simulate_gives(folder: Path):
     result = run(folder)
     scenario = result.study.scenario(5)
-    alone = simulate(scenario.plant, scenario.command, duration=0.5, start=scenario.start, output=0.005)
+    alone = simulate(scenario.plant, scenario.command, duration=0.5, initial_state=scenario.start, output_times=0.005)
     assert result["pressure"][5] == pytest.approx(alone["pressure"][-1], rel=1e-12)
     assert result["course"][5] == pytest.approx(alone["force"][::10], rel=1e-9)
     assert scenario.plant.circuit.fill.conductance == result.study.values[5, 0]

@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 
 from airmuscle import cite, fit, load, load_data, read, read_csv, save, write_csv
-from airmuscle.control.driver import PWM, WithDrivers
+from airmuscle.control.driver import PWM
 from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
 from airmuscle.control.trajectory import spline_trajectory
+from airmuscle.control.with_drivers import WithDrivers
 from airmuscle.core.errors import AirmuscleError, ColumnError, FileError, ParameterError, UnknownNameError
 from airmuscle.mechanism import HangingMass, WithOffsets
 from airmuscle.muscle import LinearDamper, Muscle
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve, in_parallel, in_series
 from airmuscle.recording import Recording
-from airmuscle.simulation import integrators
-from airmuscle.simulation.simulate import advance, simulate
+from airmuscle.simulation import advance, integrators, simulate
 
 EDGE = Valve(2.6e-9, 0.433)
 CIRCUIT = FillDischarge(Supply(6e5), EDGE, EDGE)
@@ -93,8 +93,8 @@ CASES = {
     "class simulated": (lambda: simulate(Plant, FILL, duration=0.1), "simulate: <class .* is no plant"),
     "muscle advanced": (lambda: advance(MUSCLE, REST, {}, 0.1), "advance: Muscle.* is no plant; give Plant"),
     "advanced from": (lambda: advance(PLANT, REST, {}, 0.1, start_time="0 s"), "advance: start_time is '0 s'; it must"),
-    "method as class": (lambda: simulate(PLANT, FILL, duration=0.1, method=integrators.Rodas4), "the method is <class"),
-    "times as text": (lambda: simulate(PLANT, FILL, duration=0.1, output=["a"]), r"output is \['a'\]; give a spacing"),
+    "method as class": (lambda: simulate(PLANT, FILL, duration=0.1, integrator=integrators.Rodas4), "the method is <class"),
+    "times as text": (lambda: simulate(PLANT, FILL, duration=0.1, output_times=["a"]), r"output is \['a'\]; give a spacing"),
     "motion as text": (lambda: spline_trajectory("a", "b"), "follow: 'a' and 'b' are not times"),
     "sources of a name": (lambda: cite("dmsp-20-300"), r"cite: 'dmsp-20-300' is no model; .*cite\(load\("),
     "fit of a name": (lambda: fit("Sarosi2012", RUN), "fit: Sarosi2012 is no characteristic"),

@@ -24,8 +24,8 @@ from airmuscle.reproduce import hosovsky_fill as filling
 from airmuscle.reproduce import hosovsky_release as releasing
 from airmuscle.reproduce.hosovsky_plant import MATRIX, Numbers, hanging, latched, plant, surface, surface_fit
 from airmuscle.reproduce.hosovsky_schedule import FILLING
+from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import DormandPrince8, RungeKutta4
-from airmuscle.simulation.simulate import simulate
 
 NUMBERS = Numbers()
 
@@ -125,7 +125,7 @@ def ramp(law: ContractileSurface, contraction: float) -> Recording:
     muscle = Muscle(law, plant(NUMBERS, latched()).muscles[0].geometry, LinearSpring(0.0), LinearDamper(300.0))
     system = Plant(muscle, plant(NUMBERS, latched()).circuits[0], Isometric(contraction), Isothermal())
     opening = SampledSignal({"fill": ((0.0, 0.0), (4.0, 0.2))})
-    return simulate(system, opening, duration=20.0, start=system.state_at(pressure=40e3), output=0.2)
+    return simulate(system, opening, duration=20.0, initial_state=system.state_at(pressure=40e3), output_times=0.2)
 
 
 @pytest.mark.parametrize(("method", "coarse", "order"), [(RungeKutta4, 4e-3, 4), (DormandPrince8, 5e-2, 8)])
@@ -137,10 +137,12 @@ def test_a_taut_closed_muscle_without_kinks_is_solved_at_the_order_of_the_method
     start = rest | {"position": rest["position"] - 0.004}
 
     def end(method):
-        return simulate(system, ZERO_INPUT, duration=0.4, start=start, method=method, output=0.4)["position"][-1]
+        return simulate(system, ZERO_INPUT, duration=0.4, initial_state=start, integrator=method, output_times=0.4)[
+            "position"
+        ][-1]
 
     exact = end(DormandPrince8(5e-4))
-    assert simulate(system, ZERO_INPUT, duration=0.4, start=start)["force"].min() > 1.0
+    assert simulate(system, ZERO_INPUT, duration=0.4, initial_state=start)["force"].min() > 1.0
     errors = np.array([abs(end(method(coarse / 2**i)) - exact) for i in range(2)])
     assert order - 0.2 < np.log2(errors[0] / errors[1]) < order + 1.1  # the leading term is small: 8.9 at these steps
 
@@ -183,7 +185,9 @@ def test_a_component_in_the_limit_of_the_printed_one_changes_nothing(nothing):
 def test_the_effects_are_differences_of_two_runs(effects):
     adiabatic = next(e for e in effects if e.exchanged.what == "first law, adiabatic")
     runs = [
-        simulate(plant(NUMBERS, hanging(NUMBERS), gas=gas), filling.SCHEDULE, duration=25.0, output=adiabatic.time)
+        simulate(
+            plant(NUMBERS, hanging(NUMBERS), gas=gas), filling.SCHEDULE, duration=25.0, output_times=adiabatic.time
+        )
         for gas in (Isothermal(), EnergyBalance(0.0))
     ]
     np.testing.assert_allclose(runs[1]["pressure"] - runs[0]["pressure"], adiabatic.pressure, atol=30.0)

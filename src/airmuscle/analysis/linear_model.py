@@ -1,4 +1,4 @@
-"""A system near one state as a linear one: x' = A x + B u, y = C x + D u, with names, units and poles."""
+"""LinearModel: the linearisation of a system, x' = A x + B u, y = C x + D u, with names, units and poles."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..compile import System
+from ..compile.jacobians import derivatives
+from ..compile.program import compile_system
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError, ParameterError, suggestion
-from ..plant.columns import units_of
-from ..plant.plant import Plant
-from ..plant.state import check_state, state_vector
-from .equilibrium import given_inputs
+from ..core.system import System
+from ..plant.state import check_system, state_vector
+from ..plant.units import column_units
+from .equilibrium import complete_inputs
 from .static_stiffness import Stiffness, stiffness
 
 
@@ -30,14 +31,14 @@ class Pole(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LinearModel:
-    """dx' = A dx + B du,  dy = C dx + D du: departures from the state and inputs that it was made at.
+    """dx' = A dx + B du,  dy = C dx + D du: deviations from the operating point, a state and inputs.
 
     A, B, C, D      (n, n), (n, m), (k, n), (k, m)
     states, inputs, outputs    names, in the order of rows and columns; the states are among the outputs
     units           unit of every name
-    state, given    the values of the states and inputs that it was made at
-    rates           (n,) what the states' rates were there: all zero at a rest
-    stiffness       of a Plant, both of its stiffnesses there; None for another system
+    state, input_values    the operating point
+    rates           (n,) rates of the states there: all zero at an equilibrium
+    stiffness       of a Plant, its stiffness at constant pressure and with shut valves; None for another system
     """
 
     A: Array
@@ -78,13 +79,13 @@ class LinearModel:
         found = []
         for f in np.atleast_1d(np.asarray(frequencies, dtype=float)):
             if not (np.isfinite(f) and f >= 0):
-                raise ParameterError(f"response: a frequency is {f!r} Hz; it must be finite and not negative.")
+                raise ParameterError(f"frequency_response: a frequency is {f!r} Hz; it must be finite and not negative.")
             shifted = 2j * math.pi * f * np.eye(len(self.states)) - self.A
             try:
                 found.append(self.C @ np.linalg.solve(shifted, self.B) + self.D)
             except np.linalg.LinAlgError:
                 raise ParameterError(
-                    f"response: there is a pole at {f:g} Hz, as shut-in air is at 0 Hz, and the response is "
+                    f"frequency_response: there is a pole at {f:g} Hz, as shut-in air is at 0 Hz, and the response is "
                     "infinite. Choose another frequency."
                 ) from None
         return np.array(found, dtype=complex)
@@ -120,43 +121,29 @@ class LinearModel:
 
 
 def linearise(plant: System, state: Mapping[str, float], inputs: Mapping[str, float] | None = None) -> LinearModel:
-    """A system near a state and inputs (0 unless given), by exact derivatives of the equations that are simulated.
+    """A system linearised at a state and inputs (0 unless given), by exact derivatives of the simulated equations.
 
     At a kink - a valve just shut, a muscle just slack, a stop just touched - derivatives are those of one side, and
     where two kinks meet, as in the middle of a valve without overlap, of one side of each: choose a state away from
-    it. The state need not be a rest; `rates` says whether it is. Raises ParameterError for an unknown or missing name,
-    or an input beyond its range.
+    it. The state need not be an equilibrium; `rates` says whether it is. Raises ParameterError for an unknown or
+    missing name, or an input beyond its range.
     """
-    from ..compile.jacobians import derivatives
-    from ..compile.program import compile_system
-
+    check_system("linearise", plant)
     x = state_vector(plant, state).tolist()
-    if isinstance(plant, Plant):
-        check_state(plant, state)
-    given = _inputs(plant, inputs or {})
-    names, u = [s.name for s in plant.states], list(given.values())
-    if not np.isfinite(u).all():
-        raise ParameterError(f"linearise: inputs must be finite; they are {given}.")
-    ready = compile_system(plant)
-    at = derivatives(ready, x, u)
-    further = [i for i, name in enumerate(ready.output_names) if name not in names]
+    plant.check_state(state)
+    values = complete_inputs(plant, inputs)
+    names, u = [s.name for s in plant.states], list(values.values())
+    compiled = compile_system(plant)
+    at = derivatives(compiled, x, u)
+    further = [i for i, name in enumerate(compiled.output_names) if name not in names]
     return LinearModel(
         at.rates_by_state, at.rates_by_input,
         np.vstack([np.eye(len(names)), at.outputs_by_state[further]]),
-        np.vstack([np.zeros((len(names), len(given))), at.outputs_by_input[further]]),
-        tuple(names), tuple(given), (*names, *(ready.output_names[i] for i in further)),
-        units_of(plant, ready.output_names), dict(zip(names, x, strict=True)), given, at.rates,
-        stiffness(plant, state) if isinstance(plant, Plant) else None,
+        np.vstack([np.zeros((len(names), len(values))), at.outputs_by_input[further]]),
+        tuple(names), tuple(values), (*names, *(compiled.output_names[i] for i in further)),
+        column_units(plant, compiled.output_names), dict(zip(names, x, strict=True)), values, at.rates,
+        stiffness(plant, state) if plant.equilibrium_plant is plant else None,
     )  # fmt: skip
-
-
-def _inputs(plant: System, inputs: Mapping[str, float]) -> dict[str, float]:
-    if isinstance(plant, Plant):
-        return given_inputs(plant, inputs)
-    for name in inputs:
-        if name not in plant.inputs:
-            raise ParameterError(f"the system has no input '{name}'; there are {', '.join(plant.inputs) or 'none'}.")
-    return {name: float(inputs.get(name, 0.0)) for name in plant.inputs}
 
 
 def _places(kind: str, wanted: Sequence[str] | None, known: tuple[str, ...]) -> list[int]:

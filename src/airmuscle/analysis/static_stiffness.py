@@ -1,4 +1,4 @@
-"""The two stiffnesses of a muscle and of what it moves: at constant pressure, and with shut valves."""
+"""Stiffness of a muscle and of its load: at constant pressure, and with shut valves."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ..core.ops import Value
 from ..muscle import Muscle, SeriesSpring
 from ..plant.muscle_state import MuscleState
 from ..plant.plant import Plant
-from ..plant.state import check_state, state_vector
+from ..plant.state import state_vector
 from ..pneumatics.gas import NO_FLOW, gauge
 
 
 class StiffnessPair(NamedTuple):
-    """The same stiffness while the pressure stays what it is, and while the air is shut in; the unit is the owner's."""
+    """A stiffness at constant pressure and with shut valves, in the unit of its owner."""
 
     constant_pressure: float
     shut_valves: float
@@ -28,8 +28,8 @@ class Stiffness:
 
     muscles      of every muscle by its name, -dF/deps [N]
     per_metre    the same by length, dF/dL [N/m]
-    coordinates  what the muscles give every coordinate against its own motion, -dQ/dq [N/m, N m/rad], with the
-                 change of their arms; the mechanism's own springs and weights are not in it
+    coordinates  of every coordinate, -dQ/dq [N/m, N m/rad], with the change of the muscles' moment arms; the springs
+                 and weights of the mechanism are not included
     """
 
     muscles: Mapping[str, StiffnessPair]
@@ -43,14 +43,14 @@ def stiffness(plant: Plant, state: Mapping[str, float]) -> Stiffness:
         k_p = -dF/deps,   k_m = k_p - (dF/dp) (dp/deps),   dp/deps by the gas with no flow and no heat
                                                           (polytropic: -n p_abs/V dV/deps)
 
-    With shut valves a muscle that is pulled takes up pressure, and is stiffer. Isothermal and polytropic air follow
-    their process; with EnergyBalance the pull is too quick for heat, so adiabatic, and a slow one is that of
-    Isothermal. A series spring stands in series: 1/k = 1/k_inside + 1/k_SE. Friction, creep and wall do not move. A
-    slack muscle has none. Raises ParameterError for an unknown or missing name and for what cannot be, OutOfReach where
-    a muscle cannot take its contraction.
+    With shut valves the pressure rises where a muscle is stretched, and the muscle is stiffer. Isothermal and
+    polytropic air follow their process; with EnergyBalance the motion is taken as adiabatic; that of a slow motion is
+    Isothermal's. A series spring acts in series: 1/k = 1/k_inner + 1/k_SE. Friction, creep and wall do not move. A
+    slack muscle has none. Raises ParameterError for an unknown or missing name and for an impossible state,
+    GeometryLimitError where a muscle cannot take its contraction.
     """
     state_vector(plant, state)
-    check_state(plant, state)
+    plant.check_state(state)
     ports = plant.muscle_states(state)
     found = [_of_muscle(plant, muscle, port) for muscle, port in zip(plant.muscles, ports, strict=True)]
     names = [m.name for m in plant.muscles]
@@ -67,7 +67,7 @@ def stiffness(plant: Plant, state: Mapping[str, float]) -> Stiffness:
 
 def _of_muscle(plant: Plant, muscle: Muscle, port: MuscleState) -> StiffnessPair:
     by_pressure, by_contraction = _slopes(muscle, port)
-    squeezed = _pressure_growth(plant, muscle, port)
+    squeezed = _pressure_slope(plant, muscle, port)
     inside = (0.0 - by_contraction, 0.0 - by_contraction - by_pressure * squeezed)
     if not isinstance(muscle.series, SeriesSpring):
         return StiffnessPair(*inside)
@@ -87,7 +87,7 @@ def _slopes(muscle: Muscle, port: MuscleState) -> tuple[float, float]:
     return float(along[0]), float(along[1])
 
 
-def _pressure_growth(plant: Plant, muscle: Muscle, port: MuscleState) -> float:
+def _pressure_slope(plant: Plant, muscle: Muscle, port: MuscleState) -> float:
     """dp/deps [Pa] of the air shut in: its pressure by volume and by what the gas law makes of its content."""
     content = {s.name: port.states[s.name] for s in plant.gas.states(port.volume, plant.ambient)}
     names = list(content)

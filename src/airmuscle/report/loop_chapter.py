@@ -9,7 +9,7 @@ import numpy as np
 
 from ..control.control_loop import ControlLoop
 from ..control.controller import relative_unit
-from ..control.inputs import PiecewiseLinear
+from ..control.piecewise_linear import PiecewiseLinear
 from ..core.plotting import BLACK, BLUE, legend_below, new_figure
 from ..recording import Recording
 from ..recording.plot import scale

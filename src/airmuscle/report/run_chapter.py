@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
-from ..control.driver import WithDrivers
 from ..control.inputs import InputSignal, Periodic, SampledSignal, Schedule
+from ..control.with_drivers import WithDrivers
 from ..core.plotting import BLACK, BLUE, legend_below, new_figure
 from ..core.reference import cite
 from ..recording import Recording

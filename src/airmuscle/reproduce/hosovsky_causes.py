@@ -21,7 +21,7 @@ from ..pneumatics.gas import EnergyBalance, Gas, Polytropic
 from ..recording import Recording
 from ..report.chapter import Plot, Table
 from ..simulation.integrators import Rodas4
-from ..simulation.simulate import simulate
+from ..simulation import simulate
 from .hosovsky_plant import MATRIX, Chosen, Numbers, hanging, plant
 from .hosovsky_schedule import DISCHARGING, DURATION, FILLING, SCHEDULE
 
@@ -143,7 +143,7 @@ def effects(numbers: Numbers, suspected: Suspected) -> tuple[Effect, ...]:
 
 
 def _run(exchanged: Exchanged, numbers: Numbers) -> Recording:
-    return simulate(exchanged.plant(numbers), SCHEDULE, duration=DURATION, method=Rodas4(1e-7), output=SPACING)
+    return simulate(exchanged.plant(numbers), SCHEDULE, duration=DURATION, integrator=Rodas4(1e-7), output_times=SPACING)
 
 
 def _effect(base: Recording, exchanged: Exchanged, run: Recording) -> Effect:

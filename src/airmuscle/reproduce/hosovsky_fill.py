@@ -12,7 +12,7 @@ from ..pneumatics import Valve
 from ..recording import Recording
 from ..report.chapter import AtMost, Claim, Equal, Plot
 from ..simulation.integrators import DormandPrince8, Integrator, Rodas4
-from ..simulation.simulate import simulate
+from ..simulation import simulate
 from .hosovsky_plant import MATRIX, PAPER, Numbers, hanging, plant
 from .hosovsky_schedule import DISCHARGING, DURATION, FILLING, SCHEDULE
 
@@ -33,7 +33,7 @@ def run_fill(numbers: Numbers, valve: Valve = MATRIX) -> Fill:
 
 
 def _run(system: Plant, method: Integrator) -> Recording:
-    return simulate(system, SCHEDULE, duration=DURATION, method=method)
+    return simulate(system, SCHEDULE, duration=DURATION, integrator=method)
 
 
 def figure_3(fill: Fill) -> Plot:
@@ -73,7 +73,7 @@ def valve_figure(valve: Valve, temperature: float) -> Plot:
 def choke_ends_at(plant: Plant) -> tuple[float, float]:
     """The muscle's absolute pressure [Pa] at which the filling flow begins to fall, and its growth in a row [Pa]."""
     spacing = np.append(np.arange(FILLING[0], FILLING[0] + 1.0, 1e-4), DURATION)
-    run = simulate(plant, SCHEDULE, duration=DURATION, method=Rodas4(1e-8), output=spacing)
+    run = simulate(plant, SCHEDULE, duration=DURATION, integrator=Rodas4(1e-8), output_times=spacing)
     filling = (run["time"] >= FILLING[0]) & (run["time"] < FILLING[0] + 1.0)
     flow, pressure = run["mass_flow"][filling], run["pressure"][filling] + plant.ambient.pressure
     subsonic = int(np.argmax(flow < flow.max() * (1 - 1e-9)))

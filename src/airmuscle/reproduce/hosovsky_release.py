@@ -13,7 +13,7 @@ from ..core.plotting import DASHES, LINES, legend_below, new_figure
 from ..recording import Recording
 from ..report.chapter import AtLeast, AtMost, Claim, Plot, Table
 from ..simulation.integrators import Rodas4
-from ..simulation.simulate import simulate
+from ..simulation import simulate
 from .hosovsky_plant import MAPS, PAPER, Numbers, latched, plant
 
 RELEASED_AT, DURATION = 0.5, 6.0
@@ -38,7 +38,8 @@ def release(numbers: Numbers, pressure: float, data: str = MAPS[0]) -> Release:
     """Clamped at zero contraction at a gauge pressure [Pa], valves shut, then let go."""
     system = plant(numbers, latched(), data=data)
     run = simulate(
-        system, SCHEDULE, duration=DURATION, start=system.state_at(pressure=pressure), method=Rodas4(1e-9), output=1e-3
+        system, SCHEDULE, duration=DURATION, initial_state=system.state_at(pressure=pressure),
+        integrator=Rodas4(1e-9), output_times=1e-3
     )
     free = run["time"] >= RELEASED_AT
     ratio, rate = damping(run["time"][free], run["position"][free], run["speed"][free])

@@ -29,8 +29,8 @@ from ..core.variables import Input
 from ..library.build import build
 from ..library.location import Location, checked, finite, located_errors, number
 from ..library.models import model_class, model_names
-from ..plant.columns import units_of
 from ..plant.plant import Plant
+from ..plant.units import column_units
 from .inputs import command_from, drivers_from
 
 KEYS = ("period", "setpoint")
@@ -40,7 +40,7 @@ KEYS = ("period", "setpoint")
 def units_around(plant: Plant, start: Mapping[str, float]) -> dict[str, str]:
     """The units of the states, outputs and inputs that a run of a plant has in columns; '' where none is known."""
     outputs = list(plant.outputs(start, dict.fromkeys(plant.inputs, 0.0)))
-    units = units_of(plant, outputs)
+    units = column_units(plant, outputs)
     return {name: units[name] for name in (*(s.name for s in plant.states), *outputs, *plant.inputs)}
 
 

@@ -37,6 +37,7 @@ from typing import Any
 
 import numpy as np
 
+from ..compile.program import compile_system
 from ..core import tree
 from ..core.errors import ParameterError
 from ..identify.dynamic import DynamicFit, Experiment, InitialConditions, StartTime, StartValue, fit_dynamic
@@ -48,8 +49,8 @@ from ..library.write import scenario_toml
 from ..plant.plant import Plant
 from ..recording import Recording, read
 from ..recording.columns import quantity_of
-from ..simulation.arguments import check_input_range
-from ..simulation.integrators import Integrator
+from ..simulation import Integrator
+from ..simulation.problem import check_input_range
 from .inputs import command_from
 from .scenario import plant_from
 
@@ -254,7 +255,7 @@ class _Record:
         command = command_from(table, plant.input_variables, at)
         with located_errors(at):
             length = max(float(recording["time"][-1]) - start_time, 1e-9)
-            check_input_range(plant, command.segments(plant.inputs, 0.0, length), 0.0)
+            check_input_range(compile_system(plant), command.segments(plant.inputs, 0.0, length), 0.0)
         return Experiment(recording, command, self.start(plant, recording), start_time, plant), table
 
     def plant(self) -> Plant:

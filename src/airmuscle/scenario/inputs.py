@@ -15,8 +15,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..control.driver import Driver, SolenoidDriver, WithDrivers
+from ..control.driver import Driver, SolenoidDriver
 from ..control.inputs import NO_INPUT, InputSignal, Periodic, SampledSignal, Schedule, check_input_names
+from ..control.with_drivers import WithDrivers
 from ..core.errors import ColumnError, ParameterError
 from ..core.variables import Input
 from ..library.build import build

@@ -28,10 +28,11 @@ from types import MappingProxyType, NoneType
 from typing import Any
 
 from ..analysis.equilibrium import find_equilibrium
+from ..compile.program import compile_system
 from ..characteristic.base import ForceLaw
 from ..control.control_loop import ControlLoop
-from ..control.driver import WithDrivers
 from ..control.inputs import InputSignal
+from ..control.with_drivers import WithDrivers
 from ..core.errors import ParameterError, suggestion
 from ..library.build import build
 from ..library.catalogue import load, parsed
@@ -40,9 +41,8 @@ from ..library.location import Location, check_keys, checked, finite, located_er
 from ..muscle import Muscle
 from ..plant.plant import Plant
 from ..recording import Recording
-from ..simulation.arguments import check_input_range
-from ..simulation.integrators import Integrator, Rodas4
-from ..simulation.simulate import simulate
+from ..simulation import Integrator, Rodas4, simulate
+from ..simulation.problem import check_input_range
 from .controller import loop_from, units_around
 from .inputs import command_from
 
@@ -74,10 +74,10 @@ class Scenario:
             self.plant,
             self.command,
             duration=self.duration,
-            start=self.start,
+            initial_state=self.start,
             start_time=self.start_time,
-            method=self.method,
-            output=self.output,
+            integrator=self.method,
+            output_times=self.output,
             complete=complete,
         )
 
@@ -112,7 +112,7 @@ def scenario_from(
     command = _command(table, plant, start, duration, place.inside("command"))
     shown = WithDrivers(command.other_inputs, command.drivers) if isinstance(command, ControlLoop) else command
     with located_errors(place.inside("command")):
-        check_input_range(plant, shown.segments(plant.inputs, start_time, duration), start_time)
+        check_input_range(compile_system(plant), shown.segments(plant.inputs, start_time, duration), start_time)
     known = list(units_of_run(plant, start, command))
     return Scenario(
         title=text(tables, "title", place, needed=False) or Path(place.file).stem,

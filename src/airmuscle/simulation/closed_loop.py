@@ -119,6 +119,9 @@ class _Run:
         inputs = prepared.inputs
         inputs.values[first:last, prepared.commanded] = state.commanded
         times = prepared.times[prepared.row_offsets[k] : prepared.row_offsets[k + 1]]
+        ends: Any
+        values: Any
+        slopes: Any
         if self.chains:
             part = PiecewiseLinear(inputs.ends[first:last], inputs.values[first:last], inputs.slopes[first:last])
             columns = [part.column(i) for i in range(inputs.values.shape[1])]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..compile.cache.kernel import Kernel, fixed_step, rodas4
 from ..compile.program import CompiledSystem, Tableau
-from ..control.inputs import PiecewiseLinear
+from ..control.piecewise_linear import PiecewiseLinear
 from ..core.arrays import Array
 from ..core.declaration import model, parameter
 from ..core.errors import ParameterError

@@ -82,7 +82,7 @@ class ScenarioTemplate:
             if isinstance(number.at, int):
                 leaves_of_each[:, number.at] = column
         pressures, inputs = (pressure,) * len(plant.muscles), np.zeros(len(plant.inputs))
-        found = find_equilibrium_of_each(compile_system(plant), leaves_of_each, pressures, inputs).states
+        found = find_equilibrium_of_each(compile_system(plant), leaves_of_each, pressures, inputs)
         names = [s.name for s in plant.states]
         return [dict(zip(names, x, strict=True)) if np.isfinite(x).all() else None for x in found.tolist()]
 

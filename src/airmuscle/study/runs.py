@@ -10,8 +10,8 @@ from ..core.arrays import Array
 from ..core.errors import AirmuscleError, SimulationError
 from ..recording import Recording
 from ..scenario.scenario import Scenario
-from ..simulation.arguments import output_times
-from ..simulation.simulate import simulate
+from ..simulation import simulate
+from ..simulation.output_times import output_times
 
 REFUSALS = (AirmuscleError, ArithmeticError, ValueError)
 """What one run of many may end by, from values that nobody foresaw, without ending the others."""
@@ -28,10 +28,10 @@ def simulate_all(scenarios: Sequence[Scenario], instants: Array) -> Iterator[Rec
                 scenario.plant,
                 scenario.command,
                 duration=scenario.duration,
-                start=scenario.start,
+                initial_state=scenario.start,
                 start_time=scenario.start_time,
-                method=scenario.method,
-                output=_rows(scenario, instants),
+                integrator=scenario.method,
+                output_times=_rows(scenario, instants),
             )
         except REFUSALS as error:
             if isinstance(error, SimulationError) and error.interrupted:

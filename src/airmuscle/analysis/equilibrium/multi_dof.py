@@ -1,95 +1,128 @@
-"""Where several coordinates of a plant are in balance: Newton's method from many places."""
+"""Where a plant with several coordinates is in balance: Newton's method from many places at once."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
+import numpy.typing as npt
 
 from ...core.arrays import Array
-from .statics import StaticProblem
+from .statics import Rows, Statics
 
 STARTS = 60
-"""Places from which the search begins, spread evenly over what the muscles can take."""
+"""Places from which the search begins, spread evenly over what the muscles can take (chosen)."""
 ITERATIONS = 40
 BALANCED = 1e-8
-"""Imbalance that counts as none, as a share of the greatest at the starts."""
+"""Imbalance that counts as none, relative to the greatest at the starts (chosen)."""
 APART = 1e-6
-"""Rests closer than this share of a coordinate's nominal size are one."""
+"""Equilibria closer than this part of a coordinate's nominal size are one (chosen)."""
 
 
-def places_of_several(static: StaticProblem) -> list[Array]:
-    """Every place of balance that a start leads to, sorted by its coordinates."""
-    sizes = np.array([c.nominal for c in static.coordinates])
-    begun = [(x, static.accelerations(static.place(x))) for x in starts(static)]
-    balance = BALANCED * max((np.abs(f).max() for _, f in begun), default=0.0)
+def equilibria_of_several_coordinates(statics: Statics) -> tuple[Rows, Array]:
+    """The row of its plant and the place (d,) of every balance that a start leads to, by row and place."""
+    rows, places = [], []
+    for row in range(len(statics.parameters)):
+        found = _places(statics.of(np.array([row])))
+        rows += [row] * len(found)
+        places += found
+    return np.array(rows, dtype=np.intp), np.array(places).reshape(len(rows), len(statics.coordinates))
+
+
+def _places(one: Statics) -> list[Array]:
+    """Every place of balance of one plant that a start leads to, sorted by its coordinates."""
+    sizes = one.nominal_sizes()
+    x = starts(one)
+    if not len(x):
+        return []
+    f = one.accelerations(x[None])[0]
     found: list[Array] = []
-    for x, f in begun:
-        place = _newton(static, x, f, sizes, balance)
-        if place is not None and all(np.abs((place - other) / sizes).max() > APART for other in found):
+    for place in _newton(one, x, f, sizes, BALANCED * np.abs(f).max()):
+        if all(np.abs((place - other) / sizes).max() > APART for other in found):
             found.append(place)
     return sorted(found, key=tuple)
 
 
-def starts(static: StaticProblem) -> Iterator[Array]:
-    """Places within reach, from contractions of the muscles that are spread evenly (an additive recurrence)."""
-    low, high = np.array(static.reach).T
+def starts(one: Statics) -> Array:
+    """Places (K, d) within reach of one plant, from contractions that are spread evenly (an additive recurrence)."""
+    limits = [[float(np.asarray(end).flat[0]) for end in ends] for ends in one.contraction_limits]
+    low, high = np.array(limits).T
     high = np.minimum(high, 0.5)  # further on a muscle is past its greatest volume
-    count = low.size
     root = 2.0
     for _ in range(30):
-        root = (1.0 + root) ** (1.0 / (count + 1))
-    steps = root ** -np.arange(1.0, count + 1)
-    for i in range(STARTS):
-        target = low + (high - low) * ((0.5 + i * steps) % 1.0)
-        x = _place_of(static, target)
-        if static.within_reach(static.place(x)) and np.isfinite(static.accelerations(static.place(x))).all():
-            yield x
+        root = (1.0 + root) ** (1.0 / (low.size + 1))
+    steps = root ** -np.arange(1.0, low.size + 1)
+    targets = low + (high - low) * ((0.5 + np.arange(STARTS)[:, None] * steps) % 1.0)
+    x = _place_of(one, targets)
+    inside = one.within_reach(x[None])[0]
+    inside &= np.isfinite(one.accelerations(x[None])[0]).all(axis=1)
+    return x[inside]
 
 
-def _place_of(static: StaticProblem, target: Array) -> Array:
-    """The coordinates whose contractions are nearest to these."""
-    sizes = np.array([c.nominal for c in static.coordinates])
-    x = np.zeros(sizes.size)
+def _contractions(one: Statics, x: Array) -> Array:
+    """Contractions (K, muscles) at places (K, d)."""
+    return np.stack([eps[0] for eps in one.contractions(x[None])], axis=-1)
+
+
+def _place_of(one: Statics, targets: Array) -> Array:
+    """The coordinates (K, d) whose contractions are nearest to these (K, muscles)."""
+    sizes: Array = one.nominal_sizes()
+    x: Array = np.zeros((len(targets), sizes.size))
     for _ in range(4):
-        at = np.array(static.contractions(static.place(x)))
-        slopes = np.column_stack([
-            np.array(static.contractions(static.place(x + 1e-6 * step))) - at for step in np.diag(sizes)
-        ]) / 1e-6  # fmt: skip
-        x = x + sizes * np.linalg.lstsq(slopes, target - at, rcond=None)[0]
-    return np.asarray(x)
+        at = _contractions(one, x)
+        nudged = [_contractions(one, x + 1e-6 * step) for step in np.diag(sizes)]
+        slopes = np.stack([(value - at) / 1e-6 for value in nudged], axis=-1)
+        x = np.add(x, sizes * _least_squares(slopes, targets - at, 1e-15))
+    return x
 
 
-def _newton(static: StaticProblem, x: Array, f: Array, sizes: Array, balance: float) -> Array | None:
-    """The place of balance that Newton's method finds from x, with steps halved until the imbalance falls."""
+def _least_squares(matrices: Array, right: Array, rcond: float) -> Array:
+    """Least squares solutions (K, d) of matrices (K, r, d); NaN where a matrix is not finite."""
+    solution: Array = np.full((len(matrices), matrices.shape[2]), np.nan)
+    finite = np.isfinite(matrices).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
+    solution[finite] = np.einsum("kdr,kr->kd", np.linalg.pinv(matrices[finite], rcond=rcond), right[finite])
+    return solution
+
+
+def _newton(one: Statics, x: Array, f: Array, sizes: Array, balance: float) -> list[Array]:
+    """The places of balance that Newton's method finds from x (K, d), its steps halved until the imbalance falls."""
+    found = []
     for _ in range(ITERATIONS):
-        step = _step(static, x, f, sizes)
-        if not np.isfinite(step).all():
-            return None
-        if np.abs(step / sizes).max() < 1e-13:
-            return x if np.abs(f).max() <= balance else None
-        for share in 0.5 ** np.arange(12):
-            ahead = x + share * step
-            after = static.accelerations(static.place(ahead)) if static.within_reach(static.place(ahead)) else None
-            if after is not None and np.abs(after).max() < np.abs(f).max():
-                break
-        else:
-            return x if np.abs(f).max() <= balance else None
-        x, f = ahead, after
-    return None
+        step = _steps(one, x, f, sizes)
+        ahead, after, fell = _descend(one, x, f, step)
+        ended = (np.abs(step / sizes).max(axis=1) < 1e-13) | ~fell
+        found += list(x[ended & np.isfinite(step).all(axis=1) & (np.abs(f).max(axis=1) <= balance)])
+        x, f = ahead[~ended], after[~ended]
+        if not len(x):
+            break
+    return found
 
 
-def _step(static: StaticProblem, x: Array, f: Array, sizes: Array) -> Array:
-    width = 1e-5
-    slopes = np.empty((f.size, x.size))
-    for k, nudge in enumerate(np.diag(width * sizes)):
-        ahead, back = (x + sign * nudge for sign in (1.0, -1.0))
-        ends = [p if static.within_reach(static.place(p)) else x for p in (ahead, back)]
-        span = (ends[0] - ends[1])[k] / sizes[k]
-        at = [static.accelerations(static.place(end)) for end in ends]
-        slopes[:, k] = (at[0] - at[1]) / span if span else np.nan
-    if not np.isfinite(slopes).all():
-        return np.full(x.size, np.nan)
-    rows = np.abs(slopes).max(axis=1)
-    rows[rows == 0] = 1.0
-    return np.asarray(-sizes * np.linalg.lstsq(slopes / rows[:, None], f / rows, rcond=1e-14)[0])
+def _descend(one: Statics, x: Array, f: Array, step: Array) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+    """Places ahead, the imbalance there, and for which of them a part of the step makes it smaller."""
+    ahead, after, fell = x.copy(), f.copy(), np.zeros(len(x), dtype=bool)
+    waiting = np.flatnonzero(np.isfinite(step).all(axis=1))
+    for part in 0.5 ** np.arange(12):
+        if not waiting.size:
+            break
+        trial = x[waiting] + part * step[waiting]
+        at = one.accelerations(trial[None])[0]
+        with np.errstate(invalid="ignore"):
+            better = np.abs(at).max(axis=1) < np.abs(f[waiting]).max(axis=1)
+        better &= one.within_reach(trial[None])[0]
+        rows = waiting[better]
+        ahead[rows], after[rows], fell[rows] = trial[better], at[better], True
+        waiting = waiting[~better]
+    return ahead, after, fell
+
+
+def _steps(one: Statics, x: Array, f: Array, sizes: Array) -> Array:
+    """Newton's step (K, d) by central differences, one-sided at the ends of the reach; NaN where there is none."""
+    slopes = np.empty((len(x), f.shape[1], x.shape[1]))
+    for k, nudge in enumerate(np.diag(1e-5 * sizes)):
+        ends = [np.where(one.within_reach(p[None])[0][:, None], p, x) for p in (x + nudge, x - nudge)]
+        span = (ends[0] - ends[1])[:, k] / sizes[k]
+        difference = one.accelerations(ends[0][None])[0] - one.accelerations(ends[1][None])[0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slopes[:, :, k] = difference / span[:, None]
+    scale = np.abs(slopes).max(axis=2)
+    scale[scale == 0.0] = 1.0
+    return np.asarray(-sizes * _least_squares(slopes / scale[:, :, None], f / scale, 1e-14))

@@ -1,4 +1,4 @@
-"""Where the coordinates of many plants are in balance, each between the places at which it was looked at."""
+"""Roots of one function for each of many plants, between the places at which it was evaluated."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ...core.arrays import Array
 Rows = npt.NDArray[np.intp]
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 JUMP = 1e-6
-"""What may be left at a root, as a share of the middle one of all places; a function that has more there changes its
+"""What may be left at a root, relative to the median of all places; a function that has more there changes its
 sign by a jump (chosen)."""
 CLOSE = 1e-13
-"""Step that ends a search for a root, as a share of the way that it began with: what is left is far less (chosen)."""
+"""Step that ends a search for a root, relative to the interval that it began with: what is left is far less (chosen)."""
 
 
 class SingleDofPlants(Protocol):

@@ -1,4 +1,4 @@
-"""Where the one coordinate of a plant is in balance, looked for over the whole reach of its muscles."""
+"""Where plants with one coordinate are in balance, sought over the whole reach of their muscles."""
 
 from __future__ import annotations
 
@@ -8,80 +8,101 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
-from ...core.errors import EquilibriumError, GeometryLimitError
 from .roots import balances
-from .statics import StaticProblem
+from .statics import Rows, Statics
 
-PLACES = 101
-"""Places looked at between the ends of the reach."""
+GRID_POINTS = 101
+"""Places that are evaluated between the ends of the reach."""
 
 
-def places(static: StaticProblem) -> list[float]:
-    """Every coordinate of balance, rising. Raises NoEquilibrium where the plant is in balance anywhere."""
-    alone, x = _Alone(static), grid(static)[None, :]
-    f = alone.accelerations(x)
-    if not f.any():
-        kind = type(static.plant.mechanism).__name__
-        raise EquilibriumError(
-            f"{kind} rests wherever it is: nothing moves it under these inputs. Choose a start by "
-            f"plant.state_at(pressure=..., {static.coordinates[0].name}=...)."
-        )
-    _, found = balances(alone, x, f)
-    return [float(v) for v in found]
+def equilibria_of_one_coordinate(statics: Statics) -> tuple[Rows, Array]:
+    """The row of its plant and the place (1,) of every balance, by row and place; plants in balance anywhere or
+    without any place have none."""
+    x = grid(statics)
+    line = Line(statics)
+    f = line.accelerations(x)
+    plain = np.flatnonzero(((f != 0.0) & np.isfinite(f)).any(axis=1))
+    if not plain.size:
+        return plain, np.empty((0, 1))
+    found, place = balances(line if plain.size == len(f) else line.of(plain), x[plain], f[plain])
+    return plain[found], place[:, None]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class _Alone:
-    """One plant as a table of plants, place by place: its laws may be such as take no arrays, or its air be shut in."""
+class Line:
+    """Plants as functions of their one coordinate, at one place each (N,) or at several (N, K)."""
 
-    static: StaticProblem
+    statics: Statics
 
-    def of(self, rows: npt.NDArray[np.intp]) -> _Alone:
-        return self
+    def of(self, rows: Rows) -> Line:
+        """Some of the plants."""
+        return Line(self.statics.of(rows))
 
     def accelerations(self, x: Array) -> Array:
-        """As those of `SideBySide`."""
-        found = [self.static.accelerations(self.static.place([v]))[0] for v in x.ravel()]
-        return np.array(found).reshape(x.shape)
+        """Acceleration from rest."""
+        return self.statics.accelerations(x.reshape(len(x), -1, 1)).reshape(x.shape)
+
+    def contractions(self, x: Array) -> list[Array]:
+        """Contraction [1] of every muscle (N, K) at places (N, K)."""
+        return self.statics.contractions(x[..., None])
+
+    def within_reach(self, x: Array) -> npt.NDArray[np.bool_]:
+        """Whether every muscle can take its contraction at places (N, K)."""
+        return self.statics.within_reach(x[..., None])
 
 
-def grid(static: StaticProblem) -> Array:
-    """Coordinates that every muscle can take, rising. Raises OutOfReach where there are none."""
-    ends = _ends_of_straight(static)
-    if ends is None:
-        c = static.coordinates[0]
-        x = np.linspace(c.lower_limit, c.upper_limit, PLACES)
-        inside = np.array([static.within_reach(static.place([v])) for v in x])
-        edges = [_edge(static, *x[i : i + 2]) for i in np.flatnonzero(inside[:-1] != inside[1:])]
-        x = np.unique([*x[inside], *edges])
-    else:
-        x = np.linspace(*ends, PLACES) if ends[0] < ends[1] else np.empty(0)
-    if x.size == 0:
-        kind, names = type(static.plant.mechanism).__name__, ", ".join(m.name for m in static.plant.muscles)
-        raise GeometryLimitError(f"{kind} has no place that {names} can all take; change offsets, radius or arms.")
-    return x
+def grid(statics: Statics) -> Array:
+    """Coordinates (N, K) that every muscle can take, rising; NaN at the end of a row that has fewer."""
+    line = Line(statics)
+    low, high, straight = _ends_where_straight(line)
+    x = np.linspace(low, high, GRID_POINTS, axis=1)
+    x[~(low < high)] = np.nan
+    if straight.all():
+        return x
+    curved = np.flatnonzero(~straight)
+    part = _inside(line.of(curved))
+    rows = np.full((len(x), max(part.shape[1], GRID_POINTS)), np.nan)
+    rows[:, :GRID_POINTS] = x
+    rows[curved] = np.nan
+    rows[curved, : part.shape[1]] = part
+    return rows
 
 
-def _ends_of_straight(static: StaticProblem) -> tuple[float, float] | None:
-    """The reach where contractions are straight lines over the coordinate; None where they are not."""
-    c = static.coordinates[0]
-    at = [np.array(static.contractions(static.place([k * c.nominal]))) for k in (0.0, 1.0, -3.0)]
-    slope = (at[1] - at[0]) / c.nominal
-    if not np.allclose(at[2], at[0] - 3.0 * c.nominal * slope, rtol=0.0, atol=1e-12):
-        return None
-    low, high = c.lower_limit, c.upper_limit
-    for zero, rate, reach in zip(at[0], slope, static.reach, strict=True):
-        if rate == 0.0:
-            continue
-        ends = sorted((end - zero) / rate for end in reach)
-        low, high = max(low, ends[0]), min(high, ends[1])
-    return low, high
+def _ends_where_straight(line: Line) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+    """Both ends of the reach (N,), and whether contractions are linear functions of the coordinate."""
+    size, low, high = line.statics.limits(0)
+    straight = np.ones(size.shape, dtype=bool)
+    at = [line.contractions(k * size) for k in (0.0, 1.0, -3.0)]
+    for zero, one, other, reach in zip(*at, line.statics.contraction_limits, strict=True):
+        rate = (one - zero) / size
+        straight &= np.abs(other - (zero - 3.0 * size * rate)) <= 1e-12
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = [(end - zero) / rate for end in reach]
+        low = np.where(rate == 0.0, low, np.maximum(low, np.minimum(*ends)))
+        high = np.where(rate == 0.0, high, np.minimum(high, np.maximum(*ends)))
+    return low[:, 0], high[:, 0], straight[:, 0]
 
 
-def _edge(static: StaticProblem, a: float, b: float) -> float:
-    """The last place within reach between one that is and one that is not."""
-    inside, outside = (a, b) if static.within_reach(static.place([a])) else (b, a)
-    for _ in range(60):
+def _inside(line: Line) -> Array:
+    """Of evenly spread places those within reach, and both ends of every stretch of them; then NaN."""
+    _, low, high = line.statics.limits(0)
+    with np.errstate(invalid="ignore"):
+        x = np.linspace(low[:, 0], high[:, 0], GRID_POINTS, axis=1)
+    inside = line.within_reach(x)
+    rows, i = np.nonzero(inside[:, :-1] != inside[:, 1:])
+    first = inside[rows, i]
+    edges = _edges(line.of(rows), *(np.where(first, x[rows, i + k], x[rows, i + 1 - k]) for k in (0, 1)))
+    columns = np.full((len(x), np.bincount(rows, minlength=1).max(initial=0)), np.nan)
+    columns[rows, np.arange(rows.size) - np.searchsorted(rows, rows)] = edges
+    places = np.sort(np.hstack([np.where(inside, x, np.nan), columns]), axis=1)
+    places[:, 1:][np.diff(places, axis=1) == 0.0] = np.nan
+    return np.sort(places, axis=1)
+
+
+def _edges(line: Line, inside: Array, outside: Array) -> Array:
+    """The last place (R,) within reach between one that is and one that is not."""
+    for _ in range(60 if inside.size else 0):
         middle = 0.5 * (inside + outside)
-        inside, outside = (middle, outside) if static.within_reach(static.place([middle])) else (inside, middle)
+        there = line.within_reach(middle[:, None])[:, 0]
+        inside, outside = np.where(there, middle, inside), np.where(there, outside, middle)
     return inside

@@ -1,49 +1,38 @@
-"""Whether a plant returns to a rest after a small push."""
+"""Stability of equilibria, by the eigenvalues of the motion."""
 
 from __future__ import annotations
 
 import weakref
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from ...compile.program import CompiledSystem, Program
 from ...core.arrays import Array
 from ...plant.plant import Plant
-from .statics import StaticProblem
-
-if TYPE_CHECKING:
-    from ...compile.program import CompiledSystem, Program  # CasADi, which describing a plant does not need
 
 MARGIN = 1e-9
-"""Greatest real part of an eigenvalue, as a share of the greatest eigenvalue, that counts as none."""
+"""Greatest real part of an eigenvalue, relative to the greatest eigenvalue, that counts as none (chosen)."""
 _functions: weakref.WeakKeyDictionary[Program, Any] = weakref.WeakKeyDictionary()
 
 
-def is_stable(static: StaticProblem, state: Mapping[str, float]) -> bool:
-    """Whether no eigenvalue of the motion has a positive real part; see `are_stable`."""
-    x = np.array([[state[n] for n in static.names]])
-    inputs = np.array(list(static.inputs.values()))
-    return bool(are_stable(static.ready, static.ready.parameters[None, :], x, inputs, shut=static.shut)[0])
-
-
 def are_stable(
-    ready: CompiledSystem, parameters: Array, states: Array, inputs: Array, *, shut: bool = False
+    compiled: CompiledSystem, parameters: Array, states: Array, inputs: Array, *, shut: bool = False
 ) -> npt.NDArray[np.bool_]:
     """Whether no eigenvalue of the motion has a positive real part, for plants with parameters (R, P) at states (R, n).
 
     The motion is that of coordinates, series springs, creep and walls. With given pressures the air follows the
-    volume, m = m_0 V/V_0; `shut` in, it stays as it is, at its temperature. Friction is left out, as it would hold any
-    place. Where the motion has no finite slopes nothing is stable.
+    volume, m = m_0 V/V_0; with `shut` valves its mass and temperature stay the same. Friction is left out, as it would
+    hold any place. Where the motion has no finite derivatives nothing is stable.
     """
-    plant, names = ready.system, [s.name for s in ready.system.states]
+    plant, names = compiled.system, [s.name for s in compiled.system.states]
     assert isinstance(plant, Plant)
     air, moving = _kinds(plant)
     free = [i for i, n in enumerate(names) if n in moving]
     if not free:
         return np.ones(len(states), dtype=bool)
-    by_state, volumes, growths = _slopes(ready, free, parameters, states, inputs)
+    by_state, volumes, growths = _slopes(compiled, free, parameters, states, inputs)
     matrix = by_state[:, :, free]
     if not shut:
         for k, prefix in enumerate(plant.prefixes):
@@ -69,25 +58,25 @@ def _kinds(plant: Plant) -> tuple[set[str], set[str]]:
 
 
 def _slopes(
-    ready: CompiledSystem, free: list[int], parameters: Array, states: Array, inputs: Array
+    compiled: CompiledSystem, free: list[int], parameters: Array, states: Array, inputs: Array
 ) -> tuple[Array, Array, Array]:
     """Rates of f free states by all (R, f, n), the volume of every muscle (R, k), and these by states (R, k, n)."""
     count, size = states.shape
-    results = _function(ready, free)(states.T, np.repeat(inputs[:, None], count, axis=1), parameters.T)
+    results = _function(compiled, free)(states.T, np.repeat(inputs[:, None], count, axis=1), parameters.T)
     by_state, volumes, growths = (r.full() for r in results)
     stacked = [part.reshape(-1, count, size).transpose(1, 0, 2) for part in (by_state, growths)]
     return stacked[0], volumes.T, stacked[1]
 
 
-def _function(ready: CompiledSystem, free: list[int]) -> Any:
+def _function(compiled: CompiledSystem, free: list[int]) -> Any:
     """(x, u, p) -> (df/dx of what is free, V, dV/dx), differentiated once for a structure, which says what is free."""
-    program, plant = ready.program, ready.system
+    program, plant = compiled.program, compiled.system
     assert isinstance(plant, Plant)
     if program not in _functions:
         import casadi
 
         t = program.traced
-        volumes = casadi.vertcat(*(t.o[ready.output_names.index(f"{prefix}volume")] for prefix in plant.prefixes))
+        volumes = casadi.vertcat(*(t.o[compiled.output_names.index(f"{prefix}volume")] for prefix in plant.prefixes))
         wanted = [casadi.jacobian(t.f[free], t.x), volumes, casadi.jacobian(volumes, t.x)]
         _functions[program] = casadi.Function("motion", [t.x, t.u, t.p], casadi.cse(wanted))
     return _functions[program]

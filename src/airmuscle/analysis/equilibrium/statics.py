@@ -1,159 +1,208 @@
-"""A plant at rest as a function of its coordinates: its state, and what is out of balance there."""
+"""Plants at rest as functions of their coordinates: their states there, and the accelerations that are left."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from typing import TypeAlias
+import dataclasses
+import functools
+from collections.abc import Mapping
 
 import numpy as np
+import numpy.typing as npt
 
-from ...control.inputs import check_input_names
-from ...core import ops
+from ...compile.cache.kernel import evaluate_rates
+from ...compile.program import CompiledSystem
+from ...core import ops, tree
 from ...core.arrays import Array
-from ...core.errors import EquilibriumError, ParameterError
+from ...core.errors import AirmuscleError
 from ...core.ops import Value
+from ...mechanism import Coordinate
 from ...muscle import Muscle
 from ...plant.plant import Plant
-from ...pneumatics.gas import absolute, gauge
+from ...pneumatics.gas import absolute
+from .shut_air import shut_air_pressure
 
-Given: TypeAlias = float | tuple[float, ...] | None
-STRETCHED = -0.5
-"""No search goes beyond this contraction [1]; a geometry may be defined far past it."""
-GREATEST = 1e8
-"""Greatest absolute pressure [Pa] that a mass of air is looked for at."""
-
-
-class StaticProblem:
-    """What is given of a plant's air, and how the rest of its state follows from its coordinates."""
-
-    def __init__(
-        self, plant: Plant, pressure: Given, air_mass: Given, inputs: Mapping[str, float] | None = None
-    ) -> None:
-        from ...compile.program import compile_system  # CasADi, which describing a plant does not need
-
-        if (pressure is None) == (air_mass is None):
-            raise ParameterError("equilibrium: give either the pressure [Pa] or the air_mass [kg] of the muscles.")
-        self.plant = plant
-        self.shut = pressure is None
-        self.air = _each(plant, "pressure" if air_mass is None else "air_mass", pressure, air_mass)
-        self.inputs = given_inputs(plant, inputs)
-        self.coordinates = plant.mechanism.coordinates
-        self.names = [s.name for s in plant.states]
-        self.speeds = [self.names.index(c.speed) for c in self.coordinates]
-        self.ready = compile_system(plant)
-        self.lengths = [float(length) for length in plant.resting_lengths]
-        self._before = (0.0,) * len(self.air)  # pressures of the place before: the next are near
-        self.reach = [reach_of(m) for m in plant.muscles]
-
-    def place(self, x: Sequence[float] | Array) -> dict[str, float]:
-        """Coordinates by name from a vector."""
-        return {c.name: float(v) for c, v in zip(self.coordinates, x, strict=True)}
-
-    def contractions(self, q: Mapping[str, float]) -> list[float]:
-        """Contraction [1] of every muscle."""
-        return [float(c) for c in self.plant.mechanism.contractions(q, self.lengths)]
-
-    def contracted(self, state: Mapping[str, float]) -> float:
-        """How far a state is from full length: the sum of squared contractions."""
-        return sum(c**2 for c in self.contractions(state))
-
-    def within_reach(self, q: Mapping[str, float]) -> bool:
-        """Whether every muscle can take its contraction there."""
-        return all(low <= c <= high for c, (low, high) in zip(self.contractions(q), self.reach, strict=True))
-
-    def state(self, q: Mapping[str, float]) -> dict[str, float]:
-        """The state at rest with these coordinates."""
-        return self.plant.state_at(pressure=self.pressures(q) if self.shut else self.air, **q)
-
-    def pressures(self, q: Mapping[str, float]) -> tuple[float, ...]:
-        """Gauge pressure [Pa] of every muscle there."""
-        if not self.shut:
-            return self.air
-        given = zip(self.plant.muscles, self.air, self.contractions(q), self._before, strict=True)
-        self._before = tuple(pressure_of(self.plant, m, mass, eps, guess) for m, mass, eps, guess in given)
-        return self._before
-
-    def accelerations(self, q: Mapping[str, float]) -> Array:
-        """Acceleration of every coordinate from rest there: 0 where it rests, nan where no pressure holds the air."""
-        try:
-            state = self.state(q)
-        except EquilibriumError:  # at the ends of its reach a muscle may have no volume
-            return np.full(len(self.coordinates), np.nan)
-        return self.ready.rates([state[n] for n in self.names], list(self.inputs.values()))[self.speeds]
+Rows = npt.NDArray[np.intp]
+LOWEST_CONTRACTION = -0.5
+"""Smallest contraction [1] at which an equilibrium is sought; a geometry may be defined far beyond it (chosen)."""
+_NO_ARRAYS = (TypeError, ValueError, ArithmeticError, AirmuscleError)
+"""What a law raises that is written for single numbers, or that is impossible for one of the plants."""
 
 
-def _each(plant: Plant, name: str, pressure: Given, air_mass: Given) -> tuple[float, ...]:
-    given, unit = (pressure, "Pa") if air_mass is None else (air_mass, "kg")
-    values = given if isinstance(given, tuple) else (given,) * len(plant.muscles)
-    if len(values) != len(plant.muscles):
-        raise ParameterError(
-            f"equilibrium: {name} has {len(values)} values; the plant has {len(plant.muscles)} muscles."
-        )
-    for value in values:
-        if not isinstance(value, float | int | np.floating) or not np.isfinite(value):
-            raise ParameterError(f"equilibrium: {name} is {value!r}; it must be a finite number of {unit}.")
-        if air_mass is not None and not value > 0:
-            raise ParameterError(f"equilibrium: air_mass is {value:g} kg; it must be greater than 0.")
-    return tuple(float(value) for value in values if value is not None)
+@dataclasses.dataclass(frozen=True, eq=False)
+class Statics:
+    """N plants of one structure at rest, as functions of their d coordinates at K places each, x (N, K, d).
 
-
-def given_inputs(plant: Plant, inputs: Mapping[str, float] | None) -> dict[str, float]:
-    """Every input of a plant, 0 unless given. Raises ParameterError for an unknown name or one beyond its range."""
-    given = dict(inputs or {})
-    check_input_names(list(given), plant.inputs)
-    for command in plant.input_variables:
-        value = given.get(command.name, 0.0)
-        if isinstance(value, str) or not np.ndim(value) == 0:
-            raise ParameterError(f"the input '{command.name}' is {value!r}; it must be one number, in SI units.")
-        if not command.minimum <= value <= command.maximum:
-            unit = "" if command.unit == "1" else f" {command.unit}"
-            raise ParameterError(
-                f"the input '{command.name}' is {value:g}{unit}; allowed are {command.minimum:g} to "
-                f"{command.maximum:g}{unit} ({command.meaning})."
-            )
-    return {name: float(given.get(name, 0.0)) for name in plant.inputs}
-
-
-def reach_of(muscle: Muscle) -> tuple[Value, Value]:
-    """The contractions [1] between which a rest of a muscle is looked for."""
-    low, high = muscle.geometry.contraction_range
-    low = ops.maximum(low, STRETCHED)
-    margin = 1e-9 * (high - low)
-    return low + margin, high - margin
-
-
-def pressure_of(plant: Plant, muscle: Muscle, air_mass: float, contraction: float, guess: float = 0.0) -> float:
-    """Gauge pressure [Pa] of a mass of air [kg] shut in a muscle at rest; wall and series spring settled.
-
-    `guess` is where the search begins [Pa]. Raises NoEquilibrium, naming the muscle, where no pressure up to 1000 bar
-    belongs to it.
+    compiled     any of the plants
+    parameters   (N, P) all parameters of each
+    precomputed  (N, c) what the compiled functions need of them
+    air          of each muscle the gauge pressure [Pa] or, of air that is shut in, its mass [kg]
+    inputs       (m,); air and inputs are the same for all plants
+    plants       one Plant with an array (N, 1) for every parameter
     """
 
-    def excess(x: float) -> float:
-        """log of the air that the muscle holds at an absolute pressure exp(x), less that of the given air."""
-        p = gauge(math.exp(x), plant.ambient)
-        own = muscle.settled(p, contraction)
-        volume = muscle.volume(muscle.inner_contraction(contraction, own), own)
-        held = float(plant.gas.state_at(math.exp(x), volume, plant.ambient)["air_mass"])
-        return math.log(held / air_mass) if held > 0 else -math.inf
+    compiled: CompiledSystem
+    parameters: Array
+    precomputed: Array
+    air: tuple[float, ...]
+    shut: bool
+    inputs: Array
+    plants: Plant
 
-    a = math.log(absolute(guess, plant.ambient))
-    at_a = excess(a)
-    b = a - at_a
-    for _ in range(20):  # the secant is exact for a rigid wall and a gas that keeps to one process
-        at_b = excess(b) if math.isfinite(b) and b < math.log(GREATEST) else math.nan
-        if not math.isfinite(at_b):
-            break
-        if abs(at_b) < 1e-13 or at_b == at_a:
-            return float(gauge(math.exp(b), plant.ambient))
-        a, b, at_a = b, b - at_b * (b - a) / (at_b - at_a), at_b
-    low, high = 0.0, math.log(GREATEST)
-    if not excess(low) < 0 < excess(high):
-        raise EquilibriumError(
-            f"{muscle.name} cannot hold {air_mass:g} kg of air at a contraction of {contraction:.1%}: no pressure "
-            f"below {GREATEST:g} Pa belongs to it."
-        )
-    while low < (middle := 0.5 * (low + high)) < high:
-        low, high = (middle, high) if excess(middle) < 0 else (low, middle)
-    return float(gauge(math.exp(low), plant.ambient))
+    @classmethod
+    def of_plants(
+        cls, compiled: CompiledSystem, parameters: Array, air: tuple[float, ...], inputs: Array, shut: bool = False
+    ) -> Statics:
+        """The plants with these parameters (N, P)."""
+        precomputed = np.array([compiled.program.precompute(row) for row in np.ascontiguousarray(parameters)])
+        plant = compiled.system
+        assert isinstance(plant, Plant)
+        return cls(compiled, parameters, precomputed, air, shut, inputs, _with_arrays(plant, parameters))
+
+    def of(self, rows: Rows) -> Statics:
+        """Some of the plants, which may be repeated."""
+        parameters = self.parameters[rows]
+        plants = self.plants if len(self.parameters) == 1 else _with_arrays(self.plants, parameters)
+        return dataclasses.replace(self, parameters=parameters, precomputed=self.precomputed[rows], plants=plants)
+
+    @functools.cached_property
+    def separate(self) -> list[Plant]:
+        """The plants, each with numbers."""
+        plant = self.compiled.system
+        assert isinstance(plant, Plant)
+        return [tree.unflatten(plant, row.tolist()) for row in self.parameters]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The states, in their order."""
+        return self.compiled.description.state_names
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """The coordinates."""
+        return self.plants.mechanism.coordinates
+
+    def limits(self, index: int) -> tuple[Array, Array, Array]:
+        """Nominal size and limits (N, 1) of a coordinate."""
+        c, shape = self.coordinates[index], (len(self.parameters), 1)
+        nominal, low, high = (np.array(np.broadcast_to(v, shape)) for v in (c.nominal, c.lower_limit, c.upper_limit))
+        return nominal, low, high
+
+    def nominal_sizes(self) -> Array:
+        """Nominal sizes (d,) of the coordinates of the first plant."""
+        return np.array([self.limits(i)[0][0, 0] for i in range(len(self.coordinates))])
+
+    @functools.cached_property
+    def contraction_limits(self) -> list[tuple[Value, Value]]:
+        """The contractions [1] between which an equilibrium of each muscle is sought."""
+        return [_search_range(muscle) for muscle in self.plants.muscles]
+
+    def allowed(self) -> npt.NDArray[np.bool_]:
+        """Which plants (N,) take these inputs and pressures."""
+        found = np.array(np.broadcast_to(True, (len(self.parameters), 1)))
+        for variable, value in zip(self.plants.input_variables, self.inputs, strict=True):
+            found &= (variable.minimum <= value) & (value <= variable.maximum)
+        for pressure in () if self.shut else self.air:
+            found &= np.asarray(absolute(pressure, self.plants.ambient)) > 0.0
+        return found[:, 0]
+
+    def contractions(self, x: Array) -> list[Array]:
+        """Contraction [1] of every muscle (N, K)."""
+        try:
+            values = self.plants.mechanism.contractions(self._coordinate_values(x), self.plants.resting_lengths)
+            return [np.broadcast_to(np.asarray(eps, dtype=float), x.shape[:2]) for eps in values]
+        except _NO_ARRAYS:
+            table = np.empty((len(self.plants.muscles), *x.shape[:2]))
+            for i, k in np.ndindex(*x.shape[:2]):
+                plant = self.separate[i]
+                table[:, i, k] = plant.mechanism.contractions(self.place(x[i, k]), plant.resting_lengths)
+            return list(table)
+
+    def within_reach(self, x: Array) -> npt.NDArray[np.bool_]:
+        """Whether every muscle can take its contraction (N, K)."""
+        inside = np.ones(x.shape[:2], dtype=bool)
+        for eps, (low, high) in zip(self.contractions(x), self.contraction_limits, strict=True):
+            inside &= (eps >= low) & (eps <= high)
+        return inside
+
+    def place(self, x: Array) -> dict[str, float]:
+        """Coordinates (d,) by name."""
+        return {c.name: float(v) for c, v in zip(self.coordinates, x, strict=True)}
+
+    def _coordinate_values(self, x: Array) -> dict[str, Value]:
+        return {c.name: x[..., i] for i, c in enumerate(self.coordinates)}
+
+    def states(self, x: Array) -> Array:
+        """The states at rest (N, K, n); NaN where a plant cannot be."""
+        try:
+            with np.errstate(all="ignore"):
+                return self._states(x)
+        except _NO_ARRAYS:
+            return self._states_one_by_one(x)
+
+    def _states(self, x: Array) -> Array:
+        plant, shape = self.plants, x.shape[:2]
+        known = self._coordinate_values(x) | {c.speed: 0.0 for c in self.coordinates}
+        contractions, possible = self.contractions(x), np.ones(shape, dtype=bool)
+        for eps, muscle in zip(contractions, plant.muscles, strict=True):
+            low, high = muscle.geometry.contraction_range
+            possible &= (eps >= low) & (eps <= high)
+        pressures: list[Value] = list(self.air)
+        if self.shut:
+            air = zip(plant.muscles, self.air, contractions, strict=True)
+            pressures = [shut_air_pressure(plant, muscle, mass, eps) for muscle, mass, eps in air]
+        state, volumes = plant.settle_muscles(pressures, known)
+        for volume, pressure in zip(volumes, pressures, strict=True):
+            possible &= (np.asarray(volume) > 0.0) & np.isfinite(pressure)
+        state = plant.fill_muscles(pressures, volumes, state)
+        table = np.empty((*shape, len(self.names)))
+        for i, name in enumerate(self.names):
+            table[..., i] = state[name]
+        table[~possible] = np.nan
+        return table
+
+    def _states_one_by_one(self, x: Array) -> Array:
+        """The same of plants with laws that take no arrays."""
+        table = np.full((*x.shape[:2], len(self.names)), np.nan)
+        for i, k in np.ndindex(*x.shape[:2]):
+            plant, place = self.separate[i], self.place(x[i, k])
+            try:
+                pressures = self.air
+                if self.shut:
+                    contractions = plant.mechanism.contractions(place, plant.resting_lengths)
+                    air = zip(plant.muscles, self.air, contractions, strict=True)
+                    pressures = tuple(float(shut_air_pressure(plant, m, mass, np.array(eps))) for m, mass, eps in air)
+                state = plant.state_at(pressure=pressures, **place)
+            except (AirmuscleError, ValueError, ArithmeticError):
+                continue
+            table[i, k] = [state[name] for name in self.names]
+        return table
+
+    def accelerations(self, x: Array) -> Array:
+        """Acceleration of every coordinate from rest (N, K, d); NaN where a plant cannot be."""
+        states = np.ascontiguousarray(self.states(x))
+        rates = np.empty_like(states)
+        if states.size:
+            evaluate_rates(self.compiled.address["rhs"], self.precomputed, self.inputs, states, rates)
+        return np.asarray(rates[..., [self.names.index(c.speed) for c in self.coordinates]])
+
+    def contracted(self, x: Array) -> Array:
+        """The sum of squared contractions (N, K): the distance of a place from full length."""
+        return sum((eps**2 for eps in self.contractions(x)), np.zeros(x.shape[:2]))
+
+    def state(self, x: Mapping[str, float]) -> dict[str, float]:
+        """The state at rest of the first plant at coordinates by name, as a mapping."""
+        place = np.array([[[x[c.name] for c in self.coordinates]]])
+        return dict(zip(self.names, self.states(place)[0, 0].tolist(), strict=True))
+
+
+def _with_arrays(plant: Plant, parameters: Array) -> Plant:
+    """The plant with an array (N, 1) for every parameter, also of one plant: it then rests where it would beside
+    others to the last digit, which a power of numbers would not give."""
+    return tree.unflatten(plant, [column[:, None].copy() for column in parameters.T])
+
+
+def _search_range(muscle: Muscle) -> tuple[Value, Value]:
+    low, high = muscle.geometry.contraction_range
+    low = ops.maximum(low, LOWEST_CONTRACTION)
+    margin = 1e-9 * (high - low)
+    return low + margin, high - margin

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...analysis.equilibrium import find_equilibrium
-from ...compile import System
+from ...compile.cache.kernel import newton
 from ...core import autodiff, tree
 from ...core.arrays import Array
 from ...core.errors import IdentificationError, ParameterError, suggestion
+from ...core.status import Status
+from ...core.system import System
 from ...plant.plant import Plant
 
 if TYPE_CHECKING:
@@ -20,11 +22,6 @@ if TYPE_CHECKING:
 
 NUDGE = 100.0
 """A little more gauge pressure [Pa], by which states that settle with it are found."""
-_WHY = {
-    1: "where the search came to, some state changes none of what is asked",
-    2: "the search left all bounds",
-    3: "the search did not come to an end",
-}
 _conditions: dict[Any, Function] = {}
 
 
@@ -132,18 +129,14 @@ def solved(
     `function` is that of `conditions`, made once for a structure.
     Raises IdentificationError where no state meets the conditions.
     """
-    from ...compile.cache.announce import announce_compilation
-    from ...compile.kernels.newton import root
-
-    announce_compilation(root)
     n, x, target = guess.size, guess.copy(), np.concatenate([known, np.zeros(len(start.stationary) + len(start.equal))])
-    values, by_state, by_leaf, work = np.empty(n), np.empty((n, n)), np.empty((n, leaves.size)), np.zeros(n * n + n)
-    status = root(function.address, leaves, target, sizes, x, values, by_state, by_leaf, work)
-    if status != 0:
+    values, by_state, by_leaf, a, b = np.empty(n), np.empty((n, n)), np.empty((n, leaves.size)), np.zeros((n, n)), np.zeros(n)
+    status = Status(newton(function.address, leaves, target, sizes, x, values, by_state, by_leaf, a, b))
+    if status != Status.DONE:
         raise IdentificationError(
             f"no state meets the start {dict(zip(start.known, known.tolist(), strict=True))} with "
             f"{', '.join(start.stationary) or 'nothing'} at rest and "
-            f"{', '.join(f'{a} = {b}' for a, b in start.equal) or 'nothing'} equal: {_WHY[status]}."
+            f"{', '.join(f'{a} = {b}' for a, b in start.equal) or 'nothing'} equal: {status.message}."
         )
     inverse = sizes[:, None] * np.linalg.inv(by_state * sizes)
     return x, inverse[:, : known.size], -inverse @ by_leaf

@@ -8,12 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...compile import System
-from ...control.inputs import PiecewiseLinear
+from ...compile.cache.kernel import evaluate
+from ...compile.program import compile_system
+from ...control.piecewise_linear import PiecewiseLinear
 from ...core import tree
 from ...core.arrays import Array
 from ...core.errors import IdentificationError, ParameterError
-from ...simulation.integrators import INTERRUPTED, Integrator
+from ...core.status import Status
+from ...core.system import System
+from ...simulation.integrators import Integrator
 from ...simulation.sensitivity import WithSensitivities
 from .experiment import Experiment, StartTime, StartValue, Unknown
 from .initial_conditions import conditions, solved
@@ -29,8 +32,6 @@ class RecordModel:
         self, plant: System, experiment: Experiment, number: int, unknowns: Sequence[Unknown],
         observed: Mapping[str, float], method: Integrator,
     ) -> None:  # fmt: skip
-        from ...compile.program import compile_system  # CasADi, which describing a fit does not need
-
         self.plant, self.experiment, self.method = experiment.plant or plant, experiment, method
         self.unknowns = unknowns
         self.mine = [k for k, u in enumerate(unknowns) if u.record in (None, number)]
@@ -43,7 +44,7 @@ class RecordModel:
         groups = tuple(unknowns[k].paths for k in self.columns) or ((),)
         scales = tuple(unknowns[k].scale for k in self.columns) or (1.0,)
         self.ready = compile_system(_sensitive(self.plant, groups, scales, self.names, experiment))
-        self._nominal = self.ready.nominal()
+        self._nominal = self.ready.nominal
         place = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.plant))}
         moved = [(place[path], k) for k in self.mine for path in unknowns[k].paths]
         self._moved = np.array([i for i, _ in moved], dtype=int), np.array([k for _, k in moved], dtype=int)
@@ -101,8 +102,6 @@ class RecordModel:
         return Modelled(outputs[:, :count], slopes, steps)
 
     def _outputs(self, values: Array, most_steps: int) -> tuple[Array, npt.NDArray[np.bool_], int]:
-        from ...compile.cache.kernel import evaluate
-
         state, slopes = self.start(values)
         clock = self._clock(self.start_time(values))
         leaves = self.ready.parameters.copy()
@@ -113,9 +112,9 @@ class RecordModel:
         if self.columns:
             full[state.size :] = slopes.ravel()
         course = self.method.run(ready, clock.segments, 0.0, full, clock.times, most_steps)
-        if course.status == INTERRUPTED:
+        if course.status == Status.INTERRUPTED:
             raise KeyboardInterrupt
-        if course.status != 0:
+        if course.status != Status.DONE:
             raise IdentificationError(
                 f"{self.experiment.recording.origin}: the run ended early, at {course.time:.4g} s."
             )

@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ...analysis.equilibrium import complete_inputs, find_equilibrium, find_equilibrium_of_each
-from ...analysis.equilibrium.many import block_size
+from ...analysis.equilibrium import block_size, complete_inputs, find_equilibrium, find_equilibrium_of_each
 from ...compile.program import compile_system
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError, ParameterError, PhysicsError, suggestion
@@ -92,8 +91,8 @@ def default_states(variations: Variations, advanced: Callable[[int], None]) -> t
     for begin in range(0, rows.size, each):
         part = rows[begin : begin + each]
         table = find_equilibrium_of_each(compiled, variations.table(part), pressures, inputs)
-        states[begin : begin + each] = table.states
-        for i in np.flatnonzero(~np.isfinite(table.states).all(axis=1)):
+        states[begin : begin + each] = table
+        for i in np.flatnonzero(~np.isfinite(table).all(axis=1)):
             state = _equilibrium(variations.one(int(part[i])), names)
             if isinstance(state, str):
                 reasons[begin + int(i)] = state

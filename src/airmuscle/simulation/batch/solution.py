@@ -96,4 +96,6 @@ class BatchSolution:
         return Recording(columns, "simulation", system.constants, tuple(notes))
 
     def __repr__(self) -> str:
-        return f"BatchSolution({len(self)} plants, {self.failed.size} failed, columns {', '.join(self.columns)})"
+        failed = f", {self.failed.size} failed" if self.failed.size else ""
+        kept = f"{', '.join(self.columns)} at {self.time.size} times" if self.columns else "final states"
+        return f"BatchSolution({len(self)} plants: {kept}{failed})"

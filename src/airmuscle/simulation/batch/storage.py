@@ -1,4 +1,4 @@
-"""Where the columns of a batch are kept: in memory, or in a folder of .npy files that appears when it is whole."""
+"""Storage of the columns of a batch: in memory, or in a folder of .npy files that appears when it is complete."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from ...core.errors import FileError, ParameterError
 
-MOST_BYTES = 4e9
-"""What is held in memory without a word."""
+MAX_MEMORY = 4e9
+"""Bytes that the columns in memory may take (chosen)."""
 
 
 class InMemory:
@@ -25,60 +25,60 @@ class InMemory:
 
     def __init__(self, names: Sequence[str], count: int, rows: int, kind: npt.DTypeLike) -> None:
         size = len(names) * count * rows * np.dtype(kind).itemsize
-        if size > MOST_BYTES:
+        if size > MAX_MEMORY:
             raise ParameterError(
-                f"simulate_batch: {len(names)} columns of {count} plants at {rows} instants take {size / 1e9:.3g} GB "
-                f"of memory; {MOST_BYTES / 1e9:g} GB are allowed. Choose columns (keep=...), write to disk (into=...), "
-                "or ask for fewer instants (output=...)."
+                f"simulate_batch: {len(names)} columns of {count} plants at {rows} output times take {size / 1e9:.3g} GB "
+                f"of memory; the limit is {MAX_MEMORY / 1e9:g} GB. Choose columns (keep=...), write to disk (into=...), "
+                "or fewer output times (output_times=...)."
             )
         self.columns: dict[str, npt.NDArray[Any]] = {name: np.empty((count, rows), kind) for name in names}
 
-    def finished(self, small: Mapping[str, npt.NDArray[Any]], told: Mapping[str, Any]) -> dict[str, Any]:
-        """The columns, for good."""
+    def finish(self, small: Mapping[str, npt.NDArray[Any]], remarks: Mapping[str, Any]) -> dict[str, Any]:
+        """The complete columns."""
         return self.columns
 
-    def abandoned(self) -> None:
-        """Nothing is left behind."""
+    def abandon(self) -> None:
+        """Discard the columns."""
 
 
 class OnDisk(InMemory):
-    """Columns (N, T) as one .npy file each, in a folder that takes its name when all is written."""
+    """Columns (N, T) as one .npy file each, in a folder that is renamed to its name when all is written."""
 
     def __init__(self, path: str | Path, names: Sequence[str], count: int, rows: int, kind: npt.DTypeLike) -> None:
-        self.goal = Path(path)
-        if self.goal.exists():
-            raise FileError(f"{self.goal}: it exists already; name a folder that does not, or remove it.")
+        self.path = Path(path)
+        if self.path.exists():
+            raise FileError(f"{self.path}: it exists already; give a folder that does not exist, or remove it.")
         try:
-            self.goal.parent.mkdir(parents=True, exist_ok=True)
-            self.place = Path(tempfile.mkdtemp(prefix=f".{self.goal.name}-", dir=self.goal.parent))
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._folder = Path(tempfile.mkdtemp(prefix=f".{self.path.name}-", dir=self.path.parent))
             self.columns = {
-                name: np.lib.format.open_memmap(self.place / file_of(name), "w+", np.dtype(kind), (count, rows))
+                name: np.lib.format.open_memmap(self._folder / file_of(name), "w+", np.dtype(kind), (count, rows))
                 for name in names
             }
         except OSError as error:
-            raise FileError(f"{self.goal}: cannot be written: {error.strerror or error}.") from None
+            raise FileError(f"{self.path}: cannot be written: {error.strerror or error}.") from None
 
-    def finished(self, small: Mapping[str, npt.NDArray[Any]], told: Mapping[str, Any]) -> dict[str, Any]:
-        """Write what is left, give the folder its name, and open the columns for reading."""
+    def finish(self, small: Mapping[str, npt.NDArray[Any]], remarks: Mapping[str, Any]) -> dict[str, Any]:
+        """Write the rest, rename the folder, and open the columns for reading."""
         names = list(self.columns)
         for column in self.columns.values():
             column.flush()  # type: ignore[attr-defined]
         self.columns = {}
         for name, values in small.items():
-            np.save(self.place / file_of(name), values)
+            np.save(self._folder / file_of(name), values)
         files = {name: file_of(name) for name in (*names, *small)}
-        text = json.dumps({"files": files, **told}, indent=2)
-        (self.place / "batch.json").write_text(text, encoding="utf-8")
-        self.place.chmod(0o755)
-        os.replace(self.place, self.goal)
-        return {name: np.load(self.goal / file_of(name), mmap_mode="r") for name in names}
+        text = json.dumps({"files": files, **remarks}, indent=2)
+        (self._folder / "batch.json").write_text(text, encoding="utf-8")
+        self._folder.chmod(0o755)
+        os.replace(self._folder, self.path)
+        return {name: np.load(self.path / file_of(name), mmap_mode="r") for name in names}
 
-    def abandoned(self) -> None:
-        """Remove what was begun."""
+    def abandon(self) -> None:
+        """Remove what was written."""
         self.columns = {}
-        shutil.rmtree(self.place, ignore_errors=True)
+        shutil.rmtree(self._folder, ignore_errors=True)
 
 
 def file_of(name: str) -> str:
-    """The file of a column; signs that a file's name may not hold are written as %2F."""
+    """The file of a column; characters that a file name may not contain are percent-encoded."""
     return f"{quote(name, safe=' ')}.npy"

@@ -1,4 +1,4 @@
-"""One queue of work, all cores, and a user who may stop it."""
+"""Threads that share one queue of work, its progress bar, and interruption by the user."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-PATIENCE = 2.0
-"""Seconds after which a bar is drawn, on a terminal."""
+BAR_DELAY = 2.0
+"""Seconds after which a progress bar is drawn, on a terminal."""
 
 
-def cores_here() -> int:
+def available_cores() -> int:
     """Cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
@@ -25,24 +25,24 @@ def cores_here() -> int:
 
 
 class Queue:
-    """Pieces of work that threads take one after the other; `stop` is a flag that kernels look at."""
+    """Items of work that threads take one after the other; `stop` is a flag that kernels check."""
 
-    def __init__(self, pieces: int) -> None:
+    def __init__(self, items: int) -> None:
         self.stop: npt.NDArray[np.int64] = np.zeros(1, dtype=np.int64)
         self.done = 0
         self.error: BaseException | None = None
-        self._pieces = iter(range(pieces))
+        self._items = iter(range(items))
         self._lock = threading.Lock()
 
     def _take(self) -> int | None:
         with self._lock:
-            return None if self.stop[0] else next(self._pieces, None)
+            return None if self.stop[0] else next(self._items, None)
 
     def work(self, worker: Callable[[int], Any]) -> None:
-        """Take pieces until there are none, or until someone failed or stops it."""
+        """Take items until there are none, or until a worker failed or the queue was stopped."""
         try:
-            while (piece := self._take()) is not None:
-                worker(piece)
+            while (item := self._take()) is not None:
+                worker(item)
                 with self._lock:
                     self.done += 1
         except BaseException as error:
@@ -50,8 +50,8 @@ class Queue:
             self.stop[0] = 1
 
 
-def shared_out(queue: Queue, workers: list[Callable[[int], Any]], advanced: Callable[[int], None]) -> bool:
-    """Let each worker run on a thread of its own until the queue is empty; whether it was not interrupted."""
+def run_workers(queue: Queue, workers: list[Callable[[int], Any]], advanced: Callable[[int], None]) -> bool:
+    """Run each worker on its own thread until the queue is empty; False where the user interrupted it."""
     threads = [threading.Thread(target=queue.work, args=(worker,), daemon=True) for worker in workers]
     for thread in threads:
         thread.start()
@@ -73,11 +73,11 @@ def shared_out(queue: Queue, workers: list[Callable[[int], Any]], advanced: Call
 
 @contextlib.contextmanager
 def progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
-    """A function that is told how many are done; it draws a bar on a terminal once that takes long."""
-    begun, bar = time.monotonic(), _Bar(what, total)
+    """A function that takes the number of items done and draws a bar on a terminal once that takes long."""
+    started, bar = time.monotonic(), _Bar(what, total)
 
     def advanced(done: int) -> None:
-        if time.monotonic() - begun > PATIENCE and sys.stderr.isatty():
+        if time.monotonic() - started > BAR_DELAY and sys.stderr.isatty():
             bar.show(done)
 
     try:

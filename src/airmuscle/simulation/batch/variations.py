@@ -1,8 +1,7 @@
-"""What differs from plant to plant: parameters by their paths, checked as if each plant were made anew."""
+"""Variations: parameters of N plants by path, checked as if each plant were constructed."""
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -10,15 +9,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...compile import System
 from ...core import tree
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError, ParameterError, suggestion
+from ...core.system import System
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Variations:
-    """A system, and for N others of its structure the values (N, V) of the leaves that differ."""
+    """A system, and for N others of its structure the values (N, V) of the parameters that differ."""
 
     system: System
     paths: tuple[str, ...]
@@ -26,23 +25,23 @@ class Variations:
     values: Array
 
     def parameters(self, index: int) -> Array:
-        """All leaves (P,) of one of the systems."""
-        found = tree.flatten(self.system)
-        found[self.places] = self.values[index]
-        return found
+        """All parameters (P,) of one of the systems."""
+        parameters = tree.flatten(self.system).copy()
+        parameters[self.places] = self.values[index]
+        return parameters
 
     def table(self, indices: npt.NDArray[np.intp]) -> Array:
-        """All leaves (R, P) of some of the systems."""
-        found = np.repeat(tree.flatten(self.system)[None, :], indices.size, axis=0)
-        found[:, self.places] = self.values[indices]
-        return found
+        """All parameters (R, P) of some of the systems."""
+        parameters = np.repeat(tree.flatten(self.system)[None, :], indices.size, axis=0)
+        parameters[:, self.places] = self.values[indices]
+        return parameters
 
     def one(self, index: int) -> System:
         """One of the systems."""
         return tree.unflatten(self.system, self.parameters(index).tolist())
 
     def nominal(self) -> Array:
-        """The size (N, n) of each state below which its relative error no longer matters, for every system."""
+        """Nominal size (N, n) of each state, below which its relative error no longer matters, for every system."""
         count = len(self.values)
         if not self.paths:
             sizes = [np.array([s.nominal for s in self.system.states])] * count
@@ -54,7 +53,7 @@ class Variations:
             return np.array([[s.nominal for s in self.one(i).states] for i in range(count)])
 
     def as_columns(self) -> Any:
-        """The system with a column (N,) in place of every leaf that differs."""
+        """The system with a column (N,) in place of every parameter that differs."""
         leaves: list[Any] = tree.flatten(self.system).tolist()
         for place, column in zip(self.places, self.values.T, strict=True):
             leaves[place] = column.view(Column)
@@ -67,14 +66,14 @@ class Variations:
                 continue
             try:
                 part.check()
-            except (TypeError, ValueError, AirmuscleError):  # rows differ, or one of them is refused: row by row
+            except (TypeError, ValueError, AirmuscleError):  # rows differ, or one of them is impossible: row by row
                 of_row = _rows_of(part)
                 for row in range(len(self.values)):
                     _check_row(row, part if of_row is None else of_row(row))
 
 
 class Column(np.ndarray):
-    """A column that is asked `if`: it answers where all rows agree, so that one answer serves for all of them."""
+    """A column with a truth value where all rows agree, so that one `if` serves for all of them."""
 
     def __bool__(self) -> bool:
         answers = np.asarray(self, dtype=bool)
@@ -112,7 +111,8 @@ def _has_column(thing: Any) -> bool:
 
 
 def _rows_of(thing: Any) -> Callable[[int], Any] | None:
-    """What gives a model with the numbers of one row in place of its columns (N,); None where it has no column."""
+    """A function from a row to the model with the numbers of that row in place of its columns (N,); None where it has no
+    column."""
     if isinstance(thing, np.ndarray):
         numbers = thing.tolist()
         return lambda row: numbers[row]
@@ -125,9 +125,12 @@ def _rows_of(thing: Any) -> Callable[[int], Any] | None:
         return None
     inside = {field.name: _rows_of(getattr(thing, field.name)) for field in dataclasses.fields(thing)}
     changed = [(name, of_row) for name, of_row in inside.items() if of_row is not None]
+    fields = {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
 
     def with_numbers(row: int) -> Any:
-        new = copy.copy(thing)
+        new = object.__new__(type(thing))
+        for name, value in fields.items():
+            object.__setattr__(new, name, value)
         for name, of_row in changed:
             object.__setattr__(new, name, of_row(row))
         return new
@@ -136,12 +139,12 @@ def _rows_of(thing: Any) -> Callable[[int], Any] | None:
 
 
 def variations_of(system: System, given: Mapping[str, npt.ArrayLike], count: int | None) -> Variations:
-    """The variations of a system, refused where a path is unknown or a value is not possible.
+    """The variations of a system. Raises ParameterError for an unknown path or an impossible value.
 
-    `count` is the number of plants where something else than parameters says it.
+    `count` is the number of plants where initial states or inputs determine it.
     """
     if not isinstance(given, Mapping):
-        raise ParameterError(f"variations: they are {given!r}; write a column of values for each path.")
+        raise ParameterError(f"variations: they are {str(given)[:80]}; give a column of values for each path.")
     leaves = {leaf.path: (place, leaf) for place, leaf in enumerate(tree.leaves(system))}
     columns = []
     for path, values in given.items():
@@ -149,22 +152,22 @@ def variations_of(system: System, given: Mapping[str, npt.ArrayLike], count: int
             near = suggestion(str(path), leaves)
             raise ParameterError(
                 f"variations: {type(system).__name__} has no parameter '{path}'.{near} "
-                "Its paths are those of airmuscle.tree.leaves(plant)."
+                "Its paths are those of airmuscle.core.tree.leaves(plant)."
             )
         columns.append(_column(leaves[path][1], values))
     sizes = {path: len(column) for path, column in zip(given, columns, strict=True)}
     if len({*sizes.values(), *(() if count is None else (count,))}) > 1:
-        others = "" if count is None else f", and starts or commands for {count}"
-        raise ParameterError(f"variations: every column needs one value a plant; there are {sizes}{others}.")
+        others = "" if count is None else f", and initial states or inputs for {count}"
+        raise ParameterError(f"variations: every column needs one value per plant; there are {sizes}{others}.")
     count = next(iter(sizes.values()), count)
     if count is None:
-        raise ParameterError("simulate_batch: nothing varies; give variations, starts or commands, or use simulate.")
+        raise ParameterError("simulate_batch: nothing varies; give variations, initial states or inputs, or use simulate.")
     if count == 0:
         raise ParameterError("simulate_batch: there are no plants; give at least one row.")
     table = np.column_stack(columns) if columns else np.empty((count, 0))
-    found = Variations(system, tuple(given), np.array([leaves[p][0] for p in given], dtype=np.intp), table)
-    found.check_consistent()
-    return found
+    varied = Variations(system, tuple(given), np.array([leaves[p][0] for p in given], dtype=np.intp), table)
+    varied.check_consistent()
+    return varied
 
 
 def _column(leaf: tree.Leaf, given: npt.ArrayLike) -> Array:
@@ -172,20 +175,20 @@ def _column(leaf: tree.Leaf, given: npt.ArrayLike) -> Array:
     try:
         values = np.array(given, dtype=float)
     except (TypeError, ValueError):
-        raise ParameterError(f"variations: '{leaf.path}' must be numbers, one a plant; it is {given!r}.") from None
+        raise ParameterError(f"variations: '{leaf.path}' must be numbers, one for each plant; it is {str(given)[:80]}.") from None
     if values.ndim != 1:
         raise ParameterError(
-            f"variations: '{leaf.path}' must be a column (N,), one value a plant; its shape is {values.shape}."
+            f"variations: '{leaf.path}' must be a column (N,), one value per plant; its shape is {values.shape}."
         )
     declared = leaf.declared
     low, high = declared.bounds
     unit = "" if declared.unit == "1" else f" {declared.unit}"
-    refused = np.flatnonzero(~(np.isfinite(values) & (values >= low) & (values <= high)))
-    if refused.size:
-        row = int(refused[0])
-        more = f" ({refused.size - 1} further rows too)" if refused.size > 1 else ""
+    wrong = np.flatnonzero(~(np.isfinite(values) & (values >= low) & (values <= high)))
+    if wrong.size:
+        row = int(wrong[0])
+        more = f" ({wrong.size - 1} further rows too)" if wrong.size > 1 else ""
         raise ParameterError(
             f"variations, row {row}: '{leaf.path}' ({declared.symbol}, {declared.meaning}) is {values[row]:g}{unit}; "
-            f"allowed are finite values from {low:g} to {high:g}{unit}{more}. Values are SI."
+            f"it must be within {low:g} to {high:g}{unit}{more}. Values are in SI units."
         )
     return values

@@ -1,0 +1,53 @@
+"""What is given of a plant whose equilibria are sought: pressures or air masses of its muscles, and its inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeAlias
+
+import numpy as np
+
+from ...control.inputs import check_input_names
+from ...core.errors import ParameterError
+from ...core.system import System
+from ...plant.plant import Plant
+
+MuscleValues: TypeAlias = float | tuple[float, ...] | None
+"""One number for all muscles, or one for each; None where the other quantity is given."""
+
+
+def air_of_each(plant: Plant, pressure: MuscleValues, air_mass: MuscleValues) -> tuple[float, ...]:
+    """The given pressures [Pa] or air masses [kg], one for each muscle. Raises ParameterError where they are wrong."""
+    if (pressure is None) == (air_mass is None):
+        raise ParameterError("find_equilibrium: give either the pressure [Pa] or the air_mass [kg] of the muscles.")
+    name, given, unit = ("pressure", pressure, "Pa") if air_mass is None else ("air_mass", air_mass, "kg")
+    values = given if isinstance(given, tuple) else (given,) * len(plant.muscles)
+    if len(values) != len(plant.muscles):
+        raise ParameterError(
+            f"find_equilibrium: {name} has {len(values)} values; the plant has {len(plant.muscles)} muscles."
+        )
+    for value in values:
+        if not isinstance(value, float | int | np.floating) or not np.isfinite(value):
+            raise ParameterError(f"find_equilibrium: {name} is {value!r}; it must be a finite number in {unit}.")
+        if air_mass is not None and not value > 0:
+            raise ParameterError(f"find_equilibrium: air_mass is {value:g} kg; it must be greater than 0.")
+    return tuple(float(value) for value in values if value is not None)
+
+
+def complete_inputs(system: System, inputs: Mapping[str, float] | None) -> dict[str, float]:
+    """Every input of a system, 0 unless given. Raises ParameterError for an unknown name or one beyond its range."""
+    given = dict(inputs or {})
+    check_input_names(list(given), system.inputs)
+    for variable in system.input_variables:
+        value = given.get(variable.name, 0.0)
+        if isinstance(value, str) or not np.ndim(value) == 0 or not np.isfinite(value):
+            raise ParameterError(
+                f"the input '{variable.name}' is {value!r}; it must be one finite number, in SI units."
+            )
+        if not variable.minimum <= value <= variable.maximum:
+            unit = "" if variable.unit in ("", "1") else f" {variable.unit}"
+            raise ParameterError(
+                f"the input '{variable.name}' is {value:g}{unit}; it must be within {variable.minimum:g} to "
+                f"{variable.maximum:g}{unit} ({variable.meaning})."
+            )
+    return {name: float(given.get(name, 0.0)) for name in system.inputs}
