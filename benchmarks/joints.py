@@ -111,7 +111,7 @@ class JointWithHeat(Joint):
     def side_rates(self, side: str, sign: float, state: Mapping[str, Any], inputs: Mapping[str, Any]) -> Any:
         contraction, speed = self._motion(sign, state)
         volume = self.muscle.geometry.volume(contraction)
-        growth = self.muscle.geometry.volume_growth(contraction) * speed / self.muscle.geometry.resting_length
+        growth = self.muscle.geometry.volume_derivative(contraction) * speed / self.muscle.geometry.resting_length
         mass, energy, spool = (state[f"{side}.{name}"] for name in ("air_mass", "energy", "spool"))
         temperature = energy / (mass * HEAT_CAPACITY)
         pressure = mass * GAS_CONSTANT * temperature / volume

@@ -42,7 +42,7 @@ simulate(run.system, run.command, duration=0.1, start=run.start)
 
 def fresh(system: System) -> Program:
     """The program of a system as if its laws had never been traced."""
-    autodiff._functions.clear()
+    autodiff._traced_functions.clear()
     return Program(system)
 
 

@@ -128,7 +128,7 @@ def main() -> None:
     print(line("  by length", 21, [rms(e) for e in each], least))
     candidates = [Candidate("one surface of degree 5 for all", surface(5)), *standard_candidates(train)]
     for candidate in candidates:
-        if hasattr(candidate.law, "of_length") or candidate is candidates[0]:
+        if hasattr(candidate.law, "with_resting_length") or candidate is candidates[0]:
             try:
                 size = len(fit(candidate.law, train, fixed=candidate.fixed).estimates)
                 print(line(candidate.name, size, judged(candidate, train, test, specimens), least), flush=True)

@@ -65,8 +65,8 @@ def test_both_are_their_formulas(gas, exponent, pressure, contraction):
     plant = Plant(MUSCLE, ClosedChamber(), Isometric(contraction), gas)
     found = stiffness(plant, plant.state_at(pressure=pressure))
     area, growth, volume = (
-        VirtualWork(BRAID).area(contraction),
-        BRAID.volume_growth(contraction),
+        VirtualWork(BRAID).effective_area(contraction),
+        BRAID.volume_derivative(contraction),
         BRAID.volume(contraction),
     )
     at_pressure = MUSCLE.stiffness(pressure, contraction)

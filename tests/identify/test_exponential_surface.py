@@ -25,7 +25,7 @@ from airmuscle.identify.surface.monotone import (
 from airmuscle.recording import Recording
 
 CURVES = SAM_30X290.sample()
-EXACT = SAM_30X290.interpolated()
+EXACT = SAM_30X290.interpolate()
 FITS = [linearised, nonlinear]
 
 

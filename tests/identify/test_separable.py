@@ -87,7 +87,7 @@ def lengths(inner: ContractileSurface, dead_length: float, noise: float = 0.0) -
     for i, length in enumerate((0.08, 0.12, 0.2, 0.4)):
         random = np.random.default_rng(i)
         pressure, contraction = random.uniform(3e5, 6e5, 150), random.uniform(0.0, 0.12, 150)
-        force = EffectiveLength(inner, length, dead_length, 1e-3).unclamped(pressure, contraction)
+        force = EffectiveLength(inner, length, dead_length, 1e-3).unclamped_force(pressure, contraction)
         columns = {
             "pressure": pressure,
             "contraction": contraction,

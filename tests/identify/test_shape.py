@@ -77,7 +77,7 @@ def test_at_points_of_free_contraction_the_force_is_zero():
     pressure = np.array([2e5, 4e5, 6e5])
     free = Recording({"pressure": pressure, "contraction": np.full(3, 0.2)}, "hung free")
     found = fit_shaped(surface(4), data, free=free)
-    assert found.model.unclamped(pressure, free["contraction"]) == pytest.approx(np.zeros(3), abs=1e-8)
+    assert found.model.unclamped_force(pressure, free["contraction"]) == pytest.approx(np.zeros(3), abs=1e-8)
     assert shape_breaks(found.model, found.model.validity_range) == ()
     many = Recording({"pressure": np.linspace(1e5, 6e5, 9), "contraction": np.linspace(0.05, 0.2, 9) ** 2}, "too many")
     with pytest.raises(IdentificationError, match="leave none"):

@@ -44,7 +44,7 @@ def experiment(seed: int, law=TRUTH, *, shared: float = 0.0) -> list[Recording]:
     for contraction in np.linspace(0.0, 0.22, 8):
         pressure, held = np.linspace(1e5, 6e5, 8), np.full(8, contraction)
         errors = NOISE * random.standard_normal(8) + shared * random.standard_normal()
-        force = law.unclamped(pressure, held) + errors
+        force = law.unclamped_force(pressure, held) + errors
         columns = {"pressure": pressure, "contraction": held, "force": np.maximum(force, 1e-3)}
         runs.append(Recording(columns, f"run {contraction:.3f}"))
     return runs
@@ -62,7 +62,7 @@ def experiments():
 def share_held(fits, law, *, reading: bool = False) -> np.ndarray:
     """In how many of the experiments the band at each place holds the truth, or a new reading."""
     random = np.random.default_rng(5)
-    truth = law.unclamped(PLACES["pressure"], PLACES["contraction"])
+    truth = law.unclamped_force(PLACES["pressure"], PLACES["contraction"])
     inside = []
     for found in fits:
         low, high = confidence_band(found, PLACES, reading=reading)[1:]

@@ -23,7 +23,7 @@ EXACT = """
     -9.1269357045e-02   2.4281079659e-03  -8.8866673682e-06
      2.6581395349e-03  -7.9516994633e-05   4.5438282648e-07
 """
-EXPONENTIAL = SAM_30X290.interpolated()
+EXPONENTIAL = SAM_30X290.interpolate()
 
 
 @pytest.fixture(scope="module")
@@ -41,18 +41,18 @@ def repaired() -> BorzikovaDirect:
     ],
 )
 def test_a_plane_curve_is_the_printed_formula(force, bar, contraction):
-    assert SAM_30X290.at(force).contraction(bar * 1e5) == pytest.approx(contraction, abs=1e-15)
+    assert SAM_30X290.curve_at(force).contraction(bar * 1e5) == pytest.approx(contraction, abs=1e-15)
 
 
 @pytest.mark.parametrize(("force", "turns"), [(45.0, [4.950]), (130.0, [0.119, 3.283]), (260.0, [0.276, 3.600])])
 def test_plane_curves_turn_where_they_do(force, turns):
-    found = SAM_30X290.at(force).turning_pressures()
+    found = SAM_30X290.curve_at(force).turning_pressures()
     assert [p / 1e5 for p in found] == pytest.approx(turns, abs=6e-4)
 
 
 def test_between_the_loads_there_is_no_plane_curve():
     with pytest.raises(GeometryLimitError, match=r"under 200 N; there are 45, 130, 260 N\. Between them ask a surface"):
-        SAM_30X290.at(200.0)
+        SAM_30X290.curve_at(200.0)
 
 
 def test_the_surface_through_the_curves_has_the_known_coefficients():

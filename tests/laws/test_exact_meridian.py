@@ -81,7 +81,7 @@ def circle(line, rings=0):
 
 @pytest.mark.parametrize(("name", "force"), TABLE)
 def test_pressures_and_radii_agree_with_the_reference_table(name, force):
-    found = exact(LINES[name]).balance_at(CONTRACTIONS, float(force))
+    found = exact(LINES[name]).shape_at_force(CONTRACTIONS, float(force))
     pressures, radii = TABLE[name, force]
     assert found.pressure / 1e6 == pytest.approx(pressures, abs=6e-7, nan_ok=True)
     assert 1e3 * found.radius == pytest.approx(radii, abs=6e-5, nan_ok=True)
@@ -102,16 +102,16 @@ def test_the_circle_agrees_with_its_reference_table(name, force):
 def test_without_rubber_it_is_the_elliptic_outline():
     law, tube = exact(NONE), PleatedTube(L0, D0)
     contraction = np.concatenate([CONTRACTIONS, [2e-4, 0.45]])
-    found = law.balance_at(contraction, 100.0)
-    assert found.pressure == pytest.approx(100.0 / tube.area(contraction), rel=1e-11)
-    assert found.radius == pytest.approx(tube.segment(contraction).largest_radius, rel=1e-12)
-    assert law.force(2e5, contraction) == pytest.approx(2e5 * tube.area(contraction), rel=1e-10)
+    found = law.shape_at_force(contraction, 100.0)
+    assert found.pressure == pytest.approx(100.0 / tube.effective_area(contraction), rel=1e-11)
+    assert found.radius == pytest.approx(tube.segment(contraction).max_radius, rel=1e-12)
+    assert law.force(2e5, contraction) == pytest.approx(2e5 * tube.effective_area(contraction), rel=1e-10)
     assert law.volume(0.2, 100.0) == pytest.approx(tube.volume(0.2), rel=1e-12)
 
 
 def integrated(law, contraction, force):
     """Half the meridian from the middle to the end by the differential equations: length, chord, volume, end radius."""
-    found = law.balance_at(contraction, force)
+    found = law.shape_at_force(contraction, force)
     p, fibre = found.pressure, force + np.pi * found.pressure * found.radius**2
     r0 = law.geometry.end_radius
 
@@ -138,7 +138,7 @@ def test_an_independent_integration_meets_the_end_ring(name, force, contraction)
     assert 2 * volume == pytest.approx(law.volume(contraction, float(force)), rel=1e-9)
     x, r = law.profile(contraction, float(force), 401)
     assert x[-1] - x[0] == pytest.approx(2 * chord, rel=1e-9)
-    assert r.max() == pytest.approx(law.balance_at(contraction, float(force)).radius, rel=1e-12)
+    assert r.max() == pytest.approx(law.shape_at_force(contraction, float(force)).radius, rel=1e-12)
     assert np.hypot(np.diff(x), np.diff(r)).sum() == pytest.approx(L0, rel=1e-4)
 
 
@@ -167,7 +167,7 @@ def test_virtual_work_gives_the_tension(contraction, force, name, rings):
 def test_the_half_shell_balances(contraction, force, name):
     """2 N0 sin(phi0)/pi + 2 t Int sigma ds = 2 p Int r dx, all from the drawn outline."""
     law = exact(LINES[name])
-    found = law.balance_at(contraction, force)
+    found = law.shape_at_force(contraction, force)
     x, r = law.profile(contraction, force, 8001)
     axial = force + np.pi * found.pressure * (D0 / 2) ** 2
     slope = _end_slope(law, found)
@@ -286,4 +286,4 @@ def test_rest_under_the_starting_pressure():
         assert circle(line).pressure(0.0, 80.0) == pytest.approx(start, rel=1e-13)
         near, further = exact(line).pressure(np.array([1e-4, 4e-4]), 80.0)
         assert 2 * near - further == pytest.approx(start, rel=0.01)  # it leaves the start like sqrt(eps)
-    assert circle(LINE_B).contraction(circle(LINE_B).starting_pressure, 80.0) == 0.0
+    assert circle(LINE_B).contraction(circle(LINE_B).threshold_pressure, 80.0) == 0.0

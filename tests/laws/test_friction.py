@@ -20,7 +20,7 @@ from scipy.integrate import solve_ivp
 from airmuscle.core.errors import ParameterError
 from airmuscle.core.tree import leaves
 from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
-from airmuscle.friction.path import stops
+from airmuscle.friction.path import stop_operators
 
 STIFFNESSES, LIMITS = (4e4, 2e4, 1e4), (1e-4, 4e-4, 1e-3)
 SLIP = MaxwellSlip(STIFFNESSES, LIMITS)
@@ -103,7 +103,7 @@ def test_the_replay_of_lugre_in_time_is_the_integral_of_its_rates():
 def test_a_yielding_stop_stays_within_its_transition_of_the_exact_one(law, transition, ends):
     """|delta - exact| <= eta Delta: the plant's form tends to the exact one with eta."""
     bends = yielded(replace(law, transition=transition), ends)
-    exact = stops(np.array([0.0, *ends]), law.limits)[-1]
+    exact = stop_operators(np.array([0.0, *ends]), law.limits)[-1]
     assert (np.abs(bends - exact) <= transition * np.array(law.limits) + 1e-9).all()
 
 
@@ -191,7 +191,7 @@ def test_rows_between_two_turning_points_change_nothing(law):
 def test_a_stop_is_what_defines_it(ends):
     """|z| <= r and (dx - dz)(z - phi) >= 0 for every |phi| <= r; with the play operator beside it, x = E + P."""
     path = np.array([0.0, *ends])
-    bends = stops(path, LIMITS)
+    bends = stop_operators(path, LIMITS)
     play = np.zeros(3)
     for i, (x, bend) in enumerate(zip(path, bends, strict=True)):
         assert (np.abs(bend) <= LIMITS).all()

@@ -15,7 +15,7 @@ from airmuscle.core import autodiff
 from airmuscle.core.errors import GeometryLimitError, ParameterError
 from airmuscle.geometry.catenary import Catenary
 from airmuscle.geometry.circular_arc import CircularArc
-from airmuscle.geometry.fibre_sum import EvenSpread, GivenSum, SumOverHalf, SumPastHalf
+from airmuscle.geometry.fibre_sum import UniformFibreSum, UserDefinedFibreSum, HalfShellFibreSum, PrintedFibreSum
 from airmuscle.geometry.parabola import Parabola, TrueArcParabola
 from airmuscle.geometry.pleated import PleatedTube
 from airmuscle.geometry.straight_fibre import StraightFibre
@@ -105,7 +105,7 @@ def test_outlines_agree_with_the_reference_table(row):
         "parabola": lambda: segment.end_slope,
     }[name]()
     assert printed(shape, found)
-    assert printed(radius, 1e3 * segment.largest_radius)
+    assert printed(radius, 1e3 * segment.max_radius)
     assert printed(slope, segment.end_slope)
     assert printed(volume, 1e9 * segment.volume)
     assert printed(section, 1e6 * segment.half_section)
@@ -123,7 +123,7 @@ def test_integrals_are_those_of_the_drawn_curve(meridian, contraction):
     rise = middle - D0 / 2
     assert segment.length == pytest.approx(dx.sum(), rel=1e-12)
     assert segment.arc == pytest.approx(ds.sum(), rel=1e-7)
-    assert segment.largest_radius == pytest.approx(r.max(), rel=1e-9)
+    assert segment.max_radius == pytest.approx(r.max(), rel=1e-9)
     assert segment.half_section == pytest.approx((middle * dx).sum(), rel=1e-7)
     assert segment.arc_excess == pytest.approx((rise * ds).sum(), rel=1e-6)
     assert segment.arc_excess_squared == pytest.approx((rise**2 * ds).sum(), rel=1e-6)
@@ -164,14 +164,14 @@ def test_volume_growth_is_exact_though_newton_is_unrolled(meridian, contraction)
     step = 2e-3 * contraction
     ends = [shape.volume(contraction + n * step) for n in (-2, -1, 1, 2)]
     by_difference = (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / (12 * step)
-    assert shape.volume_growth(contraction) == pytest.approx(by_difference, rel=2e-8, abs=1e-12)
+    assert shape.volume_derivative(contraction) == pytest.approx(by_difference, rel=2e-8, abs=1e-12)
 
 
 def test_the_circles_growth_in_closed_form_is_the_derivative_of_its_integrals():
     contraction = np.array([1e-9, 1e-4, 0.03, 0.2, 0.4, 0.49])
     shape = tube(CIRCLE)
     z = CIRCLE.angle_squared(contraction)
-    growth = CIRCLE.growth_times_angle(z, L0, D0 / 2)
+    growth = CIRCLE.derivatives_times_angle(z, L0, D0 / 2)
     assert growth.volume / np.sqrt(z) == pytest.approx(autodiff.derivative(shape, "volume", contraction), rel=1e-12)
     step = 1e-3 * contraction
     for name in ("arc_excess", "arc_excess_squared"):
@@ -215,7 +215,7 @@ def test_the_parabola_3_is_too_short_by_what_the_reference_says():
     ],
 )
 def test_largest_volumes_lie_where_the_reference_says(shape, percent):
-    found = 100 * brentq(lambda c: float(shape.volume_growth(c)), 0.2, 0.49, xtol=1e-9)
+    found = 100 * brentq(lambda c: float(shape.volume_derivative(c)), 0.2, 0.49, xtol=1e-9)
     assert round(found, 2) == percent
 
 
@@ -223,13 +223,13 @@ def test_largest_volumes_lie_where_the_reference_says(shape, percent):
 def test_the_exact_outline_agrees_with_its_reference_table(row):
     contraction = row[0] / 100
     shape = PleatedTube(L0, D0)
-    ellipse, segment = shape.ellipse(contraction), shape.segment(contraction)
+    ellipse, segment = shape.elliptic_outline(contraction), shape.segment(contraction)
     found = (
         ellipse.parameter,
         ellipse.angle,
-        1e3 * segment.largest_radius,
+        1e3 * segment.max_radius,
         np.degrees(np.arctan2(segment.end_sine, segment.end_cosine)),
-        1e6 * shape.area(contraction),
+        1e6 * shape.effective_area(contraction),
         1e9 * segment.volume,
         1e6 * segment.half_section,
         1e6 * segment.arc_excess,
@@ -242,8 +242,8 @@ def test_the_exact_outline_agrees_with_its_reference_table(row):
 def test_rings_divide_the_exact_muscle(rings):
     areas, radii, volumes = RINGS[rings]
     shape = PleatedTube(L0, D0, rings)
-    assert 1e6 * shape.area(CONTRACTIONS) == pytest.approx(areas, rel=1e-5, abs=1e-4)
-    assert 1e3 * shape.segment(CONTRACTIONS).largest_radius == pytest.approx(radii, abs=6e-6)
+    assert 1e6 * shape.effective_area(CONTRACTIONS) == pytest.approx(areas, rel=1e-5, abs=1e-4)
+    assert 1e3 * shape.segment(CONTRACTIONS).max_radius == pytest.approx(radii, abs=6e-6)
     assert 1e9 * shape.volume(CONTRACTIONS) == pytest.approx(volumes, abs=6e-3)
 
 
@@ -252,7 +252,7 @@ def test_free_contraction_with_rings_and_of_a_slender_muscle():
     slender = PleatedTube(20.0, 2e-4)
     assert 100 * slender.free_contraction == pytest.approx(54.3053, abs=2e-3)
     ends = [
-        1e3 * PleatedTube(L0, D0, n).segment(PleatedTube(L0, D0, n).free_contraction).largest_radius for n in (0, 1, 2)
+        1e3 * PleatedTube(L0, D0, n).segment(PleatedTube(L0, D0, n).free_contraction).max_radius for n in (0, 1, 2)
     ]
     assert np.round(ends, 4).tolist() == [32.0365, 18.3115, 13.7465]
 
@@ -267,8 +267,8 @@ def test_virtual_work_gives_the_tension_of_the_exact_outline(contraction, rings)
     weights = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
     growth = ends @ weights / step
     scale = np.pi * shape.end_radius**2
-    assert shape.area(contraction) == pytest.approx(growth / L0, rel=1e-9, abs=1e-8 * scale)
-    assert shape.volume_growth(contraction) == pytest.approx(growth, rel=1e-9, abs=1e-8 * scale * L0)
+    assert shape.effective_area(contraction) == pytest.approx(growth / L0, rel=1e-9, abs=1e-8 * scale)
+    assert shape.volume_derivative(contraction) == pytest.approx(growth, rel=1e-9, abs=1e-8 * scale * L0)
 
 
 @UNHURRIED
@@ -276,10 +276,10 @@ def test_virtual_work_gives_the_tension_of_the_exact_outline(contraction, rings)
 def test_the_exact_half_shell_balances(contraction):
     """N sin(phi0) = pi p Int r dx with N/(pi p) = R^2/(2 mu): the pressure on a half shell pulls at its ends."""
     shape = PleatedTube(L0, D0)
-    segment, mu = shape.segment(contraction), shape.ellipse(contraction).parameter
-    fibre = segment.largest_radius**2 / (2 * mu)
+    segment, mu = shape.segment(contraction), shape.elliptic_outline(contraction).parameter
+    fibre = segment.max_radius**2 / (2 * mu)
     assert fibre * segment.end_sine == pytest.approx(segment.half_section, rel=1e-12)
-    axial = shape.area(contraction) / np.pi + shape.end_radius**2
+    axial = shape.effective_area(contraction) / np.pi + shape.end_radius**2
     assert fibre * segment.end_cosine == pytest.approx(axial, rel=1e-10, abs=1e-9 * fibre)
 
 
@@ -287,8 +287,8 @@ def test_the_exact_half_shell_balances(contraction):
 def test_the_exact_outline_solves_its_differential_equation(contraction):
     """N dphi/ds = -2 pi r p with N constant, integrated from the end: middle, chord and volume."""
     shape = PleatedTube(L0, D0)
-    segment, mu = shape.segment(contraction), shape.ellipse(contraction).parameter
-    curvature = 4 * mu / segment.largest_radius**2
+    segment, mu = shape.segment(contraction), shape.elliptic_outline(contraction).parameter
+    curvature = 4 * mu / segment.max_radius**2
     start = (D0 / 2, np.arctan2(segment.end_sine, segment.end_cosine), 0.0, 0.0)
 
     def along(s, state):
@@ -297,11 +297,11 @@ def test_the_exact_outline_solves_its_differential_equation(contraction):
 
     end = solve_ivp(along, (0, L0 / 2), start, rtol=1e-12, atol=1e-15, method="DOP853").y[:, -1]
     assert end[1] == pytest.approx(0, abs=1e-9)
-    assert end[0] == pytest.approx(segment.largest_radius, rel=1e-10)
+    assert end[0] == pytest.approx(segment.max_radius, rel=1e-10)
     assert 2 * end[2] == pytest.approx(segment.length, rel=1e-10)
     assert 2 * end[3] == pytest.approx(segment.volume, rel=1e-10)
     x, r = shape.outline(contraction, 4001)
-    assert np.interp(0.0, x, r) == pytest.approx(segment.largest_radius, rel=1e-6)
+    assert np.interp(0.0, x, r) == pytest.approx(segment.max_radius, rel=1e-6)
     assert np.hypot(np.diff(x), np.diff(r)).sum() == pytest.approx(L0, rel=1e-5)
 
 
@@ -310,7 +310,7 @@ def test_small_contraction_of_the_exact_outline_follows_its_limit():
     contraction = np.array([1e-4, 1e-3, 1e-2])
     r0 = D0 / 2
     limit = np.pi * r0 * L0 / np.sqrt(6 * contraction) + np.pi * (L0**2 / 5 - r0**2)
-    surplus = 1 - PleatedTube(L0, D0).area(contraction) / limit
+    surplus = 1 - PleatedTube(L0, D0).effective_area(contraction) / limit
     assert [f"{s:.1e}" for s in surplus] == ["2.6e-04", "2.6e-03", "2.7e-02"]
 
 
@@ -321,19 +321,19 @@ def test_rings_are_segments_in_series(contraction, rings):
     assert whole.volume(contraction) == pytest.approx((rings + 1) * part.volume(contraction), rel=1e-14)
     x, r = whole.outline(contraction, 601)
     assert x[-1] - x[0] == pytest.approx(L0 * (1 - contraction), rel=1e-12)
-    assert r.max() <= part.segment(contraction).largest_radius * (1 + 1e-12)
+    assert r.max() <= part.segment(contraction).max_radius * (1 + 1e-12)
     assert x == pytest.approx(-x[::-1], abs=1e-12)
     assert r == pytest.approx(r[::-1], abs=1e-12)
 
 
 def test_fibre_sums():
-    assert [round(s.of(16), 5) for s in (SumPastHalf(), SumOverHalf())] == [4.93074, 5.12583]
-    assert EvenSpread().of(16) == pytest.approx(5.092958, abs=5e-7)
-    assert GivenSum(5.0).of(16) == 5.0
+    assert [round(s.sum_of_sines(16), 5) for s in (PrintedFibreSum(), HalfShellFibreSum())] == [4.93074, 5.12583]
+    assert UniformFibreSum().sum_of_sines(16) == pytest.approx(5.092958, abs=5e-7)
+    assert UserDefinedFibreSum(5.0).sum_of_sines(16) == 5.0
     angles = np.pi / 16 * (2 * np.arange(9) + 1)
-    assert SumPastHalf().of(16) == pytest.approx(np.sin(angles).sum(), rel=1e-14)
-    assert SumOverHalf().of(16) == pytest.approx(np.sin(angles[:-1]).sum(), rel=1e-14)
-    assert SumOverHalf().of(4000) == pytest.approx(EvenSpread().of(4000), rel=1e-6)
+    assert PrintedFibreSum().sum_of_sines(16) == pytest.approx(np.sin(angles).sum(), rel=1e-14)
+    assert HalfShellFibreSum().sum_of_sines(16) == pytest.approx(np.sin(angles[:-1]).sum(), rel=1e-14)
+    assert HalfShellFibreSum().sum_of_sines(4000) == pytest.approx(UniformFibreSum().sum_of_sines(4000), rel=1e-6)
 
 
 def test_what_cannot_be_is_refused():

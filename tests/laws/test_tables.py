@@ -101,13 +101,13 @@ def test_the_stated_error_of_a_stand_in_bounds_it(name: str):
     error = np.abs(stand_in.force(p, c) - entry.characteristic.force(p, c))
     assert error.max() <= 1.15 * stand_in.max_error  # measured on a coarser grid
     assert np.sqrt(np.mean(error**2)) == pytest.approx(stand_in.rms_error, rel=0.15)
-    assert stand_in.covered == 1.0
+    assert stand_in.coverage == 1.0
 
 
 def test_a_stand_in_on_a_box_that_the_law_does_not_fill_says_so():
     validity_range = ValidityRange(1e5, 2e5, 0.0, 0.2)
     with pytest.warns(AirmuscleWarning, match=r"Tabulated has no answer on \d\d% of the validity range"):
         stand_in = as_force_law(SMALL, validity_range, degree=3)
-    assert 0.4 < stand_in.covered < 0.6
+    assert 0.4 < stand_in.coverage < 0.6
     with pytest.raises(SolveError, match="0 of 400 points of the validity range"):
         as_force_law(SMALL, ValidityRange(3e5, 4e5, 0.0, 0.2), degree=4)

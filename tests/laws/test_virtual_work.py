@@ -92,11 +92,11 @@ def test_the_polynomial_of_a_geometry_states_errors_that_bound_it():
     coarse = as_polynomial(table, degree=6)
     error = np.abs(coarse.volume(contraction) - table.volume(contraction)).max()
     assert 0.5 * error <= coarse.volume_error <= 1.05 * error
-    slope_error = np.abs(coarse.volume_growth(contraction) - table.volume_growth(contraction)).max()
-    assert coarse.growth_error == pytest.approx(slope_error, rel=0.1)
+    slope_error = np.abs(coarse.volume_derivative(contraction) - table.volume_derivative(contraction)).max()
+    assert coarse.derivative_error == pytest.approx(slope_error, rel=0.1)
 
 
 def test_outside_its_box_a_polynomial_geometry_goes_on_by_its_tangent():
     replaced = as_polynomial(BRAID, degree=5, reach=(0.0, 0.3))
-    beyond = replaced.volume(0.3) + 0.1 * BRAID.volume_growth(0.3)
+    beyond = replaced.volume(0.3) + 0.1 * BRAID.volume_derivative(0.3)
     assert replaced.volume(0.4) == pytest.approx(beyond, rel=1e-9)

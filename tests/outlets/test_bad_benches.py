@@ -124,7 +124,7 @@ def test_a_force_sensor_at_its_upper_end_gives_bounds_not_values(tmp_path):
     law = load(out / "muscle.toml").characteristic
     true = float(MUSCLE.force(4e5, 0.02))
     assert true > 850.0
-    assert law.unclamped(4e5, 0.02) == pytest.approx(true, rel=0.01)
+    assert law.unclamped_force(4e5, 0.02) == pytest.approx(true, rel=0.01)
     runs = read(files, resting_length=0.3)
     found = fit(ContractileSurface.blank(3, max_force=1e5), runs)
     high = np.concatenate([run["force"] for run in runs]) >= 500.0
@@ -133,7 +133,7 @@ def test_a_force_sensor_at_its_upper_end_gives_bounds_not_values(tmp_path):
     assert found.rmse < 1.0
     as_it_stands = fit(ContractileSurface.blank(3, max_force=1e5), runs, censoring=UNCENSORED)
     assert as_it_stands.rmse > 10.0
-    assert float(as_it_stands.model.unclamped(4e5, 0.02)) < 0.65 * true
+    assert float(as_it_stands.model.unclamped_force(4e5, 0.02)) < 0.65 * true
 
 
 def test_a_sensor_without_an_end_changes_nothing(tmp_path):

@@ -110,7 +110,7 @@ def test_the_force_is_zero_where_the_muscle_hangs_free(tmp_path):
     assert airmuscle("fit", tmp_path / "bench.csv", *asked, "--out", tmp_path / "fit").exit_code == 0
     law = load(tmp_path / "fit" / "muscle.toml").characteristic
     for pressure, contraction in ((2e5, 0.18), (6e5, 0.195)):
-        assert law.unclamped(pressure, contraction) == pytest.approx(0.0, abs=1e-6)
+        assert law.unclamped_force(pressure, contraction) == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize(

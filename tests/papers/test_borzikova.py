@@ -41,7 +41,7 @@ def verdict(name, law, curves=CURVES):
 def rms(law, force, least=0.25e5):
     """Per cent of contraction, over 27 even pressures from `least` to 3.5 bar."""
     pressures = np.linspace(least, 3.5e5, 27)
-    errors = law.contraction(pressures, force) - CURVES.at(force).contraction(pressures)
+    errors = law.contraction(pressures, force) - CURVES.curve_at(force).contraction(pressures)
     return 100 * np.sqrt(np.mean(np.asarray(errors) ** 2))
 
 
@@ -96,11 +96,11 @@ def test_another_saturation_changes_the_verdict(laws, saturation):
 
 
 def test_another_sign_of_a_plane_curve_changes_the_verdict(laws):
-    middle = CURVES.at(130.0)
+    middle = CURVES.curve_at(130.0)
     flipped = dataclasses.replace(middle, coefficients=(0.0082, -0.0872, *middle.coefficients[2:]))
     curves = dataclasses.replace(CURVES, curves=(CURVES.curves[0], flipped, CURVES.curves[2]))
     assert verdict(REPAIRED, laws[REPAIRED], curves) == DIFFERS
-    assert verdict(EXPONENTIAL, curves.interpolated(), curves) == HOLDS
+    assert verdict(EXPONENTIAL, curves.interpolate(), curves) == HOLDS
 
 
 def test_where_no_index_exists_the_explained_part_stands_in_its_place(laws):

@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from airmuscle.characteristic.rubber import AlongAxis, RubberLine
+from airmuscle.characteristic.rubber import AxialIntegral, RubberLine
 from airmuscle.characteristic.saga2007 import LINE_A, LINE_B, Saga2007
 from airmuscle.core import autodiff
 from airmuscle.core.errors import GeometryLimitError, ParameterError, SolveError
 from airmuscle.core.tree import flatten, structure
 from airmuscle.geometry.circular_arc import CircularArc
-from airmuscle.geometry.fibre_sum import EvenSpread, GivenSum, SumPastHalf
+from airmuscle.geometry.fibre_sum import UniformFibreSum, UserDefinedFibreSum, PrintedFibreSum
 from airmuscle.geometry.parabola import Parabola
 from airmuscle.geometry.straight_fibre import StraightFibre
 from airmuscle.library.catalogue import load
@@ -85,7 +85,7 @@ def test_pressures_of_every_reading(w, q, name, force):
 @given(law=READINGS, contraction=st.floats(1e-4, 0.41), force=st.floats(0, 300))
 def test_it_is_equation_19_letter_for_letter(law, contraction, force):
     expected = letter_for_letter(law, contraction, force)
-    assert law.balancing_pressure(contraction, force) == pytest.approx(expected, rel=1e-11)
+    assert law.equilibrium_pressure(contraction, force) == pytest.approx(expected, rel=1e-11)
 
 
 @pytest.mark.parametrize("name", LINES)
@@ -96,7 +96,7 @@ def test_along_the_arc_it_integrates_the_hoop_stress_there(name):
         a = parabola.length / (2 * parabola.end_slope)
 
         def stress(x, parabola=parabola, a=a, law=law):
-            radius = parabola.largest_radius - x * x / (2 * a)
+            radius = parabola.max_radius - x * x / (2 * a)
             return law.rubber.stress(2 * radius / law.geometry.end_diameter - 1) * math.hypot(1, x / a)
 
         hoop = law.wall_thickness * 2 * quad(stress, 0, parabola.length / 2, epsabs=0, epsrel=1e-12)[0]
@@ -114,7 +114,7 @@ def test_the_exact_mechanics_reading_agrees_with_its_reference():
 @UNHURRIED
 @given(law=READINGS, contraction=st.floats(1e-3, 0.40), force=st.floats(0, 300))
 def test_force_and_pressure_are_each_others_inverse(law, contraction, force):
-    pressure = law.balancing_pressure(contraction, force)
+    pressure = law.equilibrium_pressure(contraction, force)
     assert law.force(pressure, contraction) == pytest.approx(force, rel=1e-10, abs=1e-9)
 
 
@@ -129,14 +129,14 @@ def test_line_b_always_rises_so_that_contraction_returns(contraction, force, q, 
     law = reading(LINE_B, w, q)
     pressure = law.pressure(contraction, force)
     assert law.contraction(pressure, force) == pytest.approx(contraction, rel=1e-9)
-    assert autodiff.derivative(law, "balancing_pressure", contraction, force) > 0
+    assert autodiff.derivative(law, "equilibrium_pressure", contraction, force) > 0
 
 
 @UNHURRIED
 @given(law=READINGS, contraction=st.floats(1e-3, 0.40), force=st.floats(0, 300))
 def test_the_two_fibre_tensions_agree_in_balance(law, contraction, force):
     """(8) from the end section, (18) from the half shell with the minus that (9) and (19) demand."""
-    pressure = law.balancing_pressure(contraction, force)
+    pressure = law.equilibrium_pressure(contraction, force)
     assert law.shell_tension(pressure, contraction) == pytest.approx(
         law.end_tension(pressure, contraction, force), rel=1e-9
     )
@@ -150,7 +150,7 @@ def test_fibre_tension_is_the_printed_one():
     hoop = 0.002 * length * (0.1263e6 * length**2 + 6 * 0.3e6 * a * 0.012) / (3 * 0.012 * a)
     push = pressure * length * (length**2 / (3 * a) + 2 * 0.012)
     assert law.end_tension(pressure, c, force) == pytest.approx(axial, rel=1e-13)
-    printed = (push - hoop) / (2 * law.fibre_sum.of(16) * math.sin(math.atan(length / a)))
+    printed = (push - hoop) / (2 * law.fibre_sum.sum_of_sines(16) * math.sin(math.atan(length / a)))
     assert law.shell_tension(pressure, c) == pytest.approx(printed, rel=1e-12)
 
 
@@ -160,26 +160,26 @@ def test_limits_of_each_reading(w, q):
     laws = [reading(LINE_A, float(w), float(q), n) for n in (0, 1, 2)]
     assert [round(100 * law.pole, 1) for law in laws] == list(poles)
     contraction = np.linspace(0.05, 0.5, 4501)
-    needed = laws[0].balancing_pressure(contraction, 0.0)
+    needed = laws[0].equilibrium_pressure(contraction, 0.0)
     assert needed.min() / 1e6 == pytest.approx(lowest, abs=6e-6)
     assert 100 * contraction[needed.argmin()] == pytest.approx(where, abs=0.06)
-    assert laws[0].snapping_load == pytest.approx(load, abs=0.06)
+    assert laws[0].snap_through_load == pytest.approx(load, abs=0.06)
     for offset, rises in ((-1.0, False), (1.0, True)):
-        start = laws[0].balancing_pressure(np.array([0.0, 1e-8]), laws[0].snapping_load + offset)
+        start = laws[0].equilibrium_pressure(np.array([0.0, 1e-8]), laws[0].snap_through_load + offset)
         assert (start[1] > start[0]) is np.bool_(rises)
-    assert reading(LINE_B, float(w), float(q)).snapping_load < 0
+    assert reading(LINE_B, float(w), float(q)).snap_through_load < 0
 
 
 def test_pressure_starts_at_that_of_a_thin_ring():
     assert reading(LINE_A, 1.0, 2.0).pressure(0.0, 50.0) == pytest.approx(2 * 0.002 * 0.3e6 / 0.012, rel=1e-14)
     assert DEFAULT.pressure(0.0, 50.0) == pytest.approx(0.002 * 0.1263e6 / 0.012, rel=1e-14)
-    assert DEFAULT.starting_pressure == pytest.approx(DEFAULT.pressure(0.0, 0.0), rel=1e-14)
+    assert DEFAULT.threshold_pressure == pytest.approx(DEFAULT.pressure(0.0, 0.0), rel=1e-14)
 
 
 @pytest.mark.filterwarnings("error")
 def test_straight_fibres_hold_any_tension():
     for law in (DEFAULT, circle(LINE_A)):
-        start = law.starting_pressure
+        start = law.threshold_pressure
         for at in (0.0, np.array([0.0])):
             assert law.force(2 * start, at) > 1e150
             assert law.force(start / 2, at) < -1e150
@@ -211,9 +211,9 @@ def test_the_quintic_holds_every_root_that_a_search_finds(law, pressure, force):
     grid = np.concatenate([np.geomspace(1e-9, 1e-3, 800), np.linspace(1.01e-3, law.pole - 1e-6, 3200)])
 
     def miss(c):
-        return float(law.balancing_pressure(c, force)) - pressure
+        return float(law.equilibrium_pressure(c, force)) - pressure
 
-    values = law.balancing_pressure(grid, force) - pressure
+    values = law.equilibrium_pressure(grid, force) - pressure
     searched = [
         brentq(miss, a, b, xtol=1e-14)
         for a, b, u, v in zip(grid, grid[1:], values, values[1:], strict=False)
@@ -226,7 +226,7 @@ def test_the_quintic_holds_every_root_that_a_search_finds(law, pressure, force):
         assert near.stable == (miss(root * (1 + 1e-5)) > miss(root * (1 - 1e-5)))
     for equilibrium in listed:
         c = equilibrium.contraction
-        scale = abs(autodiff.derivative(law, "balancing_pressure", max(c, 1e-12), force)) * max(c, 1e-12) + pressure
+        scale = abs(autodiff.derivative(law, "equilibrium_pressure", max(c, 1e-12), force)) * max(c, 1e-12) + pressure
         assert abs(miss(c)) < 1e-6 * scale
 
 
@@ -245,18 +245,18 @@ def test_strain_passes_the_rubber_test_at_21_percent():
     assert round(100 * DEFAULT.contraction_at_strain(3.0), 1) == 21.1
     c = np.array([0.01, 0.1, 0.3])
     assert DEFAULT.middle_strain(c) == pytest.approx(1.5 * np.sqrt(24 * c * (1 - c)), rel=1e-13)
-    radius = DEFAULT.geometry.segment(c).largest_radius
+    radius = DEFAULT.geometry.segment(c).max_radius
     assert DEFAULT.middle_strain(c) == pytest.approx(radius / 0.006 - 1, rel=1e-12)
     assert [LINES[n].stress(3.0) / 1e6 for n in "AB"] == pytest.approx([0.679, 1.026], abs=1e-3)
 
 
 def test_cautions_name_what_is_wrong_at_a_point():
-    assert DEFAULT.cautions(DEFAULT.pressure(0.1, 100.0), 0.1) == ()
-    strained, volume = DEFAULT.cautions(DEFAULT.pressure(0.31, 100.0), 0.31)
+    assert DEFAULT.validity_warnings(DEFAULT.pressure(0.1, 100.0), 0.1) == ()
+    strained, volume = DEFAULT.validity_warnings(DEFAULT.pressure(0.31, 100.0), 0.31)
     assert "strained to 3.40; its test ended at 3, reached at 21.1% contraction" in strained
     assert "the volume falls" in volume
     law = reading(LINE_A, 2.0, 1.0)
-    (unstable,) = law.cautions(law.pressure(0.05, 0.0), 0.05)
+    (unstable,) = law.validity_warnings(law.pressure(0.05, 0.0), 0.05)
     assert "it snaps through" in unstable
 
 
@@ -294,8 +294,8 @@ def test_slopes_are_exact(law, contraction, pressure):
 @given(law=READINGS, contraction=st.floats(0.01, 0.4))
 def test_rings_are_muscles_in_series(law, contraction):
     part = replace(law, geometry=StraightFibre(law.geometry.fibre_length, 0.012, 0, Parabola()))
-    assert law.balancing_pressure(contraction, 80.0) == pytest.approx(
-        part.balancing_pressure(contraction, 80.0), rel=1e-14
+    assert law.equilibrium_pressure(contraction, 80.0) == pytest.approx(
+        part.equilibrium_pressure(contraction, 80.0), rel=1e-14
     )
 
 
@@ -347,7 +347,7 @@ CIRCLE_BALANCES = {
 def test_the_balances_of_the_circle_agree_with_the_reference(name, force):
     tube, line = pairs.OUTLINES["circle"], LINES[name]
     along_arc = pairs.closures(tube, line, pairs.CONTRACTIONS)
-    along_axis = pairs.closures(tube, line, pairs.CONTRACTIONS, along=AlongAxis())
+    along_axis = pairs.closures(tube, line, pairs.CONTRACTIONS, along=AxialIntegral())
     found = (along_arc["end balance"], along_axis["end balance"], along_arc["middle balance"])
     for share, expected in zip(found, CIRCLE_BALANCES[name, force], strict=True):
         assert pairs.pressure(share, float(force)) / 1e6 == pytest.approx(expected, abs=6e-7, nan_ok=True)
@@ -405,7 +405,7 @@ def test_there_are_fifteen_pairs():
 def test_the_balances_break_virtual_work_by_as_much_as_the_reference_says():
     """Without rubber, at 20 %: the reading of exact mechanics pulls 14.3 % too much, its outline's work 47.6 % less."""
     law = replace(mechanics(LINE_A), rubber=RubberLine(0.0, 0.0))
-    truth = 1e5 * exact(LINE_A).geometry.area(0.2)
+    truth = 1e5 * exact(LINE_A).geometry.effective_area(0.2)
     assert law.force(1e5, 0.2) / truth - 1 == pytest.approx(0.143, abs=5e-4)
     assert virtual_work(law, 1e5, 0.2) / truth - 1 == pytest.approx(-0.476, abs=5e-4)
 
@@ -438,14 +438,14 @@ def test_mechanics_caps_the_tension():
 def test_verdicts_change_with_the_fibre_sum_and_the_projection_factor():
     law = reading(LINE_B, 2.0, 2.0)
     assert verdict(claims.lifting_claim(law, "")) == HOLDS
-    assert verdict(claims.lifting_claim(replace(law, fibre_sum=GivenSum(5.5)), "")) == DIFFERS
+    assert verdict(claims.lifting_claim(replace(law, fibre_sum=UserDefinedFibreSum(5.5)), "")) == DIFFERS
     assert verdict(claims.lifting_claim(replace(law, projection_factor=1.0), "")) == DIFFERS
     assert verdict(claims.start_claims(DEFAULT, "")[0]) == HOLDS
     assert verdict(claims.start_claims(replace(DEFAULT, projection_factor=1.0), "")[0]) == DIFFERS
     mended = claims.accuracy_claims(replace(DEFAULT, projection_factor=1.0, slope_factor=2.0), "")[0]
     assert (verdict(claims.accuracy_claims(DEFAULT, "")[0]), verdict(mended)) == (DIFFERS, DIFFERS)
     assert verdict(claims.accuracy_claims(mechanics(LINE_A), "")[0]) == HOLDS
-    even = replace(mechanics(LINE_A), fibre_sum=GivenSum(8.0))
+    even = replace(mechanics(LINE_A), fibre_sum=UserDefinedFibreSum(8.0))
     assert verdict(claims.accuracy_claims(even, "")[0]) == DIFFERS
 
 
@@ -481,9 +481,9 @@ def test_a_claim_without_a_number_is_never_held():
 
 
 def test_the_printed_fibre_sum_is_a_reading():
-    assert replace(DEFAULT, fibre_sum=SumPastHalf()).pressure(0.2, 100.0) < DEFAULT.pressure(0.2, 100.0)
+    assert replace(DEFAULT, fibre_sum=PrintedFibreSum()).pressure(0.2, 100.0) < DEFAULT.pressure(0.2, 100.0)
     sums = [
-        replace(DEFAULT, fibre_sum=s).pressure(0.2, 100.0) for s in (SumPastHalf(), EvenSpread(), GivenSum(5.12583))
+        replace(DEFAULT, fibre_sum=s).pressure(0.2, 100.0) for s in (PrintedFibreSum(), UniformFibreSum(), UserDefinedFibreSum(5.12583))
     ]
     assert sums == sorted(sums)
 

@@ -91,7 +91,7 @@ def _pressure_growth(plant: Plant, muscle: Muscle, port: MuscleState) -> float:
     """dp/deps [Pa] of the air shut in: its pressure by volume and by what the gas law makes of its content."""
     content = {s.name: port.states[s.name] for s in plant.gas.states(port.volume, plant.ambient)}
     names = list(content)
-    growth = muscle.geometry.volume_growth(port.inner_contraction)
+    growth = muscle.geometry.volume_derivative(port.inner_contraction)
     moved, still = (plant.gas.rates(content, port.air, NO_FLOW, rate, plant.ambient) for rate in (growth, 0.0))
 
     def pressure(x: Sequence[Value]) -> list[Value]:

@@ -13,9 +13,9 @@ from typing import ClassVar, NamedTuple
 from ..core import autodiff
 from ..core.ops import Value
 from ..core.reference import Reference
-from .solve import first_crossing
+from .solve import find_first_root
 
-NO_PRESSURE = 1e-300
+MIN_PRESSURE = 1e-300
 """Stands for a pressure of zero [Pa] where a force is divided by it: no load then has an answer."""
 
 
@@ -70,21 +70,21 @@ class Characteristic(abc.ABC):
         """-dF/deps at constant pressure [N]; divide by the resting length for N/m."""
         return -self.slopes(pressure, contraction).by_contraction
 
-    def _no_contraction(self, pressure: float, force: float) -> str:
+    def _no_contraction_message(self, pressure: float, force: float) -> str:
         start, end = self.contraction_range
         return (
             f"{type(self).__name__}: no contraction between {start:.1%} and {end:.1%} balances {force:.6g} N at "
             f"{pressure / 1e3:.6g} kPa. "
         )
 
-    def _no_pressure(self, contraction: float, force: float) -> str:
+    def _no_pressure_message(self, contraction: float, force: float) -> str:
         start, end = (p / 1e3 for p in self.pressure_range)
         return (
             f"{type(self).__name__}: no gauge pressure between {start:.6g} and {end:.6g} kPa gives {force:.6g} N at "
             f"a contraction of {contraction:.2%}. "
         )
 
-    def _no_force(self, pressure: float, contraction: float) -> str:
+    def _no_force_message(self, pressure: float, contraction: float) -> str:
         start, end = self.force_range
         return (
             f"{type(self).__name__}: no force between {start:.6g} and {end:.6g} N holds a contraction of "
@@ -95,7 +95,7 @@ class Characteristic(abc.ABC):
 class ForceLaw(Characteristic):
     """A law given as F(p, eps)."""
 
-    def unclamped(self, pressure: Value, contraction: Value) -> Value:
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
         """The tension [N] before the law holds it within a range: what a fit determines from measured points."""
         return self.force(pressure, contraction)
 
@@ -104,18 +104,18 @@ class ForceLaw(Characteristic):
             return load - self.force(p, contraction)
 
         def message(p: float, load: float, low: float, high: float) -> str:
-            return self._no_contraction(p, load) + _pulls(load - high, load - low)
+            return self._no_contraction_message(p, load) + _describe_force_limits(load - high, load - low)
 
-        return first_crossing(unbalance, self.contraction_range, (pressure, force), message)
+        return find_first_root(unbalance, self.contraction_range, (pressure, force), message)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         def excess(pressure: Value, c: Value, load: Value) -> Value:
             return self.force(pressure, c) - load
 
         def message(c: float, load: float, low: float, high: float) -> str:
-            return self._no_pressure(c, load) + _pulls(low + load, high + load)
+            return self._no_pressure_message(c, load) + _describe_force_limits(low + load, high + load)
 
-        return first_crossing(excess, self.pressure_range, (contraction, force), message)
+        return find_first_root(excess, self.pressure_range, (contraction, force), message)
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         return Slopes(
@@ -123,17 +123,17 @@ class ForceLaw(Characteristic):
             autodiff.derivative(self, "force", pressure, contraction, wrt=1),
         )
 
-    def _no_contraction_here(self, pressure: float, force: float) -> str:
+    def _contraction_limits_message(self, pressure: float, force: float) -> str:
         """For a law solved in closed form, whose tension falls steadily from one end of its reach to the other."""
         ends = (float(self.force(pressure, end)) for end in self.contraction_range)
-        return self._no_contraction(pressure, force) + _pulls(*sorted(ends))
+        return self._no_contraction_message(pressure, force) + _describe_force_limits(*sorted(ends))
 
-    def _no_pressure_here(self, contraction: float, force: float) -> str:
+    def _pressure_limits_message(self, contraction: float, force: float) -> str:
         ends = (float(self.force(end, contraction)) for end in self.pressure_range)
-        return self._no_pressure(contraction, force) + _pulls(*sorted(ends))
+        return self._no_pressure_message(contraction, force) + _describe_force_limits(*sorted(ends))
 
 
-def _pulls(low: float, high: float) -> str:
+def _describe_force_limits(low: float, high: float) -> str:
     return f"Between these the muscle pulls {low:.6g} to {high:.6g} N there."
 
 
@@ -146,9 +146,9 @@ class ContractionLaw(Characteristic):
 
         def message(p: float, c: float, low: float, high: float) -> str:
             possible = f"Between these it contracts by {c - high:.2%} to {c - low:.2%} at this pressure."
-            return self._no_force(p, c) + possible
+            return self._no_force_message(p, c) + possible
 
-        return first_crossing(shortfall, self.force_range, (pressure, contraction), message)
+        return find_first_root(shortfall, self.force_range, (pressure, contraction), message)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         def excess(pressure: Value, c: Value, load: Value) -> Value:
@@ -156,9 +156,9 @@ class ContractionLaw(Characteristic):
 
         def message(c: float, load: float, low: float, high: float) -> str:
             possible = f"Between these it contracts by {low + c:.2%} to {high + c:.2%} under this load."
-            return self._no_pressure(c, load) + possible
+            return self._no_pressure_message(c, load) + possible
 
-        return first_crossing(excess, self.pressure_range, (contraction, force), message)
+        return find_first_root(excess, self.pressure_range, (contraction, force), message)
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         force = self.force(pressure, contraction)
@@ -176,9 +176,9 @@ class PressureLaw(Characteristic):
 
         def message(p: float, c: float, low: float, high: float) -> str:
             possible = f"Between these it needs {(low + p) / 1e3:.6g} to {(high + p) / 1e3:.6g} kPa there."
-            return self._no_force(p, c) + possible
+            return self._no_force_message(p, c) + possible
 
-        return first_crossing(excess, self.force_range, (pressure, contraction), message)
+        return find_first_root(excess, self.force_range, (pressure, contraction), message)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         def excess(contraction: Value, p: Value, load: Value) -> Value:
@@ -186,9 +186,9 @@ class PressureLaw(Characteristic):
 
         def message(p: float, load: float, low: float, high: float) -> str:
             possible = f"Between these it needs {(low + p) / 1e3:.6g} to {(high + p) / 1e3:.6g} kPa under this load."
-            return self._no_contraction(p, load) + possible
+            return self._no_contraction_message(p, load) + possible
 
-        return first_crossing(excess, self.contraction_range, (pressure, force), message)
+        return find_first_root(excess, self.contraction_range, (pressure, force), message)
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         force = self.force(pressure, contraction)

@@ -66,7 +66,7 @@ class PlaneCurves:
     curves: tuple[PlaneCurve, ...]
     max_pressure: float = parameter("Pa", "p_high", "upper end of the measured gauge pressures", fitted=False)
 
-    def at(self, force: float) -> PlaneCurve:
+    def curve_at(self, force: float) -> PlaneCurve:
         """The curve of one load [N]. Raises OutOfReach where the paper has no curve for it."""
         for curve in self.curves:
             if curve.force == force:
@@ -88,7 +88,7 @@ class PlaneCurves:
             notes=("Curves fitted by the authors, not measured points: those are lost.",),
         )
 
-    def interpolated(self, force_degree: int = 2) -> BorzikovaExponential:
+    def interpolate(self, force_degree: int = 2) -> BorzikovaExponential:
         """The one exponential surface through all the curves, for one load more than its degree in force."""
         loads = np.array([c.force for c in self.curves])
         degree = max(len(c.coefficients) for c in self.curves) - 1
@@ -117,7 +117,7 @@ are those with which the printed matrix agrees. The range of 3.5 bar is inferred
 
 
 @model
-class _Surface(ContractionLaw):
+class _PolynomialSurface(ContractionLaw):
     """What the two surfaces share: Sum_ij a_ij p^i F^j in bar and newton, and the validity range it was fitted on."""
 
     references: ClassVar[tuple[Reference, ...]] = (BORZIKOVA,)
@@ -169,10 +169,10 @@ class _Surface(ContractionLaw):
         """Sum_ij a_ij p^i F^j at gauge pressure [Pa] and force [N]; outside the validity range by its tangent."""
         inner_p = ops.clip(pressure, self.min_pressure, self.max_pressure)
         inner_f = ops.clip(force, self.min_force, self.max_force)
-        value, by_p, by_f = self._with_slopes(inner_p / bar, inner_f)
+        value, by_p, by_f = self._value_and_derivatives(inner_p / bar, inner_f)
         return value + by_p * (pressure - inner_p) / bar + by_f * (force - inner_f)
 
-    def _with_slopes(self, p: Value, f: Value) -> tuple[Value, Value, Value]:
+    def _value_and_derivatives(self, p: Value, f: Value) -> tuple[Value, Value, Value]:
         """The polynomial and its slopes by p [bar] and F [N], by Horner's scheme in both."""
         width = self.force_degree + 1
         value: Value = 0.0
@@ -187,7 +187,7 @@ class _Surface(ContractionLaw):
 
 
 @model
-class BorzikovaDirect(_Surface):
+class BorzikovaDirect(_PolynomialSurface):
     """Contraction as a polynomial: k = Sum_{i=0..m} Sum_{j=0..n} a_ij p^i F^j.
 
     k contraction in per cent, p gauge pressure in bar, F load in N; m = 4 and n = 2 give the 15 coefficients
@@ -201,7 +201,7 @@ class BorzikovaDirect(_Surface):
 
 
 @model
-class BorzikovaExponential(_Surface):
+class BorzikovaExponential(_PolynomialSurface):
     """Contraction that saturates: k = k_max (1 - exp v), v = Sum_{i=0..m} Sum_{j=0..n} a_ij p^i F^j.
 
     p gauge pressure in bar, F load in N, k_max the contraction that the muscle saturates towards [1], 0.40

@@ -9,8 +9,8 @@ from ..core.declaration import model
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..geometry.braid import CHOU_HANNAFORD_1996, Braid
-from .base import NO_PRESSURE, ForceLaw
-from .solve import within_reach
+from .base import MIN_PRESSURE, ForceLaw
+from .solve import check_solution
 
 
 @model
@@ -45,18 +45,18 @@ class ChouHannaford1996(ForceLaw):
         return (start, float(1.0 - self.thread / (ops.sqrt(3.0) * self.geometry.resting_length)))
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        return pressure * self._area(contraction)
+        return pressure * self._effective_area(contraction)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        found = force / self._area(contraction)
-        return within_reach(found, self.pressure_range, (contraction, force), self._no_pressure_here)
+        found = force / self._effective_area(contraction)
+        return check_solution(found, self.pressure_range, (contraction, force), self._pressure_limits_message)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
-        ratio = force / ops.where(pressure == 0.0, NO_PRESSURE, pressure) * 4 * ops.pi * self.turns**2 / self.thread**2
+        ratio = force / ops.where(pressure == 0.0, MIN_PRESSURE, pressure) * 4 * ops.pi * self.turns**2 / self.thread**2
         found = 1.0 - self.thread * ops.sqrt((ratio + 1) / 3) / self.geometry.resting_length
-        return within_reach(found, self.contraction_range, (pressure, force), self._no_contraction_here)
+        return check_solution(found, self.contraction_range, (pressure, force), self._contraction_limits_message)
 
-    def _area(self, contraction: Value) -> Value:
+    def _effective_area(self, contraction: Value) -> Value:
         """F/p [m2]."""
         length = self.geometry.resting_length * (1.0 - contraction)
         return self.thread**2 / (4 * ops.pi * self.turns**2) * (3 * length**2 / self.thread**2 - 1)

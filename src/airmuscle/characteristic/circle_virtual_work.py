@@ -12,16 +12,16 @@ from ..core.ops import Value
 from ..core.reference import Reference
 from ..geometry.circular_arc import FERRARESI_2001, CircularArc
 from ..geometry.meridian import SAGA_2007
-from ..geometry.straight_fibre import StraightFibre, check_limit
+from ..geometry.straight_fibre import StraightFibre, check_contraction_range
 from .base import ForceLaw
 from .rubber import RubberLine
-from .solve import first_crossing, within_reach
+from .solve import find_first_root, check_solution
 
-_STRAIGHT = 1e-200
+_MIN_ANGLE = 1e-200
 """Stands for a zero angle in a denominator, so that straight fibres pull without bound but divide by nothing."""
 
 
-class _Work(NamedTuple):
+class _WorkTerms(NamedTuple):
     """Times psi, so that they are finite at zero contraction."""
 
     area: Value
@@ -59,23 +59,23 @@ class CircleVirtualWork(ForceLaw):
     @property
     def contraction_range(self) -> tuple[float, float]:
         """From rest to the largest volume, where the pressure that holds a load becomes infinite."""
-        return (0.0, _largest_volume(self.geometry) * (1.0 - 1e-9))
+        return (0.0, _contraction_of_max_volume(self.geometry) * (1.0 - 1e-9))
 
     @property
-    def starting_pressure(self) -> float:
+    def threshold_pressure(self) -> float:
         """The gauge pressure [Pa] at which contraction starts under any load: t beta/r_0."""
         return float(self.wall_thickness * self.rubber.intercept / self.geometry.end_radius)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         """Tension [N], negative past the largest volume; without bound at rest, where straight fibres hold any."""
-        self._check(contraction, self.geometry.contraction_range)
-        work = self._work(contraction)
-        return (pressure * work.area - work.rubber) / ops.maximum(work.angle, _STRAIGHT)
+        self._check_contraction(contraction, self.geometry.contraction_range)
+        work = self._work_terms(contraction)
+        return (pressure * work.area - work.rubber) / ops.maximum(work.angle, _MIN_ANGLE)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        self._check(contraction, self.contraction_range)
+        self._check_contraction(contraction, self.contraction_range)
         found = self._pressure(contraction, force)
-        return within_reach(found, self.pressure_range, (contraction, force), self._no_pressure)
+        return check_solution(found, self.pressure_range, (contraction, force), self._no_pressure_message)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         def excess(contraction: Value, p: Value, load: Value) -> Value:
@@ -83,45 +83,45 @@ class CircleVirtualWork(ForceLaw):
 
         def message(p: float, load: float, low: float, high: float) -> str:
             possible = f"Between these it needs {(low + p) / 1e3:.6g} kPa or more under this load."
-            return self._no_contraction(p, load) + possible
+            return self._no_contraction_message(p, load) + possible
 
-        started = (self.starting_pressure, float("inf"))
-        within_reach(pressure + 0.0 * force, started, (pressure, force), self._still_straight)
-        return first_crossing(excess, self.contraction_range, (pressure, force), message)
+        started = (self.threshold_pressure, float("inf"))
+        check_solution(pressure + 0.0 * force, started, (pressure, force), self._below_threshold_message)
+        return find_first_root(excess, self.contraction_range, (pressure, force), message)
 
     def _pressure(self, contraction: Value, force: Value) -> Value:
-        work = self._work(contraction)
+        work = self._work_terms(contraction)
         return (force * work.angle + work.rubber) / work.area
 
-    def _work(self, contraction: Value) -> _Work:
+    def _work_terms(self, contraction: Value) -> _WorkTerms:
         tube = self.geometry
         arc = CircularArc()
         angle_squared = arc.angle_squared(contraction)
-        growth = arc.growth_times_angle(angle_squared, tube.fibre_length, tube.end_radius)
+        growth = arc.derivatives_times_angle(angle_squared, tube.fibre_length, tube.end_radius)
         energy = self.rubber.energy(growth.arc_excess, growth.arc_excess_squared, tube.end_radius)
-        return _Work(
+        return _WorkTerms(
             growth.volume / tube.fibre_length,
             self.wall_thickness * energy / tube.fibre_length,
             ops.sqrt(angle_squared),
         )
 
-    def _check(self, contraction: Value, reach: tuple[float, float]) -> None:
+    def _check_contraction(self, contraction: Value, reach: tuple[float, float]) -> None:
         if not ops.is_symbol(self.wall_thickness):
-            check_limit(contraction, reach, "CircleVirtualWork")
+            check_contraction_range(contraction, reach, "CircleVirtualWork")
 
-    def _still_straight(self, pressure: float, force: float) -> str:
+    def _below_threshold_message(self, pressure: float, force: float) -> str:
         return (
             f"CircleVirtualWork: at {pressure / 1e3:.6g} kPa the tube is still straight; contraction starts at "
-            f"{self.starting_pressure / 1e3:.6g} kPa."
+            f"{self.threshold_pressure / 1e3:.6g} kPa."
         )
 
 
 @functools.lru_cache(maxsize=256)
-def _largest_volume(tube: StraightFibre) -> float:
+def _contraction_of_max_volume(tube: StraightFibre) -> float:
     """The contraction of largest volume, by bisection of its growth; the geometry's end if it still grows there."""
     low, high = tube.contraction_range
     while (middle := (low + high) / 2) not in (low, high):
         arc = CircularArc()
-        growth = arc.growth_times_angle(arc.angle_squared(middle), tube.fibre_length, tube.end_radius)
+        growth = arc.derivatives_times_angle(arc.angle_squared(middle), tube.fibre_length, tube.end_radius)
         low, high = (middle, high) if growth.volume > 0 else (low, middle)
     return high

@@ -30,5 +30,5 @@ class Clamped(ForceLaw):
     def force(self, pressure: Value, contraction: Value) -> Value:
         return ops.clip(self.inner.force(pressure, contraction), self.min_force, self.max_force)
 
-    def unclamped(self, pressure: Value, contraction: Value) -> Value:
-        return self.inner.unclamped(pressure, contraction)
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
+        return self.inner.unclamped_force(pressure, contraction)

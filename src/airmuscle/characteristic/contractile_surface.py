@@ -90,12 +90,12 @@ class ContractileSurface(ForceLaw):
     def force(self, pressure: Value, contraction: Value) -> Value:
         return ops.clip(self.polynomial(pressure, contraction), self.min_force, self.max_force)
 
-    def unclamped(self, pressure: Value, contraction: Value) -> Value:
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
         return self.polynomial(pressure, contraction)
 
     def basis(self, pressure: Value, contraction: Value) -> list[Value]:
         """What each coefficient multiplies at points inside the validity range: the columns of the matrix that a fit solves."""
-        x, q = self._scaled(pressure, contraction)
+        x, q = self._scale(pressure, contraction)
         powers_x, powers_q = [x * 0.0 + 1.0], [q * 0.0 + 1.0]
         for _ in range(self.degree):
             powers_x.append(powers_x[-1] * x)
@@ -103,18 +103,18 @@ class ContractileSurface(ForceLaw):
         return [powers_x[i] * powers_q[j] for i, j in exponents(self.degree)]
 
     @property
-    def terms(self) -> tuple[str, ...]:
+    def term_labels(self) -> tuple[str, ...]:
         """What each coefficient multiplies, in words for tables and messages: `x^2 q`."""
-        return tuple(f"{_power('x', i)} {_power('q', j)}".strip() or "1" for i, j in exponents(self.degree))
+        return tuple(f"{_power_label('x', i)} {_power_label('q', j)}".strip() or "1" for i, j in exponents(self.degree))
 
     def polynomial(self, pressure: Value, contraction: Value) -> Value:
         """The force [N] before the clamp, continued by its tangent outside the validity range."""
-        x, q = self._scaled(pressure, contraction)
+        x, q = self._scale(pressure, contraction)
         inner_q, inner_x = ops.clip(q, -1.0, 1.0), ops.clip(x, -1.0, 1.0)
         value, by_x, by_q = self._horner(inner_x, inner_q)
         return value + ops.minimum(by_x, 0.0) * (x - inner_x) + ops.maximum(by_q, 0.0) * (q - inner_q)
 
-    def _scaled(self, pressure: Value, contraction: Value) -> tuple[Value, Value]:
+    def _scale(self, pressure: Value, contraction: Value) -> tuple[Value, Value]:
         """Contraction and pressure as x and q, from -1 to 1 on the validity range."""
         half_p = (self.max_pressure - self.min_pressure) / 2
         half_c = (self.max_contraction - self.min_contraction) / 2
@@ -138,15 +138,15 @@ class ContractileSurface(ForceLaw):
             by_x = by_x * q + slope
         return value, by_x, by_q
 
-    def plain_coefficients(self, pressure_unit: float = 1.0) -> dict[tuple[int, int], float]:
+    def monomial_coefficients(self, pressure_unit: float = 1.0) -> dict[tuple[int, int], float]:
         """Coefficients of eps^i p^j inside the validity range, p in multiples of `pressure_unit` [Pa] (1e5 for bar).
 
         Returns {(i, j): value in N per pressure_unit^j}. Plain powers are badly conditioned: for export, not for fits.
         """
         scale_c = 2 / (self.max_contraction - self.min_contraction)
         scale_p = 2 / (self.max_pressure - self.min_pressure)
-        powers_c = _powers(-1 - scale_c * self.min_contraction, scale_c, self.degree)
-        powers_p = _powers(-1 - scale_p * self.min_pressure, scale_p * pressure_unit, self.degree)
+        powers_c = _powers_of_linear(-1 - scale_c * self.min_contraction, scale_c, self.degree)
+        powers_p = _powers_of_linear(-1 - scale_p * self.min_pressure, scale_p * pressure_unit, self.degree)
         plain = dict.fromkeys(exponents(self.degree), 0.0)
         for (i, j), a in zip(exponents(self.degree), self.coefficients, strict=True):
             for m, by_c in enumerate(powers_c[i]):
@@ -155,11 +155,11 @@ class ContractileSurface(ForceLaw):
         return plain
 
 
-def _power(symbol: str, exponent: int) -> str:
+def _power_label(symbol: str, exponent: int) -> str:
     return "" if exponent == 0 else symbol if exponent == 1 else f"{symbol}^{exponent}"
 
 
-def _powers(constant: float, factor: float, degree: int) -> list[list[float]]:
+def _powers_of_linear(constant: float, factor: float, degree: int) -> list[list[float]]:
     """The coefficients of (constant + factor t)^i in t, for i up to `degree`."""
     powers = [[1.0]]
     for _ in range(degree):

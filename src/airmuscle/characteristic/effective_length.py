@@ -10,7 +10,7 @@ from ..core.errors import ParameterError
 from ..core.ops import Value
 from .base import ForceLaw
 
-_ROOM = 2.0
+_RANGE_FACTOR = 2.0
 """Widening of a surface's validity range: so much more than the whole muscle its middle may contract (chosen)."""
 
 
@@ -20,7 +20,7 @@ class EffectiveLength(ForceLaw):
 
     eps contraction of the whole muscle, L_0 its length between the fittings. The ends take l_d of it that does not
     contract; d is the length by which they give under pressure or the zero of a bench is off. Short muscles so
-    contract less. `of_length` gives the law of another muscle of the type. Made for this program; that a dead
+    contract less. `with_resting_length` gives the law of another muscle of the type. Made for this program; that a dead
     length at the ends limits short muscles is Tondu and Lopez (2000), whose end correction is L_0/(L_0 - l_d).
     """
 
@@ -50,7 +50,7 @@ class EffectiveLength(ForceLaw):
         named = getattr(self.inner, "linear_in", ())
         return tuple(f"inner.{field}" for field in ((named,) if isinstance(named, str) else named))
 
-    def of_length(self, resting_length: float) -> EffectiveLength:
+    def with_resting_length(self, resting_length: float) -> EffectiveLength:
         """The law of a muscle of the same type with this length [m] between the fittings."""
         return dataclasses.replace(self, resting_length=resting_length)
 
@@ -60,15 +60,15 @@ class EffectiveLength(ForceLaw):
         if not hasattr(inner, "with_validity_range"):
             return self
         low, high = contraction
-        room = (_ROOM - 1) * (high - low) / 2
+        room = (_RANGE_FACTOR - 1) * (high - low) / 2
         return dataclasses.replace(self, inner=inner.with_validity_range(pressure, (low - room, high + room)))
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        return self.inner.force(pressure, self._of_the_middle(contraction))
+        return self.inner.force(pressure, self._active_contraction(contraction))
 
-    def unclamped(self, pressure: Value, contraction: Value) -> Value:
-        return self.inner.unclamped(pressure, self._of_the_middle(contraction))
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
+        return self.inner.unclamped_force(pressure, self._active_contraction(contraction))
 
-    def _of_the_middle(self, contraction: Value) -> Value:
+    def _active_contraction(self, contraction: Value) -> Value:
         shortening = contraction * self.resting_length + self.end_shift
         return shortening / (self.resting_length - self.dead_length)

@@ -20,9 +20,9 @@ HUNT_2017 = Reference(
     note="formula and coefficients of a 10 mm Festo muscle second hand, from two copies that agree",
 )
 
-_STEEPEST = 1.5
+_MAX_TANGENT_ARGUMENT = 1.5
 """Argument at which the tangent is held: past it the law asks for more than 2.9 MPa, which no muscle stands."""
-_LEAST_SPAN = 1e-6
+_MIN_SPAN = 1e-6
 """Least span of contraction: the law knows no load that takes all of it."""
 
 
@@ -62,6 +62,6 @@ class Hunt2017(PressureLaw):
             )
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        span = ops.maximum(self.max_contraction - self.span_by_force * force, _LEAST_SPAN)
-        argument = ops.clip(self.steepness * (contraction / span - self.centre), -_STEEPEST, _STEEPEST)
+        span = ops.maximum(self.max_contraction - self.span_by_force * force, _MIN_SPAN)
+        argument = ops.clip(self.steepness * (contraction / span - self.centre), -_MAX_TANGENT_ARGUMENT, _MAX_TANGENT_ARGUMENT)
         return self.offset + self.scale * ops.tan(argument) + self.by_force * force + self.half_gap * self.direction

@@ -39,7 +39,7 @@ class LengthFamily(ForceLaw):
         fields = [f"{name}.{part.linear_in}" for name, part in parts if hasattr(part, "linear_in")]
         return tuple(fields) if len(fields) == len(parts) else ()
 
-    def of_length(self, resting_length: float) -> Self:
+    def with_resting_length(self, resting_length: float) -> Self:
         """The law of a muscle of the same type with this length [m] between the fittings."""
         return dataclasses.replace(self, resting_length=resting_length)
 
@@ -54,15 +54,15 @@ class LengthFamily(ForceLaw):
         return dataclasses.replace(self, **boxed)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        return ops.maximum(self.unclamped(pressure, contraction), 0.0)
+        return ops.maximum(self.unclamped_force(pressure, contraction), 0.0)
 
     @abc.abstractmethod
-    def share(self) -> Value:
+    def length_factor(self) -> Value:
         """s [1] at this muscle's length."""
 
-    def unclamped(self, pressure: Value, contraction: Value) -> Value:
-        whole = self.inner.unclamped(pressure, contraction)
-        return whole + self.share() * self.change.unclamped(pressure, contraction)
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
+        whole = self.inner.unclamped_force(pressure, contraction)
+        return whole + self.length_factor() * self.change.unclamped_force(pressure, contraction)
 
 
 @model
@@ -70,11 +70,11 @@ class InverseLength(LengthFamily):
     """F = max(0, F_inner(p, eps) + (L_ref/L_0 - 1) F_change(p, eps)).
 
     L_0 length between the fittings, L_ref the length at which F_inner is the whole law; clamps inside do not act.
-    If both are surfaces, every coefficient has a term in 1/L_0: what ends of a fixed size do. `of_length` gives
+    If both are surfaces, every coefficient has a term in 1/L_0: what ends of a fixed size do. `with_resting_length` gives
     the law of another muscle of the type. Made for this program.
     """
 
-    def share(self) -> Value:
+    def length_factor(self) -> Value:
         return self.reference_length / self.resting_length - 1.0
 
 
@@ -83,10 +83,10 @@ class LogarithmicLength(LengthFamily):
     """F = max(0, F_inner(p, eps) + ln(L_0/L_ref) F_change(p, eps)).
 
     L_0 length between the fittings, L_ref the length at which F_inner is the whole law; clamps inside do not act.
-    Between a term in 1/L_0, which is all but gone in long muscles, and one in L_0, which has no end. `of_length`
+    Between a term in 1/L_0, which is all but gone in long muscles, and one in L_0, which has no end. `with_resting_length`
     gives the law of another muscle of the type. Made for this program, after measured muscles of 83 to 382 mm whose
     force grew about as much with the first doubling of their length as with the second.
     """
 
-    def share(self) -> Value:
+    def length_factor(self) -> Value:
         return ops.log(self.resting_length / self.reference_length)

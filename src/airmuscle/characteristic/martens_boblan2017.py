@@ -55,13 +55,13 @@ class MartensBoblan2017(ForceLaw):
         return (max(-0.05, straight / 2), 0.4)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        return ops.maximum(self.unclamped(pressure, contraction), 0.0)
+        return ops.maximum(self.unclamped_force(pressure, contraction), 0.0)
 
     def modulus(self, length: Value) -> Value:
         """E [Pa] of the wall at a length [m] between the fittings."""
         return self.c0 + length * (self.c1 + length * (self.c2 + length * self.c3))
 
-    def unclamped(self, pressure: Value, contraction: Value) -> Value:
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
         rest, angle = self.geometry.resting_length, self.geometry.braid_angle
         length = rest * (1.0 - contraction)
         turns = rest * ops.tan(angle) / (ops.pi * 2 * self.geometry.radius)

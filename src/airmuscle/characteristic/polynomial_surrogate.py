@@ -15,7 +15,7 @@ from .base import Characteristic, ForceLaw
 from .contractile_surface import ContractileSurface, exponents
 from .validity_range import ValidityRange
 
-_UNLIMITED = 1e6
+_NO_CLAMP = 1e6
 """Clamp [N] of the surface: beyond any muscle, so that the surface follows the law below zero too."""
 
 
@@ -31,7 +31,7 @@ class PolynomialSurrogate(ForceLaw):
     rms_error: float = parameter(
         "N", "dF_rms", "root mean square error on the validity range", bounds=(0.0, 1e9), fitted=False
     )
-    covered: float = parameter(
+    coverage: float = parameter(
         "1", "A", "part of the validity range where the law has an answer", bounds=(0.0, 1.0), fitted=False
     )
     surrogate_of: str = ""
@@ -53,30 +53,30 @@ def as_force_law(law: Characteristic, validity_range: ValidityRange, *, degree: 
     """
     count = 4 * (degree + 1)
     pressure, contraction = _grid(validity_range, np.cos(np.pi * (np.arange(count) + 0.5) / count))
-    force = _answers(law, pressure, contraction)
+    force = _force_or_nan(law, pressure, contraction)
     known = np.isfinite(force)
     if known.sum() < 2 * len(exponents(degree)):
         raise SolveError(
             f"as_force_law: {type(law).__name__} has an answer at {known.sum()} of {known.size} points of the validity range, too "
             f"few for degree {degree}. Choose a validity range where the law holds."
         )
-    x, q = _scaled(validity_range, pressure[known], contraction[known])
+    x, q = _scale(validity_range, pressure[known], contraction[known])
     powers = np.stack([x**i * q**j for i, j in exponents(degree)], axis=1)
     found = np.linalg.lstsq(powers, force[known], rcond=None)[0]
     surface = ContractileSurface(
         tuple(float(a) for a in found),
         *validity_range.pressure,
         *validity_range.contraction,
-        -_UNLIMITED,
-        _UNLIMITED,
+        -_NO_CLAMP,
+        _NO_CLAMP,
         degree,
     )
-    return _measured(law, surface, validity_range)
+    return _with_errors(law, surface, validity_range)
 
 
-def _measured(law: Characteristic, surface: ContractileSurface, validity_range: ValidityRange) -> PolynomialSurrogate:
+def _with_errors(law: Characteristic, surface: ContractileSurface, validity_range: ValidityRange) -> PolynomialSurrogate:
     pressure, contraction = _grid(validity_range, np.linspace(-1.0, 1.0, 4 * surface.degree + 3))
-    error = surface.force(pressure, contraction) - _answers(law, pressure, contraction)
+    error = surface.force(pressure, contraction) - _force_or_nan(law, pressure, contraction)
     known = np.isfinite(error)
     if not known.all():
         warnings.warn(
@@ -97,12 +97,12 @@ def _grid(validity_range: ValidityRange, places: Array) -> tuple[Array, Array]:
     return pressure, np.clip(c_low + (x + 1) / 2 * (c_high - c_low), c_low, c_high)
 
 
-def _scaled(validity_range: ValidityRange, pressure: Array, contraction: Array) -> tuple[Array, Array]:
+def _scale(validity_range: ValidityRange, pressure: Array, contraction: Array) -> tuple[Array, Array]:
     (p_low, p_high), (c_low, c_high) = validity_range.pressure, validity_range.contraction
     return 2 * (contraction - c_low) / (c_high - c_low) - 1, 2 * (pressure - p_low) / (p_high - p_low) - 1
 
 
-def _answers(law: Characteristic, pressure: Array, contraction: Array) -> Array:
+def _force_or_nan(law: Characteristic, pressure: Array, contraction: Array) -> Array:
     """The law's forces [N] at N points; NaN where it has none. Halves the points until those are found."""
     try:
         found: Any = np.asarray(law.force(pressure, contraction), dtype=float)
@@ -110,6 +110,6 @@ def _answers(law: Characteristic, pressure: Array, contraction: Array) -> Array:
         if pressure.size == 1:
             return np.array([np.nan])
         half = pressure.size // 2
-        parts = (_answers(law, pressure[s], contraction[s]) for s in (slice(None, half), slice(half, None)))
+        parts = (_force_or_nan(law, pressure[s], contraction[s]) for s in (slice(None, half), slice(half, None)))
         return np.concatenate(list(parts))
     return np.broadcast_to(found, pressure.shape)

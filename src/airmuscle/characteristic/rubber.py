@@ -28,7 +28,7 @@ class RubberLine:
         """U/t = 2 pi (alpha Q/(2 r_0) + beta G) [N] per wall thickness; linear: it takes their growth as well."""
         return 2 * pi * (self.slope * arc_excess_squared / (2 * end_radius) + self.intercept * arc_excess)
 
-    def _along(self, excess: Value, path: Value, end_radius: Value) -> Value:
+    def _integrate_stress(self, excess: Value, path: Value, end_radius: Value) -> Value:
         return self.slope / end_radius * excess + self.intercept * path
 
 
@@ -41,16 +41,16 @@ class RubberIntegral(abc.ABC):
 
 
 @model
-class AlongAxis(RubberIntegral):
+class AxialIntegral(RubberIntegral):
     """H = Int sigma dx, as Saga et al. 2007 print in (12)."""
 
     def hoop_stress(self, rubber: RubberLine, segment: Segment) -> Value:
-        return rubber._along(segment.excess, segment.length, segment.end_radius)
+        return rubber._integrate_stress(segment.excess, segment.length, segment.end_radius)
 
 
 @model
-class AlongArc(RubberIntegral):
+class ArcIntegral(RubberIntegral):
     """H = Int sigma ds: a hoop stress acts along the arc."""
 
     def hoop_stress(self, rubber: RubberLine, segment: Segment) -> Value:
-        return rubber._along(segment.arc_excess, segment.arc, segment.end_radius)
+        return rubber._integrate_stress(segment.arc_excess, segment.arc, segment.end_radius)

@@ -10,13 +10,13 @@ from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
-from ..geometry.fibre_sum import FibreSum, SumOverHalf
+from ..geometry.fibre_sum import FibreSum, HalfShellFibreSum
 from ..geometry.meridian import SAGA_2007
 from ..geometry.parabola import Parabola
-from ..geometry.straight_fibre import StraightFibre, check_limit
+from ..geometry.straight_fibre import StraightFibre, check_contraction_range
 from .base import PressureLaw
-from .rubber import AlongAxis, RubberIntegral, RubberLine
-from .solve import first_crossing, within_reach
+from .rubber import AxialIntegral, RubberIntegral, RubberLine
+from .solve import find_first_root, check_solution
 
 LINE_A = RubberLine(slope=0.1263e6, intercept=0.3e6)
 """The rubber as the text prints it; its stress at strain 3 is 0.68 MPa. That it is in MPa is inferred from Fig. 4."""
@@ -26,11 +26,11 @@ RUBBER_TEST_STRAIN = 3.0
 """The strain at which the rubber test of Fig. 4 ends; the line is extrapolated beyond."""
 
 
-_STRAIGHT = 1e-200
+_MIN_SLOPE = 1e-200
 """Stands for a zero slope in a denominator, so that straight fibres pull without bound but divide by nothing."""
 
 
-class Equilibrium(NamedTuple):
+class EquilibriumPoint(NamedTuple):
     """A contraction at which pressure and load balance."""
 
     contraction: float
@@ -49,7 +49,7 @@ class Saga2007(PressureLaw):
         P = [2 m t (alpha l^2 + 6 a beta d_0) + 12 d_0 M F/q]/(d_0 [w m (l^2 + 6 a d_0) - 3 pi M d_0^2/q]).
     Readings: w = 2 as (17) prints, 1 as (16) demands; q = 1 as (7), (8), (14), (18) print, 2 the end slope of (2);
     M printed, mended or evenly spread; H along x as printed or along the arc. The default is the printed one (w = 2,
-    q = 1, along x) with the mended sum. Only w = 1, q = 2, EvenSpread, AlongArc is exact mechanics; no reading keeps
+    q = 1, along x) with the mended sum. Only w = 1, q = 2, UniformFibreSum, ArcIntegral is exact mechanics; no reading keeps
     energy, so that dynamics want CircleVirtualWork. Reference: Saga et al. 2007.
     """
 
@@ -65,8 +65,8 @@ class Saga2007(PressureLaw):
         "1", "q", "divisor of the end slope l/a", bounds=(0.5, 4.0), fitted=False, default=1.0
     )
     fibres: int = 16
-    fibre_sum: FibreSum = SumOverHalf()
-    rubber_integral: RubberIntegral = AlongAxis()
+    fibre_sum: FibreSum = HalfShellFibreSum()
+    rubber_integral: RubberIntegral = AxialIntegral()
 
     def check(self) -> None:
         if isinstance(self.fibres, bool) or not isinstance(self.fibres, int) or self.fibres < 4 or self.fibres % 2:
@@ -88,43 +88,43 @@ class Saga2007(PressureLaw):
         return _pole(self)
 
     @property
-    def starting_pressure(self) -> float:
+    def threshold_pressure(self) -> float:
         """The gauge pressure [Pa] at which contraction starts under any load, t beta/(w r_0); w = 1 is a thin ring."""
         thin_ring = self.wall_thickness * self.rubber.intercept / self.geometry.end_radius
         return float(thin_ring / self.projection_factor)
 
     @property
-    def snapping_load(self) -> float:
+    def snap_through_load(self) -> float:
         """The load [N] below which pressure falls as contraction starts: the muscle then snaps, as a balloon does."""
-        tube, share = self.geometry, self.fibre_sum.of(self.fibres) / (self.fibres * self.slope_factor)
+        tube, share = self.geometry, self.fibre_sum.sum_of_sines(self.fibres) / (self.fibres * self.slope_factor)
         widening = tube.fibre_length**2 / 12 - share * ops.pi * tube.end_radius**2 / self.projection_factor
         stiffening = self.wall_thickness * self.rubber.slope * tube.fibre_length**2 / (12 * tube.end_radius)
         return float((self.wall_thickness * self.rubber.intercept / tube.end_radius * widening - stiffening) / share)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        self._check(contraction)
-        found = self.balancing_pressure(contraction, force)
-        return within_reach(found, self.pressure_range, (contraction, force), self._no_pressure)
+        self._check_contraction(contraction)
+        found = self.equilibrium_pressure(contraction, force)
+        return check_solution(found, self.pressure_range, (contraction, force), self._no_pressure_message)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         """Tension [N]; without bound at zero contraction, where the straight fibres hold any."""
-        self._check(contraction)
+        self._check_contraction(contraction)
         shell, rubber, lever = self._terms(contraction)
-        return (pressure * shell - rubber) / ops.maximum(lever, _STRAIGHT)
+        return (pressure * shell - rubber) / ops.maximum(lever, _MIN_SLOPE)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         def excess(contraction: Value, p: Value, load: Value) -> Value:
-            return self.balancing_pressure(contraction, load) - p
+            return self.equilibrium_pressure(contraction, load) - p
 
         def message(p: float, load: float, low: float, high: float) -> str:
             possible = f"Between these it needs {(low + p) / 1e3:.6g} to {(high + p) / 1e3:.6g} kPa under this load."
-            return self._no_contraction(p, load) + possible
+            return self._no_contraction_message(p, load) + possible
 
-        started = (self.starting_pressure, float("inf"))
-        within_reach(pressure + 0.0 * force, started, (pressure, force), self._still_straight)
-        return first_crossing(excess, self.contraction_range, (pressure, force), message)
+        started = (self.threshold_pressure, float("inf"))
+        check_solution(pressure + 0.0 * force, started, (pressure, force), self._below_threshold_message)
+        return find_first_root(excess, self.contraction_range, (pressure, force), message)
 
-    def balancing_pressure(self, contraction: Value, force: Value) -> Value:
+    def equilibrium_pressure(self, contraction: Value, force: Value) -> Value:
         """The formula itself [Pa], at any contraction below 1, whatever comes out: beyond the pole it is negative."""
         shell, rubber, lever = self._terms(contraction)
         return (rubber + lever * force) / shell
@@ -133,7 +133,7 @@ class Saga2007(PressureLaw):
         """w A_1 - (M/m) tau pi r_0^2 [m2], t H [N], (M/m) tau [1]."""
         tube = self.geometry
         parabola = tube.meridian.segment(contraction, tube.fibre_length, tube.end_radius)
-        lever = self.fibre_sum.of(self.fibres) / self.fibres * self.end_slope(contraction)
+        lever = self.fibre_sum.sum_of_sines(self.fibres) / self.fibres * self.end_slope(contraction)
         shell = self.projection_factor * parabola.half_section - lever * ops.pi * tube.end_radius**2
         return shell, self.wall_thickness * self.rubber_integral.hoop_stress(self.rubber, parabola), lever
 
@@ -164,7 +164,7 @@ class Saga2007(PressureLaw):
         product = (4 * tube.end_diameter * strain / tube.fibre_length) ** 2 / 24
         return float(0.5 - ops.sqrt(max(0.25 - product, 0.0)))
 
-    def cautions(self, pressure: float, contraction: float) -> tuple[str, ...]:
+    def validity_warnings(self, pressure: float, contraction: float) -> tuple[str, ...]:
         """What one should know of the model at this point: rubber extrapolated, unstable, past the largest volume."""
         found = []
         if (strain := float(self.middle_strain(contraction))) > RUBBER_TEST_STRAIN:
@@ -174,37 +174,37 @@ class Saga2007(PressureLaw):
             )
         if contraction > 0 and float(self.slopes(pressure, contraction).by_contraction) > 0:
             found.append("the muscle is unstable here: it takes less pressure to contract further; it snaps through")
-        if contraction > 0 and float(self.geometry.volume_growth(contraction)) < 0:
+        if contraction > 0 and float(self.geometry.volume_derivative(contraction)) < 0:
             found.append("the volume falls with contraction here, and still the balance pulls: no energy is kept")
         return tuple(found)
 
-    def equilibria(self, pressure: float, force: float) -> tuple[Equilibrium, ...]:
+    def equilibria(self, pressure: float, force: float) -> tuple[EquilibriumPoint, ...]:
         """Every contraction from 0 to 1 that balances a gauge pressure [Pa] and a load [N], smallest first.
 
         With the rubber along x they are roots of one quintic, so that no search can miss one. Past
         `contraction_range` they are the formula's, not a muscle's.
         """
-        if not isinstance(self.rubber_integral, AlongAxis):
+        if not isinstance(self.rubber_integral, AxialIntegral):
             raise ParameterError(
                 "Saga2007: the equilibria are roots of a polynomial only with the rubber along the axis; "
-                "give rubber_integral=AlongAxis(), or ask for `contraction`."
+                "give rubber_integral=AxialIntegral(), or ask for `contraction`."
             )
         roots = sorted({c for c in _quintic_roots(self, pressure, force) if 0.0 <= c < 1.0})
-        return tuple(Equilibrium(c, self._is_stable(c, force)) for c in roots)
+        return tuple(EquilibriumPoint(c, self._is_stable(c, force)) for c in roots)
 
     def _is_stable(self, contraction: float, force: float) -> bool:
         at = max(contraction, 1e-12)  # the slope is infinite at zero
-        return bool(autodiff.derivative(self, "balancing_pressure", at, force) > 0)
+        return bool(autodiff.derivative(self, "equilibrium_pressure", at, force) > 0)
 
-    def _check(self, contraction: Value) -> None:
+    def _check_contraction(self, contraction: Value) -> None:
         if not ops.is_symbol(self.wall_thickness):
             why = f"; the pole of this reading is at {self.pole:.2%}" if self.pole < 0.5 else ""
-            check_limit(contraction, self.contraction_range, "Saga2007", why)
+            check_contraction_range(contraction, self.contraction_range, "Saga2007", why)
 
-    def _still_straight(self, pressure: float, force: float) -> str:
+    def _below_threshold_message(self, pressure: float, force: float) -> str:
         text = (
             f"Saga2007: at {pressure / 1e3:.6g} kPa the tube is still straight; contraction starts at "
-            f"{self.starting_pressure / 1e3:.6g} kPa."
+            f"{self.threshold_pressure / 1e3:.6g} kPa."
         )
         return text + " Equilibria that are not reached from rest are listed by `equilibria(pressure, force)`."
 
@@ -223,7 +223,7 @@ def _quintic_roots(law: Saga2007, pressure: float, force: float) -> list[float]:
     import numpy as np  # noqa: TID251  (roots of a polynomial are never traced)
 
     tube, m, w, q = law.geometry, law.fibres, law.projection_factor, law.slope_factor
-    d, t, m_sum = tube.end_diameter, law.wall_thickness, law.fibre_sum.of(law.fibres)
+    d, t, m_sum = tube.end_diameter, law.wall_thickness, law.fibre_sum.sum_of_sines(law.fibres)
     a2 = m * (w * pressure * d - 2 * t * law.rubber.slope) * tube.fibre_length**2
     a0 = -3 * ops.pi * m_sum * d**3 / q * pressure - 12 * d * m_sum * force / q
     b = 6 * m * d * (2 * t * law.rubber.intercept - w * pressure * d) * tube.fibre_length
@@ -233,17 +233,17 @@ def _quintic_roots(law: Saga2007, pressure: float, force: float) -> list[float]:
     found = np.roots(quintic)
     real = found.real[(abs(found.imag) < 1e-7) & (found.real > 0) & (found.real <= 1)]
     sided = [1.0 - x for x in real if b * (a2 * x * x + a0) >= 0]
-    return [_polished(law, float(c), pressure, force) for c in sided]
+    return [_refine_root(law, float(c), pressure, force) for c in sided]
 
 
-def _polished(law: Saga2007, contraction: float, pressure: float, force: float) -> float:
+def _refine_root(law: Saga2007, contraction: float, pressure: float, force: float) -> float:
     """The root after two Newton steps on the law itself, where they help."""
     for _ in range(2):
         if not 0.0 < contraction < 1.0:
             break
-        miss = law.balancing_pressure(contraction, force) - pressure
-        better = contraction - miss / autodiff.derivative(law, "balancing_pressure", contraction, force)
-        if not 0.0 < better < 1.0 or abs(law.balancing_pressure(better, force) - pressure) >= abs(miss):
+        miss = law.equilibrium_pressure(contraction, force) - pressure
+        better = contraction - miss / autodiff.derivative(law, "equilibrium_pressure", contraction, force)
+        if not 0.0 < better < 1.0 or abs(law.equilibrium_pressure(better, force) - pressure) >= abs(miss):
             break
         contraction = float(better)
     return contraction

@@ -15,7 +15,7 @@ INTERVALS = 256
 _TOLERANCES = {"xatol": 0.0, "xrtol": 4 * float(np.finfo(float).eps), "fatol": 0.0, "frtol": 0.0}
 
 
-def first_crossing(
+def find_first_root(
     function: Callable[[Any, Any, Any], Any],
     reach: tuple[float, float],
     given: tuple[Any, Any],
@@ -45,7 +45,7 @@ def first_crossing(
     found = np.full(a.size, reach[0])
     index = rises.argmax(axis=0)
     plateau = np.take_along_axis(values, index[None, :] + 1, axis=0)[0] == 0
-    for chosen, searched in ((~plateau, function), (plateau, _by_sign(function))):
+    for chosen, searched in ((~plateau, function), (plateau, _sign_function(function))):
         here = chosen & ~at_start
         if here.any():
             bracket = (grid[index[here]], grid[index[here] + 1])
@@ -57,12 +57,12 @@ def first_crossing(
     return float(found[0]) if first.ndim == 0 else found.reshape(first.shape)
 
 
-def _by_sign(function: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Any, Any], Any]:
+def _sign_function(function: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Any, Any], Any]:
     """The function reduced to its side of zero: a plateau at zero (a clamped force) is then searched for its edge."""
     return lambda x, a, b: np.where(np.asarray(function(x, a, b)) >= 0, 1.0, -1.0)
 
 
-def within_reach(
+def check_solution(
     found: Any, reach: tuple[float, float], given: tuple[Any, Any], message: Callable[[float, float], str]
 ) -> Any:
     """`found`, the answer of a closed form, where it lies in `reach`; raises SolveError(message(a, b)) elsewhere.

@@ -14,7 +14,7 @@ from ..core.errors import ParameterError, SolveError
 from ..core.ops import Value
 from .base import Characteristic, Slopes
 
-_HALVINGS = 60
+_BISECTIONS = 60
 """Bisections of a contraction: 2^-60 of the table's width lies below the rounding of its ends."""
 
 
@@ -55,10 +55,10 @@ class Tabulated(Characteristic):
         return (min(self.contractions), max(self.contractions))
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        return _isobars(self).at(pressure, contraction)[0][()]
+        return _isobars(self).evaluate(pressure, contraction)[0][()]
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
-        _, by_pressure, by_contraction = _isobars(self).at(pressure, contraction)
+        _, by_pressure, by_contraction = _isobars(self).evaluate(pressure, contraction)
         return Slopes(by_pressure[()], by_contraction[()])
 
     def pressure(self, contraction: Value, force: Value) -> Value:
@@ -70,7 +70,7 @@ class Tabulated(Characteristic):
         if not found.all():
             worst = int(np.argmin(found.reshape(-1)))
             column = forces.reshape(table.levels.size, -1)[:, worst]
-            raise SolveError(self._no_pressure(c.flat[worst], load.flat[worst]) + _held(column))
+            raise SolveError(self._no_pressure_message(c.flat[worst], load.flat[worst]) + _describe_force_limits(column))
         j = between.argmax(axis=0)
         low, high = (np.take_along_axis(side, j[None], axis=0)[0] for side in (forces[:-1], forces[1:]))
         share = np.where(high > low, (load - low) / np.where(high > low, high - low, 1.0), 0.0)
@@ -79,21 +79,21 @@ class Tabulated(Characteristic):
     def contraction(self, pressure: Value, force: Value) -> Value:
         table = _isobars(self)
         p, load = np.broadcast_arrays(np.asarray(pressure, dtype=float), np.asarray(force, dtype=float))
-        low, high = table.covered(p)
-        ends = np.array([table.at(p, low)[0], table.at(p, high)[0]])
+        low, high = table.contraction_limits(p)
+        ends = np.array([table.evaluate(p, low)[0], table.evaluate(p, high)[0]])
         refused = ~((load <= ends[0]) & (load >= ends[1]))
         if refused.any():
             at = int(np.argmax(refused.reshape(-1)))
-            raise SolveError(self._no_contraction(p.flat[at], load.flat[at]) + _held(ends.reshape(2, -1)[:, at]))
-        for _ in range(_HALVINGS):
+            raise SolveError(self._no_contraction_message(p.flat[at], load.flat[at]) + _describe_force_limits(ends.reshape(2, -1)[:, at]))
+        for _ in range(_BISECTIONS):
             middle = (low + high) / 2
-            above = table.at(p, middle)[0] > load
+            above = table.evaluate(p, middle)[0] > load
             low, high = np.where(above, middle, low), np.where(above, high, middle)
-        start = table.covered(p)[0]
+        start = table.contraction_limits(p)[0]
         return np.where(ends[0] <= load, start, high)[()]
 
 
-class _Isobars:
+class _IsobarTable:
     """The table made ready: the pressures of the isobars, their curves and the contractions these cover."""
 
     def __init__(self, law: Tabulated) -> None:
@@ -113,24 +113,24 @@ class _Isobars:
         # A cubic meets its right end only to rounding, which would put the last row of the table outside of it.
         return np.array([np.where(contraction == end, last, curve(contraction)) for curve, end, last in rows])
 
-    def at(self, pressure: Any, contraction: Any) -> tuple[Array, Array, Array]:
+    def evaluate(self, pressure: Any, contraction: Any) -> tuple[Array, Array, Array]:
         """Force [N] and its slopes by pressure and contraction. Raises NoSolution outside the table."""
         p, c = np.broadcast_arrays(np.asarray(pressure, dtype=float), np.asarray(contraction, dtype=float))
-        start, end = self.covered(p)
+        start, end = self.contraction_limits(p)
         outside = ~((c >= start) & (c <= end))
         if outside.any():
             worst = int(np.argmax(outside.reshape(-1)))
-            raise SolveError(self._outside(p.flat[worst], c.flat[worst], start.flat[worst], end.flat[worst]))
-        j, share = self._neighbours(p)
+            raise SolveError(self._outside_message(p.flat[worst], c.flat[worst], start.flat[worst], end.flat[worst]))
+        j, share = self._bracketing_isobars(p)
         low, high = (np.take_along_axis(self.forces(c), k[None], axis=0)[0] for k in (j, j + 1))
         by_c = np.array([slope(c) for slope in self.slopes])
         low_by_c, high_by_c = (np.take_along_axis(by_c, k[None], axis=0)[0] for k in (j, j + 1))
         by_pressure = (high - low) / (self.levels[j + 1] - self.levels[j])
-        return _mixed(share, low, high), by_pressure, _mixed(share, low_by_c, high_by_c)
+        return _interpolate(share, low, high), by_pressure, _interpolate(share, low_by_c, high_by_c)
 
-    def covered(self, pressure: Array) -> tuple[Array, Array]:
+    def contraction_limits(self, pressure: Array) -> tuple[Array, Array]:
         """The contractions that the table covers at each pressure; NaN at pressures outside it."""
-        j, share = self._neighbours(pressure)
+        j, share = self._bracketing_isobars(pressure)
         inside = (share >= 0) & (share <= 1)
         start = np.where(inside, np.maximum(self.starts[j], self.starts[j + 1]), np.nan)
         end = np.where(inside, np.minimum(self.ends[j], self.ends[j + 1]), np.nan)
@@ -138,12 +138,12 @@ class _Isobars:
             start, end = np.where(on_isobar, self.starts[k], start), np.where(on_isobar, self.ends[k], end)
         return start, end
 
-    def _neighbours(self, pressure: Array) -> tuple[npt.NDArray[np.intp], Array]:
+    def _bracketing_isobars(self, pressure: Array) -> tuple[npt.NDArray[np.intp], Array]:
         """The isobar below each pressure, and the share of the way to the next."""
         j = np.clip(np.searchsorted(self.levels, pressure, side="right") - 1, 0, self.levels.size - 2)
         return j, (pressure - self.levels[j]) / (self.levels[j + 1] - self.levels[j])
 
-    def _outside(self, pressure: float, contraction: float, start: float, end: float) -> str:
+    def _outside_message(self, pressure: float, contraction: float, start: float, end: float) -> str:
         there = "" if np.isnan(contraction) else f" and {contraction:.2%} of contraction"
         question = f"Tabulated: {pressure / 1e3:.6g} kPa{there} lie outside the table"
         if np.isnan(start):
@@ -152,8 +152,8 @@ class _Isobars:
 
 
 @functools.lru_cache(maxsize=64)
-def _isobars(law: Tabulated) -> _Isobars:
-    return _Isobars(law)
+def _isobars(law: Tabulated) -> _IsobarTable:
+    return _IsobarTable(law)
 
 
 def _curve(pressure: float, contractions: Array, forces: Array) -> Any:
@@ -169,13 +169,13 @@ def _curve(pressure: float, contractions: Array, forces: Array) -> Any:
     return PchipInterpolator(c, f, extrapolate=False)
 
 
-def _mixed(share: Array, low: Array, high: Array) -> Array:
+def _interpolate(share: Array, low: Array, high: Array) -> Array:
     """Linear between two isobars; on an isobar its own value, though its neighbour may not reach there."""
     mixed: Array = np.where(share == 0, low, np.where(share == 1, high, low + share * (high - low)))
     return mixed
 
 
-def _held(forces: Array) -> str:
+def _describe_force_limits(forces: Array) -> str:
     if np.isnan(forces).all():
         return "The table does not reach there."
     return f"There the table holds {np.nanmin(forces):.6g} to {np.nanmax(forces):.6g} N."

@@ -9,8 +9,8 @@ from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..geometry.braid import Braid
-from .base import NO_PRESSURE, ForceLaw
-from .solve import within_reach
+from .base import MIN_PRESSURE, ForceLaw
+from .solve import check_solution
 
 TONDU_LOPEZ_2000 = Reference(
     "tondu-lopez-2000",
@@ -47,18 +47,18 @@ class TonduLopez2000(ForceLaw):
         return (float(start / self.end_correction), float(force_ends / self.end_correction))
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        return pressure * self._area(contraction)
+        return pressure * self._effective_area(contraction)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        found = force / self._area(contraction)
-        return within_reach(found, self.pressure_range, (contraction, force), self._no_pressure_here)
+        found = force / self._effective_area(contraction)
+        return check_solution(found, self.pressure_range, (contraction, force), self._pressure_limits_message)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
-        ratio = force / (ops.where(pressure == 0.0, NO_PRESSURE, pressure) * ops.pi * self.geometry.radius**2)
+        ratio = force / (ops.where(pressure == 0.0, MIN_PRESSURE, pressure) * ops.pi * self.geometry.radius**2)
         found = (1.0 - ops.sqrt((ratio + self._b) / self._a)) / self.end_correction
-        return within_reach(found, self.contraction_range, (pressure, force), self._no_contraction_here)
+        return check_solution(found, self.contraction_range, (pressure, force), self._contraction_limits_message)
 
-    def _area(self, contraction: Value) -> Value:
+    def _effective_area(self, contraction: Value) -> Value:
         """F/p [m2]."""
         middle = 1.0 - self.end_correction * contraction
         return ops.pi * self.geometry.radius**2 * (self._a * middle**2 - self._b)

@@ -6,8 +6,8 @@ from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 
-PRESSURES = (-101_325.0, 1e8)
-CONTRACTIONS = (-0.5, 1.0)
+PRESSURE_BOUNDS = (-101_325.0, 1e8)
+CONTRACTION_BOUNDS = (-0.5, 1.0)
 """What can be measured: no pressure below absolute zero, no contraction beyond the whole length."""
 
 
@@ -16,16 +16,16 @@ class ValidityRange:
     """A rectangle of gauge pressure and contraction."""
 
     min_pressure: float = parameter(
-        "Pa", "p_low", "lower end of the validity range in gauge pressure", bounds=PRESSURES, fitted=False
+        "Pa", "p_low", "lower end of the validity range in gauge pressure", bounds=PRESSURE_BOUNDS, fitted=False
     )
     max_pressure: float = parameter(
-        "Pa", "p_high", "upper end of the validity range in gauge pressure", bounds=PRESSURES, fitted=False
+        "Pa", "p_high", "upper end of the validity range in gauge pressure", bounds=PRESSURE_BOUNDS, fitted=False
     )
     min_contraction: float = parameter(
-        "1", "eps_low", "lower end of the validity range in contraction", bounds=CONTRACTIONS, fitted=False
+        "1", "eps_low", "lower end of the validity range in contraction", bounds=CONTRACTION_BOUNDS, fitted=False
     )
     max_contraction: float = parameter(
-        "1", "eps_high", "upper end of the validity range in contraction", bounds=CONTRACTIONS, fitted=False
+        "1", "eps_high", "upper end of the validity range in contraction", bounds=CONTRACTION_BOUNDS, fitted=False
     )
 
     def check(self) -> None:

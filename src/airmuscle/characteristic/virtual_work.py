@@ -11,7 +11,7 @@ from ..core.reference import Reference
 from ..geometry.base import Geometry
 from ..geometry.braid import CHOU_HANNAFORD_1996
 from .base import ForceLaw, Slopes
-from .solve import within_reach
+from .solve import check_solution
 
 
 @model
@@ -33,15 +33,15 @@ class VirtualWork(ForceLaw):
         return self.geometry.contraction_range
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        return pressure * self.area(contraction)
+        return pressure * self.effective_area(contraction)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        found = force / self.area(contraction)
-        return within_reach(found, self.pressure_range, (contraction, force), self._no_pressure)
+        found = force / self.effective_area(contraction)
+        return check_solution(found, self.pressure_range, (contraction, force), self._no_pressure_message)
 
-    def area(self, contraction: Value) -> Value:
+    def effective_area(self, contraction: Value) -> Value:
         """F/p [m2]: the piston that the muscle is worth at a contraction [1]."""
-        return self.geometry.volume_growth(contraction) / self.geometry.resting_length
+        return self.geometry.volume_derivative(contraction) / self.geometry.resting_length
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         if not type(self.geometry).traceable:

@@ -13,7 +13,7 @@ from typing import Any
 
 import casadi
 
-from ..core.system import Differentiated
+from ..core.system import SensitivitySystem
 from .functions import PARAMETERS, ArraySizes, Printer, TracedSystem, trace_system
 from .ir.instructions import Code, Operand, finished, recorded
 from .ir.jacobian import ZERO, Tape, derivatives
@@ -48,7 +48,7 @@ class TangentSystem:
         return [loaded(block, array, self.size + i * self.lanes, self.lanes) for i in range(self.size)]
 
 
-def tangent_system(system: Differentiated) -> TangentSystem:
+def tangent_system(system: SensitivitySystem) -> TangentSystem:
     """The inner system of a differentiated one, traced, with what is observed as its outputs."""
     inner, names = trace_system(system.inner), [s.name for s in system.inner.states]
     found = {
@@ -56,7 +56,7 @@ def tangent_system(system: Differentiated) -> TangentSystem:
         **{n: inner.o[i] for i, n in enumerate(inner.output_names)},
     }
     observed = casadi.densify(casadi.vertcat(casadi.SX(0, 1), *(found[n] for n in system.observed_names)))
-    return TangentSystem(dataclasses.replace(inner, o=observed), system.places, system.output_names)
+    return TangentSystem(dataclasses.replace(inner, o=observed), system.parameter_indices, system.output_names)
 
 
 class Values:

@@ -4,13 +4,13 @@ from . import ops
 from .arrays import Array
 from .declaration import Parameter, model, parameter, parameters
 from .reference import Reference, cite
-from .system import Differentiated, System
+from .system import SensitivitySystem, System
 from .tree import Leaf, flatten, leaves, structure, unflatten, with_parameters
 from .variables import Input, StateVariable
 
 __all__ = [
     "Array",
-    "Differentiated",
+    "SensitivitySystem",
     "Input",
     "Leaf",
     "Parameter",

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from . import ops, tree
 from .errors import TraceError
 
-_functions: dict[Any, Any] = {}
+_traced_functions: dict[Any, Any] = {}
 
 
 def symbolic(thing: Any) -> tuple[Any, Any]:
@@ -42,28 +42,28 @@ def check_finite(expression: Any, owner: str) -> None:
             )
 
 
-def _function(thing: Any, method: str, count: int) -> Any:
+def _trace_with_derivatives(thing: Any, method: str, count: int) -> Any:
     """The CasADi function (arguments, parameters) -> (value, by each argument, by parameters), traced once."""
     import casadi
 
     key = (tree.structure(thing), method, count)
-    if key not in _functions:
+    if key not in _traced_functions:
         model, parameters = symbolic(thing)
         arguments = [casadi.SX.sym(f"x{i}") for i in range(count)]
         value = casadi.SX(getattr(model, method)(*arguments))
         check_finite(value, f"{type(thing).__name__}.{method}")
         outputs = [value, *(casadi.jacobian(value, x) for x in arguments), casadi.jacobian(value, parameters)]
-        _functions[key] = casadi.Function("law", [*arguments, parameters], casadi.cse(outputs))
-    return _functions[key]
+        _traced_functions[key] = casadi.Function("law", [*arguments, parameters], casadi.cse(outputs))
+    return _traced_functions[key]
 
 
-def _evaluated(thing: Any, method: str, arguments: tuple[Any, ...]) -> tuple[list[Any], tuple[int, ...], int]:
-    function = _function(thing, method, len(arguments))
-    results, shape = _at(function, [leaf.value for leaf in tree.leaves(thing)], arguments)
+def _evaluate_traced(thing: Any, method: str, arguments: tuple[Any, ...]) -> tuple[list[Any], tuple[int, ...], int]:
+    function = _trace_with_derivatives(thing, method, len(arguments))
+    results, shape = _call_traced(function, [leaf.value for leaf in tree.leaves(thing)], arguments)
     return results, shape, math.prod(shape)
 
 
-def _at(function: Any, parameters: Sequence[Any], arguments: Sequence[Any]) -> tuple[list[Any], tuple[int, ...]]:
+def _call_traced(function: Any, parameters: Sequence[Any], arguments: Sequence[Any]) -> tuple[list[Any], tuple[int, ...]]:
     """What a traced function gives at numbers or arrays, and their shape; parameters may be arrays too, as of many."""
     many = any(isinstance(value, np.ndarray) and value.size > 1 for value in parameters)
     broadcast = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (*arguments, *(parameters if many else ()))))
@@ -77,15 +77,15 @@ def _at(function: Any, parameters: Sequence[Any], arguments: Sequence[Any]) -> t
 def derivative(thing: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
     """The exact derivative of `thing.method(*arguments)` by argument number `wrt`, shaped like the arguments."""
     if ops.is_symbol(*arguments):
-        return _symbolic_slope(thing, method, arguments, wrt)
+        return _symbolic_derivative(thing, method, arguments, wrt)
     if _is_jax(*arguments):
-        return _jax_slope(thing, method, arguments, wrt)
-    results, shape, _ = _evaluated(thing, method, arguments)
+        return _jax_derivative(thing, method, arguments, wrt)
+    results, shape, _ = _evaluate_traced(thing, method, arguments)
     found = results[1 + wrt].reshape(shape)
     return float(found) if found.ndim == 0 else found
 
 
-def _symbolic_slope(thing: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
+def _symbolic_derivative(thing: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
     import casadi
 
     symbol = casadi.SX.sym("x")
@@ -94,7 +94,7 @@ def _symbolic_slope(thing: Any, method: str, arguments: tuple[Any, ...], wrt: in
     return casadi.substitute(derivative, symbol, arguments[wrt])
 
 
-def _jax_slope(thing: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
+def _jax_derivative(thing: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
     import jax  # type: ignore[import-not-found, unused-ignore]
 
     def along(x: Any) -> Any:
@@ -117,7 +117,7 @@ def jvp(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], along: Sequ
     import casadi
 
     x, values = _symbolic_values(function, len(at))
-    return _put_in(casadi.jtimes(values, x, casadi.vertcat(*along)), x, at, ops.is_symbol(*at, *along))
+    return _substitute(casadi.jtimes(values, x, casadi.vertcat(*along)), x, at, ops.is_symbol(*at, *along))
 
 
 def vjp(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], weights: Sequence[Any]) -> tuple[Any, ...]:
@@ -131,7 +131,7 @@ def vjp(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], weights: Se
     import casadi
 
     x, values = _symbolic_values(function, len(at))
-    return _put_in(casadi.jtimes(values, x, casadi.vertcat(*weights), True), x, at, ops.is_symbol(*at, *weights))
+    return _substitute(casadi.jtimes(values, x, casadi.vertcat(*weights), True), x, at, ops.is_symbol(*at, *weights))
 
 
 def value_and_derivative(thing: Any, method: str, count: int, wrt: int = 0) -> Callable[..., tuple[Any, Any]]:
@@ -143,28 +143,28 @@ def value_and_derivative(thing: Any, method: str, count: int, wrt: int = 0) -> C
     import casadi
 
     key = (tree.structure(thing), method, count, wrt)
-    if key not in _functions:
+    if key not in _traced_functions:
         model, symbols = symbolic(thing)
         x = [casadi.SX.sym(f"x{i}") for i in range(count)]
         value = casadi.SX(getattr(model, method)(*x))
         check_finite(value, f"{type(thing).__name__}.{method}")
-        _functions[key] = casadi.Function("law", [*x, symbols], casadi.cse([value, casadi.jacobian(value, x[wrt])]))
-    function, parameters = _functions[key], [leaf.value for leaf in tree.leaves(thing)]
+        _traced_functions[key] = casadi.Function("law", [*x, symbols], casadi.cse([value, casadi.jacobian(value, x[wrt])]))
+    function, parameters = _traced_functions[key], [leaf.value for leaf in tree.leaves(thing)]
     if any(isinstance(value, np.ndarray) for value in parameters):
-        return lambda *arguments: _valued(function, parameters, arguments)
+        return lambda *arguments: _evaluate_pair(function, parameters, arguments)
     vector = casadi.DM(np.array(parameters, dtype=float))
 
     def both(*arguments: Any) -> tuple[Any, Any]:
         if any(isinstance(x, np.ndarray) for x in arguments):
-            return _valued(function, parameters, arguments)
+            return _evaluate_pair(function, parameters, arguments)
         value, derivative = function(*arguments, vector)
         return float(value), float(derivative)
 
     return both
 
 
-def _valued(function: Any, parameters: Sequence[Any], arguments: Sequence[Any]) -> tuple[Any, Any]:
-    (value, derivative), shape = _at(function, parameters, arguments)
+def _evaluate_pair(function: Any, parameters: Sequence[Any], arguments: Sequence[Any]) -> tuple[Any, Any]:
+    (value, derivative), shape = _call_traced(function, parameters, arguments)
     return value.reshape(shape), derivative.reshape(shape)
 
 
@@ -179,7 +179,7 @@ def _symbolic_values(function: Callable[[Any], Sequence[Any]], count: int) -> tu
     return x, casadi.vertcat(*(casadi.SX(v) for v in function([x[i] for i in range(count)])))
 
 
-def _put_in(derivative: Any, x: Any, at: Sequence[Any], symbolic: bool) -> tuple[Any, ...]:
+def _substitute(derivative: Any, x: Any, at: Sequence[Any], symbolic: bool) -> tuple[Any, ...]:
     import casadi
 
     found = casadi.substitute(derivative, x, casadi.vertcat(*at))
@@ -189,7 +189,7 @@ def _put_in(derivative: Any, x: Any, at: Sequence[Any], symbolic: bool) -> tuple
 
 def jacobian(thing: Any, method: str, *arguments: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Values (N,) of `thing.method` at N points, and their derivatives (N, P) by the P leaves of `thing`."""
-    results, _, count = _evaluated(thing, method, arguments)
+    results, _, count = _evaluate_traced(thing, method, arguments)
     size = results[-1].size // max(count, 1)
     return results[0].reshape(-1), results[-1].reshape(count, size)
 

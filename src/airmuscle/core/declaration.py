@@ -86,14 +86,14 @@ def _validate(thing: Any) -> None:
                 f"{type(thing).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is {value!r}; "
                 f"it must be {due}."
             )
-        object.__setattr__(thing, declared.name, _checked(type(thing).__name__, declared, value))
+        object.__setattr__(thing, declared.name, _check_value(type(thing).__name__, declared, value))
     if hasattr(thing, "check"):
         thing.check()
 
 
-def _checked(owner: str, declared: Parameter, value: Any) -> Any:
+def _check_value(owner: str, declared: Parameter, value: Any) -> Any:
     if isinstance(value, tuple | list | np.ndarray):
-        return tuple(_checked(owner, declared, v) for v in value)
+        return tuple(_check_value(owner, declared, v) for v in value)
     low, high = declared.bounds
     unit = "" if declared.unit == "1" else f" {declared.unit}"
     where = f"{owner}.{declared.name} ({declared.symbol}, {declared.meaning})"
@@ -104,12 +104,12 @@ def _checked(owner: str, declared: Parameter, value: Any) -> Any:
     if not low <= value <= high:
         raise ParameterError(
             f"{where} is {value:g}{unit}; allowed are {low:g} to {high:g}{unit}."
-            f"{' Values are SI: check the unit.' if unit else _per_cent(float(value), high)}"
+            f"{' Values are SI: check the unit.' if unit else _percent_hint(float(value), high)}"
         )
     return float(value)
 
 
-def _per_cent(value: float, high: float) -> str:
+def _percent_hint(value: float, high: float) -> str:
     """A question, where a ratio above its bound makes sense as per cent."""
     return f" Is it in per cent? As a ratio it is {value / 100:g}." if 0 < value / 100 <= high <= 1 < value else ""
 
@@ -131,7 +131,7 @@ def as_finite_float(what: str, value: Any) -> float:
 
 
 @functools.cache
-def _kinds(cls: type[Any]) -> dict[str, type[Any]]:
+def _component_types(cls: type[Any]) -> dict[str, type[Any]]:
     """What the structural fields of a model class hold, where that is one class of models."""
     try:
         hints = typing.get_type_hints(cls)
@@ -147,7 +147,7 @@ def check_structure(thing: Any) -> None:
         for item in thing:
             check_structure(item)
     elif dataclasses.is_dataclass(thing) and not isinstance(thing, type):
-        for name, kind in _kinds(type(thing)).items():
+        for name, kind in _component_types(type(thing)).items():
             part = getattr(thing, name)
             if not isinstance(part, kind):
                 raise ParameterError(

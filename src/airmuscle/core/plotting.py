@@ -44,13 +44,13 @@ def save(figure: Any, path: Any) -> None:
     """Write a figure byte-identically for the same content, to the format that the path's suffix names."""
     import matplotlib as mpl
 
-    _dress(figure)
+    _apply_text_style(figure)
     with mpl.rc_context(_STYLE):
         metadata = {"Date": None} if str(path).endswith(".svg") else None
         figure.savefig(path, metadata=metadata)
 
 
-def _dress(figure: Any) -> None:
+def _apply_text_style(figure: Any) -> None:
     """Give titles and legends the house style: Matplotlib sets it when they are made, outside our reach."""
     legends = [*figure.legends, *(a.get_legend() for a in figure.axes if a.get_legend() is not None)]
     for legend in legends:

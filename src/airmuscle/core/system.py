@@ -31,7 +31,7 @@ class System(Protocol):
 
 
 @runtime_checkable
-class Differentiated(System, Protocol):
+class SensitivitySystem(System, Protocol):
     """A system that carries another's states, then their derivatives along columns, state by state.
 
     It is a System like any other; its program is printed from the inner one, which costs less than its own rates.
@@ -42,7 +42,7 @@ class Differentiated(System, Protocol):
         """The system whose states come first."""
 
     @property
-    def places(self) -> tuple[tuple[int, ...], ...]:
+    def parameter_indices(self) -> tuple[tuple[int, ...], ...]:
         """For every column the places among the inner leaves that move together."""
 
     @property

@@ -89,15 +89,15 @@ def _rebuild(thing: Any, feed: Iterator[Any]) -> Any:
 
 def with_parameters(thing: T, values: Sequence[float]) -> T:
     """The same model with other leaf values, checked as if it were newly made."""
-    checked: T = _revalidated(unflatten(thing, [float(v) for v in values]))
+    checked: T = _revalidate(unflatten(thing, [float(v) for v in values]))
     return checked
 
 
-def _revalidated(thing: Any) -> Any:
+def _revalidate(thing: Any) -> Any:
     if isinstance(thing, tuple):
-        return tuple(_revalidated(item) for item in thing)
+        return tuple(_revalidate(item) for item in thing)
     if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
         return dataclasses.replace(
-            thing, **{f.name: _revalidated(getattr(thing, f.name)) for f in dataclasses.fields(thing)}
+            thing, **{f.name: _revalidate(getattr(thing, f.name)) for f in dataclasses.fields(thing)}
         )
     return thing

@@ -68,26 +68,26 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
-def _pint_text(unit: str) -> str:
+def _to_pint_syntax(unit: str) -> str:
     """Our spelling of a unit in pint's grammar: `m3/(s Pa)` is `m**3/(s*Pa)`."""
     powers = re.sub(r"([A-Za-z])\^?(\d)", r"\1**\2", unit.replace("³", "3").replace("²", "2"))
     return re.sub(r"(?<=[\w)])\s+(?=[\w(])", "*", powers).replace("%", "percent").replace("°C", "degC")
 
 
-_TOWER = re.compile(r"(\*\*|\^)[\s\d()+-]*(\*\*|\^)|(\*\*|\^)\s*\(?\s*[-+]?\s*\d{2}")
+_LARGE_EXPONENT = re.compile(r"(\*\*|\^)[\s\d()+-]*(\*\*|\^)|(\*\*|\^)\s*\(?\s*[-+]?\s*\d{2}")
 """Powers of powers and powers of ten or more: no unit has them, and working them out may never end."""
 
 
-def _by_pint(unit: str, target: str, where: str) -> UnitConversion:
+def _convert_with_pint(unit: str, target: str, where: str) -> UnitConversion:
     import pint
 
     try:
-        if _TOWER.search(unit):
+        if _LARGE_EXPONENT.search(unit):
             raise ValueError(unit)
         registry = _registry()
-        zero, one = (registry.Quantity(v, _pint_text(unit)).to(_pint_text(target)).magnitude for v in (0.0, 1.0))
+        zero, one = (registry.Quantity(v, _to_pint_syntax(unit)).to(_to_pint_syntax(target)).magnitude for v in (0.0, 1.0))
     except pint.DimensionalityError:
-        raise UnitError(f"{where}unit '{unit}' cannot become {_kind(target)}: it measures something else.") from None
+        raise UnitError(f"{where}unit '{unit}' cannot become {_describe_target(target)}: it measures something else.") from None
     except Exception:  # pint and tokenize raise many kinds on text that is no unit
         raise UnitError(
             f"{where}'{unit}' is no unit known here. Write it like 'mm', 'kPa', 'bara', 'N', '%' or 'm3/(s Pa)'."
@@ -95,7 +95,7 @@ def _by_pint(unit: str, target: str, where: str) -> UnitConversion:
     return UnitConversion(float(one - zero), float(zero))
 
 
-def _kind(target: str) -> str:
+def _describe_target(target: str) -> str:
     return "a ratio" if target in ("1", "dimensionless") else f"'{target}'"
 
 
@@ -119,11 +119,11 @@ def conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, whe
         absolute = found["kind"].lower().startswith("a")
         return UnitConversion(conversion(bare, "Pa").factor, -ambient if absolute else 0.0)
     if unit in _FACTORS and {_FACTORS[unit][1], target} == {"1", "rad"}:  # pint takes an angle for a ratio
-        raise UnitError(f"{where}unit '{unit}' cannot become {_kind(target)}: it measures something else.")
+        raise UnitError(f"{where}unit '{unit}' cannot become {_describe_target(target)}: it measures something else.")
     if unit in _FACTORS and _FACTORS[unit][1] == target:
         factor = _FACTORS[unit][0]
         return UnitConversion(factor, assumed_gauge=target == "Pa")
-    found_by_pint = _by_pint(unit or "dimensionless", "dimensionless" if target == "1" else target, where)
+    found_by_pint = _convert_with_pint(unit or "dimensionless", "dimensionless" if target == "1" else target, where)
     return dataclasses.replace(found_by_pint, assumed_gauge=target == "Pa")
 
 
@@ -154,10 +154,10 @@ def quantity(value: float | str, target: str, *, ambient: float = AMBIENT_PRESSU
     try:
         return float(conversion(found["unit"], target, ambient=ambient, where=where)(number))
     except UnitError as reason:
-        raise UnitError(f"{reason}{_nearest(found['unit'], target)}") from None
+        raise UnitError(f"{reason}{_suggest_unit(found['unit'], target)}") from None
 
 
-def _nearest(unit: str, target: str) -> str:
+def _suggest_unit(unit: str, target: str) -> str:
     """A closing sentence: the unit of the right kind whose spelling is nearest, in whatever case."""
     pressures = ("bara", "barg", "psia", "psig") if target in ("Pa", ABSOLUTE) else ()
     kind = "Pa" if target == ABSOLUTE else target

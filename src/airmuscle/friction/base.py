@@ -52,7 +52,7 @@ class Friction(abc.ABC):
     def presliding_distance(self) -> float:
         """Displacement from rest within which the force builds up [m], for figures and nominal sizes."""
 
-    def relaxed(self) -> dict[str, Value]:
+    def initial_state(self) -> dict[str, Value]:
         """The bristles of a muscle that has never moved."""
         return {state.name: 0.0 for state in self.states}
 

@@ -11,7 +11,7 @@ from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
 from .base import Friction
-from .path import autonomous
+from .path import relative_deflection
 
 BOUC1967 = Reference(
     key="bouc-1967",
@@ -37,7 +37,7 @@ ISMAIL2009 = Reference(
     doi="10.1007/s11831-009-9031-8",
     note="normalised form, and the bounds sigma >= 1/2, n >= 1 within which it cannot create energy",
 )
-LEAST = 1e-12
+MIN_RELATIVE_DEFLECTION = 1e-12
 """Below this |w| counts as this, so that a power of it has a derivative at 0 (chosen)."""
 
 
@@ -67,17 +67,17 @@ class BoucWen(Friction):
     def presliding_distance(self) -> float:
         return self.coulomb_force / self.stiffness
 
-    def _bending(self, share: Value, speed: Value) -> Value:
-        size = ops.maximum(ops.absolute_value(share), LEAST) ** (self.sharpness - 1.0)
+    def _deflection_rate(self, share: Value, speed: Value) -> Value:
+        size = ops.maximum(ops.absolute_value(share), MIN_RELATIVE_DEFLECTION) ** (self.sharpness - 1.0)
         opposed = self.unloading * ops.absolute_value(speed) * share
         along = (self.unloading - 1.0) * speed * ops.absolute_value(share)
         return speed + size * (along - opposed)
 
     def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
-        return {"bristle": self._bending(bristles["bristle"] * self.stiffness / self.coulomb_force, speed)}
+        return {"bristle": self._deflection_rate(bristles["bristle"] * self.stiffness / self.coulomb_force, speed)}
 
     def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
         return self.stiffness * bristles["bristle"]
 
     def force_along(self, displacement: Any, time: Any = None) -> Any:
-        return self.coulomb_force * autonomous(self._bending, displacement, self.presliding_distance)
+        return self.coulomb_force * relative_deflection(self._deflection_rate, displacement, self.presliding_distance)

@@ -11,7 +11,7 @@ from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
 from .base import Friction
-from .path import deflection, speeds
+from .path import deflection, compute_speed
 
 CANUDAS_DE_WIT1995 = Reference(
     key="canudas-de-wit-1995",
@@ -74,6 +74,6 @@ class LuGre(Friction):
     def force_along(self, displacement: Any, time: Any = None) -> Any:
         if time is None:
             return self.stiffness * deflection(displacement, self.presliding_distance)
-        speed = speeds(displacement, time)
+        speed = compute_speed(displacement, time)
         bend = deflection(displacement, self.sliding_force(speed) / self.stiffness)
         return self.force({"bristle": bend}, speed)

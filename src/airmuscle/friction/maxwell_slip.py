@@ -12,7 +12,7 @@ from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
 from .base import Friction
-from .path import stops
+from .path import stop_operators
 
 IWAN1966 = Reference(
     key="iwan-1966",
@@ -43,7 +43,7 @@ VO_MINH2011 = Reference(
 )
 
 
-def yielding(bend: Value, limit: Value, transition: Value, speed: Value) -> Value:
+def element_rate(bend: Value, limit: Value, transition: Value, speed: Value) -> Value:
     """The rate [m/s] of a bristle that slides at its limit [m], with a continuous start of sliding.
 
     d(delta)/dt = v (1 - s),  s = (|delta|/Delta - 1 + eta)/eta within 0..1 where v bends it further, else 0.
@@ -104,15 +104,15 @@ class MaxwellSlip(Friction):
     def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
         elements = enumerate(self.limits, 1)
         return {
-            f"bristle{i}": yielding(bristles[f"bristle{i}"], limit, self.transition, speed) for i, limit in elements
+            f"bristle{i}": element_rate(bristles[f"bristle{i}"], limit, self.transition, speed) for i, limit in elements
         }
 
     def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
         return sum(k * bristles[f"bristle{i}"] for i, k in enumerate(self.stiffnesses, 1))
 
-    def terms(self, displacement: Any) -> Any:
+    def element_deflections(self, displacement: Any) -> Any:
         """The exact deflection [m] of every element along a path, shape (N, elements)."""
-        return stops(displacement, self.limits)
+        return stop_operators(displacement, self.limits)
 
     def force_along(self, displacement: Any, time: Any = None) -> Any:
-        return self.terms(displacement) @ self.stiffnesses
+        return self.element_deflections(displacement) @ self.stiffnesses

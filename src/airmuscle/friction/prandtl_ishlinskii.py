@@ -12,8 +12,8 @@ from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
 from .base import Friction
-from .maxwell_slip import check_equal_lengths, yielding
-from .path import stops
+from .maxwell_slip import check_equal_lengths, element_rate
+from .path import stop_operators
 
 KUHNEN2003 = Reference(
     key="kuhnen-2003",
@@ -94,12 +94,12 @@ class PrandtlIshlinskii(Friction):
 
     def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
         elements = enumerate(self.limits, 1)
-        return {f"stop{i}": yielding(bristles[f"stop{i}"], limit, self.transition, speed) for i, limit in elements}
+        return {f"stop{i}": element_rate(bristles[f"stop{i}"], limit, self.transition, speed) for i, limit in elements}
 
     def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
-        return self.shaped(sum(k * bristles[f"stop{i}"] for i, k in enumerate(self.stiffnesses, 1)))
+        return self.apply_dead_zones(sum(k * bristles[f"stop{i}"] for i, k in enumerate(self.stiffnesses, 1)))
 
-    def shaped(self, force: Value) -> Value:
+    def apply_dead_zones(self, force: Value) -> Value:
         """S(u): the force [N] of the stops after the dead zones."""
         total = force
         for threshold, weight in zip(self.thresholds, self.weights, strict=True):
@@ -108,4 +108,4 @@ class PrandtlIshlinskii(Friction):
         return total
 
     def force_along(self, displacement: Any, time: Any = None) -> Any:
-        return self.shaped(stops(displacement, self.limits) @ self.stiffnesses)
+        return self.apply_dead_zones(stop_operators(displacement, self.limits) @ self.stiffnesses)

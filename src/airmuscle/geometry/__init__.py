@@ -5,7 +5,7 @@ from .braid import Braid
 from .catenary import Catenary
 from .chebyshev import ChebyshevGeometry
 from .circular_arc import CircularArc
-from .fibre_sum import EvenSpread, GivenSum, SumOverHalf, SumPastHalf
+from .fibre_sum import UniformFibreSum, UserDefinedFibreSum, HalfShellFibreSum, PrintedFibreSum
 from .parabola import Parabola, TrueArcParabola
 from .pleated import PleatedTube
 from .straight_fibre import StraightFibre
@@ -17,14 +17,14 @@ __all__ = [
     "Catenary",
     "ChebyshevGeometry",
     "CircularArc",
-    "EvenSpread",
+    "UniformFibreSum",
     "Geometry",
-    "GivenSum",
+    "UserDefinedFibreSum",
     "Parabola",
     "PleatedTube",
     "StraightFibre",
-    "SumOverHalf",
-    "SumPastHalf",
+    "HalfShellFibreSum",
+    "PrintedFibreSum",
     "TabulatedGeometry",
     "TrueArcParabola",
     "Vessel",

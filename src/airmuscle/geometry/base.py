@@ -40,7 +40,7 @@ class Geometry(abc.ABC):
         Raises OutOfReach where the geometry cannot take this contraction.
         """
 
-    def volume_growth(self, contraction: Value) -> Value:
+    def volume_derivative(self, contraction: Value) -> Value:
         """dV/deps [m3], exact; virtual work makes p dV/deps / L0 the tension of an ideal muscle."""
         return autodiff.derivative(self, "volume", contraction)
 

@@ -6,8 +6,8 @@ from ..core import ops
 from ..core.arrays import Array
 from ..core.declaration import model
 from ..core.ops import Value
-from .meridian import Meridian, Profile, Segment, volume_of
-from .stumpff import double_arc, stumpff, triple_arc
+from .meridian import Meridian, Profile, Segment, segment_volume
+from .stumpff import double_angle_term, stumpff, triple_angle_term
 
 
 @model
@@ -28,13 +28,13 @@ class Catenary(Meridian):
             end_radius=end_radius,
             length=2 * half,
             arc=fibre_length,
-            largest_radius=end_radius + half * u * stumpff(2, w),
+            max_radius=end_radius + half * u * stumpff(2, w),
             end_sine=u * stumpff(1, w) / stumpff(0, w),
             end_cosine=1.0 / stumpff(0, w),
             excess=excess,
             arc_excess=4 * half**2 * u * stumpff(3, 4 * w),
-            arc_excess_squared=half**3 * w * triple_arc(w),
-            volume=volume_of(end_radius, 2 * half, excess, half**3 * w * double_arc(w)),
+            arc_excess_squared=half**3 * w * triple_angle_term(w),
+            volume=segment_volume(end_radius, 2 * half, excess, half**3 * w * double_angle_term(w)),
         )
 
     def shape_squared(self, contraction: Value) -> Value:

@@ -11,7 +11,7 @@ from ..core.errors import ParameterError
 from ..core.ops import Value
 from .base import Geometry
 
-_PLACES = 1001
+_ERROR_POINTS = 1001
 """Where the error of a stand-in is measured: close enough for the corners in the slope of a table."""
 
 
@@ -33,7 +33,7 @@ class ChebyshevGeometry(Geometry):
     volume_error: float = parameter(
         "m3", "dV", "largest error of the volume on the validity range", fitted=False, default=0.0
     )
-    growth_error: float = parameter(
+    derivative_error: float = parameter(
         "m3", "dV'", "largest error of dV/deps on the validity range", fitted=False, default=0.0
     )
 
@@ -83,17 +83,17 @@ def as_polynomial(geometry: Geometry, degree: int = 16, reach: tuple[float, floa
     geometry.check_contraction([low, high])
     middle, half = (low + high) / 2, (high - low) / 2
     fit = np.polynomial.chebyshev.chebinterpolate(
-        lambda x: geometry.volume(_inside(middle + half * x, low, high)), degree
+        lambda x: geometry.volume(_clip_to_range(middle + half * x, low, high)), degree
     )
     found = ChebyshevGeometry(tuple(fit), low, high, geometry.resting_length)
-    between = np.linspace(low, high, _PLACES)
+    between = np.linspace(low, high, _ERROR_POINTS)
     errors = (
         np.abs(found.volume(between) - geometry.volume(between)).max(),
-        np.abs(found.volume_growth(between) - geometry.volume_growth(between)).max(),
+        np.abs(found.volume_derivative(between) - geometry.volume_derivative(between)).max(),
     )
     return ChebyshevGeometry(tuple(fit), low, high, geometry.resting_length, *(float(e) for e in errors))
 
 
-def _inside(contraction: npt.NDArray[np.float64], low: float, high: float) -> npt.NDArray[np.float64]:
+def _clip_to_range(contraction: npt.NDArray[np.float64], low: float, high: float) -> npt.NDArray[np.float64]:
     """Rounding must not carry a sample past the end of the reach."""
     return np.clip(contraction, low, high)

@@ -9,8 +9,8 @@ from ..core.arrays import Array
 from ..core.declaration import model
 from ..core.ops import Value
 from ..core.reference import Reference
-from .meridian import Meridian, Profile, Segment, volume_of
-from .stumpff import double_arc, stumpff, triple_arc
+from .meridian import Meridian, Profile, Segment, segment_volume
+from .stumpff import double_angle_term, stumpff, triple_angle_term
 
 FERRARESI_2001 = Reference(
     "ferraresi-2001",
@@ -22,7 +22,7 @@ FERRARESI_2001 = Reference(
 )
 
 
-class Growth(NamedTuple):
+class SegmentDerivatives(NamedTuple):
     """How the integrals of one segment grow with contraction."""
 
     volume: Value
@@ -53,13 +53,13 @@ class CircularArc(Meridian):
             end_radius=end_radius,
             length=length,
             arc=fibre_length,
-            largest_radius=end_radius + fibre_length * psi * stumpff(2, -z) / 2,
+            max_radius=end_radius + fibre_length * psi * stumpff(2, -z) / 2,
             end_sine=ops.sin(psi),
             end_cosine=ops.cos(psi),
             excess=excess,
             arc_excess=fibre_length**2 * psi * (stumpff(2, -z) - stumpff(3, -z)) / 2,
-            arc_excess_squared=fibre_length**3 * z * double_arc(-z) / 8,
-            volume=volume_of(end_radius, length, excess, fibre_length**3 * z * triple_arc(-z) / 8),
+            arc_excess_squared=fibre_length**3 * z * double_angle_term(-z) / 8,
+            volume=segment_volume(end_radius, length, excess, fibre_length**3 * z * triple_angle_term(-z) / 8),
         )
 
     def angle_squared(self, contraction: Value) -> Value:
@@ -69,7 +69,7 @@ class CircularArc(Meridian):
             z = z - 2 * (z * stumpff(3, -z) - contraction) / (stumpff(2, -z) - stumpff(3, -z))
         return z
 
-    def growth_times_angle(self, angle_squared: Value, fibre_length: Value, end_radius: Value) -> Growth:
+    def derivatives_times_angle(self, angle_squared: Value, fibre_length: Value, end_radius: Value) -> SegmentDerivatives:
         """psi times what the integrals grow by: finite down to psi = 0, where the growth itself is infinite.
 
         From d eps/d psi = psi (S_2 - S_3) and the derivatives of the closed forms by psi, w = -psi^2.
@@ -77,11 +77,11 @@ class CircularArc(Meridian):
         z = angle_squared
         by_angle = stumpff(2, -z) - stumpff(3, -z)
         excess = fibre_length**2 * (stumpff(2, -4 * z) - 2 * stumpff(3, -4 * z))
-        squared = fibre_length**3 * (stumpff(1, -z) * stumpff(3, -4 * z) - 0.375 * triple_arc(-z))
+        squared = fibre_length**3 * (stumpff(1, -z) * stumpff(3, -4 * z) - 0.375 * triple_angle_term(-z))
         psi = ops.sqrt(z)
         rise = 2 * end_radius * excess + squared * psi
         moment = stumpff(3, -4 * z) - 5 * stumpff(4, -4 * z) + 9 * stumpff(5, -4 * z)
-        return Growth(
+        return SegmentDerivatives(
             volume=ops.pi * (rise / by_angle - end_radius**2 * fibre_length * psi),
             arc_excess=fibre_length**2 * (stumpff(1, -z) / 2 / by_angle - 1.0),
             arc_excess_squared=2 * fibre_length**3 * psi * moment / by_angle,

@@ -13,39 +13,39 @@ class FibreSum(abc.ABC):
     """M = Sum sin(theta_n) over the cut half, theta_n = (pi/m)(2 n + 1): Saga et al. 2007, (13), (15)."""
 
     @abc.abstractmethod
-    def of(self, fibres: int) -> Value:
+    def sum_of_sines(self, fibres: int) -> Value:
         """M [1] for m fibres."""
 
 
 @model
-class SumPastHalf(FibreSum):
+class PrintedFibreSum(FibreSum):
     """n up to m/2, as (15) is printed: one fibre past pi, which counts against the others; 4.93074 for 16 fibres."""
 
-    def of(self, fibres: int) -> Value:
+    def sum_of_sines(self, fibres: int) -> Value:
         return 1.0 / ops.sin(ops.pi / fibres) - ops.sin(ops.pi / fibres)
 
 
 @model
-class SumOverHalf(FibreSum):
+class HalfShellFibreSum(FibreSum):
     """n up to m/2 - 1, the fibres that the half holds: 1/sin(pi/m), 5.12583 for 16 fibres."""
 
-    def of(self, fibres: int) -> Value:
+    def sum_of_sines(self, fibres: int) -> Value:
         return 1.0 / ops.sin(ops.pi / fibres)
 
 
 @model
-class EvenSpread(FibreSum):
+class UniformFibreSum(FibreSum):
     """Fibres spread evenly all around: m/pi, which any axisymmetric muscle needs; 5.09296 for 16 fibres."""
 
-    def of(self, fibres: int) -> Value:
+    def sum_of_sines(self, fibres: int) -> Value:
         return fibres / ops.pi
 
 
 @model
-class GivenSum(FibreSum):
+class UserDefinedFibreSum(FibreSum):
     """A number, to see what depends on it."""
 
     value: float = parameter("1", "M", "sum of the sines of the fibre angles", bounds=(0.1, 1e3), fitted=False)
 
-    def of(self, fibres: int) -> Value:
+    def sum_of_sines(self, fibres: int) -> Value:
         return self.value

@@ -33,7 +33,7 @@ class Segment(NamedTuple):
     """Chord l [m]."""
     arc: Value
     """Int ds [m]; the fibre's length, but for an outline that only nearly keeps it."""
-    largest_radius: Value
+    max_radius: Value
     """Radius in the middle [m]."""
     end_sine: Value
     """Sine of the end slope angle phi_0."""
@@ -75,6 +75,6 @@ class Meridian(abc.ABC):
         """Positions from the middle [m] and radii there [m] at places `along` the outline, -1 to 1 from end to end."""
 
 
-def volume_of(end_radius: Value, length: Value, excess: Value, excess_squared: Value) -> Value:
+def segment_volume(end_radius: Value, length: Value, excess: Value, excess_squared: Value) -> Value:
     """pi Int r^2 dx from Int (r - r_0) dx and Int (r - r_0)^2 dx."""
     return ops.pi * (end_radius**2 * length + 2 * end_radius * excess + excess_squared)

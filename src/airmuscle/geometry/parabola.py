@@ -8,14 +8,14 @@ from ..core import ops
 from ..core.arrays import Array
 from ..core.declaration import model
 from ..core.ops import Value
-from .meridian import Meridian, Profile, Segment, volume_of
+from .meridian import Meridian, Profile, Segment, segment_volume
 
 _NODES, _WEIGHTS = (
     (0.5 * (v + shift)).tolist() for v, shift in zip(np.polynomial.legendre.leggauss(24), (1, 0), strict=True)
 )
 
 
-def _steepness(slope_squared: Value, t: float) -> Value:
+def _arc_element(slope_squared: Value, t: float) -> Value:
     """ds/dx at the fraction t of the half length, where the end slope is u: sqrt(1 + u^2 t^2)."""
     return ops.sqrt(1.0 + slope_squared * t * t)
 
@@ -27,21 +27,21 @@ def arc_surplus(slope_squared: Value) -> Value:
     so that nothing cancels where the closed forms do.
     """
     z = slope_squared
-    return z * sum(w * t * t / (1.0 + _steepness(z, t)) for t, w in zip(_NODES, _WEIGHTS, strict=True))
+    return z * sum(w * t * t / (1.0 + _arc_element(z, t)) for t, w in zip(_NODES, _WEIGHTS, strict=True))
 
 
-def _arc_surplus_growth(slope_squared: Value) -> Value:
+def _arc_surplus_derivative(slope_squared: Value) -> Value:
     """The derivative of `arc_surplus` by u^2."""
-    return sum(0.5 * w * t * t / _steepness(slope_squared, t) for t, w in zip(_NODES, _WEIGHTS, strict=True))
+    return sum(0.5 * w * t * t / _arc_element(slope_squared, t) for t, w in zip(_NODES, _WEIGHTS, strict=True))
 
 
 def _arc_moment(slope_squared: Value, power: int) -> Value:
     """Int_0^1 (1 - t^2)^power sqrt(1 + u^2 t^2) dt."""
     z = slope_squared
-    return sum(w * (1.0 - t * t) ** power * _steepness(z, t) for t, w in zip(_NODES, _WEIGHTS, strict=True))
+    return sum(w * (1.0 - t * t) ** power * _arc_element(z, t) for t, w in zip(_NODES, _WEIGHTS, strict=True))
 
 
-def _parabola(slope: Value, slope_squared: Value, length: Value, end_radius: Value) -> Segment:
+def _parabolic_segment(slope: Value, slope_squared: Value, length: Value, end_radius: Value) -> Segment:
     rise = length * slope / 4
     excess = 2 * length * rise / 3
     steepness = ops.sqrt(1.0 + slope_squared)
@@ -49,13 +49,13 @@ def _parabola(slope: Value, slope_squared: Value, length: Value, end_radius: Val
         end_radius=end_radius,
         length=length,
         arc=length * (1.0 + arc_surplus(slope_squared)),
-        largest_radius=end_radius + rise,
+        max_radius=end_radius + rise,
         end_sine=slope / steepness,
         end_cosine=1.0 / steepness,
         excess=excess,
         arc_excess=length * rise * _arc_moment(slope_squared, 1),
         arc_excess_squared=length * rise**2 * _arc_moment(slope_squared, 2),
-        volume=volume_of(end_radius, length, excess, 8 * length * rise**2 / 15),
+        volume=segment_volume(end_radius, length, excess, 8 * length * rise**2 / 15),
     )
 
 
@@ -63,7 +63,7 @@ class _ParabolicMeridian(Meridian):
     def profile(self, contraction: float, fibre_length: float, end_radius: float, along: Array) -> Profile:
         segment = self.segment(contraction, fibre_length, end_radius)
         t = along
-        rise = segment.largest_radius - end_radius
+        rise = segment.max_radius - end_radius
         return segment.length / 2 * t, end_radius + rise * (1.0 - t * t)
 
 
@@ -78,7 +78,7 @@ class Parabola(_ParabolicMeridian):
     def segment(self, contraction: Value, fibre_length: Value, end_radius: Value) -> Segment:
         stretch = 1.0 - contraction
         slope_squared = 6.0 * contraction / stretch
-        return _parabola(ops.sqrt(slope_squared), slope_squared, fibre_length * stretch, end_radius)
+        return _parabolic_segment(ops.sqrt(slope_squared), slope_squared, fibre_length * stretch, end_radius)
 
 
 @model
@@ -90,12 +90,12 @@ class TrueArcParabola(_ParabolicMeridian):
 
     def segment(self, contraction: Value, fibre_length: Value, end_radius: Value) -> Segment:
         z = self.slope_squared(contraction)
-        return _parabola(ops.sqrt(z), z, fibre_length * (1.0 - contraction), end_radius)
+        return _parabolic_segment(ops.sqrt(z), z, fibre_length * (1.0 - contraction), end_radius)
 
     def slope_squared(self, contraction: Value) -> Value:
         """The square of the end slope at a contraction [1]."""
         wanted = contraction / (1.0 - contraction)
         z = 6.0 * contraction * (1.0 + 0.95 * contraction) ** 2
         for _ in range(5):
-            z = z - (arc_surplus(z) - wanted) / _arc_surplus_growth(z)
+            z = z - (arc_surplus(z) - wanted) / _arc_surplus_derivative(z)
         return z

@@ -23,12 +23,12 @@ DAERDEN_LEFEBER_2001 = Reference(
     2001,
     note="elliptic integrals of a membrane without hoop stress; derived again here, not copied",
 )
-_ROOTS = (1e-6, 0.9)
+_ROOT_MU_BRACKET = (1e-6, 0.9)
 """Where sqrt(mu) is looked for."""
-_EXACT = {"xatol": 0.0, "xrtol": 4 * float(np.finfo(float).eps), "fatol": 0.0, "frtol": 0.0}
+_ROOT_TOLERANCES = {"xatol": 0.0, "xrtol": 4 * float(np.finfo(float).eps), "fatol": 0.0, "frtol": 0.0}
 
 
-class Ellipse(NamedTuple):
+class EllipticOutline(NamedTuple):
     """What fixes one outline: the parameter mu, the angle theta_0 and the integrals at them."""
 
     parameter: Any
@@ -59,7 +59,7 @@ class PleatedTube(FibreTube):
     @property
     def contraction_range(self) -> tuple[float, float]:
         """From straight fibres to half the length, less for a short tube; past `free_contraction` it must be pushed."""
-        return (0.0, _reach(self._slenderness))
+        return (0.0, _max_contraction(self._slenderness))
 
     @property
     def free_contraction(self) -> float:
@@ -70,7 +70,7 @@ class PleatedTube(FibreTube):
     def _slenderness(self) -> float:
         return float(self.fibre_length / self.end_radius)
 
-    def ellipse(self, contraction: Value) -> Ellipse:
+    def elliptic_outline(self, contraction: Value) -> EllipticOutline:
         """The parameter, angle and integrals at a contraction [1], by a bracketed search for the parameter."""
         from scipy.optimize import elementwise
 
@@ -81,23 +81,23 @@ class PleatedTube(FibreTube):
             return _contraction(root * root, self._slenderness) - c
 
         # searched in sqrt(mu), which starts like contraction^(1/4): nothing is lost near zero
-        found = elementwise.find_root(surplus, _ROOTS, args=(wanted,), tolerances=_EXACT, maxiter=300)
+        found = elementwise.find_root(surplus, _ROOT_MU_BRACKET, args=(wanted,), tolerances=_ROOT_TOLERANCES, maxiter=300)
         mu = np.where(wanted > 0, found.x, np.nan) ** 2
         angle = _angle(mu, self._slenderness)
-        return Ellipse(mu, angle, *_integrals(mu, angle))
+        return EllipticOutline(mu, angle, *_integrals(mu, angle))
 
-    def area(self, contraction: Value) -> Value:
+    def effective_area(self, contraction: Value) -> Value:
         """F/p [m2], tension over pressure of the ideal muscle; infinite at zero contraction."""
-        shape = self.ellipse(contraction)
+        shape = self.elliptic_outline(contraction)
         radius = self.end_radius / np.cos(shape.angle)
-        return _as_given(np.pi * radius**2 * (1 - 2 * shape.parameter) / (2 * shape.parameter))
+        return _unwrap_scalar(np.pi * radius**2 * (1 - 2 * shape.parameter) / (2 * shape.parameter))
 
-    def volume_growth(self, contraction: Value) -> Value:
+    def volume_derivative(self, contraction: Value) -> Value:
         """dV/deps = L_0 F/p, by virtual work; the tests hold it against the volume's slope."""
-        return self.resting_length * self.area(contraction)
+        return self.resting_length * self.effective_area(contraction)
 
     def segment(self, contraction: Value) -> Segment:
-        shape = self.ellipse(contraction)
+        shape = self.elliptic_outline(contraction)
         mu, sine, cosine = shape.parameter, np.sin(shape.angle), np.cos(shape.angle)
         root = np.sqrt(mu)
         radius = self.end_radius / cosine
@@ -119,9 +119,9 @@ class PleatedTube(FibreTube):
             squares - 2 * self.end_radius * along + self.end_radius**2 * self.fibre_length,
             np.pi * radius**3 / (3 * mu**1.5) * bracket,
         )
-        return Segment(self.end_radius, *(_as_given(self._straight(v, contraction, i)) for i, v in enumerate(values)))
+        return Segment(self.end_radius, *(_unwrap_scalar(self._cylinder_at_zero(v, contraction, i)) for i, v in enumerate(values)))
 
-    def _straight(self, value: Any, contraction: Value, index: int) -> Any:
+    def _cylinder_at_zero(self, value: Any, contraction: Value, index: int) -> Any:
         """The value, or at zero contraction that of the cylinder, where mu = 0."""
         radius, length = self.end_radius, self.fibre_length
         cylinder = (length, length, radius, 0.0, 1.0, 0.0, 0.0, 0.0, np.pi * radius**2 * length)
@@ -132,7 +132,7 @@ class PleatedTube(FibreTube):
 
         if contraction == 0:
             return along / 2 * self.fibre_length, np.full_like(along, self.end_radius)
-        shape = self.ellipse(contraction)
+        shape = self.elliptic_outline(contraction)
         theta = along * shape.angle
         radius = self.end_radius / np.cos(shape.angle)
         mu = shape.parameter
@@ -158,7 +158,7 @@ def _angle(mu: Any, slenderness: float) -> Any:
     def surplus(angle: Any, mu: Any) -> Any:
         return ellipkinc(angle, mu) - slenderness * np.sqrt(mu) * np.cos(angle)
 
-    return elementwise.find_root(surplus, (0.0, np.pi / 2), args=(np.asarray(mu),), tolerances=_EXACT, maxiter=300).x
+    return elementwise.find_root(surplus, (0.0, np.pi / 2), args=(np.asarray(mu),), tolerances=_ROOT_TOLERANCES, maxiter=300).x
 
 
 def _contraction(mu: Any, slenderness: float) -> Any:
@@ -167,9 +167,9 @@ def _contraction(mu: Any, slenderness: float) -> Any:
 
 
 @functools.cache
-def _reach(slenderness: float) -> float:
-    return min(0.5, float(_contraction(np.asarray(_ROOTS[1] ** 2), slenderness)))
+def _max_contraction(slenderness: float) -> float:
+    return min(0.5, float(_contraction(np.asarray(_ROOT_MU_BRACKET[1] ** 2), slenderness)))
 
 
-def _as_given(value: Any) -> npt.NDArray[np.float64] | float:
+def _unwrap_scalar(value: Any) -> npt.NDArray[np.float64] | float:
     return float(value) if np.ndim(value) == 0 else value

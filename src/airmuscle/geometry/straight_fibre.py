@@ -15,7 +15,7 @@ from .circular_arc import CircularArc
 from .meridian import Meridian, Profile, Segment
 
 
-def check_limit(contraction: Value, reach: tuple[float, float], owner: str, why: str = "") -> None:
+def check_contraction_range(contraction: Value, reach: tuple[float, float], owner: str, why: str = "") -> None:
     """Raise OutOfReach, naming what is possible, for numbers outside `reach`; a traced contraction passes."""
     if not isinstance(contraction, float | int | np.ndarray | np.generic):
         return
@@ -98,7 +98,7 @@ class StraightFibre(FibreTube):
         return (0.0, self.meridian.max_contraction)
 
     def segment(self, contraction: Value) -> Segment:
-        check_limit(contraction, self.contraction_range, "StraightFibre")
+        check_contraction_range(contraction, self.contraction_range, "StraightFibre")
         return self.meridian.segment(contraction, self.fibre_length, self.end_radius)
 
     def profile(self, contraction: float, along: Array) -> Profile:

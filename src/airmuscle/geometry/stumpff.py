@@ -32,11 +32,11 @@ def stumpff(order: int, w: Value) -> Value:
     return power_series(_COEFFICIENTS[order], w)
 
 
-def double_arc(w: Value) -> Value:
+def double_angle_term(w: Value) -> Value:
     """(u (cosh 2u + 2) - (3/2) sinh 2u)/u^5, or with cos and sin of psi for w = -psi^2; 8/15 at zero."""
     return 16 * (stumpff(4, 4 * w) - 3 * stumpff(5, 4 * w))
 
 
-def triple_arc(w: Value) -> Value:
+def triple_angle_term(w: Value) -> Value:
     """(sinh(3u)/6 + (3/2) sinh u - 2 u cosh u)/u^5, or with cos and sin of psi for w = -psi^2; 4/15 at zero."""
     return 40.5 * stumpff(5, 9 * w) + 1.5 * stumpff(5, w) - 2 * stumpff(4, w)

@@ -46,7 +46,7 @@ class TabulatedGeometry(Geometry):
         self.check_contraction(contraction)
         return _curve(self)(contraction)[()]
 
-    def volume_growth(self, contraction: Value) -> Value:
+    def volume_derivative(self, contraction: Value) -> Value:
         self.check_contraction(contraction)
         return _curve(self).derivative()(contraction)[()]
 

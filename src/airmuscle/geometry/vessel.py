@@ -26,7 +26,7 @@ class Vessel(Geometry):
     def volume(self, contraction: Value) -> Value:
         return self.enclosed_volume + 0.0 * contraction
 
-    def volume_growth(self, contraction: Value) -> Value:
+    def volume_derivative(self, contraction: Value) -> Value:
         return 0.0 * contraction
 
     def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:

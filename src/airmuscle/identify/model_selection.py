@@ -158,8 +158,8 @@ def errors_in_force(model: Characteristic, runs: Sequence[Recording], ceiling: f
         rows = run.rows((run["force"] > 0) & np.isfinite(run["pressure"] + run["contraction"] + run["force"]))
         law: Any = model
         rest = run.constants.get("resting_length")
-        if rest is not None and hasattr(law, "of_length"):
-            law = law.of_length(float(rest))
+        if rest is not None and hasattr(law, "with_resting_length"):
+            law = law.with_resting_length(float(rest))
         found.append(force_of(law, rows["pressure"], rows["contraction"], ceiling) - rows["force"])
     return np.concatenate(found)
 

@@ -35,21 +35,21 @@ class Direction:
         return QUANTITIES[self.quantity].unit
 
 
-FORCE = Direction("unclamped", ("pressure", "contraction"), "force")
+FORCE = Direction("unclamped_force", ("pressure", "contraction"), "force")
 CONTRACTION = Direction("contraction", ("pressure", "force"), "contraction")
 PRESSURE = Direction("pressure", ("contraction", "force"), "pressure")
 
 
 def by_specimen(law: Any, data: Recording) -> list[tuple[Any, npt.NDArray[np.intp]]]:
     """The law of each length of muscle in the data, and its rows: one law for all where it knows of no lengths."""
-    if RESTING_LENGTH not in data.columns or not hasattr(law, "of_length"):
+    if RESTING_LENGTH not in data.columns or not hasattr(law, "with_resting_length"):
         return [(law, np.arange(len(data)))]
     lengths = data[RESTING_LENGTH]
     return [(_of_length(law, float(length)), np.flatnonzero(lengths == length)) for length in np.unique(lengths)]
 
 
 def _of_length(law: Any, length: float) -> Any:
-    """As `law.of_length`, but unchecked: a search may pass where the law has no meaning."""
+    """As `law.with_resting_length`, but unchecked: a search may pass where the law has no meaning."""
     leaves = tree.leaves(law)
     return tree.unflatten(law, [length if leaf.path == RESTING_LENGTH else leaf.value for leaf in leaves])
 
@@ -104,7 +104,7 @@ class FitProblem:
     @property
     def labels(self) -> tuple[str, ...]:
         """A short name for each free parameter: its term in a sum, else its symbol."""
-        terms = getattr(self.law, "terms", ())
+        terms = getattr(self.law, "term_labels", ())
         field = getattr(self.law, "linear_in", None)
         texts = {f"{field}[{i}]": f"a({term})" for i, term in enumerate(terms)}
         symbols = [self.leaves[i].declared.symbol for i in self.free]

@@ -67,7 +67,7 @@ def is_linear(problem: FitProblem) -> bool:
 def design(problem: FitProblem) -> tuple[Array, Array]:
     """Matrix (N, P) and constant part (N,) of a law linear in its free parameters."""
     basis = getattr(problem.law, "basis", None)
-    if basis is not None and len(problem.free) == len(problem.law.terms):
+    if basis is not None and len(problem.free) == len(problem.law.term_labels):
         return np.array(basis(*problem.arguments)).T, np.zeros(len(problem.data))
     matrix = problem.slopes(problem.start)
     return matrix, problem.modelled(problem.start) - matrix @ problem.start

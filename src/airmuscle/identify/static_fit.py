@@ -130,7 +130,7 @@ def _of_rigs(by_rig: Array | None, problem: FitProblem) -> list[str]:
 def _of_length(law: Any, data: Recording) -> Any:
     """A law for muscles of any length as that of the muscle in the data, where there is one."""
     rest = data.constants.get(RESTING_LENGTH)
-    return law.of_length(float(rest)) if rest is not None and hasattr(law, "of_length") else law
+    return law.with_resting_length(float(rest)) if rest is not None and hasattr(law, "with_resting_length") else law
 
 
 def _with_validity_range(law: Characteristic, data: Recording) -> Characteristic:

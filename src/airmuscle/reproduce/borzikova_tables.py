@@ -150,7 +150,7 @@ def _range_text(values: np.ndarray) -> str:
 
 def coefficient_table(curves: PlaneCurves) -> Table:
     """The exact coefficients of equation (1), and how far both procedures come from them."""
-    exact = curves.interpolated()
+    exact = curves.interpolate()
     data, saturation = curves.sample(), curves.curves[0].saturation
     fits = [procedure(data, saturation).model.coefficients for procedure in (linearised, nonlinear)]
     powers = [(i, j) for i in range(exact.pressure_degree + 1) for j in range(exact.force_degree + 1)]

@@ -61,7 +61,7 @@ def surface_figure() -> Plot:
 
 def coefficients() -> Table:
     """The fitted coefficients in plain units, p in bar: what the paper leaves out, for this muscle."""
-    plain = {name: surface(name).plain_coefficients(1e5) for name in MAPS}
+    plain = {name: surface(name).monomial_coefficients(1e5) for name in MAPS}
     powers = exponents(5)
     columns: dict[str, list[float] | list[int]] = {
         "power of contraction": [i for i, _ in powers],

@@ -61,7 +61,7 @@ def lifting_claim(law: Characteristic, name: str) -> Claim:
 
 def ceiling_claim() -> Claim:
     """Claim 2 against mechanics: what fibres that do not stretch can pull at all, without any rubber."""
-    found = PRESSURE * float(exact(LINES["A"]).geometry.area(0.35))
+    found = PRESSURE * float(exact(LINES["A"]).geometry.effective_area(0.35))
     note = (
         "The most that inextensible fibres of 72 mm on ends of 12 mm can pull, by virtual work and without rubber; "
         "either rubber line lowers it. Claims 1 and 2 cannot hold together."
@@ -71,8 +71,8 @@ def ceiling_claim() -> Claim:
 
 def start_claims(law: Saga2007, name: str) -> tuple[Claim, Claim]:
     """Claim 3 and the sentence that speaks against it: low pressure at the start, or high."""
-    first, later = (float(law.balancing_pressure(c, 0.0)) for c in (0.01, 0.10))
-    needed = max(law.starting_pressure, first)
+    first, later = (float(law.equilibrium_pressure(c, 0.0)) for c in (0.01, 0.10))
+    needed = max(law.threshold_pressure, first)
     low = _claim(
         "3. Contraction starts at low pressure",
         AtMost(LOW_PRESSURE / 1e6, chosen=True),
@@ -104,7 +104,7 @@ def ring_claim(law: Saga2007, name: str, force: float) -> Claim:
 
 
 def _unstable(law: Saga2007, force: float) -> str:
-    falling = any(with_rings(law, n).snapping_load > force for n in (1, 2))
+    falling = any(with_rings(law, n).snap_through_load > force for n in (1, 2))
     return " Where pressure falls, equal segments are unstable: they do not contract alike." if falling else ""
 
 
@@ -131,7 +131,7 @@ def accuracy_claims(law: Saga2007, name: str) -> tuple[Claim, ...]:
     truth = exact(law.rubber, law.geometry.rings)
     low, high = np.linspace(0.01, 0.20, 20), np.linspace(0.25, 0.40, 16)
     below, above = (
-        100 * float(np.max(np.abs(law.balancing_pressure(c, 100.0) / truth.balance_at(c, 100.0).pressure - 1)))
+        100 * float(np.max(np.abs(law.equilibrium_pressure(c, 100.0) / truth.shape_at_force(c, 100.0).pressure - 1)))
         for c in (low, high)
     )
     note = "Largest error of the pressure at 100 N against the exact meridian; the measurements are lost. "
@@ -147,7 +147,7 @@ def accuracy_claims(law: Saga2007, name: str) -> tuple[Claim, ...]:
 
 def outline_claim(law: Saga2007) -> Claim:
     """Claim 6: the outlines of Fig. 2 lie within its axis."""
-    radii = [1e3 * float(law.geometry.segment(c).largest_radius) for c in FIG_2]
+    radii = [1e3 * float(law.geometry.segment(c).max_radius) for c in FIG_2]
     printed = ", ".join(f"{r:.2f}" for r in radii)
     note = f"The curves are lost, the axis is 0 to 0.03 m. Largest radii at 5, 10, 15, 20, 25 %: {printed} mm."
     return _claim("6. Fig. 2: all outlines lie within 0.03 m", AtMost(30.0), max(radii), "mm", "(2), (3)", note)
@@ -156,7 +156,7 @@ def outline_claim(law: Saga2007) -> Claim:
 def feed_forward_claim(law: Saga2007, name: str, force: float) -> Claim:
     """Claim 7: the share of wanted contractions that the pressure of the formula brings about, starting from rest."""
     wanted = np.linspace(0.01, 0.35, 35)
-    pressures = law.balancing_pressure(wanted, force)
+    pressures = law.equilibrium_pressure(wanted, force)
     met = sum(_returns(law, float(p), force, float(c)) for p, c in zip(pressures, wanted, strict=True))
     note = "Share of the contractions 1 to 35 % that the formula's pressure leads to, from rest and to 1e-9. "
     note += "Where pressure falls with contraction the muscle snaps past what was wanted." if met < wanted.size else ""
@@ -173,7 +173,7 @@ def _returns(law: Saga2007, pressure: float, force: float, wanted: float) -> boo
 
 def axis_claim(law: Saga2007, name: str, force: float) -> Claim:
     """Fig. 8 shows pressures up to 0.16 MPa for contractions up to 0.4: what load would that take?"""
-    found = float(np.max(law.balancing_pressure(np.linspace(0.0, 0.4, 81), force))) / 1e6
+    found = float(np.max(law.equilibrium_pressure(np.linspace(0.0, 0.4, 81), force))) / 1e6
     note = "Greatest pressure of the formula for 0 to 40 %; the load of Fig. 8 is not stated."
     return _claim("Fig. 8 spans 0.16 MPa", AtLeast(0.16), found, "MPa", f"{name}, {force:g} N", note)
 

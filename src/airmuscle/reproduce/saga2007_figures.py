@@ -104,7 +104,7 @@ def force_over_contraction() -> Plot:
         axes.plot(100 * contraction, DEFAULT.force(pressure, contraction), color=LINES[i], label=f"{label}, (19)")
         axes.plot(
             100 * contraction,
-            truth.balance_under(pressure, contraction).force,
+            truth.shape_at_pressure(pressure, contraction).force,
             "--",
             color=LINES[i],
             label=f"{label}, exact",
@@ -125,7 +125,7 @@ def snap_through() -> Plot:
     """Pressure over contraction with line A: a balloon's fall and rise."""
     figure, (left, right) = new_figure(1, 2, width=7.2, height=3.4)
     law = reading(RUBBER["A"], 2.0, 1.0)
-    for i, force in enumerate((0.0, 30.0, law.snapping_load, 120.0)):
+    for i, force in enumerate((0.0, 30.0, law.snap_through_load, 120.0)):
         _pressure(left, law, force, i, f"{force:.3g} N")
     for i, (name, law) in enumerate((n, r) for n, r in READINGS.items() if n.endswith("A")):
         _pressure(right, law, 0.0, i, name.removesuffix(", line A"))
@@ -144,7 +144,7 @@ def snap_through() -> Plot:
 
 def _pressure(axes: Any, law: Saga2007, force: float, i: int, label: str) -> None:
     contraction = np.concatenate([np.geomspace(1e-5, 0.01, 40), np.linspace(0.011, 0.5, 200)])
-    needed = law.balancing_pressure(contraction, force) * MPA
+    needed = law.equilibrium_pressure(contraction, force) * MPA
     axes.plot(100 * contraction, needed, ls=DASHES[i], color=LINES[i], label=label)
     lowest = int(np.argmin(needed))
     if lowest > 40:

@@ -10,10 +10,10 @@ import numpy as np
 from ..characteristic.base import Characteristic
 from ..characteristic.circle_virtual_work import CircleVirtualWork
 from ..characteristic.exact_meridian import ExactMeridian
-from ..characteristic.rubber import AlongArc, RubberLine
+from ..characteristic.rubber import ArcIntegral, RubberLine
 from ..characteristic.saga2007 import LINE_A, LINE_B, Saga2007
 from ..core.errors import SolveError
-from ..geometry.fibre_sum import EvenSpread
+from ..geometry.fibre_sum import UniformFibreSum
 from ..geometry.parabola import Parabola
 from ..geometry.pleated import PleatedTube
 from ..geometry.straight_fibre import StraightFibre
@@ -36,7 +36,7 @@ def reading(rubber: RubberLine, projection_factor: float, slope_factor: float, r
 
 def mechanics(rubber: RubberLine, rings: int = 0) -> Saga2007:
     """The only reading that is exact mechanics, short of the parabola itself."""
-    return replace(reading(rubber, 1.0, 2.0, rings), fibre_sum=EvenSpread(), rubber_integral=AlongArc())
+    return replace(reading(rubber, 1.0, 2.0, rings), fibre_sum=UniformFibreSum(), rubber_integral=ArcIntegral())
 
 
 def with_rings(law: Saga2007, rings: int) -> Saga2007:
@@ -85,7 +85,7 @@ def reached(law: Characteristic, pressure: float, force: float) -> float:
 def pressure_along(law: Characteristic, contraction: Any, force: float) -> Any:
     """Pressures [Pa] over contractions, NaN where the law has none."""
     if isinstance(law, Saga2007):
-        return law.balancing_pressure(contraction, force)
+        return law.equilibrium_pressure(contraction, force)
     if isinstance(law, ExactMeridian):
-        return np.asarray(law.balance_at(contraction, force).pressure)
+        return np.asarray(law.shape_at_force(contraction, force).pressure)
     return np.asarray(law.pressure(contraction, force))

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..characteristic.rubber import AlongArc, RubberIntegral, RubberLine
+from ..characteristic.rubber import ArcIntegral, RubberIntegral, RubberLine
 from ..core import autodiff
 from ..core.arrays import Array
 from ..core.declaration import model
@@ -81,15 +81,15 @@ def _lever(segment: Segment, sine_or_slope: Value, radius: Value, rubber: Value)
 
 
 def closures(
-    tube: FibreTube, rubber: RubberLine, contraction: Array, along: RubberIntegral = AlongArc()
+    tube: FibreTube, rubber: RubberLine, contraction: Array, along: RubberIntegral = ArcIntegral()
 ) -> dict[str, Share]:
     """The three closures of one outline over contraction, w = 1 and M = m/pi; the rubber of the balances `along`."""
     segment = tube.segment(contraction)
     hoop = WALL * along.hoop_stress(rubber, segment)
-    growth = tube.volume_growth(contraction) / tube.resting_length
+    growth = tube.volume_derivative(contraction) / tube.resting_length
     return {
         "end balance": _lever(segment, segment.end_slope, segment.end_radius, hoop),
-        "middle balance": _lever(segment, segment.end_sine, segment.largest_radius, hoop),
+        "middle balance": _lever(segment, segment.end_sine, segment.max_radius, hoop),
         "virtual work": Share(growth, _energy_growth(tube, rubber, contraction) / tube.fibre_length),
     }
 
@@ -118,14 +118,14 @@ def pressures(rubber: RubberLine, force: float, contraction: Array) -> dict[tupl
 
 def ideal_errors(contraction: Array) -> dict[tuple[str, str], Array]:
     """Error of F/p of each pair against the exact meridian, both without rubber [1]."""
-    truth = np.asarray(PleatedTube(LENGTH, DIAMETER).area(contraction))
+    truth = np.asarray(PleatedTube(LENGTH, DIAMETER).effective_area(contraction))
     found = _shares(RubberLine(0.0, 0.0), tuple(contraction))
     return {pair: share.area / truth - 1 for pair, share in found.items()}
 
 
 def errors(rubber: RubberLine, force: float, contraction: Array) -> dict[tuple[str, str], Array]:
     """Error of the pressure of each pair against the exact meridian with rubber [1]; NaN where either has none."""
-    truth = np.asarray(exact(rubber).balance_at(contraction, force).pressure)
+    truth = np.asarray(exact(rubber).shape_at_force(contraction, force).pressure)
     return {pair: found / truth - 1 for pair, found in pressures(rubber, force, contraction).items()}
 
 

@@ -38,7 +38,7 @@ def readings() -> Table:
     rows = [(name, force, law) for name, law in READINGS.items() for force in (0.0, 100.0, 200.0)]
     columns: dict[str, Any] = {"reading": [r[0] for r in rows], "load [N]": [r[1] for r in rows]}
     for c in SHOWN:
-        columns[f"pressure at {c:.1%} [MPa]"] = [round(law.balancing_pressure(c, f) / 1e6, 4) for _, f, law in rows]
+        columns[f"pressure at {c:.1%} [MPa]"] = [round(law.equilibrium_pressure(c, f) / 1e6, 4) for _, f, law in rows]
     note = "No ring. Printed are w 2, q 1; M = 5.12583; exact mechanics is w 1, q 2, M = m/pi, rubber along the arc."
     return Table("saga2007_readings", "Pressure by equation (19) in its readings", columns, note)
 
@@ -64,8 +64,8 @@ def outlines() -> Table:
     pairs = [(DEFAULT.geometry.segment(c), truth.segment(c)) for c in FIG_2]
     columns: dict[str, Any] = {
         "contraction [%]": [100 * c for c in FIG_2],
-        "largest radius by (2), (3) [mm]": [round(1e3 * ours.largest_radius, 2) for ours, _ in pairs],
-        "largest radius, exact [mm]": [round(1e3 * theirs.largest_radius, 2) for _, theirs in pairs],
+        "largest radius by (2), (3) [mm]": [round(1e3 * ours.max_radius, 2) for ours, _ in pairs],
+        "largest radius, exact [mm]": [round(1e3 * theirs.max_radius, 2) for _, theirs in pairs],
         "arc by (2), (3) [mm]": [round(1e3 * ours.arc, 3) for ours, _ in pairs],
         "volume by (2), (3) [cm3]": [round(1e6 * ours.volume, 3) for ours, _ in pairs],
         "volume, exact [cm3]": [round(1e6 * theirs.volume, 3) for _, theirs in pairs],
@@ -79,8 +79,8 @@ def limits() -> Table:
     columns: dict[str, Any] = {
         "reading": [r[0] for r in rows],
         "rings": [r[1] for r in rows],
-        "starting pressure [MPa]": [round(r[2].starting_pressure / 1e6, 4) for r in rows],
-        "pressure falls at first below [N]": [round(r[2].snapping_load, 1) for r in rows],
+        "starting pressure [MPa]": [round(r[2].threshold_pressure / 1e6, 4) for r in rows],
+        "pressure falls at first below [N]": [round(r[2].snap_through_load, 1) for r in rows],
         "pressure infinite at [%]": [round(100 * r[2].pole, 1) for r in rows],
         "strain 3 at [%]": [round(100 * r[2].contraction_at_strain(RUBBER_TEST_STRAIN), 1) for r in rows],
         "largest volume, exact [%]": [round(100 * exact(LINES["A"], r[1]).geometry.free_contraction, 1) for r in rows],
@@ -98,7 +98,7 @@ def lost_work() -> Table:
         columns[f"{name} [N]"] = np.round(law.force(PRESSURE, contraction), 2)
     columns["parabola, virtual work [N]"] = np.round(virtual_work(DEFAULT, PRESSURE, contraction), 2)
     columns["circle, virtual work [N]"] = np.round(circle(LINES["B"]).force(PRESSURE, contraction), 2)
-    columns["exact meridian [N]"] = np.round(exact(LINES["B"]).balance_under(PRESSURE, contraction).force, 2)
+    columns["exact meridian [N]"] = np.round(exact(LINES["B"]).shape_at_pressure(PRESSURE, contraction).force, 2)
     note = (
         "At 0.11 MPa; where the tension is negative it must be pushed, nan has no outline. A balance that differs from "
         "its own outline's virtual work makes or loses energy on a closed path; circle and exact are that work."
@@ -111,7 +111,7 @@ def virtual_work(law: Saga2007, pressure: float, contraction: Any) -> Any:
     tube = law.geometry
     stored = saga2007_pairs.Stored(tube, law.rubber)
     per_segment = autodiff.derivative(stored, "energy", contraction)
-    return (pressure * tube.volume_growth(contraction) - tube.segments * per_segment) / LENGTH
+    return (pressure * tube.volume_derivative(contraction) - tube.segments * per_segment) / LENGTH
 
 
 def series() -> Table:
@@ -121,6 +121,6 @@ def series() -> Table:
     for n in (0, 1, 2):
         for force in (0.0, 100.0, 200.0):
             header = f"pressure, {n} rings, {force:g} N [MPa]"
-            columns[header] = with_rings(DEFAULT, n).balancing_pressure(contraction, force) / 1e6
+            columns[header] = with_rings(DEFAULT, n).equilibrium_pressure(contraction, force) / 1e6
     note = f"w 2, q 1, line B, wall {1e3 * WALL:g} mm."
     return Table("saga2007_curves", "Pressure over contraction, rings and loads", columns, note, shown=False)

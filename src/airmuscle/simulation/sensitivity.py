@@ -59,7 +59,7 @@ class WithSensitivities:
                 )
 
     @property
-    def places(self) -> tuple[tuple[int, ...], ...]:
+    def parameter_indices(self) -> tuple[tuple[int, ...], ...]:
         """For every column the places of its paths among the inner leaves."""
         place = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.inner))}
         return tuple(tuple(place[path] for path in group) for group in self.columns)

@@ -165,7 +165,7 @@ def _linear(friction: Any, run: LoopSeries) -> Friction:
     """Stiffnesses of elements with given limits: least squares without a search, none of them negative."""
     from scipy.optimize import lsq_linear
 
-    terms = friction.terms(run.path)[run.rows]
+    terms = friction.element_deflections(run.path)[run.rows]
     weight = np.linalg.norm(terms, axis=0)
     weight = np.where(weight > 0, weight, 1.0)
     design = np.hstack([run.columns[run.rows], -terms / weight])
