@@ -187,14 +187,14 @@ def test_a_batch_has_no_more_plants_than_it_has():
 
 
 PARTS = [
-    (lambda: FillDischarge(Supply(5e5), 3, VALVE), "FillDischarge: its fill must be of Orifice; it is 3"),
-    (lambda: FillDischarge(5e5, VALVE, VALVE), "its supply must be of AirSource; it is 500000"),
-    (lambda: WithTubes(FillDischarge(Supply(5e5), VALVE, VALVE), VALVE), "WithTubes: its tube must be of TubeModel"),
+    (lambda: FillDischarge(Supply(5e5), 3, VALVE), "FillDischarge: fill must be an instance of Orifice; it is 3"),
+    (lambda: FillDischarge(5e5, VALVE, VALVE), "supply must be an instance of AirSource; it is 500000"),
+    (lambda: WithTubes(FillDischarge(Supply(5e5), VALVE, VALVE), VALVE), "WithTubes: tube must be an instance of TubeModel"),
     (
         lambda: WithTubes(FillDischarge(Supply(5e5), VALVE, VALVE), Tube(VALVE, 1e-6, 1, "air")),
-        "its gas must be of Gas",
+        "gas must be an instance of Gas",
     ),
-    (lambda: WithLeak(None, VALVE), "WithLeak: its circuit must be of Circuit; it is None"),
+    (lambda: WithLeak(None, VALVE), "WithLeak: circuit must be an instance of Circuit; it is None"),
     (lambda: Manifold(Supply(5e5), (3,), ("a",)), "its branches must be a tuple of Circuit"),
     (lambda: Manifold(Supply(5e5), FillDischarge(SharedSupply(), VALVE, VALVE), ("a",)), "must be a tuple of Circuit"),
     (
@@ -213,10 +213,10 @@ def test_a_part_of_another_kind_is_named(make, message):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Held(3), "Held: its inner must be of Mechanism; it is 3"),
-        (lambda: MusclesInSeries(3, (1.0,)), "MusclesInSeries: its inner must be of Mechanism"),
-        (lambda: WithEndStops(3, 0.0, 0.1, HuntCrossley(1e9)), "WithEndStops: its inner must be of Mechanism"),
-        (lambda: WithEndStops(HangingMass(1.0), 0.0, 0.1, 3), "WithEndStops: its contact must be of HuntCrossley"),
+        (lambda: Held(3), "Held: inner must be an instance of Mechanism; it is 3"),
+        (lambda: MusclesInSeries(3, (1.0,)), "MusclesInSeries: inner must be an instance of Mechanism"),
+        (lambda: WithEndStops(3, 0.0, 0.1, HuntCrossley(1e9)), "WithEndStops: inner must be an instance of Mechanism"),
+        (lambda: WithEndStops(HangingMass(1.0), 0.0, 0.1, 3), "WithEndStops: contact must be an instance of HuntCrossley"),
     ],
 )
 def test_a_part_of_a_mechanism_is_one(make, message):

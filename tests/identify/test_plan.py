@@ -118,4 +118,4 @@ def test_the_command_prints_json():
 def test_a_limit_without_its_unit_is_one_line():
     done = CliRunner().invoke(app, ["plan", "tondu-lopez", "--max-pressure", "5", "--max-force", "400 N"])
     assert done.exit_code == 1
-    assert "carries no unit" in done.output
+    assert "has no unit" in done.output

@@ -54,7 +54,11 @@ def simulated(
     direction = direction_of(law)
     if isinstance(law, ForceLaw):
         contraction = random.uniform(low, high, 400)
-        columns = {"pressure": pressure, "contraction": contraction, "force": law.unclamped_force(pressure, contraction)}
+        columns = {
+            "pressure": pressure,
+            "contraction": contraction,
+            "force": law.unclamped_force(pressure, contraction),
+        }
     elif isinstance(law, ContractionLaw):
         force = random.uniform(*law.force_range, 400)
         columns = {"pressure": pressure, "force": force, "contraction": law.contraction(pressure, force)}

@@ -212,7 +212,7 @@ def test_a_regulator_with_a_leak_stays_below_its_set_point_within_its_band():
 
 def test_a_set_point_beyond_the_range_is_refused():
     system = plant(ProportionalRegulator(Supply(7e5), VALVE, VALVE, SecondOrderLag(50.0)))
-    with pytest.raises(ParameterError, match=r"setpoint.*allowed are 0 to 1e\+06 Pa"):
+    with pytest.raises(ParameterError, match=r"setpoint.*allowed range: 0 to 1e\+06 Pa"):
         simulate(system, Schedule({"setpoint": ((0.0, 2e6),)}), duration=1.0)
 
 
@@ -303,7 +303,7 @@ def test_a_manifold_books_what_its_branches_draw():
         (lambda: Manifold(Supply(6e5), (ClosedChamber(SharedSupply()),), ("a.b",)), "a word without a dot"),
         (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 0.0, 3), "one muscle or two, not 3"),
         (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 0.0, True), "one muscle or two, not True"),
-        (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 1.0), r"overlap .* allowed are -0.5 to 0.9"),
+        (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 1.0), r"overlap .* allowed range: -0.5 to 0.9"),
         (lambda: Tube(VALVE, 1e-5, 0), "Tube: pieces is 0; give a whole number from 1 to 200"),
         (lambda: DistributedTube(1.0, 4e-3, 2.5), "DistributedTube: pieces is 2.5"),
         (lambda: plant(FillDischarge(Supply(5e5), VALVE, VALVE), count=2), "circuits feed 1 muscles; 2 are given"),

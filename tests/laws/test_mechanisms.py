@@ -232,8 +232,8 @@ def test_a_stop_begins_without_a_jump(speed):
         (lambda: WithEndStops(HangingMass(1.0), 0.0, 0.1, CONTACT, "angle"), "no coordinate 'angle' in m"),
         (lambda: WithEndStops(HangingMass(1.0), 0.1, 0.1, CONTACT), "must lie below"),
         (lambda: SpringLoad(float("nan"), 1.0), "must be finite"),
-        (lambda: Isotonic(-5.0, 1.0), "allowed are 0 to"),
-        (lambda: Pulley(0.0, 1.0), "allowed are 0.0001"),
+        (lambda: Isotonic(-5.0, 1.0), "allowed range: 0 to"),
+        (lambda: Pulley(0.0, 1.0), "allowed range: 0.0001"),
     ],
 )
 def test_what_cannot_be_is_refused(make, message):

@@ -251,9 +251,7 @@ def test_free_contraction_with_rings_and_of_a_slender_muscle():
     assert [round(100 * PleatedTube(L0, D0, n).free_contraction, 4) for n in (0, 1, 2)] == [46.8835, 40.2520, 34.5741]
     slender = PleatedTube(20.0, 2e-4)
     assert 100 * slender.free_contraction == pytest.approx(54.3053, abs=2e-3)
-    ends = [
-        1e3 * PleatedTube(L0, D0, n).segment(PleatedTube(L0, D0, n).free_contraction).max_radius for n in (0, 1, 2)
-    ]
+    ends = [1e3 * PleatedTube(L0, D0, n).segment(PleatedTube(L0, D0, n).free_contraction).max_radius for n in (0, 1, 2)]
     assert np.round(ends, 4).tolist() == [32.0365, 18.3115, 13.7465]
 
 

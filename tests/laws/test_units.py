@@ -15,7 +15,9 @@ COMMON = {name: entry for name, entry in units._FACTORS.items() if name not in (
 @pytest.mark.parametrize("unit", COMMON)
 def test_a_common_unit_is_what_pint_says(unit):
     factor, target = COMMON[unit]
-    by_pint = units._convert_with_pint("dimensionless" if unit == "1" else unit, "dimensionless" if target == "1" else target, "")
+    by_pint = units._convert_with_pint(
+        "dimensionless" if unit == "1" else unit, "dimensionless" if target == "1" else target, ""
+    )
     assert by_pint.factor == pytest.approx(factor, rel=1e-12)
     assert by_pint.offset == 0.0
 

@@ -187,11 +187,11 @@ def test_arrays_floats_and_symbols_agree(law):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: IndexedValve(1e-8, 0.3, 1.5), "subsonic_index .* allowed are 0.25 to 1"),
-        (lambda: IndexedValve(1e-8, 0.3, 0.5, -1.0), "cracking_pressure .* allowed are 0 to 500000 Pa"),
-        (lambda: IndexedValve(1e-8, 1.0), "critical_ratio .* allowed are 0 to 0.95"),
+        (lambda: IndexedValve(1e-8, 0.3, 1.5), "subsonic_index .* allowed range: 0.25 to 1"),
+        (lambda: IndexedValve(1e-8, 0.3, 0.5, -1.0), "cracking_pressure .* allowed range: 0 to 500000 Pa"),
+        (lambda: IndexedValve(1e-8, 1.0), "critical_ratio .* allowed range: 0 to 0.95"),
         (lambda: IndexedValve(float("nan"), 0.3), "conductance .* must be finite"),
-        (lambda: IndexedValve(1.1, 0.3), "conductance .* Values are SI: check the unit"),
+        (lambda: IndexedValve(1.1, 0.3), "conductance .* Values are in SI units; check the unit"),
     ],
 )
 def test_an_impossible_valve_is_refused(make, message):

@@ -267,8 +267,8 @@ def test_a_point_outside_the_data_is_a_warning():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (("--pressure=3 kg", "--force=1 N"), "--pressure: unit 'kg' cannot become 'Pa'"),
-        (("--pressure=3", "--force=1 N"), "--pressure: '3' carries no unit; write it like '3 Pa'"),
+        (("--pressure=3 kg", "--force=1 N"), "--pressure: unit 'kg' cannot be converted to 'Pa'"),
+        (("--pressure=3", "--force=1 N"), "--pressure: '3' has no unit; write it like '3 Pa'"),
         (("--pressure=-2 bar", "--contraction=0.1"), "a gauge pressure of -200 kPa lies below absolute zero"),
         (("--pressure=3 bar", "--force=9 kN"), "no contraction between .* balances 9000 N at 300 kPa"),
     ],
@@ -328,7 +328,7 @@ def test_fit_starts_from_a_library_entry_and_keeps_what_is_fixed(tmp_path: Path)
         (36, ("--characteristic", "Saga2007"), "--characteristic: Saga2007 needs values to start from"),
         (36, ("--characteristic", "ContractileSurfac"), "no library entry 'ContractileSurfac'"),
         (20, ("--characteristic", "ContractileSurface"), ".*has 21 parameters to be found, but only 19 points"),
-        (36, ("--characteristic", "ContractileSurface", "--robust", "5 mm"), "--robust: unit 'mm' cannot become 'N'"),
+        (36, ("--characteristic", "ContractileSurface", "--robust", "5 mm"), "--robust: unit 'mm' cannot be converted to 'N'"),
         (36, ("--characteristic", "ContractileSurface", "--resting-length", "3 N"), ".*resting_length.*'N'"),
     ],
 )
@@ -435,7 +435,7 @@ def test_simulate_prints_json(scenario: Path, tmp_path: Path):
     [
         ('duration = "0.5 s"', "", ".*duration"),
         ("critical_ratio", "critical_ration", ".*critical_ration"),
-        ('mass = "5 kg"', 'mass = "5 N"', ".*unit 'N' cannot become 'kg'"),
+        ('mass = "5 kg"', 'mass = "5 N"', ".*unit 'N' cannot be converted to 'kg'"),
         ("fill = [[", "fil = [[", r".*no input 'fil'.*Did you mean 'fill'\?"),
         ('mass = "5 kg"', 'mass = "5000 kg"', ".*"),
     ],

@@ -118,7 +118,7 @@ def test_the_force_is_zero_where_the_muscle_hangs_free(tmp_path):
     [
         ((*SURFACE, "--free", "2 bar=18 %"), 2, "give --shape"),
         ((*SURFACE, "--shape", "--free", "2 bar"), 2, "like '3 bar=18 %'"),
-        ((*SURFACE, "--shape", "--free", "2 N=18 %"), 1, "--free: unit 'N' cannot become 'Pa'"),
+        ((*SURFACE, "--shape", "--free", "2 N=18 %"), 1, "--free: unit 'N' cannot be converted to 'Pa'"),
         ((*SURFACE, "--shape", "--free", "2 bar=1800 %"), 2, "contracted by 0 to 100 %, not by '1800 %'"),
         ((*SURFACE, "--shape", "--free", "2 bar=-18 %"), 2, "contracted by 0 to 100 %, not by '-18 %'"),
         (("--compare", "--shape"), 2, "no --compare"),

@@ -359,7 +359,7 @@ def test_a_decimal_sign_that_was_told_settles_thousands(tmp_path: Path):
         ({9: "pressure [bar]"}, ColumnError, "the mapping names column '9'"),
         ({"pressure": "presure [bar]"}, ColumnError, "is no known quantity; known are time, pressure"),
         ({"pressure": "presure [bar]"}, ColumnError, "Did you mean 'pressure'?"),
-        ({"pressure": "pressure [mm]"}, UnitError, "unit 'mm' cannot become 'Pa'"),
+        ({"pressure": "pressure [mm]"}, UnitError, "unit 'mm' cannot be converted to 'Pa'"),
     ],
 )
 def test_a_mapping_that_does_not_fit_says_why(tmp_path: Path, columns, kind, expected: str):

@@ -228,7 +228,7 @@ lag = {{ model = "SecondOrderLag", frequency = "20 Hz", damping_ratio = 0.7 }}
     scenario = load_scenario(written(tmp_path, text=text))
     assert scenario.command == Schedule({"setpoint": ((0.1, 2e5), (0.2, 1e5))})
     assert "setpoint\n[Pa]" in [axis.get_ylabel() for axis in _inputs(scenario, scenario.simulate()).figure.axes]
-    with pytest.raises(UnitError, match=r"\[command\], setpoint: unit 'mm' cannot become 'Pa'"):
+    with pytest.raises(UnitError, match=r"\[command\], setpoint: unit 'mm' cannot be converted to 'Pa'"):
         load_scenario(written(tmp_path, ('"2 bar"', '"2 mm"'), text=text))
 
 
@@ -240,7 +240,7 @@ def test_a_column_of_no_known_quantity_has_the_unit_of_its_heading(tmp_path: Pat
         table = f'file = "bench.csv"\ncolumns = {{ fill = "{column}", discharge = "discharge" }}'
         command = load_scenario(written(tmp_path, (FILL, table))).command
         assert command == SampledSignal({"fill": ((0, 0.5), (1, 0.2)), "discharge": ((0, 1), (1, 0))})
-    with pytest.raises(UnitError, match=r"bench.csv, port \[mm\]: unit 'mm' cannot become a ratio"):
+    with pytest.raises(UnitError, match=r"bench.csv, port \[mm\]: unit 'mm' cannot be converted to a ratio"):
         load_scenario(written(tmp_path, (FILL, 'file = "bench.csv"\ncolumns = { fill = "port" }')))
 
 
@@ -344,16 +344,16 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             r"\[plant.gas\], model: .*Did you mean 'Isothermal'\?",
         ),
         ("3e-9, critical_ratio = 0.3", "3e-9", ParameterError, r"\[plant.circuit.fill\]: Valve needs 'critical_ratio'"),
-        ("= 0.3", "= 30", ParameterError, r"is 30; allowed are 0 to 0.95. Is it in per cent\? As a ratio it is 0.3"),
-        ('"5 bar"', '"-2 bar"', ParameterError, r"\[plant.circuit.supply\]: .* is -200000 Pa; allowed are -100000 to"),
-        ('"5 bar"', '"5,5 bar"', UnitError, r"supply\], pressure: '5,5 bar' holds a comma; .* as a point, '5.5 bar'"),
-        ('"5 kg"', '"5 N"', UnitError, r"\[plant.mechanism\], mass: unit 'N' cannot become 'kg'"),
+        ("= 0.3", "= 30", ParameterError, r"is 30; allowed range: 0 to 0.95. Is it in per cent\? As a ratio it is 0.3"),
+        ('"5 bar"', '"-2 bar"', ParameterError, r"\[plant.circuit.supply\]: .* is -200000 Pa; allowed range: -100000 to"),
+        ('"5 bar"', '"5,5 bar"', UnitError, r"supply\], pressure: '5,5 bar' contains a comma; .* a decimal point, '5.5 bar'"),
+        ('"5 kg"', '"5 N"', UnitError, r"\[plant.mechanism\], mass: unit 'N' cannot be converted to 'kg'"),
         # the command
         (FILL, 'fil = [["0 s", 1]]', ParameterError, r"\[command\]: .* no input 'fil'; .*Did you mean 'fill'\?"),
         (FILL, "fill = 1", ParameterError, r"\[command\], fill is 1; write instants and values, \[\[\"5 s\", 1\]"),
         (FILL, "fill = [1]", ParameterError, r"\[command\], fill holds 1; each is an instant and a value"),
-        (FILL, 'fill = [["1 bar", 1]]', UnitError, r"\[command\], fill: unit 'bar' cannot become 's'"),
-        (FILL, 'fill = [["0.1", 1]]', UnitError, r"\[command\], fill: '0.1' carries no unit; write it like '0.1 s'"),
+        (FILL, 'fill = [["1 bar", 1]]', UnitError, r"\[command\], fill: unit 'bar' cannot be converted to 's'"),
+        (FILL, 'fill = [["0.1", 1]]', UnitError, r"\[command\], fill: '0.1' has no unit; write it like '0.1 s'"),
         (FILL, "fill = [[0.1, true]]", ParameterError, r"\[command\], fill is True; it must be a number"),
         (FILL, "fill = [[0.1, nan]]", ParameterError, r"\[command\], fill is nan; it must be finite"),
         (
@@ -390,7 +390,7 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             r"\[command\]: Periodic.period is 0.0 s; it must be positive",
         ),
         (FILL, f"{FILL}\nperiod = nan", ParameterError, r"\[command\], period is nan; it must be finite"),
-        (FILL, f'{FILL}\nperiod = "1 bar"', UnitError, r"\[command\], period: unit 'bar' cannot become 's'"),
+        (FILL, f'{FILL}\nperiod = "1 bar"', UnitError, r"\[command\], period: unit 'bar' cannot be converted to 's'"),
         (FILL, "file = 3", ParameterError, r"\[command\]: file is 3; it must be text"),
         (FILL, 'file = "no.csv"', FileError, r"\[command\]: .*no\.csv"),
         (
@@ -433,7 +433,7 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             FILL,
             f'{FILL}\ndrivers = {{ fill = {{ model = "SolenoidDriver", opening_delay = "-1 s" }} }}',
             ParameterError,
-            r"\[command.drivers.fill\]: SolenoidDriver.opening_delay .* is -1 s; allowed are 0 to 10 s",
+            r"\[command.drivers.fill\]: SolenoidDriver.opening_delay .* is -1 s; allowed range: 0 to 10 s",
         ),
         (
             FILL,
@@ -478,7 +478,7 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
         (DURATION, 'duration = "-1 s"', ParameterError, r"\[run\], duration is '-1 s'; it must be greater than zero"),
         (DURATION, "duration = inf", ParameterError, r"\[run\], duration is inf; it must be finite"),
         (DURATION, "duration = [1]", ParameterError, r"\[run\], duration is \[1\]; it must be a number in s, or text"),
-        (DURATION, 'duration = "1 m"', UnitError, r"\[run\], duration: unit 'm' cannot become 's'"),
+        (DURATION, 'duration = "1 m"', UnitError, r"\[run\], duration: unit 'm' cannot be converted to 's'"),
         (DURATION, f"{DURATION}\noutput = 0", ParameterError, r"\[run\], output is 0; it must be greater than zero"),
         (DURATION, f"{DURATION}\nstart_time = nan", ParameterError, r"\[run\], start_time is nan; it must be finite"),
         (DURATION, f'{DURATION}\nmethod = "Rodas"', UnknownNameError, r"\[run.method\], .*Did you mean 'Rodas4'\?"),

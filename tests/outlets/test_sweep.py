@@ -443,7 +443,7 @@ def test_a_value_beyond_its_bounds_fails_its_run_alone(folder: Path):
     result = run(folder)
     assert np.array_equal(result.failed, np.flatnonzero(result.study.values[:, 0] < 0))
     assert result.failed.size
-    assert "allowed are" in result.reasons[result.failed[0]]
+    assert "allowed range: " in result.reasons[result.failed[0]]
 
 
 def test_what_nobody_foresaw_fails_its_run_alone(folder: Path, monkeypatch: pytest.MonkeyPatch):
@@ -582,7 +582,7 @@ BAD = [
     ("mechanism.contraction", "run.stop", "the scenario has no number 'run.stop'"),
     ('low = "2 %"', "low = nan", "it must be finite"),
     ('low = "2 %"', "low = -inf", "it must be finite"),
-    ('low = "2 %"', 'low = "2 mm"', "cannot become a ratio"),
+    ('low = "2 %"', 'low = "2 mm"', "cannot be converted to a ratio"),
     ('low = "2 %"', 'low = "20 %"', "low must be the smaller one"),
     ('low = "2 %"', 'low = "-95 %"', "allowed are"),
     ('low = "2 %", ', "", "Uniform needs 'low' (least value)"),
@@ -598,7 +598,7 @@ BAD = [
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "LogNormal", median = 0.0, log_deviation = 0.1 }', "it must be greater than zero"),
     ('model = "Uniform"', 'model = "Unifrom"', "no model 'Unifrom' here; there are Range, Uniform, Normal, LogNormal, Triangular, Truncated. Did you mean 'Uniform'?"),
     ('deviation = "0.2e-9 m3/(s Pa)"', "deviation = 0", "it must be greater than zero"),
-    ('deviation = "0.2e-9 m3/(s Pa)"', 'deviation = "1 kg"', "cannot become 'm3/(s Pa)'"),
+    ('deviation = "0.2e-9 m3/(s Pa)"', 'deviation = "1 kg"', "cannot be converted to 'm3/(s Pa)'"),
     ("count = 22", "count = 0", "at least one point is needed"),
     ("count = 22", "count = -1", "must be a whole number"),
     ("count = 22", "count = 2.5", "must be a whole number"),
@@ -611,7 +611,7 @@ BAD = [
     ('model = "MonteCarlo"\ncount = 22\nseed = 3', 'model = "Grid"', "has no levels; give a list or a Range"),
     ('model = "MonteCarlo"', 'model = "Random"', "no model 'Random' here"),
     ('[design]\nmodel = "MonteCarlo"\ncount = 22\nseed = 3', "", "[design] is None; write a table with a model"),
-    ('"2 bar"', '"2 mm"', "cannot become 'Pa'"),
+    ('"2 bar"', '"2 mm"', "cannot be converted to 'Pa'"),
     ('"2 bar"', "inf", "it must be finite"),
     ('model = "Final", column = "pressure"', 'model = "Final", column = "presure"', "a run has no column 'presure'"),
     ('model = "Final", column = "pressure"', 'model = "Last", column = "pressure"', "no model 'Last' here"),

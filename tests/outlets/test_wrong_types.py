@@ -84,7 +84,7 @@ CASES = {
     "a class": (lambda: Plant(MUSCLE, CIRCUIT, HangingMass), "its mechanism must be a Mechanism; it is <class"),
     "supply as number": (
         lambda: Plant(MUSCLE, FillDischarge(6e5, EDGE, EDGE), MASS),
-        "FillDischarge: its supply must be of AirSource; it is 600000",
+        "FillDischarge: supply must be an instance of AirSource; it is 600000",
     ),
     "one for several": (lambda: WithOffsets(MASS, 0.1), r"WithOffsets.offsets .* is 0.1; it must be several numbers, \(1.0"),
     "valve as number": (lambda: in_series(EDGE, 2.0), "number 2 is float; the rule holds for Valve"),

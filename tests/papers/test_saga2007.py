@@ -483,7 +483,8 @@ def test_a_claim_without_a_number_is_never_held():
 def test_the_printed_fibre_sum_is_a_reading():
     assert replace(DEFAULT, fibre_sum=PrintedFibreSum()).pressure(0.2, 100.0) < DEFAULT.pressure(0.2, 100.0)
     sums = [
-        replace(DEFAULT, fibre_sum=s).pressure(0.2, 100.0) for s in (PrintedFibreSum(), UniformFibreSum(), UserDefinedFibreSum(5.12583))
+        replace(DEFAULT, fibre_sum=s).pressure(0.2, 100.0)
+        for s in (PrintedFibreSum(), UniformFibreSum(), UserDefinedFibreSum(5.12583))
     ]
     assert sums == sorted(sums)
 

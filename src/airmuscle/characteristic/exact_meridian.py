@@ -132,7 +132,9 @@ class ExactMeridian(PressureLaw):
         lost = np.isnan(found.pressure)
         return self._solve_by_unloading(found, c, load, start * area, lost) if lost.any() else _unwrap_scalars(found)
 
-    def _solve_by_unloading(self, found: MeridianShape, contraction: Any, load: Any, scale: Any, lost: Any) -> MeridianShape:
+    def _solve_by_unloading(
+        self, found: MeridianShape, contraction: Any, load: Any, scale: Any, lost: Any
+    ) -> MeridianShape:
         """The lost shapes sought again from a larger load, which is then taken away step by step."""
         c, wanted, extra = contraction[lost], load[lost], scale[lost]
         radius, area, rubber = self._circle_estimate(c)

@@ -63,5 +63,7 @@ class Hunt2017(PressureLaw):
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         span = ops.maximum(self.max_contraction - self.span_by_force * force, _MIN_SPAN)
-        argument = ops.clip(self.steepness * (contraction / span - self.centre), -_MAX_TANGENT_ARGUMENT, _MAX_TANGENT_ARGUMENT)
+        argument = ops.clip(
+            self.steepness * (contraction / span - self.centre), -_MAX_TANGENT_ARGUMENT, _MAX_TANGENT_ARGUMENT
+        )
         return self.offset + self.scale * ops.tan(argument) + self.by_force * force + self.half_gap * self.direction

@@ -74,7 +74,9 @@ def as_force_law(law: Characteristic, validity_range: ValidityRange, *, degree: 
     return _with_errors(law, surface, validity_range)
 
 
-def _with_errors(law: Characteristic, surface: ContractileSurface, validity_range: ValidityRange) -> PolynomialSurrogate:
+def _with_errors(
+    law: Characteristic, surface: ContractileSurface, validity_range: ValidityRange
+) -> PolynomialSurrogate:
     pressure, contraction = _grid(validity_range, np.linspace(-1.0, 1.0, 4 * surface.degree + 3))
     error = surface.force(pressure, contraction) - _force_or_nan(law, pressure, contraction)
     known = np.isfinite(error)

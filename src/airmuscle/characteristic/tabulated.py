@@ -70,7 +70,9 @@ class Tabulated(Characteristic):
         if not found.all():
             worst = int(np.argmin(found.reshape(-1)))
             column = forces.reshape(table.levels.size, -1)[:, worst]
-            raise SolveError(self._no_pressure_message(c.flat[worst], load.flat[worst]) + _describe_force_limits(column))
+            raise SolveError(
+                self._no_pressure_message(c.flat[worst], load.flat[worst]) + _describe_force_limits(column)
+            )
         j = between.argmax(axis=0)
         low, high = (np.take_along_axis(side, j[None], axis=0)[0] for side in (forces[:-1], forces[1:]))
         share = np.where(high > low, (load - low) / np.where(high > low, high - low, 1.0), 0.0)
@@ -84,7 +86,10 @@ class Tabulated(Characteristic):
         refused = ~((load <= ends[0]) & (load >= ends[1]))
         if refused.any():
             at = int(np.argmax(refused.reshape(-1)))
-            raise SolveError(self._no_contraction_message(p.flat[at], load.flat[at]) + _describe_force_limits(ends.reshape(2, -1)[:, at]))
+            raise SolveError(
+                self._no_contraction_message(p.flat[at], load.flat[at])
+                + _describe_force_limits(ends.reshape(2, -1)[:, at])
+            )
         for _ in range(_BISECTIONS):
             middle = (low + high) / 2
             above = table.evaluate(p, middle)[0] > load

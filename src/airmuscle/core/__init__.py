@@ -1,4 +1,4 @@
-"""Foundations: parameters and models, parameter trees, operators over numbers and symbols, errors, references, units."""
+"""Foundations: models and parameters, parameter trees, numeric and symbolic operators, errors, references, units."""
 
 from . import ops
 from .arrays import Array
@@ -10,11 +10,11 @@ from .variables import Input, StateVariable
 
 __all__ = [
     "Array",
-    "SensitivitySystem",
     "Input",
     "Leaf",
     "Parameter",
     "Reference",
+    "SensitivitySystem",
     "StateVariable",
     "System",
     "cite",

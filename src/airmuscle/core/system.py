@@ -1,4 +1,4 @@
-"""What can be turned into a program: named states, named inputs, rates and outputs written over `ops`."""
+"""System interface: named states and inputs, with rates and outputs written over `ops`."""
 
 from __future__ import annotations
 
@@ -10,45 +10,45 @@ from .variables import StateVariable
 
 
 class System(Protocol):
-    """Ordinary differential equations of a frozen model; its declared leaves are the program's parameters.
+    """Ordinary differential equations of a frozen model; its declared leaves are the parameters of the program.
 
-    Every mapping is keyed by the names that `states` and `inputs` list. Rates must be continuous in the states.
+    Mappings are keyed by the names listed in `states` and `inputs`. Rates must be continuous in the states.
     """
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
-        """The states, in the order of their vector."""
+        """The states, in the order of the state vector."""
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The names of the inputs, each linear in time between instants."""
+        """The names of the inputs, each piecewise linear in time."""
 
     def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> Mapping[str, Value]:
         """The time derivative of every state."""
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> Mapping[str, Value]:
-        """Further quantities of interest at a state."""
+        """Output quantities at a state."""
 
 
 @runtime_checkable
 class SensitivitySystem(System, Protocol):
-    """A system that carries another's states, then their derivatives along columns, state by state.
+    """A system augmented by its sensitivities: the inner states, then their derivatives, column by column, per state.
 
-    It is a System like any other; its program is printed from the inner one, which costs less than its own rates.
+    Its compiled program is generated from the inner system, which costs less than its own rates.
     """
 
     @property
     def inner(self) -> System:
-        """The system whose states come first."""
+        """The system that is differentiated; its states come first."""
 
     @property
     def parameter_indices(self) -> tuple[tuple[int, ...], ...]:
-        """For every column the places among the inner leaves that move together."""
+        """For every column, the indices of the inner leaves that vary together."""
 
     @property
     def observed_names(self) -> tuple[str, ...]:
-        """Inner states and outputs that are given as outputs."""
+        """Inner states and outputs that are returned as outputs."""
 
     @property
     def output_names(self) -> tuple[str, ...]:
-        """Values of what is observed, the derivatives of each, their slopes in time."""
+        """Observed values, the derivatives of each, and their time derivatives."""

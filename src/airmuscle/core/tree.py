@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 @dataclasses.dataclass(frozen=True)
 class Leaf:
-    """One number inside a model: its dotted path, its value and what is declared about it."""
+    """One number inside a model: its dotted path, its value and its declaration."""
 
     path: str
     value: Any
@@ -24,7 +24,7 @@ class Leaf:
 
 
 def leaves(thing: Any, path: str = "") -> Iterator[Leaf]:
-    """Every declared number of a model and of the models inside it, in a fixed order."""
+    """Yield every declared number of a model and of the models inside it, in a fixed order."""
     if isinstance(thing, tuple):
         for i, item in enumerate(thing):
             yield from leaves(item, f"{path}[{i}]")
@@ -42,12 +42,12 @@ def leaves(thing: Any, path: str = "") -> Iterator[Leaf]:
 
 
 def flatten(thing: Any) -> npt.NDArray[np.float64]:
-    """The values of all leaves as one vector, in the order of `leaves`."""
+    """Return the values of all leaves as one vector, in the order of `leaves`."""
     return np.array([leaf.value for leaf in leaves(thing)], dtype=np.float64)
 
 
 def structure(thing: Any) -> Any:
-    """A hashable description of everything about a model but the values of its parameters."""
+    """Return a hashable description of a model without the values of its parameters."""
     if isinstance(thing, tuple):
         return tuple(structure(item) for item in thing)
     if not dataclasses.is_dataclass(thing) or isinstance(thing, type):
@@ -62,15 +62,15 @@ def structure(thing: Any) -> Any:
 
 
 def unflatten(thing: T, values: Sequence[Any]) -> T:
-    """The same model with other leaf values, in the order of `leaves`; symbols are put in unchecked."""
-    feed = iter(values)
-    rebuilt: T = _rebuild(thing, feed)
+    """Return the model with other leaf values, in the order of `leaves`; values, such as symbols, are not validated."""
+    rebuilt: T = _rebuild(thing, iter(values))
     return rebuilt
 
 
-def _rebuild(thing: Any, feed: Iterator[Any]) -> Any:
+def _rebuild(thing: Any, values: Iterator[Any]) -> Any:
+    """Return a copy whose leaves are taken from the iterator."""
     if isinstance(thing, tuple):
-        return tuple(_rebuild(item, feed) for item in thing)
+        return tuple(_rebuild(item, values) for item in thing)
     if not dataclasses.is_dataclass(thing) or isinstance(thing, type):
         return thing
     declared = {p.name for p in parameters(thing)}
@@ -78,22 +78,23 @@ def _rebuild(thing: Any, feed: Iterator[Any]) -> Any:
     for field in dataclasses.fields(thing):
         value = getattr(thing, field.name)
         if field.name not in declared:
-            value = _rebuild(value, feed)
+            value = _rebuild(value, values)
         elif isinstance(value, tuple):
-            value = tuple(next(feed) for _ in value)
+            value = tuple(next(values) for _ in value)
         else:
-            value = next(feed)
+            value = next(values)
         object.__setattr__(new, field.name, value)
     return new
 
 
 def with_parameters(thing: T, values: Sequence[float]) -> T:
-    """The same model with other leaf values, checked as if it were newly made."""
-    checked: T = _revalidate(unflatten(thing, [float(v) for v in values]))
-    return checked
+    """Return the model with other leaf values, validated like a new object. Raises ParameterError."""
+    validated: T = _revalidate(unflatten(thing, [float(v) for v in values]))
+    return validated
 
 
 def _revalidate(thing: Any) -> Any:
+    """Return a copy constructed anew at every level, so that every validation runs."""
     if isinstance(thing, tuple):
         return tuple(_revalidate(item) for item in thing)
     if dataclasses.is_dataclass(thing) and not isinstance(thing, type):

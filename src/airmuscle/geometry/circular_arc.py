@@ -69,7 +69,9 @@ class CircularArc(Meridian):
             z = z - 2 * (z * stumpff(3, -z) - contraction) / (stumpff(2, -z) - stumpff(3, -z))
         return z
 
-    def derivatives_times_angle(self, angle_squared: Value, fibre_length: Value, end_radius: Value) -> SegmentDerivatives:
+    def derivatives_times_angle(
+        self, angle_squared: Value, fibre_length: Value, end_radius: Value
+    ) -> SegmentDerivatives:
         """psi times what the integrals grow by: finite down to psi = 0, where the growth itself is infinite.
 
         From d eps/d psi = psi (S_2 - S_3) and the derivatives of the closed forms by psi, w = -psi^2.

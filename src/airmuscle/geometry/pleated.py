@@ -81,7 +81,9 @@ class PleatedTube(FibreTube):
             return _contraction(root * root, self._slenderness) - c
 
         # searched in sqrt(mu), which starts like contraction^(1/4): nothing is lost near zero
-        found = elementwise.find_root(surplus, _ROOT_MU_BRACKET, args=(wanted,), tolerances=_ROOT_TOLERANCES, maxiter=300)
+        found = elementwise.find_root(
+            surplus, _ROOT_MU_BRACKET, args=(wanted,), tolerances=_ROOT_TOLERANCES, maxiter=300
+        )
         mu = np.where(wanted > 0, found.x, np.nan) ** 2
         angle = _angle(mu, self._slenderness)
         return EllipticOutline(mu, angle, *_integrals(mu, angle))
@@ -119,7 +121,9 @@ class PleatedTube(FibreTube):
             squares - 2 * self.end_radius * along + self.end_radius**2 * self.fibre_length,
             np.pi * radius**3 / (3 * mu**1.5) * bracket,
         )
-        return Segment(self.end_radius, *(_unwrap_scalar(self._cylinder_at_zero(v, contraction, i)) for i, v in enumerate(values)))
+        return Segment(
+            self.end_radius, *(_unwrap_scalar(self._cylinder_at_zero(v, contraction, i)) for i, v in enumerate(values))
+        )
 
     def _cylinder_at_zero(self, value: Any, contraction: Value, index: int) -> Any:
         """The value, or at zero contraction that of the cylinder, where mu = 0."""
@@ -158,7 +162,9 @@ def _angle(mu: Any, slenderness: float) -> Any:
     def surplus(angle: Any, mu: Any) -> Any:
         return ellipkinc(angle, mu) - slenderness * np.sqrt(mu) * np.cos(angle)
 
-    return elementwise.find_root(surplus, (0.0, np.pi / 2), args=(np.asarray(mu),), tolerances=_ROOT_TOLERANCES, maxiter=300).x
+    return elementwise.find_root(
+        surplus, (0.0, np.pi / 2), args=(np.asarray(mu),), tolerances=_ROOT_TOLERANCES, maxiter=300
+    ).x
 
 
 def _contraction(mu: Any, slenderness: float) -> Any:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ..core.constants import STANDARD_GRAVITY
 from ..core.declaration import model, parameter
 from ..core.ops import Value
 from .translation import Translation
-
-STANDARD_GRAVITY = 9.80665
-"""Standard acceleration of gravity [m/s2] (ISO 80000-3)."""
 
 
 @model

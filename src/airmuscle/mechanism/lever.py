@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..core import ops
+from ..core.constants import STANDARD_GRAVITY
 from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from .base import Coordinate, Mechanism
-from .hanging_mass import STANDARD_GRAVITY
 
 
 @model

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ..core.constants import STANDARD_GRAVITY
 from ..core.declaration import check_structure, model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from .base import Coordinate, Mechanism
-from .hanging_mass import STANDARD_GRAVITY
 from .wrapper import MechanismWrapper
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ..core.constants import STANDARD_GRAVITY
 from ..core.declaration import model, parameter
 from ..core.ops import Value
-from .hanging_mass import STANDARD_GRAVITY
 from .translation import Translation
 
 

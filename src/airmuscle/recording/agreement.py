@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ..core.constants import STANDARD_GRAVITY
 from ..core.errors import AirmuscleWarning, UnitError
 from ..core.units import conversion
 from .columns import quantity_of
@@ -83,7 +84,7 @@ def _factor(name: str, unit: str) -> float:
     try:
         return conversion(unit, quantity.unit if quantity else "1").factor
     except UnitError:
-        return conversion(unit, "kg").factor * 9.80665  # a load in kg
+        return conversion(unit, "kg").factor * STANDARD_GRAVITY  # a load in kg
 
 
 def _offset(name: str, unit: str) -> float:

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..core.arrays import Array
+from ..core.constants import STANDARD_GRAVITY
 from ..core.errors import ColumnError, UnitError, suggestion
 from ..core.units import AMBIENT_PRESSURE, UnitConversion, conversion
 from .clock import seconds_from_clock
@@ -20,9 +21,6 @@ from .heading import SPELLINGS, Heading, known_name, read_heading
 from .plausible import check_plausible
 from .recording import Recording
 from .table import Cells, RawTable
-
-STANDARD_GRAVITY = 9.80665
-"""What makes a load in kg a force [m/s2] (ISO 80000-3)."""
 
 
 def interpret(

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..characteristic.base import ContractionLaw
 from ..characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
+from ..core.constants import STANDARD_GRAVITY
 from ..identify.surface.basis import Chebyshev, LoadRange, conditioning
 from ..identify.surface.exponential import linearised, nonlinear
 from ..recording import Recording
@@ -29,8 +30,6 @@ from .borzikova_surfaces import (
 from .borzikova_tables import CATALOGUE_TABLE, CATALOGUE_TEXT, tables
 
 PAPER = "borzikova"
-GRAVITY = 9.80665
-"""Standard fall [m/s2], which the paper takes as 10."""
 
 
 def curve_claims(curves: PlaneCurves) -> tuple[Claim, ...]:
@@ -102,7 +101,7 @@ def load_claim() -> Claim:
         PAPER,
         "a load of 26 kg is 260 N",
         Equal(260.0, 0.5),
-        26.0 * GRAVITY,
+        26.0 * STANDARD_GRAVITY,
         "N",
         "The paper takes g as 10 m/s2; true are 44.1, 127.5 and 255.0 N. Its numbers are kept.",
     )

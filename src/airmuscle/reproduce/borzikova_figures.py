@@ -129,7 +129,9 @@ def residuals(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Plot:
     scale = figure.colorbar(filled, ax=right)
     scale.set_label("difference in contraction [%]", fontsize=9)
     scale.ax.tick_params(labelsize=8)
-    worst = np.abs(laws[MISPRINT_MENDED].contraction(pressures, 260.0) - curves.curve_at(260.0).contraction(pressures)).max()
+    worst = np.abs(
+        laws[MISPRINT_MENDED].contraction(pressures, 260.0) - curves.curve_at(260.0).contraction(pressures)
+    ).max()
     caption = (
         "Left: the repaired direct surface against the plane curves (with a_02 mended alone it is off by up to "
         f"{100 * worst:.0f} % under 260 N). Right: the two surfaces against each other; dotted, the loads at which "
