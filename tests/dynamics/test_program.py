@@ -120,7 +120,10 @@ class Forgetful(Silent):
 
 
 def test_a_constant_that_is_not_finite_names_the_law():
-    with pytest.raises(TraceError, match=r"Silent: the traced expression contains a constant that is not finite. Use airmuscle.core.ops"):
+    with pytest.raises(
+        TraceError,
+        match=r"Silent: the traced expression contains a constant that is not finite. Use airmuscle.core.ops",
+    ):
         compile_system(Silent())
     with pytest.raises(TraceError, match=r"states are \['x'\], but rates are given for \[\]"):
         compile_system(Forgetful())

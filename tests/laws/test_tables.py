@@ -78,7 +78,7 @@ def test_a_table_that_is_no_surface_is_refused(rows: tuple[tuple[float, ...], ..
 
 def test_a_volume_beyond_its_table_is_refused():
     table = TabulatedGeometry((0.0, 0.1), (1e-4, 2e-4), 0.3)
-    with pytest.raises(GeometryLimitError, match=r"20.00%; it reaches from 0.00% to 10.00%"):
+    with pytest.raises(GeometryLimitError, match=r"contraction of 20 % is outside its range, 0 to 10 %"):
         table.volume(0.2)
     with pytest.raises(ParameterError, match="2 contractions and 1 volumes"):
         TabulatedGeometry((0.0, 0.1), (1e-4,), 0.3)

@@ -85,7 +85,7 @@ def test_a_tabulated_volume_gives_its_force_but_no_second_derivative():
 
 
 def test_the_polynomial_of_a_geometry_states_errors_that_bound_it():
-    replaced = as_polynomial(BRAID, degree=3, reach=(0.0, 0.35))
+    replaced = as_polynomial(BRAID, degree=3, contraction_range=(0.0, 0.35))
     assert replaced.volume_error < 1e-18  # the volume of a braid is a cubic
     contraction = np.linspace(0.0, 0.35, 201)
     table = TabulatedGeometry(tuple(contraction[::10]), tuple(BRAID.volume(contraction[::10])), 0.3)
@@ -97,6 +97,6 @@ def test_the_polynomial_of_a_geometry_states_errors_that_bound_it():
 
 
 def test_outside_its_box_a_polynomial_geometry_goes_on_by_its_tangent():
-    replaced = as_polynomial(BRAID, degree=5, reach=(0.0, 0.3))
+    replaced = as_polynomial(BRAID, degree=5, contraction_range=(0.0, 0.3))
     beyond = replaced.volume(0.3) + 0.1 * BRAID.volume_derivative(0.3)
     assert replaced.volume(0.4) == pytest.approx(beyond, rel=1e-9)

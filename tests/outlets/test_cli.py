@@ -328,7 +328,11 @@ def test_fit_starts_from_a_library_entry_and_keeps_what_is_fixed(tmp_path: Path)
         (36, ("--characteristic", "Saga2007"), "--characteristic: Saga2007 needs values to start from"),
         (36, ("--characteristic", "ContractileSurfac"), "no library entry 'ContractileSurfac'"),
         (20, ("--characteristic", "ContractileSurface"), ".*has 21 parameters to be found, but only 19 points"),
-        (36, ("--characteristic", "ContractileSurface", "--robust", "5 mm"), "--robust: unit 'mm' cannot be converted to 'N'"),
+        (
+            36,
+            ("--characteristic", "ContractileSurface", "--robust", "5 mm"),
+            "--robust: unit 'mm' cannot be converted to 'N'",
+        ),
         (36, ("--characteristic", "ContractileSurface", "--resting-length", "3 N"), ".*resting_length.*'N'"),
     ],
 )

@@ -85,7 +85,10 @@ def test_the_table_is_printed(tmp_path):
             (MUSCLE, "ContractileSurface", "--min-contraction", "25.9 %", "--max-pressure", "1 bar"),
             "nothing to c",
         ),
-        ((MUSCLE, "ContractileSurface", "--min-pressure", "7 mm"), "--min-pressure: unit 'mm' cannot be converted to 'Pa'"),
+        (
+            (MUSCLE, "ContractileSurface", "--min-pressure", "7 mm"),
+            "--min-pressure: unit 'mm' cannot be converted to 'Pa'",
+        ),
     ],
 )
 def test_what_cannot_be_converted_is_refused(arguments, message, tmp_path):

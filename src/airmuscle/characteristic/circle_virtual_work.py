@@ -10,12 +10,13 @@ from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
+from ..geometry.base import check_contraction_range
 from ..geometry.circular_arc import FERRARESI_2001, CircularArc
 from ..geometry.meridian import SAGA_2007
-from ..geometry.straight_fibre import StraightFibre, check_contraction_range
+from ..geometry.straight_fibre import StraightFibre
 from .base import ForceLaw
 from .rubber import RubberLine
-from .solve import find_first_root, check_solution
+from .solve import check_solution, find_first_root
 
 _MIN_ANGLE = 1e-200
 """Stands for a zero angle in a denominator, so that straight fibres pull without bound but divide by nothing."""

@@ -10,13 +10,13 @@ import numpy as np
 from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
+from ..geometry.base import check_contraction_range
 from ..geometry.circular_arc import CircularArc
 from ..geometry.meridian import SAGA_2007, Profile
 from ..geometry.pleated import DAERDEN_LEFEBER_2001, PleatedTube
-from ..geometry.straight_fibre import check_contraction_range
 from .base import PressureLaw, Slopes
 from .rubber import RubberLine
-from .solve import find_first_root, check_solution
+from .solve import check_solution, find_first_root
 
 NODES = 120  # Gauss points over half the meridian
 

@@ -10,13 +10,14 @@ from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
+from ..geometry.base import check_contraction_range
 from ..geometry.fibre_sum import FibreSum, HalfShellFibreSum
 from ..geometry.meridian import SAGA_2007
 from ..geometry.parabola import Parabola
-from ..geometry.straight_fibre import StraightFibre, check_contraction_range
+from ..geometry.straight_fibre import StraightFibre
 from .base import PressureLaw
 from .rubber import AxialIntegral, RubberIntegral, RubberLine
-from .solve import find_first_root, check_solution
+from .solve import check_solution, find_first_root
 
 LINE_A = RubberLine(slope=0.1263e6, intercept=0.3e6)
 """The rubber as the text prints it; its stress at strain 3 is 0.68 MPa. That it is in MPa is inferred from Fig. 4."""

@@ -11,7 +11,7 @@ from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
 from .base import Friction
-from .path import deflection, compute_speed
+from .path import compute_speed, deflection
 
 CANUDAS_DE_WIT1995 = Reference(
     key="canudas-de-wit-1995",

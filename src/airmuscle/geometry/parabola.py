@@ -1,4 +1,4 @@
-"""Parabolic outlines: Saga's, whose arc is only nearly the fibre's length, and the one whose arc is."""
+"""Parabolic meridians: the approximation of Saga et al. 2007, and the parabola with the exact fibre length."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ _NODES, _WEIGHTS = (
 
 
 def _arc_element(slope_squared: Value, t: float) -> Value:
-    """ds/dx at the fraction t of the half length, where the end slope is u: sqrt(1 + u^2 t^2)."""
+    """ds/dx = sqrt(1 + u^2 t^2) at the fraction t of the half length; u is the end slope."""
     return ops.sqrt(1.0 + slope_squared * t * t)
 
 
 def arc_surplus(slope_squared: Value) -> Value:
-    """arc/chord - 1 = (sqrt(1 + u^2) + asinh(u)/u)/2 - 1 of a parabola with end slope u, exact down to u = 0.
+    """arc/chord - 1 = (sqrt(1 + u^2) + asinh(u)/u)/2 - 1 of a parabola with end slope u, accurate down to u = 0.
 
-    This and its kin are summed at 24 Gauss points, whose error is below rounding for u < 4: all terms are positive,
-    so that nothing cancels where the closed forms do.
+    This and the related integrals use Gauss quadrature with 24 points, whose error is below rounding for u < 4. All
+    terms are positive, so that there is no cancellation, unlike in the closed forms.
     """
     z = slope_squared
     return z * sum(w * t * t / (1.0 + _arc_element(z, t)) for t, w in zip(_NODES, _WEIGHTS, strict=True))
 
 
 def _arc_surplus_derivative(slope_squared: Value) -> Value:
-    """The derivative of `arc_surplus` by u^2."""
+    """Derivative of `arc_surplus` with respect to u^2."""
     return sum(0.5 * w * t * t / _arc_element(slope_squared, t) for t, w in zip(_NODES, _WEIGHTS, strict=True))
 
 
@@ -42,6 +42,7 @@ def _arc_moment(slope_squared: Value, power: int) -> Value:
 
 
 def _parabolic_segment(slope: Value, slope_squared: Value, length: Value, end_radius: Value) -> Segment:
+    """Segment with a parabolic meridian of this end slope, chord length [m] and end radius [m]."""
     rise = length * slope / 4
     excess = 2 * length * rise / 3
     steepness = ops.sqrt(1.0 + slope_squared)
@@ -60,19 +61,21 @@ def _parabolic_segment(slope: Value, slope_squared: Value, length: Value, end_ra
 
 
 class _ParabolicMeridian(Meridian):
-    def profile(self, contraction: float, fibre_length: float, end_radius: float, along: Array) -> Profile:
+    """Common profile of the parabolic meridians."""
+
+    def profile(self, contraction: float, fibre_length: float, end_radius: float, position: Array) -> Profile:
         segment = self.segment(contraction, fibre_length, end_radius)
-        t = along
+        t = position
         rise = segment.max_radius - end_radius
         return segment.length / 2 * t, end_radius + rise * (1.0 - t * t)
 
 
 @model
 class Parabola(_ParabolicMeridian):
-    """f(x) = -x^2/(2 a) + l^2/(8 a) + r_0,   a = sqrt(l^3/(24 (l_0 - l))).
+    """Parabola: f(x) = -x^2/(2 a) + l^2/(8 a) + r_0,   a = sqrt(l^3/(24 (l_0 - l))).
 
-    a [m] makes the arc l_0 to second order in the slope only: it is 0.3 % too short at 10 % contraction and 11 %
-    at 40 %. End slope l/(2 a). Reference: Saga et al. 2007, equations (2), (3).
+    With this a [m] the arc equals l_0 to second order in the slope only: it is 0.3 % too short at 10 % contraction
+    and 11 % at 40 %. The end slope is l/(2 a). Reference: Saga et al. 2007, equations (2), (3).
     """
 
     def segment(self, contraction: Value, fibre_length: Value, end_radius: Value) -> Segment:
@@ -83,9 +86,10 @@ class Parabola(_ParabolicMeridian):
 
 @model
 class TrueArcParabola(_ParabolicMeridian):
-    """The parabola whose arc is the fibre's length: (sqrt(1 + u^2) + asinh(u)/u)/2 = 1/(1 - eps), u the end slope.
+    """Parabola whose arc equals the fibre length: (sqrt(1 + u^2) + asinh(u)/u)/2 = 1/(1 - eps), u: end slope.
 
-    Solved for u^2 by four Newton steps from u = sqrt(6 eps)(1 + 0.95 eps), which reach rounding for eps <= 0.5.
+    u^2 is computed by five Newton steps from u = sqrt(6 eps)(1 + 0.95 eps), which converge to rounding precision for
+    eps <= 0.5.
     """
 
     def segment(self, contraction: Value, fibre_length: Value, end_radius: Value) -> Segment:
@@ -93,9 +97,9 @@ class TrueArcParabola(_ParabolicMeridian):
         return _parabolic_segment(ops.sqrt(z), z, fibre_length * (1.0 - contraction), end_radius)
 
     def slope_squared(self, contraction: Value) -> Value:
-        """The square of the end slope at a contraction [1]."""
-        wanted = contraction / (1.0 - contraction)
+        """Square of the end slope at a contraction [1]."""
+        target = contraction / (1.0 - contraction)
         z = 6.0 * contraction * (1.0 + 0.95 * contraction) ** 2
         for _ in range(5):
-            z = z - (arc_surplus(z) - wanted) / _arc_surplus_derivative(z)
+            z = z - (arc_surplus(z) - target) / _arc_surplus_derivative(z)
         return z
