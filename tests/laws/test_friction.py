@@ -272,10 +272,10 @@ def test_no_friction_is_no_force_and_no_state():
 
 
 def test_elements_that_do_not_pair_and_dead_zones_that_would_drive_are_refused():
-    with pytest.raises(ParameterError, match="MaxwellSlip: 2 stiffnesses and 1 limits; give one of each"):
+    with pytest.raises(ParameterError, match="MaxwellSlip: 2 stiffnesses and 1 limits; give one stiffness and one limit per element"):
         MaxwellSlip((1.0, 2.0), (1e-3,))
     with pytest.raises(ParameterError, match="PrandtlIshlinskii: 1 thresholds and 0 weights"):
         PrandtlIshlinskii((1.0,), (1e-3,), (5.0,))
-    with pytest.raises(ParameterError, match=r"weight -0.9 at 12 N the force would fall.*must exceed -1"):
+    with pytest.raises(ParameterError, match=r"weight -0.9 at 12 N the force would decrease.*must not be less than -1"):
         PrandtlIshlinskii((1.0,), (1e-3,), (5.0, 12.0), (-0.2, -0.9))
     PrandtlIshlinskii((1.0,), (1e-3,), (5.0, -12.0), (-0.2, -0.9))
