@@ -1,4 +1,4 @@
-"""Static laws: what binds gauge pressure, contraction and tension. One paper, one file, one class."""
+"""Static characteristics: relations between gauge pressure, contraction and tension; one class per paper."""
 
 from .base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from .borzikova import BorzikovaDirect, BorzikovaExponential

@@ -6,7 +6,6 @@ import functools
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from ..core.arrays import Array
 from ..core.declaration import model
@@ -93,7 +92,7 @@ class PleatedTube(FibreTube):
         """Effective area F/p [m2] of the ideal muscle; infinite at zero contraction."""
         shape = self.elliptic_outline(contraction)
         radius = self.end_radius / np.cos(shape.angle)
-        return _unwrap_scalar(np.pi * radius**2 * (1 - 2 * shape.parameter) / (2 * shape.parameter))
+        return unwrap_scalar(np.pi * radius**2 * (1 - 2 * shape.parameter) / (2 * shape.parameter))
 
     def volume_derivative(self, contraction: Value) -> Value:
         """dV/deps = L_0 F/p [m3] by virtual work; the tests compare it with the derivative of the volume."""
@@ -123,7 +122,7 @@ class PleatedTube(FibreTube):
             np.pi * radius**3 / (3 * mu**1.5) * bracket,
         )
         return Segment(
-            self.end_radius, *(_unwrap_scalar(self._cylinder_at_zero(v, contraction, i)) for i, v in enumerate(values))
+            self.end_radius, *(unwrap_scalar(self._cylinder_at_zero(v, contraction, i)) for i, v in enumerate(values))
         )
 
     def _cylinder_at_zero(self, value: Any, contraction: Value, index: int) -> Any:
@@ -180,6 +179,6 @@ def _max_contraction(slenderness: float) -> float:
     return min(0.5, float(_contraction(np.asarray(_ROOT_MU_BRACKET[1] ** 2), slenderness)))
 
 
-def _unwrap_scalar(value: Any) -> npt.NDArray[np.float64] | float:
+def unwrap_scalar(value: Any) -> Any:
     """Return a float for a zero-dimensional array, else the array."""
     return float(value) if np.ndim(value) == 0 else value
