@@ -212,7 +212,7 @@ def test_a_regulator_with_a_leak_stays_below_its_set_point_within_its_band():
 
 def test_a_set_point_beyond_the_range_is_refused():
     system = plant(ProportionalRegulator(Supply(7e5), VALVE, VALVE, SecondOrderLag(50.0)))
-    with pytest.raises(ParameterError, match=r"setpoint.*allowed range: 0 to 1e\+06 Pa"):
+    with pytest.raises(ParameterError, match=r"setpoint.*allowed are 0 to 1e\+06 Pa"):
         simulate(system, Schedule({"setpoint": ((0.0, 2e6),)}), duration=1.0)
 
 

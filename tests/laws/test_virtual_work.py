@@ -80,7 +80,7 @@ def test_a_tabulated_volume_gives_its_force_but_no_second_derivative():
     inside = np.linspace(0.0125, 0.3375, 9)
     ideal = VirtualWork(BRAID).force(4e5, inside)
     np.testing.assert_allclose(VirtualWork(table).force(4e5, inside), ideal, atol=0.01 * ideal.max())
-    with pytest.raises(TraceError, match=r"TabulatedGeometry is not closed-form.*as_polynomial"):
+    with pytest.raises(TraceError, match=r"TabulatedGeometry is not in closed form.*as_polynomial"):
         VirtualWork(table).slopes(4e5, 0.1)
 
 
@@ -96,7 +96,7 @@ def test_the_polynomial_of_a_geometry_states_errors_that_bound_it():
     assert coarse.derivative_error == pytest.approx(slope_error, rel=0.1)
 
 
-def test_outside_its_box_a_polynomial_geometry_goes_on_by_its_tangent():
+def test_outside_its_range_a_polynomial_geometry_is_extrapolated_linearly():
     replaced = as_polynomial(BRAID, degree=5, contraction_range=(0.0, 0.3))
     beyond = replaced.volume(0.3) + 0.1 * BRAID.volume_derivative(0.3)
     assert replaced.volume(0.4) == pytest.approx(beyond, rel=1e-9)

@@ -74,7 +74,7 @@ class Characteristic(abc.ABC):
         low, high = self.contraction_range
         limits = describe_range(100 * low, 100 * high, "%")
         return (
-            f"{type(self).__name__}: no contraction from {limits} is in equilibrium with {force:.4g} N at "
+            f"{type(self).__name__}: no contraction in the range {limits} is in equilibrium with {force:.4g} N at "
             f"{pressure / 1e3:.4g} kPa. "
         )
 
@@ -82,14 +82,14 @@ class Characteristic(abc.ABC):
         low, high = self.pressure_range
         limits = describe_range(low / 1e3, high / 1e3, "kPa")
         return (
-            f"{type(self).__name__}: no gauge pressure from {limits} gives {force:.4g} N at a contraction of "
+            f"{type(self).__name__}: no gauge pressure in the range {limits} gives {force:.4g} N at a contraction of "
             f"{100 * contraction:.4g} %. "
         )
 
     def _no_force_message(self, pressure: float, contraction: float) -> str:
         limits = describe_range(*self.force_range, "N")
         return (
-            f"{type(self).__name__}: no force from {limits} gives a contraction of {100 * contraction:.4g} % at "
+            f"{type(self).__name__}: no force in the range {limits} gives a contraction of {100 * contraction:.4g} % at "
             f"{pressure / 1e3:.4g} kPa. "
         )
 
