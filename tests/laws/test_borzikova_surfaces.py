@@ -125,7 +125,7 @@ def test_the_law_traces_to_what_it_computes():
 
 
 def test_the_misprinted_surface_loads_with_a_warning():
-    with pytest.warns(UserWarning, match="carries misprints"):
+    with pytest.warns(UserWarning, match="contains misprints"):
         printed = load("borzikova-direct-printed").characteristic
     assert printed.contraction(1e5, 260.0) < -5.0
 

@@ -53,5 +53,5 @@ def test_hunt_turns_back_nowhere_up_to_its_pole_and_beyond():
 def test_the_library_says_what_is_second_hand_or_chosen():
     for name in ("hunt2017-festo-10", "reynolds2003", "serres2009"):
         entry = catalogue.load(name)
-        assert entry.provenance == "second hand"
+        assert entry.provenance == "secondary source"
         assert "chosen" in entry.note

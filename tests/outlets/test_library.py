@@ -272,13 +272,13 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path):
             '"1.2 kN"',
             '"-1 N"',
             ParameterError,
-            r"\[characteristic\]: Clamped: min_force 0 N must lie below max_force",
+            r"\[characteristic\]: Clamped: min_force 0 N must be less than max_force",
         ),
         (
             '"6 bar"',
             '"-1 bar"',
             ParameterError,
-            r"\[validity_range\]: ValidityRange: min_pressure 0 must lie below max_pressure",
+            r"\[validity_range\]: ValidityRange: min_pressure 0 must be less than max_pressure",
         ),
     ],
 )

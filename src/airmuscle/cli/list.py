@@ -25,7 +25,7 @@ def list_entries(json: Json = False) -> None:
 
     A muscle can be simulated; a characteristic lacks a geometry for that, or is not solved for the force.
     A valve stands in a scenario as { library = NAME }. A data set is a FILE that `airmuscle fit` knows by its
-    name. Trust says how the numbers came here: printed, measured, data sheet, second hand, fitted or chosen.
+    name. Trust says how the numbers came here: printed, measured, data sheet, secondary source, fitted or chosen.
 
     \b
     Examples:
@@ -78,5 +78,5 @@ def _data_head(path: Path) -> ListRow:
         comments = list(itertools.takewhile(lambda line: line.startswith("#"), file))
     text = " ".join(line.lstrip("# ").strip() for line in comments)
     title = comments[0].lstrip("# ").strip() if comments else ""
-    provenance = "second hand" if "second hand" in text else "measured" if "measured" in text else ""
+    provenance = "secondary source" if "secondary source" in text else "measured" if "measured" in text else ""
     return ListRow(path.stem, title, "data set", provenance)
