@@ -80,7 +80,7 @@ def test_the_table_is_printed(tmp_path):
         ((MUSCLE, "ContractileSurfac"), "no library entry 'ContractileSurfac'"),
         ((MUSCLE, "Saga2007"), "MODEL: Saga2007 needs values to start from"),
         ((MUSCLE, "hunt"), "has no force at"),
-        ((MUSCLE, "ContractileSurface", "--min-pressure", "7 bar"), "must lie below max_pressure"),
+        ((MUSCLE, "ContractileSurface", "--min-pressure", "7 bar"), "must be less than max_pressure"),
         (
             (MUSCLE, "ContractileSurface", "--min-contraction", "25.9 %", "--max-pressure", "1 bar"),
             "nothing to c",

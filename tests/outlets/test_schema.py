@@ -193,7 +193,7 @@ def test_a_broken_scenario_is_found_by_the_schema_and_refused_by_the_program(
         ('wall_thickness = "1.8 mm"\n', "", ".characteristic: none of"),
         ('quantity = "force"', 'quantity = "stiffness"', ".check[0].quantity: none of"),
         ('equals = "328.0 N"', "", ".check[0]: lacks equals"),
-        ("max_contraction", "max_contractoin", ".validity_range: greatest_contractoin is not known"),
+        ("max_contraction", "max_contractoin", ".validity_range: max_contractoin is not known"),
     ],
 )
 def test_a_broken_muscle_is_found_by_the_schema_and_refused_by_the_program(was: str, becomes: str, fault: str):
