@@ -72,7 +72,7 @@ ARGUMENTS = {
     "method": "numerical integrator",
     "output": "sample time [s] or times [s] of the recorded rows",
     "complete": "whether a run that ends early raises an error",
-    "thing": "any object of airmuscle",
+    "obj": "any object of airmuscle",
     "muscle": "one muscle, or a tuple of muscles",
     "orifice": "flow restriction",
     "valves": "valves to be combined into one",

@@ -397,7 +397,10 @@ def test_everything_else_that_cannot_be_is_refused(tmp_path):
     )
     lengths = {"mechanism.mass": [9.0, 10.0], "muscle.geometry.resting_length": [0.3, 0.02]}
     refused(
-        "start, row 1: Braid: a contraction of", GeometryLimitError, variations=lengths, start={**start, "position": -0.02}
+        "start, row 1: Braid: a contraction of",
+        GeometryLimitError,
+        variations=lengths,
+        start={**start, "position": -0.02},
     )
     refused("start: it is 'rest'; give for each state a number", start="rest")
     refused("keep: it is 3; name columns", keep=3)

@@ -1,7 +1,7 @@
-"""Plane curves k(p) under 45, 130 and 260 N, and the surfaces over them, as Borzikova et al. define them:
+"""Plane curves k(p) under 45, 130 and 260 N, and the surfaces over them, as defined by Borzíková et al.:
 
 k = k_max (1 - exp v) with v = Sum a_ij p^i F^j, or directly k[%] = Sum a_ij p^i F^j; p in bar, F in N.
-A surface answers searches in its validity range alone, says what lies outside, and goes on there by its tangent.
+Solutions are searched within the validity range; outside it a surface is flagged and extrapolated linearly.
 """
 
 import dataclasses
@@ -45,7 +45,7 @@ def test_a_plane_curve_is_the_printed_formula(force, bar, contraction):
 
 
 @pytest.mark.parametrize(("force", "turns"), [(45.0, [4.950]), (130.0, [0.119, 3.283]), (260.0, [0.276, 3.600])])
-def test_plane_curves_turn_where_they_do(force, turns):
+def test_extrema_of_the_plane_curves(force, turns):
     found = SAM_30X290.curve_at(force).turning_pressures()
     assert [p / 1e5 for p in found] == pytest.approx(turns, abs=6e-4)
 
@@ -69,7 +69,7 @@ def test_a_sample_of_the_curves_lies_on_the_surface_through_them():
     assert np.abs(found - data["contraction"]).max() < 2e-15
 
 
-def test_direct_contraction_is_per_cent_over_bar_and_newton():
+def test_direct_contraction_is_in_per_cent_of_bar_and_newton():
     law = BorzikovaDirect((1.0, 0.0, 0.0, 0.0, 2.0, 0.5), 0.0, 3e5, 10.0, 100.0, 1, 2)
     # 1 + 2 p F + 0.5 p F^2 at 3 bar and 10 N is 1 + 60 + 150 per cent
     assert law.contraction(3e5, 10.0) == pytest.approx(2.11, abs=1e-14)
@@ -117,7 +117,7 @@ def test_outside_the_validity_range_the_exponent_is_extrapolated_linearly():
     assert EXPONENTIAL.polynomial(2e5, 500.0) == pytest.approx(at_edge + 240.0 * slope, rel=1e-9)
 
 
-def test_the_law_traces_to_what_it_computes():
+def test_the_traced_model_gives_the_numeric_values():
     pressure, force = np.linspace(-1e5, 5e5, 30), np.linspace(0.0, 400.0, 30)
     values, by_parameters = autodiff.jacobian(EXPONENTIAL, "contraction", pressure, force)
     assert values == pytest.approx(EXPONENTIAL.contraction(pressure, force), abs=1e-14)
@@ -130,11 +130,11 @@ def test_the_misprinted_surface_loads_with_a_warning():
     assert printed.contraction(1e5, 260.0) < -5.0
 
 
-def test_a_wrong_number_of_coefficients_is_refused():
+def test_a_wrong_number_of_coefficients_is_an_error():
     with pytest.raises(ParameterError, match=r"degree 4 in pressure and 2 in force needs 15 coefficients, not 14"):
         dataclasses.replace(EXPONENTIAL, coefficients=EXPONENTIAL.coefficients[:14])
 
 
-def test_an_empty_validity_range_is_refused():
+def test_an_empty_validity_range_is_an_error():
     with pytest.raises(ParameterError, match="min_force 260 must be less than max_force 260"):
         dataclasses.replace(EXPONENTIAL, min_force=260.0)

@@ -1,7 +1,7 @@
-"""The exact meridian with rubber: fibres in balance everywhere, virtual work to 1e-9, and 3a where there is no rubber.
+"""Exact meridian with rubber: local equilibrium of the fibres, virtual work to 1e-9, and the limit without rubber.
 
 N cos(phi) = F + pi p r^2 and dN/dr = 2 pi t sigma along the whole fibre. Reference values are of the muscle of Table 1
-of Saga et al. 2007, computed by quadrature apart from this code. The circle closed by virtual work stands beside it.
+of Saga et al. 2007, computed by quadrature independently of this code. The circular meridian with virtual work is tested as well.
 """
 
 from dataclasses import replace
@@ -130,7 +130,7 @@ def integrated(law, contraction, force):
 @pytest.mark.parametrize(
     ("name", "force", "contraction"), [("A", 0, 0.05), ("A", 100, 0.2), ("B", 0, 0.4), ("B", 200, 0.01)]
 )
-def test_an_independent_integration_meets_the_end_ring(name, force, contraction):
+def test_an_independent_integration_reaches_the_end_ring(name, force, contraction):
     law = exact(LINES[name])
     radius, _, chord, volume, _ = integrated(law, contraction, float(force))
     assert radius == pytest.approx(D0 / 2, rel=1e-8)
@@ -165,7 +165,7 @@ def test_virtual_work_gives_the_tension(contraction, force, name, rings):
 @settings(deadline=None, max_examples=30)
 @given(contraction=st.floats(0.02, 0.36), force=st.floats(20.0, 300.0), name=st.sampled_from("AB"))
 def test_the_half_shell_balances(contraction, force, name):
-    """2 N0 sin(phi0)/pi + 2 t Int sigma ds = 2 p Int r dx, all from the drawn outline."""
+    """2 N0 sin(phi0)/pi + 2 t Int sigma ds = 2 p Int r dx, all from the profile."""
     law = exact(LINES[name])
     found = law.shape_at_force(contraction, force)
     x, r = law.profile(contraction, force, 8001)
@@ -226,7 +226,7 @@ def _stored(law, contraction):
     return law.geometry.segments * WALL * per_wall
 
 
-def test_the_circle_is_as_near_the_exact_meridian_as_it_says():
+def test_the_error_of_the_circle_is_as_documented():
     contraction = np.linspace(0.01, 0.30, 30)
     for name, line in LINES.items():
         for force in (100.0, 150.0, 200.0):
@@ -250,18 +250,21 @@ def test_the_end_slope_reaches_zero_where_the_equations_say():
     """Line A, 1 %: from a horizontal end (phi0 = 0) the equations reach the middle at 15.681 N and 0.0840629 MPa."""
     law = exact(LINE_A)
     assert law.pressure(0.01, 15.69) == pytest.approx(84062.9, abs=5.0)
-    with pytest.raises(SolveError, match=r"no equilibrium with 15\.67 N at a contraction of 1 %.*contract the tube below"):
+    with pytest.raises(
+        SolveError, match=r"no equilibrium with 15\.67 N at a contraction of 1 %.*contract the tube below"
+    ):
         law.pressure(0.01, 15.67)
 
 
-def test_what_has_no_answer_says_why():
+def test_errors_state_why_there_is_no_solution():
     law = exact(LINE_A)
     with pytest.raises(
         SolveError, match=r"no equilibrium with 0 N at a contraction of 1 %.*increase the contraction or the force"
     ):
         law.pressure(0.01, 0.0)
     with pytest.raises(
-        SolveError, match=r"ExactMeridian: 20 kPa is below the threshold pressure of 100 kPa, at which contraction starts"
+        SolveError,
+        match=r"ExactMeridian: 20 kPa is below the threshold pressure of 100 kPa, at which contraction starts",
     ):
         law.contraction(2e4, 0.0)
     with pytest.raises(SolveError, match=r"no meridian with a contraction of 30 % exists at 10 kPa"):

@@ -1,7 +1,7 @@
-"""Straight fibres: every outline has the integrals that its own curve has, and the arc that the fibre has.
+"""Straight fibres: the integrals of every meridian are those of its curve, and its arc is the fibre length.
 
 Reference values are of the muscle of Table 1 of Saga et al. 2007 (l0 = 72 mm, r0 = 6 mm), computed from the closed
-forms apart from this code. A volume's slope by contraction is exact, and the ideal muscle's tension is p dV/deps / L0.
+forms independently of this code. dV/deps is exact, and the tension of the ideal muscle is (p dV/deps)/L0.
 """
 
 import numpy as np
@@ -84,7 +84,7 @@ RINGS = {
 
 
 def printed(text, value):
-    """Agreement to the last digit that a table gives."""
+    """Agreement to the last printed digit of a table."""
     digits = text.partition(".")[2]
     return abs(float(text) - value) <= 0.51 * 10.0 ** -len(digits)
 
@@ -114,7 +114,7 @@ def test_outlines_agree_with_the_reference_table(row):
 
 @pytest.mark.parametrize("meridian", MERIDIANS, ids=lambda m: type(m).__name__)
 @pytest.mark.parametrize("contraction", [1e-6, 0.1, 0.35, 0.45])
-def test_integrals_are_those_of_the_drawn_curve(meridian, contraction):
+def test_integrals_are_those_of_the_profile(meridian, contraction):
     segment = tube(meridian).segment(contraction)
     points = 20001
     x, r = meridian.profile(contraction, L0, D0 / 2, np.linspace(-1, 1, points))
@@ -132,7 +132,7 @@ def test_integrals_are_those_of_the_drawn_curve(meridian, contraction):
 
 
 @pytest.mark.parametrize("meridian", KEEP_THEIR_ARC, ids=lambda m: type(m).__name__)
-def test_newton_solves_the_shape_equation_to_rounding_over_all_its_reach(meridian):
+def test_newton_solves_the_shape_equation_to_rounding_over_its_whole_range(meridian):
     contraction = np.concatenate([np.geomspace(1e-12, 0.01, 40), np.linspace(0.011, 0.5, 200)])
     if meridian is CIRCLE:
         z = meridian.angle_squared(contraction)
@@ -159,7 +159,7 @@ def _true_arc(u, contraction):
 @pytest.mark.parametrize("meridian", MERIDIANS, ids=lambda m: type(m).__name__)
 @UNHURRIED
 @given(contraction=st.floats(1e-4, 0.44))
-def test_volume_growth_is_exact_though_newton_is_unrolled(meridian, contraction):
+def test_the_volume_derivative_is_exact_with_unrolled_newton_steps(meridian, contraction):
     shape = tube(meridian)
     step = 2e-3 * contraction
     ends = [shape.volume(contraction + n * step) for n in (-2, -1, 1, 2)]
@@ -167,7 +167,7 @@ def test_volume_growth_is_exact_though_newton_is_unrolled(meridian, contraction)
     assert shape.volume_derivative(contraction) == pytest.approx(by_difference, rel=2e-8, abs=1e-12)
 
 
-def test_the_circles_growth_in_closed_form_is_the_derivative_of_its_integrals():
+def test_the_closed_form_derivatives_of_the_circle_are_those_of_its_integrals():
     contraction = np.array([1e-9, 1e-4, 0.03, 0.2, 0.4, 0.49])
     shape = tube(CIRCLE)
     z = CIRCLE.angle_squared(contraction)
@@ -181,7 +181,7 @@ def test_the_circles_growth_in_closed_form_is_the_derivative_of_its_integrals():
 
 
 @pytest.mark.parametrize("meridian", MERIDIANS, ids=lambda m: type(m).__name__)
-def test_small_contractions_lose_no_digits(meridian):
+def test_small_contractions_are_accurate(meridian):
     """To first order in sqrt(eps): tan(phi0) = sqrt(6 eps), G = l0^2 sqrt(6 eps)/6, Q = l0^3 6 eps/30."""
     for contraction in (1e-14, 1e-10, 1e-8):
         u = np.sqrt(6 * contraction)
@@ -214,7 +214,7 @@ def test_the_parabola_3_is_too_short_by_what_the_reference_says():
         (tube(PARABOLA), 29.47),
     ],
 )
-def test_largest_volumes_lie_where_the_reference_says(shape, percent):
+def test_contractions_of_maximum_volume_agree_with_the_reference(shape, percent):
     found = 100 * brentq(lambda c: float(shape.volume_derivative(c)), 0.2, 0.49, xtol=1e-9)
     assert round(found, 2) == percent
 
@@ -272,7 +272,7 @@ def test_virtual_work_gives_the_tension_of_the_exact_outline(contraction, rings)
 @UNHURRIED
 @given(contraction=st.floats(1e-6, 0.49))
 def test_the_exact_half_shell_balances(contraction):
-    """N sin(phi0) = pi p Int r dx with N/(pi p) = R^2/(2 mu): the pressure on a half shell pulls at its ends."""
+    """N sin(phi0) = pi p Int r dx with N/(pi p) = R^2/(2 mu): the pressure on a half shell is balanced at its ends."""
     shape = PleatedTube(L0, D0)
     segment, mu = shape.segment(contraction), shape.elliptic_outline(contraction).parameter
     fibre = segment.max_radius**2 / (2 * mu)
@@ -334,7 +334,7 @@ def test_fibre_sums():
     assert HalfShellFibreSum().sum_of_sines(4000) == pytest.approx(UniformFibreSum().sum_of_sines(4000), rel=1e-6)
 
 
-def test_what_cannot_be_is_refused():
+def test_impossible_values_are_errors():
     with pytest.raises(
         GeometryLimitError, match=r"StraightFibre: a contraction of 60 % is outside its range, 0 to 50 %"
     ):

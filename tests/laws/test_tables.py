@@ -30,7 +30,7 @@ def test_the_rows_of_a_table_lie_on_its_surface(name: str):
 
 
 @pytest.mark.parametrize("name", TOOL)
-def test_a_table_rises_with_pressure_and_falls_with_contraction(name: str):
+def test_a_table_increases_with_pressure_and_decreases_with_contraction(name: str):
     entry = catalogue.load(name)
     p, c = np.meshgrid(
         np.linspace(*entry.validity_range.pressure, 101), np.linspace(*entry.validity_range.contraction, 101)
@@ -71,12 +71,12 @@ def test_a_point_without_a_solution_states_the_tabulated_range():
         (((1e5, 1e5), (0.0, 0.1), (1.0,)), "2 pressures, 2 contractions and 1 forces"),
     ],
 )
-def test_a_table_that_is_no_surface_is_refused(rows: tuple[tuple[float, ...], ...], message: str):
+def test_an_invalid_table_is_an_error(rows: tuple[tuple[float, ...], ...], message: str):
     with pytest.raises(ParameterError, match=message):
         Tabulated(*rows)
 
 
-def test_a_volume_beyond_its_table_is_refused():
+def test_a_volume_outside_its_table_is_an_error():
     table = TabulatedGeometry((0.0, 0.1), (1e-4, 2e-4), 0.3)
     with pytest.raises(GeometryLimitError, match=r"contraction of 20 % is outside its range, 0 to 10 %"):
         table.volume(0.2)

@@ -270,7 +270,10 @@ def test_a_point_outside_the_data_is_a_warning():
         (("--pressure=3 kg", "--force=1 N"), "--pressure: unit 'kg' cannot be converted to 'Pa'"),
         (("--pressure=3", "--force=1 N"), "--pressure: '3' has no unit; write it like '3 Pa'"),
         (("--pressure=-2 bar", "--contraction=0.1"), "a gauge pressure of -200 kPa lies below absolute zero"),
-        (("--pressure=3 bar", "--force=9 kN"), "no contraction in the range .* is in equilibrium with 9000 N at 300 kPa"),
+        (
+            ("--pressure=3 bar", "--force=9 kN"),
+            "no contraction in the range .* is in equilibrium with 9000 N at 300 kPa",
+        ),
     ],
 )
 def test_a_request_without_an_answer_says_why_and_writes_nothing(tmp_path: Path, given: tuple[str, ...], message: str):

@@ -1,4 +1,4 @@
-"""Every number that a library file carries as a check comes out of its model, within the tolerance it states."""
+"""Every check of a library file is reproduced by its model within the stated tolerance."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ def quietly_loaded(name: str) -> catalogue.Entry:
 
 
 @pytest.mark.parametrize("name", catalogue.list_library())
-def test_the_checks_of_an_entry_hold(name: str):
+def test_the_checks_of_an_entry_pass(name: str):
     verdicts = verify(quietly_loaded(name))
     assert verdicts, "the file has no [[check]]"
     assert [str(verdict) for verdict in verdicts if not verdict.holds] == []
 
 
 @pytest.mark.parametrize("name", catalogue.list_library())
-def test_an_entry_says_where_it_is_from(name: str):
+def test_an_entry_states_its_sources(name: str):
     entry = quietly_loaded(name)
     assert entry.references or entry.characteristic.references or getattr(entry.characteristic, "inner", None)
     assert all(check.source for check in entry.checks)

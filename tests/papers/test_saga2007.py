@@ -1,7 +1,7 @@
-"""Saga, Nakamura and Yaegashi 2007: equation (19) in every reading, its branches and limits, and what the paper claims.
+"""Saga, Nakamura and Yaegashi 2007: equation (19) in every interpretation, its branches and limits, and the claims.
 
 P = [2 m t (alpha l^2 + 6 a beta d0) + 12 d0 M F/q]/(d0 [w m (l^2 + 6 a d0) - 3 pi M d0^2/q]), a^2 = l^3/(24 (l0 - l)).
-Pressures were computed from the printed equations apart from this code; M = 5.12583 unless said.
+Pressures were computed from the printed equations independently of this code; M = 5.12583 by default.
 """
 
 import math
@@ -232,7 +232,9 @@ def test_the_quintic_holds_every_root_that_a_search_finds(law, pressure, force):
 
 def test_the_branch_from_rest_is_not_the_one_beyond_the_snap():
     law = reading(LINE_A, 2.0, 1.0)
-    with pytest.raises(SolveError, match=r"36 kPa is below the threshold pressure of 50 kPa, at which contraction starts"):
+    with pytest.raises(
+        SolveError, match=r"36 kPa is below the threshold pressure of 50 kPa, at which contraction starts"
+    ):
         law.contraction(0.036e6, 0.0)
     with pytest.raises(SolveError, match=r"with 0 N at 60 kPa\. Required pressure at this load: 31\.86 to 50 kPa"):
         law.contraction(0.06e6, 0.0)

@@ -20,13 +20,13 @@ from .errors import TraceError
 _traced_functions: dict[Any, Any] = {}
 
 
-def symbolic(thing: Any) -> tuple[Any, Any]:
+def symbolic(obj: Any) -> tuple[Any, Any]:
     """Return the model with a CasADi symbol in place of every leaf, and the vector of these symbols."""
     import casadi
 
-    count = sum(1 for _ in tree.leaves(thing))
+    count = sum(1 for _ in tree.leaves(obj))
     vector = casadi.SX.sym("p", count)
-    return tree.unflatten(thing, [vector[i] for i in range(count)]), vector
+    return tree.unflatten(obj, [vector[i] for i in range(count)]), vector
 
 
 def check_finite(expression: Any, owner: str) -> None:
@@ -45,25 +45,25 @@ def check_finite(expression: Any, owner: str) -> None:
             )
 
 
-def _trace_with_derivatives(thing: Any, method: str, count: int) -> Any:
+def _trace_with_derivatives(obj: Any, method: str, count: int) -> Any:
     """Return the cached CasADi function (arguments, parameters) -> (value, d/d argument i, d/d parameters)."""
     import casadi
 
-    key = (tree.structure(thing), method, count)
+    key = (tree.structure(obj), method, count)
     if key not in _traced_functions:
-        model, parameters = symbolic(thing)
+        model, parameters = symbolic(obj)
         arguments = [casadi.SX.sym(f"x{i}") for i in range(count)]
         value = casadi.SX(getattr(model, method)(*arguments))
-        check_finite(value, f"{type(thing).__name__}.{method}")
+        check_finite(value, f"{type(obj).__name__}.{method}")
         outputs = [value, *(casadi.jacobian(value, x) for x in arguments), casadi.jacobian(value, parameters)]
         _traced_functions[key] = casadi.Function("law", [*arguments, parameters], casadi.cse(outputs))
     return _traced_functions[key]
 
 
-def _evaluate_traced(thing: Any, method: str, arguments: tuple[Any, ...]) -> tuple[list[Any], tuple[int, ...], int]:
+def _evaluate_traced(obj: Any, method: str, arguments: tuple[Any, ...]) -> tuple[list[Any], tuple[int, ...], int]:
     """Return the outputs of the traced function at the arguments, their shape and the number of points."""
-    function = _trace_with_derivatives(thing, method, len(arguments))
-    results, shape = _call_traced(function, [leaf.value for leaf in tree.leaves(thing)], arguments)
+    function = _trace_with_derivatives(obj, method, len(arguments))
+    results, shape = _call_traced(function, [leaf.value for leaf in tree.leaves(obj)], arguments)
     return results, shape, math.prod(shape)
 
 
@@ -83,34 +83,34 @@ def _call_traced(
     return [r.full() for r in function(*rows[:count], vector)], broadcast[0].shape
 
 
-def derivative(thing: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
-    """Exact derivative of `thing.method(*arguments)` with respect to argument number `wrt`, shaped like the arguments.
+def derivative(obj: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
+    """Exact derivative of `obj.method(*arguments)` with respect to argument number `wrt`, shaped like the arguments.
 
     Raises TraceError if the method cannot be traced.
     """
     if ops.is_symbol(*arguments):
-        return _symbolic_derivative(thing, method, arguments, wrt)
+        return _symbolic_derivative(obj, method, arguments, wrt)
     if _is_jax(*arguments):
-        return _jax_derivative(thing, method, arguments, wrt)
-    results, shape, _ = _evaluate_traced(thing, method, arguments)
+        return _jax_derivative(obj, method, arguments, wrt)
+    results, shape, _ = _evaluate_traced(obj, method, arguments)
     value = results[1 + wrt].reshape(shape)
     return float(value) if value.ndim == 0 else value
 
 
-def _symbolic_derivative(thing: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
+def _symbolic_derivative(obj: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
     import casadi
 
     symbol = casadi.SX.sym("x")
     inner = [symbol if i == wrt else x for i, x in enumerate(arguments)]
-    derivative = casadi.jacobian(casadi.SX(getattr(thing, method)(*inner)), symbol)
+    derivative = casadi.jacobian(casadi.SX(getattr(obj, method)(*inner)), symbol)
     return casadi.substitute(derivative, symbol, arguments[wrt])
 
 
-def _jax_derivative(thing: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
+def _jax_derivative(obj: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
     import jax  # type: ignore[import-not-found, unused-ignore]
 
     def partial(x: Any) -> Any:
-        return getattr(thing, method)(*(x if i == wrt else a for i, a in enumerate(arguments)))
+        return getattr(obj, method)(*(x if i == wrt else a for i, a in enumerate(arguments)))
 
     point = jax.numpy.asarray(arguments[wrt], dtype=float)
     return jax.jvp(partial, (point,), (jax.numpy.ones_like(point),))[1]
@@ -148,25 +148,25 @@ def vjp(function: Callable[[Any], Sequence[Any]], point: Sequence[Any], weights:
     return _substitute(product, x, point, ops.is_symbol(*point, *weights))
 
 
-def value_and_derivative(thing: Any, method: str, count: int, wrt: int = 0) -> Callable[..., tuple[Any, Any]]:
-    """Return a function that evaluates `thing.method` and its exact derivative with respect to argument `wrt`.
+def value_and_derivative(obj: Any, method: str, count: int, wrt: int = 0) -> Callable[..., tuple[Any, Any]]:
+    """Return a function that evaluates `obj.method` and its exact derivative with respect to argument `wrt`.
 
     `count` is the number of arguments of the method. The returned function takes numbers or arrays that broadcast and
-    returns (value, derivative) of their shape. The parameters of `thing` may be arrays as well.
+    returns (value, derivative) of their shape. The parameters of `obj` may be arrays as well.
     Raises TraceError if the method cannot be traced.
     """
     import casadi
 
-    key = (tree.structure(thing), method, count, wrt)
+    key = (tree.structure(obj), method, count, wrt)
     if key not in _traced_functions:
-        model, symbols = symbolic(thing)
+        model, symbols = symbolic(obj)
         x = [casadi.SX.sym(f"x{i}") for i in range(count)]
         value = casadi.SX(getattr(model, method)(*x))
-        check_finite(value, f"{type(thing).__name__}.{method}")
+        check_finite(value, f"{type(obj).__name__}.{method}")
         _traced_functions[key] = casadi.Function(
             "law", [*x, symbols], casadi.cse([value, casadi.jacobian(value, x[wrt])])
         )
-    function, parameters = _traced_functions[key], [leaf.value for leaf in tree.leaves(thing)]
+    function, parameters = _traced_functions[key], [leaf.value for leaf in tree.leaves(obj)]
     if any(isinstance(value, np.ndarray) for value in parameters):
         return lambda *arguments: _evaluate_pair(function, parameters, arguments)
     vector = casadi.DM(np.array(parameters, dtype=float))
@@ -205,9 +205,9 @@ def _substitute(derivative: Any, x: Any, point: Sequence[Any], symbolic: bool) -
     return components if symbolic else tuple(float(component) for component in components)
 
 
-def jacobian(thing: Any, method: str, *arguments: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Values of `thing.method` at N points, shape (N,), and derivatives with respect to its P leaves, shape (N, P)."""
-    results, _, count = _evaluate_traced(thing, method, arguments)
+def jacobian(obj: Any, method: str, *arguments: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Values of `obj.method` at N points, shape (N,), and derivatives with respect to its P leaves, shape (N, P)."""
+    results, _, count = _evaluate_traced(obj, method, arguments)
     size = results[-1].size // max(count, 1)
     return results[0].reshape(-1), results[-1].reshape(count, size)
 

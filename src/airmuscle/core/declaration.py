@@ -67,29 +67,27 @@ def model(cls: type[T]) -> type[T]:
     return dataclasses.dataclass(frozen=True)(cls)
 
 
-def parameters(thing: Any) -> tuple[Parameter, ...]:
+def parameters(obj: Any) -> tuple[Parameter, ...]:
     """Return the declared parameters of a model or model class, in order, without those of nested models."""
     return tuple(
-        Parameter(name=f.name, default=f.default, **f.metadata)
-        for f in dataclasses.fields(thing)
-        if "unit" in f.metadata
+        Parameter(name=f.name, default=f.default, **f.metadata) for f in dataclasses.fields(obj) if "unit" in f.metadata
     )
 
 
-def _validate(thing: Any) -> None:
+def _validate(obj: Any) -> None:
     """Check every declared parameter, then the conditions of `check`. Raises ParameterError."""
-    lists = {f.name for f in dataclasses.fields(thing) if "tuple" in str(f.type)}
-    for declared in parameters(thing):
-        value = getattr(thing, declared.name)
+    lists = {f.name for f in dataclasses.fields(obj) if "tuple" in str(f.type)}
+    for declared in parameters(obj):
+        value = getattr(obj, declared.name)
         if isinstance(value, tuple | list | np.ndarray) != (declared.name in lists):
             expected = "several numbers, such as (1.0, 2.0)" if declared.name in lists else "one number"
             raise ParameterError(
-                f"{type(thing).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is {value!r}; "
+                f"{type(obj).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is {value!r}; "
                 f"it must be {expected}."
             )
-        object.__setattr__(thing, declared.name, _check_value(type(thing).__name__, declared, value))
-    if hasattr(thing, "check"):
-        thing.check()
+        object.__setattr__(obj, declared.name, _check_value(type(obj).__name__, declared, value))
+    if hasattr(obj, "check"):
+        obj.check()
 
 
 def _check_value(owner: str, declared: Parameter, value: Any) -> Any:
@@ -143,21 +141,20 @@ def _component_types(cls: type[Any]) -> dict[str, type[Any]]:
     return {n: k for n, k in structural.items() if isinstance(k, type) and k.__module__ not in ("builtins", "types")}
 
 
-def check_structure(thing: Any) -> None:
+def check_structure(obj: Any) -> None:
     """Raise ParameterError if a component, at any depth of a model, is not an instance of its field's class."""
-    if isinstance(thing, tuple):
-        for item in thing:
+    if isinstance(obj, tuple):
+        for item in obj:
             check_structure(item)
-    elif dataclasses.is_dataclass(thing) and not isinstance(thing, type):
-        for name, kind in _component_types(type(thing)).items():
-            component = getattr(thing, name)
+    elif dataclasses.is_dataclass(obj) and not isinstance(obj, type):
+        for name, kind in _component_types(type(obj)).items():
+            component = getattr(obj, name)
             if not isinstance(component, kind):
                 raise ParameterError(
-                    f"{type(thing).__name__}: {name} must be an instance of {kind.__name__}; it is "
-                    f"{str(component)[:80]}."
+                    f"{type(obj).__name__}: {name} must be an instance of {kind.__name__}; it is {str(component)[:80]}."
                 )
-        for field in dataclasses.fields(thing):
-            check_structure(getattr(thing, field.name))
+        for field in dataclasses.fields(obj):
+            check_structure(getattr(obj, field.name))
 
 
 def check_field(cls: type[Any], name: str) -> None:

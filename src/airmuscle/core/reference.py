@@ -35,26 +35,26 @@ CHOSEN = "chosen"
 """Label of a number that no paper prints."""
 
 
-def _walk(thing: Any) -> Iterator[Reference]:
+def _walk(obj: Any) -> Iterator[Reference]:
     """Yield the references of an object and of its fields, with repetitions."""
-    yield from getattr(thing, "references", ())
-    if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
-        for field in dataclasses.fields(thing):
-            yield from _walk(getattr(thing, field.name))
-    elif isinstance(thing, tuple | list):
-        for item in thing:
+    yield from getattr(obj, "references", ())
+    if dataclasses.is_dataclass(obj) and not isinstance(obj, type):
+        for field in dataclasses.fields(obj):
+            yield from _walk(getattr(obj, field.name))
+    elif isinstance(obj, tuple | list):
+        for item in obj:
             yield from _walk(item)
 
 
-def cite(thing: Any) -> list[Reference]:
+def cite(obj: Any) -> list[Reference]:
     """Return the references of an object and of all its components, without repetitions, sorted by key.
 
-    `thing` is any object of airmuscle: a characteristic, a muscle, a plant, a fit, a library entry, or a tuple of them.
+    `obj` is any object of airmuscle: a characteristic, a muscle, a plant, a fit, a library entry, or a tuple of them.
     Raises ParameterError for anything else, such as a name.
     """
-    if not (dataclasses.is_dataclass(thing) or isinstance(thing, tuple | list) or hasattr(thing, "references")):
+    if not (dataclasses.is_dataclass(obj) or isinstance(obj, tuple | list) or hasattr(obj, "references")):
         raise ParameterError(
-            f"cite: {thing!r} is not a model; load a library entry by its name: cite(load('dmsp-20-300'))."
+            f"cite: {obj!r} is not a model; load a library entry by its name: cite(load('dmsp-20-300'))."
         )
-    by_key = {reference.key: reference for reference in _walk(thing)}
+    by_key = {reference.key: reference for reference in _walk(obj)}
     return [by_key[key] for key in sorted(by_key)]

@@ -23,15 +23,15 @@ class Leaf:
     declared: Parameter
 
 
-def leaves(thing: Any, path: str = "") -> Iterator[Leaf]:
+def leaves(obj: Any, path: str = "") -> Iterator[Leaf]:
     """Yield every declared number of a model and of the models inside it, in a fixed order."""
-    if isinstance(thing, tuple):
-        for i, item in enumerate(thing):
+    if isinstance(obj, tuple):
+        for i, item in enumerate(obj):
             yield from leaves(item, f"{path}[{i}]")
-    elif dataclasses.is_dataclass(thing) and not isinstance(thing, type):
-        declared = {p.name: p for p in parameters(thing)}
-        for field in dataclasses.fields(thing):
-            value = getattr(thing, field.name)
+    elif dataclasses.is_dataclass(obj) and not isinstance(obj, type):
+        declared = {p.name: p for p in parameters(obj)}
+        for field in dataclasses.fields(obj):
+            value = getattr(obj, field.name)
             inner = f"{path}.{field.name}" if path else field.name
             if field.name not in declared:
                 yield from leaves(value, inner)
@@ -41,42 +41,42 @@ def leaves(thing: Any, path: str = "") -> Iterator[Leaf]:
                 yield Leaf(inner, value, declared[field.name])
 
 
-def flatten(thing: Any) -> npt.NDArray[np.float64]:
+def flatten(obj: Any) -> npt.NDArray[np.float64]:
     """Return the values of all leaves as one vector, in the order of `leaves`."""
-    return np.array([leaf.value for leaf in leaves(thing)], dtype=np.float64)
+    return np.array([leaf.value for leaf in leaves(obj)], dtype=np.float64)
 
 
-def structure(thing: Any) -> Any:
+def structure(obj: Any) -> Any:
     """Return a hashable description of a model without the values of its parameters."""
-    if isinstance(thing, tuple):
-        return tuple(structure(item) for item in thing)
-    if not dataclasses.is_dataclass(thing) or isinstance(thing, type):
-        return thing
-    declared = {p.name for p in parameters(thing)}
+    if isinstance(obj, tuple):
+        return tuple(structure(item) for item in obj)
+    if not dataclasses.is_dataclass(obj) or isinstance(obj, type):
+        return obj
+    declared = {p.name for p in parameters(obj)}
     fields = []
-    for field in dataclasses.fields(thing):
-        value = getattr(thing, field.name)
+    for field in dataclasses.fields(obj):
+        value = getattr(obj, field.name)
         size = len(value) if isinstance(value, tuple) else 1
         fields.append((field.name, size) if field.name in declared else (field.name, structure(value)))
-    return (type(thing), *fields)
+    return (type(obj), *fields)
 
 
-def unflatten(thing: T, values: Sequence[Any]) -> T:
+def unflatten(obj: T, values: Sequence[Any]) -> T:
     """Return the model with other leaf values, in the order of `leaves`; values, such as symbols, are not validated."""
-    rebuilt: T = _rebuild(thing, iter(values))
+    rebuilt: T = _rebuild(obj, iter(values))
     return rebuilt
 
 
-def _rebuild(thing: Any, values: Iterator[Any]) -> Any:
+def _rebuild(obj: Any, values: Iterator[Any]) -> Any:
     """Return a copy whose leaves are taken from the iterator."""
-    if isinstance(thing, tuple):
-        return tuple(_rebuild(item, values) for item in thing)
-    if not dataclasses.is_dataclass(thing) or isinstance(thing, type):
-        return thing
-    declared = {p.name for p in parameters(thing)}
-    new = object.__new__(type(thing))
-    for field in dataclasses.fields(thing):
-        value = getattr(thing, field.name)
+    if isinstance(obj, tuple):
+        return tuple(_rebuild(item, values) for item in obj)
+    if not dataclasses.is_dataclass(obj) or isinstance(obj, type):
+        return obj
+    declared = {p.name for p in parameters(obj)}
+    new = object.__new__(type(obj))
+    for field in dataclasses.fields(obj):
+        value = getattr(obj, field.name)
         if field.name not in declared:
             value = _rebuild(value, values)
         elif isinstance(value, tuple):
@@ -87,18 +87,16 @@ def _rebuild(thing: Any, values: Iterator[Any]) -> Any:
     return new
 
 
-def with_parameters(thing: T, values: Sequence[float]) -> T:
+def with_parameters(obj: T, values: Sequence[float]) -> T:
     """Return the model with other leaf values, validated like a new object. Raises ParameterError."""
-    validated: T = _revalidate(unflatten(thing, [float(v) for v in values]))
+    validated: T = _revalidate(unflatten(obj, [float(v) for v in values]))
     return validated
 
 
-def _revalidate(thing: Any) -> Any:
+def _revalidate(obj: Any) -> Any:
     """Return a copy constructed anew at every level, so that every validation runs."""
-    if isinstance(thing, tuple):
-        return tuple(_revalidate(item) for item in thing)
-    if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
-        return dataclasses.replace(
-            thing, **{f.name: _revalidate(getattr(thing, f.name)) for f in dataclasses.fields(thing)}
-        )
-    return thing
+    if isinstance(obj, tuple):
+        return tuple(_revalidate(item) for item in obj)
+    if dataclasses.is_dataclass(obj) and not isinstance(obj, type):
+        return dataclasses.replace(obj, **{f.name: _revalidate(getattr(obj, f.name)) for f in dataclasses.fields(obj)})
+    return obj
