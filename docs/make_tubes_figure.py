@@ -41,7 +41,7 @@ def fill(tube: Tube | DistributedTube, conductance: float, duration: float = 0.6
 
 def lumped(length: float, pieces: int) -> Tube:
     """The tube without inertia, by its size."""
-    return Tube.of_size(length, DIAMETER, pieces)
+    return Tube.from_dimensions(length, DIAMETER, pieces)
 
 
 def error(length: float, pieces: int, conductance: float, fine: int = FINE) -> float:

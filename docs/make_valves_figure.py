@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from airmuscle.core.plotting import DASHES, LINES, new_figure, save
-from airmuscle.pneumatics import CheckValve, IndexedValve, Orifice, Valve, in_series
+from airmuscle.pneumatics import CheckValve, SubsonicIndexValve, Orifice, Valve, in_series
 from airmuscle.pneumatics.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
 
 PICTURE = Path(__file__).with_name("images") / "valves.png"
@@ -33,9 +33,9 @@ def draw_laws(axes: Any) -> None:
     laws: dict[str, Orifice] = {
         "b = 0": Valve(1e-8, 0.0),
         "b = 0.3": Valve(1e-8, 0.3),
-        "b = 0.3, m = 0.7": IndexedValve(1e-8, 0.3, 0.7),
-        "b = 0.3, cracking at 0.7 bar": IndexedValve(1e-8, 0.3, cracking_pressure=70e3),
-        "the same, check valve": CheckValve(IndexedValve(1e-8, 0.3, cracking_pressure=70e3)),
+        "b = 0.3, m = 0.7": SubsonicIndexValve(1e-8, 0.3, 0.7),
+        "b = 0.3, cracking at 0.7 bar": SubsonicIndexValve(1e-8, 0.3, cracking_pressure=70e3),
+        "the same, check valve": CheckValve(SubsonicIndexValve(1e-8, 0.3, cracking_pressure=70e3)),
     }
     choked = 1e-8 * REFERENCE_DENSITY * UPSTREAM
     for i, (label, law) in enumerate(laws.items()):

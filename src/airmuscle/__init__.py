@@ -14,8 +14,8 @@ from .analysis.equilibrium import find_equilibrium
 from .control.inputs import SampledSignal, Schedule
 from .core.errors import AirmuscleError
 from .core.reference import Reference, cite
-from .library.catalogue import list_library, load, load_data, save
-from .mechanism import HangingMass, Held, Isometric, Mechanism
+from .library.catalogue import list_laws, load, load_data, save
+from .mechanism import HangingMass, WithLatch, Isometric, Mechanism
 from .muscle import LinearDamper, LinearSpring, Muscle
 from .plant.plant import Plant
 from .pneumatics import Circuit, FillDischarge, Supply, Valve
@@ -38,7 +38,7 @@ __all__ = [
     "FillDischarge",
     "Fit",
     "HangingMass",
-    "Held",
+    "WithLatch",
     "Isometric",
     "Isothermal",
     "LinearDamper",
@@ -61,7 +61,7 @@ __all__ = [
     "find_equilibrium",
     "fit",
     "geometry",
-    "list_library",
+    "list_laws",
     "load",
     "load_data",
     "read",

@@ -13,7 +13,7 @@ from airmuscle.analysis.static_stiffness import stiffness
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import PiecewiseLinear, Schedule
 from airmuscle.core.errors import AirmuscleError, SimulationError
-from airmuscle.mechanism import HangingMass, Held, MusclesInSeries, WithEndStops
+from airmuscle.mechanism import HangingMass, WithLatch, MusclesInSeries, WithEndStops
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import LinearDamper, SeriesSpring
 from airmuscle.plant.plant import Plant
@@ -213,7 +213,7 @@ def test_a_part_of_another_kind_is_named(make, message):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Held(3), "Held: its inner must be of Mechanism; it is 3"),
+        (lambda: WithLatch(3), "WithLatch: its inner must be of Mechanism; it is 3"),
         (lambda: MusclesInSeries(3, (1.0,)), "MusclesInSeries: its inner must be of Mechanism"),
         (lambda: WithEndStops(3, 0.0, 0.1, HuntCrossley(1e9)), "WithEndStops: its inner must be of Mechanism"),
         (lambda: WithEndStops(HangingMass(1.0), 0.0, 0.1, 3), "WithEndStops: its contact must be of HuntCrossley"),

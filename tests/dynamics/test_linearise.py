@@ -36,7 +36,7 @@ from airmuscle.simulation.simulate import simulate
 VALVE = Valve(2.6e-9, 0.433)
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))
 JOINT = AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12)
-PROPORTIONAL = ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(50.0), muscles=2)
+PROPORTIONAL = ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(50.0), muscle_count=2)
 HANGING = Plant(chosen_muscle(), FillDischarge(Supply(6e5), VALVE, VALVE), HangingMass(20.0))
 REGULATED = Plant(
     replace(chosen_muscle(), series=SeriesSpring(5e4)),

@@ -24,16 +24,16 @@ from airmuscle.pneumatics import (
     ClosedChamber,
     DistributedTube,
     FillDischarge,
-    IndexedValve,
     Manifold,
     ProportionalRegulator,
     ProportionalValve,
     RegulatedSupply,
     SecondOrderLag,
     SharedSupply,
+    SubsonicIndexValve,
     Supply,
     Tank,
-    ThreePosition,
+    ThreePositionValve,
     Tube,
     Valve,
     WithLeak,
@@ -65,8 +65,8 @@ def plant(circuit, gas=ADIABATIC, count=1, mechanism=HELD):
 
 CIRCUITS = {
     "two valves": plant(FillDischarge(Supply(5e5), VALVE, NARROW)),
-    "check and index": plant(FillDischarge(Supply(5e5), CheckValve(VALVE), IndexedValve(1e-8, 0.3, 0.6, 2e4))),
-    "three positions on a tank": plant(ThreePosition(tank(), VALVE, NARROW)),
+    "check and index": plant(FillDischarge(Supply(5e5), CheckValve(VALVE), SubsonicIndexValve(1e-8, 0.3, 0.6, 2e4))),
+    "three positions on a tank": plant(ThreePositionValve(tank(), VALVE, NARROW)),
     "regulated supply on a tank": plant(
         FillDischarge(RegulatedSupply(tank(), WIDE, 4e5, gas=ADIABATIC), VALVE, NARROW)
     ),
@@ -304,8 +304,8 @@ def test_a_manifold_books_what_its_branches_draw():
         (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 0.0, 3), "one muscle or two, not 3"),
         (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 0.0, True), "one muscle or two, not True"),
         (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 1.0), r"overlap .* allowed are -0.5 to 0.9"),
-        (lambda: Tube(VALVE, 1e-5, 0), "Tube: pieces is 0; give a whole number from 1 to 200"),
-        (lambda: DistributedTube(1.0, 4e-3, 2.5), "DistributedTube: pieces is 2.5"),
+        (lambda: Tube(VALVE, 1e-5, 0), "Tube: segment_count is 0; give a whole number from 1 to 200"),
+        (lambda: DistributedTube(1.0, 4e-3, 2.5), "DistributedTube: segment_count is 2.5"),
         (lambda: plant(FillDischarge(Supply(5e5), VALVE, VALVE), count=2), "circuits feed 1 muscles; 2 are given"),
     ],
 )  # fmt: skip

@@ -91,7 +91,7 @@ def reached_from_rest(law: Characteristic, pressure: float, contraction: float, 
     return bool(slopes.by_pressure > 0 and slopes.by_contraction < 0)
 
 
-every_entry = pytest.mark.parametrize("name", catalogue.list_library())
+every_entry = pytest.mark.parametrize("name", catalogue.list_laws())
 
 
 @every_entry

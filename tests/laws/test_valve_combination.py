@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from airmuscle.core.errors import ParameterError
-from airmuscle.pneumatics import IndexedValve, Valve, in_parallel, in_series
+from airmuscle.pneumatics import SubsonicIndexValve, Valve, in_parallel, in_series
 
 P1, T0 = 7e5, 293.15
 valves = st.builds(Valve, st.floats(1e-9, 1e-7), st.floats(0.0, 0.6))
@@ -137,5 +137,5 @@ def test_what_has_no_equivalent_is_refused(rule):
         rule()
     with pytest.raises(ParameterError, match=f"{name}: number 2 has no conductance"):
         rule(Valve(1e-8, 0.3), Valve(0.0, 0.3))
-    with pytest.raises(ParameterError, match=f"{name}: number 2 is IndexedValve; the rule holds for Valve"):
-        rule(Valve(1e-8, 0.3), IndexedValve(1e-8, 0.3))
+    with pytest.raises(ParameterError, match=f"{name}: number 2 is SubsonicIndexValve; the rule holds for Valve"):
+        rule(Valve(1e-8, 0.3), SubsonicIndexValve(1e-8, 0.3))

@@ -27,7 +27,7 @@ from airmuscle.control.inputs import SampledSignal, Schedule
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import FileError, ParameterError, SolveError, UnitError
 from airmuscle.core.units import ABSOLUTE, conversion, quantity
-from airmuscle.library.catalogue import list_library, parsed
+from airmuscle.library.catalogue import list_laws, read_toml
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
@@ -185,7 +185,7 @@ def test_a_request_that_no_muscle_can_meet(tmp_path: Path, given: tuple[str, ...
 
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
-@pytest.mark.parametrize("name", list_library())
+@pytest.mark.parametrize("name", list_laws())
 def test_every_entry_answers_or_refuses_in_one_line(name: str):
     """Loads, pressures and contractions far beyond any muscle: a number that JSON can hold, or one line."""
     beyond = (
@@ -339,7 +339,7 @@ def test_a_file_that_is_no_toml(tmp_path: Path, content: bytes, message: str):
 @pytest.mark.parametrize("name", ["a\0.toml", f"{'a' * 5000}.toml"])
 def test_a_name_that_no_file_can_have(name: str):
     with pytest.raises(FileError, match="cannot be read"):
-        parsed(Path(name))
+        read_toml(Path(name))
 
 
 BOX = "min_pressure = 0\nmax_pressure = 6e5\nmin_contraction = 0\nmax_contraction = 0.25\n"

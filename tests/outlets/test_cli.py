@@ -24,8 +24,8 @@ from airmuscle.cli.app import app
 from airmuscle.cli.cite import as_bibtex
 from airmuscle.core.errors import UnknownNameError
 from airmuscle.core.reference import Reference
-from airmuscle.library.catalogue import list_library, load
-from airmuscle.library.valve_catalogue import valve_names
+from airmuscle.library.catalogue import list_laws, load
+from airmuscle.library.valve_catalogue import list_valves
 from airmuscle.recording import read_csv
 from airmuscle.report.chapter import Chapter, Claim, Equal
 from airmuscle.reproduce import run
@@ -120,7 +120,7 @@ def test_wrong_usage_is_exit_code_2(arguments: tuple[str, ...]):
 def test_list_names_every_entry_with_title_kind_and_trust():
     found = json.loads(airmuscle("list", "--json").output)
     listed = {entry["name"]: entry for entry in found if entry["kind"] != "data set"}
-    assert tuple(listed) == (*list_library(), *valve_names())
+    assert tuple(listed) == (*list_laws(), *list_valves())
     entry = load(MUSCLE)
     assert listed[MUSCLE] == {
         "name": MUSCLE,
@@ -129,7 +129,7 @@ def test_list_names_every_entry_with_title_kind_and_trust():
         "provenance": entry.provenance,
     }
     table = airmuscle("list").output
-    assert all(name in table for name in list_library())
+    assert all(name in table for name in list_laws())
 
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
@@ -161,7 +161,7 @@ def test_show_gives_parameters_sources_and_checks():
 
 
 def test_show_leaves_out_the_middle_of_long_lists():
-    long = next(n for n in list_library() if len(json.loads(airmuscle("show", n, "--json").stdout)["parameters"]) > 60)
+    long = next(n for n in list_laws() if len(json.loads(airmuscle("show", n, "--json").stdout)["parameters"]) > 60)
     text = airmuscle("show", long).output
     assert re.search(r"\.\.\. \d+ more", text)
     assert len(text.splitlines()) < 60
@@ -234,7 +234,7 @@ def test_the_chart_and_its_data_stand_in_the_folder(tmp_path: Path):
 
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
-@pytest.mark.parametrize("name", list_library())
+@pytest.mark.parametrize("name", list_laws())
 def test_every_entry_has_a_chart(tmp_path: Path, name: str):
     entry = load(name)
     low, high = entry.validity_range.pressure if entry.validity_range else entry.characteristic.pressure_range

@@ -87,11 +87,11 @@ def test_the_code_of_the_page_runs():
 
 def test_the_table_of_the_page_is_a_loop(tmp_path: Path):
     held = PLANT.replace(
-        'model = "HangingMass"\nmass = "5 kg"', 'model = "Held"\ninner = { model = "HangingMass", mass = 5 }'
+        'model = "HangingMass"\nmass = "5 kg"', 'model = "WithLatch"\ninner = { model = "HangingMass", mass = 5 }'
     )
     scenario = load_scenario(written(tmp_path, text=f"{held}{TABLE}"))
     pid = PID("position", SplitRange("fill", "discharge"), 40.0, 1.0, 0.05)
-    wanted, beside = Schedule({"position": ((0.0, 0.0), (0.2, 0.02))}), Schedule({"held": ((0.0, 1.0), (0.1, 0.0))})
+    wanted, beside = Schedule({"position": ((0.0, 0.0), (0.2, 0.02))}), Schedule({"latched": ((0.0, 1.0), (0.1, 0.0))})
     assert scenario.command == ControlLoop(pid, 5e-3, wanted, beside, {"fill": PWM(200.0), "discharge": PWM(200.0)})
     run = scenario.simulate()
     assert np.ptp(run["position"][run["time"] <= 0.1]) < 1e-12
@@ -155,7 +155,7 @@ def test_drivers_and_inputs_beside_stand_where_they_always_do(tmp_path: Path):
 def test_the_columns_of_a_loop_may_be_asked_for(tmp_path: Path):
     asked = ("[run]", '[output]\ncolumns = ["setpoint.pressure", "command.fill"]\n[run]')
     scenario = load_scenario(written(tmp_path, asked))
-    assert list(scenario.chosen(scenario.simulate())) == ["time", "setpoint.pressure", "command.fill"]
+    assert list(scenario.select_columns(scenario.simulate())) == ["time", "setpoint.pressure", "command.fill"]
 
 
 # What is wrong
@@ -222,9 +222,9 @@ def test_what_is_no_table_of_a_controller_is_refused(tmp_path: Path):
 
 
 def test_two_inputs_of_one_command_are_of_one_kind(tmp_path: Path):
-    text = regulated('{ model = "SplitRange", positive = "setpoint", negative = "held" }')
+    text = regulated('{ model = "SplitRange", positive = "setpoint", negative = "latched" }')
     text = text.replace(
-        'model = "HangingMass"\nmass = "5 kg"', 'model = "Held"\ninner = { model = "HangingMass", mass = 5 }'
+        'model = "HangingMass"\nmass = "5 kg"', 'model = "WithLatch"\ninner = { model = "HangingMass", mass = 5 }'
     )
     with pytest.raises(ParameterError, match="setpoint and held have different units; name inputs of one kind"):
         load_scenario(written(tmp_path, text=text))
@@ -238,12 +238,12 @@ def test_a_column_that_a_set_point_follows_is_there(tmp_path: Path):
 
 def test_a_record_has_no_controller(tmp_path: Path):
     from airmuscle.library.location import Location
-    from airmuscle.scenario.inputs import command_from
+    from airmuscle.scenario.inputs import build_input_signal
 
     with pytest.raises(
         ParameterError, match=r"record, \[command\]: a controller stands in a scenario only; give what was"
     ):
-        command_from({"controller": {}}, (), Location("record", "command", tmp_path))
+        build_input_signal({"controller": {}}, (), Location("record", "command", tmp_path))
 
 
 # Schema, report, program, study

@@ -19,7 +19,7 @@ from airmuscle.identify.dynamic import StartTime, StartValue
 from airmuscle.mechanism import HangingMass
 from airmuscle.recording import Recording, read_csv
 from airmuscle.recording.csv_writer import write_csv
-from airmuscle.scenario.identification import load_study
+from airmuscle.scenario.identification import load_dynamic_fit
 from airmuscle.scenario.scenario import load_scenario
 
 PLANT = """
@@ -148,7 +148,7 @@ def test_a_study_says_what_it_was_told(folder):
               '[[record]]\nfile = "run2.csv"\nfirst = "0.3 s"\nlast = "1 s"\n[record.command]\nfill = [[0, 1]]\n'
               '[record.plant.mechanism]\nmodel = "HangingMass"\nmass = "12 kg"\n'),
     )  # fmt: skip
-    study = load_study(path)
+    study = load_dynamic_fit(path)
     first, second = study.experiments
     assert study.own == ("circuit.supply.pressure", StartTime(0.05), StartValue("pressure", 2e3))
     assert (study.seed, study.starts, study.bounds) == (3, 2, {"gas.exponent": (1.01, 1.4)})
@@ -168,7 +168,7 @@ model = "VirtualWork"
 geometry = { model = "Vessel", enclosed_volume = "100 mL" }
 [plant.muscle]
 geometry = { model = "Vessel", enclosed_volume = "100 mL" }
-wall = { model = "SwellingWall", growth_volume = 1e-4, middle = "150 kPa", breadth = "50 kPa", lag = "0.2 s" }
+wall = { model = "SwellingWall", growth_volume = 1e-4, midpoint_pressure = "150 kPa", pressure_width = "50 kPa", time_constant = "0.2 s" }
 [plant.circuit]
 model = "WithTubes"
 [plant.circuit.circuit]
@@ -196,7 +196,7 @@ file = "run1.csv"
 
 def test_an_unloaded_muscle_behind_a_tube_is_fitted_and_written_too(folder, tmp_path):
     (folder / "fill.toml").write_text(UNLOADED, encoding="utf-8")
-    study = load_study(folder / "fill.toml")
+    study = load_dynamic_fit(folder / "fill.toml")
     (experiment,) = study.experiments
     assert experiment.start.known["pressure"] == pytest.approx(np.median(experiment.recording["pressure"][:3]))
     result = airmuscle("fit-dynamic", folder / "fill.toml", "--out", tmp_path / "out", "--json")
@@ -280,7 +280,7 @@ def test_the_page_on_dynamic_identification_holds_a_study_that_loads(folder):
     page = (Path(__file__).parents[2] / "docs" / "dynamic-identification.md").read_text(encoding="utf-8")
     (text,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
     (folder / "page.toml").write_text(text, encoding="utf-8")
-    study = load_study(folder / "page.toml")
+    study = load_dynamic_fit(folder / "page.toml")
     assert [e.plant.mechanism.mass for e in study.experiments] == [10.0, 12.0]
     assert study.free[0] == ("circuit.fill.conductance", "circuit.discharge.conductance")
 

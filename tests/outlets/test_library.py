@@ -30,7 +30,7 @@ from airmuscle.library.location import Location
 from airmuscle.library.models import model_class, model_names
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, EndStop, LinearDamper, LinearSpring, PressureDamper, SwellingWall
-from airmuscle.scenario.scenario import muscle_from
+from airmuscle.scenario.scenario import build_muscle
 
 GOOD = """
 title = "A muscle of our own"
@@ -57,7 +57,7 @@ stiffness = "2 N/mm"
 [damper]
 model = "PressureDamper"
 damping = 50.0
-growth = "1 N s/(m bar)"
+damping_slope = "1 N s/(m bar)"
 [validity_range]
 min_pressure = "0 bar"
 max_pressure = "6 bar"
@@ -93,7 +93,7 @@ def test_a_file_becomes_a_muscle_in_si(tmp_path: Path):
     assert entry.spring == LinearSpring(2000.0)
     assert entry.damper == PressureDamper(50.0, 1e-5)
     assert entry.validity_range.pressure == (0.0, 6e5)
-    assert entry.checks[0].given == (("pressure", 5e5), ("contraction", 0.0))
+    assert entry.checks[0].conditions == (("pressure", 5e5), ("contraction", 0.0))
     assert {"ours", "tondu-lopez-2000"} <= {reference.key for reference in cite(entry)}
     assert entry.muscle.tension(5e5, 0.0) == 1200.0
     held_back = 2000.0 * 0.1 * 0.3 + (50.0 + 1e-5 * 5e5) * 0.02
@@ -140,8 +140,8 @@ def test_a_plant_takes_over_the_friction_of_its_muscle_file_unless_it_states_ano
     catalogue.save(entry, tmp_path / "muscle.toml")
     table = {"library": "muscle.toml", "damper": {"model": "LinearDamper", "damping": 100.0}}
     place = Location("scenario.toml", "plant.muscle", tmp_path)
-    assert muscle_from(table, place).friction == FRICTION[0]
-    assert muscle_from({**table, "friction": {"model": "NoFriction"}}, place).friction == NoFriction()
+    assert build_muscle(table, place).friction == FRICTION[0]
+    assert build_muscle({**table, "friction": {"model": "NoFriction"}}, place).friction == NoFriction()
 
 
 def test_a_muscle_file_carries_wall_stop_and_creep(tmp_path: Path):
@@ -169,7 +169,7 @@ def test_a_saved_muscle_loads_to_the_same_numbers(tmp_path: Path):
     assert [path.name for path in tmp_path.iterdir()] == ["muscle.toml"]
 
 
-@pytest.mark.parametrize("name", catalogue.list_library())
+@pytest.mark.parametrize("name", catalogue.list_laws())
 def test_every_library_entry_survives_saving(name: str, tmp_path: Path):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
@@ -346,7 +346,7 @@ def test_an_entry_that_is_no_muscle_says_what_it_lacks():
         _ = table.muscle
 
 
-@pytest.mark.parametrize("name", catalogue.measured_names())
+@pytest.mark.parametrize("name", catalogue.list_data())
 def test_a_data_set_says_where_it_is_from(name: str):
     recording = catalogue.load_data(name)
     assert len(recording) >= 60

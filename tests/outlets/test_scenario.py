@@ -28,7 +28,7 @@ from airmuscle.geometry import Braid
 from airmuscle.library.catalogue import load, save
 from airmuscle.library.entry import Entry
 from airmuscle.library.valve_catalogue import load_valve
-from airmuscle.mechanism import HangingMass, Held, Isometric
+from airmuscle.mechanism import HangingMass, WithLatch, Isometric
 from airmuscle.muscle import LinearDamper
 from airmuscle.pneumatics import ClosedChamber
 from airmuscle.pneumatics.gas import Isothermal, Polytropic
@@ -124,7 +124,12 @@ def test_what_is_optional_has_the_defaults_of_the_page(tmp_path: Path):
     ("was", "becomes", "part", "expected"),
     [
         (MASS, 'model = "Isometric"\ncontraction = "10 %"', "mechanism", Isometric(0.1)),
-        (MASS, 'model = "Held"\ninner = { model = "HangingMass", mass = 5 }', "mechanism", Held(HangingMass(5.0))),
+        (
+            MASS,
+            'model = "WithLatch"\ninner = { model = "HangingMass", mass = 5 }',
+            "mechanism",
+            WithLatch(HangingMass(5.0)),
+        ),
         (MUSCLE, f'{MUSCLE}\ngas = "Polytropic"', "gas", Polytropic()),
         (MUSCLE, f'{MUSCLE}\ngas = {{ model = "Polytropic", exponent = 1.4 }}', "gas", Polytropic(1.4)),
     ],
@@ -208,7 +213,7 @@ def test_a_recorded_command_may_be_held_and_rows_may_stand_beside_it(tmp_path: P
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 def test_a_driver_may_have_the_delays_of_a_valve_of_the_catalogue(tmp_path: Path):
-    response = load_valve("smc-sx91").response
+    response = load_valve("smc-sx91").switching_times
     command = load_scenario(
         written(tmp_path, (FILL, f'{FILL}\ndrivers = {{ fill = {{ library = "smc-sx91" }} }}'))
     ).command
@@ -254,9 +259,9 @@ def test_the_file_of_a_run_holds_the_columns_that_are_asked_for(tmp_path: Path):
     path = written(tmp_path, ("[run]", '[output]\ncolumns = ["force", "fill"]\n[run]'))
     scenario = load_scenario(path)
     run = scenario.simulate()
-    assert list(scenario.chosen(run)) == ["time", "force", "fill"]
+    assert list(scenario.select_columns(run)) == ["time", "force", "fill"]
     everything = load_scenario(written(tmp_path))
-    assert list(everything.chosen(run)) == list(run)
+    assert list(everything.select_columns(run)) == list(run)
 
 
 def test_a_muscle_of_the_library_keeps_the_box_of_its_law(tmp_path: Path):

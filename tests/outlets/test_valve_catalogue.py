@@ -18,18 +18,18 @@ from airmuscle.core.reference import cite
 from airmuscle.library.build import build
 from airmuscle.library.find import find
 from airmuscle.library.location import Location
-from airmuscle.library.valve_catalogue import load_valve, valve_names
+from airmuscle.library.valve_catalogue import load_valve, list_valves
 from airmuscle.pneumatics import CheckValve, Valve
 from airmuscle.reproduce.hosovsky_plant import MATRIX
 from airmuscle.scenario.scenario import load_scenario
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
-every_valve = pytest.mark.parametrize("name", valve_names())
+every_valve = pytest.mark.parametrize("name", list_valves())
 GOOD = """
 title = "A valve of ours"
 provenance = "measured"
 [valve]
-model = "IndexedValve"
+model = "SubsonicIndexValve"
 conductance = "2 dm3/(s bar)"
 critical_ratio = 0.3
 subsonic_index = 0.55
@@ -37,7 +37,7 @@ subsonic_index = 0.55
 model = "Valve"
 conductance = "3 dm3/(s bar)"
 critical_ratio = 0.25
-[response]
+[switching_times]
 opening_delay = "4 ms"
 closing_delay = "7 ms"
 [[check]]
@@ -64,18 +64,18 @@ def written(folder: Path, text: str) -> Path:
 def test_published_flows_come_out_of_the_law(name: str):
     entry = load_valve(name)
     for check in entry.checks:
-        assert abs(entry.flow(**dict(check.given)) - check.equals) <= check.tolerance, check.source
+        assert abs(entry.flow(**dict(check.conditions)) - check.equals) <= check.tolerance, check.source
 
 
 def test_enough_of_the_catalogue_is_judged_by_a_published_flow():
-    assert sum(bool(load_valve(name).checks) for name in valve_names()) >= 8
+    assert sum(bool(load_valve(name).checks) for name in list_valves()) >= 8
 
 
 def test_a_check_fails_when_the_valve_changes():
     entry = load_valve("smc-sy5000")
     (check,) = entry.checks
     other = Valve(1.01 * entry.valve.conductance, entry.valve.critical_ratio)
-    flow = other.mass_flow(*(p for _, p in check.given), 1.0, 293.15) / 1.185
+    flow = other.mass_flow(*(p for _, p in check.conditions), 1.0, 293.15) / 1.185
     assert abs(flow - check.equals) > check.tolerance
 
 
@@ -98,18 +98,18 @@ def test_the_valve_of_the_third_paper():
 def test_the_paths_of_a_valve_may_differ():
     entry = load_valve("ckd-m4ga1-r")
     for path, conductance in (("valve", 0.99e-8), ("exhaust", 1.2e-8)):
-        assert entry.along(path).conductance == pytest.approx(conductance, rel=1e-12)
-        assert entry.along(path).critical_ratio == 0.20
+        assert entry.orifice(path).conductance == pytest.approx(conductance, rel=1e-12)
+        assert entry.orifice(path).critical_ratio == 0.20
     assert isinstance(load_valve("smc-ak2000-01").valve, CheckValve)
 
 
 def test_a_file_of_the_user_is_read_in_si(tmp_path: Path):
     entry = load_valve(written(tmp_path, GOOD))
     assert entry.valve.conductance == pytest.approx(2e-8)
-    assert (entry.response.opening_delay, entry.response.closing_delay) == pytest.approx((4e-3, 7e-3))
+    assert (entry.switching_times.opening_delay, entry.switching_times.closing_delay) == pytest.approx((4e-3, 7e-3))
     (check,) = entry.checks
-    assert entry.flow(**dict(check.given)) == pytest.approx(check.equals, rel=1e-9)
-    assert dict(check.given) == {"upstream": 7e5, "downstream": 1e5}
+    assert entry.flow(**dict(check.conditions)) == pytest.approx(check.equals, rel=1e-9)
+    assert dict(check.conditions) == {"upstream": 7e5, "downstream": 1e5}
     assert find(tmp_path / "valve.toml") == find(str(tmp_path / "valve.toml")) == entry
 
 
@@ -121,7 +121,7 @@ def test_the_page_on_valves_is_true(tmp_path: Path, capsys: pytest.CaptureFixtur
     _, own = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
     entry = load_valve(written(tmp_path, own))
     (check,) = entry.checks
-    assert abs(entry.flow(**dict(check.given)) - check.equals) <= check.tolerance
+    assert abs(entry.flow(**dict(check.conditions)) - check.equals) <= check.tolerance
 
 
 def test_a_limit_of_use_is_a_warning():
@@ -190,10 +190,15 @@ def test_a_valve_that_is_not_there_is_refused(tmp_path: Path, table, error, mess
     [
         ("[valve]", "[valv]", ParameterError, r"'valv' is not known here.* Did you mean 'valve'\?"),
         ('title = "A valve of ours"', "", ParameterError, "'title' is missing"),
-        ('model = "IndexedValve"', 'model = "Supply"\npressure = 1e5', ParameterError, r"\[valve\]: .*'conductance'"),
+        (
+            'model = "SubsonicIndexValve"',
+            'model = "Supply"\npressure = 1e5',
+            ParameterError,
+            r"\[valve\]: .*'conductance'",
+        ),
         ('"2 dm3/(s bar)"', '"2 dm3/s"', UnitError, r"\[valve\], conductance: unit 'dm3/s' cannot become"),
-        ('"4 ms"', '"-4 ms"', ParameterError, r"\[response\]: .*opening_delay .* allowed are 0 to 1 s"),
-        ('"4 ms"', '"4 mm"', UnitError, r"\[response\], opening_delay: unit 'mm' cannot become 's'"),
+        ('"4 ms"', '"-4 ms"', ParameterError, r"\[switching_times\]: .*opening_delay .* allowed are 0 to 1 s"),
+        ('"4 ms"', '"4 mm"', UnitError, r"\[switching_times\], opening_delay: unit 'mm' cannot become 's'"),
         ('closing_delay = "7 ms"', "", ParameterError, "'closing_delay' is missing"),
         ('upstream = "7 bara"', 'upstream = "7 barg"', UnitError, r"\[check 1\], upstream: unit 'barg' is gauge"),
         ('flow = "840 l/min"', "", ParameterError, r"\[check 1\]: 'flow' is missing; it is a number in m3/s"),
@@ -215,9 +220,9 @@ def test_a_file_without_a_valve_or_with_another_thing_is_refused(tmp_path: Path)
     supply = '[valve]\nmodel = "Supply"\npressure = "6 bar"\n'
     with pytest.raises(ParameterError, match="Supply is no orifice"):
         load_valve(written(tmp_path, f'title = "t"\nprovenance = "chosen"\n{supply}'))
-    head = "response = 3\n"
-    with pytest.raises(ParameterError, match=r"\[response\]: 3 is no table"):
-        load_valve(written(tmp_path, head + GOOD.partition("[response]")[0]))
+    head = "switching_times = 3\n"
+    with pytest.raises(ParameterError, match=r"\[switching_times\]: 3 is no table"):
+        load_valve(written(tmp_path, head + GOOD.partition("[switching_times]")[0]))
 
 
 def test_the_command_line_lists_shows_and_cites_valves():
@@ -229,7 +234,7 @@ def test_the_command_line_lists_shows_and_cites_valves():
     shown = json.loads(run("show", "smc-sx91", "--json").stdout)
     values = {p["name"]: p["value"] for p in shown["parameters"]}
     assert values["valve.conductance"] == pytest.approx(2.5e-9)
-    assert values["response.opening_delay"] == pytest.approx(0.01)
+    assert values["switching_times.opening_delay"] == pytest.approx(0.01)
     assert shown["checks"][0]["quantity"] == "flow"
     assert all(word in run("show", "matrix-821").output for word in ("critical pressure ratio", "0.433", "Hosovsky"))
     assert "SM-P00077-A/3" in run("cite", "ckd-m4ga1").output

@@ -109,7 +109,7 @@ def _write(
     found: Sequence[LoopFit], creep: Sequence[str], chosen: HysteresisFit | None, entry: Entry | None, out: Path
 ) -> Path | None:
     from ..library.catalogue import save
-    from ..library.write import part_lines
+    from ..library.write import part_toml
     from ..report.hysteresis_chapter import hysteresis_chapters
     from ..report.output_folder import atomic_folder
     from ..report.write import fill
@@ -120,7 +120,7 @@ def _write(
         if chosen is not None and entry is not None:
             save(_with_friction(entry, chosen), place / "muscle.toml")
         elif chosen is not None:
-            lines = [f"# {chosen.verdict}", *part_lines("friction", chosen.friction)]
+            lines = [f"# {chosen.verdict}", *part_toml("friction", chosen.friction)]
             (place / "friction.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
     return out / name if name else None
 

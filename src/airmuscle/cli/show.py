@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 PARTS = (
     "characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "validity_range", "valve",
-    "exhaust", "response",
+    "exhaust", "switching_times",
 )  # fmt: skip
 MANY = 30
 """Values of one list above which the table shows its ends only."""
@@ -62,7 +62,7 @@ def described(entry: Entry | ValveEntry) -> dict[str, Any]:
         "checks": [
             {
                 "quantity": c.quantity,
-                "given": dict(c.given),
+                "given": dict(c.conditions),
                 "equals": c.equals,
                 "tolerance": c.tolerance,
                 "source": c.source,

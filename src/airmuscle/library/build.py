@@ -17,7 +17,7 @@ from typing import Any
 
 from ..core.declaration import Parameter, check_field, parameters
 from ..core.errors import ParameterError
-from .location import Location, check_keys, located_errors, number, text
+from .location import Location, check_keys, located_errors, read_number, read_text
 from .models import model_class
 
 
@@ -41,9 +41,9 @@ def build(table: Mapping[str, Any], place: Location, ready: Mapping[str, Any] | 
     hints = typing.get_type_hints(cls)
     _check_present(cls, {**given, **(ready or {})}, hints, place)
     values = {
-        key: _numbers(value, declared[key], hints[key], place)
+        key: _read_parameter(value, declared[key], hints[key], place)
         if key in declared
-        else _part(value, hints[key], key, place)
+        else _build_part(value, hints[key], key, place)
         for key, value in given.items()
     }
     with located_errors(place):
@@ -55,9 +55,9 @@ def _from_catalogue(table: Mapping[str, Any], place: Location) -> Any:
     from .valve_catalogue import PATHS, load_valve  # which is built from tables itself
 
     check_keys(table, ("library", "path"), place)
-    name, path = (text({"path": PATHS[0], **table}, key, place, needed=True) for key in ("library", "path"))
+    name, path = (read_text({"path": PATHS[0], **table}, key, place, needed=True) for key in ("library", "path"))
     with located_errors(place):
-        return load_valve(place.folder / name if name.endswith(".toml") else name).along(path)
+        return load_valve(place.folder / name if name.endswith(".toml") else name).orifice(path)
 
 
 def _check_present(cls: type[Any], given: Mapping[str, Any], hints: Mapping[str, Any], place: Location) -> None:
@@ -67,32 +67,34 @@ def _check_present(cls: type[Any], given: Mapping[str, Any], hints: Mapping[str,
             continue
         facts = field.metadata
         what = (
-            f"[{facts['unit']}] ({facts['symbol']}, {facts['meaning']})" if facts else f"({_words(hints[field.name])})"
+            f"[{facts['unit']}] ({facts['symbol']}, {facts['meaning']})"
+            if facts
+            else f"({_describe_type(hints[field.name])})"
         )
         raise ParameterError(f"{place}: {cls.__name__} needs '{field.name}' {what}; it is missing.")
 
 
-def _numbers(value: Any, declared: Parameter, hint: Any, place: Location) -> Any:
+def _read_parameter(value: Any, declared: Parameter, hint: Any, place: Location) -> Any:
     """A declared parameter: one number, or a tuple of them where the model has a tuple."""
     where = f"{place}, {declared.name}"
     many = typing.get_origin(hint) is tuple
     if isinstance(value, Mapping) and many:
-        return _column(value, where, place.folder)
+        return _read_column(value, where, place.folder)
     if isinstance(value, list) != many:
         wanted = "a list of numbers" if many else "one number"
         raise ParameterError(
             f"{where} is {value!r}; {wanted} in {declared.unit} is wanted ({declared.symbol}, {declared.meaning})."
         )
     if many:
-        return tuple(_number(v, declared, f"{where}[{i}]") for i, v in enumerate(value))
-    return _number(value, declared, where)
+        return tuple(_read_number(v, declared, f"{where}[{i}]") for i, v in enumerate(value))
+    return _read_number(value, declared, where)
 
 
-def _number(value: Any, declared: Parameter, where: str) -> float:
-    return number(value, declared.unit, where, f" ({declared.symbol}, {declared.meaning})")
+def _read_number(value: Any, declared: Parameter, where: str) -> float:
+    return read_number(value, declared.unit, where, f" ({declared.symbol}, {declared.meaning})")
 
 
-def _column(value: Mapping[str, Any], where: str, folder: Path) -> tuple[float, ...]:
+def _read_column(value: Mapping[str, Any], where: str, folder: Path) -> tuple[float, ...]:
     """A column of a data file as a tuple, in the SI unit that recordings keep it in."""
     from ..recording import read_csv  # pandas, which most entries do not need
 
@@ -103,24 +105,24 @@ def _column(value: Mapping[str, Any], where: str, folder: Path) -> tuple[float, 
         return tuple(float(v) for v in recording[value["column"]])
 
 
-def _part(value: Any, hint: Any, key: str, place: Location) -> Any:
+def _build_part(value: Any, hint: Any, key: str, place: Location) -> Any:
     """A field that is structure: a model, a tuple of models, a whole number, a name, true or false."""
     inner = place.inside(key)
     if isinstance(value, Mapping):
         found = build(value, inner)
     elif isinstance(value, list):
-        found = tuple(_part(v, _item(hint), f"{key}[{i}]", place) for i, v in enumerate(value))
+        found = tuple(_build_part(v, _item_type(hint), f"{key}[{i}]", place) for i, v in enumerate(value))
     elif isinstance(value, str) and not _accepts(hint, value):
         found = build({"model": value}, inner)
     else:
         found = value
     if not _accepts(hint, found):
         what = type(found).__name__ if dataclasses.is_dataclass(found) else repr(found)
-        raise ParameterError(f"{place}: {key} is {what}; {_words(hint)} is wanted.")
+        raise ParameterError(f"{place}: {key} is {what}; {_describe_type(hint)} is wanted.")
     return found
 
 
-def _item(hint: Any) -> Any:
+def _item_type(hint: Any) -> Any:
     """What a list under a field may hold, by the field's annotation."""
     options = typing.get_args(hint) if typing.get_origin(hint) in (typing.Union, types.UnionType) else (hint,)
     return next((typing.get_args(option)[0] for option in options if typing.get_origin(option) is tuple), Any)
@@ -138,7 +140,7 @@ def _accepts(hint: Any, value: Any) -> bool:
     return isinstance(value, (int, float) if cls is float else cls)
 
 
-def _words(hint: Any) -> str:
+def _describe_type(hint: Any) -> str:
     options = typing.get_args(hint) if typing.get_origin(hint) in (typing.Union, types.UnionType) else (hint,)
     plain = {
         int: "a whole number",

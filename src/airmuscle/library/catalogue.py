@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.errors import AirmuscleWarning, FileError, UnknownNameError, suggestion
 from .entry import Check, Entry
-from .read import entry_from
+from .read import build_entry
 from .write import save, to_toml
 
 if TYPE_CHECKING:
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 __all__ = [
     "Check",
     "Entry",
-    "complete",
-    "list_library",
+    "complete_name",
+    "list_laws",
     "load",
     "load_data",
-    "measured_names",
-    "parsed",
+    "list_data",
+    "read_toml",
     "save",
     "to_toml",
 ]  # fmt: skip
@@ -37,12 +37,12 @@ FOLDER = Path(__file__).parent
 DATA = FOLDER / "data"
 
 
-def list_library() -> tuple[str, ...]:
+def list_laws() -> tuple[str, ...]:
     """The names of all library entries, sorted."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
 
-def measured_names() -> tuple[str, ...]:
+def list_data() -> tuple[str, ...]:
     """The names of all measured or tabulated data sets that come with the library, sorted."""
     return tuple(sorted(path.stem for path in DATA.glob("*.csv")))
 
@@ -55,8 +55,8 @@ def load(name_or_path: str | Path) -> Entry:
     """
     text = str(name_or_path)
     is_path = isinstance(name_or_path, Path) or text.endswith(".toml") or "/" in text or "\\" in text
-    path = Path(name_or_path) if is_path else FOLDER / f"{complete(text, list_library(), 'library entry')}.toml"
-    entry = entry_from(parsed(path), path.stem, path if is_path else Path(path.name), path.parent)
+    path = Path(name_or_path) if is_path else FOLDER / f"{complete_name(text, list_laws(), 'library entry')}.toml"
+    entry = build_entry(read_toml(path), path.stem, path if is_path else Path(path.name), path.parent)
     if entry.warning:
         warnings.warn(f"{entry.name}: {entry.warning}", AirmuscleWarning, stacklevel=2)
     return entry
@@ -69,14 +69,14 @@ def load_data(name: str) -> Recording:
     """
     from ..recording import read_csv  # pandas, which no entry without data needs
 
-    path = DATA / f"{complete(str(name), measured_names(), 'data set')}.csv"
+    path = DATA / f"{complete_name(str(name), list_data(), 'data set')}.csv"
     recording: Recording = read_csv(path)
     lines = path.read_text(encoding="utf-8").splitlines()
     head = " ".join(line.lstrip("# ") for line in lines if line.startswith("#") and " = " not in line)
     return dataclasses.replace(recording, notes=(*recording.notes, head))
 
 
-def complete(name: str, known: Iterable[str], kind: str) -> str:
+def complete_name(name: str, known: Iterable[str], kind: str) -> str:
     """The one known name that is, or begins with, `name`. Raises UnknownName with what there is."""
     known = tuple(known)
     if name in known:
@@ -89,7 +89,7 @@ def complete(name: str, known: Iterable[str], kind: str) -> str:
     return found[0]
 
 
-def parsed(path: Path) -> dict[str, Any]:
+def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file. Raises FileError where it cannot be read or is not TOML."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))

@@ -13,9 +13,9 @@ from ..geometry.base import Geometry
 
 if TYPE_CHECKING:
     from ..friction.base import Friction
-    from ..muscle import CreepElements, Damper, Muscle, Series, Spring, Stop, Wall
+    from ..muscle import CreepElements, Damper, Muscle, SeriesElement, Spring, Stop, Wall
 
-OPTIONAL = ("spring", "damper", "friction", "wall", "series", "stop", "creep")
+OPTIONAL_PARTS = ("spring", "damper", "friction", "wall", "series", "stop", "creep")
 """Parts that a muscle may do without, as fields of an entry and tables of its file."""
 
 
@@ -24,7 +24,7 @@ class Check:
     """A published number that the entry must give: `quantity` at the `given` values, within a tolerance."""
 
     quantity: str
-    given: tuple[tuple[str, float], ...]
+    conditions: tuple[tuple[str, float], ...]
     equals: float
     tolerance: float
     source: str
@@ -47,7 +47,7 @@ class Entry:
     damper: Damper | None = None
     friction: Friction | None = None
     wall: Wall | None = None
-    series: Series | None = None
+    series: SeriesElement | None = None
     stop: Stop | None = None
     creep: CreepElements | None = None
     note: str = ""
@@ -68,5 +68,5 @@ class Entry:
                 else "a law solved for the force: see as_force_law"
             )
             raise UnknownNameError(f"{self.name} is a characteristic, not yet a muscle; it lacks {lack}.")
-        given = {part: getattr(self, part) for part in OPTIONAL if getattr(self, part) is not None}
+        given = {part: getattr(self, part) for part in OPTIONAL_PARTS if getattr(self, part) is not None}
         return Muscle(self.characteristic, self.geometry, validity_range=self.validity_range, **given)

@@ -47,7 +47,7 @@ def check_keys(table: Mapping[str, Any], known: Sequence[str], place: Location) 
             )
 
 
-def number(value: Any, unit: str, where: str, about: str = "") -> float:
+def read_number(value: Any, unit: str, where: str, about: str = "") -> float:
     """A number in SI, from a number in `unit` or text with its unit; `about` ends the message on anything else."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         wanted = "a number" if unit == "1" else f"a number in {unit}"
@@ -55,15 +55,15 @@ def number(value: Any, unit: str, where: str, about: str = "") -> float:
     return units.quantity(value, unit, where=where)
 
 
-def finite(value: Any, unit: str, where: str) -> float:
+def read_finite_number(value: Any, unit: str, where: str) -> float:
     """As `number`; what is not finite, which a TOML file can hold, is refused."""
-    found = number(value, unit, where)
+    found = read_number(value, unit, where)
     if not math.isfinite(found):
         raise ParameterError(f"{where} is {value}; it must be finite.")
     return found
 
 
-def text(table: Mapping[str, Any], key: str, place: Location, *, needed: bool) -> str:
+def read_text(table: Mapping[str, Any], key: str, place: Location, *, needed: bool) -> str:
     """The text under a key, or nothing where it may be missing."""
     value = table.get(key, "")
     if not isinstance(value, str):
@@ -73,7 +73,7 @@ def text(table: Mapping[str, Any], key: str, place: Location, *, needed: bool) -
     return value
 
 
-def checked(found: Any, kind: type[Any], place: Location) -> Any:
+def check_type(found: Any, kind: type[Any], place: Location) -> Any:
     """What was built, if it is of the kind that stands here."""
     if not isinstance(found, kind):
         raise ParameterError(f"{place}: {type(found).__name__} is no {kind.__name__.lower()}.")

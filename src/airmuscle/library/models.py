@@ -25,10 +25,10 @@ def _registry() -> dict[str, type[Any]]:
     for package in PACKAGES:
         module = importlib.import_module(f"airmuscle.{package}")
         listed |= {name: getattr(module, name) for name in module.__all__}
-    return {name: thing for name, thing in listed.items() if inspect.isclass(thing) and _from_file(thing)}
+    return {name: thing for name, thing in listed.items() if inspect.isclass(thing) and _is_file_model(thing)}
 
 
-def _from_file(cls: type[Any]) -> bool:
+def _is_file_model(cls: type[Any]) -> bool:
     return getattr(cls, "from_file", False) and not inspect.isabstract(cls)
 
 

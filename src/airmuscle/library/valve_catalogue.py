@@ -27,10 +27,10 @@ from ..core.units import ABSOLUTE
 from ..pneumatics.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
 from ..pneumatics.orifice import Orifice
 from .build import build
-from .catalogue import complete, parsed
+from .catalogue import complete_name, read_toml
 from .entry import Check
-from .location import Location, check_keys, checked, finite, located_errors, text
-from .read import references_from, rows_of
+from .location import Location, check_keys, check_type, read_finite_number, located_errors, read_text
+from .read import read_references, read_table_array
 
 FOLDER = Path(__file__).parent / "valves"
 PATHS = ("valve", "exhaust")
@@ -60,13 +60,13 @@ class ValveEntry:
     provenance: str
     valve: Orifice
     exhaust: Orifice | None = None
-    response: SwitchingTimes | None = None
+    switching_times: SwitchingTimes | None = None
     note: str = ""
     warning: str = ""
     checks: tuple[Check, ...] = ()
     references: tuple[Reference, ...] = ()
 
-    def along(self, path: str) -> Orifice:
+    def orifice(self, path: str) -> Orifice:
         """The law of a path, "valve" or "exhaust". Raises UnknownName where the entry has no such path."""
         found = getattr(self, path, None) if path in PATHS else None
         if found is None:
@@ -82,7 +82,7 @@ class ValveEntry:
         return float(self.valve.mass_flow(upstream, downstream, 1.0, REFERENCE_TEMPERATURE) / REFERENCE_DENSITY)
 
 
-def valve_names() -> tuple[str, ...]:
+def list_valves() -> tuple[str, ...]:
     """The names of all valves of the catalogue, sorted."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
@@ -95,33 +95,35 @@ def load_valve(name_or_path: str | Path) -> ValveEntry:
     """
     as_text = str(name_or_path)
     is_path = isinstance(name_or_path, Path) or as_text.endswith(".toml")
-    path = Path(name_or_path) if is_path else FOLDER / f"{complete(as_text, valve_names(), 'valve')}.toml"
-    entry = valve_from(parsed(path), path.stem, path if is_path else Path(path.name))
+    path = Path(name_or_path) if is_path else FOLDER / f"{complete_name(as_text, list_valves(), 'valve')}.toml"
+    entry = build_valve_entry(read_toml(path), path.stem, path if is_path else Path(path.name))
     if entry.warning:
         warnings.warn(f"{entry.name}: {entry.warning}", AirmuscleWarning, stacklevel=2)
     return entry
 
 
-def valve_from(tables: Mapping[str, Any], name: str, file: Path) -> ValveEntry:
+def build_valve_entry(tables: Mapping[str, Any], name: str, file: Path) -> ValveEntry:
     """The valve that a parsed file describes; messages name `file`."""
     place = Location(str(file), "", file.parent)
     check_keys(tables, (*_TEXTS, *PATHS, "response", "check", "reference"), place)
     if "valve" not in tables:
         raise ParameterError(f"{place}: the table [valve] is missing; it says which flow law and its parameters.")
-    texts: dict[str, Any] = {key: text(tables, key, place, needed=key in ("title", "provenance")) for key in _TEXTS}
+    texts: dict[str, Any] = {
+        key: read_text(tables, key, place, needed=key in ("title", "provenance")) for key in _TEXTS
+    }
     paths = {key: _orifice(tables[key], place.inside(key)) for key in PATHS if key in tables}
     return ValveEntry(
         name=name,
         **texts,
         **paths,
-        response=_response(tables["response"], place.inside("response")) if "response" in tables else None,
-        checks=tuple(_check(t, p) for t, p in rows_of(tables, "check", place)),
-        references=references_from(tables, place),
+        switching_times=_response(tables["response"], place.inside("response")) if "response" in tables else None,
+        checks=tuple(_check(t, p) for t, p in read_table_array(tables, "check", place)),
+        references=read_references(tables, place),
     )
 
 
 def _orifice(table: Any, place: Location) -> Any:
-    return checked(build(table, place), Orifice, place)
+    return check_type(build(table, place), Orifice, place)
 
 
 def _response(table: Any, place: Location) -> SwitchingTimes:
@@ -133,7 +135,7 @@ def _response(table: Any, place: Location) -> SwitchingTimes:
         if name not in table:
             raise ParameterError(f"{place}: '{name}' is missing; a response has {' and '.join(names)}.")
     with located_errors(place):
-        return SwitchingTimes(**{name: finite(table[name], "s", f"{place}, {name}") for name in names})
+        return SwitchingTimes(**{name: read_finite_number(table[name], "s", f"{place}, {name}") for name in names})
 
 
 def _check(table: Mapping[str, Any], place: Location) -> Check:
@@ -141,6 +143,6 @@ def _check(table: Mapping[str, Any], place: Location) -> Check:
     for key, unit in _CHECK.items():
         if key not in table:
             raise ParameterError(f"{place}: '{key}' is missing; it is a number in {unit}, or text with a unit.")
-    values = {key: finite(table[key], unit, f"{place}, {key}") for key, unit in _CHECK.items()}
+    values = {key: read_finite_number(table[key], unit, f"{place}, {key}") for key, unit in _CHECK.items()}
     given = (("upstream", values["upstream"]), ("downstream", values["downstream"]))
-    return Check("flow", given, values["flow"], values["tolerance"], text(table, "source", place, needed=True))
+    return Check("flow", given, values["flow"], values["tolerance"], read_text(table, "source", place, needed=True))

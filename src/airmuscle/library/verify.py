@@ -9,33 +9,33 @@ from .entry import Check, Entry
 
 
 @dataclasses.dataclass(frozen=True)
-class Verdict:
+class CheckResult:
     """A check of a library entry and what the model gives for it."""
 
     check: Check
-    found: float
+    computed: float
 
     @property
-    def holds(self) -> bool:
+    def passes(self) -> bool:
         """Whether the model gives the number within its tolerance; NaN never holds."""
-        return abs(self.found - self.check.equals) <= self.check.tolerance
+        return abs(self.computed - self.check.equals) <= self.check.tolerance
 
     def __str__(self) -> str:
-        given = ", ".join(f"{name} {value:g}" for name, value in self.check.given)
-        word = "is" if self.holds else "is NOT"
+        given = ", ".join(f"{name} {value:g}" for name, value in self.check.conditions)
+        word = "is" if self.passes else "is NOT"
         return (
             f"{self.check.quantity} at {given} {word} {self.check.equals:g} within {self.check.tolerance:g}: "
-            f"{self.found:.8g} ({self.check.source})"
+            f"{self.computed:.8g} ({self.check.source})"
         )
 
 
-def verify(entry: Entry) -> tuple[Verdict, ...]:
+def verify(entry: Entry) -> tuple[CheckResult, ...]:
     """Every check of a library entry, computed. Raises NoSolution where the model has no answer."""
-    return tuple(Verdict(check, _computed(entry, check)) for check in entry.checks)
+    return tuple(CheckResult(check, _compute(entry, check)) for check in entry.checks)
 
 
-def _computed(entry: Entry, check: Check) -> float:
-    given = dict(check.given)
+def _compute(entry: Entry, check: Check) -> float:
+    given = dict(check.conditions)
     if check.quantity != "volume":
         return float(getattr(entry.characteristic, check.quantity)(**given))
     if entry.geometry is None:

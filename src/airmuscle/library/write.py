@@ -10,18 +10,18 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import FileError, ParameterError
-from .entry import OPTIONAL, Check, Entry
+from .entry import OPTIONAL_PARTS, Check, Entry
 
 
 def to_toml(entry: Entry) -> str:
     """The text of a library file for this entry; numbers in SI, with all their digits."""
     texts = {key: getattr(entry, key) for key in ("title", "provenance", "note", "warning")}
     lines = [f"{key} = {_value(text)}" for key, text in texts.items() if text]
-    for part in ("characteristic", "geometry", *OPTIONAL):
+    for part in ("characteristic", "geometry", *OPTIONAL_PARTS):
         built = getattr(entry, part)
         belongs_to_law = part == "geometry" and built == getattr(entry.characteristic, "geometry", None)
         if built is not None and not belongs_to_law:
-            lines += part_lines(part, built)
+            lines += part_toml(part, built)
     if entry.validity_range is not None:
         lines += _table("validity_range", dataclasses.asdict(entry.validity_range))
     for check in entry.checks:
@@ -31,7 +31,7 @@ def to_toml(entry: Entry) -> str:
     return "\n".join(lines) + "\n"
 
 
-def part_lines(name: str, thing: Any) -> list[str]:
+def part_toml(name: str, thing: Any) -> list[str]:
     """The lines of one table of such a file: [friction], say, with the model and its numbers."""
     return list(_table(name, _described(thing)))
 
@@ -75,7 +75,7 @@ def _structured(value: Any) -> Any:
 
 
 def _row(check: Check) -> dict[str, Any]:
-    return {"quantity": check.quantity, **dict(check.given), "equals": check.equals,
+    return {"quantity": check.quantity, **dict(check.conditions), "equals": check.equals,
             "tolerance": check.tolerance, "source": check.source}  # fmt: skip
 
 

@@ -4,9 +4,9 @@ from .check_valve import CheckValve
 from .circuit import Circuit, CircuitFlows
 from .combination import in_parallel, in_series
 from .distributed_tube import DistributedTube
-from .fill_discharge import ClosedChamber, FillDischarge, ThreePosition
-from .gas import Air, Ambient, EnergyBalance, Flow, Gas, Isothermal, Polytropic, absolute, gauge
-from .indexed_valve import IndexedValve
+from .fill_discharge import ClosedChamber, FillDischarge, ThreePositionValve
+from .gas import Air, Ambient, EnergyBalance, Flow, Gas, Isothermal, Polytropic, absolute_pressure, gauge_pressure
+from .subsonic_index_valve import SubsonicIndexValve
 from .manifold import Manifold, WithLeak
 from .orifice import Orifice
 from .proportional import ProportionalRegulator, ProportionalValve, SecondOrderLag
@@ -29,7 +29,7 @@ __all__ = [
     "FillDischarge",
     "Flow",
     "Gas",
-    "IndexedValve",
+    "SubsonicIndexValve",
     "Isothermal",
     "Manifold",
     "Orifice",
@@ -41,15 +41,15 @@ __all__ = [
     "SharedSupply",
     "Supply",
     "Tank",
-    "ThreePosition",
+    "ThreePositionValve",
     "Tube",
     "TubeModel",
     "TubeOrifice",
     "Valve",
     "WithLeak",
     "WithTubes",
-    "absolute",
-    "gauge",
+    "absolute_pressure",
+    "gauge_pressure",
     "in_parallel",
     "in_series",
 ]

@@ -38,7 +38,7 @@ class Circuit(abc.ABC):
     supply: AirSource
 
     @property
-    def ports(self) -> int:
+    def port_count(self) -> int:
         """How many muscles it feeds."""
         return 1
 
@@ -51,7 +51,7 @@ class Circuit(abc.ABC):
         """Its states without those of its supply."""
         return ()
 
-    def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+    def own_steady_state(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
         """Its own states at rest, with every input at zero and this air in the muscles."""
         return {}
 
@@ -72,9 +72,9 @@ class Circuit(abc.ABC):
 
     def steady_state(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
         """All its states at rest."""
-        return {**self.own_settled(airs, ambient), **with_prefix(SUPPLY, self.supply.steady_state(ambient))}
+        return {**self.own_steady_state(airs, ambient), **with_prefix(SUPPLY, self.supply.steady_state(ambient))}
 
-    def respond(
+    def compute_flows(
         self, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value], ambient: Ambient
     ) -> CircuitFlows:
         """What it does with this air in the muscles; `drawn` is then what comes from outside the plant."""

@@ -32,7 +32,7 @@ def in_series(*valves: Valve) -> Valve:
     Raises ParameterError for no valve, a shut one, or what is not a Valve. The same in substance as the rules of
     ISO 6358:1989 and of textbooks; derived here, as neither text was at hand (ISO 6358-3:2014 goes numerically).
     """
-    return _combined(valves, "in_series", _two_in_series)
+    return _combine(valves, "in_series", _combine_two_in_series)
 
 
 def in_parallel(*valves: Valve) -> Valve:
@@ -43,10 +43,10 @@ def in_parallel(*valves: Valve) -> Valve:
     For b up to 0.6 the flow is off by at most 5.3 % of the choked flow, by 1.8 % for b from 0.2 to 0.5, always too
     much; valves of one b are exact. The order does not matter. Raises ParameterError as in_series does.
     """
-    return _combined(valves, "in_parallel", _two_in_parallel)
+    return _combine(valves, "in_parallel", _combine_two_in_parallel)
 
 
-def _combined(valves: tuple[Valve, ...], rule: str, two: Callable[[Valve, Valve], Valve]) -> Valve:
+def _combine(valves: tuple[Valve, ...], rule: str, two: Callable[[Valve, Valve], Valve]) -> Valve:
     if not valves:
         raise ParameterError(f"{rule} needs one valve at least.")
     for i, valve in enumerate(valves, 1):
@@ -59,7 +59,7 @@ def _combined(valves: tuple[Valve, ...], rule: str, two: Callable[[Valve, Valve]
     return reduce(two, valves)
 
 
-def _two_in_series(first: Valve, second: Valve) -> Valve:
+def _combine_two_in_series(first: Valve, second: Valve) -> Valve:
     c1, b1, c2, b2 = first.conductance, first.critical_ratio, second.conductance, second.critical_ratio
     if c1 <= b1 * c2:
         conductance = c1
@@ -69,15 +69,15 @@ def _two_in_series(first: Valve, second: Valve) -> Valve:
         root = ops.sqrt(ops.maximum(b1**2 + a * (1.0 - 2.0 * b1), 0.0))
         conductance = c2 * (b1 + root) / a
     ratio = 1.0 - conductance**2 * ((1.0 - b1) / c1**2 + (1.0 - b2) / c2**2)
-    return _equivalent(conductance, ratio, first, second)
+    return _equivalent_valve(conductance, ratio, first, second)
 
 
-def _two_in_parallel(first: Valve, second: Valve) -> Valve:
+def _combine_two_in_parallel(first: Valve, second: Valve) -> Valve:
     conductance = first.conductance + second.conductance
     near_equal = sum(v.conductance / ops.sqrt(1.0 - v.critical_ratio) for v in (first, second))
-    return _equivalent(conductance, 1.0 - (conductance / near_equal) ** 2, first, second)
+    return _equivalent_valve(conductance, 1.0 - (conductance / near_equal) ** 2, first, second)
 
 
-def _equivalent(conductance: float, ratio: float, *parts: Valve) -> Valve:
+def _equivalent_valve(conductance: float, ratio: float, *parts: Valve) -> Valve:
     """b is at least 0 but for rounding; the laminar range is that of the part which has the widest."""
     return Valve(conductance, ops.maximum(ratio, 0.0), min(part.laminar_ratio for part in parts))

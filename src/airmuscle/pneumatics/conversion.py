@@ -30,9 +30,11 @@ NOMINAL_UPSTREAM, NOMINAL_DOWNSTREAM = 7e5, 6e5
 KV_PER_CV = 0.865
 """Kv [m3/h at 1 bar] of a valve with Cv 1 [US gallons a minute at 1 psi]."""
 _HEAT_RATIO = 1.4
-_NOZZLE: float = _HEAT_RATIO**0.5 * (2.0 / (_HEAT_RATIO + 1.0)) ** ((_HEAT_RATIO + 1.0) / (2.0 * (_HEAT_RATIO - 1.0)))
+_NOZZLE_FACTOR: float = _HEAT_RATIO**0.5 * (2.0 / (_HEAT_RATIO + 1.0)) ** (
+    (_HEAT_RATIO + 1.0) / (2.0 * (_HEAT_RATIO - 1.0))
+)
 """qm sqrt(R T)/(S p1) of choked air without loss [1], 0.6847."""
-_SPEED: float = ops.sqrt(GAS_CONSTANT * REFERENCE_TEMPERATURE)
+_REFERENCE_SPEED: float = ops.sqrt(GAS_CONSTANT * REFERENCE_TEMPERATURE)
 """sqrt(R T0) [m/s]."""
 _KV_AREA: float = 1.0 / 3600.0 / ops.sqrt(2.0 * 1e5 / 1000.0)
 """Area [m2] of Kv = 1: 1 m3/h of water, 1000 kg/m3, at 1 bar."""
@@ -53,26 +55,26 @@ def flow_at_reference(conductance: float, critical_ratio: float, upstream: float
 
     Raises ParameterError for a number that is not positive and finite, or a downstream pressure not the smaller.
     """
-    _positive("conductance", conductance)
+    _check_positive("conductance", conductance)
     return conductance * _unit_flow(critical_ratio, upstream, downstream)
 
 
 def conductance_from_flow(volume_flow: float, critical_ratio: float, upstream: float, downstream: float) -> float:
     """C [m3/(s Pa)] from a volume flow [m3/s] at the reference atmosphere between two absolute pressures [Pa]."""
-    _positive("volume_flow", volume_flow)
+    _check_positive("volume_flow", volume_flow)
     return volume_flow / _unit_flow(critical_ratio, upstream, downstream)
 
 
 def kv(conductance: float, critical_ratio: float) -> float:
     """Kv [m3/h] of a valve. Raises ParameterError."""
-    _positive("conductance", conductance)
-    return conductance * REFERENCE_DENSITY * _SPEED / (_KV_AREA * _near_equal(critical_ratio))
+    _check_positive("conductance", conductance)
+    return conductance * REFERENCE_DENSITY * _REFERENCE_SPEED / (_KV_AREA * _near_equal_factor(critical_ratio))
 
 
 def conductance_from_kv(kv: float, critical_ratio: float) -> float:
     """C [m3/(s Pa)] from Kv [m3/h]. Raises ParameterError."""
-    _positive("Kv", kv)
-    return kv * _KV_AREA * _near_equal(critical_ratio) / (REFERENCE_DENSITY * _SPEED)
+    _check_positive("Kv", kv)
+    return kv * _KV_AREA * _near_equal_factor(critical_ratio) / (REFERENCE_DENSITY * _REFERENCE_SPEED)
 
 
 def cv(conductance: float, critical_ratio: float) -> float:
@@ -82,36 +84,38 @@ def cv(conductance: float, critical_ratio: float) -> float:
 
 def conductance_from_cv(cv: float, critical_ratio: float) -> float:
     """C [m3/(s Pa)] from Cv [US gallons a minute]. Raises ParameterError."""
-    _positive("Cv", cv)
+    _check_positive("Cv", cv)
     return conductance_from_kv(KV_PER_CV * cv, critical_ratio)
 
 
 def effective_area(conductance: float) -> float:
     """Effective area S [m2]. Raises ParameterError."""
-    _positive("conductance", conductance)
-    return conductance * REFERENCE_DENSITY * _SPEED / _NOZZLE
+    _check_positive("conductance", conductance)
+    return conductance * REFERENCE_DENSITY * _REFERENCE_SPEED / _NOZZLE_FACTOR
 
 
 def conductance_from_area(area: float) -> float:
     """C [m3/(s Pa)] from the effective area S [m2]. Raises ParameterError."""
-    _positive("area", area)
-    return area * _NOZZLE / (REFERENCE_DENSITY * _SPEED)
+    _check_positive("area", area)
+    return area * _NOZZLE_FACTOR / (REFERENCE_DENSITY * _REFERENCE_SPEED)
 
 
 def diameter(conductance: float, discharge_coefficient: float) -> float:
     """Diameter [m] of the round hole that chokes at the same flow. Raises ParameterError."""
-    _coefficient(discharge_coefficient)
+    _check_discharge_coefficient(discharge_coefficient)
     return float(ops.sqrt(effective_area(conductance) / discharge_coefficient * 4.0 / ops.pi))
 
 
 def conductance_from_diameter(diameter: float, discharge_coefficient: float) -> float:
     """C [m3/(s Pa)] of a round hole from its diameter [m] and discharge coefficient [1]. Raises ParameterError."""
-    _positive("diameter", diameter)
-    _coefficient(discharge_coefficient)
+    _check_positive("diameter", diameter)
+    _check_discharge_coefficient(discharge_coefficient)
     return conductance_from_area(discharge_coefficient * ops.pi / 4.0 * diameter**2)
 
 
-def leak(volume_flow: float, pressure: float, ambient: Ambient | None = None, critical_ratio: float = 0.3) -> Valve:
+def leak_valve(
+    volume_flow: float, pressure: float, ambient: Ambient | None = None, critical_ratio: float = 0.3
+) -> Valve:
     """A leak as a valve that is always open, from its flow at one gauge pressure.
 
     `volume_flow` [m3/s] at the reference atmosphere is what leaks out of `pressure` [Pa] gauge. At other
@@ -125,31 +129,31 @@ def leak(volume_flow: float, pressure: float, ambient: Ambient | None = None, cr
 
 def _unit_flow(critical_ratio: float, upstream: float, downstream: float) -> float:
     """Volume flow at the reference atmosphere of C = 1; Valve's own law, so that it holds on its chord too."""
-    _positive("upstream pressure", upstream)
-    _positive("downstream pressure", downstream)
+    _check_positive("upstream pressure", upstream)
+    _check_positive("downstream pressure", downstream)
     if not downstream < upstream:
         raise ParameterError(
             f"air flows from the higher pressure: upstream {upstream:g} Pa is not above downstream {downstream:g} Pa "
             "(both absolute)."
         )
-    law = Valve(1e-8, _ratio(critical_ratio))
+    law = Valve(1e-8, _check_critical_ratio(critical_ratio))
     return float(law.mass_flow(upstream, downstream, 1.0, REFERENCE_TEMPERATURE) / (REFERENCE_DENSITY * 1e-8))
 
 
-def _near_equal(critical_ratio: float) -> float:
-    return float(ops.sqrt(1.0 - _ratio(critical_ratio)))
+def _near_equal_factor(critical_ratio: float) -> float:
+    return float(ops.sqrt(1.0 - _check_critical_ratio(critical_ratio)))
 
 
-def _ratio(critical_ratio: float) -> float:
+def _check_critical_ratio(critical_ratio: float) -> float:
     return Valve(1e-8, critical_ratio).critical_ratio  # the bounds are declared there
 
 
-def _positive(what: str, value: float) -> None:
+def _check_positive(what: str, value: float) -> None:
     if isinstance(value, bool) or not isinstance(value, float | int) or not 0.0 < value < float("inf"):
         raise ParameterError(f"{what} is {value!r}; it must be a finite number above zero.")
 
 
-def _coefficient(value: float) -> None:
-    _positive("discharge coefficient", value)
+def _check_discharge_coefficient(value: float) -> None:
+    _check_positive("discharge coefficient", value)
     if value > 1.0:
         raise ParameterError(f"discharge coefficient is {value:g}; it is at most 1 (about 0.6 for a sharp edge).")

@@ -10,7 +10,7 @@ from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable, add_prefix, select_prefix, with_prefix
-from .gas import GAS_CONSTANT, HEAT_AT_CONSTANT_PRESSURE, Air, Ambient, Flow, Gas, Isothermal
+from .gas import GAS_CONSTANT, SPECIFIC_HEAT_CONSTANT_PRESSURE, Air, Ambient, Flow, Gas, Isothermal
 from .tube import check_segment_count
 from .tube_model import TubeModel
 
@@ -22,11 +22,11 @@ BLASIUS1913 = Reference(
     1913,
     note="friction factor 0.3164 Re^(-1/4) of turbulent flow in a smooth tube",
 )
-TURBULENT = (64.0 / 0.3164) ** (4.0 / 3.0)
+TRANSITION_REYNOLDS_NUMBER = (64.0 / 0.3164) ** (4.0 / 3.0)
 """Reynolds number at which Hagen-Poiseuille's and Blasius' friction are equal, 1187."""
 
 
-SWIFT = 1.0 / 3.0
+MAX_MACH_NUMBER = 1.0 / 3.0
 """Share of the speed of sound up to which the momentum that the flow carries along may be left out (chosen)."""
 
 
@@ -51,7 +51,7 @@ class DistributedTube(TubeModel):
 
     length: float = parameter("m", "L", "length of the tube", bounds=(1e-3, 200.0))
     diameter: float = parameter("m", "D", "inner diameter of the tube", bounds=(5e-4, 0.1))
-    pieces: int = 20
+    segment_count: int = 20
     gas: Gas = Isothermal()
     viscosity: float = parameter(
         "Pa s", "mu", "dynamic viscosity of the air", bounds=(1e-6, 1e-4), fitted=False, default=1.82e-5
@@ -60,7 +60,7 @@ class DistributedTube(TubeModel):
     end_loss: float = parameter("1", "zeta", "loss at both ends, in dynamic heads", bounds=(0.0, 10.0), default=1.5)
 
     def check(self) -> None:
-        check_segment_count("DistributedTube", self.pieces)
+        check_segment_count("DistributedTube", self.segment_count)
 
     @property
     def area(self) -> Value:
@@ -68,65 +68,67 @@ class DistributedTube(TubeModel):
         return ops.pi / 4.0 * self.diameter**2
 
     @property
-    def piece_volume(self) -> Value:
+    def segment_volume(self) -> Value:
         """Volume [m3] of one piece."""
-        return self.area * self.length / self.pieces
+        return self.area * self.length / self.segment_count
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        brisk = 0.1 * self.area * ambient.pressure / self.gas.sound_speed(_still(ambient))
+        brisk = 0.1 * self.area * ambient.pressure / self.gas.sound_speed(_resting_air(ambient))
         of_piece = (
-            *self.gas.states(self.piece_volume, ambient),
+            *self.gas.states(self.segment_volume, ambient),
             StateVariable("flow", "kg/s", brisk, "mass flow to the next piece"),
         )
-        return tuple(state for name in self.names for state in add_prefix(name, of_piece))
+        return tuple(state for name in self.prefixes for state in add_prefix(name, of_piece))
 
     def steady_state(self, air: Air, ambient: Ambient) -> dict[str, Value]:
-        content = {**self.gas.state_at(air.pressure, self.piece_volume, ambient), "flow": 0.0}
-        return {name: value for prefix in self.names for name, value in with_prefix(prefix, content).items()}
+        content = {**self.gas.state_at(air.pressure, self.segment_volume, ambient), "flow": 0.0}
+        return {name: value for prefix in self.prefixes for name, value in with_prefix(prefix, content).items()}
 
     def air_states(self, state: Mapping[str, Value], ambient: Ambient) -> tuple[Air, ...]:
-        held = (select_prefix(name, state) for name in self.names)
-        return tuple(self.gas.air(content, self.piece_volume, ambient) for content in held)
+        held = (select_prefix(name, state) for name in self.prefixes)
+        return tuple(self.gas.air(content, self.segment_volume, ambient) for content in held)
 
     def rates(
         self, state: Mapping[str, Value], airs: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
     ) -> tuple[dict[str, Value], Flow]:
         rates: dict[str, Value] = {}
-        for name, air, after in zip(self.names, airs, (*airs[1:], muscle), strict=True):
+        for name, air, after in zip(self.prefixes, airs, (*airs[1:], muscle), strict=True):
             mass = state[f"{name}flow"]
-            onward = _carried(mass, air, after)
+            onward = _convected_flow(mass, air, after)
             rates |= with_prefix(name, self.gas.rates(select_prefix(name, state), air, flow - onward, 0.0, ambient))
             density = (_density(air) + _density(after)) / 2.0
             force = self.area * (air.pressure - after.pressure)
             if after is muscle:
                 force = force - self.end_loss * ops.absolute_value(mass) * mass / (2.0 * density * self.area)
-            rates[f"{name}flow"] = force * self.pieces / self.length - self.friction(mass, density) * mass
+            rates[f"{name}flow"] = (
+                force * self.segment_count / self.length - self.friction_coefficient(mass, density) * mass
+            )
             flow = onward
         return rates, flow
 
     def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
         """Where its air ran faster than a third of the speed of sound, at the temperature of the surroundings."""
-        still, found = _still(ambient), {}
-        for name in self.names:
+        still, found = _resting_air(ambient), {}
+        for name in self.prefixes:
             if not {f"{name}flow", f"{name}pressure"} <= columns.keys():
                 continue
             density = (columns[f"{name}pressure"] + ambient.pressure) / (GAS_CONSTANT * ambient.temperature)
             share = (abs(columns[f"{name}flow"]) / (density * self.area * self.gas.sound_speed(still))).max()
-            if share > SWIFT:
+            if share > MAX_MACH_NUMBER:
                 found[name] = (
                     f"air ran at up to {share:.2g} times the speed of sound; DistributedTube knows no choking and lets "
                     "through too much beyond a third of it"
                 )
         return found
 
-    def friction(self, mass_flow: Value, density: Value) -> Value:
+    def friction_coefficient(self, mass_flow: Value, density: Value) -> Value:
         """f [1/s], by which friction slows a mass flow [kg/s] of air of a density [kg/m3]."""
         reynolds = ops.absolute_value(mass_flow) * self.diameter / (self.area * self.viscosity)
         laminar = 32.0 * self.viscosity / (density * self.diameter**2)
-        return laminar * ops.maximum(reynolds / TURBULENT, 1.0) ** 0.75
+        return laminar * ops.maximum(reynolds / TRANSITION_REYNOLDS_NUMBER, 1.0) ** 0.75
 
 
-def _still(ambient: Ambient) -> Air:
+def _resting_air(ambient: Ambient) -> Air:
     return Air(ambient.pressure, ambient.temperature)
 
 
@@ -134,9 +136,9 @@ def _density(air: Air) -> Value:
     return air.pressure / (GAS_CONSTANT * air.temperature)
 
 
-def _carried(mass: Value, air: Air, after: Air) -> Flow:
+def _convected_flow(mass: Value, air: Air, after: Air) -> Flow:
     """A mass flow with the temperature of the piece that it comes from."""
     temperature = air.temperature
     if after.temperature is not air.temperature:
         temperature = ops.where(mass >= 0, air.temperature, after.temperature)
-    return Flow(mass, HEAT_AT_CONSTANT_PRESSURE * temperature * mass)
+    return Flow(mass, SPECIFIC_HEAT_CONSTANT_PRESSURE * temperature * mass)

@@ -15,7 +15,7 @@ from .orifice import Orifice
 from .supply import AirSource, Supply
 
 
-def surroundings(ambient: Ambient) -> Air:
+def ambient_air(ambient: Ambient) -> Air:
     """The air around the plant."""
     return Air(ambient.pressure, ambient.temperature)
 
@@ -37,12 +37,12 @@ class FillDischarge(Circuit):
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
         incoming = orifice_flow(self.fill, inlet, airs[0], inputs["fill"])
-        outgoing = orifice_flow(self.discharge, airs[0], surroundings(ambient), inputs["discharge"])
+        outgoing = orifice_flow(self.discharge, airs[0], ambient_air(ambient), inputs["discharge"])
         return CircuitFlows((incoming - outgoing,), incoming, outgoing)
 
 
 @model
-class ThreePosition(Circuit):
+class ThreePositionValve(Circuit):
     """A 3/3 valve with closed centre: one input, `valve`; 1 fills, 0 shuts, -1 discharges, less is part of the area."""
 
     supply: AirSource
@@ -59,7 +59,7 @@ class ThreePosition(Circuit):
     ) -> CircuitFlows:  # fmt: skip
         place = inputs["valve"]
         incoming = orifice_flow(self.fill, inlet, airs[0], ops.maximum(place, 0.0))
-        outgoing = orifice_flow(self.discharge, airs[0], surroundings(ambient), ops.maximum(-place, 0.0))
+        outgoing = orifice_flow(self.discharge, airs[0], ambient_air(ambient), ops.maximum(-place, 0.0))
         return CircuitFlows((incoming - outgoing,), incoming, outgoing)
 
 

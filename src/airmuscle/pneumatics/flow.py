@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..core import ops
 from ..core.ops import Value
-from .gas import HEAT_AT_CONSTANT_PRESSURE, Air, Flow
+from .gas import SPECIFIC_HEAT_CONSTANT_PRESSURE, Air, Flow
 from .orifice import Orifice
 
 
@@ -14,7 +14,7 @@ def orifice_flow(orifice: Orifice, first: Air, second: Air, opening: Value = 1.0
     if second.temperature is not first.temperature:  # a choice between two equal temperatures would cost time
         temperature = ops.where(first.pressure >= second.pressure, first.temperature, second.temperature)
     mass = orifice.mass_flow(first.pressure, second.pressure, opening, temperature)
-    return Flow(mass, HEAT_AT_CONSTANT_PRESSURE * temperature * mass)
+    return Flow(mass, SPECIFIC_HEAT_CONSTANT_PRESSURE * temperature * mass)
 
 
 def proportional_opening(excess: Value, band: Value) -> Value:

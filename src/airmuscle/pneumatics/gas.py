@@ -22,9 +22,9 @@ GAS_CONSTANT = 287.05
 """Specific gas constant of dry air [J/(kg K)]."""
 HEAT_CAPACITY_RATIO = 1.4
 """Ratio of the specific heats of a diatomic ideal gas, as dry air is taken for here."""
-HEAT_AT_CONSTANT_VOLUME = GAS_CONSTANT / (HEAT_CAPACITY_RATIO - 1.0)
+SPECIFIC_HEAT_CONSTANT_VOLUME = GAS_CONSTANT / (HEAT_CAPACITY_RATIO - 1.0)
 """Specific heat c_v of dry air [J/(kg K)]."""
-HEAT_AT_CONSTANT_PRESSURE = HEAT_CAPACITY_RATIO * HEAT_AT_CONSTANT_VOLUME
+SPECIFIC_HEAT_CONSTANT_PRESSURE = HEAT_CAPACITY_RATIO * SPECIFIC_HEAT_CONSTANT_VOLUME
 """Specific heat c_p of dry air [J/(kg K)]."""
 REFERENCE_DENSITY = 1.185
 """Density of air at the reference atmosphere of ISO 8778, 100 kPa and 293.15 K [kg/m3]."""
@@ -56,19 +56,19 @@ class Ambient:
     )
 
 
-def absolute(pressure: Value, ambient: Ambient) -> Value:
+def absolute_pressure(pressure: Value, ambient: Ambient) -> Value:
     """Absolute pressure [Pa] from gauge pressure [Pa]; the one place where gauge becomes absolute."""
     return pressure + ambient.pressure
 
 
-def gauge(pressure: Value, ambient: Ambient) -> Value:
+def gauge_pressure(pressure: Value, ambient: Ambient) -> Value:
     """Gauge pressure [Pa] from absolute pressure [Pa]."""
     return pressure - ambient.pressure
 
 
 def check_above_vacuum(pressure: float, ambient: Ambient) -> None:
     """Raise ParameterError for a gauge pressure [Pa] at or below absolute zero."""
-    if not absolute(pressure, ambient) > 0:
+    if not absolute_pressure(pressure, ambient) > 0:
         raise ParameterError(
             f"a gauge pressure of {pressure / 1e3:.6g} kPa lies below absolute zero "
             f"({-ambient.pressure / 1e3:.6g} kPa gauge). Is it in another unit?"
@@ -258,7 +258,7 @@ class EnergyBalance(Gas):
 
     def air(self, content: Mapping[str, Value], volume: Value, ambient: Ambient) -> Air:
         energy = content["internal_energy"]
-        temperature = energy / (content["air_mass"] * HEAT_AT_CONSTANT_VOLUME)
+        temperature = energy / (content["air_mass"] * SPECIFIC_HEAT_CONSTANT_VOLUME)
         return Air((HEAT_CAPACITY_RATIO - 1.0) * energy / volume, temperature)
 
     def state_at(self, pressure: Value, volume: Value, ambient: Ambient) -> dict[str, Value]:

@@ -11,7 +11,7 @@ from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from .circuit import SUPPLY, Circuit, CircuitFlows
-from .fill_discharge import surroundings
+from .fill_discharge import ambient_air
 from .flow import orifice_flow
 from .gas import Air, Ambient
 from .orifice import Orifice
@@ -29,15 +29,15 @@ class WithLeak(CircuitWrapper):
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         return self.circuit.own_states(ambient)
 
-    def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
-        return self.circuit.own_settled(airs, ambient)
+    def own_steady_state(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        return self.circuit.own_steady_state(airs, ambient)
 
     def supplied_flow(
         self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
         done = self.circuit.supplied_flow(inlet, airs, state, inputs, ambient)
-        lost = [orifice_flow(self.leak, air, surroundings(ambient)) for air in airs]
+        lost = [orifice_flow(self.leak, air, ambient_air(ambient)) for air in airs]
         flows = tuple(flow - leaking for flow, leaking in zip(done.flows, lost, strict=True))
         return dataclasses.replace(done, flows=flows, exhausted=sum(lost, done.exhausted))
 
@@ -70,31 +70,31 @@ class Manifold(Circuit):
                     f"Manifold: branch '{name}' has a supply of its own; give it SharedSupply(), as the manifold feeds it."
                 )
 
-    def _parts(self) -> Iterator[tuple[str, Circuit]]:
+    def _named_branches(self) -> Iterator[tuple[str, Circuit]]:
         return zip((f"{name}." for name in self.names), self.branches, strict=True)
 
     @property
-    def ports(self) -> int:
-        return sum(branch.ports for branch in self.branches)
+    def port_count(self) -> int:
+        return sum(branch.port_count for branch in self.branches)
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        return tuple(i for name, branch in self._parts() for i in add_prefix(name, branch.inputs))
+        return tuple(i for name, branch in self._named_branches() for i in add_prefix(name, branch.inputs))
 
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        return tuple(s for name, branch in self._parts() for s in add_prefix(name, branch.own_states(ambient)))
+        return tuple(s for name, branch in self._named_branches() for s in add_prefix(name, branch.own_states(ambient)))
 
-    def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+    def own_steady_state(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
         found: dict[str, Value] = {}
         left = list(airs)
-        for name, branch in self._parts():
-            mine, left = tuple(left[: branch.ports]), left[branch.ports :]
-            found |= with_prefix(name, branch.own_settled(mine, ambient))
+        for name, branch in self._named_branches():
+            mine, left = tuple(left[: branch.port_count]), left[branch.port_count :]
+            found |= with_prefix(name, branch.own_steady_state(mine, ambient))
         return found
 
     def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
         found: dict[str, str] = {}
-        for name, branch in self._parts():
+        for name, branch in self._named_branches():
             found |= with_prefix(name, branch.validity_warnings(select_prefix(name, columns), ambient))
         return found
 
@@ -103,8 +103,8 @@ class Manifold(Circuit):
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
         total, left = CircuitFlows(()), list(airs)
-        for name, branch in self._parts():
-            mine, left = tuple(left[: branch.ports]), left[branch.ports :]
+        for name, branch in self._named_branches():
+            mine, left = tuple(left[: branch.port_count]), left[branch.port_count :]
             done = branch.supplied_flow(inlet, mine, select_prefix(name, state), select_prefix(name, inputs), ambient)
             total = CircuitFlows(
                 total.flows + done.flows, total.drawn + done.drawn, total.exhausted + done.exhausted,

@@ -10,9 +10,9 @@ from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.variables import Input, StateVariable
 from .circuit import Circuit, CircuitFlows
-from .fill_discharge import surroundings
+from .fill_discharge import ambient_air
 from .flow import orifice_flow, proportional_opening
-from .gas import NO_FLOW, Air, Ambient, Flow, absolute, gauge
+from .gas import NO_FLOW, Air, Ambient, Flow, absolute_pressure, gauge_pressure
 from .orifice import Orifice
 from .supply import AirSource
 
@@ -45,16 +45,16 @@ class ProportionalValve(Circuit):
     discharge: Orifice
     spool: SecondOrderLag
     overlap: float = parameter("1", "o", "overlap, share of the stroke", bounds=(-0.5, 0.9), default=0.0)
-    muscles: int = 1
+    muscle_count: int = 1
     """How many muscles it feeds, one or two."""
 
     def check(self) -> None:
-        if isinstance(self.muscles, bool) or self.muscles not in (1, 2):
-            raise ParameterError(f"ProportionalValve: it feeds one muscle or two, not {self.muscles!r}.")
+        if isinstance(self.muscle_count, bool) or self.muscle_count not in (1, 2):
+            raise ParameterError(f"ProportionalValve: it feeds one muscle or two, not {self.muscle_count!r}.")
 
     @property
-    def ports(self) -> int:
-        return self.muscles
+    def port_count(self) -> int:
+        return self.muscle_count
 
     @property
     def inputs(self) -> tuple[Input, ...]:
@@ -65,7 +65,7 @@ class ProportionalValve(Circuit):
         return (StateVariable("spool", "1", 1.0, "place of the spool"),
                 StateVariable("spool_speed", "1/s", speed, "speed of the spool"))  # fmt: skip
 
-    def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+    def own_steady_state(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
         return {"spool": 0.0, "spool_speed": 0.0}
 
     def opening(self, place: Value) -> Value:
@@ -79,7 +79,7 @@ class ProportionalValve(Circuit):
         place, flows, drawn, exhausted = state["spool"], [], NO_FLOW, NO_FLOW
         for air, towards in zip(airs, (place, -place), strict=False):
             incoming = orifice_flow(self.fill, inlet, air, self.opening(towards))
-            outgoing = orifice_flow(self.discharge, air, surroundings(ambient), self.opening(-towards))
+            outgoing = orifice_flow(self.discharge, air, ambient_air(ambient), self.opening(-towards))
             flows.append(incoming - outgoing)
             drawn, exhausted = drawn + incoming, exhausted + outgoing
         moving, pushed = self.spool.rates(place, state["spool_speed"], inputs["command"])
@@ -112,17 +112,17 @@ class ProportionalRegulator(Circuit):
         return (StateVariable("regulated", "Pa", 1e5, "gauge pressure that it regulates to"),
                 StateVariable("regulated_rate", "Pa/s", rate, "rate of that pressure"))  # fmt: skip
 
-    def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
-        return {"regulated": gauge(airs[0].pressure, ambient), "regulated_rate": 0.0}
+    def own_steady_state(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        return {"regulated": gauge_pressure(airs[0].pressure, ambient), "regulated_rate": 0.0}
 
     def supplied_flow(
         self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
         (air,) = airs
-        error = absolute(state["regulated"], ambient) - air.pressure
+        error = absolute_pressure(state["regulated"], ambient) - air.pressure
         incoming = orifice_flow(self.fill, inlet, air, proportional_opening(error, self.band))
-        outgoing = orifice_flow(self.discharge, air, surroundings(ambient), proportional_opening(-error, self.band))
+        outgoing = orifice_flow(self.discharge, air, ambient_air(ambient), proportional_opening(-error, self.band))
         moving, pushed = self.lag.rates(state["regulated"], state["regulated_rate"], inputs["setpoint"])
         flow: Flow = incoming - outgoing
         return CircuitFlows((flow,), incoming, outgoing, {"regulated": moving, "regulated_rate": pushed})

@@ -11,7 +11,7 @@ from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.variables import StateVariable, add_prefix, select_prefix, with_prefix
 from .flow import orifice_flow, proportional_opening
-from .gas import Air, Ambient, Flow, Gas, Isothermal, absolute
+from .gas import Air, Ambient, Flow, Gas, Isothermal, absolute_pressure
 from .orifice import Orifice
 
 
@@ -42,7 +42,7 @@ class Supply(AirSource):
     pressure: float = parameter("Pa", "p_s", "gauge pressure of the supply", bounds=(-1e5, 5e6))
 
     def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
-        return Air(absolute(self.pressure, ambient), ambient.temperature)
+        return Air(absolute_pressure(self.pressure, ambient), ambient.temperature)
 
 
 @model
@@ -123,7 +123,7 @@ class RegulatedSupply(AirSource):
 
     def steady_state(self, ambient: Ambient) -> dict[str, Value]:
         before = self.supply.steady_state(ambient)
-        pressure = ops.minimum(absolute(self.pressure, ambient), self.supply.air(before, ambient).pressure)
+        pressure = ops.minimum(absolute_pressure(self.pressure, ambient), self.supply.air(before, ambient).pressure)
         return {**self.gas.state_at(pressure, self.volume, ambient), **with_prefix("supply.", before)}
 
     def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
@@ -131,7 +131,7 @@ class RegulatedSupply(AirSource):
 
     def balance(self, state: Mapping[str, Value], drawn: Flow, ambient: Ambient) -> tuple[dict[str, Value], Flow]:
         before, inside = select_prefix("supply.", state), self.air(state, ambient)
-        opening = proportional_opening(absolute(self.pressure, ambient) - inside.pressure, self.band)
+        opening = proportional_opening(absolute_pressure(self.pressure, ambient) - inside.pressure, self.band)
         fed = orifice_flow(self.valve, self.supply.air(before, ambient), inside, opening)
         further, taken = self.supply.balance(before, fed, ambient)
         rates = self.gas.rates(state, inside, fed - drawn, 0.0, ambient)

@@ -26,7 +26,7 @@ ECKERSTEN = Reference(
     1975,
     note="conductance and critical ratio of a tube; second hand, held against Darcy's law in the tests",
 )
-_ANY = Valve(1e-8, 0.3)
+_TEMPLATE_VALVE = Valve(1e-8, 0.3)
 
 
 @model
@@ -55,7 +55,7 @@ class TubeOrifice(Orifice):
         return 474.0 * self.conductance / self.diameter**2
 
     def mass_flow(self, upstream: Value, downstream: Value, opening: Value, temperature: Value) -> Value:
-        valve = unflatten(_ANY, (self.conductance, self.critical_ratio, _ANY.laminar_ratio))
+        valve = unflatten(_TEMPLATE_VALVE, (self.conductance, self.critical_ratio, _TEMPLATE_VALVE.laminar_ratio))
         return valve.mass_flow(upstream, downstream, opening, temperature)
 
 
@@ -71,41 +71,41 @@ class Tube(TubeModel):
 
     orifice: Orifice
     volume: float = parameter("m3", "V_t", "volume of the tube", bounds=(1e-9, 1e-2))
-    pieces: int = 1
+    segment_count: int = 1
     gas: Gas = Isothermal()
 
     @classmethod
-    def of_size(cls, length: float, diameter: float, pieces: int = 1, gas: Gas = Isothermal()) -> Tube:
+    def from_dimensions(cls, length: float, diameter: float, pieces: int = 1, gas: Gas = Isothermal()) -> Tube:
         """The tube of a length and an inner diameter [m]: its volume, and the flow of a `TubeOrifice`."""
         return cls(TubeOrifice(length, diameter), ops.pi / 4.0 * diameter**2 * length, pieces, gas)
 
     def check(self) -> None:
-        check_segment_count("Tube", self.pieces)
+        check_segment_count("Tube", self.segment_count)
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        of_piece = self.gas.states(self.volume / self.pieces, ambient)
-        return tuple(state for name in self.names for state in add_prefix(name, of_piece))
+        of_piece = self.gas.states(self.volume / self.segment_count, ambient)
+        return tuple(state for name in self.prefixes for state in add_prefix(name, of_piece))
 
     def steady_state(self, air: Air, ambient: Ambient) -> dict[str, Value]:
-        content = self.gas.state_at(air.pressure, self.volume / self.pieces, ambient)
-        return {name: value for prefix in self.names for name, value in with_prefix(prefix, content).items()}
+        content = self.gas.state_at(air.pressure, self.volume / self.segment_count, ambient)
+        return {name: value for prefix in self.prefixes for name, value in with_prefix(prefix, content).items()}
 
     def air_states(self, state: Mapping[str, Value], ambient: Ambient) -> tuple[Air, ...]:
-        held = (select_prefix(name, state) for name in self.names)
-        return tuple(self.gas.air(content, self.volume / self.pieces, ambient) for content in held)
+        held = (select_prefix(name, state) for name in self.prefixes)
+        return tuple(self.gas.air(content, self.volume / self.segment_count, ambient) for content in held)
 
     def rates(
         self, state: Mapping[str, Value], airs: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
     ) -> tuple[dict[str, Value], Flow]:
         rates: dict[str, Value] = {}
-        for name, air, after in zip(self.names, airs, (*airs[1:], muscle), strict=True):
-            onward = orifice_flow(self.orifice, air, after, self.pieces**0.5)
+        for name, air, after in zip(self.prefixes, airs, (*airs[1:], muscle), strict=True):
+            onward = orifice_flow(self.orifice, air, after, self.segment_count**0.5)
             rates |= with_prefix(name, self.gas.rates(select_prefix(name, state), air, flow - onward, 0.0, ambient))
             flow = onward
         return rates, flow
 
 
-def check_segment_count(owner: str, pieces: int) -> None:
+def check_segment_count(owner: str, segment_count: int) -> None:
     """Raise ParameterError unless a tube is cut into 1 to 200 pieces."""
     if isinstance(pieces, bool) or not (isinstance(pieces, int) and 1 <= pieces <= 200):
-        raise ParameterError(f"{owner}: pieces is {pieces!r}; give a whole number from 1 to 200.")
+        raise ParameterError(f"{owner}: segment_count is {segment_count!r}; give a whole number from 1 to 200.")

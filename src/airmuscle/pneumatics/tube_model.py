@@ -16,12 +16,12 @@ class TubeModel(abc.ABC):
     """A tube of one model or another. States are mappings by the names of `states`."""
 
     references: ClassVar[tuple[Reference, ...]] = ()
-    pieces: int
+    segment_count: int
 
     @property
-    def names(self) -> tuple[str, ...]:
+    def prefixes(self) -> tuple[str, ...]:
         """What the names of each piece's states begin with, from the valve to the muscle."""
-        return ("tube.",) if self.pieces == 1 else tuple(f"tube{i}." for i in range(1, self.pieces + 1))
+        return ("tube.",) if self.segment_count == 1 else tuple(f"tube{i}." for i in range(1, self.segment_count + 1))
 
     @abc.abstractmethod
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:

@@ -22,8 +22,8 @@ class CircuitWrapper(Circuit, abc.ABC):
         return self.circuit.supply
 
     @property
-    def ports(self) -> int:
-        return self.circuit.ports
+    def port_count(self) -> int:
+        return self.circuit.port_count
 
     def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
         return self.circuit.validity_warnings(columns, ambient)

@@ -27,24 +27,26 @@ from ..core.declaration import Parameter, parameters
 from ..core.errors import ParameterError
 from ..core.variables import Input
 from ..library.build import build
-from ..library.location import Location, checked, finite, located_errors, number
+from ..library.location import Location, check_type, read_finite_number, located_errors, read_number
 from ..library.models import model_class, model_names
 from ..plant.columns import units_of
 from ..plant.plant import Plant
-from .inputs import command_from, drivers_from
+from .inputs import build_input_signal, build_drivers
 
-KEYS = ("period", "setpoint")
+LOOP_KEYS = ("period", "setpoint")
 """Keys of the table that are no parameters of the controller."""
 
 
-def units_around(plant: Plant, start: Mapping[str, float]) -> dict[str, str]:
+def signal_units(plant: Plant, start: Mapping[str, float]) -> dict[str, str]:
     """The units of the states, outputs and inputs that a run of a plant has in columns; '' where none is known."""
     outputs = list(plant.outputs(start, dict.fromkeys(plant.inputs, 0.0)))
     units = units_of(plant, outputs)
     return {name: units[name] for name in (*(s.name for s in plant.states), *outputs, *plant.inputs)}
 
 
-def loop_from(table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], place: Location) -> ControlLoop:
+def build_control_loop(
+    table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], place: Location
+) -> ControlLoop:
     """The loop that the table [command] with a controller describes; `units` are those of `units_around`.
 
     Raises ParameterError, UnitError, UnknownName, FileError or ColumnError.
@@ -52,15 +54,15 @@ def loop_from(table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], 
     at, given = place.inside("controller"), table["controller"]
     if not isinstance(given, Mapping):
         raise ParameterError(f'{at} is {given!r}; write model = "PID", its parameters, period and setpoint under it.')
-    controller = _controller({k: v for k, v in given.items() if k not in KEYS}, plant.inputs, units, at)
+    controller = _controller({k: v for k, v in given.items() if k not in LOOP_KEYS}, plant.inputs, units, at)
     for key, example in (("period", 'period = "10 ms"'), ("setpoint", f"[{at.table}.setpoint]")):
         if key not in given:
             raise ParameterError(f"{at}: '{key}' is missing; write {example}.")
     beside = {key: value for key, value in table.items() if key not in ("controller", "drivers")}
-    period = finite(given["period"], "s", f"{at}, period")
+    period = read_finite_number(given["period"], "s", f"{at}, period")
     setpoint = _setpoint(given["setpoint"], controller, units, at.inside("setpoint"))
-    others = command_from(beside, plant.commands, place)
-    drivers = drivers_from(table.get("drivers", {}), plant.inputs, place.inside("drivers"))
+    others = build_input_signal(beside, plant.commands, place)
+    drivers = build_drivers(table.get("drivers", {}), plant.inputs, place.inside("drivers"))
     with located_errors(at):
         loop = ControlLoop(controller, period, setpoint, others, drivers)
         loop.check_columns([name for name in units if name not in plant.inputs], plant.inputs)
@@ -78,13 +80,13 @@ def _controller(
             known = [n for n in model_names() if issubclass(model_class(n, ""), Controller)]
             raise ParameterError(f"{place}: {cls.__name__} is no controller; there are {', '.join(known)}.")
         relative = {p.name: p for p in parameters(cls) if p.unit in RELATIVE and p.name in table}
-    draft: Controller = checked(build({**table, **dict.fromkeys(relative, 1.0)}, place), Controller, place)
+    draft: Controller = check_type(build({**table, **dict.fromkeys(relative, 1.0)}, place), Controller, place)
     with located_errors(place):
         check_present(draft, [name for name in units if name not in inputs], inputs)
     if relative and len({units[name] for name in draft.inputs}) > 1:
         raise ParameterError(f"{place}: {' and '.join(draft.inputs)} have different units; name inputs of one kind.")
     numbers = {
-        name: number(table[name], _unit(p, draft, units), f"{place}, {name}", f" ({p.symbol}, {p.meaning})")
+        name: read_number(table[name], _unit(p, draft, units), f"{place}, {name}", f" ({p.symbol}, {p.meaning})")
         for name, p in relative.items()
     }
     found: Controller = build({**table, **numbers}, place)
@@ -104,10 +106,10 @@ def _setpoint(given: Any, controller: Controller, units: Mapping[str, str], plac
     if "drivers" in given:
         raise ParameterError(f"{place}: a set point has no drivers; write [command.drivers] for those of the inputs.")
     followed = [Input(name, units.get(name) or "1", -math.inf, math.inf) for name in names]
-    return command_from(given, followed, place, "the controller has no set point")
+    return build_input_signal(given, followed, place, "the controller has no set point")
 
 
-def numbers_of(
+def controller_number_paths(
     table: Mapping[str, Any], loop: ControlLoop, units: Mapping[str, str]
 ) -> Iterator[tuple[tuple[str | int, ...], str]]:
     """Where in the table [command.controller] numbers stand or may stand, and the unit of each, for studies."""

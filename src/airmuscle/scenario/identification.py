@@ -42,16 +42,16 @@ from ..core.errors import ParameterError
 from ..identify.dynamic import DynamicFit, Experiment, InitialConditions, StartTime, StartValue, fit_dynamic
 from ..identify.dynamic.experiment import Own, Shared
 from ..library.build import build
-from ..library.catalogue import parsed
-from ..library.location import Location, check_keys, checked, finite, located_errors, text
+from ..library.catalogue import read_toml
+from ..library.location import Location, check_keys, check_type, read_finite_number, located_errors, read_text
 from ..library.write import scenario_toml
 from ..plant.plant import Plant
 from ..recording import Recording, read
 from ..recording.columns import quantity_of
 from ..simulation.arguments import check_input_range
 from ..simulation.integrators import Integrator
-from .inputs import command_from
-from .scenario import plant_from
+from .inputs import build_input_signal
+from .scenario import build_plant
 
 _TABLES = ("title", "plant", "command", "observed", "fit", "record")
 _FIT = ("free", "own", "start_time", "start", "starts", "seed", "method", "bounds")
@@ -61,7 +61,7 @@ FIRST_ROWS = 3
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class DynamicStudy:
+class DynamicFitSetup:
     """Records, their plant, and what is to be found; all numbers SI."""
 
     title: str
@@ -103,13 +103,13 @@ class DynamicStudy:
         return scenario_toml(f"{self.title}, {origin}", plant, self.commands[record], run, note)
 
 
-def load_study(path: str | Path) -> DynamicStudy:
+def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
     """The study in a file. Raises FileError, ParameterError, UnitError, UnknownName or ColumnError, saying where."""
     file = Path(path)
-    tables = parsed(file)
+    tables = read_toml(file)
     place = Location(str(file), "", file.parent)
     check_keys(tables, _TABLES, place)
-    plant = plant_from(_table(tables, "plant", place), place.inside("plant"))
+    plant = build_plant(_table(tables, "plant", place), place.inside("plant"))
     observed = _observed(_table(tables, "observed", place), plant, place.inside("observed"))
     records = tables.get("record")
     if not isinstance(records, list) or not records:
@@ -120,8 +120,8 @@ def load_study(path: str | Path) -> DynamicStudy:
     ]
     wanted, at = _table(tables, "fit", place), place.inside("fit")
     check_keys(wanted, _FIT, at)
-    return DynamicStudy(
-        title=text(tables, "title", place, needed=False) or file.stem,
+    return DynamicFitSetup(
+        title=read_text(tables, "title", place, needed=False) or file.stem,
         plant=plant,
         experiments=tuple(experiment for experiment, _ in read_so_far),
         commands=tuple(command for _, command in read_so_far),
@@ -162,7 +162,7 @@ def _method(table: Mapping[str, Any], place: Location) -> Integrator | None:
     if given is None:
         return None
     at = place.inside("method")
-    found: Integrator = checked(build({"model": given} if isinstance(given, str) else given, at), Integrator, at)
+    found: Integrator = check_type(build({"model": given} if isinstance(given, str) else given, at), Integrator, at)
     return found
 
 
@@ -181,10 +181,10 @@ def _observed(table: Mapping[str, Any], plant: Plant, place: Location) -> dict[s
     for name, given in table.items():
         entry = given if isinstance(given, Mapping) else {"deviation": given}
         check_keys(entry, ("deviation", "column"), place.inside(name))
-        deviation = finite(entry.get("deviation"), _unit(name, plant), f"{place}, {name}")
+        deviation = read_finite_number(entry.get("deviation"), _unit(name, plant), f"{place}, {name}")
         if not deviation > 0:
             raise ParameterError(f"{place}, {name} is {deviation:g}; a sensor's standard deviation is above zero.")
-        found[name] = deviation, text(entry, "column", place.inside(name), needed=False) or name
+        found[name] = deviation, read_text(entry, "column", place.inside(name), needed=False) or name
     if not found:
         raise ParameterError(f'{place}: nothing is observed; write pressure = "500 Pa", its sensor\'s deviation.')
     return found
@@ -208,7 +208,7 @@ def _own(table: Mapping[str, Any], plant: Plant, place: Location) -> tuple[Own, 
 
 
 def _positive(given: Any, unit: str, where: str) -> float:
-    found = finite(given, unit, where)
+    found = read_finite_number(given, unit, where)
     if not found > 0:
         raise ParameterError(f"{where} is {given!r}; it must be greater than zero.")
     return found
@@ -221,7 +221,7 @@ def _bounds(table: Mapping[str, Any], plant: Plant, place: Location) -> dict[str
         check_keys({path: given}, tuple(declared), place)
         if not isinstance(given, list) or len(given) != 2:
             raise ParameterError(f"{place}, {path} is {given!r}; write the least and the greatest value, [1.01, 1.4].")
-        low, high = (finite(end, declared[path].unit, f"{place}, {path}") for end in given)
+        low, high = (read_finite_number(end, declared[path].unit, f"{place}, {path}") for end in given)
         least, greatest = declared[path].bounds
         if low < least or high > greatest:
             raise ParameterError(f"{place}, {path} is {given!r}; allowed are {least:g} to {greatest:g}.")
@@ -250,8 +250,8 @@ class _Record:
         if "file" in table:  # so that it can be written elsewhere
             table["file"] = str((self.place.folder / str(table["file"])).resolve())
         recording, at = self.recording(observed), self.place.inside("command")
-        start_time = finite(self.row.get("start_time", 0.0), "s", f"{self.place}, start_time")
-        command = command_from(table, plant.commands, at)
+        start_time = read_finite_number(self.row.get("start_time", 0.0), "s", f"{self.place}, start_time")
+        command = build_input_signal(table, plant.commands, at)
         with located_errors(at):
             length = max(float(recording["time"][-1]) - start_time, 1e-9)
             check_input_range(plant, command.segments(plant.inputs, 0.0, length), 0.0)
@@ -260,11 +260,11 @@ class _Record:
     def plant(self) -> Plant:
         """The shared plant, with the parts that this record states put in their place."""
         other = _table(self.row, "plant", self.place, needed=False)
-        return plant_from({**self.tables["plant"], **other}, self.place.inside("plant")) if other else self.shared
+        return build_plant({**self.tables["plant"], **other}, self.place.inside("plant")) if other else self.shared
 
     def recording(self, observed: Mapping[str, tuple[float, str]]) -> Recording:
         """The part of the file that is used, with the observed columns under the names of the outputs."""
-        name = text(self.row, "file", self.place, needed=True)
+        name = read_text(self.row, "file", self.place, needed=True)
         told = {key: self.row[key] for key in ("mapping", "resting_length") if key in self.row}
         if "mapping" in told:
             told["mapping"] = self.place.folder / told["mapping"]
@@ -278,7 +278,7 @@ class _Record:
 
     def cut(self, recording: Recording) -> Recording:
         """The rows from `first` to `last`."""
-        ends = [finite(self.row[key], "s", f"{self.place}, {key}") if key in self.row else other
+        ends = [read_finite_number(self.row[key], "s", f"{self.place}, {key}") if key in self.row else other
                 for key, other in (("first", -np.inf), ("last", np.inf))]  # fmt: skip
         rows = (recording["time"] >= ends[0]) & (recording["time"] <= ends[1])
         if not rows.any():
@@ -291,7 +291,7 @@ class _Record:
         """Rest at a pressure, or the state that is stated."""
         at = self.place.inside("start")
         given = dict(_table(self.row, "start", self.place, needed=False))
-        values = {name: finite(value, _unit(name, plant), f"{at}, {name}") for name, value in given.items()}
+        values = {name: read_finite_number(value, _unit(name, plant), f"{at}, {name}") for name, value in given.items()}
         sensed = [name for name in recording if name.rpartition(".")[2] == "pressure"]
         usual = float(np.median(recording[sensed[0]][:FIRST_ROWS])) if sensed else 0.0
         pressure = values.pop("pressure", usual)

@@ -20,15 +20,15 @@ from ..control.inputs import NO_INPUT, InputSignal, Periodic, SampledSignal, Sch
 from ..core.errors import ColumnError, ParameterError
 from ..core.variables import Input
 from ..library.build import build
-from ..library.location import Location, check_keys, checked, finite, located_errors, text
+from ..library.location import Location, check_keys, check_type, read_finite_number, located_errors, read_text
 from ..library.models import model_class
 
-KEYS = ("model", "period", "file", "columns", "drivers")
+RESERVED_KEYS = ("model", "period", "file", "columns", "drivers")
 """Keys of the table that are no inputs."""
 Points = tuple[tuple[float, float], ...]
 
 
-def command_from(
+def build_input_signal(
     table: Mapping[str, Any], commands: Sequence[Input], place: Location, lacks: str = NO_INPUT
 ) -> InputSignal:
     """The command that the table describes. Raises ParameterError, UnitError, UnknownName, FileError or ColumnError;
@@ -39,25 +39,25 @@ def command_from(
         )
     units = {given.name: given.unit for given in commands}
     inputs = tuple(units)
-    rows = {key: value for key, value in table.items() if key not in KEYS}
+    rows = {key: value for key, value in table.items() if key not in RESERVED_KEYS}
     with located_errors(place):
         check_input_names(list(rows), inputs, lacks)
-    points = _recorded(table, units, place)
+    points = _read_points(table, units, place)
     for key, given in rows.items():
         if key in points:
             raise ParameterError(f"{place}: '{key}' stands in the file and here too; take it out of one of them.")
         points[key] = tuple(_point(row, units[key], f"{place}, {key}") for row in _list(given, f"{place}, {key}"))
     with located_errors(place):
-        command: InputSignal = _kind(table, place)(points)
+        command: InputSignal = _signal_class(table, place)(points)
     if "period" in table:
-        length = finite(table["period"], "s", f"{place}, period")
+        length = read_finite_number(table["period"], "s", f"{place}, period")
         with located_errors(place):
             command = Periodic(command, length)
-    drivers = drivers_from(table.get("drivers", {}), inputs, place.inside("drivers"))
+    drivers = build_drivers(table.get("drivers", {}), inputs, place.inside("drivers"))
     return WithDrivers(command, drivers) if drivers else command
 
 
-def _kind(table: Mapping[str, Any], place: Location) -> type[Schedule] | type[SampledSignal]:
+def _signal_class(table: Mapping[str, Any], place: Location) -> type[Schedule] | type[SampledSignal]:
     kind = model_class(table.get("model", "SampledSignal" if "file" in table else "Schedule"), f"{place}, model")
     if not issubclass(kind, Schedule | SampledSignal):
         raise ParameterError(f"{place}: {kind.__name__} is no command; there are Schedule and Signal.")
@@ -73,10 +73,10 @@ def _list(rows: Any, where: str) -> list[Any]:
 def _point(row: Any, unit: str, where: str) -> tuple[float, float]:
     if not (isinstance(row, list) and len(row) == 2):
         raise ParameterError(f'{where} holds {row!r}; each is an instant and a value, ["5 s", 1].')
-    return finite(row[0], "s", where), finite(row[1], unit, where)
+    return read_finite_number(row[0], "s", where), read_finite_number(row[1], unit, where)
 
 
-def _recorded(table: Mapping[str, Any], units: Mapping[str, str], place: Location) -> dict[str, Points]:
+def _read_points(table: Mapping[str, Any], units: Mapping[str, str], place: Location) -> dict[str, Points]:
     """The points of the inputs that follow a column of a data file; none where no file is named."""
     columns, inputs = table.get("columns"), tuple(units)
     if "file" not in table:
@@ -86,7 +86,7 @@ def _recorded(table: Mapping[str, Any], units: Mapping[str, str], place: Locatio
     from ..recording import read_csv  # pandas, which no other command needs
     from ..recording.heading import stated_unit
 
-    path = text(table, "file", place, needed=True)
+    path = read_text(table, "file", place, needed=True)
     with located_errors(place):
         recording = read_csv(place.folder / path)
         if columns is None:
@@ -106,7 +106,7 @@ def _recorded(table: Mapping[str, Any], units: Mapping[str, str], place: Locatio
         return {name: tuple(points) for name, points in signal.points.items()}
 
 
-def drivers_from(table: Any, inputs: Sequence[str], place: Location) -> dict[str, Driver | tuple[Driver, ...]]:
+def build_drivers(table: Any, inputs: Sequence[str], place: Location) -> dict[str, Driver | tuple[Driver, ...]]:
     """The drivers of the inputs that the table [command.drivers] names."""
     if not isinstance(table, Mapping):
         raise ParameterError(
@@ -114,31 +114,31 @@ def drivers_from(table: Any, inputs: Sequence[str], place: Location) -> dict[str
         )
     with located_errors(place):
         check_input_names(list(table), inputs)
-    return {name: _chain(given, place.inside(name)) for name, given in table.items()}
+    return {name: _build_chain(given, place.inside(name)) for name, given in table.items()}
 
 
-def _chain(given: Any, place: Location) -> Driver | tuple[Driver, ...]:
+def _build_chain(given: Any, place: Location) -> Driver | tuple[Driver, ...]:
     if isinstance(given, list):
-        return tuple(_driver(each, place.inside(f"[{i}]")) for i, each in enumerate(given))
-    return _driver(given, place)
+        return tuple(_build_driver(each, place.inside(f"[{i}]")) for i, each in enumerate(given))
+    return _build_driver(given, place)
 
 
-def _driver(given: Any, place: Location) -> Driver:
+def _build_driver(given: Any, place: Location) -> Driver:
     if isinstance(given, Mapping) and "library" in given and "model" not in given:
         check_keys(given, ("library",), place)
-        return _of_catalogue(text(given, "library", place, needed=True), place)
-    found: Driver = checked(build({"model": given} if isinstance(given, str) else given, place), Driver, place)
+        return _library_driver(read_text(given, "library", place, needed=True), place)
+    found: Driver = check_type(build({"model": given} if isinstance(given, str) else given, place), Driver, place)
     return found
 
 
-def _of_catalogue(name: str, place: Location) -> SolenoidDriver:
+def _library_driver(name: str, place: Location) -> SolenoidDriver:
     """The delays of a valve of the catalogue, or of a file beside the scenario; its motion is part of them."""
     from ..library.valve_catalogue import load_valve
 
     with located_errors(place):
         valve = load_valve(place.folder / name if name.endswith(".toml") else name)
-        if valve.response is None:
+        if valve.switching_times is None:
             raise ParameterError(
                 f'{valve.name}: no response is published; write model = "SolenoidDriver" and its opening_delay.'
             )
-    return SolenoidDriver(valve.response.opening_delay, valve.response.closing_delay)
+    return SolenoidDriver(valve.switching_times.opening_delay, valve.switching_times.closing_delay)

@@ -34,22 +34,22 @@ from ..control.driver import WithDrivers
 from ..control.inputs import InputSignal
 from ..core.errors import ParameterError, suggestion
 from ..library.build import build
-from ..library.catalogue import load, parsed
+from ..library.catalogue import load, read_toml
 from ..library.entry import Entry
-from ..library.location import Location, check_keys, checked, finite, located_errors, text
+from ..library.location import Location, check_keys, check_type, read_finite_number, located_errors, read_text
 from ..muscle import Muscle
 from ..plant.plant import Plant
 from ..recording import Recording
 from ..simulation.arguments import check_input_range
 from ..simulation.integrators import Integrator, Rodas4
 from ..simulation.simulate import simulate
-from .controller import loop_from, units_around
-from .inputs import command_from
+from .controller import build_control_loop, signal_units
+from .inputs import build_input_signal
 
 TABLES = ("title", "plant", "command", "run", "output")
 RUN = ("duration", "start_time", "output", "start", "method")
 OUTPUT = ("columns",)
-AMBIENT: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
+DEFAULT_START: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
 """A run begins at rest at ambient pressure unless it says otherwise."""
 
 
@@ -81,7 +81,7 @@ class Scenario:
             complete=complete,
         )
 
-    def chosen(self, recording: Recording) -> Recording:
+    def select_columns(self, recording: Recording) -> Recording:
         """The recording with the columns that the scenario asks for."""
         kept = {name: recording[name] for name in recording if not self.columns or name in ("time", *self.columns)}
         return dataclasses.replace(recording, columns=kept)
@@ -90,10 +90,10 @@ class Scenario:
 def load_scenario(path: str | Path) -> Scenario:
     """The scenario in a file. Raises FileError, ParameterError, UnitError or UnknownName, saying where."""
     file = Path(path)
-    return scenario_from(parsed(file), Location(str(file), "", file.parent))
+    return build_scenario(read_toml(file), Location(str(file), "", file.parent))
 
 
-def scenario_from(
+def build_scenario(
     tables: Mapping[str, Any], place: Location, plant: Plant | None = None, rest: dict[str, float] | None = None
 ) -> Scenario:
     """The scenario that the tables of a file describe; a `plant` that is given stands for the table [plant], and a
@@ -106,23 +106,26 @@ def scenario_from(
     check_keys(run, RUN, at)
     if "duration" not in run:
         raise ParameterError(f"{at}: 'duration' is missing; write it like duration = \"25 s\".")
-    duration, start_time = _length(run, "duration", at), finite(run.get("start_time", 0.0), "s", f"{at}, start_time")
+    duration, start_time = (
+        _read_duration(run, "duration", at),
+        read_finite_number(run.get("start_time", 0.0), "s", f"{at}, start_time"),
+    )
     table = _table(tables.get("command", {}), "command", place)
-    start = _start(run.get("start", AMBIENT), plant, at.inside("start"), rest)
+    start = _start(run.get("start", DEFAULT_START), plant, at.inside("start"), rest)
     command = _command(table, plant, start, duration, place.inside("command"))
     shown = WithDrivers(command.other_inputs, command.drivers) if isinstance(command, ControlLoop) else command
     with located_errors(place.inside("command")):
         check_input_range(plant, shown.segments(plant.inputs, start_time, duration), start_time)
-    known = list(units_of_run(plant, start, command))
+    known = list(column_units(plant, start, command))
     return Scenario(
-        title=text(tables, "title", place, needed=False) or Path(place.file).stem,
+        title=read_text(tables, "title", place, needed=False) or Path(place.file).stem,
         plant=plant,
         command=command,
         duration=duration,
         start=start,
         start_time=start_time,
-        output=_length(run, "output", at) if "output" in run else None,
-        method=_object(run["method"], Integrator, at.inside("method")) if "method" in run else Rodas4(),
+        output=_read_duration(run, "output", at) if "output" in run else None,
+        method=_build_model(run["method"], Integrator, at.inside("method")) if "method" in run else Rodas4(),
         columns=_columns(_table(tables.get("output", {}), "output", place), known, place.inside("output")),
     )
 
@@ -138,22 +141,22 @@ def _command(
     table: Mapping[str, Any], plant: Plant, start: Mapping[str, float], duration: float, place: Location
 ) -> InputSignal | ControlLoop:
     if "controller" not in table:
-        return command_from(table, plant.commands, place)
-    loop = loop_from(table, plant, units_around(plant, start), place)
+        return build_input_signal(table, plant.commands, place)
+    loop = build_control_loop(table, plant, signal_units(plant, start), place)
     with located_errors(place.inside("controller")):
         loop.check_period(duration)
     return loop
 
 
-def units_of_run(plant: Plant, start: Mapping[str, float], command: InputSignal | ControlLoop) -> dict[str, str]:
+def column_units(plant: Plant, start: Mapping[str, float], command: InputSignal | ControlLoop) -> dict[str, str]:
     """The units of all columns that a run has; '' where none is known."""
-    units = {"time": "s"} | units_around(plant, start)
+    units = {"time": "s"} | signal_units(plant, start)
     return units | (command.units(units) if isinstance(command, ControlLoop) else {})
 
 
-def _length(table: Mapping[str, Any], key: str, place: Location) -> float:
+def _read_duration(table: Mapping[str, Any], key: str, place: Location) -> float:
     """A length of time [s]."""
-    found = finite(table[key], "s", f"{place}, {key}")
+    found = read_finite_number(table[key], "s", f"{place}, {key}")
     if not found > 0:
         raise ParameterError(f"{place}, {key} is {table[key]!r}; it must be greater than zero.")
     return found
@@ -169,7 +172,7 @@ def _plant(table: Mapping[str, Any], place: Location) -> Plant:
     else:
         found = _muscle(muscles, place.inside("muscle"))
     rest = {"model": "Plant", **{key: value for key, value in table.items() if key != "muscle"}}
-    plant: Plant = checked(build(rest, place, {"muscle": found}), Plant, place)
+    plant: Plant = check_type(build(rest, place, {"muscle": found}), Plant, place)
     return plant
 
 
@@ -177,7 +180,9 @@ def _muscle(given: Any, place: Location) -> Any:
     if isinstance(given, Mapping):
         rest = {"model": "Muscle", **given}
         base = rest.pop("library", None)
-        return build(rest, place, {} if base is None else _parts(_entry(base, place.inside("library")), rest, place))
+        return build(
+            rest, place, {} if base is None else _entry_parts(_entry(base, place.inside("library")), rest, place)
+        )
     entry = _entry(given, place)
     with located_errors(place):
         return entry.muscle
@@ -190,7 +195,7 @@ def _entry(given: Any, place: Location) -> Entry:
         return load(place.folder / given if given.endswith(".toml") else given)
 
 
-def _parts(entry: Entry, replaced: Mapping[str, Any], place: Location) -> dict[str, Any]:
+def _entry_parts(entry: Entry, replaced: Mapping[str, Any], place: Location) -> dict[str, Any]:
     """The parts of an entry that a table leaves as they are; what it lacks, such as a geometry, the table may give."""
     names = [f.name for f in dataclasses.fields(Muscle) if f.name not in ("contractile", "name")]
     parts = {"contractile": entry.characteristic, **{name: getattr(entry, name, None) for name in names}}
@@ -205,12 +210,12 @@ def _parts(entry: Entry, replaced: Mapping[str, Any], place: Location) -> dict[s
     return left
 
 
-def pressure_of_rest(tables: Mapping[str, Any], place: Location) -> float | None:
+def initial_pressure(tables: Mapping[str, Any], place: Location) -> float | None:
     """Gauge pressure [Pa] in the muscles where a run begins at rest; None where it begins at another state."""
-    given = tables["run"].get("start", AMBIENT)
+    given = tables["run"].get("start", DEFAULT_START)
     if not isinstance(given, Mapping) or set(given) - {"pressure"}:
         return None
-    return finite(given.get("pressure", 0.0), "Pa", f"{place.inside('run').inside('start')}, pressure")
+    return read_finite_number(given.get("pressure", 0.0), "Pa", f"{place.inside('run').inside('start')}, pressure")
 
 
 def _start(given: Any, plant: Plant, place: Location, rest: dict[str, float] | None) -> dict[str, float]:
@@ -221,7 +226,7 @@ def _start(given: Any, plant: Plant, place: Location, rest: dict[str, float] | N
     }
     kinds = {"pressure": "Pa", **coordinates}
     check_keys(given, tuple(kinds), place)
-    values = {key: finite(value, kinds[key], f"{place}, {key}") for key, value in given.items()}
+    values = {key: read_finite_number(value, kinds[key], f"{place}, {key}") for key, value in given.items()}
     pressure = values.pop("pressure", 0.0)
     with located_errors(place):
         if values:
@@ -242,9 +247,9 @@ def _columns(table: Mapping[str, Any], known: Sequence[str], place: Location) ->
     return tuple(given)
 
 
-def _object(given: Any, kind: type[Any], place: Location) -> Any:
-    return checked(build({"model": given} if isinstance(given, str) else given, place), kind, place)
+def _build_model(given: Any, kind: type[Any], place: Location) -> Any:
+    return check_type(build({"model": given} if isinstance(given, str) else given, place), kind, place)
 
 
-plant_from, muscle_from = _plant, _muscle
+build_plant, build_muscle = _plant, _muscle
 """The grammar of a plant and of a muscle, for other files that hold them."""

@@ -39,7 +39,7 @@ _PLAIN: Mapping[Any, str] = {int: "integer", float: "number", str: "string", boo
 
 def scenario_schema() -> Schema:
     """The schema of a scenario file; see docs/scenario.md."""
-    known = _Models()
+    known = _ModelSchemas()
     tables = {
         "title": _TEXT,
         "plant": _plant(known),
@@ -47,12 +47,12 @@ def scenario_schema() -> Schema:
         "run": _run(known),
         "output": _table({"columns": {"type": "array", "items": _TEXT}}),
     }
-    return _whole("A simulation with airmuscle", _only(tables, scenario.TABLES), ("plant", "run"), known)
+    return _document("A simulation with airmuscle", _select_keys(tables, scenario.TABLES), ("plant", "run"), known)
 
 
 def muscle_schema() -> Schema:
     """The schema of a muscle file and of every file of the library; see docs/muscle-file.md."""
-    known = _Models()
+    known = _ModelSchemas()
     quantities = {name: _quantity(unit) for name, unit in read.QUANTITIES.items()}
     check = {
         "quantity": {"enum": list(quantities)},
@@ -68,12 +68,15 @@ def muscle_schema() -> Schema:
         "check": {"type": "array", "items": _table(check, ("quantity", "equals", "tolerance", "source"))},
         "reference": {"type": "array", "items": known.table(Reference, model_needed=None)},
     }
-    return _whole(
-        "A muscle or a law in airmuscle", _only(tables, read._KEYS), ("title", "provenance", "characteristic"), known
+    return _document(
+        "A muscle or a law in airmuscle",
+        _select_keys(tables, read._KEYS),
+        ("title", "provenance", "characteristic"),
+        known,
     )
 
 
-def _whole(title: str, properties: Schema, required: Sequence[str], known: _Models) -> Schema:
+def _document(title: str, properties: Schema, required: Sequence[str], known: _ModelSchemas) -> Schema:
     return {
         "$schema": DRAFT,
         "title": title,
@@ -82,7 +85,7 @@ def _whole(title: str, properties: Schema, required: Sequence[str], known: _Mode
     }
 
 
-def _only(tables: Schema, keys: Sequence[str]) -> Schema:
+def _select_keys(tables: Schema, keys: Sequence[str]) -> Schema:
     """The tables in the order of the keys that the reader of the file takes; KeyError where one is not described."""
     return {key: tables[key] for key in keys}
 
@@ -99,7 +102,7 @@ def _quantity(unit: str, low: float = -math.inf, high: float = math.inf) -> Sche
     return {"anyOf": [{"type": "number", **bounds}, {"type": "string", "pattern": pattern}]}
 
 
-class _Models:
+class _ModelSchemas:
     """The definitions of the models that a schema refers to, found while it is made."""
 
     def __init__(self) -> None:
@@ -111,7 +114,7 @@ class _Models:
         if name not in self.found:
             self.found[name] = {}  # stands while its members are made, which may contain their own kind
             members = [n for n in model_names() if issubclass(model_class(n, "schema"), cls)]
-            alone = [n for n in members if not _required(model_class(n, "schema"))]
+            alone = [n for n in members if not _required_fields(model_class(n, "schema"))]
             tables = [self._reference(n) for n in members]
             if cls is Orifice:
                 tables.append(_table({"library": _TEXT, "path": {"enum": list(PATHS)}}, ("library",)))
@@ -132,7 +135,7 @@ class _Models:
         for field in dataclasses.fields(cls):
             if field.init:
                 properties[field.name] = self.field(declared.get(field.name), hints[field.name])
-        required = [*(["model"] if model_needed else []), *_required(cls)]
+        required = [*(["model"] if model_needed else []), *_required_fields(cls)]
         summary = " ".join(inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0].split())
         return {"description": summary, **_table(properties, required)}
 
@@ -158,7 +161,7 @@ class _Models:
         return {"type": _PLAIN[hint]} if hint in _PLAIN else self.kind(hint)
 
 
-def _required(cls: type[Any]) -> list[str]:
+def _required_fields(cls: type[Any]) -> list[str]:
     return [
         field.name
         for field in dataclasses.fields(cls)
@@ -166,7 +169,7 @@ def _required(cls: type[Any]) -> list[str]:
     ]
 
 
-def _plant(known: _Models) -> Schema:
+def _plant(known: _ModelSchemas) -> Schema:
     """A plant is the table of its fields, but its muscles may also be named, or begin from a library entry."""
     plant, muscle = (known.table(cls, model_needed=False) for cls in (Plant, Muscle))
     name = {"description": "a library entry, or a muscle file beside this one", **_TEXT}
@@ -178,7 +181,7 @@ def _plant(known: _Models) -> Schema:
     return plant
 
 
-def _command(known: _Models) -> Schema:
+def _command(known: _ModelSchemas) -> Schema:
     point = {"type": "array", "prefixItems": [_quantity("s"), _quantity("")], "minItems": 2, "maxItems": 2}
     rows = {"description": "instants [s] and values", "type": "array", "items": point}
     driver = known.kind(Driver)
@@ -191,13 +194,13 @@ def _command(known: _Models) -> Schema:
         "columns": {"type": "object", "additionalProperties": _TEXT},
         "drivers": {"type": "object", "additionalProperties": chain},
     }
-    known_keys = _only(keys, inputs.KEYS)
+    known_keys = _select_keys(keys, inputs.RESERVED_KEYS)
     plain_keys = {key: value for key, value in known_keys.items() if key != "drivers"}
     plain = {"type": "object", "properties": plain_keys, "additionalProperties": rows}
     return {**plain, "properties": {**known_keys, "controller": _controller(known, plain)}}
 
 
-def _controller(known: _Models, setpoint: Schema) -> Schema:
+def _controller(known: _ModelSchemas, setpoint: Schema) -> Schema:
     """A controller with its parameters, and beside them how often it looks and what it is to follow."""
     keys = {"period": _quantity("s", low=0.0), "setpoint": setpoint}
     tables = []
@@ -205,12 +208,12 @@ def _controller(known: _Models, setpoint: Schema) -> Schema:
         cls = model_class(name, "schema")
         if issubclass(cls, Controller):
             table = known.table(cls)
-            table["properties"] |= _only(keys, controller.KEYS)
-            tables.append({**table, "required": [*table["required"], *controller.KEYS]})
+            table["properties"] |= _select_keys(keys, controller.LOOP_KEYS)
+            tables.append({**table, "required": [*table["required"], *controller.LOOP_KEYS]})
     return {"anyOf": tables}
 
 
-def _run(known: _Models) -> Schema:
+def _run(known: _ModelSchemas) -> Schema:
     keys = {
         "duration": _quantity("s", low=0.0),
         "start_time": _quantity("s"),
@@ -218,4 +221,4 @@ def _run(known: _Models) -> Schema:
         "start": {"type": "object", "additionalProperties": _quantity("m")},
         "method": known.kind(Integrator),
     }
-    return _table(_only(keys, scenario.RUN), ("duration",))
+    return _table(_select_keys(keys, scenario.RUN), ("duration",))

@@ -27,7 +27,7 @@ _TINY = 1e-9
 
 
 @model
-class IndexedValve(Orifice):
+class SubsonicIndexValve(Orifice):
     """A valve with sonic conductance C, critical pressure ratio b, subsonic index m and cracking pressure dp_c.
 
         qm = C rho0 p1 sqrt(T0/T1) phi
