@@ -14,7 +14,7 @@ from airmuscle.control.inputs import Schedule
 from airmuscle.core import autodiff
 from airmuscle.core.errors import EquilibriumError, ParameterError
 from airmuscle.library.catalogue import load
-from airmuscle.mechanism import HangingMass, WithLatch, Isometric
+from airmuscle.mechanism import HangingMass, Isometric, WithLatch
 from airmuscle.muscle import LinearDamper
 from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant

@@ -29,7 +29,7 @@ from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import ParameterError, SimulationError
 from airmuscle.core.reference import cite
-from airmuscle.mechanism import HangingMass, WithLatch, Isometric
+from airmuscle.mechanism import HangingMass, Isometric, WithLatch
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, ProportionalRegulator, ProportionalValve, SecondOrderLag, Supply, Valve
 from airmuscle.pneumatics.gas import Isothermal

@@ -15,7 +15,7 @@ from airmuscle.characteristic import VirtualWork
 from airmuscle.control.inputs import ZERO_INPUT, SampledSignal, Schedule
 from airmuscle.geometry import Braid
 from airmuscle.mechanism import HangingMass
-from airmuscle.muscle import CreepElements, CubicSpring, ViscoelasticWall, LinearDamper, Muscle
+from airmuscle.muscle import CreepElements, CubicSpring, LinearDamper, Muscle, ViscoelasticWall
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, DistributedTube, FillDischarge, Supply, Valve, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Polytropic

@@ -22,17 +22,17 @@ from airmuscle.friction import Dahl
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
-    WithLatch,
     Isometric,
     JointWithEndStops,
     Lever,
     MusclesInSeries,
     PrescribedMotion,
     SpringLoad,
+    WithLatch,
     WithOffsets,
 )
 from airmuscle.mechanism.contact import HuntCrossley
-from airmuscle.muscle import CreepElements, ViscoelasticWall, SeriesSpring
+from airmuscle.muscle import CreepElements, SeriesSpring, ViscoelasticWall
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, FillDischarge, ProportionalValve, SecondOrderLag, Supply, Valve
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic

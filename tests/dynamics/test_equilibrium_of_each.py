@@ -32,7 +32,7 @@ from airmuscle.mechanism import (
     SpringLoad,
 )
 from airmuscle.mechanism.contact import HuntCrossley
-from airmuscle.muscle import ViscoelasticWall, LinearSpring, SeriesSpring
+from airmuscle.muscle import LinearSpring, SeriesSpring, ViscoelasticWall
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, FillDischarge, ProportionalRegulator, Supply, Tube, Valve, WithTubes
 from airmuscle.pneumatics.gas import Ambient, Polytropic

@@ -13,7 +13,7 @@ from airmuscle.analysis.static_stiffness import stiffness
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import PiecewiseLinear, Schedule
 from airmuscle.core.errors import AirmuscleError, SimulationError
-from airmuscle.mechanism import HangingMass, WithLatch, MusclesInSeries, WithEndStops
+from airmuscle.mechanism import HangingMass, MusclesInSeries, WithEndStops, WithLatch
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import LinearDamper, SeriesSpring
 from airmuscle.plant.plant import Plant
@@ -53,7 +53,7 @@ def test_a_fixed_step_that_is_too_long_is_not_called_a_result():
 @pytest.mark.parametrize("gas", [Isothermal(), Polytropic(1.2), EnergyBalance(0.2)], ids=repr)
 def test_a_load_that_tears_a_muscle_out_of_its_reach_is_named_as_the_cause(mechanism, gas):
     """A braid stretched until its threads lie along it encloses nothing; a stop is what keeps a load from doing so."""
-    muscles = tuple(replace(chosen_muscle(), name=name) for name in ("upper", "lower"))[: mechanism.muscles or 1]
+    muscles = tuple(replace(chosen_muscle(), name=name) for name in ("upper", "lower"))[: mechanism.muscle_count or 1]
     plant = Plant(muscles, (FillDischarge(Supply(5e5), VALVE, HUGE),) * len(muscles), mechanism, gas)
     empty = Schedule({name: ((0.0, 1.0),) for name in plant.inputs if name.endswith("discharge")})
     with pytest.raises(SimulationError, match=r"upper had come to a contraction of -10.*put Stopped around") as caught:
@@ -195,11 +195,11 @@ PARTS = [
         "its gas must be of Gas",
     ),
     (lambda: WithLeak(None, VALVE), "WithLeak: its circuit must be of Circuit; it is None"),
-    (lambda: Manifold(Supply(5e5), (3,), ("a",)), "its branches must be a tuple of Circuit"),
+    (lambda: Manifold(Supply(5e5), (3,), ("a",)), "branches is .*; it must be a tuple of Circuit"),
     (lambda: Manifold(Supply(5e5), FillDischarge(SharedSupply(), VALVE, VALVE), ("a",)), "must be a tuple of Circuit"),
     (
         lambda: Manifold(Supply(5e5), (FillDischarge(SharedSupply(), VALVE, VALVE),), (1,)),
-        "names must be a tuple of str",
+        "names is .*; it must be a tuple of str",
     ),
 ]
 

@@ -57,7 +57,14 @@ CASES = {
 def moving(plant, pressure=3e5):
     """A state away from rest and from kinks."""
     state = find_equilibrium(plant, pressure=pressure)
-    push = {"speed": 0.02, "angular_speed": 0.2, "spool": 0.1, "regulated": 8e3, "tube.air_mass": 1e-6, "bristle": 1e-6}
+    push = {
+        "speed": 0.02,
+        "angular_speed": 0.2,
+        "spool": 0.1,
+        "lagged_setpoint": 8e3,
+        "tube.air_mass": 1e-6,
+        "bristle": 1e-6,
+    }
     return {n: v + push.get(n, 0.0) for n, v in state.items()}
 
 

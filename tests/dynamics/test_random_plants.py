@@ -33,11 +33,11 @@ from airmuscle.muscle import (
     CubicSpring,
     DirectionalDamper,
     EndStop,
-    ViscoelasticWall,
     LinearDamper,
     PressureDamper,
     RigidSeriesElement,
     SeriesSpring,
+    ViscoelasticWall,
 )
 from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
@@ -46,13 +46,13 @@ from airmuscle.pneumatics import (
     ClosedChamber,
     DistributedTube,
     FillDischarge,
-    SubsonicIndexValve,
     Manifold,
     ProportionalRegulator,
     ProportionalValve,
     RegulatedSupply,
     SecondOrderLag,
     SharedSupply,
+    SubsonicIndexValve,
     Supply,
     Tank,
     ThreePositionValve,

@@ -16,7 +16,7 @@ from airmuscle.control.inputs import Schedule
 from airmuscle.friction import LuGre, MaxwellSlip
 from airmuscle.mechanism import HangingMass
 from airmuscle.mechanism.contact import HuntCrossley
-from airmuscle.muscle import CreepElements, DirectionalDamper, EndStop, ViscoelasticWall, SeriesSpring
+from airmuscle.muscle import CreepElements, DirectionalDamper, EndStop, SeriesSpring, ViscoelasticWall
 from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import DistributedTube, FillDischarge, RegulatedSupply, Supply, Tank, Tube, Valve, WithTubes

@@ -21,7 +21,7 @@ from airmuscle.geometry.braid import Braid
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import CheckValve, FillDischarge, SubsonicIndexValve, Orifice, Supply, Valve
+from airmuscle.pneumatics import CheckValve, FillDischarge, Orifice, SubsonicIndexValve, Supply, Valve
 from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, Ambient, Isothermal
 from airmuscle.simulation.integrators import Rodas4
 from airmuscle.simulation.simulate import simulate

@@ -133,9 +133,11 @@ def test_the_widest_laminar_range_is_kept(first, second):
 @pytest.mark.parametrize("rule", [in_series, in_parallel])
 def test_what_has_no_equivalent_is_refused(rule):
     name = rule.__name__
-    with pytest.raises(ParameterError, match=f"{name} needs one valve at least"):
+    with pytest.raises(ParameterError, match=f"{name}: no valve is given; give at least one"):
         rule()
-    with pytest.raises(ParameterError, match=f"{name}: number 2 has no conductance"):
+    with pytest.raises(ParameterError, match=f"{name}: the conductance of argument 2 is 0; it must be positive"):
         rule(Valve(1e-8, 0.3), Valve(0.0, 0.3))
-    with pytest.raises(ParameterError, match=f"{name}: number 2 is SubsonicIndexValve; the rule holds for Valve"):
+    with pytest.raises(
+        ParameterError, match=f"{name}: argument 2 is SubsonicIndexValve; it must be a Valve, with C and b"
+    ):
         rule(Valve(1e-8, 0.3), SubsonicIndexValve(1e-8, 0.3))

@@ -75,12 +75,12 @@ def test_components_nest_in_a_file_with_units_as_text(tmp_path):
 @pytest.mark.parametrize(
     ("right", "wrong", "message"),
     [
-        ('segment_count = 5', 'segment_count = 0', r"DistributedTube: segment_count is 0; give a whole number from 1 to 200"),
+        ('segment_count = 5', 'segment_count = 0', r"DistributedTube: segment_count is 0; give an integer from 1 to 200"),
         ('diameter = "4 mm"', 'diameter = "4 m"', r"diameter \(D, inner diameter of the tube\) is 4 m; allowed are"),
         ('tube = { model = "DistributedTube"', 'tube = { model = "Supply", pressure = "1 bar" } #', r"tube is Supply; a TubeModel is wanted"),
         ('damper = "Serres2009Damper"', 'damper = "LinearSpring"', r"needs 'stiffness'"),
         ('valve = [["10 ms", 1]', 'valve = [["10 ms", 2]', r"the input 'valve' is 2 .* allowed are -1 to 1"),
-        ('supply = { model = "Tank"', 'supply = "SharedSupply" #', r"SharedSupply\(\) is the supply of a branch in a Manifold"),
+        ('supply = { model = "Tank"', 'supply = "SharedSupply" #', r"SharedSupply\(\) is allowed only as the supply of a branch in a Manifold"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_a_component_is_said_with_its_place(right, wrong, message, tmp_path):

@@ -141,6 +141,14 @@ def _kinds(cls: type[Any]) -> dict[str, type[Any]]:
     return {n: k for n, k in plain.items() if isinstance(k, type) and k.__module__ not in ("builtins", "types")}
 
 
+def attribute_hint(thing: Any, kind: type[Any]) -> str:
+    """Sentence that names the fields of `thing` that hold an object of class `kind`; empty if there are none."""
+    if not dataclasses.is_dataclass(thing) or isinstance(thing, type):
+        return ""
+    names = [f".{f.name}" for f in dataclasses.fields(thing) if isinstance(getattr(thing, f.name), kind)]
+    return f" It contains one: write {' or '.join(names)} after it." if names else ""
+
+
 def check_structure(thing: Any) -> None:
     """Raise ParameterError where a part, anywhere inside a model, is not of the kind that its field holds."""
     if isinstance(thing, tuple):
@@ -152,6 +160,7 @@ def check_structure(thing: Any) -> None:
             if not isinstance(part, kind):
                 raise ParameterError(
                     f"{type(thing).__name__}: its {name} must be of {kind.__name__}; it is {str(part)[:80]}."
+                    f"{attribute_hint(part, kind)}"
                 )
         for field in dataclasses.fields(thing):
             check_structure(getattr(thing, field.name))

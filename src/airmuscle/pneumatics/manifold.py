@@ -1,4 +1,4 @@
-"""Circuits made of circuits: one that leaks, and several on one supply."""
+"""WithLeak and Manifold: a circuit with leakage, and several circuits on one supply."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .wrapper import CircuitWrapper
 
 @model
 class WithLeak(CircuitWrapper):
-    """A circuit whose muscles also lose air to the surroundings through a leak each."""
+    """Circuit with a leak from each of its muscles to the surroundings."""
 
     circuit: Circuit
     leak: Orifice
@@ -29,22 +29,22 @@ class WithLeak(CircuitWrapper):
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         return self.circuit.own_states(ambient)
 
-    def own_steady_state(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
-        return self.circuit.own_steady_state(airs, ambient)
+    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        return self.circuit.own_steady_state(air_states, ambient)
 
     def supplied_flow(
-        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
-        done = self.circuit.supplied_flow(inlet, airs, state, inputs, ambient)
-        lost = [orifice_flow(self.leak, air, ambient_air(ambient)) for air in airs]
-        flows = tuple(flow - leaking for flow, leaking in zip(done.flows, lost, strict=True))
-        return dataclasses.replace(done, flows=flows, exhausted=sum(lost, done.exhausted))
+        inner = self.circuit.supplied_flow(inlet, air_states, state, inputs, ambient)
+        leakage = [orifice_flow(self.leak, air, ambient_air(ambient)) for air in air_states]
+        flows = tuple(flow - leak for flow, leak in zip(inner.flows, leakage, strict=True))
+        return dataclasses.replace(inner, flows=flows, exhausted=sum(leakage, inner.exhausted))
 
 
 @model
 class Manifold(Circuit):
-    """Several circuits on one supply, so that one that draws much starves the others; each has a name."""
+    """Manifold: several named circuits on one supply; a large flow in one reduces the supply pressure of all."""
 
     supply: AirSource
     branches: tuple[Circuit, ...]
@@ -53,25 +53,35 @@ class Manifold(Circuit):
     def check(self) -> None:
         check_structure(self)
         for field, kind in (("branches", Circuit), ("names", str)):
-            given = getattr(self, field)
-            if not isinstance(given, tuple) or not all(isinstance(item, kind) for item in given):
-                raise ParameterError(f"Manifold: its {field} must be a tuple of {kind.__name__}; they are {given!r}.")
+            value = getattr(self, field)
+            if not isinstance(value, tuple) or not all(isinstance(item, kind) for item in value):
+                raise ParameterError(f"Manifold: {field} is {value!r}; it must be a tuple of {kind.__name__}.")
         if len(self.names) != len(self.branches) or len(set(self.names)) != len(self.names) or not self.names:
-            raise ParameterError(f"Manifold: {len(self.branches)} branches need as many different names: {self.names}.")
+            raise ParameterError(
+                f"Manifold: names is {self.names}; give a distinct name for each of the {len(self.branches)} branches."
+            )
         for name in self.names:
             if not name or "." in name or f"{name}." == SUPPLY:
                 raise ParameterError(
-                    f"Manifold: a branch cannot be named {name!r}; give a word without a dot, and not 'supply', which "
-                    "names the manifold's own."
+                    f"Manifold: a branch cannot be named {name!r}; give a name without a dot and other than 'supply', "
+                    "which is reserved for the supply of the manifold."
                 )
         for name, branch in zip(self.names, self.branches, strict=True):
             if not isinstance(branch.supply, SharedSupply):
                 raise ParameterError(
-                    f"Manifold: branch '{name}' has a supply of its own; give it SharedSupply(), as the manifold feeds it."
+                    f"Manifold: the supply of branch '{name}' is {type(branch.supply).__name__}; it must be "
+                    "SharedSupply(), because the manifold feeds all branches."
                 )
 
     def _named_branches(self) -> Iterator[tuple[str, Circuit]]:
         return zip((f"{name}." for name in self.names), self.branches, strict=True)
+
+    def _branch_air(self, air_states: tuple[Air, ...]) -> Iterator[tuple[str, Circuit, tuple[Air, ...]]]:
+        """Prefix and circuit of each branch, with the air states of its muscles."""
+        first = 0
+        for name, branch in self._named_branches():
+            yield name, branch, air_states[first : first + branch.port_count]
+            first += branch.port_count
 
     @property
     def port_count(self) -> int:
@@ -84,30 +94,29 @@ class Manifold(Circuit):
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         return tuple(s for name, branch in self._named_branches() for s in add_prefix(name, branch.own_states(ambient)))
 
-    def own_steady_state(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
-        found: dict[str, Value] = {}
-        left = list(airs)
-        for name, branch in self._named_branches():
-            mine, left = tuple(left[: branch.port_count]), left[branch.port_count :]
-            found |= with_prefix(name, branch.own_steady_state(mine, ambient))
-        return found
+    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        state: dict[str, Value] = {}
+        for name, branch, branch_air in self._branch_air(air_states):
+            state |= with_prefix(name, branch.own_steady_state(branch_air, ambient))
+        return state
 
     def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
-        found: dict[str, str] = {}
+        warnings: dict[str, str] = {}
         for name, branch in self._named_branches():
-            found |= with_prefix(name, branch.validity_warnings(select_prefix(name, columns), ambient))
-        return found
+            warnings |= with_prefix(name, branch.validity_warnings(select_prefix(name, columns), ambient))
+        return warnings
 
     def supplied_flow(
-        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
-        total, left = CircuitFlows(()), list(airs)
-        for name, branch in self._named_branches():
-            mine, left = tuple(left[: branch.port_count]), left[branch.port_count :]
-            done = branch.supplied_flow(inlet, mine, select_prefix(name, state), select_prefix(name, inputs), ambient)
+        total = CircuitFlows(())
+        for name, branch, branch_air in self._branch_air(air_states):
+            part = branch.supplied_flow(
+                inlet, branch_air, select_prefix(name, state), select_prefix(name, inputs), ambient
+            )
             total = CircuitFlows(
-                total.flows + done.flows, total.drawn + done.drawn, total.exhausted + done.exhausted,
-                {**total.rates, **with_prefix(name, done.rates)}, {**total.outputs, **with_prefix(name, done.outputs)},
+                total.flows + part.flows, total.drawn + part.drawn, total.exhausted + part.exhausted,
+                {**total.rates, **with_prefix(name, part.rates)}, {**total.outputs, **with_prefix(name, part.outputs)},
             )  # fmt: skip
         return total
