@@ -16,8 +16,8 @@ from airmuscle.characteristic import (
     LogarithmicLength,
     RubberLine,
     VirtualWork,
+    as_force_law,
 )
-from airmuscle.characteristic import as_force_law
 from airmuscle.characteristic.validity_range import ValidityRange
 from airmuscle.geometry.catenary import Catenary
 from airmuscle.geometry.chebyshev import as_polynomial
@@ -27,7 +27,6 @@ from airmuscle.library import catalogue
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
-    WithLatch,
     Isometric,
     Isotonic,
     JointWithEndStops,
@@ -37,6 +36,7 @@ from airmuscle.mechanism import (
     Pulley,
     SpringLoad,
     WithEndStops,
+    WithLatch,
     WithOffsets,
 )
 from airmuscle.mechanism.contact import HuntCrossley
@@ -45,7 +45,6 @@ from airmuscle.muscle import (
     CubicSpring,
     DirectionalDamper,
     EndStop,
-    ViscoelasticWall,
     LinearDamper,
     LinearSpring,
     Muscle,
@@ -56,6 +55,7 @@ from airmuscle.muscle import (
     Serres2009Damper,
     Serres2009Spring,
     SwellingWall,
+    ViscoelasticWall,
 )
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve

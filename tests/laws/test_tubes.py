@@ -242,6 +242,6 @@ def test_the_page_states_the_error_of_lumped_tubes(length, conductance, per_cent
     spec = importlib.util.spec_from_file_location("make_tubes_figure", script)
     drawing = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(drawing)
-    assert 100 * drawing.error(length, 1, conductance) == pytest.approx(per_cent, abs=0.07)
+    assert 100 * drawing.max_error(length, 1, conductance) == pytest.approx(per_cent, abs=0.07)
     page = script.with_name("components.md").read_text(encoding="utf-8")
     assert f"{per_cent} %" in page

@@ -109,7 +109,10 @@ def test_a_leak_passes_what_it_was_said_to_pass():
         (lambda: c.conductance_from_cv("0.3", 0.3), "Cv is '0.3'"),
         (lambda: c.conductance_from_nominal_flow(float("inf"), 0.3), "flow is inf"),
         (lambda: c.conductance_from_nominal_flow(1e-3, 1.2), "critical_ratio .* allowed are 0 to 0.95"),
-        (lambda: c.conductance_from_flow(1e-3, 0.3, 1e5, 1e5), "the downstream pressure is 100000 Pa; it must be less than the upstream pressure of 100000 Pa"),
+        (
+            lambda: c.conductance_from_flow(1e-3, 0.3, 1e5, 1e5),
+            "the downstream pressure is 100000 Pa; it must be less than the upstream pressure of 100000 Pa",
+        ),
         (lambda: c.leak_valve(1e-6, -1e4), "the downstream pressure is 101325 Pa; it must be less than the upstream"),
         (lambda: c.leak_valve(1e-6, -2e5), "upstream pressure is -98675.0"),
         (lambda: c.conductance_from_diameter(-1e-3, 0.7), "diameter is -0.001"),

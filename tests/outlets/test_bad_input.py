@@ -27,7 +27,7 @@ from airmuscle.control.inputs import SampledSignal, Schedule
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import FileError, ParameterError, SolveError, UnitError
 from airmuscle.core.units import ABSOLUTE, conversion, quantity
-from airmuscle.library.catalogue import list_laws, read_toml
+from airmuscle.library.files import list_laws, read_toml
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
@@ -323,9 +323,9 @@ def test_a_step_of_no_length(plant: Plant, dt: float):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"\x00", r"is not TOML: Invalid statement \(at line 1, column 1\)"),
+        (b"\x00", r"is not valid TOML: Invalid statement \(at line 1, column 1\)"),
         (b"\xff\xfe", r"is not UTF-8 text \(byte 0\). Save it as UTF-8"),
-        (b"title = 'a'\ntitle = 'b'\n", r"is not TOML: Cannot overwrite a value \(at line 2"),
+        (b"title = 'a'\ntitle = 'b'\n", r"is not valid TOML: Cannot overwrite a value \(at line 2"),
         (b"x = " + b"[" * 5000 + b"]" * 5000, r"cannot be read \(maximum recursion depth"),
         (b"x = 1" + b"0" * 5000, r"cannot be read \(Exceeds the limit"),
     ],
@@ -348,7 +348,7 @@ BOX = "min_pressure = 0\nmax_pressure = 6e5\nmin_contraction = 0\nmax_contractio
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("validity_range = 3", r"\[validity_range\]: 3 is not a table"),
+        ("validity_range = 3", r"\[validity_range\] is 3; it must be a table"),
         (f"[validity_range]\n{BOX.replace('0.25', '25')}", r"\[validity_range\]: Box.max_contraction .* is 25; allowed are -0.5 to 1"),
         (f"[validity_range]\n{BOX.replace('min_pressure = 0', 'min_pressure = -3e5', 1)}", r"\[validity_range\]: .* is -300000 Pa"),
         (f'[validity_range]\nmodel = "Braid"\n{BOX}', r"\[validity_range\]: Braid has no parameter 'min_pressure'"),

@@ -24,8 +24,8 @@ from airmuscle.cli.app import app
 from airmuscle.cli.cite import as_bibtex
 from airmuscle.core.errors import UnknownNameError
 from airmuscle.core.reference import Reference
-from airmuscle.library.catalogue import list_laws, load
-from airmuscle.library.valve_catalogue import list_valves
+from airmuscle.library.catalogue import load
+from airmuscle.library.files import list_laws, list_valves
 from airmuscle.recording import read_csv
 from airmuscle.report.chapter import Chapter, Claim, Equal
 from airmuscle.reproduce import run
@@ -169,7 +169,7 @@ def test_show_leaves_out_the_middle_of_long_lists():
 
 def test_a_unique_beginning_of_a_name_is_enough_and_others_are_refused():
     assert airmuscle("show", "dmsp-20").output == airmuscle("show", MUSCLE).output
-    assert_failed(airmuscle("show", "dmsp"), "'dmsp' is the beginning of several: dmsp-10-250, dmsp-20-300")
+    assert_failed(airmuscle("show", "dmsp"), "'dmsp' is ambiguous: dmsp-10-250, dmsp-20-300")
     assert_failed(airmuscle("show", "dmps-20-300"), r".*Did you mean 'dmsp-20-300'\?")
     assert_failed(airmuscle("show", "no/such.toml"), "no/such.toml: there is no such file")
 
@@ -326,7 +326,7 @@ def test_fit_starts_from_a_library_entry_and_keeps_what_is_fixed(tmp_path: Path)
     ("rows", "options", "message"),
     [
         (36, ("--characteristic", "Saga2007"), "--characteristic: Saga2007 needs values to start from"),
-        (36, ("--characteristic", "ContractileSurfac"), "no library entry 'ContractileSurfac'"),
+        (36, ("--characteristic", "ContractileSurfac"), "no muscle or law 'ContractileSurfac'"),
         (20, ("--characteristic", "ContractileSurface"), ".*has 21 parameters to be found, but only 19 points"),
         (36, ("--characteristic", "ContractileSurface", "--robust", "5 mm"), "--robust: unit 'mm' cannot become 'N'"),
         (36, ("--characteristic", "ContractileSurface", "--resting-length", "3 N"), ".*resting_length.*'N'"),

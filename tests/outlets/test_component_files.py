@@ -20,7 +20,7 @@ from airmuscle.scenario.scenario import load_scenario
 def text_of(plant):
     places = "".join(f', "{c.name}" = "0.005 {c.unit}"' for c in plant.mechanism.coordinates)
     start = f'start = {{ pressure = "2 bar"{places} }}' if places else ""
-    tables = "\n".join(write._table("plant", write._described(plant)))
+    tables = write.part_toml("plant", plant)
     return f'{tables}\n[run]\nduration = "20 ms"\noutput = "5 ms"\n{start}\n'
 
 
@@ -77,7 +77,7 @@ def test_components_nest_in_a_file_with_units_as_text(tmp_path):
     [
         ('segment_count = 5', 'segment_count = 0', r"DistributedTube: segment_count is 0; give an integer from 1 to 200"),
         ('diameter = "4 mm"', 'diameter = "4 m"', r"diameter \(D, inner diameter of the tube\) is 4 m; allowed are"),
-        ('tube = { model = "DistributedTube"', 'tube = { model = "Supply", pressure = "1 bar" } #', r"tube is Supply; a TubeModel is wanted"),
+        ('tube = { model = "DistributedTube"', 'tube = { model = "Supply", pressure = "1 bar" } #', r"tube is Supply; it must be a TubeModel"),
         ('damper = "Serres2009Damper"', 'damper = "LinearSpring"', r"needs 'stiffness'"),
         ('valve = [["10 ms", 1]', 'valve = [["10 ms", 2]', r"the input 'valve' is 2 .* allowed are -1 to 1"),
         ('supply = { model = "Tank"', 'supply = "SharedSupply" #', r"SharedSupply\(\) is allowed only as the supply of a branch in a Manifold"),

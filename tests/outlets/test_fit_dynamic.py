@@ -222,16 +222,16 @@ def test_a_command_may_stand_in_a_file_and_is_found_from_the_written_scenario(fo
 
 
 REFUSED = {
-    "no record": ('[[record]]\nfile = "run1.csv"', "[[recor]]", "'recor' is not known here"),
+    "no record": ('[[record]]\nfile = "run1.csv"', "[[recor]]", "unknown key 'recor'"),
     "a file that is not there": ('"run1.csv"', '"run3.csv"', "run3.csv"),
     "an unknown path": ('"gas.exponent", "m', '"gas.exponen", "m', "no parameter 'gas.exponen'"),
     "an unknown path in bounds": ('"gas.exponent" =', '"gas.exponen" =', "Did you mean 'gas.exponent'"),
-    "bounds upside down": ("[1.01, 1.4]", "[1.4, 1.01]", "the least value must lie below the greatest"),
+    "bounds upside down": ("[1.01, 1.4]", "[1.4, 1.01]", "the minimum must be less than the maximum"),
     "bounds beyond what can be": ("[1.01, 1.4]", "[1.0, 1.4]", "allowed are 1.001 to 1.667"),
-    "one bound": ("[1.01, 1.4]", "1.4", "write the least and the greatest value"),
+    "one bound": ("[1.01, 1.4]", "1.4", "it must be a list of minimum and maximum"),
     "bounds of another kind": ("[1.01, 1.4]", '["1 m", 1.4]', "unit 'm' cannot become"),
     "a start beyond its bounds": ("[1.01, 1.4]", "[1.2, 1.4]", "gas.exponent starts at 1.1; its bounds are 1.2 to 1.4"),
-    "a deviation of zero": ('"500 Pa"', '"0 Pa"', "a sensor's standard deviation is above zero"),
+    "a deviation of zero": ('"500 Pa"', '"0 Pa"', "the standard deviation of a sensor must be greater than zero"),
     "a deviation of another kind": ('"500 Pa"', '"500 mm"', "[observed], pressure: unit 'mm' cannot become 'Pa'"),
     "a column that is not there": ('"height"', '"heigth"', "no column 'heigth'; there are time, pressure, height"),
     "no such output": (
@@ -240,12 +240,16 @@ REFUSED = {
         "Plant has no state or output 'heading'",
     ),
     "a margin of zero": ('"50 ms"', '"0 ms"', "start_time is '0 ms'; it must be greater than zero"),
-    "no whole number": ("starts = 2", "starts = 2.5", "starts is 2.5; it must be a whole number, 1 or more"),
+    "no whole number": ("starts = 2", "starts = 2.5", "starts is 2.5; it must be an integer of at least 1"),
     "a command of no input": ("discharge = [[", "exhaust = [[", "no input 'exhaust'"),
-    "no list": ('own = ["circuit.supply.pressure"]', 'own = "circuit.supply.pressure"', "write a list of paths"),
+    "no list": ('own = ["circuit.supply.pressure"]', 'own = "circuit.supply.pressure"', "it must be a list of paths"),
     "nothing observed": ('pressure = "500 Pa"\nposition = { deviation = "50 um", column = "height" }', "", "observed"),
-    "an empty stretch": ('start_time = "0.2 s"', 'start_time = "0.2 s"\nfirst = "9 s"', "no row lies between"),
-    "a key without meaning": ('start_time = "0.2 s"', 'star = "0.2 s"', "'star' is not known here"),
+    "an empty stretch": (
+        'start_time = "0.2 s"',
+        'start_time = "0.2 s"\nfirst = "9 s"',
+        "there is no row between first, 9 s, and last",
+    ),
+    "a key without meaning": ('start_time = "0.2 s"', 'star = "0.2 s"', "unknown key 'star'"),
     "nothing free": (
         f'free = [{VALVES}, "gas.exponent", "muscle.damper.damping"]\nown = ["circuit.supply.pressure"]\n'
         'start_time = "50 ms"\n',

@@ -128,7 +128,7 @@ def test_a_second_run_at_another_level_is_a_loop_of_its_own(two):
     [
         ((0.02, 0.14), LENGTH, "loop.csv: no branch along which the path falls: a loop goes up and down."),
         (TURNS, (), "loop.csv: friction against shortening needs the resting length"),
-        (TURNS, (*LENGTH, "--muscle", "none-such"), "no library entry 'none-such'"),
+        (TURNS, (*LENGTH, "--muscle", "none-such"), "no muscle or law 'none-such'"),
     ],
 )
 def test_what_is_no_loop_is_refused(turns, options, message, tmp_path):

@@ -16,7 +16,7 @@ from airmuscle.core import tree
 from airmuscle.friction import MaxwellSlip
 from airmuscle.mechanism import HangingMass
 from airmuscle.mechanism.contact import HuntCrossley
-from airmuscle.muscle import CreepElements, EndStop, ViscoelasticWall, SeriesSpring
+from airmuscle.muscle import CreepElements, EndStop, SeriesSpring, ViscoelasticWall
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Tank, Tube, Valve, WithLeak, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic

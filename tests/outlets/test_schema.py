@@ -18,9 +18,11 @@ from typer.testing import CliRunner
 from airmuscle.cli.app import app
 from airmuscle.core.declaration import parameters
 from airmuscle.core.errors import AirmuscleError
-from airmuscle.library.catalogue import list_laws, load, to_toml
+from airmuscle.library.catalogue import load
+from airmuscle.library.entry_file import build_entry
+from airmuscle.library.files import list_laws
 from airmuscle.library.models import model_class
-from airmuscle.library.read import build_entry
+from airmuscle.library.write import to_toml
 from airmuscle.scenario.scenario import load_scenario
 from airmuscle.scenario.schema import muscle_schema, scenario_schema
 
@@ -193,7 +195,7 @@ def test_a_broken_scenario_is_found_by_the_schema_and_refused_by_the_program(
         ('wall_thickness = "1.8 mm"\n', "", ".characteristic: none of"),
         ('quantity = "force"', 'quantity = "stiffness"', ".check[0].quantity: none of"),
         ('equals = "328.0 N"', "", ".check[0]: lacks equals"),
-        ("max_contraction", "max_contractoin", ".validity_range: greatest_contractoin is not known"),
+        ("max_contraction", "max_contractoin", ".validity_range: max_contractoin is not known"),
     ],
 )
 def test_a_broken_muscle_is_found_by_the_schema_and_refused_by_the_program(was: str, becomes: str, fault: str):

@@ -12,14 +12,17 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+import airmuscle as am
 from airmuscle.cli.app import app
 from airmuscle.core.errors import AirmuscleWarning, FileError, ParameterError, UnitError, UnknownNameError
 from airmuscle.core.reference import cite
-from airmuscle.library.build import build
-from airmuscle.library.find import find
+from airmuscle.library.build import build, load_valve
+from airmuscle.library.catalogue import load, load_law
+from airmuscle.library.entry import Entry
+from airmuscle.library.files import list_laws, list_library, list_valves
 from airmuscle.library.location import Location
-from airmuscle.library.valve_catalogue import load_valve, list_valves
-from airmuscle.pneumatics import CheckValve, Valve
+from airmuscle.library.valve_entry import ValveEntry
+from airmuscle.pneumatics import CheckValve, Valve, in_series
 from airmuscle.reproduce.hosovsky_plant import MATRIX
 from airmuscle.scenario.scenario import load_scenario
 
@@ -83,7 +86,7 @@ def test_a_check_fails_when_the_valve_changes():
 def test_every_valve_says_where_it_is_from_and_what_was_converted(name: str):
     entry = load_valve(name)
     assert entry.references, "no source"
-    assert entry.provenance in ("printed", "data sheet, second hand", "second hand, converted")
+    assert entry.provenance in ("printed", "data sheet, secondary source", "secondary source, converted")
     assert entry.note
     assert ("chosen" in entry.note) == ("converted" in entry.provenance)
     assert all(check.source for check in entry.checks)
@@ -110,7 +113,7 @@ def test_a_file_of_the_user_is_read_in_si(tmp_path: Path):
     (check,) = entry.checks
     assert entry.flow(**dict(check.conditions)) == pytest.approx(check.equals, rel=1e-9)
     assert dict(check.conditions) == {"upstream": 7e5, "downstream": 1e5}
-    assert find(tmp_path / "valve.toml") == find(str(tmp_path / "valve.toml")) == entry
+    assert load(tmp_path / "valve.toml") == load(str(tmp_path / "valve.toml")) == entry
 
 
 def test_the_page_on_valves_is_true(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
@@ -125,7 +128,7 @@ def test_the_page_on_valves_is_true(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 def test_a_limit_of_use_is_a_warning():
-    with pytest.warns(AirmuscleWarning, match=r"smc-sx91: Made for 0\.2 MPa at most"):
+    with pytest.warns(AirmuscleWarning, match=r"smc-sx91: Maximum pressure 0\.2 MPa"):
         load_valve("smc-sx91")
 
 
@@ -168,15 +171,15 @@ def test_a_scenario_runs_with_valves_of_the_catalogue(tmp_path: Path):
     [
         ({"library": "matrx-821"}, UnknownNameError, r"\[fill\]: no valve 'matrx-821'; .* Did you mean 'matrix-821'\?"),
         ({"library": "dmsp-20-300"}, UnknownNameError, "no valve 'dmsp-20-300'"),
-        ({"library": "ckd"}, UnknownNameError, "'ckd' is the beginning of several"),
+        ({"library": "ckd"}, UnknownNameError, "'ckd' is ambiguous"),
         (
             {"library": "matrix-821", "path": "exhaust"},
             UnknownNameError,
-            "matrix-821 has no path 'exhaust'; there are valve",
+            "matrix-821 has no path 'exhaust'; it has valve",
         ),
         ({"library": "matrix-821", "path": "exaust"}, UnknownNameError, r"no path 'exaust'.* Did you mean 'exhaust'\?"),
-        ({"library": "matrix-821", "conductance": 1e-8}, ParameterError, "'conductance' is not known here"),
-        ({"library": 821}, ParameterError, "library is 821; it must be text"),
+        ({"library": "matrix-821", "conductance": 1e-8}, ParameterError, "unknown key 'conductance'"),
+        ({"library": 821}, ParameterError, "library is 821; it must be a text in quotes"),
         ({"library": "none.toml"}, FileError, r"none\.toml: there is no such file"),
     ],
 )
@@ -188,7 +191,7 @@ def test_a_valve_that_is_not_there_is_refused(tmp_path: Path, table, error, mess
 @pytest.mark.parametrize(
     ("old", "new", "error", "message"),
     [
-        ("[valve]", "[valv]", ParameterError, r"'valv' is not known here.* Did you mean 'valve'\?"),
+        ("[valve]", "[valv]", ParameterError, r"unknown key 'valv'.* Did you mean 'valve'\?"),
         ('title = "A valve of ours"', "", ParameterError, "'title' is missing"),
         (
             'model = "SubsonicIndexValve"',
@@ -201,12 +204,12 @@ def test_a_valve_that_is_not_there_is_refused(tmp_path: Path, table, error, mess
         ('"4 ms"', '"4 mm"', UnitError, r"\[switching_times\], opening_delay: unit 'mm' cannot become 's'"),
         ('closing_delay = "7 ms"', "", ParameterError, "'closing_delay' is missing"),
         ('upstream = "7 bara"', 'upstream = "7 barg"', UnitError, r"\[check 1\], upstream: unit 'barg' is gauge"),
-        ('flow = "840 l/min"', "", ParameterError, r"\[check 1\]: 'flow' is missing; it is a number in m3/s"),
+        ('flow = "840 l/min"', "", ParameterError, r"\[check 1\]: 'flow' is missing; give a number in m3/s"),
         ('flow = "840 l/min"', "flow = nan", ParameterError, r"\[check 1\], flow is nan; it must be finite"),
         ('source = "the bench"', "", ParameterError, r"\[check 1\]: 'source' is missing"),
-        ("[[check]]", "[check]", ParameterError, r"'check' must be written as \[\[check\]\]"),
-        ('key = "ours"', "key = 1", ParameterError, "key is 1; it must be text"),
-        ("[valve]", "valve = 3\n[other]", ParameterError, "'other' is not known here"),
+        ("[[check]]", "[check]", ParameterError, r"'check' must be an array of tables; write \[\[check\]\]"),
+        ('key = "ours"', "key = 1", ParameterError, "key is 1; it must be a text in quotes"),
+        ("[valve]", "valve = 3\n[other]", ParameterError, "unknown key 'other'"),
     ],
 )
 def test_what_is_wrong_with_a_file_is_said_with_its_place(tmp_path: Path, old, new, error, message: str):
@@ -218,10 +221,10 @@ def test_a_file_without_a_valve_or_with_another_thing_is_refused(tmp_path: Path)
     with pytest.raises(ParameterError, match=r"the table \[valve\] is missing"):
         load_valve(written(tmp_path, 'title = "t"\nprovenance = "chosen"\n'))
     supply = '[valve]\nmodel = "Supply"\npressure = "6 bar"\n'
-    with pytest.raises(ParameterError, match="Supply is no orifice"):
+    with pytest.raises(ParameterError, match="Supply is not allowed here; an Orifice is required"):
         load_valve(written(tmp_path, f'title = "t"\nprovenance = "chosen"\n{supply}'))
     head = "switching_times = 3\n"
-    with pytest.raises(ParameterError, match=r"\[switching_times\]: 3 is no table"):
+    with pytest.raises(ParameterError, match=r"\[switching_times\] is 3; it must be a table"):
         load_valve(written(tmp_path, head + GOOD.partition("[switching_times]")[0]))
 
 
@@ -236,6 +239,63 @@ def test_the_command_line_lists_shows_and_cites_valves():
     assert values["valve.conductance"] == pytest.approx(2.5e-9)
     assert values["switching_times.opening_delay"] == pytest.approx(0.01)
     assert shown["checks"][0]["quantity"] == "flow"
-    assert all(word in run("show", "matrix-821").output for word in ("critical pressure ratio", "0.433", "Hosovsky"))
+    assert all(word in run("show", "matrix-821").output for word in ("critical pressure ratio", "0.433", "Hošovský"))
     assert "SM-P00077-A/3" in run("cite", "ckd-m4ga1").output
     assert "festo-mh2" in run("show", "festo").output + run("show", "festo").stderr
+
+
+# One loader for muscles, laws and valves
+
+
+def test_load_reads_every_entry_that_the_library_lists():
+    assert set(list_library()) == {*list_laws(), *list_valves()}
+    kinds = {name: type(load(name)) for name in list_library()}
+    assert {name for name, kind in kinds.items() if kind is ValveEntry} == set(list_valves())
+    assert {name for name, kind in kinds.items() if kind is Entry} == set(list_laws())
+    assert am.load is load
+    assert load("matrix-821") == load_valve("matrix-821")
+    assert load("dmsp-20-300") == load_law("dmsp-20-300")
+
+
+def test_loaded_entries_make_a_plant():
+    valve, muscle = am.load("matrix-821"), am.load("dmsp-20-300").muscle
+    plant = am.Plant(muscle, am.FillDischarge(am.Supply(5e5), valve.valve, valve.valve), am.Isometric(0.0))
+    assert plant.circuit.fill == MATRIX
+    run = am.simulate(plant, am.Schedule({"fill": ((0.0, 1.0),)}), duration=0.05, start=plant.state_at(pressure=0.0))
+    assert run["pressure"][-1] > 1e4
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda muscle, valve: am.Plant(
+                muscle.muscle, am.FillDischarge(am.Supply(5e5), valve, valve.valve), am.Isometric(0.0)
+            ),
+            r"FillDischarge: its fill must be of Orifice; .* It contains one: write \.valve after it",
+        ),
+        (
+            lambda muscle, valve: am.Plant(
+                muscle, am.FillDischarge(am.Supply(5e5), valve.valve, valve.valve), am.Isometric(0.0)
+            ),
+            r"Plant: its muscle must be a Muscle; .* give its \.muscle",
+        ),
+        (lambda muscle, valve: in_series(valve, valve.valve), r"argument 1 is ValveEntry; .* write \.valve after it"),
+    ],
+)
+def test_an_entry_in_place_of_its_part_is_refused_with_what_to_write(make, message: str):
+    with pytest.raises(ParameterError, match=message):
+        make(am.load("dmsp-20-300"), am.load("matrix-821"))
+
+
+def test_both_paths_of_a_valve_are_named():
+    entry = am.load("ckd-m4ga1-r")
+    with pytest.raises(ParameterError, match=r"write \.valve or \.exhaust after it"):
+        in_series(entry)
+
+
+def test_a_valve_in_place_of_a_muscle_is_refused(tmp_path: Path):
+    with pytest.raises(UnknownNameError, match="'matrix-821' is a valve; a muscle or a law is required: .*dmsp-20-300"):
+        load_law("matrix-821")
+    with pytest.raises(ParameterError, match=r"valve\.toml: the file describes a valve; a muscle or a law is required"):
+        load_law(written(tmp_path, GOOD))

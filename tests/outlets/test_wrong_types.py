@@ -99,7 +99,7 @@ CASES = {
     "sources of a name": (lambda: cite("dmsp-20-300"), r"cite: 'dmsp-20-300' is no model; .*cite\(load\("),
     "fit of a name": (lambda: fit("Sarosi2012", RUN), "fit: Sarosi2012 is no characteristic"),
     "fit to nothing": (lambda: fit(MUSCLE.contractile, None), "fit: None is no Recording, as read"),
-    "save a plant": (lambda: save(PLANT, "muscle.toml"), "save: Plant.* is no library entry"),
+    "save a plant": (lambda: save(PLANT, "muscle.toml"), "save: Plant.* is not an Entry"),
     "write a plant": (lambda: write_csv(PLANT, "run.csv"), "write_csv: Plant.* is no Recording"),
 }  # fmt: skip
 
@@ -118,7 +118,7 @@ def test_a_wrong_type_is_refused_in_words(wrong, message, tmp_path: Path, monkey
         (lambda: read_csv(5), FileError, "read_csv: 5 is no path"),
         (lambda: read(None), FileError, "read: None is no path; name a file, a folder"),
         (lambda: write_csv(RUN, None), FileError, "write_csv: None is no path"),
-        (lambda: save(ENTRY, None), FileError, "save: None is no path"),
+        (lambda: save(ENTRY, None), FileError, "save: None is not a path"),
         (lambda: load_data(5), UnknownNameError, "no data set '5'; there are"),
         (lambda: RUN[3], ColumnError, "a bench: no column '3'; there are time, fill"),
         (lambda: SampledSignal.recorded(RUN, {"fill": 3}), ColumnError, "a bench: no column '3'"),

@@ -12,7 +12,7 @@ from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.control.inputs import ZERO_INPUT, SampledSignal
 from airmuscle.identify.static_fit import fit
 from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.muscle import CubicSpring, ViscoelasticWall, LinearDamper, LinearSpring, Muscle
+from airmuscle.muscle import CubicSpring, LinearDamper, LinearSpring, Muscle, ViscoelasticWall
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, SubsonicIndexValve, Tube, Valve
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic

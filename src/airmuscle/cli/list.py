@@ -41,12 +41,11 @@ def list_entries(json: Json = False) -> None:
 
 def heads() -> list[ListRow]:
     """The heads of all library entries and data sets; nothing is built, so that listing stays quick."""
-    from ..library import valve_catalogue
-    from ..library.catalogue import DATA, FOLDER, list_laws, list_data
+    from ..library.files import DATA, LAWS, VALVES, list_data, list_laws, list_valves
 
     return [
-        *(_entry_head(FOLDER / f"{name}.toml") for name in list_laws()),
-        *(_valve_head(valve_catalogue.FOLDER / f"{name}.toml") for name in valve_catalogue.list_valves()),
+        *(_entry_head(LAWS / f"{name}.toml") for name in list_laws()),
+        *(_valve_head(VALVES / f"{name}.toml") for name in list_valves()),
         *(_data_head(DATA / f"{name}.csv") for name in list_data()),
     ]
 

@@ -10,7 +10,7 @@ from ..core.reference import CHOSEN, Reference
 from ..geometry.braid import Braid
 from ..identify import Fit, fit
 from ..library import catalogue
-from ..mechanism import HangingMass, WithLatch, Mechanism
+from ..mechanism import HangingMass, Mechanism, WithLatch
 from ..muscle import LinearDamper, LinearSpring, Muscle, RigidWall, Spring, Wall
 from ..plant.plant import Plant
 from ..pneumatics import FillDischarge, Orifice, Supply, TubeModel, Valve, WithTubes

@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-from ..library.catalogue import complete_name
+from ..library.files import complete_name
 from ..report.chapter import Chapter
 from ..report.output_folder import check_writable
 from ..report.write import write_report

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..core.errors import ParameterError, UnknownNameError, suggestion
-from ..library.location import Location, check_keys, read_finite_number, located_errors
+from ..library.location import Location, check_keys, located_errors, read_finite_number
 
 Reader = Callable[[Any, str, str], Any]
 """Reads a value, given the unit at hand and where it stands."""

@@ -26,7 +26,7 @@ from ..library.location import Location
 from ..library.models import model_class
 from ..plant.plant import Plant
 from ..scenario.controller import controller_number_paths
-from ..scenario.scenario import Scenario, initial_pressure, build_scenario, column_units
+from ..scenario.scenario import Scenario, build_scenario, column_units, initial_pressure
 
 Keys = tuple[str | int, ...]
 

@@ -28,9 +28,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.errors import ParameterError, suggestion
-from ..library.catalogue import read_toml
+from ..library.files import read_toml
 from ..library.location import Location, check_keys, located_errors, read_text
-from ..scenario.scenario import Scenario, load_scenario, build_scenario, column_units
+from ..scenario.scenario import Scenario, build_scenario, column_units, load_scenario
 from .design import DESIGNS, Design
 from .distributions import Variation, variation_from
 from .fingerprint import fingerprint
