@@ -82,7 +82,7 @@ def constants(plant: Any, count: int) -> Array:
     rows = [1 / load.mass, load.gravity, 1 / muscle.geometry.resting_length, k, c * c]
     rows += [GAS_CONSTANT * ambient.temperature, ambient.pressure, circuit.supply.pressure + ambient.pressure, *valves]
     rows += [x for low, high in validity_range for x in (low, 2 / (high - low))]
-    rows += [law.min_force, law.max_force, muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth]
+    rows += [law.min_force, law.max_force, muscle.spring.stiffness, muscle.damper.damping, muscle.damper.damping_slope]
     return np.array([np.broadcast_to(row, count) for row in (*rows, *law.coefficients)])
 
 

@@ -22,7 +22,7 @@ from airmuscle.core.variables import Input, StateVariable
 from airmuscle.mechanism.base import Coordinate, Mechanism
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import Circuit, CircuitFlows, FillDischarge, ProportionalValve, Supply, Tube, Valve, WithTubes
-from airmuscle.pneumatics.fill_discharge import surroundings
+from airmuscle.pneumatics.fill_discharge import ambient_air
 from airmuscle.pneumatics.flow import orifice_flow
 from airmuscle.pneumatics.gas import GAS_CONSTANT, Air, Ambient, EnergyBalance, Isothermal
 from airmuscle.pneumatics.proportional import SecondOrderLag
@@ -91,7 +91,7 @@ class LaggedValve(Circuit):
     ) -> CircuitFlows:  # fmt: skip
         spool = state["spool"]
         incoming = orifice_flow(self.valve, inlet, airs[0], ops.maximum(spool, 0.0))
-        outgoing = orifice_flow(self.valve, airs[0], surroundings(ambient), ops.maximum(-spool, 0.0))
+        outgoing = orifice_flow(self.valve, airs[0], ambient_air(ambient), ops.maximum(-spool, 0.0))
         moving = (inputs["fill"] - inputs["discharge"] - spool) / self.lag
         return CircuitFlows((incoming - outgoing,), incoming, outgoing, {"spool": moving})
 

@@ -17,7 +17,7 @@ from airmuscle.core.declaration import model, parameter
 from airmuscle.geometry.braid import Braid
 from airmuscle.muscle import LinearDamper, LinearSpring, Muscle
 from airmuscle.pneumatics import Supply, Valve
-from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, absolute, gauge
+from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, absolute_pressure, gauge_pressure
 
 HEAT_CAPACITY = GAS_CONSTANT / 0.4
 """Specific heat of air at constant volume [J/(kg K)], for a ratio of heats of 1.4."""
@@ -77,7 +77,7 @@ class Joint:
         temperature = self.ambient.temperature
         pressure = state[f"{side}.air_mass"] * GAS_CONSTANT * temperature / self.muscle.geometry.volume(contraction)
         incoming, through = self._flows(side, state, pressure, inputs[f"{side}.fill"], inputs[f"{side}.discharge"])
-        tension = self.muscle.tension(gauge(pressure, self.ambient), contraction, speed)
+        tension = self.muscle.tension(gauge_pressure(pressure, self.ambient), contraction, speed)
         return tension, {f"{side}.air_mass": through, f"{side}.tube_mass": incoming - through}
 
     def _motion(self, sign: float, state: Mapping[str, Any]) -> tuple[Any, Any]:
@@ -87,7 +87,7 @@ class Joint:
     def _flows(self, side: str, state: Mapping[str, Any], pressure: Any, fill: Any, discharge: Any) -> tuple[Any, Any]:
         temperature = self.ambient.temperature
         in_tube = state[f"{side}.tube_mass"] * GAS_CONSTANT * temperature / self.tube_volume
-        source = absolute(self.supply.pressure, self.ambient)
+        source = absolute_pressure(self.supply.pressure, self.ambient)
         incoming = self.valve.mass_flow(source, in_tube, fill, temperature)
         outgoing = self.valve.mass_flow(in_tube, self.ambient.pressure, discharge, temperature)
         return incoming - outgoing, self.tube.mass_flow(in_tube, pressure, 1.0, temperature)
@@ -120,7 +120,7 @@ class JointWithHeat(Joint):
         wall = self.ambient.temperature
         carried = (HEAT_CAPACITY + GAS_CONSTANT) * through * ops.where(through >= 0, wall, temperature)
         heat = self.heat_transfer * (wall - temperature)
-        tension = self.muscle.tension(gauge(pressure, self.ambient), contraction, speed)
+        tension = self.muscle.tension(gauge_pressure(pressure, self.ambient), contraction, speed)
         return tension, {
             f"{side}.air_mass": through,
             f"{side}.tube_mass": incoming - through,
@@ -137,7 +137,7 @@ def joint(heat: bool = False) -> Joint:
 
 def joint_start(system: Joint, pressure: float = 2e5) -> dict[str, float]:
     """At angle zero and rest, both muscles and tubes at a gauge pressure [Pa] and ambient temperature."""
-    per_volume = absolute(pressure, system.ambient) / (GAS_CONSTANT * system.ambient.temperature)
+    per_volume = absolute_pressure(pressure, system.ambient) / (GAS_CONSTANT * system.ambient.temperature)
     mass = float(per_volume * system.muscle.geometry.volume(system.offset))
     start = {"angle": 0.0, "speed": 0.0}
     for side, _ in SIDES:

@@ -20,7 +20,7 @@ from airmuscle.control.inputs import PiecewiseLinear
 from airmuscle.muscle import Muscle
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge
-from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Ambient, absolute
+from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Ambient, absolute_pressure
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4
 
 STEP = 1e-4
@@ -62,11 +62,11 @@ def _constants(muscle: Muscle, circuit: FillDischarge, ambient: Ambient) -> list
     scaling = [x for low, high in validity_range for x in (low, 2 / (high - low))]
     return [
         *(1 / muscle.geometry.resting_length, k, c * c, GAS_CONSTANT * ambient.temperature),
-        *(ambient.pressure, absolute(circuit.supply.pressure, ambient)),
+        *(ambient.pressure, absolute_pressure(circuit.supply.pressure, ambient)),
         *(scale * v.conductance for v in (circuit.fill, circuit.discharge)),
         *(valve.critical_ratio, 1 / (1 - valve.critical_ratio), float(valve.laminar_slope())),
         *(*scaling, law.min_force, law.max_force),
-        *(muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth, *law.coefficients),
+        *(muscle.spring.stiffness, muscle.damper.damping, muscle.damper.damping_slope, *law.coefficients),
     ]
 
 

@@ -39,7 +39,7 @@ REST_VOLUME = 1e-4
 OPEN = Schedule({"fill": ((0.0, 1.0),)})
 BOUNDS = {
     "supply.pressure": (590e3, 660e3), "fill.critical_ratio": (0.1, 0.6), "growth_volume": (0.0, 2 * REST_VOLUME),
-    "middle": (0.0, 600e3), "breadth": (1e4, 3e5), "lag": (0.01, 5.0),
+    "midpoint_pressure": (0.0, 600e3), "pressure_width": (1e4, 3e5), "time_constant": (0.01, 5.0),
 }  # fmt: skip
 """Physical, chosen: the building's air is 620 kPa nominal, valves have b of 0.1 to 0.6, a muscle at most trebles."""
 
@@ -87,8 +87,8 @@ def model(name: str, gas: Gas, *, growing: bool = False, lagging: bool = False, 
     valves = "circuit.circuit." if line else "circuit."
     free = [f"{valves}fill.conductance", f"{valves}fill.critical_ratio"]
     free += ["circuit.tube.volume", "circuit.tube.orifice.conductance"] if line else []
-    free += [f"muscle.wall.{part}" for part in ("growth_volume", "middle", "breadth")] if growing else []
-    free += ["muscle.wall.lag"] if lagging else []
+    free += [f"muscle.wall.{part}" for part in ("growth_volume", "midpoint_pressure", "pressure_width")] if growing else []
+    free += ["muscle.wall.time_constant"] if lagging else []
     start = plant(gas, REST_VOLUME if growing else 0.0, 0.2 if lagging else 0.005, line)
     return Model(name, start, tuple(free), "tube.pressure" if line else "pressure")
 
@@ -151,7 +151,7 @@ def show_record(name: str, fits: list[DynamicFit]) -> None:
         print(f"{fit.rms(variant.sensed) / 1e3:7.2f} kPa rms  {variant.name}; {len(fit.estimates)} unknowns{words}")
     print(f"\n{fits[-1]}\n")
     for path in ("circuit.circuit.fill.critical_ratio", "circuit.circuit.fill.conductance",
-                 "muscle.wall.growth_volume", "circuit.tube.volume", "muscle.wall.lag"):  # fmt: skip
+                 "muscle.wall.growth_volume", "circuit.tube.volume", "muscle.wall.time_constant"):  # fmt: skip
         if not fits[-1][path].on_bound:
             print(fits[-1].profile(path, 4))
 

@@ -16,7 +16,7 @@ from joints import HEAT_CAPACITY, Joint, JointWithHeat
 from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import Valve
-from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, absolute
+from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, absolute_pressure
 
 Rates = Callable[[float, Any], list[float]]
 Scalar = Callable[[float, float], float]
@@ -74,10 +74,10 @@ def hill(plant: Plant) -> Callable[[Sequence[float]], Rates]:
     rt, outside, source = (
         GAS_CONSTANT * ambient.temperature,
         ambient.pressure,
-        absolute(circuit.supply.pressure, ambient),
+        absolute_pressure(circuit.supply.pressure, ambient),
     )
     fill_flow, discharge_flow = (valve_flow(v, ambient.temperature) for v in (circuit.fill, circuit.discharge))
-    stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth
+    stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.damping_slope
     inverse_mass, gravity, per_length, cc = 1.0 / load.mass, load.gravity, 1.0 / length, c * c
     low_x, scale_x = law.min_contraction, 2.0 / (law.max_contraction - law.min_contraction)
     low_q, scale_q = law.min_pressure, 2.0 / (law.max_pressure - law.min_pressure)
@@ -142,7 +142,7 @@ def six_states(system: Joint) -> Callable[[Sequence[float]], Rates]:
     ambient, length = system.ambient, system.muscle.geometry.resting_length
     k, c = stretch_factor(system.muscle.geometry)
     rt, outside, cc = GAS_CONSTANT * ambient.temperature, ambient.pressure, c * c
-    in_tube, source, radius = rt / system.tube_volume, absolute(system.supply.pressure, ambient), system.radius
+    in_tube, source, radius = rt / system.tube_volume, absolute_pressure(system.supply.pressure, ambient), system.radius
     lever, offset, inverse_inertia = radius / length, system.offset, 1.0 / system.inertia
     friction, load, force = system.friction, system.load, _force(system)
     valve, tube = (valve_flow(v, ambient.temperature) for v in (system.valve, system.tube))
@@ -180,7 +180,7 @@ def ten_states(system: JointWithHeat) -> Callable[[Sequence[float]], Rates]:
     ambient, length = system.ambient, system.muscle.geometry.resting_length
     k, c = stretch_factor(system.muscle.geometry)
     wall, outside, cc = ambient.temperature, ambient.pressure, c * c
-    in_tube, source = GAS_CONSTANT * wall / system.tube_volume, absolute(system.supply.pressure, ambient)
+    in_tube, source = GAS_CONSTANT * wall / system.tube_volume, absolute_pressure(system.supply.pressure, ambient)
     radius, offset, inverse_inertia = system.radius, system.offset, 1.0 / system.inertia
     lever, friction, load, force = radius / length, system.friction, system.load, _force(system)
     valve, tube = (valve_flow(v, wall) for v in (system.valve, system.tube))

@@ -33,7 +33,7 @@ FREE = (
     "circuit.supply.pressure",
     "muscle.spring.stiffness",
     "muscle.damper.damping",
-    "muscle.damper.growth",
+    "muscle.damper.damping_slope",
     "mechanism.mass",
 )
 SENSORS = {"pressure": 1e3, "position": 1e-4}

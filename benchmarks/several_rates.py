@@ -11,7 +11,7 @@ from scalar_rates import Rates, beyond_box, valve_flow
 from airmuscle.muscle import Muscle
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge
-from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, absolute
+from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, absolute_pressure
 
 OneMuscle = Callable[[float, float, float, float, float], tuple[float, float]]
 
@@ -21,9 +21,9 @@ def one_muscle(muscle: Muscle, circuit: FillDischarge, ambient: Ambient) -> OneM
     law, per_length = muscle.contractile, 1.0 / muscle.geometry.resting_length
     k, c = stretch_factor(muscle.geometry)
     rt, outside, cc = GAS_CONSTANT * ambient.temperature, ambient.pressure, c * c
-    source = absolute(circuit.supply.pressure, ambient)
+    source = absolute_pressure(circuit.supply.pressure, ambient)
     fill_flow, discharge_flow = (valve_flow(v, ambient.temperature) for v in (circuit.fill, circuit.discharge))
-    stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth
+    stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.damping_slope
     low_x, scale_x = law.min_contraction, 2.0 / (law.max_contraction - law.min_contraction)
     low_q, scale_q = law.min_pressure, 2.0 / (law.max_pressure - law.min_pressure)
     least, greatest, tangent = law.min_force, law.max_force, beyond_box(law)

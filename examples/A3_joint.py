@@ -18,18 +18,18 @@ from airmuscle.units import bar, degree, kPa, mm, ms
 muscle = replace(am.load("dmsp-20-300").muscle, damper=am.LinearDamper(200.0))
 left, right = replace(muscle, name="left"), replace(muscle, name="right")
 edge = am.Valve(conductance=2.6e-9, critical_ratio=0.433)
-valve = ProportionalValve(am.Supply(6 * bar), edge, edge, SecondOrderLag(frequency=80.0), overlap=0.05, muscles=2)
-circuit = WithTubes(valve, Tube.of_size(length=1.0, diameter=4 * mm))
+valve = ProportionalValve(am.Supply(6 * bar), edge, edge, SecondOrderLag(frequency=80.0), overlap=0.05, muscle_count=2)
+circuit = WithTubes(valve, Tube.from_dimensions(length=1.0, diameter=4 * mm))
 joint = AntagonisticJoint(radius=40 * mm, inertia=0.05, damping=0.2, weight_torque=2.0, offset=0.11)
-plant = am.Plant((left, right), circuit, am.Held(joint))
+plant = am.Plant((left, right), circuit, am.WithLatch(joint))
 
 rest = am.find_equilibrium(plant, pressure=2.5 * bar)
 both = stiffness(plant, rest).coordinates["angle"]
 print(f"at rest at {rest['angle'] / degree:.1f} degrees, both muscles at 2.5 bar")
 print(f"stiffness {both.constant_pressure:.0f} N m/rad, with shut valves {both.shut_valves:.0f} N m/rad")
 
-told = am.Schedule({"command": ((0.1, 0.6), (0.3, 0.0)), "held": ((0, 1), (0.1, 0))})
-command = WithDrivers(told, {"held": SolenoidDriver(opening_delay=10 * ms, closing_delay=25 * ms)})
+told = am.Schedule({"command": ((0.1, 0.6), (0.3, 0.0)), "latched": ((0, 1), (0.1, 0))})
+command = WithDrivers(told, {"latched": SolenoidDriver(opening_delay=10 * ms, closing_delay=25 * ms)})
 run = am.simulate(plant, command, duration=2.0, start=rest)
 moves = run["time"][abs(run["angle"] - run["angle"][0]) > 0.1 * degree][0]
 print(f"brake released and valve opened at 100 ms: moves from {moves / ms:.0f} ms on")

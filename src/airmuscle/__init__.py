@@ -14,8 +14,10 @@ from .analysis.equilibrium import find_equilibrium
 from .control.inputs import SampledSignal, Schedule
 from .core.errors import AirmuscleError
 from .core.reference import Reference, cite
-from .library.catalogue import list_library, load, load_data, save
-from .mechanism import HangingMass, Held, Isometric, Mechanism
+from .library.catalogue import load, load_data
+from .library.files import list_library
+from .library.write import save
+from .mechanism import HangingMass, Isometric, Mechanism, WithLatch
 from .muscle import LinearDamper, LinearSpring, Muscle
 from .plant.plant import Plant
 from .pneumatics import Circuit, FillDischarge, Supply, Valve
@@ -38,7 +40,6 @@ __all__ = [
     "FillDischarge",
     "Fit",
     "HangingMass",
-    "Held",
     "Isometric",
     "Isothermal",
     "LinearDamper",
@@ -55,6 +56,7 @@ __all__ = [
     "Schedule",
     "Supply",
     "Valve",
+    "WithLatch",
     "advance",
     "characteristic",
     "cite",

@@ -29,7 +29,7 @@ from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import ParameterError, SimulationError
 from airmuscle.core.reference import cite
-from airmuscle.mechanism import HangingMass, Held, Isometric
+from airmuscle.mechanism import HangingMass, Isometric, WithLatch
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, ProportionalRegulator, ProportionalValve, SecondOrderLag, Supply, Valve
 from airmuscle.pneumatics.gas import Isothermal
@@ -281,18 +281,18 @@ def test_pid_follows_with_every_kind_of_valve():
 
 
 def test_position_is_followed_and_what_is_beside_goes_on():
-    plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), Held(HangingMass(10.0)))
+    plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), WithLatch(HangingMass(10.0)))
     pid = PID("position", SplitRange("fill", "discharge"), 15.0, 0.5, 0.08)
     loop = ControlLoop(
         pid,
         5e-3,
         SampledSignal({"position": ((0.0, 0.0), (2.0, 0.02))}),
-        other_inputs=Schedule({"held": ((0, 1), (0.5, 0))}),
+        other_inputs=Schedule({"latched": ((0, 1), (0.5, 0))}),
     )
     run = simulate(plant, loop, duration=5.0, start=plant.state_at(pressure=1e5))
     early = run["time"] < 0.5
     assert np.ptp(run["position"][early]) == 0.0
-    assert np.array_equal(run["held"], early.astype(float))
+    assert np.array_equal(run["latched"], early.astype(float))
     assert run["position"][-1] == pytest.approx(0.02, abs=1e-3)
     assert run["setpoint.position"] == pytest.approx(np.minimum(run["time"] / 100, 0.02))
 
@@ -334,14 +334,14 @@ def test_a_run_cut_between_two_samples_goes_on_with_what_was_commanded(cut):
 
 def test_what_was_commanded_gives_the_same_run_without_a_controller():
     drivers = {"fill": (PWM(30.0), SolenoidDriver(9e-3, 7e-3, 4e-3, 2e-3))}
-    plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), Held(HangingMass(10.0)))
-    loop = ControlLoop(VALVES, TICK, PRESSURE, Schedule({"held": ((0, 1), (0.1, 0))}), drivers)
+    plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), WithLatch(HangingMass(10.0)))
+    loop = ControlLoop(VALVES, TICK, PRESSURE, Schedule({"latched": ((0, 1), (0.1, 0))}), drivers)
     start = plant.state_at(pressure=1e5)
     run = simulate(plant, loop, duration=1.0, start=start, method=FINE)
     again = simulate(plant, loop.as_open_loop(run), duration=1.0, start=start, method=FINE, output=run["time"])
     at = np.isin(again["time"], run["time"])
     assert at.sum() == len(run)
-    for name in ("pressure", "position", "fill", "held"):
+    for name in ("pressure", "position", "fill", "latched"):
         assert again[name][at] == pytest.approx(run[name], rel=1e-6, abs=1e-8), name
 
 

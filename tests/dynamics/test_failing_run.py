@@ -13,7 +13,7 @@ from airmuscle.analysis.static_stiffness import stiffness
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import PiecewiseLinear, Schedule
 from airmuscle.core.errors import AirmuscleError, SimulationError
-from airmuscle.mechanism import HangingMass, Held, MusclesInSeries, WithEndStops
+from airmuscle.mechanism import HangingMass, MusclesInSeries, WithEndStops, WithLatch
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import LinearDamper, SeriesSpring
 from airmuscle.plant.plant import Plant
@@ -53,7 +53,7 @@ def test_a_fixed_step_that_is_too_long_is_not_called_a_result():
 @pytest.mark.parametrize("gas", [Isothermal(), Polytropic(1.2), EnergyBalance(0.2)], ids=repr)
 def test_a_load_that_tears_a_muscle_out_of_its_reach_is_named_as_the_cause(mechanism, gas):
     """A braid stretched until its threads lie along it encloses nothing; a stop is what keeps a load from doing so."""
-    muscles = tuple(replace(chosen_muscle(), name=name) for name in ("upper", "lower"))[: mechanism.muscles or 1]
+    muscles = tuple(replace(chosen_muscle(), name=name) for name in ("upper", "lower"))[: mechanism.muscle_count or 1]
     plant = Plant(muscles, (FillDischarge(Supply(5e5), VALVE, HUGE),) * len(muscles), mechanism, gas)
     empty = Schedule({name: ((0.0, 1.0),) for name in plant.inputs if name.endswith("discharge")})
     with pytest.raises(SimulationError, match=r"upper had come to a contraction of -10.*put Stopped around") as caught:
@@ -201,11 +201,11 @@ PARTS = [
         "gas must be an instance of Gas",
     ),
     (lambda: WithLeak(None, VALVE), "WithLeak: circuit must be an instance of Circuit; it is None"),
-    (lambda: Manifold(Supply(5e5), (3,), ("a",)), "its branches must be a tuple of Circuit"),
+    (lambda: Manifold(Supply(5e5), (3,), ("a",)), "branches is .*; it must be a tuple of Circuit"),
     (lambda: Manifold(Supply(5e5), FillDischarge(SharedSupply(), VALVE, VALVE), ("a",)), "must be a tuple of Circuit"),
     (
         lambda: Manifold(Supply(5e5), (FillDischarge(SharedSupply(), VALVE, VALVE),), (1,)),
-        "names must be a tuple of str",
+        "names is .*; it must be a tuple of str",
     ),
 ]
 
@@ -219,13 +219,10 @@ def test_a_part_of_another_kind_is_named(make, message):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Held(3), "Held: inner must be an instance of Mechanism; it is 3"),
+        (lambda: WithLatch(3), "WithLatch: inner must be an instance of Mechanism; it is 3"),
         (lambda: MusclesInSeries(3, (1.0,)), "MusclesInSeries: inner must be an instance of Mechanism"),
         (lambda: WithEndStops(3, 0.0, 0.1, HuntCrossley(1e9)), "WithEndStops: inner must be an instance of Mechanism"),
-        (
-            lambda: WithEndStops(HangingMass(1.0), 0.0, 0.1, 3),
-            "WithEndStops: contact must be an instance of HuntCrossley",
-        ),
+        (lambda: WithEndStops(HangingMass(1.0), 0.0, 0.1, 3), "WithEndStops: contact must be an instance of HuntCrossley"),
     ],
 )
 def test_a_part_of_a_mechanism_is_one(make, message):

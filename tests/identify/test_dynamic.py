@@ -243,9 +243,9 @@ def test_line_and_muscle_are_told_from_a_sensor_in_the_line():
     plant = free_muscle()
     valve, line, wall = "circuit.circuit.fill", "circuit.tube", "muscle.wall"
     free = (f"{valve}.conductance", f"{valve}.critical_ratio", f"{line}.volume", f"{line}.orifice.conductance",
-            f"{wall}.growth_volume", f"{wall}.lag")  # fmt: skip
+            f"{wall}.growth_volume", f"{wall}.time_constant")  # fmt: skip
     guess = changed(plant, circuit__tube__volume=1.5, circuit__tube__orifice__conductance=0.8,
-                    muscle__wall__lag=0.6, muscle__wall__growth_volume=1.4)  # fmt: skip
+                    muscle__wall__time_constant=0.6, muscle__wall__growth_volume=1.4)  # fmt: skip
     fit = fit_dynamic(
         guess, [free_fill(plant, "tube.pressure")], free=free, observed={"tube.pressure": 500.0}, starts=3
     )
@@ -269,7 +269,7 @@ def test_a_fill_tells_whether_it_was_sensed_before_the_muscle(sensed):
     valve, wall = "circuit.fill", "muscle.wall"
     inside = fit_dynamic(
         lone, [Experiment(recording, OPEN, InitialConditions.held(lone, 1e4))], observed={"pressure": 500.0}, starts=3,
-        free=(f"{valve}.conductance", f"{valve}.critical_ratio", f"{wall}.growth_volume", f"{wall}.middle"),
+        free=(f"{valve}.conductance", f"{valve}.critical_ratio", f"{wall}.growth_volume", f"{wall}.midpoint_pressure"),
         bounds={f"{valve}.critical_ratio": (0.1, 0.6), f"{wall}.growth_volume": (0.0, 2e-4)},
     )  # fmt: skip
     line = ("circuit.circuit.fill.conductance", "circuit.tube.volume", "circuit.tube.orifice.conductance")

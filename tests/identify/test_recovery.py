@@ -21,7 +21,7 @@ from airmuscle.core.errors import AirmuscleWarning, IdentificationError
 from airmuscle.identify import UNCENSORED, confidence_band, fit
 from airmuscle.identify.problem import direction_of
 from airmuscle.identify.profile_likelihood import weakly_determined
-from airmuscle.library import catalogue
+from airmuscle.library import catalogue, files
 from airmuscle.recording import Recording
 
 HELD = {
@@ -41,7 +41,7 @@ def law_of(name: str):
 
 
 def recoverable() -> list[str]:
-    return [n for n in catalogue.list_library() if any(leaf.declared.fitted for leaf in tree.leaves(law_of(n)[0]))]
+    return [n for n in files.list_laws() if any(leaf.declared.fitted for leaf in tree.leaves(law_of(n)[0]))]
 
 
 def simulated(
@@ -105,8 +105,8 @@ def test_a_law_is_recovered_within_its_bands(name: str):
 
 
 def test_every_law_of_the_library_is_tried_and_a_table_has_nothing_to_find():
-    tables = {name for name in catalogue.list_library() if isinstance(law_of(name)[0], Tabulated)}
-    assert set(recoverable()) | tables == set(catalogue.list_library())
+    tables = {name for name in files.list_laws() if isinstance(law_of(name)[0], Tabulated)}
+    assert set(recoverable()) | tables == set(files.list_laws())
     assert tables == {"festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40"}
     for name in tables:
         law, validity_range = law_of(name)

@@ -17,7 +17,8 @@ from airmuscle.characteristic.base import Characteristic, ContractionLaw, ForceL
 from airmuscle.characteristic.validity_range import ValidityRange
 from airmuscle.core import autodiff
 from airmuscle.core.errors import AirmuscleWarning, ParameterError, SolveError
-from airmuscle.library import catalogue
+from airmuscle.library import catalogue, files
+from airmuscle.library.entry import Entry
 
 ARGUMENTS = {
     "force": ("pressure", "contraction"),
@@ -41,7 +42,7 @@ class Points(NamedTuple):
 
 
 @functools.cache
-def entry(name: str) -> catalogue.Entry:
+def entry(name: str) -> Entry:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
         return catalogue.load(name)
@@ -90,7 +91,7 @@ def reached_from_rest(law: Characteristic, pressure: float, contraction: float, 
     return bool(slopes.by_pressure > 0 and slopes.by_contraction < 0)
 
 
-every_entry = pytest.mark.parametrize("name", catalogue.list_library())
+every_entry = pytest.mark.parametrize("name", files.list_laws())
 
 
 @every_entry

@@ -87,11 +87,11 @@ def test_the_code_of_the_page_runs():
 
 def test_the_table_of_the_page_is_a_loop(tmp_path: Path):
     held = PLANT.replace(
-        'model = "HangingMass"\nmass = "5 kg"', 'model = "Held"\ninner = { model = "HangingMass", mass = 5 }'
+        'model = "HangingMass"\nmass = "5 kg"', 'model = "WithLatch"\ninner = { model = "HangingMass", mass = 5 }'
     )
     scenario = load_scenario(written(tmp_path, text=f"{held}{TABLE}"))
     pid = PID("position", SplitRange("fill", "discharge"), 40.0, 1.0, 0.05)
-    wanted, beside = Schedule({"position": ((0.0, 0.0), (0.2, 0.02))}), Schedule({"held": ((0.0, 1.0), (0.1, 0.0))})
+    wanted, beside = Schedule({"position": ((0.0, 0.0), (0.2, 0.02))}), Schedule({"latched": ((0.0, 1.0), (0.1, 0.0))})
     assert scenario.command == ControlLoop(pid, 5e-3, wanted, beside, {"fill": PWM(200.0), "discharge": PWM(200.0)})
     run = scenario.simulate()
     assert np.ptp(run["position"][run["time"] <= 0.1]) < 1e-12
@@ -155,7 +155,7 @@ def test_drivers_and_inputs_beside_stand_where_they_always_do(tmp_path: Path):
 def test_the_columns_of_a_loop_may_be_asked_for(tmp_path: Path):
     asked = ("[run]", '[output]\ncolumns = ["setpoint.pressure", "command.fill"]\n[run]')
     scenario = load_scenario(written(tmp_path, asked))
-    assert list(scenario.chosen(scenario.simulate())) == ["time", "setpoint.pressure", "command.fill"]
+    assert list(scenario.select_columns(scenario.simulate())) == ["time", "setpoint.pressure", "command.fill"]
 
 
 # What is wrong
@@ -169,10 +169,10 @@ PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "SplitRange", positiv
     [
         ('measured = "pressure"', 'measured = "presure"', ParameterError, r"toml, \[command.controller\]: PID measures 'presure', which .*Did you mean 'pressure'\?"),
         ('measured = "pressure"', 'measured = "fill"', ParameterError, r"PID measures 'fill', which the plant does not have; there are"),
-        ('measured = "pressure"', "measured = 3", ParameterError, r"\[command.controller\]: measured is 3; text is wanted"),
-        ('measured = "pressure"\n', "", ParameterError, r"\[command.controller\]: PID needs 'measured' \(text\); it is missing"),
+        ('measured = "pressure"', "measured = 3", ParameterError, r"\[command.controller\]: measured is 3; it must be a text"),
+        ('measured = "pressure"\n', "", ParameterError, r"\[command.controller\]: PID needs 'measured' \(a text\); it is missing"),
         ('commanded = "fill"', 'commanded = "fil"', ParameterError, r"\[command.controller\]: the plant has no input 'fil'; there are fill, discharge. Did you mean 'fill'\?"),
-        ('commanded = "fill"', "commanded = 3", ParameterError, r"commanded is 3; text or a SplitRange is wanted"),
+        ('commanded = "fill"', "commanded = 3", ParameterError, r"commanded is 3; it must be a text or a SplitRange"),
         ('commanded = "fill"', PID_TABLE[1].format("fill", "vent"), ParameterError, r"\[command.controller\]: the plant has no input 'vent'"),
         ('commanded = "fill"', PID_TABLE[1].format("fill", "fill"), ParameterError, r"SplitRange: both sides are 'fill'"),
         ('"1.5 1/bar"', '"1.5 1/mm"', UnitError, r"\[command.controller\], gain: unit '1/mm' cannot be converted to '1/Pa'"),
@@ -194,13 +194,13 @@ PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "SplitRange", positiv
         (SETPOINT, 'presure = [[0, 1]]', ParameterError, r"\[command.controller.setpoint\]: the controller has no set point 'presure'; there are pressure.*Did you mean"),
         (SETPOINT, 'pressure = [[0, "1 mm"]]', UnitError, r"setpoint\], pressure: unit 'mm' cannot be converted to 'Pa'"),
         (SETPOINT, 'pressure = [[0, nan]]', ParameterError, r"setpoint\], pressure is nan; it must be finite"),
-        (SETPOINT, 'pressure = 3', ParameterError, r"setpoint\], pressure is 3; write instants and values"),
+        (SETPOINT, 'pressure = 3', ParameterError, r"setpoint\], pressure is 3; it must be a list of instants and values"),
         (SETPOINT, f'{SETPOINT}\ndrivers = {{ pressure = "SolenoidDriver" }}', ParameterError, r"a set point has no drivers; write \[command.drivers\]"),
-        (SETPOINT, f'{SETPOINT}\ncontroller = 3', ParameterError, r"a controller stands in a scenario only"),
+        (SETPOINT, f'{SETPOINT}\ncontroller = 3', ParameterError, r"a controller is allowed only in a scenario"),
         (SETPOINT, 'file = "none.csv"', AirmuscleError, r"none.csv"),
-        ('model = "PID"', 'model = "Valve"', ParameterError, r"\[command.controller\]: Valve is no controller; there are OnOffController, PID"),
+        ('model = "PID"', 'model = "Valve"', ParameterError, r"\[command.controller\]: Valve is not a controller; there are OnOffController, PID"),
         ('model = "PID"', 'model = "PDI"', UnknownNameError, r"no model 'PDI'"),
-        ('model = "PID"\n', "", ParameterError, r"\[command.controller\]: no model is named"),
+        ('model = "PID"\n', "", ParameterError, r"\[command.controller\]: the model is not named"),
         ("[command]\n", '[command]\nfill = [["0.1 s", 1]]\n', ParameterError, r"'fill' is commanded by the controller, and beside it too"),
         ("[command]\n", '[command]\ndischarge = [["0.1 s", 2]]\n', ParameterError, r"\[command\]: the input 'discharge' is 2 before"),
         ("[command]\n", '[command]\ndrivers = { vent = "SolenoidDriver" }\n', ParameterError, r"\[command.drivers\]: the plant has no input 'vent'"),
@@ -214,7 +214,10 @@ def test_a_loop_that_cannot_be_is_refused(tmp_path: Path, was: str, becomes: str
 def test_what_is_no_table_of_a_controller_is_refused(tmp_path: Path):
     i = GOOD.index("[command.controller]")
     for given in ("3", '"PID"'):
-        with pytest.raises(ParameterError, match=r'\[command.controller\] is .*; write model = "PID", its parameters'):
+        with pytest.raises(
+            ParameterError,
+            match=r'\[command.controller\] is .*; it must be a table. Write model = "PID", its parameters',
+        ):
             load_scenario(written(tmp_path, text=f"{GOOD[:i]}controller = {given}"))
     flat = f'{GOOD[:i]}controller = {{ model = "PID", measured = "pressure", commanded = "fill", gain = 1, period = 1e-3, setpoint = 3 }}'
     with pytest.raises(ParameterError, match=r'\[command.controller.setpoint\] is 3; write pressure = \[\["0 s"'):
@@ -222,28 +225,31 @@ def test_what_is_no_table_of_a_controller_is_refused(tmp_path: Path):
 
 
 def test_two_inputs_of_one_command_are_of_one_kind(tmp_path: Path):
-    text = regulated('{ model = "SplitRange", positive = "setpoint", negative = "held" }')
+    text = regulated('{ model = "SplitRange", positive = "setpoint", negative = "latched" }')
     text = text.replace(
-        'model = "HangingMass"\nmass = "5 kg"', 'model = "Held"\ninner = { model = "HangingMass", mass = 5 }'
+        'model = "HangingMass"\nmass = "5 kg"', 'model = "WithLatch"\ninner = { model = "HangingMass", mass = 5 }'
     )
-    with pytest.raises(ParameterError, match="setpoint and held have different units; name inputs of one kind"):
+    with pytest.raises(
+        ParameterError, match="setpoint and latched have different units; choose inputs of the same unit"
+    ):
         load_scenario(written(tmp_path, text=text))
 
 
 def test_a_column_that_a_set_point_follows_is_there(tmp_path: Path):
     (tmp_path / "wanted.csv").write_text("time [s],valve\n0,1\n1,2\n", encoding="utf-8")
-    with pytest.raises(ColumnError, match=r"wanted.csv has no column called like an input \(pressure\)"):
+    with pytest.raises(ColumnError, match=r"wanted.csv has no column with the name of an input \(pressure\)"):
         load_scenario(written(tmp_path, (SETPOINT, 'file = "wanted.csv"')))
 
 
 def test_a_record_has_no_controller(tmp_path: Path):
     from airmuscle.library.location import Location
-    from airmuscle.scenario.inputs import command_from
+    from airmuscle.scenario.inputs import build_input_signal
 
     with pytest.raises(
-        ParameterError, match=r"record, \[command\]: a controller stands in a scenario only; give what was"
+        ParameterError,
+        match=r"record, \[command\]: a controller is allowed only in a scenario; give the commanded inputs",
     ):
-        command_from({"controller": {}}, (), Location("record", "command", tmp_path))
+        build_input_signal({"controller": {}}, (), Location("record", "command", tmp_path))
 
 
 # Schema, report, program, study

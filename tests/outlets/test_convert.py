@@ -77,7 +77,7 @@ def test_the_table_is_printed(tmp_path):
             ("borzikova-exponential", "ContractileSurface"),
             "states no validity range to convert it on; give --min-pressure, ",
         ),
-        ((MUSCLE, "ContractileSurfac"), "no library entry 'ContractileSurfac'"),
+        ((MUSCLE, "ContractileSurfac"), "no muscle or law 'ContractileSurfac'"),
         ((MUSCLE, "Saga2007"), "MODEL: Saga2007 needs values to start from"),
         ((MUSCLE, "hunt"), "has no force at"),
         ((MUSCLE, "ContractileSurface", "--min-pressure", "7 bar"), "must be less than max_pressure"),

@@ -22,7 +22,7 @@ from airmuscle.library.catalogue import load
 from airmuscle.library.location import Location
 from airmuscle.recording import Recording, read
 from airmuscle.recording.csv_writer import write_csv
-from airmuscle.scenario.scenario import muscle_from
+from airmuscle.scenario.scenario import build_muscle
 
 SLIP = MaxwellSlip((2e4, 1e4, 3e3), (3e-4, 1.2e-3, 5e-3))
 TURNS = (0.02, 0.14, 0.08, 0.12, 0.05, 0.14, 0.02)
@@ -84,7 +84,7 @@ def test_without_a_muscle_the_friction_stands_in_a_table_that_a_plant_takes(two,
     assert found["recommended"] == found["laws"][0]["law"]
     assert found["laws"][0]["repeat_rmse"] is None, "one run has no second"
     table = tomllib.loads((tmp_path / "friction.toml").read_text(encoding="utf-8"))
-    muscle = muscle_from({"library": MUSCLE, **table}, Location("scenario.toml", "plant.muscle", tmp_path))
+    muscle = build_muscle({"library": MUSCLE, **table}, Location("scenario.toml", "plant.muscle", tmp_path))
     assert type(muscle.friction).__name__ == found["recommended"]
 
 
@@ -128,7 +128,7 @@ def test_a_second_run_at_another_level_is_a_loop_of_its_own(two):
     [
         ((0.02, 0.14), LENGTH, "loop.csv: no branch along which the path falls: a loop goes up and down."),
         (TURNS, (), "loop.csv: friction against shortening needs the resting length"),
-        (TURNS, (*LENGTH, "--muscle", "none-such"), "no library entry 'none-such'"),
+        (TURNS, (*LENGTH, "--muscle", "none-such"), "no muscle or law 'none-such'"),
     ],
 )
 def test_what_is_no_loop_is_refused(turns, options, message, tmp_path):

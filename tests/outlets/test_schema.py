@@ -18,9 +18,11 @@ from typer.testing import CliRunner
 from airmuscle.cli.app import app
 from airmuscle.core.declaration import parameters
 from airmuscle.core.errors import AirmuscleError
-from airmuscle.library.catalogue import list_library, load, to_toml
+from airmuscle.library.catalogue import load
+from airmuscle.library.entry_file import build_entry
+from airmuscle.library.files import list_laws
 from airmuscle.library.models import model_class
-from airmuscle.library.read import entry_from
+from airmuscle.library.write import to_toml
 from airmuscle.scenario.scenario import load_scenario
 from airmuscle.scenario.schema import muscle_schema, scenario_schema
 
@@ -113,7 +115,7 @@ def test_every_file_of_the_library_passes(path: Path):
 
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
-@pytest.mark.parametrize("name", list_library())
+@pytest.mark.parametrize("name", list_laws())
 def test_every_entry_passes_in_the_form_that_fit_and_save_write(name: str):
     assert judged(tomllib.loads(to_toml(load(name))), MUSCLE) == []
 
@@ -202,7 +204,7 @@ def test_a_broken_muscle_is_found_by_the_schema_and_refused_by_the_program(was: 
     found = judged(tables, MUSCLE)
     assert any(f.startswith(fault) for f in found), found
     with pytest.raises(AirmuscleError):
-        entry_from(tables, "broken", Path("broken.toml"), ROOT)
+        build_entry(tables, "broken", Path("broken.toml"), ROOT)
 
 
 # It is generated

@@ -12,9 +12,9 @@ from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.control.inputs import ZERO_INPUT, SampledSignal
 from airmuscle.identify.static_fit import fit
 from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.muscle import CubicSpring, LaggingWall, LinearDamper, LinearSpring, Muscle
+from airmuscle.muscle import CubicSpring, LinearDamper, LinearSpring, Muscle, ViscoelasticWall
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import ClosedChamber, IndexedValve, Tube, Valve
+from airmuscle.pneumatics import ClosedChamber, SubsonicIndexValve, Tube, Valve
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.recording import Recording
 from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_PRINTED
@@ -163,8 +163,8 @@ def test_every_suspected_cause_is_exchanged_and_changes_the_courses(effects):
     "nothing",
     [
         {"valve": dataclasses.replace(MATRIX, critical_ratio=0.433)},
-        {"valve": IndexedValve(MATRIX.conductance, MATRIX.critical_ratio, 0.5)},
-        {"wall": LaggingWall(0.0, 0.1)},
+        {"valve": SubsonicIndexValve(MATRIX.conductance, MATRIX.critical_ratio, 0.5)},
+        {"wall": ViscoelasticWall(0.0, 0.1)},
         {"gas": Polytropic(1.001)},
         {"gas": EnergyBalance(1e4)},
         {"spring": CubicSpring(1000.0, 0.0)},

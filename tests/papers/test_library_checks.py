@@ -1,4 +1,4 @@
-"""Every check of a library file is reproduced by its model within the stated tolerance."""
+"""Every number that a library file carries as a check comes out of its model, within the tolerance it states."""
 
 from __future__ import annotations
 
@@ -8,25 +8,26 @@ import warnings
 import pytest
 
 from airmuscle.core.errors import AirmuscleWarning
-from airmuscle.library import catalogue
-from airmuscle.library.verify import verify
+from airmuscle.library import catalogue, files
+from airmuscle.library.entry import Entry
+from airmuscle.library.verification import verify
 
 
-def quietly_loaded(name: str) -> catalogue.Entry:
+def quietly_loaded(name: str) -> Entry:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
         return catalogue.load(name)
 
 
-@pytest.mark.parametrize("name", catalogue.list_library())
-def test_the_checks_of_an_entry_pass(name: str):
+@pytest.mark.parametrize("name", files.list_laws())
+def test_the_checks_of_an_entry_hold(name: str):
     verdicts = verify(quietly_loaded(name))
     assert verdicts, "the file has no [[check]]"
-    assert [str(verdict) for verdict in verdicts if not verdict.holds] == []
+    assert [str(verdict) for verdict in verdicts if not verdict.passes] == []
 
 
-@pytest.mark.parametrize("name", catalogue.list_library())
-def test_an_entry_states_its_sources(name: str):
+@pytest.mark.parametrize("name", files.list_laws())
+def test_an_entry_says_where_it_is_from(name: str):
     entry = quietly_loaded(name)
     assert entry.references or entry.characteristic.references or getattr(entry.characteristic, "inner", None)
     assert all(check.source for check in entry.checks)
@@ -35,4 +36,4 @@ def test_an_entry_states_its_sources(name: str):
 def test_a_check_fails_when_the_model_changes():
     entry = catalogue.load("dmsp-20-300")
     stiffer = dataclasses.replace(entry.characteristic, c0=entry.characteristic.c0 * 1.1)
-    assert not all(verdict.holds for verdict in verify(dataclasses.replace(entry, characteristic=stiffer)))
+    assert not all(verdict.passes for verdict in verify(dataclasses.replace(entry, characteristic=stiffer)))

@@ -12,7 +12,7 @@ from ..muscle import Muscle, SeriesSpring
 from ..plant.muscle_state import MuscleState
 from ..plant.plant import Plant
 from ..plant.state import check_state, state_vector
-from ..pneumatics.gas import NO_FLOW, gauge
+from ..pneumatics.gas import NO_FLOW, gauge_pressure
 
 
 class StiffnessPair(NamedTuple):
@@ -96,7 +96,7 @@ def _pressure_growth(plant: Plant, muscle: Muscle, port: MuscleState) -> float:
 
     def pressure(x: Sequence[Value]) -> list[Value]:
         air = plant.gas.air(dict(zip(names, x[1:], strict=True)), x[0], plant.ambient)
-        return [gauge(air.pressure, plant.ambient)]
+        return [gauge_pressure(air.pressure, plant.ambient)]
 
     at = [float(v) for v in (port.volume, *content.values())]
     along = [float(growth), *(float(moved[n] - still[n]) for n in names)]

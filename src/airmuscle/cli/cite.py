@@ -28,11 +28,11 @@ def cite(
       airmuscle cite dmsp-20-300 --bibtex >> references.bib
     """
     from ..core import reference
-    from ..library.find import find
+    from ..library.catalogue import load
 
     if json and bibtex:
         raise typer.BadParameter("--json and --bibtex exclude each other")
-    found = reference.cite(find(name))
+    found = reference.cite(load(name))
     if json:
         print_json([dataclasses.asdict(source) for source in found])
         return

@@ -55,9 +55,10 @@ def convert(
     """
     from ..identify import convert as converted
     from ..identify.conversion import POINTS, on_grid
-    from ..library.catalogue import load, save
+    from ..library.catalogue import load_law
+    from ..library.write import save
 
-    entry = load(name)
+    entry = load_law(name)
     validity_range = _validity_range(entry, (min_pressure, max_pressure, min_contraction, max_contraction))
     grid = on_grid(entry.characteristic, validity_range, POINTS)
     rest = getattr(entry.geometry, "resting_length", None)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from ..identify.dynamic import DynamicFit
     from ..identify.dynamic.profile import DynamicProfile
-    from ..scenario.identification import DynamicStudy
+    from ..scenario.identification import DynamicFitSetup
 
 WEAK = "weak"
 """For --profile: all that take part in what the records do not determine."""
@@ -59,9 +59,9 @@ def fit_dynamic(
     import dataclasses
 
     from ..report.output_folder import check_writable
-    from ..scenario.identification import load_study
+    from ..scenario.identification import load_dynamic_fit
 
-    loaded = load_study(study)
+    loaded = load_dynamic_fit(study)
     if starts is not None:
         loaded = dataclasses.replace(loaded, starts=starts)
     check_writable(out)
@@ -84,7 +84,7 @@ def fit_dynamic(
     typer.echo(f"report: {out / 'report.html'}")
 
 
-def _remarks(study: DynamicStudy) -> list[str]:
+def _remarks(study: DynamicFitSetup) -> list[str]:
     """What is wrong, or may be, with the records."""
     from ..recording.segment import inspect
 
@@ -103,7 +103,7 @@ def _profiled(found: DynamicFit, names: Sequence[str]) -> list[str]:
 
 
 def _write(
-    study: DynamicStudy, found: DynamicFit, profiles: Sequence[DynamicProfile], remarks: Sequence[str], out: Path
+    study: DynamicFitSetup, found: DynamicFit, profiles: Sequence[DynamicProfile], remarks: Sequence[str], out: Path
 ) -> list[Path]:
     from ..report.dynamic_chapter import dynamic_chapters
     from ..report.output_folder import atomic_folder

@@ -69,7 +69,7 @@ def write(result: Fit, entry: Entry, recordings: list[Recording], out: Path, cha
     """Muscle and report in one folder, whole or not at all; `chapters` stand before the fit's own."""
     import dataclasses
 
-    from ..library.catalogue import save
+    from ..library.write import save
     from ..report.fit_chapter import fit_chapter
     from ..report.output_folder import atomic_folder
     from ..report.write import fill

@@ -58,13 +58,13 @@ def hysteresis(
       airmuscle hysteresis loops/*.csv --muscle fit/muscle.toml --mapping rig.toml --creep
     """
     from ..identify.hysteresis import find_loops, fit_loop
-    from ..library.catalogue import load
+    from ..library.catalogue import load_law
     from ..report.output_folder import check_writable
 
     if given and muscle is None:
         raise typer.BadParameter("--given takes the law of the muscle that --muscle names")
     recordings = measured(files, unit, mapping=mapping, resting_length=resting_length, ambient=ambient)
-    entry = None if muscle is None else load(muscle)
+    entry = None if muscle is None else load_law(muscle)
     law = entry.characteristic if entry is not None and given else None
     loops = find_loops(recordings, characteristic=law, degree=degree, all_rows=all_rows)
     check_writable(out)
@@ -108,8 +108,7 @@ def _creep(recordings: Sequence[Recording]) -> list[str]:
 def _write(
     found: Sequence[LoopFit], creep: Sequence[str], chosen: HysteresisFit | None, entry: Entry | None, out: Path
 ) -> Path | None:
-    from ..library.catalogue import save
-    from ..library.write import part_lines
+    from ..library.write import part_toml, save
     from ..report.hysteresis_chapter import hysteresis_chapters
     from ..report.output_folder import atomic_folder
     from ..report.write import fill
@@ -120,8 +119,8 @@ def _write(
         if chosen is not None and entry is not None:
             save(_with_friction(entry, chosen), place / "muscle.toml")
         elif chosen is not None:
-            lines = [f"# {chosen.verdict}", *part_lines("friction", chosen.friction)]
-            (place / "friction.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+            text = f"# {chosen.verdict}\n\n{part_toml('friction', chosen.friction)}"
+            (place / "friction.toml").write_text(text, encoding="utf-8")
     return out / name if name else None
 
 

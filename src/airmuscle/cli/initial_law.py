@@ -22,12 +22,12 @@ def start_of(name: str, recordings: Sequence[Recording], degree: int, option: st
     """The library entry to start from, or a bare one around a law that starts from data alone."""
     from ..core.errors import ParameterError
     from ..identify.candidates import standard_candidates
-    from ..library.catalogue import load
+    from ..library.catalogue import load_law
     from ..library.entry import Entry
     from ..library.models import model_class, model_names
 
     if name not in model_names():
-        return InitialLaw(load(name))
+        return InitialLaw(load_law(name))
     cls = model_class(name, option)
     if hasattr(cls, "blank"):
         # A clamp at twice what was measured cuts off no point, and still limits extrapolation.

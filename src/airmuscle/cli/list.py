@@ -41,13 +41,12 @@ def list_entries(json: Json = False) -> None:
 
 def heads() -> list[ListRow]:
     """The heads of all library entries and data sets; nothing is built, so that listing stays quick."""
-    from ..library import valve_catalogue
-    from ..library.catalogue import DATA, FOLDER, list_library, measured_names
+    from ..library.files import DATA, LAWS, VALVES, list_data, list_laws, list_valves
 
     return [
-        *(_entry_head(FOLDER / f"{name}.toml") for name in list_library()),
-        *(_valve_head(valve_catalogue.FOLDER / f"{name}.toml") for name in valve_catalogue.valve_names()),
-        *(_data_head(DATA / f"{name}.csv") for name in measured_names()),
+        *(_entry_head(LAWS / f"{name}.toml") for name in list_laws()),
+        *(_valve_head(VALVES / f"{name}.toml") for name in list_valves()),
+        *(_data_head(DATA / f"{name}.csv") for name in list_data()),
     ]
 
 

@@ -47,12 +47,12 @@ def plan(
     from ..core.units import quantity
     from ..identify.experiment_design import BenchLimits
     from ..identify.experiment_design import optimal_design as planned
-    from ..library.catalogue import load
+    from ..library.catalogue import load_law
 
     pressures = [quantity(text, "Pa", where="limits of pressure") for text in (min_pressure, max_pressure)]
     contractions = [quantity(text, "1", where="limits of contraction") for text in (min_contraction, max_contraction)]
     bench = BenchLimits(ValidityRange(*pressures, *contractions), quantity(max_force, "N", where="--max-force"))
-    found = planned(load(name).characteristic, bench, runs=runs, points=points, sigma=sigma, fixed=fix or ())
+    found = planned(load_law(name).characteristic, bench, runs=runs, points=points, sigma=sigma, fixed=fix or ())
     if out is not None:
         _write(found, out)
     if json:

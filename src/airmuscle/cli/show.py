@@ -12,11 +12,11 @@ from .terminal import print_json, print_table
 
 if TYPE_CHECKING:
     from ..library.entry import Entry
-    from ..library.valve_catalogue import ValveEntry
+    from ..library.valve_entry import ValveEntry
 
 PARTS = (
     "characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "validity_range", "valve",
-    "exhaust", "response",
+    "exhaust", "switching_times",
 )  # fmt: skip
 MANY = 30
 """Values of one list above which the table shows its ends only."""
@@ -31,9 +31,9 @@ def show(name: Name, json: Json = False) -> None:
       airmuscle show matrix-821
       airmuscle show my/muscle.toml --json
     """
-    from ..library.find import find
+    from ..library.catalogue import load
 
-    entry = find(name)
+    entry = load(name)
     if json:
         print_json(described(entry))
         return
@@ -62,7 +62,7 @@ def described(entry: Entry | ValveEntry) -> dict[str, Any]:
         "checks": [
             {
                 "quantity": c.quantity,
-                "given": dict(c.given),
+                "given": dict(c.conditions),
                 "equals": c.equals,
                 "tolerance": c.tolerance,
                 "source": c.source,

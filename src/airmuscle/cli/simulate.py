@@ -89,5 +89,5 @@ def _write(scenario: Scenario, recording: Recording, out: Path) -> None:
     from ..report.write import fill
 
     with atomic_folder(out) as place:
-        write_csv(scenario.chosen(recording), place / "recording.csv")
+        write_csv(scenario.select_columns(recording), place / "recording.csv")
         fill(place, [run_chapter(scenario, recording)], title="Simulation")

@@ -46,14 +46,14 @@ def solve(
       airmuscle solve dmsp-20-300 --contraction "12 %" --force "100 N" --out chart
       airmuscle solve my/muscle.toml --pressure "400 kPa" --contraction 0.1 --json
     """
-    from ..library.catalogue import load
+    from ..library.catalogue import load_law
     from ..report.chart import point_text, validity_range_of
 
     texts = {"pressure": pressure, "contraction": contraction, "force": force}
     missing = [quantity for quantity, text in texts.items() if text is None]
     if len(missing) != 1:
         raise typer.BadParameter(f"give two of --pressure, --contraction and --force; {3 - len(missing)} given")
-    entry = load(name)
+    entry = load_law(name)
     point, validity_range = (
         _solved(entry.characteristic, texts),
         validity_range_of(entry.characteristic, entry.validity_range),

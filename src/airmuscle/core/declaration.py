@@ -141,6 +141,14 @@ def _component_types(cls: type[Any]) -> dict[str, type[Any]]:
     return {n: k for n, k in structural.items() if isinstance(k, type) and k.__module__ not in ("builtins", "types")}
 
 
+def attribute_hint(obj: Any, kind: type[Any]) -> str:
+    """Sentence that names the fields of `obj` that hold an object of class `kind`; empty if there are none."""
+    if not dataclasses.is_dataclass(obj) or isinstance(obj, type):
+        return ""
+    names = [f".{f.name}" for f in dataclasses.fields(obj) if isinstance(getattr(obj, f.name), kind)]
+    return f" It contains one: write {' or '.join(names)} after it." if names else ""
+
+
 def check_structure(obj: Any) -> None:
     """Raise ParameterError if a component, at any depth of a model, is not an instance of its field's class."""
     if isinstance(obj, tuple):
@@ -152,6 +160,7 @@ def check_structure(obj: Any) -> None:
             if not isinstance(component, kind):
                 raise ParameterError(
                     f"{type(obj).__name__}: {name} must be an instance of {kind.__name__}; it is {str(component)[:80]}."
+                    f"{attribute_hint(component, kind)}"
                 )
         for field in dataclasses.fields(obj):
             check_structure(getattr(obj, field.name))

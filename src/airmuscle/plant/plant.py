@@ -14,8 +14,8 @@ from ..core.variables import Input, add_prefix, select_prefix, with_prefix
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..pneumatics import Circuit, CircuitFlows
-from ..pneumatics.gas import Air, Ambient, Flow, Gas, Polytropic, absolute, check_above_vacuum
-from ..pneumatics.ports import by_muscle, by_port
+from ..pneumatics.gas import Air, Ambient, Flow, Gas, Polytropic, absolute_pressure, check_above_vacuum
+from ..pneumatics.ports import key_by_muscle, key_by_port
 from ..pneumatics.supply import check_not_shared
 from .muscle_state import MuscleState, muscle_state
 
@@ -51,14 +51,14 @@ class Plant:
         names = [m.name for m in self.muscles]
         if not names:
             raise ParameterError("Plant: it has no muscle; give one, or a tuple of them.")
-        ports = sum(c.ports for c in self.circuits)
+        ports = sum(c.port_count for c in self.circuits)
         if ports != len(names):
             raise ParameterError(f"Plant: its circuits feed {ports} muscles; {len(names)} are given.")
-        taken = self.mechanism.muscles
+        taken = self.mechanism.muscle_count
         if taken not in (None, len(names)):
             owner = type(self.mechanism).__name__
             raise ParameterError(f"Plant: {owner} takes {taken} muscles; {len(names)} are given.")
-        if isinstance(self.circuit, tuple) and any(c.ports != 1 for c in self.circuit):
+        if isinstance(self.circuit, tuple) and any(c.port_count != 1 for c in self.circuit):
             raise ParameterError("Plant: a circuit that feeds several muscles stands alone, not in a tuple.")
         if len(set(names)) < len(names):
             raise ParameterError(f"Plant: muscles need different names; they are {names}.")
@@ -141,11 +141,11 @@ class Plant:
 
     def _outside(self, prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
         """What a circuit calls by its own names, by the plant's."""
-        return by_muscle(self.prefixes, values) if self._shared else with_prefix(prefix, values)
+        return key_by_muscle(self.prefixes, values) if self._shared else with_prefix(prefix, values)
 
     def _within(self, prefix: str, values: Mapping[str, Value]) -> Mapping[str, Value]:
         """What the plant calls by its names, by a circuit's own."""
-        return by_port(self.prefixes, values) if self._shared else select_prefix(prefix, values)
+        return key_by_port(self.prefixes, values) if self._shared else select_prefix(prefix, values)
 
     def ports(self, state: Mapping[str, Value]) -> tuple[MuscleState, ...]:
         """Every muscle at a state."""
@@ -164,7 +164,7 @@ class Plant:
         """What every circuit does."""
         shares = self._shares([port.air for port in ports])
         return tuple(
-            circuit.respond(share, self._within(prefix, state), select_prefix(prefix, inputs), self.ambient)
+            circuit.compute_flows(share, self._within(prefix, state), select_prefix(prefix, inputs), self.ambient)
             for (prefix, circuit), share in zip(self._circuits(), shares, strict=True)
         )
 
@@ -255,7 +255,7 @@ class Plant:
         found, volumes = dict(state), []
         contractions = self.mechanism.contractions(state, self.resting_lengths)
         for muscle, prefix, p, eps in zip(self.muscles, self.prefixes, pressures, contractions, strict=True):
-            own = {**muscle.settled(p, eps), **select_prefix(prefix, state)}
+            own = {**muscle.steady_state(p, eps), **select_prefix(prefix, state)}
             volumes.append(muscle.volume(muscle.inner_contraction(eps, own), own))
             found = {**with_prefix(prefix, own), **found}
         return found, volumes
@@ -266,7 +266,7 @@ class Plant:
         """The state with air at these gauge pressures [Pa] in muscles of these volumes [m3], and circuits settled."""
         found, airs = dict(state), []
         for prefix, p, volume in zip(self.prefixes, pressures, volumes, strict=True):
-            content = self.gas.state_at(absolute(p, self.ambient), volume, self.ambient)
+            content = self.gas.state_at(absolute_pressure(p, self.ambient), volume, self.ambient)
             airs.append(self.gas.air(content, volume, self.ambient))
             found |= with_prefix(prefix, content)
         for (prefix, circuit), share in zip(self._circuits(), self._shares(airs), strict=True):

@@ -31,7 +31,7 @@ QUANTITIES: dict[str, Quantity] = {
     "mass_flow": Quantity("kg/s", "qm", "mass flow into the muscle"),
     "fill": Quantity("1", "u_fill", "opening of the fill valve, 0 shut to 1 open"),
     "discharge": Quantity("1", "u_dis", "opening of the discharge valve, 0 shut to 1 open"),
-    "held": Quantity("1", "u_held", "1 while the load is latched, 0 released"),
+    "latched": Quantity("1", "u_latch", "1 while the load is latched, 0 released"),
     "branch": Quantity("1", "b", "branch as a file states it, 1 inflating, 2 deflating; it only judges what is found"),
     "friction": Quantity("N", "F_f", "friction of the muscle, against its motion"),
     "bristle": Quantity("m", "z", "deflection of a friction element"),

@@ -13,7 +13,7 @@ from ..control.inputs import PiecewiseLinear
 from ..core.plotting import BLACK, BLUE, legend_below, new_figure
 from ..recording import Recording
 from ..recording.plot import scale
-from ..scenario.scenario import Scenario, units_of_run
+from ..scenario.scenario import Scenario, column_units
 from .chapter import Plot, Table
 from .parameters import parameter_table
 
@@ -21,7 +21,7 @@ from .parameters import parameter_table
 def loop_plot(scenario: Scenario, loop: ControlLoop, recording: Recording) -> Plot:
     """Every set point as it was given, with its jumps, and the column that is to follow it."""
     names = list(dict.fromkeys((*loop.controller.setpoints, *loop.controller.measured_columns)))
-    units = units_of_run(scenario.plant, scenario.start, loop)
+    units = column_units(scenario.plant, scenario.start, loop)
     start, time = scenario.start_time, recording["time"]
     end = float(time[-1]) if time[-1] > start else start + scenario.duration
     given = loop.setpoint.segments(loop.controller.setpoints, start, end - start)
@@ -51,7 +51,7 @@ def corners(segments: PiecewiseLinear, start: float, i: int) -> tuple[Any, Any]:
 
 def controller_table(scenario: Scenario, loop: ControlLoop) -> Table:
     """The numbers of a controller, in the units that follow from what it measures and commands."""
-    units = units_of_run(scenario.plant, scenario.start, loop)
+    units = column_units(scenario.plant, scenario.start, loop)
     y, u = (units.get(names[0]) or "1" for names in (loop.controller.measured_columns, loop.controller.inputs))
     table = parameter_table(
         loop.controller, "controller", f"Parameters of the controller, {type(loop.controller).__name__}"

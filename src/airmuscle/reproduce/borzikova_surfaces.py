@@ -13,7 +13,7 @@ from ..core.errors import AirmuscleWarning
 from ..identify.correlation_index import CorrelationIndex, correlation_index
 from ..identify.surface.basis import LoadRange
 from ..identify.surface.monotone import monotone
-from ..library.catalogue import load
+from ..library.catalogue import load_law
 from ..recording import Recording
 
 MISPRINT = 2
@@ -32,9 +32,9 @@ def surfaces(curves: PlaneCurves = SAM_30X290) -> dict[str, ContractionLaw]:
     """Every surface that the chapter judges, by the name that it has there."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)  # that it is misprinted is what the chapter shows
-        printed = load("borzikova-direct-printed").characteristic
-    repaired = load("borzikova-direct-repaired").characteristic
-    exponential = load("borzikova-exponential").characteristic
+        printed = load_law("borzikova-direct-printed").characteristic
+    repaired = load_law("borzikova-direct-repaired").characteristic
+    exponential = load_law("borzikova-exponential").characteristic
     assert isinstance(printed, BorzikovaDirect)
     assert isinstance(repaired, BorzikovaDirect)
     assert isinstance(exponential, BorzikovaExponential)

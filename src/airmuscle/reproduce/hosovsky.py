@@ -104,7 +104,7 @@ def chapter(numbers: Numbers | None = None, suspected: causing.Suspected | None 
             causing.figure(effects),
             releasing.figure_4(low, high),
         ),
-        references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(catalogue.load(MAPS[0]))),
+        references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(catalogue.load_law(MAPS[0]))),
         chosen=(*numbers.rows(), *suspected.rows()),
     )
 
@@ -115,12 +115,12 @@ def maxwell_table(numbers: Numbers) -> Table:
     laws: dict[str, tuple[Characteristic, Geometry]]
     laws = {f"surface fitted to {name}, before the clamp": (surface_fit(name).model, shape) for name in MAPS}
     for name in ("dmsp-20-300", "dmsp-10-250"):
-        entry = catalogue.load(name)
+        entry = catalogue.load_law(name)
         laws[f"Martens-Boblan 2017, {name}"] = (entry.characteristic, entry.muscle.geometry)
     validity_ranges = [
         surface(MAPS[0]).validity_range,
         surface(MAPS[1]).validity_range,
-        *(catalogue.load(n).validity_range for n in ("dmsp-20-300", "dmsp-10-250")),
+        *(catalogue.load_law(n).validity_range for n in ("dmsp-20-300", "dmsp-10-250")),
     ]
     found = [
         maxwell_defect(law, volume, validity_range)

@@ -14,9 +14,9 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.plotting import DASHES, LINES, new_figure
-from ..muscle import CubicSpring, LaggingWall, LinearSpring, Spring, Wall
+from ..muscle import CubicSpring, LinearSpring, Spring, ViscoelasticWall, Wall
 from ..plant.plant import Plant
-from ..pneumatics import DistributedTube, IndexedValve, Orifice, Tube, TubeModel, Valve
+from ..pneumatics import DistributedTube, Orifice, SubsonicIndexValve, Tube, TubeModel, Valve
 from ..pneumatics.gas import EnergyBalance, Gas, Polytropic
 from ..recording import Recording
 from ..report.chapter import Plot, Table
@@ -82,11 +82,11 @@ def exchanges(numbers: Numbers, suspected: Suspected) -> tuple[Exchanged, ...]:
     """Every exchange, cause by cause, and last one of each cause at once."""
     s, stiffness = suspected, numbers.stiffness.value
     length, diameter = s.line_length.value, s.line_diameter.value
-    lumped, heat = Tube.of_size(length, diameter), EnergyBalance(s.heat_transfer.value)
-    indexed = IndexedValve(MATRIX.conductance, MATRIX.critical_ratio, s.index.value)
+    lumped, heat = Tube.from_dimensions(length, diameter), EnergyBalance(s.heat_transfer.value)
+    indexed = SubsonicIndexValve(MATRIX.conductance, MATRIX.critical_ratio, s.index.value)
     laminar = _valve(laminar_ratio=s.laminar_ratio.value)
     hardening = CubicSpring(stiffness, s.hardening.value)
-    wall = LaggingWall(s.wall_compliance.value, s.wall_lag.value)
+    wall = ViscoelasticWall(s.wall_compliance.value, s.wall_lag.value)
     angles = numbers.braid_angle
     return (
         Exchanged("line", "volume and resistance", tube=lumped),

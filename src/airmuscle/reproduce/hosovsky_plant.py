@@ -10,7 +10,7 @@ from ..core.reference import CHOSEN, Reference
 from ..geometry.braid import Braid
 from ..identify import Fit, fit
 from ..library import catalogue
-from ..mechanism import HangingMass, Held, Mechanism
+from ..mechanism import HangingMass, Mechanism, WithLatch
 from ..muscle import LinearDamper, LinearSpring, Muscle, RigidWall, Spring, Wall
 from ..plant.plant import Plant
 from ..pneumatics import FillDischarge, Orifice, Supply, TubeModel, Valve, WithTubes
@@ -121,6 +121,6 @@ def hanging(numbers: Numbers) -> HangingMass:
     return HangingMass(numbers.load.value)
 
 
-def latched() -> Held:
+def latched() -> WithLatch:
     """The load of the quick release behind its latch."""
-    return Held(HangingMass(RELEASED_MASS))
+    return WithLatch(HangingMass(RELEASED_MASS))

@@ -17,7 +17,7 @@ from ..simulation.simulate import simulate
 from .hosovsky_plant import MAPS, PAPER, Numbers, latched, plant
 
 RELEASED_AT, DURATION = 0.5, 6.0
-SCHEDULE = Schedule({"held": ((0.0, 1.0), (RELEASED_AT, 0.0))})
+SCHEDULE = Schedule({"latched": ((0.0, 1.0), (RELEASED_AT, 0.0))})
 COMPARABLE = 0.30
 """Dampings count as comparable when they differ by at most this fraction of the larger (chosen)."""
 

@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-from ..library.catalogue import complete
+from ..library.files import complete_name
 from ..report.chapter import Chapter
 from ..report.output_folder import check_writable
 from ..report.write import write_report
@@ -57,5 +57,5 @@ def reproduce(
 
 def named(papers: Sequence[str] | None) -> list[str]:
     """The full names of these papers, each once, in the report's order; all if there are none."""
-    wanted = {complete(paper, PAPERS, "paper") for paper in papers or PAPERS}
+    wanted = {complete_name(paper, PAPERS, "paper") for paper in papers or PAPERS}
     return [name for name in PAPERS if name in wanted]

@@ -11,7 +11,7 @@ from ..core.arrays import Array
 from ..core.variables import select_prefix, with_prefix
 from ..plant.plant import Plant
 from ..plant.state import has_negative_mass
-from ..pneumatics.ports import by_muscle, by_port
+from ..pneumatics.ports import key_by_muscle, key_by_port
 from .integrators import LESS_THAN_NONE, NO_VOLUME, NOT_FINITE, RawSolution
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def validity_warnings(plant: Plant, columns: Mapping[str, Any]) -> list[str]:
     found: dict[str, str] = {}
     shared = len(plant.circuits) < len(plant.muscles)
     for prefix, circuit in zip(plant.circuit_prefixes, plant.circuits, strict=True):
-        own = by_port(plant.prefixes, columns) if shared else select_prefix(prefix, columns)
+        own = key_by_port(plant.prefixes, columns) if shared else select_prefix(prefix, columns)
         doubts = circuit.validity_warnings(own, plant.ambient)
-        found |= by_muscle(plant.prefixes, doubts) if shared else with_prefix(prefix, doubts)
+        found |= key_by_muscle(plant.prefixes, doubts) if shared else with_prefix(prefix, doubts)
     return [f"{name.removesuffix('.')}: {words}" for name, words in found.items()]

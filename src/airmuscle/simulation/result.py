@@ -12,7 +12,7 @@ from ..compile import System
 from ..control.inputs import PiecewiseLinear
 from ..core.arrays import Array
 from ..core.errors import SimulationError
-from ..muscle import INNER, SeriesSpring
+from ..muscle import INNER_CONTRACTION, SeriesSpring
 from ..plant.plant import Plant
 from ..recording import Recording
 from .diagnostics import geometry_limit_hint, truncate_at_invalid_row, validity_warnings
@@ -87,7 +87,7 @@ def extrapolation_warnings(plant: Plant, columns: Mapping[str, Any]) -> list[str
                 ("pressure", validity_range.pressure, left, doubt),
                 ("contraction", validity_range.contraction, left, doubt),
             ]
-        own = INNER if isinstance(muscle.series, SeriesSpring) else "contraction"
+        own = INNER_CONTRACTION if isinstance(muscle.series, SeriesSpring) else "contraction"
         if f"{prefix}{own}" in columns:  # of a batch that may not be kept
             left, doubt = f"{muscle.name} was beyond the reach of its geometry", "no muscle can do this"
             of_muscle.append((own, muscle.geometry.contraction_range, left, doubt))

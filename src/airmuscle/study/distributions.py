@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ParameterError
-from ..library.location import Location, finite
+from ..library.location import Location, read_finite_number
 from .parse import chosen, difference, key, quantity, ratio, whole
 
 LEAST_SHARE = 1e-6
@@ -211,7 +211,7 @@ def variation_from(given: Any, unit: str, place: Location) -> Variation:
     if isinstance(given, list):
         if not given:
             raise ParameterError(f"{place}: the list is empty; give at least one value.")
-        return LevelSet(tuple(finite(value, unit, f"{place}[{i}]") for i, value in enumerate(given)))
+        return LevelSet(tuple(read_finite_number(value, unit, f"{place}[{i}]") for i, value in enumerate(given)))
     if not isinstance(given, Mapping):
         raise ParameterError(
             f'{place} is {given!r}; write a list of values, or a distribution like {{ model = "Uniform", low = ..., '

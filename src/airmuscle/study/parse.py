@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..core.errors import ParameterError, UnknownNameError, suggestion
-from ..library.location import Location, check_keys, finite, located_errors
+from ..library.location import Location, check_keys, located_errors, read_finite_number
 
 Reader = Callable[[Any, str, str], Any]
 """Reads a value, given the unit at hand and where it stands."""
@@ -26,23 +26,25 @@ def key(read: Reader, meaning: str, **field: Any) -> Any:
 
 def quantity(value: Any, unit: str, where: str) -> float:
     """A number in the unit at hand."""
-    return finite(value, unit, where)
+    return read_finite_number(value, unit, where)
 
 
 def difference(value: Any, unit: str, where: str) -> float:
     """A difference of two such numbers: where the zero of its unit lies does not matter."""
-    found = finite(value, unit, where)
-    return found - finite(_NUMBER.sub("0", value, count=1), unit, where) if isinstance(value, str) else found
+    found = read_finite_number(value, unit, where)
+    return (
+        found - read_finite_number(_NUMBER.sub("0", value, count=1), unit, where) if isinstance(value, str) else found
+    )
 
 
 def ratio(value: Any, unit: str, where: str) -> float:
     """A number without unit, or in per cent."""
-    return finite(value, "1", where)
+    return read_finite_number(value, "1", where)
 
 
 def seconds(value: Any, unit: str, where: str) -> float:
     """A time [s]."""
-    return finite(value, "s", where)
+    return read_finite_number(value, "s", where)
 
 
 def whole(value: Any, unit: str, where: str) -> int:

@@ -25,8 +25,8 @@ from ..core.tree import flatten, leaves, with_parameters
 from ..library.location import Location
 from ..library.models import model_class
 from ..plant.plant import Plant
-from ..scenario.controller import numbers_of
-from ..scenario.scenario import Scenario, pressure_of_rest, scenario_from, units_of_run
+from ..scenario.controller import controller_number_paths
+from ..scenario.scenario import Scenario, build_scenario, column_units, initial_pressure
 
 Keys = tuple[str | int, ...]
 
@@ -74,7 +74,7 @@ class ScenarioTemplate:
         from ..compile.program import compile_system  # CasADi, which reading a study does not need
 
         plant, alone = self.scenario.plant, [None] * len(values)
-        pressure = pressure_of_rest(self.tables, self.place)
+        pressure = initial_pressure(self.tables, self.place)
         if pressure is None or any(not isinstance(n.at, int) and n.at[:2] == ("run", "start") for n in numbers):
             return list(alone)
         leaves_of_each = np.repeat(flatten(plant)[None, :], len(values), axis=0)
@@ -100,14 +100,17 @@ class ScenarioTemplate:
                 tables = _with(tables, number.at, float(value))
         # a reason must read the same on every machine, so it names the file without its folder
         place = dataclasses.replace(self.place, file=Path(self.place.file).name)
-        return scenario_from(tables, place, with_parameters(scenario.plant, leaf_values), rest)
+        return build_scenario(tables, place, with_parameters(scenario.plant, leaf_values), rest)
 
 
 def _of_command(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:
-    units = units_of_run(scenario.plant, scenario.start, scenario.command)
+    units = column_units(scenario.plant, scenario.start, scenario.command)
     for name, given in table.items():
         if isinstance(scenario.command, ControlLoop) and name == "controller":
-            yield from ((("command", name, *keys), unit) for keys, unit in numbers_of(given, scenario.command, units))
+            yield from (
+                (("command", name, *keys), unit)
+                for keys, unit in controller_number_paths(given, scenario.command, units)
+            )
         elif name == "period":
             yield ("command", name), "s"
         elif isinstance(given, list):

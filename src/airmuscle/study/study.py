@@ -28,9 +28,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.errors import ParameterError, suggestion
-from ..library.catalogue import parsed
-from ..library.location import Location, check_keys, located_errors, text
-from ..scenario.scenario import Scenario, load_scenario, scenario_from, units_of_run
+from ..library.files import read_toml
+from ..library.location import Location, check_keys, located_errors, read_text
+from ..scenario.scenario import Scenario, build_scenario, column_units, load_scenario
 from .design import DESIGNS, Design
 from .distributions import Variation, variation_from
 from .fingerprint import fingerprint
@@ -117,13 +117,13 @@ class Study:
 
 def columns_of(scenario: Scenario) -> dict[str, str]:
     """The units of all columns that a run has."""
-    return units_of_run(scenario.plant, scenario.start, scenario.command)
+    return column_units(scenario.plant, scenario.start, scenario.command)
 
 
 def load_study(path: str | Path) -> Study:
     """The study in a file. Raises FileError, ParameterError, UnitError or UnknownName, saying where."""
     file = Path(path)
-    tables = parsed(file)
+    tables = read_toml(file)
     place = Location(str(file), "", file.parent)
     check_keys(tables, TABLES, place)
     source = _source(tables.get("scenario"), place)
@@ -134,7 +134,7 @@ def load_study(path: str | Path) -> Study:
     with located_errors(place.inside("design")):
         values = design.values(variations)
     return Study(
-        title=text(tables, "title", place, needed=False) or source.scenario.title,
+        title=read_text(tables, "title", place, needed=False) or source.scenario.title,
         path=file,
         source=source,
         numbers=tuple(numbers.values()),
@@ -151,13 +151,13 @@ def _source(given: Any, place: Location) -> ScenarioTemplate:
     if isinstance(given, str):
         file = place.folder / given
         with located_errors(f"{place}, scenario"):
-            return ScenarioTemplate(parsed(file), Location(str(file), "", file.parent), load_scenario(file))
+            return ScenarioTemplate(read_toml(file), Location(str(file), "", file.parent), load_scenario(file))
     if not isinstance(given, Mapping):
         raise ParameterError(
             f'{place}: scenario is {given!r}; name a file, scenario = "fill.toml", or write the tables '
             "[scenario.plant], [scenario.command] and [scenario.run]."
         )
-    return ScenarioTemplate(given, place.inside("scenario"), scenario_from(given, place.inside("scenario")))
+    return ScenarioTemplate(given, place.inside("scenario"), build_scenario(given, place.inside("scenario")))
 
 
 def _table(tables: Mapping[str, Any], key: str, place: Location) -> Mapping[str, Any]:

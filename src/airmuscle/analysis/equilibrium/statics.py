@@ -15,7 +15,7 @@ from ...core.errors import EquilibriumError, ParameterError
 from ...core.ops import Value
 from ...muscle import Muscle
 from ...plant.plant import Plant
-from ...pneumatics.gas import absolute, gauge
+from ...pneumatics.gas import absolute_pressure, gauge_pressure
 
 Given: TypeAlias = float | tuple[float, ...] | None
 STRETCHED = -0.5
@@ -132,13 +132,13 @@ def pressure_of(plant: Plant, muscle: Muscle, air_mass: float, contraction: floa
 
     def excess(x: float) -> float:
         """log of the air that the muscle holds at an absolute pressure exp(x), less that of the given air."""
-        p = gauge(math.exp(x), plant.ambient)
-        own = muscle.settled(p, contraction)
+        p = gauge_pressure(math.exp(x), plant.ambient)
+        own = muscle.steady_state(p, contraction)
         volume = muscle.volume(muscle.inner_contraction(contraction, own), own)
         held = float(plant.gas.state_at(math.exp(x), volume, plant.ambient)["air_mass"])
         return math.log(held / air_mass) if held > 0 else -math.inf
 
-    a = math.log(absolute(guess, plant.ambient))
+    a = math.log(absolute_pressure(guess, plant.ambient))
     at_a = excess(a)
     b = a - at_a
     for _ in range(20):  # the secant is exact for a rigid wall and a gas that keeps to one process
@@ -146,7 +146,7 @@ def pressure_of(plant: Plant, muscle: Muscle, air_mass: float, contraction: floa
         if not math.isfinite(at_b):
             break
         if abs(at_b) < 1e-13 or at_b == at_a:
-            return float(gauge(math.exp(b), plant.ambient))
+            return float(gauge_pressure(math.exp(b), plant.ambient))
         a, b, at_a = b, b - at_b * (b - a) / (at_b - at_a), at_b
     low, high = 0.0, math.log(GREATEST)
     if not excess(low) < 0 < excess(high):
@@ -156,4 +156,4 @@ def pressure_of(plant: Plant, muscle: Muscle, air_mass: float, contraction: floa
         )
     while low < (middle := 0.5 * (low + high)) < high:
         low, high = (middle, high) if excess(middle) < 0 else (low, middle)
-    return float(gauge(math.exp(low), plant.ambient))
+    return float(gauge_pressure(math.exp(low), plant.ambient))

@@ -14,7 +14,7 @@ from ...core.arrays import Array
 from ...core.ops import Value
 from ...mechanism import Coordinate
 from ...plant.plant import Plant
-from ...pneumatics.gas import absolute
+from ...pneumatics.gas import absolute_pressure
 from .statics import reach_of
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class SideBySide:
         for command, value in zip(self.columns.commands, self.inputs, strict=True):
             found &= (command.minimum <= value) & (value <= command.maximum)
         for p in self.pressures:
-            found &= np.asarray(absolute(p, self.columns.ambient)) > 0.0
+            found &= np.asarray(absolute_pressure(p, self.columns.ambient)) > 0.0
         return found[:, 0]
 
     def contractions(self, x: Array) -> list[Array]:

@@ -30,12 +30,12 @@ ADVICE: tuple[tuple[tuple[str, ...], tuple[str, ...], str], ...] = (
      "through the same valve"),
     (("critical_ratio",), ("pressure", "conductance"),
      "record the supply pressure during the run, and let the fill come to its end"),
-    (("mass",), ("damping", "growth", "stiffness"),
+    (("mass",), ("damping", "damping_slope", "stiffness"),
      "weigh the moving parts, or release the muscle with two loads that differ by a known mass"),
     (("exponent",), (*VOLUMES, "conductance"),
      "fill once quickly and once through a throttle, slowly enough to stay at room temperature"),
     (("start time",), ("conductance", *VOLUMES), "record the valve's command beside the pressure, on the same clock"),
-    (("damping",), ("growth",), "release at two pressures that lie well apart"),
+    (("damping",), ("damping_slope",), "release at two pressures that lie well apart"),
 )  # fmt: skip
 
 

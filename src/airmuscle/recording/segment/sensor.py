@@ -30,7 +30,7 @@ ROUNDING = 1e-9
 """Noise below this part of the readings is that of computing (chosen)."""
 HOLDS = 5
 """The fewest rows behind each other that show a cut-off (chosen)."""
-_IGNORED = ("time", "branch", "fill", "discharge", "held")
+_IGNORED = ("time", "branch", "fill", "discharge", "latched")
 
 
 @dataclasses.dataclass(frozen=True)
