@@ -455,7 +455,7 @@ def test_what_nobody_foresaw_fails_its_run_alone(folder: Path, monkeypatch: pyte
             raise ZeroDivisionError("by nothing")
         return simulate(*given, **named)
 
-    monkeypatch.setattr("airmuscle.study.runs.simulate", failing)
+    monkeypatch.setattr("airmuscle.study.scenario_runs.simulate", failing)
     result = run(folder)
     assert [r for r in result.reasons if r] == ["ZeroDivisionError: by nothing"]
 

@@ -6,7 +6,7 @@ from .csv_writer import write_csv
 from .mapping import ColumnMapping
 from .reader import read
 from .recording import Recording
-from .thinning import BlockMeans, Decimation
+from .downsampling import BlockMeans, Decimation
 
 __all__ = [
     "QUANTITIES",

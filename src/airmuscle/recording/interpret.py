@@ -17,7 +17,7 @@ from .clock import seconds_from_clock
 from .columns import QUANTITIES
 from .constants import constant_of_column, stated_constants
 from .heading import SPELLINGS, Heading, known_name, read_heading
-from .plausible import check_plausible
+from .plausibility import check_plausible
 from .recording import Recording
 from .table import Cells, RawTable
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from .raw_csv import parsed
 from .table import Cells, RawTable
-from .text_form import Lines, TextForm, TextHeader, encoding_of, head_of, holds_something, is_comment
-from .thinning import Decimation, Downsampling
+from .text_format import Lines, TextForm, TextHeader, encoding_of, head_of, holds_something, is_comment
+from .downsampling import Decimation, Downsampling
 
 LARGE = 32_000_000
 """Files of more bytes than this are read in pieces (chosen: below it, the whole text fits anywhere)."""

@@ -23,7 +23,7 @@ from .columns import QUANTITIES
 from .constants import constant_name
 from .heading import read_heading
 from .table import RawTable
-from .text_form import TextForm
+from .text_format import TextForm
 
 CONSTANTS = ("resting_length", "ambient", "specimen", "run")
 """Constants of a run that a mapping may state."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.errors import ColumnError, FileError
 from .table import Cells, RawTable
-from .text_form import Lines, TextForm, TextHeader, cells_of, encoding_of, head_of, holds_something, is_comment
+from .text_format import Lines, TextForm, TextHeader, cells_of, encoding_of, head_of, holds_something, is_comment
 
 _COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 _POINT_NUMBER = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")

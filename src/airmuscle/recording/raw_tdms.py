@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import FileError, suggestion
-from .common_rows import Channel, common_rows
+from .channels import Channel, common_rows
 from .optional_dependency import import_optional, lab_package
 from .table import RawTable
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from ..core.errors import FileError
-from .agreement import check_agreement
+from .unit_consistency import check_agreement
 from .interpret import interpret
 from .large_csv import Progress, is_large, large_csv
 from .mapping import ColumnMapping, mapped, read_mapping
@@ -18,7 +18,7 @@ from .raw_mdf import raw_mdf
 from .raw_tdms import raw_tdms
 from .recording import Recording
 from .table import RawTable
-from .thinning import Decimation, Downsampling, thinned
+from .downsampling import Decimation, Downsampling, thinned
 
 Source = str | Path | Iterable[str | Path]
 Tables = tuple[RawTable, ...]

@@ -22,7 +22,7 @@ from ..recording import Recording
 from ..scenario.scenario import Scenario
 from .executors import check_running
 from .fingerprint import fingerprint, program
-from .runs import REFUSALS, reason, simulate_all
+from .scenario_runs import REFUSALS, reason, simulate_all
 from .study import Study, load_study
 
 _loaded: dict[tuple[str, str], Study] = {}

@@ -12,7 +12,7 @@ from ..core.errors import FileError, SimulationError
 from ..report.output_folder import check_writable
 from .chunk import Chunk, instants, name_of, read, remember, run_chunk, write
 from .result import StudyResult
-from .runs import simulate_all
+from .scenario_runs import simulate_all
 from .study import Study
 
 CHUNKS = "chunks"

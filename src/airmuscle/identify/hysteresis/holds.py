@@ -12,7 +12,7 @@ from ...recording import Recording
 from ...recording.segment import Interval, find_plateaus
 from ...recording.segment.runs import BAND
 from ...recording.segment.sensor import noise_of
-from ...recording.segment.stretch import level_stretches
+from ...recording.segment.interval import level_stretches
 
 FEWEST = 12
 """Rows that a fit of creep needs."""

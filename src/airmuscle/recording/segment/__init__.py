@@ -9,7 +9,7 @@ from .quasi_static import quasi_static_rows
 from .runs import AT_REST, FREE, ISOBARIC, ISOMETRIC, ISOTONIC, Run, find_runs
 from .sampling import Sampling, analyse_sampling
 from .sensor import Sensor, estimate_sensors
-from .stretch import Interval
+from .interval import Interval
 
 __all__ = [
     "AT_REST",

@@ -18,7 +18,7 @@ from ...core.arrays import Array
 from ..recording import Recording
 from .sampling import row_count
 from .sensor import Sensor
-from .stretch import Interval, running_median
+from .interval import Interval, running_median
 
 SWING = 0.05
 """The part of the range by which the pressure must come back before it has turned (chosen)."""

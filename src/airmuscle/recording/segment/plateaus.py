@@ -12,7 +12,7 @@ from ..recording import Recording
 from .quasi_static import CHANGE, quasi_static_rows
 from .sampling import row_count
 from .sensor import Sensor, estimate_sensors
-from .stretch import Interval, level_stretches, true_stretches
+from .interval import Interval, level_stretches, true_stretches
 
 LEAST = 0.2
 """The shortest plateau [s] (chosen)."""

@@ -15,7 +15,7 @@ from ...core.arrays import Array
 from ..recording import Recording
 from .sampling import row_count
 from .sensor import Sensor, estimate_sensors
-from .stretch import Mask
+from .interval import Mask
 
 SETTLING = 0.1
 CHANGE = 0.01

@@ -16,7 +16,7 @@ import numpy as np
 from ...core.arrays import Array
 from ..recording import Recording
 from .sensor import Sensor, estimate_sensors
-from .stretch import Interval, level_stretches
+from .interval import Interval, level_stretches
 
 BAND = 0.02
 """Part of its greatest value within which a quantity counts as held (chosen)."""

@@ -16,7 +16,7 @@ import numpy as np
 from ...core.arrays import Array
 from ..columns import quantity_of
 from ..recording import Recording
-from .stretch import Mask, true_stretches
+from .interval import Mask, true_stretches
 
 FEWEST_VALUES = 15
 """Distinct readings from which on a step is a sensor's and not that of the settings of a test (chosen)."""
