@@ -24,7 +24,7 @@ from airmuscle.recording.segment import (
     ISOTONIC,
     analyse_sampling,
     check_swept,
-    directions,
+    branch_directions,
     estimate_sensors,
     find_branches,
     find_outliers,
@@ -35,8 +35,8 @@ from airmuscle.recording.segment import (
     plateau_points,
     quasi_static_rows,
 )
-from airmuscle.recording.segment.branches import agreement
-from airmuscle.recording.segment.sensor import noise_of, resolution_of
+from airmuscle.recording.segment.branches import branch_column_agreement
+from airmuscle.recording.segment.sensor import estimate_noise, estimate_resolution
 
 STEP = 0.05
 RANDOM = np.random.default_rng
@@ -71,8 +71,8 @@ def bench(seed: int = 1, noise: float = 400.0) -> tuple[Recording, int]:
 def test_a_stepped_ramp_with_overshoots_has_one_turn_at_the_last_row_of_the_top():
     recording, turn = bench()
     up, down = find_branches(recording)
-    assert (up.direction, up.name, up.stretch.start, up.stretch.stop) == (1, "inflating", 0, turn)
-    assert (down.direction, down.name, down.stretch.stop) == (-1, "deflating", len(recording))
+    assert (up.direction, up.name, up.interval.start, up.interval.stop) == (1, "inflating", 0, turn)
+    assert (down.direction, down.name, down.interval.stop) == (-1, "deflating", len(recording))
 
 
 @settings(max_examples=60, deadline=None)
@@ -95,7 +95,7 @@ def test_every_turn_of_a_random_history_is_found(turns, rows, rest, first, seed)
     found = find_branches(timed(measured))
     assert [b.direction for b in found] == [first * (-1) ** i for i in range(len(turns))]
     slack = 0.6 * 0.05 * np.ptp(pressure) / (0.2 * 5e5 / rows) + 2  # rows that half a swing takes at the least slope
-    differing = np.count_nonzero(directions(timed(measured), found) != truth)
+    differing = np.count_nonzero(branch_directions(timed(measured), found) != truth)
     assert differing <= len(turns) * slack
 
 
@@ -104,15 +104,15 @@ def test_every_turn_of_a_random_history_is_found(turns, rows, rest, first, seed)
 def test_branches_do_not_depend_on_unit_or_zero_of_the_pressure(scale: float, shift: float, stretch: float):
     recording, _ = bench()
     other = recording.with_columns(pressure=recording["pressure"] * scale + shift)
-    cut = [(b.direction, b.stretch) for b in find_branches(recording)]
-    assert [(b.direction, b.stretch) for b in find_branches(other)] == cut
+    cut = [(b.direction, b.interval) for b in find_branches(recording)]
+    assert [(b.direction, b.interval) for b in find_branches(other)] == cut
 
 
 def test_turning_the_pressure_over_turns_the_branches_over():
     recording, turn = bench()
     found = find_branches(recording.with_columns(pressure=6e5 - recording["pressure"]))
     assert [b.direction for b in found] == [-1, 1]
-    assert found[0].stretch.stop == turn
+    assert found[0].interval.stop == turn
 
 
 def test_a_minor_loop_is_found_and_a_ripple_is_not():
@@ -127,7 +127,7 @@ def test_a_saw_tooth_has_a_deflating_branch_of_a_row_or_two_at_each_fall():
     tooth = np.tile(np.linspace(0, 6e5, 200), 4)
     found = find_branches(timed(tooth))
     assert [b.direction for b in found] == [1, -1, 1, -1, 1, -1, 1]
-    assert all(len(b.stretch) < 10 for b in found[1::2])
+    assert all(len(b.interval) < 10 for b in found[1::2])
 
 
 def test_constant_pressure_and_no_pressure_have_no_branch():
@@ -146,8 +146,8 @@ def test_a_branch_column_judges_and_decides_nothing():
     stated = np.where(np.arange(len(recording)) < turn - 9, 1.0, 2.0)
     judged = recording.with_columns(branch=stated)
     assert find_branches(judged) == find_branches(recording)
-    assert agreement(judged, find_branches(judged)) == pytest.approx(1.0 - 9 / len(recording))
-    assert agreement(recording, find_branches(recording)) is None
+    assert branch_column_agreement(judged, find_branches(judged)) == pytest.approx(1.0 - 9 / len(recording))
+    assert branch_column_agreement(recording, find_branches(recording)) is None
 
 
 # Sensors
@@ -167,20 +167,20 @@ def test_the_step_of_readings_is_found_and_a_changing_last_digit_does_not_hide_i
     values = step * (counts + offset)
     if twins:
         values = values + 0.01 * step * RANDOM(seed).integers(0, 2, 800)
-    assert resolution_of(values) == pytest.approx(step, rel=0.01)
+    assert estimate_resolution(values) == pytest.approx(step, rel=0.01)
 
 
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 999), size=st.integers(30, 2000))
 def test_continuous_readings_have_no_step(seed: int, size: int):
     values = RANDOM(seed).normal(0, 1, size).cumsum()
-    found = resolution_of(values)
+    found = estimate_resolution(values)
     assert found < 0.02 * np.ptp(values) / np.sqrt(size), "chance leaves at most a step far below the noise"
 
 
 def test_a_few_settings_of_a_test_are_no_resolution():
-    assert resolution_of(np.repeat(np.arange(0, 7e5, 1e5), 30)) == 0.0
-    assert resolution_of(np.full(50, 3.0)) == 0.0
+    assert estimate_resolution(np.repeat(np.arange(0, 7e5, 1e5), 30)) == 0.0
+    assert estimate_resolution(np.full(50, 3.0)) == 0.0
 
 
 @settings(max_examples=30, deadline=None)
@@ -189,7 +189,7 @@ def test_noise_is_told_from_the_course(sigma: float, seed: int):
     course = 1e3 * sigma * np.sin(np.linspace(0, 6, 2000))
     noise = RANDOM(seed).normal(0, sigma, 2000)
     noise[::100] += 50.0 * sigma
-    assert noise_of(course + noise) == pytest.approx(sigma, rel=0.15)
+    assert estimate_noise(course + noise) == pytest.approx(sigma, rel=0.15)
 
 
 def test_resolution_and_cut_off_of_a_bench_are_found():
@@ -201,10 +201,10 @@ def test_resolution_and_cut_off_of_a_bench_are_found():
     assert np.isinf(found["force"].upper_limit)
     assert np.isinf(found["pressure"].lower_limit)
     assert "time" not in found
-    sides = found["force"].sides(recording["force"])
+    sides = found["force"].censoring(recording["force"])
     assert np.array_equal(sides == 1, recording["force"] < -8.7)
     assert not (sides == -1).any()
-    assert found["force"].deviation == pytest.approx(np.hypot(found["force"].noise, 0.68 / np.sqrt(12)), rel=1e-3)
+    assert found["force"].std == pytest.approx(np.hypot(found["force"].noise, 0.68 / np.sqrt(12)), rel=1e-3)
 
 
 def test_a_saturated_sensor_is_found_at_its_upper_end():
@@ -245,12 +245,12 @@ def test_several_runs_of_a_rig_show_an_end_that_one_hardly_reaches():
 def test_the_plateaus_of_a_staircase_are_its_steps():
     recording, _ = bench()
     found = find_plateaus(recording)
-    steps = {p.stretch.start // 10 for p in found}
+    steps = {p.interval.start // 10 for p in found}
     assert len(found) == len(steps) == 45
     levels = [*np.linspace(0, 6e5, 25), *np.linspace(5.4e5, 5e4, 20)]
     for plateau in found:
-        assert plateau.values["pressure"] == pytest.approx(levels[plateau.stretch.start // 10], abs=900.0)
-        assert plateau.stretch.stop <= 10 * (plateau.stretch.start // 10 + 1)
+        assert plateau.values["pressure"] == pytest.approx(levels[plateau.interval.start // 10], abs=900.0)
+        assert plateau.interval.stop <= 10 * (plateau.interval.start // 10 + 1)
     points = plateau_points(recording, found)
     assert len(points) == 45
     assert "45 plateaus stand for" in points.notes[-1]
@@ -341,7 +341,7 @@ def test_a_table_of_isobars_is_as_many_runs():
     found = find_runs(table)
     assert [run.kind for run in found] == [ISOBARIC] * 6
     assert [run.value for run in found] == pytest.approx(np.linspace(1e5, 6e5, 6))
-    assert [(r.stretch.start, r.stretch.stop) for r in found] == [(11 * i, 11 * i + 11) for i in range(6)]
+    assert [(r.interval.start, r.interval.stop) for r in found] == [(11 * i, 11 * i + 11) for i in range(6)]
 
 
 def test_constant_pressure_given_as_an_isometric_sweep_is_refused():
@@ -395,5 +395,5 @@ def test_any_recording_can_be_inspected(values: list[float], with_time: bool):
     if with_time:
         columns["time"] = STEP * np.arange(len(values))
     seen = inspect(Recording(columns, "any"))
-    assert sum(len(b.stretch) for b in seen.branches) in (0, len(values))
-    assert all(0 <= r.stretch.start < r.stretch.stop <= len(values) for r in seen.runs)
+    assert sum(len(b.interval) for b in seen.branches) in (0, len(values))
+    assert all(0 <= r.interval.start < r.interval.stop <= len(values) for r in seen.runs)

@@ -382,7 +382,7 @@ def test_a_mapping_that_does_not_fit_says_why(tmp_path: Path, columns, kind, exp
 def test_a_mapping_file_that_is_wrong(tmp_path: Path, content: str, kind, expected: str):
     (tmp_path / "rig.toml").write_text(content)
     with pytest.raises(kind, match=re.escape(expected)):
-        _ = read_mapping(tmp_path / "rig.toml").text_form
+        _ = read_mapping(tmp_path / "rig.toml").text_format
     with pytest.raises(FileError, match="cannot be read"):
         read_mapping(tmp_path / "none.toml")
 
@@ -455,7 +455,7 @@ def test_decimation_keeps_rows_as_they_were_measured(long_file: Path, most: int)
     assert np.array_equal(recording["force"], 0.5 * recording["time"])
     assert len(recording) <= most
     assert (step == 1) == (recording.notes == ())
-    table = large_csv.large_csv(long_file, thinning=Decimation(most))
+    table = large_csv.read_large_csv(long_file, thinning=Decimation(most))
     assert np.array_equal(table.rows, np.arange(4, 20_004, step)), "a row is named by its line"
     assert step == 1 or recording.notes[0].startswith(f"The file has 20000 rows; one in {step} is kept as measured")
 
@@ -467,7 +467,7 @@ def test_block_means_are_means(long_file: Path, most: int):
     expected = [np.mean(np.arange(20_000)[i : i + step]) for i in range(0, 20_000, step)]
     assert recording["time"] == pytest.approx(np.array(expected), rel=1e-12)
     assert f"each {step} are replaced by their mean" in recording.notes[0]
-    table = large_csv.large_csv(long_file, thinning=BlockMeans(most))
+    table = large_csv.read_large_csv(long_file, thinning=BlockMeans(most))
     assert np.array_equal(table.rows, np.arange(4, 20_004, step)), "a row is named by the first line of its block"
 
 

@@ -30,11 +30,11 @@ from airmuscle.core.errors import AirmuscleError, FileError, InputError, Simulat
 from airmuscle.report.write import save_table
 from airmuscle.scenario.scenario import load_scenario
 from airmuscle.simulation.simulate import simulate
-from airmuscle.study import chunk, dask_cluster, fingerprint, load_study, processes, run_study
+from airmuscle.study import chunk, dask_cluster, fingerprint, load_study, process_pool, run_study
 from airmuscle.study.chapter import study_chapter, write_study
 from airmuscle.study.design import DESIGNS
 from airmuscle.study.distributions import DISTRIBUTIONS, Range
-from airmuscle.study.metrics import OUTCOMES
+from airmuscle.study.metrics import METRICS
 
 ROOT = Path(__file__).parents[2]
 MUSCLE = """
@@ -184,7 +184,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(folder: Path, workers: 
 
 
 def test_ctrl_c_while_workers_begin_is_no_traceback_of_theirs():
-    with processes(2) as executor:
+    with process_pool(2) as executor:
         tasks = [executor.submit(os.getpid) for _ in range(2)]
         for _ in range(40):
             for child in multiprocessing.active_children():
@@ -247,7 +247,7 @@ def local_dask():
         yield executor
 
 
-@pytest.mark.parametrize("place", [lambda: processes(3), threads, local_dask], ids=["processes", "threads", "dask"])
+@pytest.mark.parametrize("place", [lambda: process_pool(3), threads, local_dask], ids=["processes", "threads", "dask"])
 def test_results_do_not_depend_on_the_executor(folder: Path, place):
     run(folder, "alone")
     with place() as executor:
@@ -259,7 +259,7 @@ def test_the_result_does_not_depend_on_the_size_of_a_chunk(folder: Path):
     first = run(folder, "first")
     edited(folder, "chunk = 4", "chunk = 7")
     second = run(folder, "second")
-    assert np.array_equal(first.numbers, second.numbers)
+    assert np.array_equal(first.scalars, second.scalars)
     assert np.array_equal(first["course"], second["course"])
 
 
@@ -275,7 +275,7 @@ def test_a_run_is_what_simulate_gives(folder: Path):
 
 def test_where_the_runs_of_a_chunk_begin_is_found_at_once_and_is_what_each_finds_alone(folder: Path):
     study = load_study(folder / "study.toml")
-    rests = study.rests(range(22))
+    rests = study.initial_states(range(22))
     assert [rest == study.scenario(run).start for run, rest in enumerate(rests)] == [True] * 22
     assert study.scenario(3, rests[3]).start == rests[3]
     assert len({rest["air_mass"] for rest in rests}) == 22
@@ -296,7 +296,7 @@ def test_a_start_that_varies_or_is_no_rest_is_found_run_by_run(folder: Path):
     text = (folder / "study.toml").read_text(encoding="utf-8")
     (folder / "study.toml").write_text(re.sub(r'"x" = .*\n', "", text), encoding="utf-8")
     study = load_study(folder / "study.toml")
-    assert study.rests(range(4)) == [None] * 4
+    assert study.initial_states(range(4)) == [None] * 4
     assert len({study.scenario(run).start["air_mass"] for run in range(4)}) == 4
     assert not run(folder).failed.size
 
@@ -307,7 +307,7 @@ def test_a_start_that_varies_or_is_no_rest_is_found_run_by_run(folder: Path):
 def computed_anew(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The chunks that a further run of the study computes."""
     found = []
-    original = chunk.computed
+    original = chunk.compute_chunk
     monkeypatch.setattr(chunk, "computed", lambda study, index: found.append(index) or original(study, index))
     run(folder)
     monkeypatch.undo()
@@ -339,18 +339,18 @@ def test_a_chunk_is_computed_anew_when_what_it_depends_on_changes(folder, monkey
 def test_another_program_computes_everything_anew(folder: Path, monkeypatch: pytest.MonkeyPatch):
     run(folder)
     monkeypatch.setattr(fingerprint.metadata, "version", lambda name: "another")
-    fingerprint.program.cache_clear()
+    fingerprint.program_fingerprint.cache_clear()
     try:
         assert not {p.name for p in (folder / "out" / "chunks").glob("*.npz")} & {
-            chunk.name_of(load_study(folder / "study.toml"), i) for i in EVERYTHING
+            chunk.chunk_file_name(load_study(folder / "study.toml"), i) for i in EVERYTHING
         }
     finally:
-        fingerprint.program.cache_clear()
+        fingerprint.program_fingerprint.cache_clear()
 
 
 def test_a_chunk_that_is_damaged_is_computed_anew(folder: Path, monkeypatch: pytest.MonkeyPatch):
     result = run(folder)
-    file = folder / "out" / "chunks" / chunk.name_of(result.study, 2)
+    file = folder / "out" / "chunks" / chunk.chunk_file_name(result.study, 2)
     whole = file.read_bytes()
     for damaged in (whole[:-40], b"", whole[:200] + bytes(8) + whole[208:]):
         file.write_bytes(damaged)
@@ -366,7 +366,7 @@ def test_a_chunk_appears_whole_or_not_at_all(folder: Path, monkeypatch: pytest.M
 
     monkeypatch.setattr(chunk.os, "replace", refusing)
     with pytest.raises(OSError, match="no space left"):
-        chunk.write(chunk.computed(study, 0), folder / "chunk.npz")
+        chunk.write_chunk(chunk.compute_chunk(study, 0), folder / "chunk.npz")
     assert not {p.name for p in folder.iterdir()} - {"muscle.toml", "scenario.toml", "study.toml"}
 
 
@@ -379,10 +379,10 @@ def test_the_way_in_which_a_start_is_given_is_an_input_too(folder: Path):
         '"mechanism.mass" = [4, 6]',
     )
     at_rest = load_study(folder / "study.toml")
-    place = at_rest.source.scenario.start["position"]
+    place = at_rest.template.scenario.start["position"]
     edited(folder, 'pressure = "0.5 bar"', f'pressure = "0.5 bar", position = {place!r}', "scenario.toml")
     held = load_study(folder / "study.toml")
-    assert held.source.scenario.start == pytest.approx(at_rest.source.scenario.start)
+    assert held.template.scenario.start == pytest.approx(at_rest.template.scenario.start)
     assert held.scenario(0).start != pytest.approx(at_rest.scenario(0).start)
     assert held.fingerprint() != at_rest.fingerprint()
 
@@ -391,13 +391,13 @@ def test_a_reason_is_the_same_from_wherever_the_study_was_read(folder: Path, mon
     """A worker knows the study by its whole path, and reasons are results."""
     edited(folder, "[design]", '"run.duration" = ["0 s"]\n[design]')
     monkeypatch.chdir(folder)
-    here, elsewhere = (chunk.computed(load_study(path), 0) for path in ("study.toml", folder / "study.toml"))
-    assert list(here.reasons) == list(elsewhere.reasons)
-    assert here.reasons[0].startswith("scenario.toml, [run], duration is 0.0; it must be greater than zero")
+    here, elsewhere = (chunk.compute_chunk(load_study(path), 0) for path in ("study.toml", folder / "study.toml"))
+    assert list(here.failure_reasons) == list(elsewhere.failure_reasons)
+    assert here.failure_reasons[0].startswith("scenario.toml, [run], duration is 0.0; it must be greater than zero")
 
 
 def test_a_worker_leaves_ctrl_c_to_the_process_that_it_works_for():
-    with processes(2) as executor:
+    with process_pool(2) as executor:
         assert executor.submit(signal.getsignal, signal.SIGINT).result() == signal.SIG_IGN
 
 
@@ -409,7 +409,7 @@ def test_a_worker_that_reads_another_study_refuses(folder: Path):
 
 def test_a_worker_that_dies_is_an_error_that_says_how_to_go_on(folder: Path):
     study = load_study(edited(folder, "count = 22", "count = 2000"))
-    with processes(2) as executor:
+    with process_pool(2) as executor:
 
         def killing(done: int, of: int) -> None:
             if done:
@@ -430,8 +430,8 @@ def test_a_run_that_fails_leaves_its_reason_and_stops_no_other(folder: Path):
     opened = result.study.values[:, 2] == 2
     assert 0 < opened.sum() < 22
     assert np.array_equal(result.failed, np.flatnonzero(opened))
-    assert np.isnan(result.numbers[opened]).all()
-    assert np.isfinite(result.numbers[~opened, 0]).all()
+    assert np.isnan(result.scalars[opened]).all()
+    assert np.isfinite(result.scalars[~opened, 0]).all()
     rows = list(csv.DictReader((folder / "out" / "results.csv").open(encoding="utf-8")))
     assert [row["status"] for row in rows] == ["failed" if o else "done" for o in opened]
     assert all("the input 'fill' is 2" in row["reason"] for row, o in zip(rows, opened, strict=True) if o)
@@ -443,7 +443,7 @@ def test_a_value_beyond_its_bounds_fails_its_run_alone(folder: Path):
     result = run(folder)
     assert np.array_equal(result.failed, np.flatnonzero(result.study.values[:, 0] < 0))
     assert result.failed.size
-    assert "allowed are" in result.reasons[result.failed[0]]
+    assert "allowed are" in result.failure_reasons[result.failed[0]]
 
 
 def test_what_nobody_foresaw_fails_its_run_alone(folder: Path, monkeypatch: pytest.MonkeyPatch):
@@ -457,7 +457,7 @@ def test_what_nobody_foresaw_fails_its_run_alone(folder: Path, monkeypatch: pyte
 
     monkeypatch.setattr("airmuscle.study.scenario_runs.simulate", failing)
     result = run(folder)
-    assert [r for r in result.reasons if r] == ["ZeroDivisionError: by nothing"]
+    assert [r for r in result.failure_reasons if r] == ["ZeroDivisionError: by nothing"]
 
 
 def test_a_study_of_failures_alone_says_so(folder: Path):
@@ -504,7 +504,7 @@ def test_a_scenario_may_stand_in_the_study(folder: Path):
     )
     edited(folder, 'scenario = "scenario.toml"\n', "")
     edited(folder, "[vary]", f"{inside}\n[vary]")
-    assert np.array_equal(run(folder, "inside").numbers, beside.numbers)
+    assert np.array_equal(run(folder, "inside").scalars, beside.scalars)
 
 
 def test_the_example_runs(tmp_path: Path):
@@ -512,12 +512,12 @@ def test_the_example_runs(tmp_path: Path):
         shutil.copy(ROOT / "examples" / name, tmp_path)
     study = load_study(tmp_path / "valve_study.toml")
     assert len(study) == 384
-    assert study.source.scenario.plant == load_scenario(ROOT / "examples" / "fill_discharge.toml").plant
+    assert study.template.scenario.plant == load_scenario(ROOT / "examples" / "fill_discharge.toml").plant
     (tmp_path / "valve_study.toml").rename(tmp_path / "study.toml")
     edited(tmp_path, "count = 64", "count = 2")
     result = run(tmp_path)
     assert result.failed.size == 0
-    assert np.isfinite(result.numbers).all()
+    assert np.isfinite(result.scalars).all()
 
 
 def test_the_study_of_the_page_can_be_read(tmp_path: Path):
@@ -527,7 +527,7 @@ def test_the_study_of_the_page_can_be_read(tmp_path: Path):
     (tmp_path / "study.toml").write_text(blocks[0], encoding="utf-8")
     study = load_study(tmp_path / "study.toml")
     shown = set(re.findall(r"`(\w+)`", page))
-    kinds = {cls.__name__ for cls in (*DESIGNS, *DISTRIBUTIONS, *OUTCOMES, Range)}
+    kinds = {cls.__name__ for cls in (*DESIGNS, *DISTRIBUTIONS, *METRICS, Range)}
     assert kinds <= shown, f"the page lacks {kinds - shown}"
     assert len(study) == 256
 
@@ -560,7 +560,7 @@ def test_the_report_shows_design_statistics_and_figures(folder: Path):
     statistics = result.statistics().columns
     assert statistics["mean"][0] == pytest.approx(result["pressure"].mean())
     assert statistics["median"][1] == pytest.approx(np.median(result["reached"]))
-    own = load_study(folder / "study.toml").source.scenario.simulate()["pressure"][-1]
+    own = load_study(folder / "study.toml").template.scenario.simulate()["pressure"][-1]
     assert statistics["as it stands"][0] == pytest.approx(own, rel=1e-9)
     write_study(result, folder / "out")
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
@@ -652,7 +652,7 @@ def test_an_empty_or_missing_table_is_refused(folder: Path, table: str):
 
 
 def test_places_that_cannot_be_are_refused(folder: Path):
-    with pytest.raises(InputError, match="at least one is needed"), processes(0):
+    with pytest.raises(InputError, match="at least one is needed"), process_pool(0):
         pass
     (folder / "file").write_text("", encoding="utf-8")
     with pytest.raises(FileError, match="cannot be written to"):

@@ -87,7 +87,7 @@ def test_base_points_with_a_failed_run_are_left_out():
     y = ishigami(Saltelli(1024, 1).values(CUBE))
     y[[3, 4, 77]] = np.nan  # of base points 0 and 15
     found = sobol_indices(y, 3)
-    assert (found.points, found.left_out) == (1022, 2)
+    assert (found.base_points, found.excluded_points) == (1022, 2)
     without = np.delete(y.reshape(-1, 5), [0, 15], axis=0).ravel()
     assert np.array_equal(found.first, sobol_indices(without, 3).first)
 

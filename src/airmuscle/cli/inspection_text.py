@@ -52,7 +52,7 @@ def summary(seen: Inspection) -> Iterator[str]:
     if seen.branch_agreement is not None:
         yield f"branches agree with the file's own column in {seen.branch_agreement:.1%} of the rows"
     if seen.sampling:
-        held = sum(len(plateau.stretch) for plateau in seen.plateaus)
+        held = sum(len(plateau.interval) for plateau in seen.plateaus)
         yield f"plateaus: {len(seen.plateaus)} with {held} rows; quasi-static are {seen.quasi_static:.0%} of all rows"
     if seen.outliers:
         yield f"suspected glitches: {len(seen.outliers)}, kept: {_cut([_of_outlier(o) for o in seen.outliers])}"
@@ -61,9 +61,9 @@ def summary(seen: Inspection) -> Iterator[str]:
 
 
 def _scale(name: str) -> tuple[float, str]:
-    from ..recording.plot import scale
+    from ..recording.plot import display_scale
 
-    return scale(name)
+    return display_scale(name)
 
 
 def _cut(parts: list[str]) -> str:

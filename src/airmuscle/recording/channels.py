@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ColumnError
-from .heading import known_name
+from .heading import find_quantity_name
 from .table import Cells, RawTable
 
 
@@ -24,7 +24,7 @@ class Channel:
     unit: str = ""
 
 
-def common_rows(
+def merge_channels(
     origin: str, channels: Sequence[Channel], remarks: Mapping[str, float | str], row_word: str = "row"
 ) -> RawTable:
     """The table that channels make together.
@@ -38,9 +38,9 @@ def common_rows(
     timed = [c for c in channels if c.time is not None]
     if not timed or all(_same_time(c, timed[0]) for c in channels):
         _check_equal_lengths(origin, channels)
-        return _table(origin, channels, timed[0].time if timed else None, (), remarks, row_word)
+        return _make_table(origin, channels, timed[0].time if timed else None, (), remarks, row_word)
     _check_timed(origin, channels)
-    return _resampled(origin, channels, remarks, row_word)
+    return _resample(origin, channels, remarks, row_word)
 
 
 def _same_time(one: Channel, other: Channel) -> bool:
@@ -68,7 +68,7 @@ def _check_timed(origin: str, channels: Sequence[Channel]) -> None:
         )
 
 
-def _resampled(origin: str, channels: Sequence[Channel], remarks: Mapping[str, float | str], row_word: str) -> RawTable:
+def _resample(origin: str, channels: Sequence[Channel], remarks: Mapping[str, float | str], row_word: str) -> RawTable:
     leader = max(channels, key=lambda c: len(c.values))
     low = max(float(c.time[0]) for c in channels if c.time is not None)
     high = min(float(c.time[-1]) for c in channels if c.time is not None)
@@ -80,14 +80,14 @@ def _resampled(origin: str, channels: Sequence[Channel], remarks: Mapping[str, f
     moved, notes = [], []
     for channel in channels:
         same = channel.time is not None and np.array_equal(channel.time, leader.time)
-        moved.append(dataclasses.replace(channel, values=_at(channel, time), time=time))
+        moved.append(dataclasses.replace(channel, values=_interpolate(channel, time), time=time))
         if not same:
             rows = f"its {len(channel.values)} rows are interpolated to the {len(time)} of '{leader.name}'"
             notes.append(f"Channel '{channel.name}' has a time of its own: {rows}.")
-    return _table(origin, moved, time, tuple(notes), remarks, row_word)
+    return _make_table(origin, moved, time, tuple(notes), remarks, row_word)
 
 
-def _at(channel: Channel, time: Array) -> Any:
+def _interpolate(channel: Channel, time: Array) -> Any:
     """Values at other times: held where they are whole numbers (a valve, a counter), else on straight lines."""
     assert channel.time is not None
     values = np.asarray(channel.values)
@@ -97,7 +97,7 @@ def _at(channel: Channel, time: Array) -> Any:
     return np.interp(time, channel.time, values)
 
 
-def _table(
+def _make_table(
     origin: str,
     channels: Sequence[Channel],
     time: Array | None,
@@ -105,17 +105,17 @@ def _table(
     remarks: Mapping[str, float | str],
     row_word: str,
 ) -> RawTable:
-    has_time = any(known_name(c.name.partition(" ")[0].partition("_")[0]) == "time" for c in channels)
+    has_time = any(find_quantity_name(c.name.partition(" ")[0].partition("_")[0]) == "time" for c in channels)
     if time is not None and not has_time:
         channels = [Channel("time", time - time[0], unit="s"), *channels]
     headings = tuple(c.name for c in channels)
     units = tuple(c.unit for c in channels)
-    columns = tuple(as_cells(c.values) for c in channels)
+    columns = tuple(to_cells(c.values) for c in channels)
     rows = np.arange(1, len(channels[0].values) + 1)
     return RawTable(origin, headings, units if any(units) else None, columns, rows, row_word, remarks, notes)
 
 
-def as_cells(values: Any) -> Cells:
+def to_cells(values: Any) -> Cells:
     """Numbers as floats, instants as seconds from the first, everything else as text."""
     array = np.asarray(values)
     if array.dtype.kind == "M":

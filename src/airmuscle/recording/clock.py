@@ -10,8 +10,8 @@ import numpy as np
 
 from ..core.arrays import Array
 
-_GERMAN = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[ T](.+)")
-_CLOCK = re.compile(r"(\d{1,3}):(\d{2}):(\d{2}(?:\.\d+)?)")
+_GERMAN_DATE = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[ T](.+)")
+_TIME_OF_DAY = re.compile(r"(\d{1,3}):(\d{2}):(\d{2}(?:\.\d+)?)")
 
 
 def seconds_from_clock(cells: Sequence[str]) -> Array | None:
@@ -19,7 +19,7 @@ def seconds_from_clock(cells: Sequence[str]) -> Array | None:
 
     Times without a date may pass midnight once: a step back by more than half a day is the next day.
     """
-    instants = [_instant(cell.replace(",", ".")) for cell in cells]
+    instants = [_parse_time(cell.replace(",", ".")) for cell in cells]
     if not instants or any(instant is None for instant in instants):
         return None
     seconds = np.array(instants, dtype=float)
@@ -27,11 +27,11 @@ def seconds_from_clock(cells: Sequence[str]) -> Array | None:
     return np.asarray(seconds - seconds[0])
 
 
-def _instant(cell: str) -> float | None:
-    clock = _CLOCK.fullmatch(cell.strip())
+def _parse_time(cell: str) -> float | None:
+    clock = _TIME_OF_DAY.fullmatch(cell.strip())
     if clock:
         return 3600.0 * float(clock[1]) + 60.0 * float(clock[2]) + float(clock[3])
-    german = _GERMAN.fullmatch(cell.strip())
+    german = _GERMAN_DATE.fullmatch(cell.strip())
     iso = f"{german[3]}-{int(german[2]):02}-{int(german[1]):02} {german[4]}" if german else cell.strip()
     try:
         moment = datetime.datetime.fromisoformat(iso)

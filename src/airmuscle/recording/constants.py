@@ -13,7 +13,7 @@ from ..core.errors import ColumnError
 from ..core.units import conversion, quantity
 from .table import RawTable
 
-UNITS = {"resting_length": "m", "ambient": "Pa"}
+CONSTANT_UNITS = {"resting_length": "m", "ambient": "Pa"}
 """The SI unit of the constants that have one."""
 _NAMES = {
     "resting_length": ("resting_length", "rest_length", "initial_length", "original_length", "l0", "l_0", "ruhelänge"),
@@ -25,7 +25,7 @@ _WITH_UNIT = re.compile(
 )
 
 
-def constant_name(text: str) -> tuple[str, str] | None:
+def parse_constant_name(text: str) -> tuple[str, str] | None:
     """The constant that a heading names, and its unit or ''; None where it names none."""
     found = _WITH_UNIT.fullmatch(text.strip())
     name, unit = (found["name"], found["square"] or found["round"] or found["loose"] or "") if found else (text, "")
@@ -35,15 +35,15 @@ def constant_name(text: str) -> tuple[str, str] | None:
     return None
 
 
-def stated_constants(table: RawTable, given: Mapping[str, float | str]) -> dict[str, Any]:
+def collect_constants(table: RawTable, given: Mapping[str, float | str]) -> dict[str, Any]:
     """The constants of a run in SI: the file's comments, then what the user gives."""
     found: dict[str, Any] = {}
-    for text, value in {**table.remarks, **given}.items():
-        named = constant_name(text)
+    for text, value in {**table.constants, **given}.items():
+        named = parse_constant_name(text)
         if named and named[1] and not isinstance(value, str):
             value = f"{value!r} {named[1]}"
         found[named[0] if named else text] = value
-    for name, unit in UNITS.items():
+    for name, unit in CONSTANT_UNITS.items():
         if name in found:
             found[name] = quantity(found[name], unit, ambient=0.0, where=f"{table.origin}: {name}")
             if not found[name] > 0:
@@ -51,21 +51,23 @@ def stated_constants(table: RawTable, given: Mapping[str, float | str]) -> dict[
     return found
 
 
-def constant_of_column(table: RawTable, heading: str, unit: str | None, values: Array) -> tuple[str, float] | None:
+def constant_from_column(table: RawTable, heading: str, unit: str | None, values: Array) -> tuple[str, float] | None:
     """The constant that a column states by holding it in every row; None where the heading names none.
 
     Raises ColumnError where the column changes: then it is no constant of one run.
     """
-    named = constant_name(heading)
+    named = parse_constant_name(heading)
     if named is None:
         return None
     name, own_unit = named
-    change = conversion(unit or own_unit or UNITS[name], UNITS[name], ambient=0.0, where=f"{table.origin}: {heading}")
+    change = conversion(
+        unit or own_unit or CONSTANT_UNITS[name], CONSTANT_UNITS[name], ambient=0.0, where=f"{table.origin}: {heading}"
+    )
     first = float(values[0])
     if not np.allclose(values, first, rtol=1e-9, atol=0.0):
         row = int(np.argmax(~np.isclose(values, first, rtol=1e-9, atol=0.0)))
         raise ColumnError(
-            f"{table.place(row)}: {heading} changes from {first:g} to {values[row]:g}, but it is one number of a run. "
+            f"{table.location(row)}: {heading} changes from {first:g} to {values[row]:g}, but it is one number of a run. "
             "Put the specimens into a file each."
         )
     return name, float(change(first))

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from .interpret import interpret
-from .raw_csv import raw_csv
+from .raw_csv import read_csv_table
 from .recording import Recording
 
 
@@ -31,4 +31,4 @@ def read_csv(
     """
     given = {"resting_length": resting_length, "ambient": ambient, "specimen": specimen}
     stated = {name: value for name, value in given.items() if value is not None}
-    return interpret(raw_csv(path), units=units or {}, constants=stated)
+    return interpret(read_csv_table(path), units=units or {}, constants=stated)

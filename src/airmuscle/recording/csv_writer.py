@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TextIO
 
 from ..core.errors import FileError, ParameterError
-from .recording import Recording, header
+from .recording import Recording, column_heading
 
 _UNITS = {"resting_length": "m", "ambient": "Pa"}
 
@@ -46,7 +46,7 @@ def _write(recording: Recording, file: TextIO) -> None:
     for note in recording.notes:
         file.write(f"# Note: {_one_line(note)}\n")
     table = csv.writer(file, lineterminator="\n")
-    table.writerow([header(name) for name in recording])
+    table.writerow([column_heading(name) for name in recording])
     table.writerows(zip(*(recording[name].tolist() for name in recording), strict=True))
 
 

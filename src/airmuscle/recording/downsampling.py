@@ -17,15 +17,15 @@ from .table import Cells, RawTable
 class Downsampling(abc.ABC):
     """At most `most_rows` rows are kept of a file that has more."""
 
-    most_rows: int = 2_000_000
+    max_rows: int = 2_000_000
 
     def __post_init__(self) -> None:
-        if self.most_rows < 1:
-            raise ParameterError(f"most_rows is {self.most_rows}; it must be 1 or more.")
+        if self.max_rows < 1:
+            raise ParameterError(f"most_rows is {self.max_rows}; it must be 1 or more.")
 
     def step(self, rows: int) -> int:
         """How many rows become one."""
-        return max(1, math.ceil(rows / self.most_rows))
+        return max(1, math.ceil(rows / self.max_rows))
 
     @abc.abstractmethod
     def column(self, cells: Cells, step: int) -> Cells:
@@ -62,7 +62,7 @@ class BlockMeans(Downsampling):
         return f"The file has {rows} rows; each {step} are replaced by their mean, {kept} in all (most_rows)."
 
 
-def thinned(table: RawTable, thinning: Downsampling) -> RawTable:
+def downsample(table: RawTable, thinning: Downsampling) -> RawTable:
     """The table with no more rows than the thinning allows."""
     step = thinning.step(len(table.rows))
     if step == 1:

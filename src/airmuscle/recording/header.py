@@ -8,10 +8,10 @@ from collections.abc import Sequence
 
 from ..core.errors import ColumnError, UnitError
 from ..core.units import conversion
-from .heading import read_heading
+from .heading import parse_heading
 
-_REMARK = re.compile(r"[#%]\s*(?P<name>[A-Za-z_]\w*)(?:\s*\[(?P<unit>[^\]]*)\])?\s*[=:]\s*(?P<value>.+)")
-_STATED_IN_WORDS = ("resting_length", "ambient", "specimen", "run")
+_CONSTANT_COMMENT = re.compile(r"[#%]\s*(?P<name>[A-Za-z_]\w*)(?:\s*\[(?P<unit>[^\]]*)\])?\s*[=:]\s*(?P<value>.+)")
+_TEXT_CONSTANTS = ("resting_length", "ambient", "specimen", "run")
 
 
 def is_number(cell: str) -> bool:
@@ -28,7 +28,7 @@ def are_headings(cells: Sequence[str]) -> bool:
     return not all(is_number(cell) for cell in cells if cell)
 
 
-def check_header(place: str) -> ColumnError:
+def missing_header_error(place: str) -> ColumnError:
     """What to raise where numbers stand in the row of the headings."""
     return ColumnError(
         f"{place}: numbers stand where the headings should. Put a line above them that names each column with its "
@@ -37,7 +37,7 @@ def check_header(place: str) -> ColumnError:
     )
 
 
-def unit_row(headings: Sequence[str], cells: Sequence[str]) -> tuple[str, ...] | None:
+def parse_unit_row(headings: Sequence[str], cells: Sequence[str]) -> tuple[str, ...] | None:
     """The row of units below the headings, if this row is one: some unit in it, and no number but 1."""
     bare = [re.sub(r"^\[(.*)\]$|^\((.*)\)$", r"\1\2", cell) for cell in cells]
     if any(is_number(cell) and cell != "1" for cell in bare):
@@ -48,26 +48,26 @@ def unit_row(headings: Sequence[str], cells: Sequence[str]) -> tuple[str, ...] |
 
 def _is_unit(heading: str, cell: str) -> bool:
     """Whether a cell is a unit of the quantity that its heading names; a foreign name takes any usual unit."""
-    target = read_heading(heading).target
+    target = parse_heading(heading).target
     try:
         return target is not None and bool(conversion(cell, target))
     except UnitError:
         return False
 
 
-def remark(line: str) -> tuple[str, float | str] | None:
+def parse_constant_comment(line: str) -> tuple[str, float | str] | None:
     """`# resting_length [mm] = 300` or `# resting_length: 300 mm`; None for a comment that states no constant.
 
     Any number or quoted text in JSON is a constant of the run; plain words only where they are expected.
     """
-    found = _REMARK.fullmatch(line.strip())
+    found = _CONSTANT_COMMENT.fullmatch(line.strip())
     if not found:
         return None
     name, said = found["name"], found["value"].strip()
     try:
         value = json.loads(said)
     except json.JSONDecodeError:
-        return (name, said) if name in _STATED_IN_WORDS else None
+        return (name, said) if name in _TEXT_CONSTANTS else None
     if not isinstance(value, float | int | str) or isinstance(value, bool):
         return None
     return name, f"{said} {found['unit']}" if found["unit"] else value

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from .columns import QUANTITIES
 
 # Letters that mean something else in the other case are told apart; every other name is not.
-_LETTERS = {"t": "time", "T": "temperature", "v": "speed", "V": "volume"}
+_CASE_SENSITIVE = {"t": "time", "T": "temperature", "v": "speed", "V": "volume"}
 _SYNONYMS = {
     "p": "pressure", "druck": "pressure", "gauge_pressure": "pressure",
     "f": "force", "load": "force", "tension": "force", "kraft": "force", "weight": "force",
@@ -21,7 +21,7 @@ _SYNONYMS = {
     **{name: name for name in QUANTITIES},
 }  # fmt: skip
 
-SPELLINGS: dict[str, tuple[str, ...]] = {
+UNIT_SPELLINGS: dict[str, tuple[str, ...]] = {
     "Pa": (
         "Pa", "kPa", "MPa", "bar", "mbar", "psi", "bara", "barg", "kPa(a)", "kPa(g)", "kPaa", "kPag", "psia", "psig",
         "bar(a)", "bar(g)", "Pa(a)", "Pa(g)",
@@ -32,7 +32,7 @@ SPELLINGS: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 """How units of each kind are usually written: what messages suggest, and what counts in `pressure_kPa`."""
 
-_MARKED = tuple(
+_MARKED_FORMS = tuple(
     re.compile(pattern)
     for pattern in (
         r"(?P<name>.*?)\s*\[(?P<unit>.*)\]",
@@ -40,7 +40,7 @@ _MARKED = tuple(
         r"(?P<name>.+?)\s*/\s*(?P<unit>.+)",
     )
 )
-_LOOSE = re.compile(r"(?P<name>.+)[_\s](?P<unit>\S+)")
+_SUFFIX_FORM = re.compile(r"(?P<name>.+)[_\s](?P<unit>\S+)")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,36 +58,36 @@ class Heading:
         return QUANTITIES[self.name.rpartition(".")[2]].unit if self.known else None
 
 
-def known_name(text: str) -> str | None:
+def find_quantity_name(text: str) -> str | None:
     """The quantity meant by a name or a synonym in any case; `left.p` is `left.pressure`."""
     prefix, dot, last = text.strip().rpartition(".")
-    found = _LETTERS.get(last) or _SYNONYMS.get(re.sub(r"[\s-]+", "_", last.strip()).lower())
+    found = _CASE_SENSITIVE.get(last) or _SYNONYMS.get(re.sub(r"[\s-]+", "_", last.strip()).lower())
     return prefix + dot + found if found else None
 
 
-def read_heading(text: str) -> Heading:
+def parse_heading(text: str) -> Heading:
     """`pressure [kPa]`, `pressure (kPa)`, `pressure_kPa`, `Pressure / kPa` and `p` say that it is the pressure."""
     text = text.strip()
-    for name, unit in _splits(text):
+    for name, unit in _candidate_splits(text):
         return Heading(text, name, unit.strip(), True)
-    known = known_name(text)
+    known = find_quantity_name(text)
     return Heading(text, known or text, None, known is not None)
 
 
-def _splits(text: str) -> Iterator[tuple[str, str]]:
+def _candidate_splits(text: str) -> Iterator[tuple[str, str]]:
     """Quantity and unit, where a heading holds both; after a mere blank or _ it must be a usual unit."""
-    for form in _MARKED:
+    for form in _MARKED_FORMS:
         found = form.fullmatch(text)
-        name = known_name(found["name"]) if found else None
+        name = find_quantity_name(found["name"]) if found else None
         if found and name:
             yield name, found["unit"]
-    found = _LOOSE.fullmatch(text)
-    name = known_name(found["name"]) if found else None
-    if found and name and found["unit"] in SPELLINGS[QUANTITIES[name.rpartition(".")[2]].unit]:
+    found = _SUFFIX_FORM.fullmatch(text)
+    name = find_quantity_name(found["name"]) if found else None
+    if found and name and found["unit"] in UNIT_SPELLINGS[QUANTITIES[name.rpartition(".")[2]].unit]:
         yield name, found["unit"]
 
 
-def stated_unit(text: str) -> tuple[str, str | None]:
+def split_unit(text: str) -> tuple[str, str | None]:
     """Name and unit of a heading whose quantity is not known, `height [mm]`; no unit where it states none."""
-    found = next((found for form in _MARKED if (found := form.fullmatch(text.strip()))), None)
+    found = next((found for form in _MARKED_FORMS if (found := form.fullmatch(text.strip()))), None)
     return (found["name"].strip(), found["unit"].strip()) if found else (text.strip(), None)

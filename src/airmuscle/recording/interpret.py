@@ -15,8 +15,8 @@ from ..core.errors import ColumnError, UnitError, suggestion
 from ..core.units import AMBIENT_PRESSURE, UnitConversion, conversion
 from .clock import seconds_from_clock
 from .columns import QUANTITIES
-from .constants import constant_of_column, stated_constants
-from .heading import SPELLINGS, Heading, known_name, read_heading
+from .constants import constant_from_column, collect_constants
+from .heading import UNIT_SPELLINGS, Heading, find_quantity_name, parse_heading
 from .plausibility import check_plausible
 from .recording import Recording
 from .table import Cells, RawTable
@@ -33,30 +33,30 @@ def interpret(
     Time that repeats or runs backwards is refused, unless `ordered` is false.
     Raises ColumnError or UnitError with file, row, value and remedy.
     """
-    found = stated_constants(table, constants)
-    headings = _headings(table, units)
+    found = collect_constants(table, constants)
+    headings = _resolve_headings(table, units)
     for heading, cells in zip(headings, table.columns, strict=True):
         if not heading.known and not isinstance(cells, list):
-            stated = constant_of_column(table, heading.text, heading.unit, cells)
+            stated = constant_from_column(table, heading.text, heading.unit, cells)
             found = {stated[0]: stated[1], **found} if stated else found
     ambient = float(found.get("ambient", AMBIENT_PRESSURE))
     columns: dict[str, Array] = {}
-    notes: list[str] = [*table.notes, *_overruled(table, headings)]
+    notes: list[str] = [*table.notes, *_override_notes(table, headings)]
     for heading, cells in zip(headings, table.columns, strict=True):
         if heading.known:
-            columns[heading.name], note = _in_si(table, heading, cells, ambient)
+            columns[heading.name], note = _convert_column(table, heading, cells, ambient)
         else:
-            note = _kept(table, heading, cells, columns)
+            note = _keep_unknown_column(table, heading, cells, columns)
         notes += [note] if note and note not in notes else []
     check_plausible(table, columns, found.get("resting_length"), ambient, ordered=ordered)
     written = {h.name: h.unit for h in headings if h.known and h.unit}
     return Recording(columns, table.origin, found, tuple(notes), written)
 
 
-def _headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
+def _resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
     """The headings with their units: the user's, the unit row's or their own, in this order."""
-    read = [read_heading(text) for text in table.headings]
-    stated = {known_name(key) or key: unit for key, unit in units.items()}
+    read = [parse_heading(text) for text in table.headings]
+    stated = {find_quantity_name(key) or key: unit for key, unit in units.items()}
     keys = [key for heading in read for key in (heading.name, heading.text)]
     for key in stated:
         if key not in keys:
@@ -70,14 +70,14 @@ def _headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
     ]
     _check_unique(table, found)
     if not any(heading.known for heading in found):
-        _check_any(table, found)
+        _check_any_known(table, found)
     return found
 
 
-def _overruled(table: RawTable, headings: list[Heading]) -> list[str]:
+def _override_notes(table: RawTable, headings: list[Heading]) -> list[str]:
     """A word on every column whose own unit gave way to the one that the user stated."""
     row = [*(table.units or ()), *[""] * len(headings)]
-    own = [below or read_heading(h.text).unit for h, below in zip(headings, row, strict=False)]
+    own = [below or parse_heading(h.text).unit for h, below in zip(headings, row, strict=False)]
     return [
         f"{h.name} is taken in {h.unit}, as stated, although the file says {unit}"
         for h, unit in zip(headings, own, strict=True)
@@ -96,7 +96,7 @@ def _check_unique(table: RawTable, headings: list[Heading]) -> None:
         seen[heading.name] = heading.text
 
 
-def _check_any(table: RawTable, headings: list[Heading]) -> None:
+def _check_any_known(table: RawTable, headings: list[Heading]) -> None:
     names = [heading.text for heading in headings]
     near = [n for name in names for n in difflib.get_close_matches(name.lower(), QUANTITIES, n=1)]
     hint = f" Did you mean '{near[0]}'?" if near else ""
@@ -105,14 +105,14 @@ def _check_any(table: RawTable, headings: list[Heading]) -> None:
     )
 
 
-def _in_si(table: RawTable, heading: Heading, cells: Cells, ambient: float) -> tuple[Array, str]:
+def _convert_column(table: RawTable, heading: Heading, cells: Cells, ambient: float) -> tuple[Array, str]:
     """A known column in SI units, and a note where its unit left something open."""
     if heading.name == "time" and isinstance(cells, list):
         seconds = seconds_from_clock(cells)
         if seconds is not None:
             return seconds, f"The time is read from a clock and counted from its first instant, {cells[0]}."
     change = _conversion(table, heading, ambient)
-    values = _numbers(table, heading, cells)
+    values = _parse_numbers(table, heading, cells)
     if change.assumed_gauge:
         said = f"unit '{heading.unit}' does not say; write bara or kPa(a) if it is absolute."
         return change(values), f"The {heading.name} is taken as gauge: its {said}"
@@ -127,12 +127,12 @@ def _in_si(table: RawTable, heading: Heading, cells: Cells, ambient: float) -> t
 def _conversion(table: RawTable, heading: Heading, ambient: float) -> UnitConversion:
     target = heading.target or "1"
     where = f"{table.origin}, column '{heading.text}'"
-    usual = ", ".join(SPELLINGS[target])
+    usual = ", ".join(UNIT_SPELLINGS[target])
     if heading.unit is None:
         if target == "1":
             return UnitConversion(1.0)
         raise UnitError(
-            f"{where}: no unit is stated. Head it '{heading.name} [{SPELLINGS[target][1 % len(SPELLINGS[target])]}]' "
+            f"{where}: no unit is stated. Head it '{heading.name} [{UNIT_SPELLINGS[target][1 % len(UNIT_SPELLINGS[target])]}]' "
             f"or give units={{'{heading.name}': ...}}; usual are {usual}."
         )
     try:
@@ -140,14 +140,14 @@ def _conversion(table: RawTable, heading: Heading, ambient: float) -> UnitConver
             return UnitConversion(conversion(heading.unit, "kg").factor * STANDARD_GRAVITY)
         return conversion(heading.unit, target, ambient=ambient, where=where)
     except UnitError as reason:
-        cases = {spelling.lower(): spelling for spelling in SPELLINGS[target]}
+        cases = {spelling.lower(): spelling for spelling in UNIT_SPELLINGS[target]}
         near = difflib.get_close_matches(heading.unit.lower(), cases, n=1)
         hint = f" Did you mean '{cases[near[0]]}'?" if near else f" The {heading.name} is usually in {usual}."
         raise UnitError(f"{reason}{hint}") from None
 
 
 def _is_mass(unit: str) -> bool:
-    if unit in SPELLINGS["N"]:
+    if unit in UNIT_SPELLINGS["N"]:
         return False
     try:
         return bool(conversion(unit, "kg"))
@@ -155,7 +155,7 @@ def _is_mass(unit: str) -> bool:
         return False
 
 
-def _numbers(table: RawTable, heading: Heading, cells: Cells) -> Array:
+def _parse_numbers(table: RawTable, heading: Heading, cells: Cells) -> Array:
     """The cells as numbers. Raises ColumnError at the first that is none, or not finite."""
     if isinstance(cells, list):
         for row, cell in enumerate(cells):
@@ -164,26 +164,26 @@ def _numbers(table: RawTable, heading: Heading, cells: Cells) -> Array:
             except ValueError:
                 said = f"'{cell}' is not a number" if cell else "has an empty cell"
                 raise ColumnError(
-                    f"{table.place(row)}: {heading.name} {said}. Correct the cell or delete the {table.row_word}."
+                    f"{table.location(row)}: {heading.name} {said}. Correct the cell or delete the {table.row_label}."
                 ) from None
     values = np.array(cells, dtype=float)
     bad = ~np.isfinite(values)
     if bad.any():
         row = int(np.argmax(bad))
         raise ColumnError(
-            f"{table.place(row)}: {heading.name} is {values[row]}, which no sensor measures (the column has "
-            f"{np.count_nonzero(bad)} such cells). Delete the {table.row_word}, or fill the gap before reading."
+            f"{table.location(row)}: {heading.name} is {values[row]}, which no sensor measures (the column has "
+            f"{np.count_nonzero(bad)} such cells). Delete the {table.row_label}, or fill the gap before reading."
         )
     return values
 
 
-def _kept(table: RawTable, heading: Heading, cells: Cells, columns: dict[str, Array]) -> str:
+def _keep_unknown_column(table: RawTable, heading: Heading, cells: Cells, columns: dict[str, Array]) -> str:
     """Keep an unknown column as it is where it holds numbers; the note on it, if any."""
     if isinstance(cells, list):
         if not any(cells):
             return ""
         return f"Column '{heading.text}' holds text and is left out."
-    stated = constant_of_column(table, heading.text, heading.unit, cells)
+    stated = constant_from_column(table, heading.text, heading.unit, cells)
     if stated:
         return f"Column '{heading.text}' holds one value and states the {stated[0]}: {stated[1]:.9g} (SI)."
     columns[heading.text or "unnamed"] = cells

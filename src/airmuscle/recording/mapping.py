@@ -20,12 +20,12 @@ from typing import Any
 
 from ..core.errors import ColumnError, FileError, ParameterError, suggestion
 from .columns import QUANTITIES
-from .constants import constant_name
-from .heading import read_heading
+from .constants import parse_constant_name
+from .heading import parse_heading
 from .table import RawTable
-from .text_format import TextForm
+from .text_format import TextFormat
 
-CONSTANTS = ("resting_length", "ambient", "specimen", "run")
+CONSTANT_NAMES = ("resting_length", "ambient", "specimen", "run")
 """Constants of a run that a mapping may state."""
 
 
@@ -47,7 +47,7 @@ class ColumnMapping:
 
     def __post_init__(self) -> None:
         for column, heading in self.columns.items():
-            if heading and not (read_heading(heading).known or constant_name(heading)):
+            if heading and not (parse_heading(heading).known or parse_constant_name(heading)):
                 name = heading.partition("[")[0].strip()
                 raise ColumnError(
                     f"mapping: column '{column}' is mapped to '{heading}', which is no known quantity; known are "
@@ -55,15 +55,15 @@ class ColumnMapping:
                 )
 
     @property
-    def text_form(self) -> TextForm:
+    def text_format(self) -> TextFormat:
         """What of it a reader of text must know."""
-        return TextForm(self.delimiter, self.decimal, headless=any(c.isdecimal() for c in self.columns))
+        return TextFormat(self.delimiter, self.decimal, headerless=any(c.isdecimal() for c in self.columns))
 
-    def with_given(self, **given: Any) -> ColumnMapping:
+    def with_overrides(self, **given: Any) -> ColumnMapping:
         """This mapping with what is not None put in its place; columns and constants are added."""
         stated = {name: value for name, value in given.items() if value is not None}
         columns = {**self.columns, **{str(k): v for k, v in stated.pop("columns", {}).items()}}
-        constants = {**self.constants, **{name: stated.pop(name) for name in CONSTANTS if name in stated}}
+        constants = {**self.constants, **{name: stated.pop(name) for name in CONSTANT_NAMES if name in stated}}
         return dataclasses.replace(self, columns=columns, constants=constants, **stated)
 
 
@@ -76,23 +76,23 @@ def read_mapping(path: str | Path) -> ColumnMapping:
         raise FileError(f"{path}: cannot be read ({reason.strerror}). Check the name and the folder.") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as reason:
         raise FileError(f"{path.name}: is no TOML file ({reason}).") from None
-    known = ("columns", *CONSTANTS, "delimiter", "decimal", "sheet", "group")
+    known = ("columns", *CONSTANT_NAMES, "delimiter", "decimal", "sheet", "group")
     for key, value in content.items():
         if key not in known:
             raise ParameterError(
                 f"{path.name}: '{key}' is nothing a mapping states; it may state {', '.join(known)}."
                 f"{suggestion(key, known)}"
             )
-        if key not in ("columns", *CONSTANTS) and not isinstance(value, str):
+        if key not in ("columns", *CONSTANT_NAMES) and not isinstance(value, str):
             raise ParameterError(f"{path.name}: {key} = {value!r}; it must be a text in quotes.")
     columns = content.pop("columns", {})
     if not isinstance(columns, dict):
         raise ParameterError(f"{path.name}: columns must be a table: [columns], then a line for each column.")
-    headings = {name: _heading(path, name, value) for name, value in columns.items()}
-    return ColumnMapping().with_given(columns=headings, **content)
+    headings = {name: _parse_entry(path, name, value) for name, value in columns.items()}
+    return ColumnMapping().with_overrides(columns=headings, **content)
 
 
-def _heading(path: Path, column: str, value: Any) -> str:
+def _parse_entry(path: Path, column: str, value: Any) -> str:
     """`pressure [bara]` from that text itself or from `{quantity = "pressure", unit = "bara"}`."""
     if isinstance(value, str):
         return value
@@ -104,12 +104,12 @@ def _heading(path: Path, column: str, value: Any) -> str:
     )
 
 
-def mapped(table: RawTable, mapping: ColumnMapping) -> RawTable:
+def apply_mapping(table: RawTable, mapping: ColumnMapping) -> RawTable:
     """The table with the headings that a mapping gives; a note for each column says so.
 
     Raises ColumnError where the mapping names a column that is not there.
     """
-    places = {_place(table, column): heading for column, heading in mapping.columns.items()}
+    places = {_column_index(table, column): heading for column, heading in mapping.columns.items()}
     headings, units = list(table.headings), list(table.units or ("",) * len(table.headings))
     notes = list(table.notes)
     for place, heading in places.items():
@@ -128,11 +128,11 @@ def mapped(table: RawTable, mapping: ColumnMapping) -> RawTable:
 
 
 def _has_unit(heading: str) -> bool:
-    constant = constant_name(heading)
-    return bool(constant[1]) if constant else read_heading(heading).unit is not None
+    constant = parse_constant_name(heading)
+    return bool(constant[1]) if constant else parse_heading(heading).unit is not None
 
 
-def _place(table: RawTable, column: str) -> int:
+def _column_index(table: RawTable, column: str) -> int:
     """Where a column stands: by its heading, by what of it is a name, by its number."""
     bare = [text.partition("[")[0].partition("(")[0].strip() for text in table.headings]
     for names in (list(table.headings), bare):

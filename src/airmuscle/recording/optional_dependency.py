@@ -12,7 +12,7 @@ from ..core.errors import AirmuscleError, FileError
 Read = TypeVar("Read")
 
 
-def lab_package(name: str, path: Path) -> Any:
+def import_lab_package(name: str, path: Path) -> Any:
     """The package by its name. Raises FileError with what to install where it is missing."""
     try:
         return importlib.import_module(name)
@@ -22,7 +22,7 @@ def lab_package(name: str, path: Path) -> Any:
         ) from None
 
 
-def import_optional(path: Path, what: str, read: Callable[[], Read]) -> Read:
+def run_reader(path: Path, what: str, read: Callable[[], Read]) -> Read:
     """What `read` makes of a file; whatever these packages raise becomes one FileError that names the file."""
     if not path.is_file():
         raise FileError(f"{path}: cannot be read (there is no such file). Check the name and the folder.")

@@ -10,7 +10,7 @@ from ..core.arrays import Array
 from ..core.errors import ColumnError
 from .table import RawTable
 
-CONTRACTIONS = (-0.5, 1.0)
+CONTRACTION_RANGE = (-0.5, 1.0)
 """Contractions that are believed (chosen): none reaches 1, and no muscle is stretched by half its length."""
 
 
@@ -41,7 +41,7 @@ def _check_ordered(table: RawTable, time: Array) -> None:
         row = int(np.argmax(late)) + 1
         said = "repeats the time of" if time[row] == time[row - 1] else "goes back behind"
         raise ColumnError(
-            f"{table.place(row)}: time {time[row]:.9g} s {said} the row before ({time[row - 1]:.9g} s). Time must "
+            f"{table.location(row)}: time {time[row]:.9g} s {said} the row before ({time[row - 1]:.9g} s). Time must "
             "increase: sort the rows, delete the repeated one, or put two runs into two files."
         )
 
@@ -51,25 +51,25 @@ def _check_above_vacuum(table: RawTable, pressure: Array, ambient: float) -> Non
     if below.any():
         row = int(np.argmax(below))
         raise ColumnError(
-            f"{table.place(row)}: a gauge pressure of {pressure[row] / 1e3:.6g} kPa lies at or below absolute zero "
+            f"{table.location(row)}: a gauge pressure of {pressure[row] / 1e3:.6g} kPa lies at or below absolute zero "
             f"({-ambient / 1e3:.6g} kPa gauge). Is it in another unit, or gauge under an absolute unit?"
         )
 
 
 def _check_contraction(table: RawTable, contraction: Array, what: str, remedy: str) -> None:
-    low, high = CONTRACTIONS
+    low, high = CONTRACTION_RANGE
     outside = ~((contraction > low) & (contraction < high))
     if outside.any():
         row = int(np.argmax(outside))
         raise ColumnError(
-            f"{table.place(row)}: {what} {contraction[row]:.6g} lies outside {low:g} to {high:g}. {remedy}"
+            f"{table.location(row)}: {what} {contraction[row]:.6g} lies outside {low:g} to {high:g}. {remedy}"
         )
 
 
 def _check_length(table: RawTable, length: Array, resting_length: float | None) -> None:
     if not (length > 0).all():
         row = int(np.argmin(length > 0))
-        raise ColumnError(f"{table.place(row)}: length {length[row]:.6g} m; it must be greater than zero.")
+        raise ColumnError(f"{table.location(row)}: length {length[row]:.6g} m; it must be greater than zero.")
     if resting_length is not None:
         _check_contraction(
             table,

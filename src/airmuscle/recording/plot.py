@@ -11,7 +11,7 @@ from ..core.plotting import LINES, new_figure
 from .columns import quantity_of
 from .recording import Recording
 
-_SHOWN = {
+_DISPLAY_UNITS = {
     "pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "length": (1e3, "mm"), "position": (1e3, "mm"),
     "volume": (1e6, "cm³"), "air_mass": (1e3, "g"), "mass_flow": (1e3, "g/s"),
 }  # fmt: skip
@@ -28,7 +28,7 @@ def plot_recording(recording: Recording, names: Sequence[str] = ()) -> Any:
         max(len(chosen), 1), 1, height=0.7 + 1.15 * max(len(chosen), 1), sharex=True, squeeze=False
     )
     for i, (name, axis) in enumerate(zip(chosen, axes[:, 0], strict=False)):
-        factor, unit = scale(name)
+        factor, unit = display_scale(name)
         axis.plot(across, recording[name] * factor, color=LINES[i % len(LINES)], **style)
         axis.set_ylabel(f"{name}\n[{unit}]" if unit else name)
     axes[-1, 0].set_xlabel("time [s]" if timed else "row")
@@ -37,9 +37,9 @@ def plot_recording(recording: Recording, names: Sequence[str] = ()) -> Any:
     return figure
 
 
-def scale(name: str) -> tuple[float, str]:
+def display_scale(name: str) -> tuple[float, str]:
     """The factor and the unit in which a column is shown."""
     quantity = quantity_of(name)
     if quantity is None:
         return 1.0, ""
-    return _SHOWN.get(name.rpartition(".")[2], (1.0, "-" if quantity.unit == "1" else quantity.unit))
+    return _DISPLAY_UNITS.get(name.rpartition(".")[2], (1.0, "-" if quantity.unit == "1" else quantity.unit))

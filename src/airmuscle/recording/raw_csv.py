@@ -9,36 +9,45 @@ import numpy as np
 
 from ..core.errors import ColumnError, FileError
 from .table import Cells, RawTable
-from .text_format import Lines, TextForm, TextHeader, cells_of, encoding_of, head_of, holds_something, is_comment
+from .text_format import (
+    NumberedLines,
+    TextFormat,
+    TextHeader,
+    split_cells,
+    detect_encoding,
+    parse_header,
+    has_content,
+    is_comment,
+)
 
 _COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 _POINT_NUMBER = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 
 
-def raw_csv(path: str | Path, form: TextForm = TextForm()) -> RawTable:
+def read_csv_table(path: str | Path, form: TextFormat = TextFormat()) -> RawTable:
     """The table in a text file. Raises FileError or ColumnError."""
     if not isinstance(path, str | Path):
         raise FileError(f"read_csv: {path!r} is no path; name a file.")
     path = Path(path)
-    lines = [(i, line) for i, line in enumerate(re.split(r"\r\n|\n|\r", _text(path)), 1) if holds_something(line)]
-    head = head_of(path.name, lines, form)
-    body = [(i, line) for i, line in lines if not is_comment(line)][head.rows_above :]
-    columns = parsed(path.name, head, body, form)
+    lines = [(i, line) for i, line in enumerate(re.split(r"\r\n|\n|\r", _read_text(path)), 1) if has_content(line)]
+    head = parse_header(path.name, lines, form)
+    body = [(i, line) for i, line in lines if not is_comment(line)][head.header_lines :]
+    columns = parse_columns(path.name, head, body, form)
     rows = np.array([i for i, _ in body], dtype=np.int64)
-    return RawTable(path.name, head.headings, head.units, columns, rows, remarks=head.remarks)
+    return RawTable(path.name, head.headings, head.units, columns, rows, constants=head.constants)
 
 
-def _text(path: Path) -> str:
+def _read_text(path: Path) -> str:
     try:
         content = path.read_bytes()
     except OSError as reason:
         raise FileError(f"{path}: cannot be read ({reason.strerror}). Check the name and the folder.") from None
     if not content.strip():
         raise FileError(f"{path}: the file is empty.")
-    return content.decode(encoding_of(content), errors="replace")
+    return content.decode(detect_encoding(content), errors="replace")
 
 
-def parsed(origin: str, head: TextHeader, body: Lines, form: TextForm) -> tuple[Cells, ...]:
+def parse_columns(origin: str, head: TextHeader, body: NumberedLines, form: TextFormat) -> tuple[Cells, ...]:
     """The columns, by a fast parser where every cell is a number, otherwise cell by cell."""
     comma = form.decimal != "." and head.delimiter != "," and any("," in line for _, line in body)
     lines = [line.replace(",", ".") if comma else line for _, line in body]
@@ -49,12 +58,14 @@ def parsed(origin: str, head: TextHeader, body: Lines, form: TextForm) -> tuple[
         numbers = np.empty((0, 0))  # a text, an empty cell or a ragged row: `_by_cells` says in which line
     doubtful = comma and any("." in line for _, line in body)
     if doubtful or numbers.shape != (len(body), len(head.headings)):
-        return _by_cells(origin, head, body, comma, form.decimal)
+        return _parse_by_cell(origin, head, body, comma, form.decimal)
     return tuple(np.ascontiguousarray(column) for column in numbers.T)
 
 
-def _by_cells(origin: str, head: TextHeader, body: Lines, comma: bool, decimal: str | None) -> tuple[Cells, ...]:
-    rows = [cells_of(line, head.delimiter) for _, line in body]
+def _parse_by_cell(
+    origin: str, head: TextHeader, body: NumberedLines, comma: bool, decimal: str | None
+) -> tuple[Cells, ...]:
+    rows = [split_cells(line, head.delimiter) for _, line in body]
     width = len(head.headings)
     for (line, _), row in zip(body, rows, strict=True):
         if len(row) < width or any(row[width:]):
@@ -67,10 +78,10 @@ def _by_cells(origin: str, head: TextHeader, body: Lines, comma: bool, decimal: 
             )
     if comma and decimal is None:
         _check_decimal_sign(origin, body, rows)
-    return tuple(_numbers_or_texts([_pointed(row[i], decimal) for row in rows]) for i in range(width))
+    return tuple(_to_cells([_with_decimal_point(row[i], decimal) for row in rows]) for i in range(width))
 
 
-def _pointed(cell: str, decimal: str | None) -> str:
+def _with_decimal_point(cell: str, decimal: str | None) -> str:
     """A number with a decimal point; where the decimal sign was told, the other one parts thousands."""
     if decimal is None:
         return cell.replace(",", ".") if _COMMA_NUMBER.fullmatch(cell) else cell
@@ -79,14 +90,14 @@ def _pointed(cell: str, decimal: str | None) -> str:
     return plain if re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?", plain) else cell
 
 
-def _numbers_or_texts(cells: list[str]) -> Cells:
+def _to_cells(cells: list[str]) -> Cells:
     try:
         return np.array([float(cell) for cell in cells])
     except ValueError:
         return cells
 
 
-def _check_decimal_sign(origin: str, body: Lines, rows: list[list[str]]) -> None:
+def _check_decimal_sign(origin: str, body: NumberedLines, rows: list[list[str]]) -> None:
     """`1,234` beside `0.5` may be a thousand or a bit more than one: refuse to guess."""
     found: dict[str, tuple[int, str]] = {}
     for (line, _), row in zip(body, rows, strict=True):

@@ -14,24 +14,24 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import ColumnError, FileError, suggestion
-from .channels import Channel, common_rows
-from .optional_dependency import import_optional, lab_package
+from .channels import Channel, merge_channels
+from .optional_dependency import run_reader, import_lab_package
 from .table import RawTable
 
-_OWN = ("__header__", "__version__", "__globals__", "#refs#", "#subsystem#")
+_INTERNAL_NAMES = ("__header__", "__version__", "__globals__", "#refs#", "#subsystem#")
 
 
-def raw_mat(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
+def read_mat_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
     """A table for each struct that holds vectors, and for those outside any, or for the one struct named."""
-    pymatreader = lab_package("pymatreader", path)
+    pymatreader = import_lab_package("pymatreader", path)
 
     def read() -> Mapping[str, Any]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # on objects it cannot read; what is missing then is said below
             return dict(pymatreader.read_mat(str(path)))
 
-    variables = {name: value for name, value in import_optional(path, "MATLAB", read).items() if name not in _OWN}
-    found = dict(_groups("", variables))
+    variables = {name: value for name, value in run_reader(path, "MATLAB", read).items() if name not in _INTERNAL_NAMES}
+    found = dict(_find_groups("", variables))
     if group is not None and group not in found:
         there = f"there are {', '.join(name or '(no struct)' for name in found)}.{suggestion(group, found)}"
         raise FileError(f"{path.name}: no struct '{group}' with vectors; {there}")
@@ -41,20 +41,20 @@ def raw_mat(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
             f"{path.name}: no vector of numbers was found among {', '.join(variables) or 'no variables'}. Objects "
             "(timeseries, table) cannot be read: save vectors or a struct of them, or write the table as CSV."
         )
-    constants = _constants(variables)
-    return tuple(_table(path, name, fields, constants, len(found) > 1) for name, fields in chosen.items())
+    constants = _scalar_fields(variables)
+    return tuple(_make_table(path, name, fields, constants, len(found) > 1) for name, fields in chosen.items())
 
 
-def _groups(name: str, fields: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+def _find_groups(name: str, fields: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """The structs with vectors by their dotted names, the variables outside any under ''."""
     if "time" in fields and "signals" in fields:
-        yield name, _simulink(fields)
+        yield name, _simulink_signals(fields)
         return
     if any(_is_vector(value) or _is_matrix(value) for value in fields.values()):
         yield name, fields
     for key, value in fields.items():
         if isinstance(value, Mapping):
-            yield from _groups(f"{name}.{key}".lstrip("."), value)
+            yield from _find_groups(f"{name}.{key}".lstrip("."), value)
 
 
 def _is_vector(value: Any) -> bool:
@@ -65,7 +65,7 @@ def _is_matrix(value: Any) -> bool:
     return isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "biuf" and min(value.shape) > 0
 
 
-def _simulink(fields: Mapping[str, Any]) -> dict[str, Any]:
+def _simulink_signals(fields: Mapping[str, Any]) -> dict[str, Any]:
     signals = fields["signals"]
     parts = signals if isinstance(signals, Sequence) else [signals]
     if isinstance(signals, Mapping) and isinstance(signals.get("values"), list):  # an array of structs, by fields
@@ -74,7 +74,7 @@ def _simulink(fields: Mapping[str, Any]) -> dict[str, Any]:
     return {"time_s": fields["time"], **named}
 
 
-def _constants(fields: Mapping[str, Any]) -> dict[str, float | str]:
+def _scalar_fields(fields: Mapping[str, Any]) -> dict[str, float | str]:
     """Single numbers and texts of the file."""
     return {
         name: value.item() if isinstance(value, np.generic) else value
@@ -83,12 +83,12 @@ def _constants(fields: Mapping[str, Any]) -> dict[str, float | str]:
     }
 
 
-def _table(
+def _make_table(
     path: Path, name: str, fields: Mapping[str, Any], constants: Mapping[str, float | str], several: bool
 ) -> RawTable:
     origin = f"{path.name}, {name or 'variables'}" if several else path.name
     channels = list(_channels(origin, fields))
-    return common_rows(origin, channels, {**constants, **_constants(fields)})
+    return merge_channels(origin, channels, {**constants, **_scalar_fields(fields)})
 
 
 def _channels(origin: str, fields: Mapping[str, Any]) -> Iterator[Channel]:

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import FileError, suggestion
-from .channels import Channel, common_rows
-from .optional_dependency import import_optional, lab_package
+from .channels import Channel, merge_channels
+from .optional_dependency import run_reader, import_lab_package
 from .table import RawTable
 
-_TIME = 1
+_TIME_MASTER = 1
 """The kind of a master channel that is a time, in both versions of the format."""
 
 
-def raw_mdf(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
+def read_mdf_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
     """The table of all channels, or of one channel group by its name. Raises FileError or ColumnError."""
-    asammdf = lab_package("asammdf", path)
+    asammdf = import_lab_package("asammdf", path)
 
     def read() -> tuple[RawTable, ...]:
         with asammdf.MDF(path) as file:
@@ -28,9 +28,9 @@ def raw_mdf(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
                 there = f"there are {', '.join(names)}.{suggestion(group, names)}"
                 raise FileError(f"{path.name}: no group '{group}'; {there}")
             chosen = [i for i, name in enumerate(names) if group in (None, name)]
-            return (common_rows(path.name, list(_channels(file, chosen)), {}),)
+            return (merge_channels(path.name, list(_channels(file, chosen)), {}),)
 
-    return import_optional(path, "MDF", read)
+    return run_reader(path, "MDF", read)
 
 
 def _group_name(group: Any, index: int) -> str:
@@ -50,4 +50,4 @@ def _channels(file: Any, groups: list[int]) -> Iterator[Channel]:
 
 
 def _is_time(master: Any) -> bool:
-    return getattr(master, "sync_type", _TIME) == _TIME
+    return getattr(master, "sync_type", _TIME_MASTER) == _TIME_MASTER

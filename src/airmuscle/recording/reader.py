@@ -7,32 +7,32 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from ..core.errors import FileError
-from .unit_consistency import check_agreement
+from .unit_consistency import check_unit_consistency
 from .interpret import interpret
-from .large_csv import Progress, is_large, large_csv
-from .mapping import ColumnMapping, mapped, read_mapping
-from .raw_csv import raw_csv
-from .raw_excel import raw_excel
-from .raw_mat import raw_mat
-from .raw_mdf import raw_mdf
-from .raw_tdms import raw_tdms
+from .large_csv import Progress, is_large_file, read_large_csv
+from .mapping import ColumnMapping, apply_mapping, read_mapping
+from .raw_csv import read_csv_table
+from .raw_excel import read_excel_tables
+from .raw_mat import read_mat_tables
+from .raw_mdf import read_mdf_tables
+from .raw_tdms import read_tdms_tables
 from .recording import Recording
 from .table import RawTable
-from .downsampling import Decimation, Downsampling, thinned
+from .downsampling import Decimation, Downsampling, downsample
 
 Source = str | Path | Iterable[str | Path]
 Tables = tuple[RawTable, ...]
 
-TEXT = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn")
-_BINARY: Mapping[str, Callable[[Path, ColumnMapping], Tables]] = {
-    ".xlsx": lambda path, m: raw_excel(path, m.sheet, headless=m.text_form.headless),
-    ".xlsm": lambda path, m: raw_excel(path, m.sheet, headless=m.text_form.headless),
-    ".mat": lambda path, m: raw_mat(path, m.group),
-    ".tdms": lambda path, m: raw_tdms(path, m.group),
-    ".mf4": lambda path, m: raw_mdf(path, m.group),
-    ".mdf": lambda path, m: raw_mdf(path, m.group),
+TEXT_EXTENSIONS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn")
+_BINARY_READERS: Mapping[str, Callable[[Path, ColumnMapping], Tables]] = {
+    ".xlsx": lambda path, m: read_excel_tables(path, m.sheet, headless=m.text_format.headerless),
+    ".xlsm": lambda path, m: read_excel_tables(path, m.sheet, headless=m.text_format.headerless),
+    ".mat": lambda path, m: read_mat_tables(path, m.group),
+    ".tdms": lambda path, m: read_tdms_tables(path, m.group),
+    ".mf4": lambda path, m: read_mdf_tables(path, m.group),
+    ".mdf": lambda path, m: read_mdf_tables(path, m.group),
 }
-ENDINGS = (*TEXT, *_BINARY)
+EXTENSIONS = (*TEXT_EXTENSIONS, *_BINARY_READERS)
 """Endings of the files that are read."""
 
 
@@ -64,30 +64,30 @@ def read(
     Raises FileError, ColumnError, UnitError or ParameterError with file, row, value and remedy.
     """
     base = mapping if isinstance(mapping, ColumnMapping) else read_mapping(mapping) if mapping else ColumnMapping()
-    told = base.with_given(
+    told = base.with_overrides(
         columns=columns, resting_length=resting_length, ambient=ambient, specimen=specimen, delimiter=delimiter,
         decimal=decimal, sheet=sheet, group=group,
     )  # fmt: skip
     found = [
-        interpret(mapped(table, told), units=units or {}, constants=told.constants, ordered=ordered)
-        for path in files(source)
-        for table in tables(path, told, thinning, progress)
+        interpret(apply_mapping(table, told), units=units or {}, constants=told.constants, ordered=ordered)
+        for path in find_files(source)
+        for table in read_tables(path, told, thinning, progress)
     ]
-    check_agreement(found)
+    check_unit_consistency(found)
     return tuple(found)
 
 
-def files(source: Source) -> list[Path]:
+def find_files(source: Source) -> list[Path]:
     """The files meant by a path, a glob, a folder or several of these, in the order of their names."""
     if not isinstance(source, str | Path):
         if not isinstance(source, Iterable):
             raise FileError(f"read: {source!r} is no path; name a file, a folder, a glob, or several of them.")
-        return [path for each in source for path in files(each)]
+        return [path for each in source for path in find_files(each)]
     path = Path(source)
     if path.is_dir():
-        found = sorted(p for p in path.iterdir() if p.suffix.lower() in ENDINGS and not p.name.startswith("."))
+        found = sorted(p for p in path.iterdir() if p.suffix.lower() in EXTENSIONS and not p.name.startswith("."))
         if not found:
-            raise FileError(f"{path}: the folder holds no file that can be read; those end in {', '.join(ENDINGS)}.")
+            raise FileError(f"{path}: the folder holds no file that can be read; those end in {', '.join(EXTENSIONS)}.")
         return found
     if glob.has_magic(str(path)) and not path.exists():
         found = sorted(Path(p) for p in glob.glob(str(path), recursive=True))
@@ -97,18 +97,20 @@ def files(source: Source) -> list[Path]:
     return [path]
 
 
-def tables(path: Path, told: ColumnMapping, thinning: Downsampling, progress: Progress | None = None) -> Tables:
+def read_tables(path: Path, told: ColumnMapping, thinning: Downsampling, progress: Progress | None = None) -> Tables:
     """The tables of one file, as yet uninterpreted. Raises FileError or ColumnError."""
     suffix = path.suffix.lower()
-    if suffix in _BINARY:
-        return tuple(thinned(table, thinning) for table in _BINARY[suffix](path, told))
+    if suffix in _BINARY_READERS:
+        return tuple(downsample(table, thinning) for table in _BINARY_READERS[suffix](path, told))
     if suffix in (".xls", ".ods"):
         raise FileError(f"{path.name}: {suffix} is not read. Save it as .xlsx or .csv.")
-    if suffix not in TEXT and _is_binary(path):
-        raise FileError(f"{path.name}: this is no text, and its ending tells no format; read are {', '.join(ENDINGS)}.")
-    if is_large(path):
-        return (large_csv(path, told.text_form, thinning, progress),)
-    return (thinned(raw_csv(path, told.text_form), thinning),)
+    if suffix not in TEXT_EXTENSIONS and _is_binary(path):
+        raise FileError(
+            f"{path.name}: this is no text, and its ending tells no format; read are {', '.join(EXTENSIONS)}."
+        )
+    if is_large_file(path):
+        return (read_large_csv(path, told.text_format, thinning, progress),)
+    return (downsample(read_csv_table(path, told.text_format), thinning),)
 
 
 def _is_binary(path: Path) -> bool:

@@ -12,7 +12,7 @@ from ..core.arrays import Array
 from ..core.errors import ColumnError, suggestion
 from ..core.units import conversion
 from .columns import quantity_of
-from .heading import stated_unit
+from .heading import split_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -81,7 +81,7 @@ class Recording:
         states, as in `height [mm]`, counts here, unless None is asked for, and its name is also 'height'. Raises
         ColumnError and UnitError."""
         for heading, values in self.columns.items():
-            plain, stated = stated_unit(heading)
+            plain, stated = split_unit(heading)
             if stated is not None and name in (heading, plain):
                 convert = conversion(stated, unit, where=f"{self.origin}, {heading}") if unit else np.asarray
                 return np.asarray(convert(values))
@@ -103,7 +103,7 @@ class Recording:
         """A data frame whose headers carry the units: `pressure [Pa]`."""
         import pandas as pd
 
-        return pd.DataFrame({header(name): values for name, values in self.columns.items()})
+        return pd.DataFrame({column_heading(name): values for name, values in self.columns.items()})
 
     def plot(self, *names: str) -> Any:
         """Columns over time, or over the row number, one axis each; a Matplotlib figure."""
@@ -119,7 +119,7 @@ class Recording:
         return f"<b>{self.origin}</b>{note}{self.to_pandas().describe().to_html(float_format='%.6g')}"
 
 
-def header(name: str) -> str:
+def column_heading(name: str) -> str:
     """A column's heading with its unit, as files and data frames carry it."""
     quantity = quantity_of(name)
     return f"{name} [{quantity.unit}]" if quantity else name

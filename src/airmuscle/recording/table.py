@@ -28,10 +28,10 @@ class RawTable:
     units: tuple[str, ...] | None
     columns: tuple[Cells, ...]
     rows: npt.NDArray[np.int64]
-    row_word: str = "line"
-    remarks: Mapping[str, float | str] = dataclasses.field(default_factory=dict)
+    row_label: str = "line"
+    constants: Mapping[str, float | str] = dataclasses.field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
-    def place(self, row: int) -> str:
+    def location(self, row: int) -> str:
         """Where a row stands, to open a message with: `bench.csv, line 41`."""
-        return f"{self.origin}, {self.row_word} {self.rows[row]}"
+        return f"{self.origin}, {self.row_label} {self.rows[row]}"

@@ -8,9 +8,9 @@ import dataclasses
 from collections.abc import Mapping
 
 from ..core.errors import FileError, ParameterError
-from .header import are_headings, check_header, remark, unit_row
+from .header import are_headings, missing_header_error, parse_constant_comment, parse_unit_row
 
-Lines = list[tuple[int, str]]
+NumberedLines = list[tuple[int, str]]
 """Lines of a file with their numbers, counted from 1."""
 
 _DELIMITERS = ("\t", ";", ",", "|", " ")
@@ -18,7 +18,7 @@ _DECIMALS = (".", ",")
 
 
 @dataclasses.dataclass(frozen=True)
-class TextForm:
+class TextFormat:
     """What the reader of a text table must know, or may be told: `delimiter`, `decimal`; None is found out.
 
     With `headless` the columns are named by their numbers, "1", "2" and so on, where no headings stand.
@@ -26,7 +26,7 @@ class TextForm:
 
     delimiter: str | None = None
     decimal: str | None = None
-    headless: bool = False
+    headerless: bool = False
 
     def __post_init__(self) -> None:
         if self.delimiter is not None and self.delimiter not in _DELIMITERS:
@@ -39,7 +39,7 @@ class TextForm:
         if self.delimiter == self.decimal == ",":
             raise ParameterError("delimiter and decimal are both ','; no table can be read so. Export it with ';'.")
 
-    def delimiter_of(self, line: str) -> str:
+    def detect_delimiter(self, line: str) -> str:
         """The delimiter: the one told, or else what this first line holds."""
         return self.delimiter or next((d for d in "\t;" if d in line), ",")
 
@@ -50,13 +50,13 @@ class TextHeader:
 
     headings: tuple[str, ...]
     units: tuple[str, ...] | None
-    remarks: Mapping[str, float | str]
+    constants: Mapping[str, float | str]
     delimiter: str
-    rows_above: int
+    header_lines: int
     """How many lines of the table itself are no rows of numbers: 0, 1 or 2."""
 
 
-def encoding_of(content: bytes) -> str:
+def detect_encoding(content: bytes) -> str:
     """The encoding that the beginning of a file shows: UTF-16 by its mark, UTF-8 where it decodes, else Latin-1."""
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16"
@@ -72,41 +72,43 @@ def is_comment(line: str) -> bool:
     return line.lstrip()[0] in "#%"
 
 
-def holds_something(line: str) -> bool:
+def has_content(line: str) -> bool:
     """Whether a line holds more than delimiters and blanks."""
     return bool(line.strip(' \t;,"\r\n'))
 
 
-def cells_of(line: str, delimiter: str) -> list[str]:
+def split_cells(line: str, delimiter: str) -> list[str]:
     """The cells of a line."""
     return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
 
 
-def head_of(origin: str, lines: Lines, form: TextForm) -> TextHeader:
+def parse_header(origin: str, lines: NumberedLines, form: TextFormat) -> TextHeader:
     """The head of a table from its first lines, none of them empty. Raises FileError or ColumnError."""
     comments = [(i, line) for i, line in lines if is_comment(line)]
     body = [(i, line) for i, line in lines if not is_comment(line)]
     if not body:
         raise FileError(f"{origin}: the file holds no table. A table has a line of headings and rows of numbers.")
-    delimiter = form.delimiter_of(body[0][1])
-    headings, above = _headings(origin, comments, body, delimiter, form.headless)
-    below = cells_of(body[above][1], delimiter) if len(body) > above else []
-    units = unit_row(headings, below)
+    delimiter = form.detect_delimiter(body[0][1])
+    headings, above = _find_headings(origin, comments, body, delimiter, form.headerless)
+    below = split_cells(body[above][1], delimiter) if len(body) > above else []
+    units = parse_unit_row(headings, below)
     above += 1 if units else 0
     if len(body) <= above:
         raise FileError(f"{origin}: there are headings ({', '.join(headings)}) but no rows of numbers below them.")
-    remarks = dict(found for _, line in comments if (found := remark(line)))
+    remarks = dict(found for _, line in comments if (found := parse_constant_comment(line)))
     return TextHeader(tuple(headings), units, remarks, delimiter, above)
 
 
-def _headings(origin: str, comments: Lines, body: Lines, delimiter: str, headless: bool) -> tuple[list[str], int]:
+def _find_headings(
+    origin: str, comments: NumberedLines, body: NumberedLines, delimiter: str, headless: bool
+) -> tuple[list[str], int]:
     """The headings, and how many lines of the body they take; they may stand in the last comment above it."""
-    first, cells = body[0][0], cells_of(body[0][1], delimiter)
+    first, cells = body[0][0], split_cells(body[0][1], delimiter)
     if are_headings(cells):
         return cells, 1
-    above = [cells_of(line.lstrip("#% \t"), delimiter) for i, line in comments if i < first]
+    above = [split_cells(line.lstrip("#% \t"), delimiter) for i, line in comments if i < first]
     if above and len(above[-1]) == len(cells) and are_headings(above[-1]):
         return above[-1], 0
     if headless:
         return [str(i) for i in range(1, len(cells) + 1)], 0
-    raise check_header(f"{origin}, line {first}")
+    raise missing_header_error(f"{origin}, line {first}")

@@ -84,13 +84,13 @@ def _recorded(table: Mapping[str, Any], units: Mapping[str, str], place: Locatio
             raise ParameterError(f'{place}: columns are named, but no file; write file = "bench.csv" beside them.')
         return {}
     from ..recording import read_csv  # pandas, which no other command needs
-    from ..recording.heading import stated_unit
+    from ..recording.heading import split_unit
 
     path = text(table, "file", place, needed=True)
     with located_errors(place):
         recording = read_csv(place.folder / path)
         if columns is None:
-            named = {*recording, *(stated_unit(heading)[0] for heading in recording)}
+            named = {*recording, *(split_unit(heading)[0] for heading in recording)}
             columns = {name: name for name in inputs if name in named}
             if not columns:
                 raise ColumnError(

@@ -12,15 +12,15 @@ from ..report.chapter import Chapter, Table
 from ..report.output_folder import atomic_folder
 from ..report.write import fill, save_table
 from .distributions import LevelSet, Variation
-from .plots import plots
+from .plots import study_plots
 from .result import StudyResult
-from .sensitivity import Indices
+from .sensitivity import SobolIndices
 from .study import Study
 
-RESULTS, COURSES = "results.csv", "courses.npz"
-MOST_LEVELS = 6
+RESULTS_FILE, TIME_SERIES_FILE = "results.csv", "courses.npz"
+MAX_LISTED_LEVELS = 6
 """Levels that are written out; of more, the ends and their number."""
-MOST_REASONS = 20
+MAX_LISTED_REASONS = 20
 
 
 def write_study(result: StudyResult, folder: Path | str) -> Path:
@@ -30,10 +30,10 @@ def write_study(result: StudyResult, folder: Path | str) -> Path:
     """
     study = result.study
     with atomic_folder(folder) as place:
-        save_table(result.table(), place / RESULTS)
-        if study.courses:
-            times = {f"{name}_time": course.instants for name, course in study.courses.items()}
-            np.savez(place / COURSES, **times, **result.courses)  # type: ignore[arg-type]
+        save_table(result.table(), place / RESULTS_FILE)
+        if study.time_series:
+            times = {f"{name}_time": course.times for name, course in study.time_series.items()}
+            np.savez(place / TIME_SERIES_FILE, **times, **result.time_series)  # type: ignore[arg-type]
         fill(place, [study_chapter(result)], title="Parameter study")
     return Path(folder) / "report.html"
 
@@ -41,69 +41,71 @@ def write_study(result: StudyResult, folder: Path | str) -> Path:
 def study_chapter(result: StudyResult) -> Chapter:
     """A study's design, statistics, sensitivities and figures."""
     study, indices = result.study, result.indices()
-    tables = [varied_table(study)]
+    tables = [variation_table(study)]
     tables += [result.statistics()] if study.scalars else []
     tables += [sensitivity_table(study, indices)] if indices else []
-    tables += [reasons_table(result)] if result.failed.size else []
+    tables += [failure_table(result)] if result.failed.size else []
     return Chapter(
         paper="study",
         title=study.title,
         summary="\n\n".join(summary(result, indices)),
-        plots=plots(result, indices),
+        plots=study_plots(result, indices),
         tables=tuple(tables),
-        references=tuple(cite(study.source.scenario.plant)),
+        references=tuple(cite(study.template.scenario.plant)),
         chosen=_settings(study),
     )
 
 
-def summary(result: StudyResult, indices: dict[str, Indices]) -> list[str]:
+def summary(result: StudyResult, indices: dict[str, SobolIndices]) -> list[str]:
     """What a reader should know before looking at any number."""
     study = result.study
-    said = [f"{len(study)} runs, {study.design}. All runs are in {RESULTS}, one a row."]
-    if study.courses:
-        said.append(f"Whole columns ({', '.join(study.courses)}) are in {COURSES}, a row a run, with their instants.")
+    said = [f"{len(study)} runs, {study.design}. All runs are in {RESULTS_FILE}, one a row."]
+    if study.time_series:
+        said.append(
+            f"Whole columns ({', '.join(study.time_series)}) are in {TIME_SERIES_FILE}, a row a run, with their instants."
+        )
     if result.failed.size:
         said.append(f"{result.failed.size} runs failed and are left out of all that follows; the table says why.")
-    left_out = max((found.left_out for found in indices.values()), default=0)
+    left_out = max((found.excluded_points for found in indices.values()), default=0)
     if left_out:
         said.append(f"Of the base points of the sensitivities {left_out} could not be used for some outcome.")
     return said
 
 
-def varied_table(study: Study) -> Table:
+def variation_table(study: Study) -> Table:
     """What varies, and how."""
     return Table(
         "varied",
         "What varies",
         {
-            "number": [number.path for number in study.numbers],
-            "unit": [number.unit for number in study.numbers],
-            "values": [in_words(variation) for variation in study.variations],
+            "number": [number.path for number in study.parameters],
+            "unit": [number.unit for number in study.parameters],
+            "values": [describe_variation(variation) for variation in study.variations],
             "min": study.values.min(axis=0),
             "max": study.values.max(axis=0),
-            "followed by": [_followers(study, i) for i in range(len(study.numbers))],
+            "followed by": [_follower_paths(study, i) for i in range(len(study.parameters))],
         },
         "Values are SI.",
     )
 
 
-def _followers(study: Study, place: int) -> str:
+def _follower_paths(study: Study, place: int) -> str:
     return ", ".join(number.path for number, leader in study.follow if leader == place)
 
 
-def in_words(variation: Variation) -> str:
+def describe_variation(variation: Variation) -> str:
     """A variation on one line."""
     if not isinstance(variation, LevelSet):
         return str(variation)
-    if len(variation.values) > MOST_LEVELS:
-        low, high = variation.ends
+    if len(variation.values) > MAX_LISTED_LEVELS:
+        low, high = variation.support
         return f"{len(variation.values)} values from {low:g} to {high:g}"
     return ", ".join(f"{value:g}" for value in variation.values)
 
 
-def sensitivity_table(study: Study, indices: dict[str, Indices]) -> Table:
+def sensitivity_table(study: Study, indices: dict[str, SobolIndices]) -> Table:
     """The Sobol indices of every outcome by every input, with their intervals."""
-    rows = [(name, number.path, i) for name in indices for i, number in enumerate(study.numbers)]
+    rows = [(name, number.path, i) for name in indices for i, number in enumerate(study.parameters)]
 
     def column(part: str, row: int | None = None) -> list[float]:
         found = [getattr(indices[name], part) for name, _, _ in rows]
@@ -127,24 +129,24 @@ def sensitivity_table(study: Study, indices: dict[str, Indices]) -> Table:
     )
 
 
-def reasons_table(result: StudyResult) -> Table:
+def failure_table(result: StudyResult) -> Table:
     """Why runs failed, the most frequent reason first."""
-    counted = Counter(result.reasons[i] for i in result.failed).most_common(MOST_REASONS)
+    counted = Counter(result.failure_reasons[i] for i in result.failed).most_common(MAX_LISTED_REASONS)
     return Table(
         "failed",
         "RunSplit that failed",
         {
             "runs": [count for _, count in counted],
-            "first": [result.reasons.index(reason) for reason, _ in counted],
+            "first": [result.failure_reasons.index(reason) for reason, _ in counted],
             "reason": [reason for reason, _ in counted],
         },
-        f"The {MOST_REASONS} most frequent reasons at most." if len(counted) == MOST_REASONS else "",
+        f"The {MAX_LISTED_REASONS} most frequent reasons at most." if len(counted) == MAX_LISTED_REASONS else "",
     )
 
 
 def _settings(study: Study) -> tuple[tuple[str, str, str], ...]:
-    scenario = study.source.scenario
-    outcomes = [(f"outcome {name}", str(outcome), "study") for name, outcome in study.outcomes.items()]
+    scenario = study.template.scenario
+    outcomes = [(f"outcome {name}", str(outcome), "study") for name, outcome in study.metrics.items()]
     return (
         ("scenario", scenario.title, str(study.path.name)),
         ("design", str(study.design), "study"),

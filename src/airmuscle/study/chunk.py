@@ -21,8 +21,8 @@ from ..core.errors import FileError
 from ..recording import Recording
 from ..scenario.scenario import Scenario
 from .executors import check_running
-from .fingerprint import fingerprint, program
-from .scenario_runs import REFUSALS, reason, simulate_all
+from .fingerprint import fingerprint, program_fingerprint
+from .scenario_runs import RUN_ERRORS, failure_reason, simulate_all
 from .study import Study, load_study
 
 _loaded: dict[tuple[str, str], Study] = {}
@@ -32,25 +32,25 @@ _loaded: dict[tuple[str, str], Study] = {}
 class Chunk:
     """Outcomes of n runs: `numbers` (n, k), `courses` by name (n, T), and why a run failed (n,), empty if not."""
 
-    numbers: Array
-    courses: Mapping[str, Array]
-    reasons: npt.NDArray[np.str_]
+    scalars: Array
+    time_series: Mapping[str, Array]
+    failure_reasons: npt.NDArray[np.str_]
 
 
-def identity(study: Study) -> str:
+def study_fingerprint(study: Study) -> str:
     """The fingerprint of a study together with the program that runs it."""
-    return fingerprint(program(), study.fingerprint(), study.values)
+    return fingerprint(program_fingerprint(), study.fingerprint(), study.values)
 
 
-def name_of(study: Study, index: int) -> str:
+def chunk_file_name(study: Study, index: int) -> str:
     """The name of the file that keeps a chunk."""
-    rows = study.rows(index)
-    return f"{fingerprint(program(), study.fingerprint(), study.values[rows.start : rows.stop])}.npz"
+    rows = study.chunk_runs(index)
+    return f"{fingerprint(program_fingerprint(), study.fingerprint(), study.values[rows.start : rows.stop])}.npz"
 
 
-def remember(study: Study) -> str:
+def register_study(study: Study) -> str:
     """Let this process take the study as it is when it runs chunks of it; its identity."""
-    mark = identity(study)
+    mark = study_fingerprint(study)
     _loaded[str(study.path.resolve()), mark] = study
     return mark
 
@@ -62,65 +62,67 @@ def run_chunk(path: str, mark: str, index: int) -> Chunk:
     """
     if (path, mark) not in _loaded:
         study = load_study(path)
-        if identity(study) != mark:
+        if study_fingerprint(study) != mark:
             raise FileError(
                 f"{path}: a worker reads another study than the one that was started. Either it was edited meanwhile, "
                 "or the worker has another version of airmuscle, of what it needs, or of the files that it names."
             )
         _loaded[path, mark] = study
-    return computed(_loaded[path, mark], index)
+    return compute_chunk(_loaded[path, mark], index)
 
 
-def computed(study: Study, index: int) -> Chunk:
+def compute_chunk(study: Study, index: int) -> Chunk:
     """The outcomes of one chunk; a run that fails leaves NaN and its reason."""
-    rows = study.rows(index)
+    rows = study.chunk_runs(index)
     found = Chunk(
         np.full((len(rows), len(study.scalars)), np.nan),
-        {name: np.full((len(rows), course.instants.size), np.nan) for name, course in study.courses.items()},
+        {name: np.full((len(rows), course.times.size), np.nan) for name, course in study.time_series.items()},
         np.array([""] * len(rows), dtype=object),
     )
     scenarios: dict[int, Scenario] = {}
-    for place, (run, rest) in enumerate(zip(rows, study.rests(rows), strict=True)):
+    for place, (run, rest) in enumerate(zip(rows, study.initial_states(rows), strict=True)):
         check_running()
         try:
             scenarios[place] = study.scenario(run, rest)
-        except REFUSALS as error:
-            found.reasons[place] = reason(error)
-    for place, run_or_reason in zip(scenarios, simulate_all(list(scenarios.values()), instants(study)), strict=True):
+        except RUN_ERRORS as error:
+            found.failure_reasons[place] = failure_reason(error)
+    for place, run_or_reason in zip(
+        scenarios, simulate_all(list(scenarios.values()), metric_times(study)), strict=True
+    ):
         check_running()
         if isinstance(run_or_reason, str):
-            found.reasons[place] = run_or_reason
+            found.failure_reasons[place] = run_or_reason
         else:
-            _keep(study, run_or_reason, found, place)
-    return dataclasses.replace(found, reasons=found.reasons.astype(str))
+            _store(study, run_or_reason, found, place)
+    return dataclasses.replace(found, failure_reasons=found.failure_reasons.astype(str))
 
 
-def instants(study: Study) -> Array:
+def metric_times(study: Study) -> Array:
     """All instants [s] that the outcomes of a study look at."""
-    return np.unique(np.concatenate([outcome.instants for outcome in study.outcomes.values()]))
+    return np.unique(np.concatenate([outcome.times for outcome in study.metrics.values()]))
 
 
-def _keep(study: Study, recording: Recording, found: Chunk, place: int) -> None:
+def _store(study: Study, recording: Recording, found: Chunk, place: int) -> None:
     time = recording["time"]
-    found.numbers[place] = [o.number(time, recording[o.column]) for o in study.scalars.values()]
-    for name, course in study.courses.items():
-        found.courses[name][place] = course.rows(time, recording[course.column])
+    found.scalars[place] = [o.value(time, recording[o.column]) for o in study.scalars.values()]
+    for name, course in study.time_series.items():
+        found.time_series[name][place] = course.sample(time, recording[course.column])
 
 
-def write(chunk: Chunk, path: Path) -> None:
+def write_chunk(chunk: Chunk, path: Path) -> None:
     """Write a chunk to its file, which appears whole or not at all."""
     handle, unfinished = tempfile.mkstemp(dir=path.parent, prefix=".unfinished-")
     try:
         with os.fdopen(handle, "wb") as file:
-            courses = {f"course:{name}": rows for name, rows in chunk.courses.items()}
-            np.savez(file, numbers=chunk.numbers, reasons=chunk.reasons, **courses)  # type: ignore[arg-type]
+            courses = {f"course:{name}": rows for name, rows in chunk.time_series.items()}
+            np.savez(file, numbers=chunk.scalars, reasons=chunk.failure_reasons, **courses)  # type: ignore[arg-type]
         os.replace(unfinished, path)
     except BaseException:
         Path(unfinished).unlink(missing_ok=True)
         raise
 
 
-def read(path: Path) -> Chunk | None:
+def read_chunk(path: Path) -> Chunk | None:
     """The chunk that a file keeps; None where there is none, or the file is damaged."""
     try:
         with np.load(path, allow_pickle=False) as file:

@@ -18,7 +18,7 @@ from ..core.errors import ParameterError
 from .distributions import LevelSet, Variation
 from .parse import key, whole
 
-MOST_RUNS = 10_000_000
+MAX_RUNS = 10_000_000
 """RunSplit of one study whose table fits a usual memory."""
 HALF_CELL = 2.0**-31
 """Half the distance of Sobol points of 30 bits; no share is nearer to 0 or 1, where normal values are infinite."""
@@ -28,27 +28,27 @@ class Design(abc.ABC):
     """How the points of a study are spread."""
 
     @abc.abstractmethod
-    def runs(self, variations: Sequence[Variation]) -> int:
+    def run_count(self, variations: Sequence[Variation]) -> int:
         """The number of runs."""
 
     @abc.abstractmethod
-    def _shares(self, variations: Sequence[Variation]) -> Array:
+    def _unit_points(self, variations: Sequence[Variation]) -> Array:
         """The points (N, d) in the unit cube."""
 
     def values(self, variations: Sequence[Variation]) -> Array:
         """What is varied, run by run (N, d). Raises ParameterError for variations that do not go with the design."""
-        runs = self.runs(variations)
-        if runs > MOST_RUNS:
-            raise ParameterError(f"{type(self).__name__}: {runs:.3g} runs; a study has {MOST_RUNS} at most.")
-        shares = np.clip(self._shares(variations), HALF_CELL, 1.0 - HALF_CELL)
-        return np.column_stack([variation.at(shares[:, i]) for i, variation in enumerate(variations)])
+        runs = self.run_count(variations)
+        if runs > MAX_RUNS:
+            raise ParameterError(f"{type(self).__name__}: {runs:.3g} runs; a study has {MAX_RUNS} at most.")
+        shares = np.clip(self._unit_points(variations), HALF_CELL, 1.0 - HALF_CELL)
+        return np.column_stack([variation.ppf(shares[:, i]) for i, variation in enumerate(variations)])
 
 
 @dataclasses.dataclass(frozen=True)
 class Grid(Design):
     """Every combination of the levels; the last of what varies changes fastest."""
 
-    def runs(self, variations: Sequence[Variation]) -> int:
+    def run_count(self, variations: Sequence[Variation]) -> int:
         return math.prod(len(self._levels(variation)) for variation in variations)
 
     def _levels(self, variation: Variation) -> tuple[float, ...]:
@@ -59,14 +59,14 @@ class Grid(Design):
             )
         return variation.values
 
-    def _shares(self, variations: Sequence[Variation]) -> Array:
+    def _unit_points(self, variations: Sequence[Variation]) -> Array:
         sizes = [len(self._levels(variation)) for variation in variations]
         places = np.unravel_index(np.arange(math.prod(sizes)), sizes)
         return np.column_stack([(place + 0.5) / size for place, size in zip(places, sizes, strict=True)])
 
 
 @dataclasses.dataclass(frozen=True)
-class Sampled(Design):
+class SampledDesign(Design):
     """A design of `count` points by chance, the same for the same seed."""
 
     count: int = key(whole, "number of points")
@@ -76,7 +76,7 @@ class Sampled(Design):
         if self.count < 1:
             raise ParameterError(f"{type(self).__name__}: count is {self.count}; at least one point is needed.")
 
-    def runs(self, variations: Sequence[Variation]) -> int:
+    def run_count(self, variations: Sequence[Variation]) -> int:
         return self.count
 
     def _check_power_of_two(self) -> None:
@@ -88,38 +88,38 @@ class Sampled(Design):
             )
 
 
-class MonteCarlo(Sampled):
+class MonteCarlo(SampledDesign):
     """Independent points. A study with a greater count begins with the same ones."""
 
-    def _shares(self, variations: Sequence[Variation]) -> Array:
+    def _unit_points(self, variations: Sequence[Variation]) -> Array:
         return np.random.default_rng(self.seed).random((self.count, len(variations)))
 
 
-class LatinHypercube(Sampled):
+class LatinHypercube(SampledDesign):
     """Each variable takes each of `count` equal parts of its range once.
 
     McKay, Beckman, Conover, Technometrics 21 (1979) 239-245.
     """
 
-    def _shares(self, variations: Sequence[Variation]) -> Array:
+    def _unit_points(self, variations: Sequence[Variation]) -> Array:
         from scipy.stats import qmc
 
         sampler = qmc.LatinHypercube(d=len(variations), seed=np.random.default_rng(self.seed))
         return np.asarray(sampler.random(self.count))
 
 
-class Sobol(Sampled):
+class Sobol(SampledDesign):
     """Scrambled Sobol points, which fill the cube evenly; `count` is a power of two. A greater one adds to them."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check_power_of_two()
 
-    def _shares(self, variations: Sequence[Variation]) -> Array:
-        return _sobol(len(variations), self.count, self.seed)
+    def _unit_points(self, variations: Sequence[Variation]) -> Array:
+        return _sobol_points(len(variations), self.count, self.seed)
 
 
-class Saltelli(Sampled):
+class Saltelli(SampledDesign):
     """Points for variance-based sensitivities: `count` base points, a power of two, make count (d + 2) runs.
 
     Two Sobol samples A and B of d variables; for each base point the runs A, then A with one variable after the other
@@ -130,12 +130,12 @@ class Saltelli(Sampled):
         super().__post_init__()
         self._check_power_of_two()
 
-    def runs(self, variations: Sequence[Variation]) -> int:
+    def run_count(self, variations: Sequence[Variation]) -> int:
         return self.count * (len(variations) + 2)
 
-    def _shares(self, variations: Sequence[Variation]) -> Array:
+    def _unit_points(self, variations: Sequence[Variation]) -> Array:
         d = len(variations)
-        both = _sobol(2 * d, self.count, self.seed)
+        both = _sobol_points(2 * d, self.count, self.seed)
         table = np.repeat(both[:, None, :d], d + 2, axis=1)
         for i in range(d):
             table[:, 1 + i, i] = both[:, d + i]
@@ -146,7 +146,7 @@ class Saltelli(Sampled):
 DESIGNS = (Grid, LatinHypercube, Sobol, MonteCarlo, Saltelli)
 
 
-def _sobol(dimension: int, count: int, seed: int) -> Array:
+def _sobol_points(dimension: int, count: int, seed: int) -> Array:
     from scipy.stats import qmc
 
     sampler = qmc.Sobol(d=dimension, scramble=True, seed=np.random.default_rng(seed))

@@ -16,7 +16,7 @@ from ..core.errors import ParameterError
 from ..library.location import Location, finite
 from .parse import chosen, difference, key, quantity, ratio, whole
 
-LEAST_SHARE = 1e-6
+MIN_PROBABILITY = 1e-6
 """Part of a distribution that a truncation must leave, so that its ends stay exact to ten digits."""
 
 
@@ -24,12 +24,12 @@ class Variation(abc.ABC):
     """The values that one number takes, from the least to the greatest."""
 
     @abc.abstractmethod
-    def at(self, shares: Array) -> Array:
+    def ppf(self, shares: Array) -> Array:
         """The values (N,) that these shares (N,) of all, in (0, 1), lie below."""
 
     @property
     @abc.abstractmethod
-    def ends(self) -> tuple[float, float]:
+    def support(self) -> tuple[float, float]:
         """The least and the greatest value; infinite where there is none."""
 
 
@@ -44,13 +44,13 @@ class LevelSet(Variation):
         if not self.values:
             raise ParameterError("Levels: the list is empty; give at least one value.")
 
-    def at(self, shares: Array) -> Array:
+    def ppf(self, shares: Array) -> Array:
         index = np.floor(shares * len(self.values)).astype(int)
         values: Array = np.array(self.values)[np.minimum(index, len(self.values) - 1)]
         return values
 
     @property
-    def ends(self) -> tuple[float, float]:
+    def support(self) -> tuple[float, float]:
         return min(self.values), max(self.values)
 
 
@@ -80,15 +80,15 @@ class Distribution(Variation):
     """A continuous distribution, computed by scipy.stats."""
 
     @abc.abstractmethod
-    def law(self) -> Any:
+    def scipy_distribution(self) -> Any:
         """The frozen distribution of scipy.stats."""
 
-    def at(self, shares: Array) -> Array:
-        return np.asarray(self.law().ppf(shares), dtype=float)
+    def ppf(self, shares: Array) -> Array:
+        return np.asarray(self.scipy_distribution().ppf(shares), dtype=float)
 
     @property
-    def ends(self) -> tuple[float, float]:
-        low, high = self.law().support()
+    def support(self) -> tuple[float, float]:
+        low, high = self.scipy_distribution().support()
         return float(low), float(high)
 
 
@@ -103,7 +103,7 @@ class Uniform(Distribution):
         _check_finite(self, self.low, self.high)
         _check_order(self, ("low", self.low), ("high", self.high))
 
-    def law(self) -> Any:
+    def scipy_distribution(self) -> Any:
         from scipy import stats
 
         return stats.uniform(self.low, self.high - self.low)
@@ -114,16 +114,16 @@ class Normal(Distribution):
     """The normal distribution; it has no ends, so put it in Truncated where values beyond some bound are impossible."""
 
     mean: float = key(quantity, "mean")
-    deviation: float = key(difference, "standard deviation")
+    std: float = key(difference, "standard deviation")
 
     def __post_init__(self) -> None:
-        _check_finite(self, self.mean, self.deviation)
-        _check_positive(self, "deviation", self.deviation)
+        _check_finite(self, self.mean, self.std)
+        _check_positive(self, "deviation", self.std)
 
-    def law(self) -> Any:
+    def scipy_distribution(self) -> Any:
         from scipy import stats
 
-        return stats.norm(self.mean, self.deviation)
+        return stats.norm(self.mean, self.std)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -131,17 +131,17 @@ class LogNormal(Distribution):
     """A value whose natural logarithm is normal: half of all lie below the median."""
 
     median: float = key(quantity, "median")
-    log_deviation: float = key(ratio, "standard deviation of the natural logarithm; about the relative one")
+    log_std: float = key(ratio, "standard deviation of the natural logarithm; about the relative one")
 
     def __post_init__(self) -> None:
-        _check_finite(self, self.median, self.log_deviation)
+        _check_finite(self, self.median, self.log_std)
         _check_positive(self, "median", self.median)
-        _check_positive(self, "log_deviation", self.log_deviation)
+        _check_positive(self, "log_deviation", self.log_std)
 
-    def law(self) -> Any:
+    def scipy_distribution(self) -> Any:
         from scipy import stats
 
-        return stats.lognorm(self.log_deviation, scale=self.median)
+        return stats.lognorm(self.log_std, scale=self.median)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -158,13 +158,13 @@ class Triangular(Distribution):
         if not self.low <= self.mode <= self.high:
             raise ParameterError(f"Triangular: mode {self.mode:g} must lie within {self.low:g} to {self.high:g}.")
 
-    def law(self) -> Any:
+    def scipy_distribution(self) -> Any:
         from scipy import stats
 
         return stats.triang((self.mode - self.low) / (self.high - self.low), self.low, self.high - self.low)
 
 
-def _inner(value: Any, unit: str, where: str) -> Distribution:
+def _read_inner(value: Any, unit: str, where: str) -> Distribution:
     found: Distribution = chosen(value, DISTRIBUTIONS[:-1], Location(where, "", Path()), unit)
     return found
 
@@ -173,7 +173,7 @@ def _inner(value: Any, unit: str, where: str) -> Distribution:
 class Truncated(Variation):
     """Another distribution without what lies beyond two ends."""
 
-    inner: Distribution = key(_inner, "the distribution that is cut, a table with a model")
+    inner: Distribution = key(_read_inner, "the distribution that is cut, a table with a model")
     low: float = key(quantity, "least value")
     high: float = key(quantity, "greatest value")
 
@@ -182,31 +182,31 @@ class Truncated(Variation):
         _check_order(self, ("low", self.low), ("high", self.high))
         if not isinstance(self.inner, Distribution):
             raise ParameterError(f"Truncated: {self.inner!r} is no distribution that can be cut.")
-        below, above = self._shares()
-        if above - below < LEAST_SHARE:
+        below, above = self._probability_range()
+        if above - below < MIN_PROBABILITY:
             raise ParameterError(
                 f"Truncated: only {above - below:.2g} of {self.inner} lies within {self.low:g} to {self.high:g}; at "
-                f"least {LEAST_SHARE:g} must."
+                f"least {MIN_PROBABILITY:g} must."
             )
 
-    def _shares(self) -> tuple[float, float]:
-        below, above = self.inner.law().cdf([self.low, self.high])
+    def _probability_range(self) -> tuple[float, float]:
+        below, above = self.inner.scipy_distribution().cdf([self.low, self.high])
         return float(below), float(above)
 
-    def at(self, shares: Array) -> Array:
-        below, above = self._shares()
-        return np.clip(self.inner.at(below + shares * (above - below)), self.low, self.high)
+    def ppf(self, shares: Array) -> Array:
+        below, above = self._probability_range()
+        return np.clip(self.inner.ppf(below + shares * (above - below)), self.low, self.high)
 
     @property
-    def ends(self) -> tuple[float, float]:
-        low, high = self.inner.ends
+    def support(self) -> tuple[float, float]:
+        low, high = self.inner.support
         return max(low, self.low), min(high, self.high)
 
 
 DISTRIBUTIONS = (Uniform, Normal, LogNormal, Triangular, Truncated)
 
 
-def variation_from(given: Any, unit: str, place: Location) -> Variation:
+def read_variation(given: Any, unit: str, place: Location) -> Variation:
     """The variation that a list or a table of a study describes."""
     if isinstance(given, list):
         if not given:

@@ -16,18 +16,18 @@ from typing import Any
 
 from ..core.errors import InputError
 
-ANSWER_WITHIN = 10.0
+CONNECT_TIMEOUT = 10.0
 """Seconds that a scheduler has for its first answer (chosen)."""
 _stop: Any = None
 
 
-def cores_here() -> int:
+def available_cores() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextlib.contextmanager
-def processes(workers: int) -> Iterator[Executor | None]:
+def process_pool(workers: int) -> Iterator[Executor | None]:
     """As many processes on this machine; one needs none but this. Leaving by an error stops them between two runs."""
     if workers < 1:
         raise InputError(f"workers is {workers}; at least one is needed.")
@@ -36,7 +36,7 @@ def processes(workers: int) -> Iterator[Executor | None]:
         return
     context = multiprocessing.get_context("spawn")  # a copy of a process that has threads may hang
     stop = context.Event()
-    executor = _Pool(workers, mp_context=context, initializer=_begin, initargs=(stop,))
+    executor = _ProcessPool(workers, mp_context=context, initializer=_initialise_worker, initargs=(stop,))
     try:
         yield executor
     except BaseException:
@@ -46,7 +46,7 @@ def processes(workers: int) -> Iterator[Executor | None]:
         executor.shutdown(cancel_futures=True)
 
 
-class _Pool(ProcessPoolExecutor):
+class _ProcessPool(ProcessPoolExecutor):
     """Ctrl-C waits while a worker is started, as `submit` does, and until the worker can say that it does not listen.
 
     A terminal tells all processes: one that is still importing would die with a traceback of its own. And a worker
@@ -54,12 +54,12 @@ class _Pool(ProcessPoolExecutor):
     """
 
     def submit(self, *task: Any, **named: Any) -> Future[Any]:
-        with _undisturbed():
+        with _sigint_blocked():
             return super().submit(*task, **named)
 
 
 @contextlib.contextmanager
-def _undisturbed() -> Iterator[None]:
+def _sigint_blocked() -> Iterator[None]:
     """Ctrl-C waits until the block is left, here and in the processes that begin in it."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
@@ -71,7 +71,7 @@ def _undisturbed() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _begin(stop: Any) -> None:
+def _initialise_worker(stop: Any) -> None:
     """A worker leaves Ctrl-C to the process that it works for."""
     global _stop  # noqa: PLW0603  a worker is told once, when it begins
     _stop = stop
@@ -99,7 +99,7 @@ def dask_cluster(address: str) -> Iterator[Executor]:
             "a Dask cluster needs the packages dask and distributed. Install them: pip install airmuscle[cluster]"
         ) from None
     try:
-        client = distributed.Client(address, timeout=ANSWER_WITHIN, set_as_default=False)
+        client = distributed.Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(
             f"no Dask scheduler answers at '{address}' ({type(error).__name__}). Start one, `dask scheduler`, and "

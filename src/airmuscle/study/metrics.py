@@ -59,7 +59,7 @@ class Metric(abc.ABC):
             )
 
     @property
-    def instants(self) -> Array:
+    def times(self) -> Array:
         """Instants [s] that must be among the rows of a run."""
         return np.array([t for t in (self.begin, self.end) if math.isfinite(t)])
 
@@ -71,13 +71,13 @@ class Metric(abc.ABC):
 class Scalar(Metric):
     """An outcome that is one number; NaN where the run does not have it."""
 
-    def number(self, time: Array, values: Array) -> float:
+    def value(self, time: Array, values: Array) -> float:
         """The outcome of a run with this column (N,) at these instants (N,) [s]."""
         window = self.window(time, values)
-        return self._of(window) if window.time.size else math.nan
+        return self._evaluate(window) if window.time.size else math.nan
 
     @abc.abstractmethod
-    def _of(self, window: Window) -> float:
+    def _evaluate(self, window: Window) -> float:
         """The outcome of a window that has one row at least."""
 
     def unit(self, of_column: str) -> str:
@@ -87,35 +87,35 @@ class Scalar(Metric):
 class Final(Scalar):
     """The last value."""
 
-    def _of(self, window: Window) -> float:
+    def _evaluate(self, window: Window) -> float:
         return float(window.values[-1])
 
 
 class Maximum(Scalar):
     """The greatest value."""
 
-    def _of(self, window: Window) -> float:
+    def _evaluate(self, window: Window) -> float:
         return float(window.values.max())
 
 
 class Minimum(Scalar):
     """The least value."""
 
-    def _of(self, window: Window) -> float:
+    def _evaluate(self, window: Window) -> float:
         return float(window.values.min())
 
 
 class Mean(Scalar):
     """The mean over time."""
 
-    def _of(self, window: Window) -> float:
-        return _mean(window.time, window.values)
+    def _evaluate(self, window: Window) -> float:
+        return _time_mean(window.time, window.values)
 
 
 class RootMeanSquare(Scalar):
     """The root of the mean square over time."""
 
-    def _of(self, window: Window) -> float:
+    def _evaluate(self, window: Window) -> float:
         # squares of a straight line are a parabola, whose integral Simpson's rule gives exactly
         a, b = window.values[:-1], window.values[1:]
         lengths = np.diff(window.time)
@@ -135,7 +135,7 @@ class TimeToReach(Scalar):
         if not math.isfinite(self.level):
             raise ParameterError(f"TimeToReach: level is {self.level}; it must be finite.")
 
-    def _of(self, window: Window) -> float:
+    def _evaluate(self, window: Window) -> float:
         return _first_crossing(window, self.level) - float(window.time[0])
 
     def unit(self, of_column: str) -> str:
@@ -145,7 +145,7 @@ class TimeToReach(Scalar):
 class Overshoot(Scalar):
     """How far the column goes beyond its last value, as a part of its way from the first to the last [1]."""
 
-    def _of(self, window: Window) -> float:
+    def _evaluate(self, window: Window) -> float:
         way = window.values[-1] - window.values[0]
         if way == 0.0:
             return math.nan
@@ -169,7 +169,7 @@ class SettlingTime(Scalar):
         if not 0 < self.band < 1:
             raise ParameterError(f"SettlingTime: band is {self.band:g}; it must lie between 0 and 1.")
 
-    def _of(self, window: Window) -> float:
+    def _evaluate(self, window: Window) -> float:
         last, begin = window.values[-1], float(window.time[0])
         half = self.band * abs(last - window.values[0])
         outside = np.flatnonzero(np.abs(window.values - last) > half)
@@ -188,44 +188,44 @@ class SettlingTime(Scalar):
 class TimeSeries(Metric):
     """The whole column, on instants at equal distances; NaN where a run ended before."""
 
-    every: float = key(seconds, "distance of the instants")
+    sample_time: float = key(seconds, "distance of the instants")
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0 < self.every < math.inf:
-            raise ParameterError(f"Course: every is {self.every:g} s; it must be positive and finite.")
+        if not 0 < self.sample_time < math.inf:
+            raise ParameterError(f"Course: every is {self.sample_time:g} s; it must be positive and finite.")
 
-    def within(self, start: float, duration: float) -> TimeSeries:
+    def clip_to_run(self, start: float, duration: float) -> TimeSeries:
         """The same with its window cut to a run, so that its instants are fixed. Raises ParameterError."""
         begin, end = max(self.begin, start), min(self.end, start + duration)
-        if not begin < end or (end - begin) / self.every > 1_000_000:
+        if not begin < end or (end - begin) / self.sample_time > 1_000_000:
             raise ParameterError(
-                f"Course: from {begin:g} to {end:g} s every {self.every:g} s; 2 to 1000000 instants must lie within "
+                f"Course: from {begin:g} to {end:g} s every {self.sample_time:g} s; 2 to 1000000 instants must lie within "
                 "the run."
             )
         return dataclasses.replace(self, begin=begin, end=end)
 
     @property
-    def instants(self) -> Array:
-        steps = math.floor((self.end - self.begin) / self.every * (1 + 1e-12))
-        return np.asarray(self.begin + self.every * np.arange(steps + 1), dtype=float)
+    def times(self) -> Array:
+        steps = math.floor((self.end - self.begin) / self.sample_time * (1 + 1e-12))
+        return np.asarray(self.begin + self.sample_time * np.arange(steps + 1), dtype=float)
 
     def unit(self, of_column: str) -> str:
         return of_column
 
-    def rows(self, time: Array, values: Array) -> Array:
+    def sample(self, time: Array, values: Array) -> Array:
         """The column at the instants, from a run whose rows hold them."""
         slack = 1e-9 * (self.end - self.begin)
-        found = np.interp(self.instants, time, values)
-        return np.where((self.instants >= time[0] - slack) & (self.instants <= time[-1] + slack), found, np.nan)
+        found = np.interp(self.times, time, values)
+        return np.where((self.times >= time[0] - slack) & (self.times <= time[-1] + slack), found, np.nan)
 
 
-OUTCOMES = (
+METRICS = (
     Final, Maximum, Minimum, Mean, RootMeanSquare, TimeToReach, Overshoot, SettlingTime, TimeSeries,
 )  # fmt: skip
 
 
-def _mean(time: Array, values: Array) -> float:
+def _time_mean(time: Array, values: Array) -> float:
     length = float(time[-1] - time[0])
     return float(np.trapezoid(values, time)) / length if length > 0 else float(values[0])
 

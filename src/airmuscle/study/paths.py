@@ -38,7 +38,7 @@ class ScenarioParameter:
     path: str
     unit: str
     bounds: tuple[float, float]
-    at: int | Keys
+    location: int | Keys
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -46,47 +46,49 @@ class ScenarioTemplate:
     """The scenario of a study: its tables, where they stand, and what they describe before anything is varied."""
 
     tables: Mapping[str, Any]
-    place: Location
+    location: Location
     scenario: Scenario
 
-    def numbers(self) -> dict[str, ScenarioParameter]:
+    def parameters(self) -> dict[str, ScenarioParameter]:
         """Everything that can vary, by path."""
         plant, told = self.scenario.plant, self.tables.get("command", {})
         found = [
             ScenarioParameter(leaf.path, leaf.declared.unit, leaf.declared.bounds, i)
             for i, leaf in enumerate(leaves(plant))
         ]
-        for keys, unit in (*_of_command(told, self.scenario), *_of_run(self.tables["run"], plant)):
-            found.append(ScenarioParameter(_spelt(keys), unit, (-math.inf, math.inf), keys))
+        for keys, unit in (*_input_parameters(told, self.scenario), *_run_parameters(self.tables["run"], plant)):
+            found.append(ScenarioParameter(_format_path(keys), unit, (-math.inf, math.inf), keys))
         return {number.path: number for number in found}
 
-    def number(self, path: str, where: str) -> ScenarioParameter:
+    def parameter(self, path: str, where: str) -> ScenarioParameter:
         """The number of this path. Raises ParameterError, with the nearest one."""
-        known = self.numbers()
+        known = self.parameters()
         if path not in known:
             near = suggestion(path, known) or f" There are {', '.join(known)}."
             raise ParameterError(f"{where}: the scenario has no number '{path}'.{near}")
         return known[path]
 
-    def rests(self, numbers: Sequence[ScenarioParameter], values: Array) -> list[dict[str, float] | None]:
+    def initial_states(self, numbers: Sequence[ScenarioParameter], values: Array) -> list[dict[str, float] | None]:
         """Where each of several runs with other values (R, d) begins, found for all at once; None for one that is to be
         asked alone. Values are not checked."""
         from ..compile.program import compile_system  # CasADi, which reading a study does not need
 
         plant, alone = self.scenario.plant, [None] * len(values)
-        pressure = pressure_of_rest(self.tables, self.place)
-        if pressure is None or any(not isinstance(n.at, int) and n.at[:2] == ("run", "start") for n in numbers):
+        pressure = pressure_of_rest(self.tables, self.location)
+        if pressure is None or any(
+            not isinstance(n.location, int) and n.location[:2] == ("run", "start") for n in numbers
+        ):
             return list(alone)
         leaves_of_each = np.repeat(flatten(plant)[None, :], len(values), axis=0)
         for number, column in zip(numbers, values.T, strict=True):
-            if isinstance(number.at, int):
-                leaves_of_each[:, number.at] = column
+            if isinstance(number.location, int):
+                leaves_of_each[:, number.location] = column
         pressures, inputs = (pressure,) * len(plant.muscles), np.zeros(len(plant.inputs))
         found = find_equilibrium_of_each(compile_system(plant), leaves_of_each, pressures, inputs).states
         names = [s.name for s in plant.states]
         return [dict(zip(names, x, strict=True)) if np.isfinite(x).all() else None for x in found.tolist()]
 
-    def changed(
+    def with_values(
         self, numbers: Sequence[ScenarioParameter], values: Sequence[float], rest: dict[str, float] | None = None
     ) -> Scenario:
         """The scenario with other values, checked as if they stood in its file; the start is found anew unless it is
@@ -94,16 +96,16 @@ class ScenarioTemplate:
         scenario, tables = self.scenario, self.tables
         leaf_values = flatten(scenario.plant).tolist()
         for number, value in zip(numbers, values, strict=True):
-            if isinstance(number.at, int):
-                leaf_values[number.at] = float(value)
+            if isinstance(number.location, int):
+                leaf_values[number.location] = float(value)
             else:
-                tables = _with(tables, number.at, float(value))
+                tables = _replace_number(tables, number.location, float(value))
         # a reason must read the same on every machine, so it names the file without its folder
-        place = dataclasses.replace(self.place, file=Path(self.place.file).name)
+        place = dataclasses.replace(self.location, file=Path(self.location.file).name)
         return scenario_from(tables, place, with_parameters(scenario.plant, leaf_values), rest)
 
 
-def _of_command(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:
+def _input_parameters(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:
     units = units_of_run(scenario.plant, scenario.start, scenario.command)
     for name, given in table.items():
         if isinstance(scenario.command, ControlLoop) and name == "controller":
@@ -115,10 +117,10 @@ def _of_command(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[
                 yield ("command", name, i, 0), "s"
                 yield ("command", name, i, 1), units[name]
         elif isinstance(given, Mapping):
-            yield from _of_models(given, ("command", name))
+            yield from _model_parameters(given, ("command", name))
 
 
-def _of_run(table: Mapping[str, Any], plant: Plant) -> Iterator[tuple[Keys, str]]:
+def _run_parameters(table: Mapping[str, Any], plant: Plant) -> Iterator[tuple[Keys, str]]:
     for name in ("duration", "start_time", "output"):
         if name in table:
             yield ("run", name), "s"
@@ -126,27 +128,27 @@ def _of_run(table: Mapping[str, Any], plant: Plant) -> Iterator[tuple[Keys, str]
     for c in plant.mechanism.coordinates:
         yield ("run", "start", c.name), c.unit
         yield ("run", "start", c.speed), f"{c.unit}/s"
-    yield from _of_models(table.get("method"), ("run", "method"))
+    yield from _model_parameters(table.get("method"), ("run", "method"))
 
 
-def _of_models(given: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
+def _model_parameters(given: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
     """The declared parameters of every model that stands in a table, or in a list or table inside it."""
     if isinstance(given, list):
         for i, item in enumerate(given):
-            yield from _of_models(item, (*keys, i))
+            yield from _model_parameters(item, (*keys, i))
     elif isinstance(given, Mapping):
         if isinstance(given.get("model"), str):
-            for declared in parameters(model_class(given["model"], _spelt(keys))):
+            for declared in parameters(model_class(given["model"], _format_path(keys))):
                 yield (*keys, declared.name), declared.unit
         for name, item in given.items():
-            yield from _of_models(item, (*keys, name))
+            yield from _model_parameters(item, (*keys, name))
 
 
-def _spelt(keys: Keys) -> str:
+def _format_path(keys: Keys) -> str:
     return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys).lstrip(".")
 
 
-def _with(tables: Mapping[str, Any], keys: Keys, value: float) -> Mapping[str, Any]:
+def _replace_number(tables: Mapping[str, Any], keys: Keys, value: float) -> Mapping[str, Any]:
     """A copy of the tables with one number put in; a table on the way that is missing is made."""
     changed: Any = copy.deepcopy(dict(tables))
     inner = changed

@@ -12,47 +12,47 @@ from ..core.arrays import Array
 from ..core.plotting import BLACK, BLUE, ORANGE, RED, SKY, legend_below, new_figure
 from ..report.chapter import Plot
 from .result import StudyResult
-from .sensitivity import Indices
+from .sensitivity import SobolIndices
 
-ACROSS = 3
+PANELS_PER_ROW = 3
 """Panels beside each other."""
-MOST_POINTS = 2000
+MAX_POINTS = 2000
 """Points of a scatter figure; of more runs every so many is drawn."""
-LONG = 28
+MAX_LABEL_LENGTH = 28
 """Letters that fit under a panel."""
-_SHOWN = {
+_DISPLAY_UNITS = {
     "Pa": (1e-3, "kPa"), "Pa(a)": (1e-3, "kPa(a)"), "m": (1e3, "mm"), "m3": (1e6, "cm³"), "rad": (180 / math.pi, "deg"),
     "m3/(s Pa)": (1e8, "dm³/(s bar)"), "kg/s": (1e3, "g/s"), "1": (1.0, ""),
 }  # fmt: skip
 """Units that people read more easily than SI."""
 
 
-def plots(result: StudyResult, indices: dict[str, Indices]) -> tuple[Plot, ...]:
+def study_plots(result: StudyResult, indices: dict[str, SobolIndices]) -> tuple[Plot, ...]:
     """All figures of a study."""
     found = [_histograms(result)] if result.study.scalars else []
     found += [_scatter(result, name) for name in result.study.scalars]
     if indices:
-        found.append(_bars(result, indices))
-    return (*found, *(_course(result, name) for name in result.study.courses))
+        found.append(_sensitivity_bars(result, indices))
+    return (*found, *(_time_series_plot(result, name) for name in result.study.time_series))
 
 
-def scale(unit: str) -> tuple[float, str]:
+def display_scale(unit: str) -> tuple[float, str]:
     """The factor and the unit in which a quantity is shown."""
-    return _SHOWN.get(unit, (1.0, unit))
+    return _DISPLAY_UNITS.get(unit, (1.0, unit))
 
 
-def label(name: str, unit: str) -> str:
+def axis_label(name: str, unit: str) -> str:
     """What stands at an axis: the name and the unit, on two lines where they are long together."""
-    shown = scale(unit)[1]
-    if len(name) > LONG:
+    shown = display_scale(unit)[1]
+    if len(name) > MAX_LABEL_LENGTH:
         name = f"{name.rpartition('.')[0]}\n.{name.rpartition('.')[2]}"
-    between = "\n" if len(name) + len(shown) > LONG and "\n" not in name else " "
+    between = "\n" if len(name) + len(shown) > MAX_LABEL_LENGTH and "\n" not in name else " "
     return f"{name}{between}[{shown}]" if shown else name
 
 
 def _panels(count: int, height: float = 2.3, **options: Any) -> tuple[Any, Iterator[Any]]:
     """A figure with as many panels, and these one after the other; places that are left over stay empty."""
-    columns = min(count, ACROSS)
+    columns = min(count, PANELS_PER_ROW)
     rows = -(-count // columns)
     width = 3.4 if columns == 1 else 2.5 * columns
     figure, axes = new_figure(rows, columns, width=width, height=height * rows, squeeze=False, **options)
@@ -65,11 +65,11 @@ def _histograms(result: StudyResult) -> Plot:
     study = result.study
     figure, panels = _panels(len(study.scalars))
     for name, axis in zip(study.scalars, panels, strict=True):
-        factor, _ = scale(study.units[name])
+        factor, _ = display_scale(study.units[name])
         values = result[name][np.isfinite(result[name])] * factor
-        axis.set(xlabel=label(name, study.units[name]), ylabel="runs")
+        axis.set(xlabel=axis_label(name, study.units[name]), ylabel="runs")
         if values.size:
-            axis.hist(values, bins=_bins(values), color=SKY, edgecolor="white", linewidth=0.4)
+            axis.hist(values, bins=_bin_count(values), color=SKY, edgecolor="white", linewidth=0.4)
         else:
             axis.text(0.5, 0.5, "no run has it", ha="center", transform=axis.transAxes)
         if math.isfinite(result.nominal[name]):
@@ -78,7 +78,7 @@ def _histograms(result: StudyResult) -> Plot:
     return Plot("histograms", caption, figure)
 
 
-def _bins(values: Array) -> int:
+def _bin_count(values: Array) -> int:
     """As many bins as the cube root of the number of runs says, twice over (rule of Rice); one where all are equal."""
     same = np.ptp(values) <= 1e-12 * np.abs(values).max()
     return 1 if same else min(60, max(4, math.ceil(2 * values.size ** (1 / 3))))
@@ -86,25 +86,25 @@ def _bins(values: Array) -> int:
 
 def _scatter(result: StudyResult, name: str) -> Plot:
     study = result.study
-    figure, panels = _panels(len(study.numbers), sharey=True)
-    factor, _ = scale(study.units[name])
+    figure, panels = _panels(len(study.parameters), sharey=True)
+    factor, _ = display_scale(study.units[name])
     there = np.flatnonzero(np.isfinite(result[name]))
-    drawn = there[:: max(1, -(-there.size // MOST_POINTS))]
+    drawn = there[:: max(1, -(-there.size // MAX_POINTS))]
     style = {"marker": "o", "linestyle": "none", "markersize": 2.4, "alpha": 0.5, "markeredgewidth": 0, "color": BLUE}
-    for i, (number, axis) in enumerate(zip(study.numbers, panels, strict=True)):
-        across, _ = scale(number.unit)
+    for i, (number, axis) in enumerate(zip(study.parameters, panels, strict=True)):
+        across, _ = display_scale(number.unit)
         axis.plot(study.values[drawn, i] * across, result[name][drawn] * factor, **style)
-        axis.set_xlabel(label(number.path, number.unit))
+        axis.set_xlabel(axis_label(number.path, number.unit))
         axis.locator_params(axis="x", nbins=5)
-        if i % ACROSS == 0:
-            axis.set_ylabel(label(name, study.units[name]))
+        if i % PANELS_PER_ROW == 0:
+            axis.set_ylabel(axis_label(name, study.units[name]))
     few = f" Of {there.size} runs {drawn.size} are drawn." if drawn.size < there.size else ""
-    return Plot(f"scatter-{_file(name)}", f"{name} against everything that varies, run by run.{few}", figure)
+    return Plot(f"scatter-{_file_stem(name)}", f"{name} against everything that varies, run by run.{few}", figure)
 
 
-def _bars(result: StudyResult, indices: dict[str, Indices]) -> Plot:
+def _sensitivity_bars(result: StudyResult, indices: dict[str, SobolIndices]) -> Plot:
     study = result.study
-    count, inputs = len(indices), [number.path for number in study.numbers]
+    count, inputs = len(indices), [number.path for number in study.parameters]
     figure, axes = new_figure(
         count, 1, width=6.3, height=0.8 + count * (0.7 + 0.42 * len(inputs)), squeeze=False, sharex=True
     )
@@ -128,22 +128,22 @@ def _bars(result: StudyResult, indices: dict[str, Indices]) -> Plot:
     return Plot("sensitivities", caption, figure)
 
 
-def _course(result: StudyResult, name: str) -> Plot:
+def _time_series_plot(result: StudyResult, name: str) -> Plot:
     study = result.study
-    course, rows = study.courses[name], result[name]
-    factor, _ = scale(study.units[name])
+    course, rows = study.time_series[name], result[name]
+    factor, _ = display_scale(study.units[name])
     there = np.isfinite(rows).any(axis=0)
     low, middle, high = np.full((3, there.size), np.nan)
     if there.any():
         low[there], middle[there], high[there] = np.nanquantile(rows[:, there] * factor, [0.05, 0.5, 0.95], axis=0)
     figure, axis = new_figure()
-    axis.fill_between(course.instants, low, high, color=SKY, alpha=0.45, linewidth=0, label="5 % to 95 % of the runs")
-    axis.plot(course.instants, middle, color=BLUE, label="median")
-    axis.set(xlabel="time [s]", ylabel=label(course.column, study.units[name]))
+    axis.fill_between(course.times, low, high, color=SKY, alpha=0.45, linewidth=0, label="5 % to 95 % of the runs")
+    axis.plot(course.times, middle, color=BLUE, label="median")
+    axis.set(xlabel="time [s]", ylabel=axis_label(course.column, study.units[name]))
     legend_below(figure, axis)
-    return Plot(f"course-{_file(name)}", f"{name}: {course.column} over time, over all runs.", figure)
+    return Plot(f"course-{_file_stem(name)}", f"{name}: {course.column} over time, over all runs.", figure)
 
 
-def _file(name: str) -> str:
+def _file_stem(name: str) -> str:
     """A name that a file can have."""
     return "".join(c if c.isalnum() or c in "-_" else "-" for c in name)

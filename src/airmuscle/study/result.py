@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ..core.arrays import Array
 from ..report.chapter import Table
 from .design import Saltelli
-from .sensitivity import Indices, sobol_indices
+from .sensitivity import SobolIndices, sobol_indices
 from .study import Study
 
 
@@ -27,28 +27,38 @@ class StudyResult:
     """
 
     study: Study
-    numbers: Array
-    courses: Mapping[str, Array]
-    reasons: tuple[str, ...]
+    scalars: Array
+    time_series: Mapping[str, Array]
+    failure_reasons: tuple[str, ...]
     nominal: Mapping[str, float]
 
     def __getitem__(self, name: str) -> Array:
         """An outcome by its name: (N,) of a number, (N, T) of a course. KeyError where there is none."""
-        return self.courses[name] if name in self.courses else self.numbers[:, list(self.study.scalars).index(name)]
+        return (
+            self.time_series[name]
+            if name in self.time_series
+            else self.scalars[:, list(self.study.scalars).index(name)]
+        )
 
     @property
     def failed(self) -> npt.NDArray[np.intp]:
         """The runs that failed."""
-        return np.flatnonzero([bool(reason) for reason in self.reasons])
+        return np.flatnonzero([bool(reason) for reason in self.failure_reasons])
 
     def table(self) -> Table:
         """One row a run: what varied, what came out, and whether it failed."""
         study = self.study
-        inputs = {f"{n.path} [{n.unit}]": study.values[:, i] for i, n in enumerate(study.numbers)}
+        inputs = {f"{n.path} [{n.unit}]": study.values[:, i] for i, n in enumerate(study.parameters)}
         outcomes = {f"{name} [{study.units[name]}]": self[name] for name in study.scalars}
-        status = ["failed" if reason else "done" for reason in self.reasons]
+        status = ["failed" if reason else "done" for reason in self.failure_reasons]
         runs: list[Any] = list(range(len(study)))
-        columns: dict[str, Any] = {"run": runs, **inputs, **outcomes, "status": status, "reason": list(self.reasons)}
+        columns: dict[str, Any] = {
+            "run": runs,
+            **inputs,
+            **outcomes,
+            "status": status,
+            "reason": list(self.failure_reasons),
+        }
         return Table("results", "All runs", columns, shown=False)
 
     def statistics(self) -> Table:
@@ -68,12 +78,12 @@ class StudyResult:
             "Over all runs that have the outcome.",
         )
 
-    def indices(self) -> dict[str, Indices]:
+    def indices(self) -> dict[str, SobolIndices]:
         """Variance-based sensitivities of every outcome that is a number; empty for other designs than Saltelli."""
         design = self.study.design
         if not isinstance(design, Saltelli):
             return {}
-        return {name: sobol_indices(self[name], len(self.study.numbers), design.seed) for name in self.study.scalars}
+        return {name: sobol_indices(self[name], len(self.study.parameters), design.seed) for name in self.study.scalars}
 
 
 def _statistics(values: Array) -> dict[str, float]:

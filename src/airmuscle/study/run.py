@@ -10,12 +10,12 @@ import numpy as np
 
 from ..core.errors import FileError, SimulationError
 from ..report.output_folder import check_writable
-from .chunk import Chunk, instants, name_of, read, remember, run_chunk, write
+from .chunk import Chunk, metric_times, chunk_file_name, read_chunk, register_study, run_chunk, write_chunk
 from .result import StudyResult
 from .scenario_runs import simulate_all
 from .study import Study
 
-CHUNKS = "chunks"
+CHUNK_FOLDER = "chunks"
 """The folder of what is kept, beside the results."""
 Progress = Callable[[int, int], None]
 
@@ -32,36 +32,42 @@ def run_study(
     there. A run that fails leaves its reason. Raises FileError where the folder cannot be written to, SimulationError
     where a worker dies.
     """
-    kept = Path(folder) / CHUNKS
+    kept = Path(folder) / CHUNK_FOLDER
     check_writable(folder)
     try:
         kept.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileError(f"{kept}: cannot be made: {error.strerror or error}.") from None
-    nominal = _nominal(study)  # before any worker starts, so that kernels are compiled once and not by each of them
-    files = [kept / name_of(study, index) for index in study.chunks]
-    missing = [index for index in study.chunks if read(files[index]) is None]
-    done = len(study) - sum(len(study.rows(index)) for index in missing)
+    nominal = _nominal_values(
+        study
+    )  # before any worker starts, so that kernels are compiled once and not by each of them
+    files = [kept / chunk_file_name(study, index) for index in study.chunks]
+    missing = [index for index in study.chunks if read_chunk(files[index]) is None]
+    done = len(study) - sum(len(study.chunk_runs(index)) for index in missing)
     tell = progress or (lambda done, total: None)
     tell(done, len(study))
-    for index, chunk in _computed(study, missing, executor):
-        write(chunk, files[index])
-        done += len(study.rows(index))
+    for index, chunk in _compute_missing(study, missing, executor):
+        write_chunk(chunk, files[index])
+        done += len(study.chunk_runs(index))
         tell(done, len(study))
     for leftover in kept.glob(".unfinished-*"):  # of runs that were killed
         leftover.unlink(missing_ok=True)
-    return _together(study, [_read(file) for file in files], nominal)
+    return _combine(study, [_read_finished(file) for file in files], nominal)
 
 
-def runs_kept(study: Study, folder: Path | str) -> int:
+def count_finished_runs(study: Study, folder: Path | str) -> int:
     """How many runs of a study `folder` keeps, by what lies there."""
-    kept = Path(folder) / CHUNKS
-    return sum(len(study.rows(index)) for index in study.chunks if read(kept / name_of(study, index)) is not None)
+    kept = Path(folder) / CHUNK_FOLDER
+    return sum(
+        len(study.chunk_runs(index))
+        for index in study.chunks
+        if read_chunk(kept / chunk_file_name(study, index)) is not None
+    )
 
 
-def _computed(study: Study, missing: Sequence[int], executor: Executor | None) -> Iterator[tuple[int, Chunk]]:
+def _compute_missing(study: Study, missing: Sequence[int], executor: Executor | None) -> Iterator[tuple[int, Chunk]]:
     """The missing chunks, in the order in which they come."""
-    path, mark = str(study.path.resolve()), remember(study)
+    path, mark = str(study.path.resolve()), register_study(study)
     if executor is None:
         yield from ((index, run_chunk(path, mark, index)) for index in missing)
         return
@@ -81,26 +87,26 @@ def _computed(study: Study, missing: Sequence[int], executor: Executor | None) -
             task.cancel()
 
 
-def _read(file: Path) -> Chunk:
-    found = read(file)
+def _read_finished(file: Path) -> Chunk:
+    found = read_chunk(file)
     if found is None:
         raise FileError(f"{file}: went away, or cannot be read any more. Run the study again; it computes what lacks.")
     return found
 
 
-def _nominal(study: Study) -> dict[str, float]:
+def _nominal_values(study: Study) -> dict[str, float]:
     """The outcomes of the scenario as it stands; NaN where it does not run."""
-    (found,) = simulate_all([study.source.scenario], instants(study))
+    (found,) = simulate_all([study.template.scenario], metric_times(study))
     if isinstance(found, str):
         return dict.fromkeys(study.scalars, np.nan)
-    return {name: o.number(found["time"], found[o.column]) for name, o in study.scalars.items()}
+    return {name: o.value(found["time"], found[o.column]) for name, o in study.scalars.items()}
 
 
-def _together(study: Study, chunks: Sequence[Chunk], nominal: dict[str, float]) -> StudyResult:
+def _combine(study: Study, chunks: Sequence[Chunk], nominal: dict[str, float]) -> StudyResult:
     return StudyResult(
         study,
-        np.concatenate([chunk.numbers for chunk in chunks]),
-        {name: np.concatenate([chunk.courses[name] for chunk in chunks]) for name in study.courses},
-        tuple(str(reason) for chunk in chunks for reason in chunk.reasons),
+        np.concatenate([chunk.scalars for chunk in chunks]),
+        {name: np.concatenate([chunk.time_series[name] for chunk in chunks]) for name in study.time_series},
+        tuple(str(reason) for chunk in chunks for reason in chunk.failure_reasons),
         nominal,
     )

@@ -13,7 +13,7 @@ from ..scenario.scenario import Scenario
 from ..simulation.arguments import output_times
 from ..simulation.simulate import simulate
 
-REFUSALS = (AirmuscleError, ArithmeticError, ValueError)
+RUN_ERRORS = (AirmuscleError, ArithmeticError, ValueError)
 """What one run of many may end by, from values that nobody foresaw, without ending the others."""
 
 
@@ -31,21 +31,21 @@ def simulate_all(scenarios: Sequence[Scenario], instants: Array) -> Iterator[Rec
                 start=scenario.start,
                 start_time=scenario.start_time,
                 method=scenario.method,
-                output=_rows(scenario, instants),
+                output=_output_times(scenario, instants),
             )
-        except REFUSALS as error:
+        except RUN_ERRORS as error:
             if isinstance(error, SimulationError) and error.interrupted:
                 raise KeyboardInterrupt from None
-            yield reason(error)
+            yield failure_reason(error)
 
 
-def reason(error: Exception) -> str:
+def failure_reason(error: Exception) -> str:
     """Why a run failed, on one line."""
     kind = "" if isinstance(error, AirmuscleError) else f"{type(error).__name__}: "
     return f"{kind}{' '.join(str(error).split())}"
 
 
-def _rows(scenario: Scenario, instants: Array) -> Array:
+def _output_times(scenario: Scenario, instants: Array) -> Array:
     """The scenario's own rows, and the instants that lie within the run."""
     end = scenario.start_time + scenario.duration
     within = instants[(instants >= scenario.start_time) & (instants < end)]

@@ -21,12 +21,12 @@ import numpy as np
 from ..core.arrays import Array
 
 CONFIDENCE = 0.95
-RESAMPLES = 1000
-AT_A_TIME = 20
+BOOTSTRAP_SAMPLES = 1000
+SAMPLES_PER_BATCH = 20
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Indices:
+class SobolIndices:
     """Sobol indices of one outcome: first order and total (d,), each with its bootstrap interval (2, d).
 
     `points` base points were used, `left_out` were not because one of their runs failed or has no such outcome.
@@ -37,11 +37,11 @@ class Indices:
     total: Array
     first_interval: Array
     total_interval: Array
-    points: int
-    left_out: int
+    base_points: int
+    excluded_points: int
 
 
-def sobol_indices(outcome: Array, variables: int, seed: int = 0) -> Indices:
+def sobol_indices(outcome: Array, variables: int, seed: int = 0) -> SobolIndices:
     """The indices of an outcome (n (d + 2),), run by run as the design Saltelli orders them.
 
     The intervals are percentiles of 1000 bootstrap samples of the base points, drawn from `seed`.
@@ -52,16 +52,18 @@ def sobol_indices(outcome: Array, variables: int, seed: int = 0) -> Indices:
     count = len(sums)
     nothing = np.full(variables, np.nan)
     if not _varies(table[complete]):
-        return Indices(nothing, nothing, np.tile(nothing, (2, 1)), np.tile(nothing, (2, 1)), count, len(table) - count)
+        return SobolIndices(
+            nothing, nothing, np.tile(nothing, (2, 1)), np.tile(nothing, (2, 1)), count, len(table) - count
+        )
     first, total = _indices(sums.mean(axis=0)[None, :], variables)
     generator = np.random.default_rng(seed)
     drawn = []
-    for _ in range(RESAMPLES // AT_A_TIME):  # a table of all samples at once would not fit the memory
-        weights = generator.multinomial(count, np.full(count, 1.0 / count), size=AT_A_TIME)
+    for _ in range(BOOTSTRAP_SAMPLES // SAMPLES_PER_BATCH):  # a table of all samples at once would not fit the memory
+        weights = generator.multinomial(count, np.full(count, 1.0 / count), size=SAMPLES_PER_BATCH)
         drawn.append(_indices(weights @ sums / count, variables))
     tails = [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]
     intervals = [np.nanquantile(np.concatenate([pair[i] for pair in drawn]), tails, axis=0) for i in (0, 1)]
-    return Indices(first[0], total[0], intervals[0], intervals[1], count, len(table) - count)
+    return SobolIndices(first[0], total[0], intervals[0], intervals[1], count, len(table) - count)
 
 
 def _summands(table: Array) -> Array:

@@ -32,14 +32,14 @@ from ..library.catalogue import parsed
 from ..library.location import Location, check_keys, located_errors, text
 from ..scenario.scenario import Scenario, load_scenario, scenario_from, units_of_run
 from .design import DESIGNS, Design
-from .distributions import Variation, variation_from
+from .distributions import Variation, read_variation
 from .fingerprint import fingerprint
-from .metrics import OUTCOMES, Metric, Scalar, TimeSeries
+from .metrics import METRICS, Metric, Scalar, TimeSeries
 from .parse import chosen, whole
 from .paths import ScenarioParameter, ScenarioTemplate
 
 TABLES = ("title", "scenario", "chunk", "vary", "follow", "design", "outcome")
-CHUNK = 32
+CHUNK_SIZE = 32
 """RunSplit that are written together unless the study says otherwise (chosen)."""
 
 
@@ -53,14 +53,14 @@ class Study:
 
     title: str
     path: Path
-    source: ScenarioTemplate
-    numbers: tuple[ScenarioParameter, ...]
+    template: ScenarioTemplate
+    parameters: tuple[ScenarioParameter, ...]
     variations: tuple[Variation, ...]
     follow: tuple[tuple[ScenarioParameter, int], ...]
     design: Design
     values: npt.NDArray[np.float64]
-    outcomes: Mapping[str, Metric]
-    chunk: int = CHUNK
+    metrics: Mapping[str, Metric]
+    chunk_size: int = CHUNK_SIZE
 
     def __len__(self) -> int:
         return len(self.values)
@@ -68,54 +68,54 @@ class Study:
     @property
     def scalars(self) -> dict[str, Scalar]:
         """The outcomes that are numbers."""
-        return {name: outcome for name, outcome in self.outcomes.items() if isinstance(outcome, Scalar)}
+        return {name: outcome for name, outcome in self.metrics.items() if isinstance(outcome, Scalar)}
 
     @property
-    def courses(self) -> dict[str, TimeSeries]:
+    def time_series(self) -> dict[str, TimeSeries]:
         """The outcomes that are whole columns."""
-        return {name: outcome for name, outcome in self.outcomes.items() if isinstance(outcome, TimeSeries)}
+        return {name: outcome for name, outcome in self.metrics.items() if isinstance(outcome, TimeSeries)}
 
     @property
     def units(self) -> dict[str, str]:
         """The units of the outcomes."""
-        known = columns_of(self.source.scenario)
-        return {name: outcome.unit(known[outcome.column]) for name, outcome in self.outcomes.items()}
+        known = column_units(self.template.scenario)
+        return {name: outcome.unit(known[outcome.column]) for name, outcome in self.metrics.items()}
 
-    def rows(self, chunk: int) -> range:
+    def chunk_runs(self, chunk: int) -> range:
         """The runs of one chunk."""
-        return range(chunk * self.chunk, min((chunk + 1) * self.chunk, len(self)))
+        return range(chunk * self.chunk_size, min((chunk + 1) * self.chunk_size, len(self)))
 
     @property
     def chunks(self) -> range:
         """The numbers of the chunks."""
-        return range(-(-len(self) // self.chunk))
+        return range(-(-len(self) // self.chunk_size))
 
     @property
-    def changing(self) -> tuple[ScenarioParameter, ...]:
+    def varying_parameters(self) -> tuple[ScenarioParameter, ...]:
         """All numbers that are not the same in every run."""
-        return (*self.numbers, *(number for number, _ in self.follow))
+        return (*self.parameters, *(number for number, _ in self.follow))
 
-    def changes(self, runs: Sequence[int]) -> npt.NDArray[np.float64]:
+    def varying_values(self, runs: Sequence[int]) -> npt.NDArray[np.float64]:
         """The values of these numbers in some runs (R, d)."""
         values = self.values[runs]
         return np.hstack([values, values[:, [i for _, i in self.follow]]])
 
-    def rests(self, runs: Sequence[int]) -> list[dict[str, float] | None]:
+    def initial_states(self, runs: Sequence[int]) -> list[dict[str, float] | None]:
         """Where each of these runs begins, as `scenario` takes it; found for all at once."""
-        return self.source.rests(self.changing, self.changes(runs))
+        return self.template.initial_states(self.varying_parameters, self.varying_values(runs))
 
     def scenario(self, run: int, rest: dict[str, float] | None = None) -> Scenario:
         """One of the runs. Raises ParameterError or PhysicsError where its values are not possible together."""
-        return self.source.changed(self.changing, self.changes([run])[0].tolist(), rest)
+        return self.template.with_values(self.varying_parameters, self.varying_values([run])[0].tolist(), rest)
 
     def fingerprint(self) -> str:
         """The fingerprint of all that the results depend on, but for the program."""
-        scenario = dataclasses.replace(self.source.scenario, title="")
-        tables = {name: table for name, table in self.source.tables.items() if name != "title"}
-        return fingerprint(scenario, tables, self.numbers, self.follow, self.outcomes)
+        scenario = dataclasses.replace(self.template.scenario, title="")
+        tables = {name: table for name, table in self.template.tables.items() if name != "title"}
+        return fingerprint(scenario, tables, self.parameters, self.follow, self.metrics)
 
 
-def columns_of(scenario: Scenario) -> dict[str, str]:
+def column_units(scenario: Scenario) -> dict[str, str]:
     """The units of all columns that a run has."""
     return units_of_run(scenario.plant, scenario.start, scenario.command)
 
@@ -126,28 +126,28 @@ def load_study(path: str | Path) -> Study:
     tables = parsed(file)
     place = Location(str(file), "", file.parent)
     check_keys(tables, TABLES, place)
-    source = _source(tables.get("scenario"), place)
-    varied = _table(tables, "vary", place)
-    numbers = {key: source.number(key, str(place.inside("vary"))) for key in varied}
-    variations = [_variation(varied[key], number, place) for key, number in numbers.items()]
+    source = _read_scenario(tables.get("scenario"), place)
+    varied = _require_table(tables, "vary", place)
+    numbers = {key: source.parameter(key, str(place.inside("vary"))) for key in varied}
+    variations = [_read_variation(varied[key], number, place) for key, number in numbers.items()]
     design: Design = chosen(tables.get("design"), DESIGNS, place.inside("design"))
     with located_errors(place.inside("design")):
         values = design.values(variations)
     return Study(
         title=text(tables, "title", place, needed=False) or source.scenario.title,
         path=file,
-        source=source,
-        numbers=tuple(numbers.values()),
+        template=source,
+        parameters=tuple(numbers.values()),
         variations=tuple(variations),
-        follow=_follow(tables.get("follow", {}), source, list(numbers), place.inside("follow")),
+        follow=_read_follow(tables.get("follow", {}), source, list(numbers), place.inside("follow")),
         design=design,
         values=values,
-        outcomes=_outcomes(_table(tables, "outcome", place), source.scenario, place.inside("outcome")),
-        chunk=_chunk(tables.get("chunk", CHUNK), f"{place}, chunk"),
+        metrics=_read_metrics(_require_table(tables, "outcome", place), source.scenario, place.inside("outcome")),
+        chunk_size=_read_chunk_size(tables.get("chunk", CHUNK_SIZE), f"{place}, chunk"),
     )
 
 
-def _source(given: Any, place: Location) -> ScenarioTemplate:
+def _read_scenario(given: Any, place: Location) -> ScenarioTemplate:
     if isinstance(given, str):
         file = place.folder / given
         with located_errors(f"{place}, scenario"):
@@ -160,7 +160,7 @@ def _source(given: Any, place: Location) -> ScenarioTemplate:
     return ScenarioTemplate(given, place.inside("scenario"), scenario_from(given, place.inside("scenario")))
 
 
-def _table(tables: Mapping[str, Any], key: str, place: Location) -> Mapping[str, Any]:
+def _require_table(tables: Mapping[str, Any], key: str, place: Location) -> Mapping[str, Any]:
     given = tables.get(key)
     if not isinstance(given, Mapping) or not given:
         what = "is missing" if given is None else "is empty" if given == {} else f"is {given!r}, no table"
@@ -168,39 +168,39 @@ def _table(tables: Mapping[str, Any], key: str, place: Location) -> Mapping[str,
     return given
 
 
-def _variation(given: Any, number: ScenarioParameter, place: Location) -> Variation:
+def _read_variation(given: Any, number: ScenarioParameter, place: Location) -> Variation:
     where = Location(f'{place}, [vary], "{number.path}"', "", place.folder)
-    found = variation_from(given, number.unit, where)
+    found = read_variation(given, number.unit, where)
     low, high = number.bounds
     unit = "" if number.unit == "1" else f" {number.unit}"
-    beyond = [v for v in found.ends if np.isfinite(v) and not low <= v <= high]
+    beyond = [v for v in found.support if np.isfinite(v) and not low <= v <= high]
     if beyond:
         raise ParameterError(f"{where} goes to {beyond[0]:g}{unit}; allowed are {low:g} to {high:g}{unit}.")
     return found
 
 
-def _follow(
+def _read_follow(
     given: Any, source: ScenarioTemplate, varied: list[str], place: Location
 ) -> tuple[tuple[ScenarioParameter, int], ...]:
     if not isinstance(given, Mapping):
         raise ParameterError(f'{place} is {given!r}; write "path" = "path of a number that varies".')
     found = []
     for path, leader in given.items():
-        number = source.number(path, str(place))
+        number = source.parameter(path, str(place))
         if path in varied:
             raise ParameterError(f"{place}: '{path}' varies by itself; take it out of [vary] or of [follow].")
         if leader not in varied:
             near = suggestion(str(leader), varied)
             raise ParameterError(f"{place}: '{path}' follows {leader!r}, which is not under [vary].{near}")
-        unit = source.number(leader, str(place)).unit
+        unit = source.parameter(leader, str(place)).unit
         if unit != number.unit:
             raise ParameterError(f"{place}: '{path}' [{number.unit}] cannot follow '{leader}' [{unit}].")
         found.append((number, varied.index(leader)))
     return tuple(found)
 
 
-def _outcomes(given: Mapping[str, Any], scenario: Scenario, place: Location) -> dict[str, Metric]:
-    known = columns_of(scenario)
+def _read_metrics(given: Mapping[str, Any], scenario: Scenario, place: Location) -> dict[str, Metric]:
+    known = column_units(scenario)
     found: dict[str, Metric] = {}
     for name, table in given.items():
         column = table.get("column") if isinstance(table, Mapping) else None
@@ -209,16 +209,16 @@ def _outcomes(given: Mapping[str, Any], scenario: Scenario, place: Location) -> 
             raise ParameterError(
                 f"{place.inside(name)}: a run has no column '{column}'; there are {', '.join(known)}.{near}"
             )
-        outcome = chosen(table, OUTCOMES, place.inside(name), known.get(str(column), "1") or "1")
+        outcome = chosen(table, METRICS, place.inside(name), known.get(str(column), "1") or "1")
         with located_errors(place.inside(name)):
             outcome.check_range(scenario.start_time, scenario.duration)
             if isinstance(outcome, TimeSeries):
-                outcome = outcome.within(scenario.start_time, scenario.duration)
+                outcome = outcome.clip_to_run(scenario.start_time, scenario.duration)
         found[name] = outcome
     return found
 
 
-def _chunk(given: Any, where: str) -> int:
+def _read_chunk_size(given: Any, where: str) -> int:
     found: int = whole(given, "1", where)
     if not found:
         raise ParameterError(f"{where} is 0; at least one run is written at a time.")

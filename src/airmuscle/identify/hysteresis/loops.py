@@ -20,7 +20,7 @@ from ...recording.segment import (
     motion_direction,
     quasi_static_rows,
 )
-from ...recording.segment.runs import BAND, STROKE
+from ...recording.segment.runs import RELATIVE_BAND, CONTRACTION_BAND
 from .fit import (
     Given,
     Mask,
@@ -105,7 +105,7 @@ def find_loops(
 def _loop(
     recording: Recording, sensed: Mapping[str, Sensor], law: Characteristic | None, degree: int, all_rows: bool
 ) -> HysteresisLoop:
-    longest = max(find_runs(recording, sensed), key=lambda run: len(run.stretch))
+    longest = max(find_runs(recording, sensed), key=lambda run: len(run.interval))
     slide: Slide = OnPressure() if longest.kind is ISOMETRIC else OnContraction()
     if law is not None:
         static: StaticCurve = Given(law)
@@ -125,7 +125,7 @@ def _counting(recording: Recording, sensed: Mapping[str, Sensor], all_rows: bool
     force = recording["force"]
     pulls = (force > 0) & np.isfinite(force)
     if "force" in sensed:
-        pulls &= sensed["force"].sides(force) == 0
+        pulls &= sensed["force"].censoring(force) == 0
     return pulls if all_rows else pulls & quasi_static_rows(recording, sensed)
 
 
@@ -144,7 +144,7 @@ def _same(one: Run, other: Run) -> bool:
     """Whether two runs hold the same quantity at the same level, as closely as one run holds it."""
     if one.kind is not other.kind or one.column != other.column or one.value is None or other.value is None:
         return False
-    band = STROKE if one.column == "contraction" else BAND * max(abs(one.value), abs(other.value))
+    band = CONTRACTION_BAND if one.column == "contraction" else RELATIVE_BAND * max(abs(one.value), abs(other.value))
     return abs(one.value - other.value) <= band
 
 

@@ -1,6 +1,6 @@
 """What a recording consists of: runs, branches, plateaus, transients, glitches, and what its sensors can tell."""
 
-from .branches import Branch, directions, find_branches, motion_direction
+from .branches import Branch, branch_directions, find_branches, motion_direction
 from .findings import Finding, check_swept
 from .inspection import Inspection, inspect, inspect_all
 from .outliers import Outlier, find_outliers
@@ -28,7 +28,7 @@ __all__ = [
     "Sensor",
     "analyse_sampling",
     "check_swept",
-    "directions",
+    "branch_directions",
     "estimate_sensors",
     "find_branches",
     "find_outliers",

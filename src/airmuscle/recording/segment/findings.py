@@ -15,13 +15,13 @@ from .runs import AT_REST, KINDS, Run
 from .sampling import Sampling
 from .sensor import Sensor
 
-SATURATED = 0.5
+MAX_SATURATED_FRACTION = 0.5
 """The part of the rows at an end of a sensor from which on a fit would have little left (chosen)."""
-UNSETTLED = 0.02
+MAX_FINAL_CHANGE = 0.02
 """A record is short where its last tenth still changes by this part of the range (chosen)."""
-WITHIN_NOISE = 10.0
+NOISE_FACTOR = 10.0
 """A pressure whose range is less than this many deviations of its sensor is constant (chosen)."""
-FEW_ROWS = 5
+MIN_ROWS_PER_STEP = 5
 """A step seen in fewer rows than this is too fast for its sampling (chosen)."""
 
 
@@ -33,27 +33,27 @@ class Finding:
     serious: bool = False
 
 
-def findings(
+def collect_findings(
     recording: Recording, timing: Sampling | None, sensed: Mapping[str, Sensor], found: tuple[Run, ...]
 ) -> tuple[Finding, ...]:
     """All that stands out in a recording, the serious first."""
     everything = [
-        *_of_time(recording, timing),
-        *_of_sensors(recording, sensed),
-        *_of_runs(recording, found),
-        *_of_length(recording, timing, sensed),
+        *_time_findings(recording, timing),
+        *_sensor_findings(recording, sensed),
+        *_run_findings(recording, found),
+        *_duration_findings(recording, timing, sensed),
     ]
     return tuple(sorted(everything, key=lambda finding: not finding.serious))
 
 
 def check_swept(recording: Recording, found: tuple[Run, ...]) -> None:
     """Raise ColumnError where nothing in a recording is swept, or it is not the run that it is said to be."""
-    for finding in _of_runs(recording, found):
+    for finding in _run_findings(recording, found):
         if finding.serious:
             raise ColumnError(f"{recording.origin}: {finding.text}")
 
 
-def _of_time(recording: Recording, timing: Sampling | None) -> Iterator[Finding]:
+def _time_findings(recording: Recording, timing: Sampling | None) -> Iterator[Finding]:
     if timing is None:
         yield Finding(
             "there is no time: rows are taken as settled points, and neither rate nor glitches can be judged."
@@ -74,7 +74,7 @@ def _of_time(recording: Recording, timing: Sampling | None) -> Iterator[Finding]
         )
 
 
-def _of_sensors(recording: Recording, sensed: Mapping[str, Sensor]) -> Iterator[Finding]:
+def _sensor_findings(recording: Recording, sensed: Mapping[str, Sensor]) -> Iterator[Finding]:
     for name, sensor in sensed.items():
         for end, word in ((sensor.lower_limit, "lowest"), (sensor.upper_limit, "highest")):
             if name not in recording.columns or not np.isfinite(end):
@@ -86,15 +86,15 @@ def _of_sensors(recording: Recording, sensed: Mapping[str, Sensor]) -> Iterator[
                 yield Finding(
                     f"the {name} stands still at its {word} reading, {end:.6g} {quantity.unit if quantity else ''}, in "
                     f"{count} rows ({part:.0%}): the sensor is cut off there. Such rows are bounds, not values.",
-                    serious=part >= SATURATED,
+                    serious=part >= MAX_SATURATED_FRACTION,
                 )
 
 
-def _of_runs(recording: Recording, found: tuple[Run, ...]) -> Iterator[Finding]:
+def _run_findings(recording: Recording, found: tuple[Run, ...]) -> Iterator[Finding]:
     stated = recording.constants.get("run")
     if any(run.kind is AT_REST for run in found):
         what = "nothing that was measured changes" if len(recording.columns) > 2 else "the one quantity does not change"
-        held = _steady(recording)
+        held = _pressure_range(recording)
         yield Finding(
             f"{what}{held}: no characteristic can be found from it. Sweep the pressure of an isometric run, the length "
             "of an isobaric one, and check that the sensors were connected.",
@@ -105,12 +105,12 @@ def _of_runs(recording: Recording, found: tuple[Run, ...]) -> Iterator[Finding]:
         if stated not in kinds and stated in {kind.name for kind in KINDS}:
             yield Finding(
                 f"it is said to be {stated}, but what was measured is {' and '.join(sorted(kinds))}"
-                f"{_steady(recording)}. Correct the statement, or take another file.",
+                f"{_pressure_range(recording)}. Correct the statement, or take another file.",
                 serious=True,
             )
 
 
-def _steady(recording: Recording) -> str:
+def _pressure_range(recording: Recording) -> str:
     """`(pressure within 1.2 kPa of 300 kPa)`, to show what was taken as constant."""
     if "pressure" not in recording:
         return ""
@@ -118,17 +118,19 @@ def _steady(recording: Recording) -> str:
     return f" (pressure from {low / 1e3:.4g} to {high / 1e3:.4g} kPa)"
 
 
-def _of_length(recording: Recording, timing: Sampling | None, sensed: Mapping[str, Sensor]) -> Iterator[Finding]:
+def _duration_findings(
+    recording: Recording, timing: Sampling | None, sensed: Mapping[str, Sensor]
+) -> Iterator[Finding]:
     """Records that end before the pressure has settled, and steps faster than the sampling."""
-    if timing is None or "pressure" not in recording or timing.rows < 2 * FEW_ROWS:
+    if timing is None or "pressure" not in recording or timing.rows < 2 * MIN_ROWS_PER_STEP:
         return
     pressure = recording["pressure"]
     reach = float(np.ptp(pressure))
-    if reach <= WITHIN_NOISE * (sensed["pressure"].deviation if "pressure" in sensed else 0.0):
+    if reach <= NOISE_FACTOR * (sensed["pressure"].std if "pressure" in sensed else 0.0):
         return
     last = pressure[-max(len(pressure) // 10, 3) :]
     calm = quasi_static_rows(recording, sensed)
-    if reach > 0 and not calm[-1] and abs(last[-1] - last[0]) > UNSETTLED * reach:
+    if reach > 0 and not calm[-1] and abs(last[-1] - last[0]) > MAX_FINAL_CHANGE * reach:
         yield Finding(
             f"the record ends while the pressure still changes ({abs(last[-1] - last[0]) / 1e3:.4g} kPa in the last "
             "tenth): it may be shorter than the dynamics. Record until the pressure has settled.",

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..recording import Recording
-from .branches import Branch, agreement, find_branches
-from .findings import Finding, findings
+from .branches import Branch, branch_column_agreement, find_branches
+from .findings import Finding, collect_findings
 from .outliers import Outlier, find_outliers
 from .plateaus import Plateau, find_plateaus
 from .quasi_static import quasi_static_rows
@@ -57,8 +57,8 @@ def inspect(recording: Recording, sensed: Mapping[str, Sensor] | None = None) ->
         find_plateaus(recording, known) if ordered else (),
         find_outliers(recording, known),
         float(quasi_static_rows(recording, known).mean()) if len(recording) else 0.0,
-        agreement(recording, turned) if turned else None,
-        findings(recording, timing, known, found),
+        branch_column_agreement(recording, turned) if turned else None,
+        collect_findings(recording, timing, known, found),
     )
 
 

@@ -29,23 +29,23 @@ class Interval:
         return slice(self.start, self.stop)
 
 
-def true_stretches(mask: Mask) -> list[Interval]:
+def true_intervals(mask: Mask) -> list[Interval]:
     """The stretches in which a mask is true."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
     return [Interval(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def level_stretches(values: Array, band: float, *, within: Interval | None = None) -> Iterator[Interval]:
+def level_intervals(values: Array, band: float, *, within: Interval | None = None) -> Iterator[Interval]:
     """The longest stretches, from the front, whose values all fit into a band of this width."""
     whole = within or Interval(0, len(values))
     start = whole.start
     while start < whole.stop:
-        stop = _leaves_band(values[: whole.stop], start, band)
+        stop = _first_row_outside(values[: whole.stop], start, band)
         yield Interval(start, stop)
         start = stop
 
 
-def _leaves_band(values: Array, start: int, band: float) -> int:
+def _first_row_outside(values: Array, start: int, band: float) -> int:
     """The first row from `start` on with which the values no longer fit; looked for in windows that double."""
     size = 64
     while True:

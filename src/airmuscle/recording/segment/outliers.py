@@ -15,11 +15,11 @@ from ...core.arrays import Array
 from ..recording import Recording
 from .sensor import Sensor, estimate_sensors
 
-DEVIATIONS = 8.0
+MIN_DEVIATIONS = 8.0
 """How many deviations make a glitch (chosen: noise with long tails reaches five or six)."""
-AGREE = 0.25
+MAX_NEIGHBOUR_DIFFERENCE = 0.25
 """The neighbours agree where they differ by less than this part of the glitch (chosen)."""
-REACH = 3
+WINDOW = 3
 """Rows before and behind that are compared."""
 
 
@@ -36,24 +36,24 @@ class Outlier:
 
 def find_outliers(recording: Recording, sensed: Mapping[str, Sensor] | None = None) -> tuple[Outlier, ...]:
     """The suspected glitches of a recording in time; without time, neighbours say nothing and none is listed."""
-    if "time" not in recording or len(recording) < 2 * REACH + 2:
+    if "time" not in recording or len(recording) < 2 * WINDOW + 2:
         return ()
     return tuple(
         found
         for name, sensor in (sensed or estimate_sensors(recording)).items()
         if name in recording.columns
-        for found in _glitches(name, recording[name], sensor)
+        for found in _column_outliers(name, recording[name], sensor)
     )
 
 
-def _glitches(name: str, values: Array, sensor: Sensor) -> Iterator[Outlier]:
-    scale = sensor.deviation or 1e-9 * float(np.max(np.abs(values)))
+def _column_outliers(name: str, values: Array, sensor: Sensor) -> Iterator[Outlier]:
+    scale = sensor.std or 1e-9 * float(np.max(np.abs(values)))
     if scale == 0.0:
         return
     before, behind = _medians_around(values)
     off = values - 0.5 * (before + behind)
-    away = np.abs(off) > DEVIATIONS * scale
-    agree = np.abs(before - behind) < AGREE * np.abs(off)
+    away = np.abs(off) > MIN_DEVIATIONS * scale
+    agree = np.abs(before - behind) < MAX_NEIGHBOUR_DIFFERENCE * np.abs(off)
     for row in np.flatnonzero(away & agree):
         expected = float(values[row] - off[row])
         yield Outlier(name, int(row), float(values[row]), expected, float(abs(off[row]) / scale))
@@ -61,10 +61,10 @@ def _glitches(name: str, values: Array, sensor: Sensor) -> Iterator[Outlier]:
 
 def _medians_around(values: Array) -> tuple[Array, Array]:
     """The medians of the rows before and behind each; at the ends, where there are too few, the row itself."""
-    medians = np.median(np.lib.stride_tricks.sliding_window_view(values, REACH), axis=1)
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(values, WINDOW), axis=1)
     before, behind = values.copy(), values.copy()
-    before[REACH:] = medians[:-1]
-    behind[:-REACH] = medians[1:]
-    before[-REACH:] = values[-REACH:]
-    behind[:REACH] = values[:REACH]
+    before[WINDOW:] = medians[:-1]
+    behind[:-WINDOW] = medians[1:]
+    before[-WINDOW:] = values[-WINDOW:]
+    behind[:WINDOW] = values[:WINDOW]
     return before, behind

@@ -9,14 +9,14 @@ import numpy as np
 
 from ...core.arrays import Array
 from ..recording import Recording
-from .quasi_static import CHANGE, quasi_static_rows
-from .sampling import row_count
+from .quasi_static import MAX_CHANGE, quasi_static_rows
+from .sampling import count_rows
 from .sensor import Sensor, estimate_sensors
-from .interval import Interval, level_stretches, true_stretches
+from .interval import Interval, level_intervals, true_intervals
 
-LEAST = 0.2
+MIN_DURATION = 0.2
 """The shortest plateau [s] (chosen)."""
-FEWEST = 3
+MIN_ROWS = 3
 """The fewest rows of one (chosen)."""
 
 
@@ -24,37 +24,37 @@ FEWEST = 3
 class Plateau:
     """Where a plateau is, and for each column its median and the standard deviation of that mean [SI]."""
 
-    stretch: Interval
+    interval: Interval
     values: Mapping[str, float]
-    deviations: Mapping[str, float]
+    standard_errors: Mapping[str, float]
 
 
 def find_plateaus(
-    recording: Recording, sensed: Mapping[str, Sensor] | None = None, *, least: float = LEAST
+    recording: Recording, sensed: Mapping[str, Sensor] | None = None, *, least: float = MIN_DURATION
 ) -> tuple[Plateau, ...]:
     """The plateaus of the pressure among the quasi-static rows; none without time, and none on a slow ramp.
 
     A plateau stays within twice the change that is quasi-static, and does not run through it from end to end.
     """
-    if "time" not in recording or "pressure" not in recording or len(recording) < FEWEST:
+    if "time" not in recording or "pressure" not in recording or len(recording) < MIN_ROWS:
         return ()
     pressure, sensed = recording["pressure"], sensed or estimate_sensors(recording)
-    band = max(2.0 * CHANGE * float(np.ptp(pressure)), 8.0 * sensed["pressure"].deviation)
-    fewest = max(FEWEST, row_count(least, recording["time"], FEWEST))
+    band = max(2.0 * MAX_CHANGE * float(np.ptp(pressure)), 8.0 * sensed["pressure"].std)
+    fewest = max(MIN_ROWS, count_rows(least, recording["time"], MIN_ROWS))
     return tuple(
-        _plateau(recording, stretch)
-        for calm in true_stretches(quasi_static_rows(recording, sensed))
-        for stretch in level_stretches(pressure, band, within=calm)
-        if len(stretch) >= fewest and not _runs_through(pressure[stretch.rows], band)
+        _make_plateau(recording, stretch)
+        for calm in true_intervals(quasi_static_rows(recording, sensed))
+        for stretch in level_intervals(pressure, band, within=calm)
+        if len(stretch) >= fewest and not _drifts(pressure[stretch.rows], band)
     )
 
 
-def _runs_through(pressure: Array, band: float) -> bool:
+def _drifts(pressure: Array, band: float) -> bool:
     third = max(len(pressure) // 3, 1)
     return bool(abs(np.median(pressure[-third:]) - np.median(pressure[:third])) > 0.4 * band)
 
 
-def _plateau(recording: Recording, stretch: Interval) -> Plateau:
+def _make_plateau(recording: Recording, stretch: Interval) -> Plateau:
     rows = {name: recording[name][stretch.rows] for name in recording}
     values = {name: float(np.median(values)) for name, values in rows.items()}
     count = np.sqrt(len(stretch))
@@ -64,5 +64,5 @@ def _plateau(recording: Recording, stretch: Interval) -> Plateau:
 def plateau_points(recording: Recording, found: tuple[Plateau, ...]) -> Recording:
     """A recording with one row for each plateau: what a static fit of a stepped test should see."""
     columns = {name: np.array([p.values[name] for p in found]) for name in recording}
-    note = f"{len(found)} plateaus stand for {sum(len(p.stretch) for p in found)} of {len(recording)} rows."
+    note = f"{len(found)} plateaus stand for {sum(len(p.interval) for p in found)} of {len(recording)} rows."
     return dataclasses.replace(recording, columns=columns, notes=(*recording.notes, note))

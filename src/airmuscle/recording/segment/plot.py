@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...core.plotting import BLUE, GREEN, ORANGE, PURPLE, RED, legend_below, new_figure
-from ..plot import scale
+from ..plot import display_scale
 from .inspection import Inspection
 from .sensor import Sensor
 
@@ -24,7 +24,7 @@ def plot_inspection(seen: Inspection) -> Any:
     figure, axes = new_figure(len(names), 1, height=1.1 + 1.5 * len(names), sharex=True, squeeze=False)
     for axis, name in zip(axes[:, 0], names, strict=True):
         _draw(axis, seen, name, across)
-        _, unit = scale(name)
+        _, unit = display_scale(name)
         axis.set_ylabel(f"{name}\n[{unit}]")
     axes[-1, 0].set_xlabel("time [s]" if "time" in recording else "row")
     figure.align_ylabels()
@@ -34,19 +34,19 @@ def plot_inspection(seen: Inspection) -> Any:
 
 
 def _draw(axis: Any, seen: Inspection, name: str, across: Any) -> None:
-    factor, _ = scale(name)
+    factor, _ = display_scale(name)
     values = seen.recording[name] * factor
     dots = {"linestyle": "none", "marker": ".", "markersize": 2.5}
     colours = {1: (BLUE, "inflating"), -1: (RED, "deflating")}
     if not seen.branches:
         axis.plot(across, values, color=BLUE, label="measured", **dots)
     for branch in seen.branches:
-        rows = branch.stretch.rows
+        rows = branch.interval.rows
         colour, label = colours[branch.direction]
         known = axis.get_legend_handles_labels()[1]
         axis.plot(across[rows], values[rows], color=colour, label=None if label in known else label, **dots)
     for i, plateau in enumerate(seen.plateaus):
-        ends = across[[plateau.stretch.start, plateau.stretch.stop - 1]]
+        ends = across[[plateau.interval.start, plateau.interval.stop - 1]]
         level = [plateau.values.get(name, np.nan) * factor] * 2
         axis.plot(ends, level, color=GREEN, linewidth=1.2, label="plateau" if i == 0 else None)
     _mark_glitches(axis, seen, name, across, values)

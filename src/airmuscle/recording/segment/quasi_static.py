@@ -13,38 +13,38 @@ import numpy as np
 
 from ...core.arrays import Array
 from ..recording import Recording
-from .sampling import row_count
+from .sampling import count_rows
 from .sensor import Sensor, estimate_sensors
 from .interval import Mask
 
-SETTLING = 0.1
-CHANGE = 0.01
-_MOVING = ("pressure", "contraction", "length", "position")
+SETTLING_TIME = 0.1
+MAX_CHANGE = 0.01
+_MONITORED = ("pressure", "contraction", "length", "position")
 
 
 def quasi_static_rows(
     recording: Recording,
     sensed: Mapping[str, Sensor] | None = None,
     *,
-    settling: float = SETTLING,
-    change: float = CHANGE,
+    settling: float = SETTLING_TIME,
+    change: float = MAX_CHANGE,
 ) -> Mask:
     """By row, whether it is quasi-static. Without time, every row is taken as a settled point."""
     calm = np.ones(len(recording), dtype=bool)
     if "time" not in recording or len(recording) < 3:
         return calm
     time = recording["time"]
-    width = row_count(settling, time, 1)
+    width = count_rows(settling, time, 1)
     sensed = sensed or estimate_sensors(recording)
     for name in recording:
-        if name.rpartition(".")[2] in _MOVING and name in sensed:
-            calm &= ~_moves(recording[name], width, change, sensed[name])
+        if name.rpartition(".")[2] in _MONITORED and name in sensed:
+            calm &= ~_is_changing(recording[name], width, change, sensed[name])
     return calm
 
 
-def _moves(values: Array, width: int, change: float, sensor: Sensor) -> Mask:
+def _is_changing(values: Array, width: int, change: float, sensor: Sensor) -> Mask:
     """Whether a value changes too much from `width` rows before, or to as many behind: settled is both."""
-    allowed = max(change * float(np.ptp(values)), 4.0 * sensor.deviation)
+    allowed = max(change * float(np.ptp(values)), 4.0 * sensor.std)
     step = np.abs(values[width:] - values[:-width]) if width < len(values) else np.empty(0)
     moves = np.zeros(len(values), dtype=bool)
     moves[: len(step)] |= step > allowed

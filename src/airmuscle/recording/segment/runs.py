@@ -16,31 +16,31 @@ import numpy as np
 from ...core.arrays import Array
 from ..recording import Recording
 from .sensor import Sensor, estimate_sensors
-from .interval import Interval, level_stretches
+from .interval import Interval, level_intervals
 
-BAND = 0.02
+RELATIVE_BAND = 0.02
 """Part of its greatest value within which a quantity counts as held (chosen)."""
-STROKE = 0.005
+CONTRACTION_BAND = 0.005
 """Contraction within which a length counts as held (chosen)."""
-SWEEP = 0.1
+SWEEP_FRACTION = 0.1
 """Part of its range in the recording that a quantity must change by to be swept (chosen)."""
-FEWEST = 3
+MIN_ROWS = 3
 """The fewest rows of a run (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Kind:
+class RunKind:
     """What a run holds: the columns that can show it, the first there being used."""
 
     name: str
-    held: tuple[str, ...]
+    constant_columns: tuple[str, ...]
 
 
-ISOBARIC = Kind("isobaric", ("pressure",))
-ISOMETRIC = Kind("isometric", ("contraction", "length", "position"))
-ISOTONIC = Kind("isotonic", ("force",))
-AT_REST = Kind("at rest", ())
-FREE = Kind("free", ())
+ISOBARIC = RunKind("isobaric", ("pressure",))
+ISOMETRIC = RunKind("isometric", ("contraction", "length", "position"))
+ISOTONIC = RunKind("isotonic", ("force",))
+AT_REST = RunKind("at rest", ())
+FREE = RunKind("free", ())
 KINDS = (ISOBARIC, ISOMETRIC, ISOTONIC)
 """The kinds of run that hold one quantity; AT_REST holds all that was measured, FREE none."""
 
@@ -49,8 +49,8 @@ KINDS = (ISOBARIC, ISOMETRIC, ISOTONIC)
 class Run:
     """Rows of one kind; `column` is held at `value` [SI], `swept` are the columns that change."""
 
-    stretch: Interval
-    kind: Kind
+    interval: Interval
+    kind: RunKind
     column: str | None
     value: float | None
     swept: tuple[str, ...]
@@ -60,36 +60,36 @@ def find_runs(recording: Recording, sensed: Mapping[str, Sensor] | None = None) 
     """The runs of a recording; one of kind FREE where nothing is held, none of an empty recording."""
     if not len(recording):
         return ()
-    bands = _bands(recording, sensed or estimate_sensors(recording))
-    whole = _run(recording, Interval(0, len(recording)), bands)
+    bands = _constant_bands(recording, sensed or estimate_sensors(recording))
+    whole = _classify(recording, Interval(0, len(recording)), bands)
     if whole.kind is not FREE:
         return (whole,)
-    split = [found for kind in KINDS if (found := _levels(recording, kind, bands))]
-    return max(split, key=lambda found: sum(len(run.stretch) for run in found), default=(whole,))
+    split = [found for kind in KINDS if (found := _runs_at_levels(recording, kind, bands))]
+    return max(split, key=lambda found: sum(len(run.interval) for run in found), default=(whole,))
 
 
-def _column(recording: Recording, kind: Kind) -> str | None:
-    return next((name for name in kind.held if name in recording), None)
+def _column(recording: Recording, kind: RunKind) -> str | None:
+    return next((name for name in kind.constant_columns if name in recording), None)
 
 
-def _bands(recording: Recording, sensed: Mapping[str, Sensor]) -> dict[str, float]:
+def _constant_bands(recording: Recording, sensed: Mapping[str, Sensor]) -> dict[str, float]:
     """The width within which each measured quantity counts as held."""
-    deviations = {name: sensor.deviation for name, sensor in sensed.items()}
+    deviations = {name: sensor.std for name, sensor in sensed.items()}
     return {
-        name: max(_least_band(recording, name), 8.0 * deviations.get(name, 0.0))
+        name: max(_min_band(recording, name), 8.0 * deviations.get(name, 0.0))
         for kind in KINDS
         if (name := _column(recording, kind))
     }
 
 
-def _least_band(recording: Recording, name: str) -> float:
+def _min_band(recording: Recording, name: str) -> float:
     if name == "contraction":
-        return STROKE
+        return CONTRACTION_BAND
     greatest = float(np.max(np.abs(recording[name])))
-    return greatest * (STROKE if name == "length" else BAND)
+    return greatest * (CONTRACTION_BAND if name == "length" else RELATIVE_BAND)
 
 
-def _run(recording: Recording, stretch: Interval, bands: dict[str, float]) -> Run:
+def _classify(recording: Recording, stretch: Interval, bands: dict[str, float]) -> Run:
     """The run that a stretch is. Where two quantities are held, the pressure names it before length and force."""
     names = {kind: name for kind in KINDS if (name := _column(recording, kind))}
     held = [kind for kind, name in names.items() if _spread(recording[name][stretch.rows]) <= bands[name]]
@@ -98,10 +98,10 @@ def _run(recording: Recording, stretch: Interval, bands: dict[str, float]) -> Ru
         return Run(stretch, FREE, None, None, swept)
     if not swept:
         return Run(stretch, AT_REST, None, None, ())
-    return _held(recording, stretch, held[0], names[held[0]], swept)
+    return _constant_run(recording, stretch, held[0], names[held[0]], swept)
 
 
-def _held(recording: Recording, stretch: Interval, kind: Kind, name: str, swept: tuple[str, ...]) -> Run:
+def _constant_run(recording: Recording, stretch: Interval, kind: RunKind, name: str, swept: tuple[str, ...]) -> Run:
     return Run(stretch, kind, name, float(np.median(recording[name][stretch.rows])), swept)
 
 
@@ -111,23 +111,23 @@ def _spread(values: Array) -> float:
     return float(high - low)
 
 
-def _levels(recording: Recording, kind: Kind, bands: dict[str, float]) -> tuple[Run, ...]:
+def _runs_at_levels(recording: Recording, kind: RunKind, bands: dict[str, float]) -> tuple[Run, ...]:
     """The runs in which one kind's quantity stays on a level while another sweeps."""
     name = _column(recording, kind)
     if name is None:
         return ()
     found = []
-    for stretch in level_stretches(recording[name], bands[name]):
+    for stretch in level_intervals(recording[name], bands[name]):
         swept = tuple(
             other
             for other, band in bands.items()
-            if other != name and _spread(recording[other][stretch.rows]) > max(band, _sweep(recording, other))
+            if other != name and _spread(recording[other][stretch.rows]) > max(band, _min_sweep(recording, other))
         )
-        if len(stretch) >= FEWEST and swept:
-            found.append(_held(recording, stretch, kind, name, swept))
+        if len(stretch) >= MIN_ROWS and swept:
+            found.append(_constant_run(recording, stretch, kind, name, swept))
     return tuple(found)
 
 
-def _sweep(recording: Recording, name: str) -> float:
+def _min_sweep(recording: Recording, name: str) -> float:
     """The change from which on a quantity is swept: a part of its range in the whole recording."""
-    return SWEEP * float(np.ptp(recording[name]))
+    return SWEEP_FRACTION * float(np.ptp(recording[name]))

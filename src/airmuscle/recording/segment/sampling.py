@@ -10,7 +10,7 @@ import numpy.typing as npt
 from ...core.arrays import Array
 from ..recording import Recording
 
-LONG = 5.0
+GAP_FACTOR = 5.0
 """A step in time is a gap where it is this many times the usual one (chosen)."""
 
 
@@ -53,7 +53,7 @@ def analyse_sampling(recording: Recording) -> Sampling | None:
     forward = steps[steps > 0]
     usual = float(np.median(forward)) if forward.size else 0.0
     spread = 1.4826 * float(np.median(np.abs(forward - usual))) / usual if usual else 0.0
-    gaps = tuple(Gap(int(i), float(time[i]), float(steps[i])) for i in np.flatnonzero(steps > LONG * usual))
+    gaps = tuple(Gap(int(i), float(time[i]), float(steps[i])) for i in np.flatnonzero(steps > GAP_FACTOR * usual))
     return Sampling(
         len(recording), float(time.max() - time.min()), usual, spread, gaps if usual else (),
         _rows(steps == 0), _rows(steps < 0),
@@ -64,7 +64,7 @@ def _rows(wrong: npt.NDArray[np.bool_]) -> tuple[int, ...]:
     return tuple(int(i) + 1 for i in np.flatnonzero(wrong))
 
 
-def row_count(seconds: float, time: Array | None, least: int) -> int:
+def count_rows(seconds: float, time: Array | None, least: int) -> int:
     """How many rows a span of time holds, `least` where there is no time or the rows are far apart."""
     if time is None or len(time) < 2:
         return least
