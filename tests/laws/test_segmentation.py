@@ -120,7 +120,7 @@ def test_a_minor_loop_is_found_and_a_ripple_is_not():
     assert [b.direction for b in find_branches(timed(loop))] == [1, -1, 1]
     ripple = np.linspace(0, 6e5, 300) + 1.2e4 * np.sin(np.arange(300) * 0.5)
     assert [b.direction for b in find_branches(timed(ripple))] == [1]
-    assert len(find_branches(timed(loop), swing=0.3)) == 1
+    assert len(find_branches(timed(loop), reversal=0.3)) == 1
 
 
 def test_a_saw_tooth_has_a_deflating_branch_of_a_row_or_two_at_each_fall():
@@ -218,9 +218,9 @@ def test_a_saturated_sensor_is_found_at_its_upper_end():
     assert found.at_upper_limit == np.count_nonzero(full == full.max())
     few, many = (np.minimum(recording["force"], recording["force"][row]) for row in (180, 80))
     for values, serious in ((few, False), (many, True)):
-        said = [f for f in inspect(recording.with_columns(force=values)).findings if "highest reading" in f.text]
+        said = [f for f in inspect(recording.with_columns(force=values)).findings if "upper limit" in f.text]
         assert [f.serious for f in said] == [serious]
-        assert "Such rows are bounds, not values." in said[0].text
+        assert "These rows are bounds (censored), not values." in said[0].text
 
 
 def test_what_rests_without_flicker_or_with_it_on_both_sides_is_not_cut_off():
@@ -253,7 +253,7 @@ def test_the_plateaus_of_a_staircase_are_its_steps():
         assert plateau.interval.stop <= 10 * (plateau.interval.start // 10 + 1)
     points = plateau_points(recording, found)
     assert len(points) == 45
-    assert "45 plateaus stand for" in points.notes[-1]
+    assert "45 plateaus replace" in points.notes[-1]
 
 
 def test_a_slow_ramp_is_quasi_static_and_no_plateau_a_fast_one_is_neither():
@@ -316,9 +316,9 @@ def test_each_kind_of_run_is_recognised():
     for kind, name in ((ISOBARIC, "pressure"), (ISOMETRIC, "contraction"), (ISOTONIC, "force")):
         recording = Recording({**swept, name: held[name]}, "run")
         (run,) = find_runs(recording)
-        assert (run.kind, run.column) == (kind, name)
-        assert run.value == pytest.approx(np.median(held[name]))
-        assert set(run.swept) == set(swept) - {name}
+        assert (run.kind, run.constant_column) == (kind, name)
+        assert run.constant_value == pytest.approx(np.median(held[name]))
+        assert set(run.swept_columns) == set(swept) - {name}
     assert [r.kind for r in find_runs(Recording(swept, "free"))] == [FREE]
     assert [r.kind for r in find_runs(Recording(held, "rest"))] == [AT_REST]
     by_length = {"pressure": swept["pressure"], "length": np.full(200, 0.3), "force": swept["force"]}
@@ -328,7 +328,7 @@ def test_each_kind_of_run_is_recognised():
 def test_a_relaxation_at_held_pressure_and_length_is_named_by_its_pressure():
     force = 500.0 + 80.0 * np.exp(-np.linspace(0, 4, 200))
     (run,) = find_runs(timed(np.full(200, 3e5), length=np.full(200, 0.28), force=force))
-    assert (run.kind, run.swept) == (ISOBARIC, ("force",))
+    assert (run.kind, run.swept_columns) == (ISOBARIC, ("force",))
 
 
 def test_a_table_of_isobars_is_as_many_runs():
@@ -340,19 +340,19 @@ def test_a_table_of_isobars_is_as_many_runs():
     )
     found = find_runs(table)
     assert [run.kind for run in found] == [ISOBARIC] * 6
-    assert [run.value for run in found] == pytest.approx(np.linspace(1e5, 6e5, 6))
+    assert [run.constant_value for run in found] == pytest.approx(np.linspace(1e5, 6e5, 6))
     assert [(r.interval.start, r.interval.stop) for r in found] == [(11 * i, 11 * i + 11) for i in range(6)]
 
 
 def test_constant_pressure_given_as_an_isometric_sweep_is_refused():
     noise = RANDOM(0).normal(0, 1, 200)
     resting = timed(3e5 + 100 * noise, force=200 + 0.5 * noise, length=np.full(200, 0.28))
-    with pytest.raises(ColumnError, match=r"synthetic: nothing that was measured changes .*299\.\d to 300\.\d kPa"):
+    with pytest.raises(ColumnError, match=r"synthetic: no measured quantity varies \(pressure 299\.\d to 300(\.\d)? kPa"):
         check_swept(resting, find_runs(resting))
     isobaric = timed(3e5 + 100 * noise, force=np.linspace(0, 900, 200), length=np.linspace(0.25, 0.3, 200))
     check_swept(isobaric, find_runs(isobaric))
     said = isobaric.with_constants(run="isometric")
-    with pytest.raises(ColumnError, match="said to be isometric, but what was measured is isobaric"):
+    with pytest.raises(ColumnError, match="stated to be isometric, but the data are isobaric"):
         check_swept(said, find_runs(said))
     assert inspect(said).findings[0].serious
 
@@ -369,12 +369,12 @@ def test_rate_jitter_gaps_repeats_and_steps_back():
     seen = analyse_sampling(Recording({"time": time}, "clock"))
     assert seen.rate == pytest.approx(20.0, rel=0.01)
     assert seen.jitter == pytest.approx(0.02, rel=0.25)
-    assert [(g.row, round(g.length, 6)) for g in seen.gaps] == [(100, 2.0)]
-    assert (seen.repeats, seen.backward) == ((200,), (301,))
+    assert [(g.row, round(g.duration, 6)) for g in seen.gaps] == [(100, 2.0)]
+    assert (seen.repeated_rows, seen.backward_rows) == ((200,), (301,))
     texts = [f.text for f in inspect(timed(np.linspace(0, 6e5, 401)).with_columns(time=time)).findings]
-    assert texts[0].startswith("time repeats in 1 rows, first in row 201")
-    assert texts[1].startswith("time runs backwards in 1 rows, first in row 302")
-    assert texts[2].startswith("1 gaps in time, the longest of 2 s behind row 101")
+    assert texts[0].startswith("time repeats in 1 row, first in row 201")
+    assert texts[1].startswith("time decreases in 1 row, first in row 302")
+    assert texts[2].startswith("1 gap in time, the longest of 2 s after row 101")
 
 
 def test_a_record_shorter_than_its_dynamics_is_said_to_be():
@@ -383,7 +383,7 @@ def test_a_record_shorter_than_its_dynamics_is_said_to_be():
     short = inspect(timed(rise[:15])).findings
     assert any("may be shorter than the dynamics" in f.text and f.serious for f in short)
     sudden = inspect(timed(np.repeat([0.0, 6e5], 30))).findings
-    assert any("faster than 20 rows per second can show" in f.text for f in sudden)
+    assert any("undersampled at 20 rows per second" in f.text for f in sudden)
     slow_sweep = inspect(timed(np.linspace(0, 6e5, 900))).findings
     assert not any("may be shorter" in f.text for f in slow_sweep)
 

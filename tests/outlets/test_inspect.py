@@ -76,8 +76,8 @@ def test_json_holds_what_the_library_says(tmp_path: Path):
     assert len(found["plateaus"]) == len(expected.plateaus) == 40
     assert [(o["column"], o["row"]) for o in found["suspected_glitches"]] == [("force", 96)]
     assert found["quasi_static"] == expected.quasi_static
-    assert any("the sensor is cut off there" in finding["text"] for finding in found["findings"])
-    assert any("taken as gauge" in note for note in found["notes"])
+    assert any("sensor saturates at its lower limit" in finding["text"] for finding in found["findings"])
+    assert any("read as gauge" in note for note in found["notes"])
 
 
 def test_the_text_says_it_in_words(tmp_path: Path):
@@ -90,7 +90,7 @@ def test_the_text_says_it_in_words(tmp_path: Path):
         "branches: inflating, rows 1 to 200; deflating, rows 201 to 400",
         "plateaus: 40 with",
         "suspected glitches: 1, kept: force in row 96",
-        "note: the force stands still at its lowest reading, -5 N",
+        "note: the force sensor saturates at its lower limit, -5 N",
     ):
         assert said in text
     assert "PROBLEM" not in text
@@ -103,7 +103,7 @@ def test_a_long_list_is_cut_and_says_by_how_much(tmp_path: Path):
     text = airmuscle("inspect", path).stdout
     assert "isobaric at pressure 800 kPa" in text
     assert "... 5 more" in text
-    assert "note: there is no time" in text
+    assert "note: no time column" in text
     assert "sampling:" not in text
 
 
@@ -125,10 +125,10 @@ def test_the_figure_draws_branches_plateaus_glitches_and_the_cut_off(tmp_path: P
     figure = inspect(recording).plot()
     pressure, force, contraction = figure.axes
     labels = pressure.get_legend_handles_labels()[1]
-    assert labels == ["inflating", "deflating", "plateau", "suspected glitch"]
+    assert labels == ["inflating", "deflating", "plateau", "suspected outlier"]
     assert force.get_ylabel() == "force\n[N]"
     assert contraction.get_ylabel() == "contraction\n[%]"
-    glitches = next(line for line in force.lines if line.get_label() == "suspected glitch")
+    glitches = next(line for line in force.lines if line.get_label() == "suspected outlier")
     assert list(glitches.get_xdata()) == [pytest.approx(0.05 * 95)]
     assert any(list(line.get_ydata()) == [-5.0, -5.0] and line.get_linestyle() == "--" for line in force.lines)
 
@@ -136,10 +136,10 @@ def test_the_figure_draws_branches_plateaus_glitches_and_the_cut_off(tmp_path: P
 def test_a_file_that_a_fit_refuses_is_still_looked_at(tmp_path: Path):
     path = bench(tmp_path / "run.csv", swap=True)
     text = airmuscle("inspect", path).stdout
-    assert "PROBLEM: time runs backwards in 1 rows, first in row 22" in text
+    assert "PROBLEM: time decreases in 1 row, first in row 22" in text
     fitted = airmuscle("fit", path, "--characteristic", "ContractileSurface", "--out", tmp_path / "fit")
     assert fitted.exit_code == 1
-    assert "goes back behind" in fitted.stderr
+    assert "is less than the time of the previous row" in fitted.stderr
 
 
 def test_flags_and_mapping_say_what_the_file_does_not(tmp_path: Path):
@@ -162,7 +162,7 @@ def test_flags_and_mapping_say_what_the_file_does_not(tmp_path: Path):
     [
         (("none.csv",), 1, "cannot be read"),
         (("run.csv", "--column", "p"), 2, "--column wants NAME=TEXT"),
-        (("run.csv", "--column", "x=pressure [bar]"), 1, "the mapping names column 'x', but there are t [s]"),
+        (("run.csv", "--column", "x=pressure [bar]"), 1, "the mapping names column 'x', but the columns are t [s]"),
         (("run.csv", "--unit", "pressure=mm"), 1, "cannot become 'Pa'"),
         ((), 2, "Missing argument"),
     ],

@@ -94,7 +94,7 @@ def test_a_file_gives_values_in_units_and_deviations_as_differences():
     place = Location("study.toml", "", None)
     found = read_variation({"model": "Normal", "mean": "6.5 bara", "deviation": "0.1 bara"}, "Pa", place)
     assert found.mean == pytest.approx(548675.0)
-    assert found.deviation == pytest.approx(1e4)
+    assert found.std == pytest.approx(1e4)
     assert difference("5 degC", "K", "here") == pytest.approx(5.0)
     assert read_variation(["1 mm", 2e-3], "m", place) == LevelSet((0.001, 0.002))
     assert read_variation({"model": "Range", "low": "0 kg", "high": "1 kg", "count": 5}, "kg", place).values == (

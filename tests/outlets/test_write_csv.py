@@ -77,7 +77,7 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path, place: str):
         write_csv(run(), tmp_path / place)
     assert str(tmp_path / place) in str(caught.value)
     assert "cannot be written" in str(caught.value)
-    assert "Choose a folder" in str(caught.value)
+    assert "Choose an existing folder" in str(caught.value)
     assert [path.name for path in tmp_path.iterdir()] == ["a file"]
 
 

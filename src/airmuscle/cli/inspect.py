@@ -114,7 +114,7 @@ def as_data(seen: Inspection) -> dict[str, Any]:
         "sensors": [dataclasses.asdict(sensor) | {"deviation": sensor.std} for sensor in seen.sensors.values()],
         "runs": [
             {"kind": run.kind.name, "first_row": run.interval.start + 1, "last_row": run.interval.stop,
-             "held": run.column, "value": run.value, "swept": run.swept} for run in seen.runs
+             "held": run.constant_column, "value": run.constant_value, "swept": run.swept_columns} for run in seen.runs
         ],
         "branches": [
             {"branch": b.name, "first_row": b.interval.start + 1, "last_row": b.interval.stop,
@@ -134,12 +134,12 @@ def as_data(seen: Inspection) -> dict[str, Any]:
 def _sampling(timing: Sampling) -> dict[str, Any]:
     return {
         "rate": timing.rate,
-        "step": timing.step,
+        "step": timing.sample_time,
         "jitter": timing.jitter,
         "duration": timing.duration,
-        "gaps": [{"after_row": gap.row + 1, "start": gap.start, "length": gap.length} for gap in timing.gaps],
-        "repeating_rows": [row + 1 for row in timing.repeats],
-        "backward_rows": [row + 1 for row in timing.backward],
+        "gaps": [{"after_row": gap.row + 1, "start": gap.start, "length": gap.duration} for gap in timing.gaps],
+        "repeating_rows": [row + 1 for row in timing.repeated_rows],
+        "backward_rows": [row + 1 for row in timing.backward_rows],
     }
 
 

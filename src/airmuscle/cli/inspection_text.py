@@ -61,7 +61,7 @@ def summary(seen: Inspection) -> Iterator[str]:
 
 
 def _scale(name: str) -> tuple[float, str]:
-    from ..recording.plot import display_scale
+    from ..recording.display_units import display_scale
 
     return display_scale(name)
 
@@ -72,7 +72,7 @@ def _cut(parts: list[str]) -> str:
 
 
 def _rows(text: str, part: Any) -> str:
-    return f"{text}, rows {part.stretch.start + 1} to {part.stretch.stop}"
+    return f"{text}, rows {part.interval.start + 1} to {part.interval.stop}"
 
 
 def _of_sampling(timing: Sampling) -> str:
@@ -81,12 +81,12 @@ def _of_sampling(timing: Sampling) -> str:
 
 
 def _of_run(seen: Inspection, run: Run) -> str:
-    if len(run.swept) == 1 and run.column is None:
-        return _rows(f"only the {run.swept[0]} was measured", run)
-    if run.column is None or run.value is None:
+    if len(run.swept_columns) == 1 and run.constant_column is None:
+        return _rows(f"only the {run.swept_columns[0]} was measured", run)
+    if run.constant_column is None or run.constant_value is None:
         return _rows(run.kind.name, run)
-    factor, unit = _scale(run.column)
-    return _rows(f"{run.kind.name} at {run.column} {run.value * factor:.4g} {unit}", run)
+    factor, unit = _scale(run.constant_column)
+    return _rows(f"{run.kind.name} at {run.constant_column} {run.constant_value * factor:.4g} {unit}", run)
 
 
 def _of_outlier(outlier: Outlier) -> str:

@@ -1,4 +1,4 @@
-"""Channels that a logger kept by themselves, each with its own time, brought to common rows."""
+"""Channels with individual time vectors, resampled to common rows."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .table import Cells, RawTable
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Channel:
-    """A channel as a file holds it: N values, and their N times [s] where the file states any."""
+    """A channel as stored in a file: `values` (N,), their times (N,) [s] if the file states any, and the unit."""
 
     name: str
     values: Any
@@ -25,70 +25,73 @@ class Channel:
 
 
 def merge_channels(
-    origin: str, channels: Sequence[Channel], remarks: Mapping[str, float | str], row_word: str = "row"
+    origin: str, channels: Sequence[Channel], constants: Mapping[str, float | str], row_label: str = "row"
 ) -> RawTable:
-    """The table that channels make together.
+    """The table with one column for each channel.
 
-    Where their times differ, the rows are those of the channel with most of them, within the time that all cover;
-    others are interpolated between their rows, steps (whole numbers) held, and a note says so for each.
+    If the time vectors differ, the rows of the table are those of the channel with the most samples, within the time
+    that all channels cover. The other channels are interpolated linearly, integer-valued ones (a valve, a counter) by
+    zero-order hold, and a note reports each. Raises ColumnError if the channels cannot be merged.
     """
     channels = [c for c in channels if np.ndim(c.values) == 1 and len(c.values)]
     if not channels:
-        raise ColumnError(f"{origin}: there is no channel with a row of numbers.")
+        raise ColumnError(f"{origin}: no channel contains a vector of numbers.")
     timed = [c for c in channels if c.time is not None]
     if not timed or all(_same_time(c, timed[0]) for c in channels):
         _check_equal_lengths(origin, channels)
-        return _make_table(origin, channels, timed[0].time if timed else None, (), remarks, row_word)
+        return _make_table(origin, channels, timed[0].time if timed else None, (), constants, row_label)
     _check_timed(origin, channels)
-    return _resample(origin, channels, remarks, row_word)
+    return _resample(origin, channels, constants, row_label)
 
 
-def _same_time(one: Channel, other: Channel) -> bool:
-    assert other.time is not None
-    if len(one.values) != len(other.values):
+def _same_time(channel: Channel, reference: Channel) -> bool:
+    assert reference.time is not None
+    if len(channel.values) != len(reference.values):
         return False
-    return one.time is None or bool(np.array_equal(one.time, other.time))
+    return channel.time is None or bool(np.array_equal(channel.time, reference.time))
 
 
 def _check_equal_lengths(origin: str, channels: Sequence[Channel]) -> None:
     if len({len(c.values) for c in channels}) > 1:
         sizes = ", ".join(f"{c.name} {len(c.values)}" for c in channels)
         raise ColumnError(
-            f"{origin}: the channels have different numbers of rows ({sizes}) and state no time that would bring them "
-            "together. Choose a group with channels of one length, or export them with their time."
+            f"{origin}: the channels have different numbers of rows ({sizes}) and no time to align them. "
+            "Select a group whose channels have equal lengths, or export the channels with their time."
         )
 
 
 def _check_timed(origin: str, channels: Sequence[Channel]) -> None:
-    without = [c.name for c in channels if c.time is None]
-    if without:
+    untimed = [c.name for c in channels if c.time is None]
+    if untimed:
         raise ColumnError(
-            f"{origin}: the channels have different rows, and {', '.join(without)} state no time. Choose a group with "
-            "channels of one length, or export them with their time."
+            f"{origin}: the channels have different rows, and no time is stated for {', '.join(untimed)}. "
+            "Select a group whose channels have equal lengths, or export the channels with their time."
         )
 
 
-def _resample(origin: str, channels: Sequence[Channel], remarks: Mapping[str, float | str], row_word: str) -> RawTable:
+def _resample(
+    origin: str, channels: Sequence[Channel], constants: Mapping[str, float | str], row_label: str
+) -> RawTable:
     leader = max(channels, key=lambda c: len(c.values))
     low = max(float(c.time[0]) for c in channels if c.time is not None)
     high = min(float(c.time[-1]) for c in channels if c.time is not None)
     assert leader.time is not None
-    rounding = 1e-9 * max(abs(low), abs(high))  # the same instant, computed in two ways
+    rounding = 1e-9 * max(abs(low), abs(high))  # equal times may differ by rounding
     time = leader.time[(leader.time >= low - rounding) & (leader.time <= high + rounding)]
     if not len(time):
-        raise ColumnError(f"{origin}: the channels have no time in common. Choose one group of them.")
-    moved, notes = [], []
+        raise ColumnError(f"{origin}: the time ranges of the channels do not overlap. Select one group of channels.")
+    resampled, notes = [], []
     for channel in channels:
         same = channel.time is not None and np.array_equal(channel.time, leader.time)
-        moved.append(dataclasses.replace(channel, values=_interpolate(channel, time), time=time))
+        resampled.append(dataclasses.replace(channel, values=_interpolate(channel, time), time=time))
         if not same:
-            rows = f"its {len(channel.values)} rows are interpolated to the {len(time)} of '{leader.name}'"
-            notes.append(f"Channel '{channel.name}' has a time of its own: {rows}.")
-    return _make_table(origin, moved, time, tuple(notes), remarks, row_word)
+            rows = f"its {len(channel.values)} rows are interpolated to the {len(time)} rows of '{leader.name}'"
+            notes.append(f"Channel '{channel.name}' has its own time vector: {rows}.")
+    return _make_table(origin, resampled, time, tuple(notes), constants, row_label)
 
 
 def _interpolate(channel: Channel, time: Array) -> Any:
-    """Values at other times: held where they are whole numbers (a valve, a counter), else on straight lines."""
+    """The values at other times: zero-order hold for integers and texts, linear interpolation otherwise."""
     assert channel.time is not None
     values = np.asarray(channel.values)
     if values.dtype.kind in "biuUSO":
@@ -102,8 +105,8 @@ def _make_table(
     channels: Sequence[Channel],
     time: Array | None,
     notes: tuple[str, ...],
-    remarks: Mapping[str, float | str],
-    row_word: str,
+    constants: Mapping[str, float | str],
+    row_label: str,
 ) -> RawTable:
     has_time = any(find_quantity_name(c.name.partition(" ")[0].partition("_")[0]) == "time" for c in channels)
     if time is not None and not has_time:
@@ -112,11 +115,11 @@ def _make_table(
     units = tuple(c.unit for c in channels)
     columns = tuple(to_cells(c.values) for c in channels)
     rows = np.arange(1, len(channels[0].values) + 1)
-    return RawTable(origin, headings, units if any(units) else None, columns, rows, row_word, remarks, notes)
+    return RawTable(origin, headings, units if any(units) else None, columns, rows, row_label, constants, notes)
 
 
 def to_cells(values: Any) -> Cells:
-    """Numbers as floats, instants as seconds from the first, everything else as text."""
+    """Values as cells of a RawTable: numbers as floats, dates as seconds from the first, anything else as text."""
     array = np.asarray(values)
     if array.dtype.kind == "M":
         return np.asarray((array - array[0]) / np.timedelta64(1, "s"), dtype=float)

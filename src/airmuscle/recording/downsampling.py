@@ -1,4 +1,4 @@
-"""Making do with fewer rows of a very long recording, and saying so."""
+"""Downsampling of very long recordings, reported in a note."""
 
 from __future__ import annotations
 
@@ -15,42 +15,42 @@ from .table import Cells, RawTable
 
 @dataclasses.dataclass(frozen=True)
 class Downsampling(abc.ABC):
-    """At most `most_rows` rows are kept of a file that has more."""
+    """Reduction of a longer file to at most `max_rows` rows."""
 
     max_rows: int = 2_000_000
 
     def __post_init__(self) -> None:
         if self.max_rows < 1:
-            raise ParameterError(f"most_rows is {self.max_rows}; it must be 1 or more.")
+            raise ParameterError(f"max_rows is {self.max_rows}; it must be at least 1.")
 
     def step(self, rows: int) -> int:
-        """How many rows become one."""
+        """The number of rows that are reduced to one."""
         return max(1, math.ceil(rows / self.max_rows))
 
     @abc.abstractmethod
-    def column(self, cells: Cells, step: int) -> Cells:
-        """A column with one row for every `step`."""
+    def reduce(self, cells: Cells, step: int) -> Cells:
+        """The column with one row for every `step` rows."""
 
     @abc.abstractmethod
     def note(self, rows: int, step: int) -> str:
-        """What the reader should know of it."""
+        """The note for the user on the reduction of `rows` rows."""
 
 
 class Decimation(Downsampling):
-    """Every n-th row as it was measured: resolution and ends of the sensors stay visible, noise is not averaged."""
+    """Every n-th row as measured: resolution and saturation of the sensors are preserved, noise is not averaged."""
 
-    def column(self, cells: Cells, step: int) -> Cells:
+    def reduce(self, cells: Cells, step: int) -> Cells:
         return cells[::step]
 
     def note(self, rows: int, step: int) -> str:
         kept = math.ceil(rows / step)
-        return f"The file has {rows} rows; one in {step} is kept as measured, {kept} in all (most_rows)."
+        return f"The file has {rows} rows; one in {step} is kept as measured, {kept} in total (max_rows)."
 
 
 class BlockMeans(Downsampling):
-    """Means of n rows: noise becomes less, glitches smear, clipping and resolution are no longer visible."""
+    """Means over blocks of n rows: noise is averaged, outliers are smeared, saturation and resolution are lost."""
 
-    def column(self, cells: Cells, step: int) -> Cells:
+    def reduce(self, cells: Cells, step: int) -> Cells:
         if isinstance(cells, list):
             return cells[::step]
         starts = np.arange(0, len(cells), step)
@@ -59,17 +59,17 @@ class BlockMeans(Downsampling):
 
     def note(self, rows: int, step: int) -> str:
         kept = math.ceil(rows / step)
-        return f"The file has {rows} rows; each {step} are replaced by their mean, {kept} in all (most_rows)."
+        return f"The file has {rows} rows; each block of {step} is replaced by its mean, {kept} in total (max_rows)."
 
 
-def downsample(table: RawTable, thinning: Downsampling) -> RawTable:
-    """The table with no more rows than the thinning allows."""
-    step = thinning.step(len(table.rows))
+def downsample(table: RawTable, downsampling: Downsampling) -> RawTable:
+    """The table with at most `downsampling.max_rows` rows, and a note if it was reduced."""
+    step = downsampling.step(len(table.rows))
     if step == 1:
         return table
     return dataclasses.replace(
         table,
-        columns=tuple(thinning.column(cells, step) for cells in table.columns),
+        columns=tuple(downsampling.reduce(cells, step) for cells in table.columns),
         rows=table.rows[::step],
-        notes=(*table.notes, thinning.note(len(table.rows), step)),
+        notes=(*table.notes, downsampling.note(len(table.rows), step)),
     )

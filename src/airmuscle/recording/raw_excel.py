@@ -1,4 +1,4 @@
-"""Excel workbooks: every worksheet that holds a table is one."""
+"""Reader of Excel workbooks: one table for each worksheet that contains one."""
 
 from __future__ import annotations
 
@@ -11,15 +11,18 @@ import numpy as np
 
 from ..core.errors import ColumnError, FileError, suggestion
 from .header import are_headings, missing_header_error, parse_constant_comment, parse_unit_row
-from .optional_dependency import run_reader, import_lab_package
+from .optional_dependency import import_lab_package, run_reader
 from .table import Cells, RawTable
 
 Rows = list[tuple[int, list[Any]]]
-"""Rows of a worksheet with their numbers, counted from 1; no row is empty."""
+"""Non-empty rows of a worksheet with their numbers, counted from 1."""
 
 
-def read_excel_tables(path: Path, sheet: str | None = None, *, headless: bool = False) -> tuple[RawTable, ...]:
-    """A table for every worksheet that holds one, or for the one named. Raises FileError or ColumnError."""
+def read_excel_tables(path: Path, sheet: str | None = None, *, headerless: bool = False) -> tuple[RawTable, ...]:
+    """Read one table from each worksheet that contains one, or from the named worksheet.
+
+    With `headerless`, columns without headings are named by their numbers. Raises FileError or ColumnError.
+    """
     openpyxl = import_lab_package("openpyxl", path)
 
     def read() -> dict[str, Rows]:
@@ -31,19 +34,24 @@ def read_excel_tables(path: Path, sheet: str | None = None, *, headless: bool = 
         finally:
             book.close()
 
-    sheets = {name: rows for name, rows in run_reader(path, "an Excel workbook", read).items() if _contains_table(rows)}
+    contents = run_reader(path, "an Excel workbook", read)
+    sheets = {name: rows for name, rows in contents.items() if _contains_table(rows)}
     if not sheets:
-        raise FileError(f"{path.name}: no worksheet holds a table. A table has a row of headings and rows of numbers.")
+        raise FileError(
+            f"{path.name}: no worksheet contains a table. A table consists of a row of headings and rows of numbers."
+        )
     several = len(sheets) > 1
     return tuple(
-        _parse_table(f"{path.name}, sheet '{name}'" if several else path.name, rows, headless)
+        _parse_table(f"{path.name}, sheet '{name}'" if several else path.name, rows, headerless)
         for name, rows in sheets.items()
     )
 
 
 def _check_sheet_exists(path: Path, sheet: str | None, names: list[str]) -> None:
     if sheet is not None and sheet not in names:
-        raise FileError(f"{path.name}: no sheet '{sheet}'; there are {', '.join(names)}.{suggestion(sheet, names)}")
+        raise FileError(
+            f"{path.name}: no sheet '{sheet}'; the sheets are {', '.join(names)}.{suggestion(sheet, names)}"
+        )
 
 
 def _nonempty_rows(rows: Iterable[tuple[Any, ...]]) -> Rows:
@@ -54,15 +62,15 @@ def _contains_table(rows: Rows) -> bool:
     return any(_is_numeric(row) for _, row in rows)
 
 
-def _parse_table(origin: str, rows: Rows, headless: bool) -> RawTable:
-    """The table of a worksheet; what stands above the headings counts as remarks."""
+def _parse_table(origin: str, rows: Rows, headerless: bool) -> RawTable:
+    """The table of a worksheet; rows above the headings may state constants."""
     start = _find_heading_row(rows)
-    remarks = dict(found for _, row in rows[:start] if (found := _parse_constant(row)))
+    constants = dict(constant for _, row in rows[:start] if (constant := _parse_constant(row)))
     first, cells = rows[start]
     used = [j for j, cell in enumerate(cells) if cell not in (None, "")]
     if are_headings([_text(c) for c in cells]):
         headings, body = [_text(cells[j]) for j in used], rows[start + 1 :]
-    elif headless:
+    elif headerless:
         headings, body = [str(n) for n in range(1, len(used) + 1)], rows[start:]
     else:
         raise missing_header_error(f"{origin}, row {first}")
@@ -70,36 +78,36 @@ def _parse_table(origin: str, rows: Rows, headless: bool) -> RawTable:
     units = parse_unit_row(headings, below)
     body = body[1:] if units else body
     if not body:
-        raise FileError(f"{origin}: there are headings ({', '.join(headings)}) but no rows of numbers below them.")
+        raise FileError(f"{origin}: no rows of numbers below the headings ({', '.join(headings)}).")
     _check_headings_cover(origin, headings, used, body)
     columns = tuple(_column([_cell(row, j) for _, row in body]) for j in used)
-    return RawTable(origin, tuple(headings), units, columns, np.array([i for i, _ in body]), "row", remarks)
+    return RawTable(origin, tuple(headings), units, columns, np.array([i for i, _ in body]), "row", constants)
 
 
 def _find_heading_row(rows: Rows) -> int:
-    """The last row above the numbers that is as wide as they are; where it holds their units, the one above it."""
+    """The index of the last row above the numbers that is as wide as they are, or of the row above the unit row."""
     numeric = next((i for i, (_, row) in enumerate(rows) if _is_numeric(row)), 0)
     width = sum(c not in (None, "") for c in rows[numeric][1])
     above = [i for i in range(numeric) if sum(c not in (None, "") for c in rows[i][1]) >= width]
     if not above:
         return numeric
-    two = len(above) > 1 and above[-2] == above[-1] - 1
+    adjacent = len(above) > 1 and above[-2] == above[-1] - 1
     last = [_text(c) for c in rows[above[-1]][1]]
-    return above[-2] if two and parse_unit_row([_text(c) for c in rows[above[-2]][1]], last) else above[-1]
+    return above[-2] if adjacent and parse_unit_row([_text(c) for c in rows[above[-2]][1]], last) else above[-1]
 
 
 def _is_numeric(row: list[Any]) -> bool:
-    """Whether a row belongs to the numbers: more than half of its cells do, beside texts like an operator's name."""
+    """Whether more than half of the cells of a row are numbers; the others may be texts such as the operator's name."""
     cells = [c for c in row if c not in (None, "")]
     numbers = sum(isinstance(c, float | int | datetime.date | datetime.time) for c in cells)
     return 2 * numbers > len(cells)
 
 
 def _parse_constant(row: list[Any]) -> tuple[str, float | str] | None:
-    """`resting_length | 300 mm` in two cells, `resting_length | 300 | mm` in three, or a comment as in text files."""
+    """A constant in two cells (`resting_length | 300 mm`), in three (`resting_length | 300 | mm`), or as a comment."""
     cells = [_text(c) for c in row if c not in (None, "")]
-    head, rest = (cells[0].rstrip(" :="), " ".join(cells[1:])) if len(cells) > 1 else (cells[0], "")
-    text = f"{head} = {rest}" if rest else head
+    name, value = (cells[0].rstrip(" :="), " ".join(cells[1:])) if len(cells) > 1 else (cells[0], "")
+    text = f"{name} = {value}" if value else name
     return parse_constant_comment(text if text[0] in "#%" else f"# {text}")
 
 
@@ -112,8 +120,8 @@ def _check_headings_cover(origin: str, headings: list[str], used: list[int], bod
         outside = [j for j, cell in enumerate(row) if cell not in (None, "") and j not in used]
         if outside:
             raise ColumnError(
-                f"{origin}, row {i}: '{_text(row[outside[0]])}' stands under no heading (there are "
-                f"{', '.join(headings)}). Name its column, or move what is no part of the table elsewhere."
+                f"{origin}, row {i}: the cell '{_text(row[outside[0]])}' has no heading (the headings are "
+                f"{', '.join(headings)}). Add a heading to its column, or move the cell outside the rows of the table."
             )
 
 

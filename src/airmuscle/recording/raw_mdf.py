@@ -1,4 +1,4 @@
-"""MDF 3 and 4, the format of ASAM: groups of channels, each group with a time of its own."""
+"""Reader of MDF 3 and 4 (ASAM): groups of channels, each group with its own time channel."""
 
 from __future__ import annotations
 
@@ -10,25 +10,26 @@ import numpy as np
 
 from ..core.errors import FileError, suggestion
 from .channels import Channel, merge_channels
-from .optional_dependency import run_reader, import_lab_package
+from .optional_dependency import import_lab_package, run_reader
 from .table import RawTable
 
 _TIME_MASTER = 1
-"""The kind of a master channel that is a time, in both versions of the format."""
+"""Type of a master channel that contains time, in both versions of the format."""
 
 
 def read_mdf_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
-    """The table of all channels, or of one channel group by its name. Raises FileError or ColumnError."""
+    """Read one table from all channels, or from the named channel group. Raises FileError or ColumnError."""
     asammdf = import_lab_package("asammdf", path)
 
     def read() -> tuple[RawTable, ...]:
         with asammdf.MDF(path) as file:
             names = [_group_name(g, i) for i, g in enumerate(file.groups)]
             if group is not None and group not in names:
-                there = f"there are {', '.join(names)}.{suggestion(group, names)}"
-                raise FileError(f"{path.name}: no group '{group}'; {there}")
-            chosen = [i for i, name in enumerate(names) if group in (None, name)]
-            return (merge_channels(path.name, list(_channels(file, chosen)), {}),)
+                raise FileError(
+                    f"{path.name}: no group '{group}'; the groups are {', '.join(names)}.{suggestion(group, names)}"
+                )
+            selected = [i for i, name in enumerate(names) if group in (None, name)]
+            return (merge_channels(path.name, list(_channels(file, selected)), {}),)
 
     return run_reader(path, "MDF", read)
 

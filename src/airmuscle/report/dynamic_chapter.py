@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.plotting import BLACK, BLUE, RED, legend_below, new_figure
 from ..core.reference import cite
-from ..recording.plot import display_scale
+from ..recording.display_units import display_scale
 from ..recording.recording import column_heading
 from .chapter import Chapter, Plot, Table
 from .uncertainty_chapter import NORMAL

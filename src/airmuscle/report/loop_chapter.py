@@ -12,7 +12,7 @@ from ..control.controller import relative_unit
 from ..control.inputs import PiecewiseLinear
 from ..core.plotting import BLACK, BLUE, legend_below, new_figure
 from ..recording import Recording
-from ..recording.plot import display_scale
+from ..recording.display_units import display_scale
 from ..scenario.scenario import Scenario, units_of_run
 from .chapter import Plot, Table
 from .parameters import parameter_table

@@ -51,11 +51,11 @@ class HysteresisLoop:
     @property
     def in_words(self) -> str:
         """`isobaric at 300 kPa`, as the recording shows it."""
-        if self.run.column is None or self.run.value is None:
+        if self.run.constant_column is None or self.run.constant_value is None:
             return self.run.kind.name
-        shown = {"pressure": f"{self.run.value / 1e3:.4g} kPa", "force": f"{self.run.value:.4g} N",
-                 "contraction": f"{self.run.value:.2%}"}  # fmt: skip
-        return f"{self.run.kind.name} at {shown.get(self.run.column, f'{self.run.value:.4g} m')}"
+        shown = {"pressure": f"{self.run.constant_value / 1e3:.4g} kPa", "force": f"{self.run.constant_value:.4g} N",
+                 "contraction": f"{self.run.constant_value:.2%}"}  # fmt: skip
+        return f"{self.run.kind.name} at {shown.get(self.run.constant_column, f'{self.run.constant_value:.4g} m')}"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -142,10 +142,10 @@ def _check_two_directions(recording: Recording, way: np.ndarray, chosen: Mask) -
 
 def _same(one: Run, other: Run) -> bool:
     """Whether two runs hold the same quantity at the same level, as closely as one run holds it."""
-    if one.kind is not other.kind or one.column != other.column or one.value is None or other.value is None:
+    if one.kind is not other.kind or one.constant_column != other.constant_column or one.constant_value is None or other.constant_value is None:
         return False
-    band = CONTRACTION_BAND if one.column == "contraction" else RELATIVE_BAND * max(abs(one.value), abs(other.value))
-    return abs(one.value - other.value) <= band
+    band = CONTRACTION_BAND if one.constant_column == "contraction" else RELATIVE_BAND * max(abs(one.constant_value), abs(other.constant_value))
+    return abs(one.constant_value - other.constant_value) <= band
 
 
 def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str], None] | None = None) -> LoopFit:
