@@ -26,14 +26,14 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.cli.interruption import check_interrupted, deferred_sigint
-from airmuscle.core.errors import AirmuscleError, FileError, InputError, SimulationError
+from airmuscle.core.errors import AirmuscleError, ColumnError, FileError, InputError, SimulationError
 from airmuscle.report.write import save_table
 from airmuscle.scenario.scenario import load_scenario
 from airmuscle.simulation.simulate import simulate
 from airmuscle.study import chunk, dask_cluster, fingerprint, load_study, process_pool, run_study
 from airmuscle.study.chapter import study_chapter, write_study
 from airmuscle.study.design import DESIGNS
-from airmuscle.study.distributions import DISTRIBUTIONS, Range
+from airmuscle.study.distributions import VARIATIONS
 from airmuscle.study.metrics import METRICS
 
 ROOT = Path(__file__).parents[2]
@@ -70,18 +70,18 @@ start = { pressure = "0.5 bar" }
 STUDY = """
 title = "Two valves"
 scenario = "scenario.toml"
-chunk = 4
+chunk_size = 4
 [vary]
-"circuit.fill.conductance" = { model = "Normal", mean = "3e-9 m3/(s Pa)", deviation = "0.2e-9 m3/(s Pa)" }
+"circuit.fill.conductance" = { model = "Normal", mean = "3e-9 m3/(s Pa)", std = "0.2e-9 m3/(s Pa)" }
 "mechanism.contraction" = { model = "Uniform", low = "2 %", high = "10 %" }
 [design]
 model = "MonteCarlo"
 count = 22
 seed = 3
-[outcome]
+[metrics]
 pressure = { model = "Final", column = "pressure" }
 reached = { model = "TimeToReach", column = "pressure", level = "2 bar", begin = "0.1 s" }
-course = { model = "TimeSeries", column = "force", every = "0.05 s" }
+course = { model = "TimeSeries", column = "force", sample_time = "0.05 s" }
 """
 
 
@@ -163,9 +163,52 @@ def test_a_study_that_was_killed_goes_on_and_ends_bit_equal(folder: Path):
     (folder / "out" / "chunks" / ".unfinished-1234").write_bytes(b"half a chunk")
     done = subprocess.run(command(folder), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert {p: p.stat().st_mtime_ns for p in before} == before, "what was kept was computed again"
+    assert f"resuming: {4 * len(before)} of 400 runs are already saved" in done.stderr
+    assert {p: p.stat().st_mtime_ns for p in before} == before, "saved runs were computed again"
     write_study(run(folder, "uninterrupted"), folder / "uninterrupted")
     assert contents(folder / "out") == contents(folder / "uninterrupted")
+
+
+def children_of(pid: int) -> list[int]:
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def is_alive(pid: int) -> bool:
+    """Whether a process exists and is not a zombie that waits for its parent."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def ignores_sigint(pid: int) -> bool:
+    """Whether a worker has been initialised."""
+    (mask,) = re.findall(r"SigIgn:\s*(\w+)", Path(f"/proc/{pid}/status").read_text())
+    return bool(int(mask, 16) & 1 << signal.SIGINT - 1)
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes are observed in /proc")
+def test_workers_exit_within_a_second_when_their_parent_is_killed(folder: Path):
+    edited(folder, "count = 22", "count = 2000")
+    process = started(folder, 3, "--workers", "2")
+    end = time.monotonic() + 60
+    while not (len(children := children_of(process.pid)) >= 3 and all(map(ignores_sigint, children))):
+        assert time.monotonic() < end, "two workers and the resource tracker of multiprocessing are expected"
+        time.sleep(0.01)
+    process.kill()
+    process.wait()
+    end = time.monotonic() + 1.0
+    while any(map(is_alive, children)):
+        assert time.monotonic() < end, "a worker survived its parent"
+        time.sleep(0.01)
+
+
+def test_a_new_study_is_not_said_to_be_resumed_and_a_finished_one_is(folder: Path):
+    arguments = ["sweep", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1"]
+    first, second = (CliRunner().invoke(app, arguments) for _ in range(2))
+    assert "resuming" not in first.stderr
+    assert "resuming: 22 of 22 runs are already saved" in second.stderr
+    assert second.stdout == first.stdout
 
 
 @pytest.mark.parametrize("workers", ["1", "2"])
@@ -175,10 +218,10 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(folder: Path, workers: 
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "of 2000 runs are kept in" in said
-    assert "the same command goes on from there" in said
+    assert "of 2000 runs are saved in" in said
+    assert "the same command resumes from there" in said
     assert "Traceback" not in said
-    (kept,) = re.findall(r"(\d+) of 2000 runs are kept", said)
+    (kept,) = re.findall(r"(\d+) of 2000 runs are saved", said)
     assert int(kept) == 4 * len(list((folder / "out" / "chunks").glob("*.npz")))
     assert not (folder / "out" / "results.csv").exists()
 
@@ -257,7 +300,7 @@ def test_results_do_not_depend_on_the_executor(folder: Path, place):
 
 def test_the_result_does_not_depend_on_the_size_of_a_chunk(folder: Path):
     first = run(folder, "first")
-    edited(folder, "chunk = 4", "chunk = 7")
+    edited(folder, "chunk_size = 4", "chunk_size = 7")
     second = run(folder, "second")
     assert np.array_equal(first.scalars, second.scalars)
     assert np.array_equal(first["course"], second["course"])
@@ -308,7 +351,7 @@ def computed_anew(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The chunks that a further run of the study computes."""
     found = []
     original = chunk.compute_chunk
-    monkeypatch.setattr(chunk, "computed", lambda study, index: found.append(index) or original(study, index))
+    monkeypatch.setattr(chunk, "compute_chunk", lambda study, index: found.append(index) or original(study, index))
     run(folder)
     monkeypatch.undo()
     return found
@@ -403,7 +446,7 @@ def test_a_worker_leaves_ctrl_c_to_the_process_that_it_works_for():
 
 def test_a_worker_that_reads_another_study_refuses(folder: Path):
     study = load_study(folder / "study.toml")
-    with pytest.raises(FileError, match="a worker reads another study than the one that was started"):
+    with pytest.raises(FileError, match="a worker process has read a different study"):
         chunk.run_chunk(str(study.path), "0" * 64, 0)
 
 
@@ -416,7 +459,7 @@ def test_a_worker_that_dies_is_an_error_that_says_how_to_go_on(folder: Path):
                 for process in executor._processes.values():
                     process.kill()
 
-        with pytest.raises(SimulationError, match="a worker died"):
+        with pytest.raises(SimulationError, match="a worker process died"):
             run_study(study, folder / "out", executor, killing)
     assert 1 <= len(list((folder / "out" / "chunks").glob("*.npz"))) < 500
 
@@ -439,7 +482,7 @@ def test_a_run_that_fails_leaves_its_reason_and_stops_no_other(folder: Path):
 
 
 def test_a_value_beyond_its_bounds_fails_its_run_alone(folder: Path):
-    edited(folder, 'deviation = "0.2e-9 m3/(s Pa)"', 'deviation = "3e-9 m3/(s Pa)"')
+    edited(folder, 'std = "0.2e-9 m3/(s Pa)"', 'std = "3e-9 m3/(s Pa)"')
     result = run(folder)
     assert np.array_equal(result.failed, np.flatnonzero(result.study.values[:, 0] < 0))
     assert result.failed.size
@@ -527,7 +570,7 @@ def test_the_study_of_the_page_can_be_read(tmp_path: Path):
     (tmp_path / "study.toml").write_text(blocks[0], encoding="utf-8")
     study = load_study(tmp_path / "study.toml")
     shown = set(re.findall(r"`(\w+)`", page))
-    kinds = {cls.__name__ for cls in (*DESIGNS, *DISTRIBUTIONS, *METRICS, Range)}
+    kinds = {*DESIGNS, *VARIATIONS, *METRICS}
     assert kinds <= shown, f"the page lacks {kinds - shown}"
     assert len(study) == 256
 
@@ -544,9 +587,15 @@ def test_the_table_has_one_row_a_run_with_units(folder: Path):
     ]  # fmt: skip
     assert [float(row["pressure [Pa]"]) for row in rows] == result["pressure"].tolist()
     write_study(result, folder / "out")
-    kept = np.load(folder / "out" / "courses.npz")
+    kept = np.load(folder / "out" / "time_series.npz")
     assert np.array_equal(kept["course"], result["course"])
     assert kept["course_time"] == pytest.approx(np.arange(11) * 0.05)
+
+
+def test_an_unknown_metric_is_an_error_with_the_nearest_name(folder: Path):
+    result = run(folder)
+    with pytest.raises(ColumnError, match=r"no metric 'presure'; the metrics are pressure, reached, course.* 'pressure'"):
+        result["presure"]
 
 
 def test_the_report_shows_design_statistics_and_figures(folder: Path):
@@ -555,13 +604,13 @@ def test_the_report_shows_design_statistics_and_figures(folder: Path):
     chapter = study_chapter(result)
     assert [t.name for t in chapter.tables] == ["varied", "statistics", "sensitivities"]
     assert [p.name for p in chapter.plots] == [
-        "histograms", "scatter-pressure", "scatter-reached", "sensitivities", "course-course",
+        "histograms", "scatter-pressure", "scatter-reached", "sensitivities", "time-series-course",
     ]  # fmt: skip
     statistics = result.statistics().columns
     assert statistics["mean"][0] == pytest.approx(result["pressure"].mean())
     assert statistics["median"][1] == pytest.approx(np.median(result["reached"]))
     own = load_study(folder / "study.toml").template.scenario.simulate()["pressure"][-1]
-    assert statistics["as it stands"][0] == pytest.approx(own, rel=1e-9)
+    assert statistics["nominal"][0] == pytest.approx(own, rel=1e-9)
     write_study(result, folder / "out")
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
     assert "Saltelli(count=8, seed=3)" in page
@@ -578,57 +627,57 @@ def test_the_command_names_its_report_last(folder: Path):
 # Studies that cannot be
 
 BAD = [
-    ("circuit.fill.conductance", "circuit.fil.conductance", "no number 'circuit.fil.conductance'. Did you mean 'circuit.fill.conductance'?"),
-    ("mechanism.contraction", "run.stop", "the scenario has no number 'run.stop'"),
+    ("circuit.fill.conductance", "circuit.fil.conductance", "no parameter 'circuit.fil.conductance'. Did you mean 'circuit.fill.conductance'?"),
+    ("mechanism.contraction", "run.stop", "the scenario has no parameter 'run.stop'"),
     ('low = "2 %"', "low = nan", "it must be finite"),
     ('low = "2 %"', "low = -inf", "it must be finite"),
     ('low = "2 %"', 'low = "2 mm"', "cannot become a ratio"),
-    ('low = "2 %"', 'low = "20 %"', "low must be the smaller one"),
+    ('low = "2 %"', 'low = "20 %"', "low is 0.2 and high is 0.1; low must be less than high"),
     ('low = "2 %"', 'low = "-95 %"', "allowed are"),
-    ('low = "2 %", ', "", "Uniform needs 'low' (least value)"),
-    ('low = "2 %"', 'lo = "2 %"', "'lo' is not known here; there are low, high. Did you mean 'low'?"),
+    ('low = "2 %", ', "", "Uniform needs 'low' (lower bound)"),
+    ('low = "2 %"', 'lo = "2 %"', "Uniform has no parameter 'lo'; there are low, high. Did you mean 'low'?"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[]", "the list is empty"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[0.02, nan]", "it must be finite"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', "0.02", "write a list of values, or a distribution"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[0.02, 0.99]", "goes to 0.99; allowed are"),
+    ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[0.02, 0.99]", "includes 0.99; allowed are"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Range", low = 0.0, high = 0.1, count = 0 }', "2 to 1000000 values"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Truncated", inner = { model = "Normal", mean = 0.05, deviation = 0.001 }, low = 0.1, high = 0.2 }', "at least 1e-06 must"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Truncated", inner = { model = "Truncated" }, low = 0.1, high = 0.2 }', "no model 'Truncated' here"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Triangular", low = 0.0, mode = 0.3, high = 0.2 }', "mode 0.3 must lie within 0 to 0.2"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "LogNormal", median = 0.0, log_deviation = 0.1 }', "it must be greater than zero"),
-    ('model = "Uniform"', 'model = "Unifrom"', "no model 'Unifrom' here; there are Range, Uniform, Normal, LogNormal, Triangular, Truncated. Did you mean 'Uniform'?"),
-    ('deviation = "0.2e-9 m3/(s Pa)"', "deviation = 0", "it must be greater than zero"),
-    ('deviation = "0.2e-9 m3/(s Pa)"', 'deviation = "1 kg"', "cannot become 'm3/(s Pa)'"),
-    ("count = 22", "count = 0", "at least one point is needed"),
-    ("count = 22", "count = -1", "must be a whole number"),
-    ("count = 22", "count = 2.5", "must be a whole number"),
-    ("count = 22", "count = true", "must be a whole number"),
-    ("count = 22", "count = 100_000_000", "a study has 10000000 at most"),
+    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Truncated", inner = { model = "Normal", mean = 0.05, std = 0.001 }, low = 0.1, high = 0.2 }', "it must be at least 1e-06"),
+    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Truncated", inner = { model = "Truncated" }, low = 0.1, high = 0.2 }', "no model 'Truncated'; there are Uniform, Normal, LogNormal, Triangular."),
+    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Triangular", low = 0.0, mode = 0.3, high = 0.2 }', "mode is 0.3; it must lie between low, 0, and high, 0.2"),
+    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "LogNormal", median = 0.0, log_std = 0.1 }', "median is 0; it must be positive"),
+    ('model = "Uniform"', 'model = "Unifrom"', "no model 'Unifrom'; there are Range, Uniform, Normal, LogNormal, Triangular, Truncated. Did you mean 'Uniform'?"),
+    ('std = "0.2e-9 m3/(s Pa)"', "std = 0", "std is 0; it must be positive"),
+    ('std = "0.2e-9 m3/(s Pa)"', 'std = "1 kg"', "cannot become 'm3/(s Pa)'"),
+    ("count = 22", "count = 0", "count is 0; it must be at least 1"),
+    ("count = 22", "count = -1", "must be a non-negative integer"),
+    ("count = 22", "count = 2.5", "must be a non-negative integer"),
+    ("count = 22", "count = true", "must be a non-negative integer"),
+    ("count = 22", "count = 100_000_000", "the maximum is 10000000"),
     ("count = 22\n", "", "MonteCarlo needs 'count'"),
-    ("seed = 3", "seed = -3", "must be a whole number"),
-    ('model = "MonteCarlo"', 'model = "Sobol"', "count is 22; Sobol points keep their balance for powers of two only. Take 16 or 32."),
-    ('model = "MonteCarlo"', 'model = "Saltelli"', "Take 16 or 32."),
+    ("seed = 3", "seed = -3", "must be a non-negative integer"),
+    ('model = "MonteCarlo"', 'model = "Sobol"', "count is 22; Sobol points are balanced only if their number is a power of two. Use 16 or 32."),
+    ('model = "MonteCarlo"', 'model = "Saltelli"', "Use 16 or 32."),
     ('model = "MonteCarlo"\ncount = 22\nseed = 3', 'model = "Grid"', "has no levels; give a list or a Range"),
-    ('model = "MonteCarlo"', 'model = "Random"', "no model 'Random' here"),
-    ('[design]\nmodel = "MonteCarlo"\ncount = 22\nseed = 3', "", "[design] is None; write a table with a model"),
+    ('model = "MonteCarlo"', 'model = "Random"', "no model 'Random'; there are Grid, LatinHypercube"),
+    ('[design]\nmodel = "MonteCarlo"\ncount = 22\nseed = 3', "", "[design] is missing"),
     ('"2 bar"', '"2 mm"', "cannot become 'Pa'"),
     ('"2 bar"', "inf", "it must be finite"),
     ('model = "Final", column = "pressure"', 'model = "Final", column = "presure"', "a run has no column 'presure'"),
-    ('model = "Final", column = "pressure"', 'model = "Last", column = "pressure"', "no model 'Last' here"),
+    ('model = "Final", column = "pressure"', 'model = "Last", column = "pressure"', "no model 'Last'; there are Final, Maximum"),
     ('begin = "0.1 s"', 'begin = "0.1 s", end = "0.1 s"', "its end must be later than its begin"),
-    ('begin = "0.1 s"', 'begin = "-9 s", end = "-8 s"', "from -9 to -8 s there is nothing of a run from 0 to"),
-    ('begin = "0.1 s"', 'begin = "9 s"', "there is nothing of a run"),
-    ('every = "0.05 s"', 'every = "0 s"', "it must be positive and finite"),
-    ('every = "0.05 s"', 'every = "1 ns"', "2 to 1000000 instants"),
-    ('every = "0.05 s"', 'every = "0.05 s", begin = "9 s"', "there is nothing of a run"),
-    ("chunk = 4", "chunk = 0", "at least one run is written at a time"),
+    ('begin = "0.1 s"', 'begin = "-9 s", end = "-8 s"', "the window -9 to -8 s does not overlap the run, 0 to"),
+    ('begin = "0.1 s"', 'begin = "9 s"', "does not overlap the run"),
+    ('sample_time = "0.05 s"', 'sample_time = "0 s"', "it must be positive and finite"),
+    ('sample_time = "0.05 s"', 'sample_time = "1 ns"', "2 to 1000000 samples"),
+    ('sample_time = "0.05 s"', 'sample_time = "0.05 s", begin = "9 s"', "does not overlap the run"),
+    ("chunk_size = 4", "chunk_size = 0", "chunk_size is 0; it must be at least 1"),
     ('scenario = "scenario.toml"', 'scenario = "senario.toml"', "there is no such file"),
     ('scenario = "scenario.toml"', "scenario = 5", "name a file"),
     ('scenario = "scenario.toml"', "", "scenario is None; name a file"),
     ("title", "titel", "'titel' is not known here"),
     ("[design]", '[follow]\n"circuit.discharge.conductance" = "mechanism.contraction"\n[design]', "cannot follow"),
     ("[design]", '[follow]\n"circuit.discharge.conductance" = "mechanism.contract"\n[design]', "is not under [vary]. Did you mean 'mechanism.contraction'?"),
-    ("[design]", '[follow]\n"mechanism.contraction" = "mechanism.contraction"\n[design]', "varies by itself"),
+    ("[design]", '[follow]\n"mechanism.contraction" = "mechanism.contraction"\n[design]', "is also under [vary]"),
 ]  # fmt: skip
 
 
@@ -640,19 +689,19 @@ def test_a_study_that_cannot_be_is_refused(folder: Path, old: str, new: str, mes
     assert "toml" in str(refused.value)
 
 
-@pytest.mark.parametrize("table", ["vary", "outcome"])
+@pytest.mark.parametrize("table", ["vary", "metrics"])
 def test_an_empty_or_missing_table_is_refused(folder: Path, table: str):
     whole = (folder / "study.toml").read_text(encoding="utf-8")
     start = whole.index(f"[{table}]")
     end = whole.find("[design]") if table == "vary" else len(whole)
     for instead in ("", f"[{table}]\n"):
         (folder / "study.toml").write_text(whole[:start] + instead + whole[end:], encoding="utf-8")
-        with pytest.raises(InputError, match=rf"the table \[{table}\] is (missing|empty)"):
+        with pytest.raises(InputError, match=rf"\[{table}\] is (missing|empty)"):
             load_study(folder / "study.toml")
 
 
 def test_places_that_cannot_be_are_refused(folder: Path):
-    with pytest.raises(InputError, match="at least one is needed"), process_pool(0):
+    with pytest.raises(InputError, match="workers is 0; it must be at least 1"), process_pool(0):
         pass
     (folder / "file").write_text("", encoding="utf-8")
     with pytest.raises(FileError, match="cannot be written to"):
@@ -665,9 +714,9 @@ def test_places_that_cannot_be_are_refused(folder: Path):
 
 def test_a_cluster_that_does_not_answer_is_refused(monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("airmuscle.study.executors.ANSWER_WITHIN", 0.5)
+    monkeypatch.setattr("airmuscle.study.executors.CONNECT_TIMEOUT", 0.5)
     for address in ("tcp://127.0.0.1:1", "nonsense://here"):
-        with pytest.raises(InputError, match=f"no Dask scheduler answers at '{address}'"), dask_cluster(address):
+        with pytest.raises(InputError, match=f"no response from a Dask scheduler at '{address}'"), dask_cluster(address):
             pass
 
 

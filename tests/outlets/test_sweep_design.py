@@ -28,7 +28,7 @@ from airmuscle.study.distributions import (
     Variation,
     read_variation,
 )
-from airmuscle.study.parse import difference
+from airmuscle.study.fields import read_difference
 
 numbers = st.floats(-1e6, 1e6)
 widths = st.floats(1e-3, 1e6)
@@ -47,15 +47,15 @@ def distributions(draw) -> Variation:
             ]
         )
     )
-    middle = inner.at(np.array([0.2, 0.9]))
+    middle = inner.ppf(np.array([0.2, 0.9]))
     return Truncated(inner, *middle.tolist()) if draw(st.booleans()) else inner
 
 
 @settings(deadline=None)
 @given(distributions(), st.lists(st.floats(1e-9, 1 - 1e-9), min_size=2, max_size=20))
 def test_values_rise_with_the_shares_and_stay_within_the_ends(variation, shares):
-    values = variation.at(np.sort(shares))
-    low, high = variation.ends
+    values = variation.ppf(np.sort(shares))
+    low, high = variation.support
     assert (np.diff(values) >= 0).all()
     assert (values >= low - 1e-9 * abs(low)).all()
     assert (values <= high + 1e-9 * abs(high)).all()
@@ -85,17 +85,17 @@ EVEN = (np.arange(100_000) + 0.5) / 100_000
     ],
 )
 def test_mean_and_deviation_are_those_of_the_text_books(variation, mean, deviation):
-    values = variation.at(EVEN)
+    values = variation.ppf(EVEN)
     assert values.mean() == pytest.approx(mean, abs=2e-4)
     assert values.std() == pytest.approx(deviation, rel=2e-3)
 
 
 def test_a_file_gives_values_in_units_and_deviations_as_differences():
     place = Location("study.toml", "", None)
-    found = read_variation({"model": "Normal", "mean": "6.5 bara", "deviation": "0.1 bara"}, "Pa", place)
+    found = read_variation({"model": "Normal", "mean": "6.5 bara", "std": "0.1 bara"}, "Pa", place)
     assert found.mean == pytest.approx(548675.0)
     assert found.std == pytest.approx(1e4)
-    assert difference("5 degC", "K", "here") == pytest.approx(5.0)
+    assert read_difference("5 degC", "K", "here") == pytest.approx(5.0)
     assert read_variation(["1 mm", 2e-3], "m", place) == LevelSet((0.001, 0.002))
     assert read_variation({"model": "Range", "low": "0 kg", "high": "1 kg", "count": 5}, "kg", place).values == (
         0.0, 0.25, 0.5, 0.75, 1.0,
@@ -157,15 +157,15 @@ def test_no_value_of_a_normal_distribution_is_infinite():
     ("make", "message"),
     [
         (lambda: LevelSet(()), "the list is empty"),
-        (lambda: LevelSet((1.0, float("nan"))), "every number must be finite"),
-        (lambda: Normal(float("inf"), 1.0), "every number must be finite"),
-        (lambda: Normal(0.0, -1.0), "deviation is -1; it must be greater than zero"),
-        (lambda: Uniform(1.0, 1.0), "low must be the smaller one"),
-        (lambda: Truncated(LevelSet((1.0,)), 0.0, 1.0), "is no distribution that can be cut"),
+        (lambda: LevelSet((1.0, float("nan"))), "all values must be finite"),
+        (lambda: Normal(float("inf"), 1.0), "all values must be finite"),
+        (lambda: Normal(0.0, -1.0), "std is -1; it must be positive"),
+        (lambda: Uniform(1.0, 1.0), "low is 1 and high is 1; low must be less than high"),
+        (lambda: Truncated(LevelSet((1.0,)), 0.0, 1.0), "is not a continuous distribution"),
         (lambda: Range(0.0, 0.0, 3), "two different ends"),
-        (lambda: MonteCarlo(0), "at least one point is needed"),
-        (lambda: Sobol(100), "Take 64 or 128"),
-        (lambda: Grid().values([LevelSet(tuple(range(2, 5000)))] * 3), "a study has 10000000 at most"),
+        (lambda: MonteCarlo(0), "count is 0; it must be at least 1"),
+        (lambda: Sobol(100), "Use 64 or 128"),
+        (lambda: Grid().values([LevelSet(tuple(range(2, 5000)))] * 3), "the maximum is 10000000"),
     ],
 )
 def test_what_cannot_be_is_refused(make, message):

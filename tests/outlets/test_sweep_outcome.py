@@ -54,7 +54,7 @@ RAMP = 3.0 * TIME - 1.0
     ],
 )
 def test_on_a_straight_line(outcome, expected):
-    assert outcome.number(TIME, RAMP) == pytest.approx(expected, rel=1e-12, abs=1e-12)
+    assert outcome.value(TIME, RAMP) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
 def test_what_a_run_does_not_have_is_not_a_number():
@@ -129,9 +129,9 @@ def test_units_follow_from_the_column():
         (lambda: Final("x", begin=1.0, end=1.0), "its end must be later than its begin"),
         (lambda: Final("x", begin=math.nan), "its end must be later than its begin"),
         (lambda: TimeToReach("x", math.inf), "it must be finite"),
-        (lambda: SettlingTime("x", band=0.0), "it must lie between 0 and 1"),
+        (lambda: SettlingTime("x", band=0.0), "it must be between 0 and 1"),
         (lambda: TimeSeries("x", 0.0), "it must be positive and finite"),
-        (lambda: TimeSeries("x", 1e-9).clip_to_run(0.0, 1.0), "2 to 1000000 instants"),
+        (lambda: TimeSeries("x", 1e-9).clip_to_run(0.0, 1.0), "2 to 1000000 samples"),
     ],
 )
 def test_what_cannot_be_is_refused(make, message):

@@ -70,6 +70,15 @@ def test_the_estimators_are_those_of_scipy():
     )
 
 
+def test_the_indices_agree_with_those_that_scipy_samples_itself():
+    """From the same function, with SciPy's own design and generator."""
+    cube = [stats.uniform(-np.pi, 2 * np.pi)] * 3
+    theirs = stats.sobol_indices(func=lambda x: ishigami(x.T), n=2**13, dists=cube, random_state=7)
+    ours = sobol_indices(ishigami(Saltelli(2**13, 7).values(CUBE)), 3, 7)
+    assert ours.first == pytest.approx(theirs.first_order, abs=0.005)
+    assert ours.total == pytest.approx(theirs.total_order, abs=0.005)
+
+
 def test_intervals_hold_the_truth_about_as_often_as_they_say():
     """Random base points: here the bootstrap's assumption of independent points holds."""
     first, _ = of_ishigami()

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def sweep(
     study: Annotated[
         Path,
-        typer.Argument(metavar="STUDY.toml", help="A file with scenario, [vary], [design] and [outcome]."),
+        typer.Argument(metavar="STUDY.toml", help="A file with scenario, [vary], [design] and [metrics]."),
     ],
     out: Folder = Path("study"),
     workers: Annotated[
@@ -76,9 +76,9 @@ def _run(study: Study, out: Path, workers: int | None, dask: str | None) -> Stud
         with _bar(study.title) as show, _executor(study, workers, dask) as executor:
             return run_study(study, out, executor, show)
     except (AirmuscleError, KeyboardInterrupt):
-        if done := count_finished_runs(study, out):  # counted where they lie: one may have come while all was stopping
-            kept = f"{done} of {len(study)} runs are kept in {out / 'chunks'}"
-            typer.echo(f"{kept}; the same command goes on from there", err=True)
+        if done := count_finished_runs(study, out):  # counted on disk: a run may have been completed during the abort
+            saved = f"{done} of {len(study)} runs are saved in {out / 'chunks'}"
+            typer.echo(f"{saved}; the same command resumes from there", err=True)
         raise
 
 
@@ -105,6 +105,8 @@ def _bar(title: str) -> Iterator[Callable[[int, int], None]]:
 
         def show(done: int, of: int) -> None:
             check_interrupted()
+            if done and bar.tasks[task].total is None:  # the first call states the runs saved by an earlier command
+                typer.echo(f"resuming: {done} of {of} runs are already saved", err=True)
             bar.update(task, completed=done, total=of)
 
         yield show
@@ -157,8 +159,8 @@ def _as_data(result: StudyResult) -> dict[str, Any]:
         "runs": len(study),
         "failed": int(result.failed.size),
         "varied": [number.path for number in study.parameters],
-        "outcomes": {
-            name: {key: values[i] for key, values in statistics.items() if key != "outcome"}
+        "metrics": {
+            name: {key: values[i] for key, values in statistics.items() if key != "metric"}
             for i, name in enumerate(study.scalars)
         },
         "sensitivities": indices,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,19 +20,39 @@ from ..core.errors import ParameterError
 from .location import Location, check_keys, located_errors, number, text
 from .models import model_class
 
+Reader = Callable[[Any, str, str], Any]
+"""Reads the value of a field, given the contextual unit and the location for error messages."""
 
-def build(table: Mapping[str, Any], place: Location, ready: Mapping[str, Any] | None = None) -> Any:
+
+def custom_field(read: Reader, meaning: str, **field: Any) -> Any:
+    """Declare a dataclass field that `read` reads from a file, instead of a parameter with a fixed unit."""
+    return dataclasses.field(metadata={"read": read, "meaning": meaning}, **field)
+
+
+def build(
+    table: Mapping[str, Any],
+    place: Location,
+    ready: Mapping[str, Any] | None = None,
+    *,
+    classes: Mapping[str, type[Any]] | None = None,
+    unit: str = "1",
+) -> Any:
     """The model that a table describes. Raises ParameterError, UnitError or UnknownName, saying where.
 
-    `ready` holds fields that are models already and so do not stand in the table.
+    ready    fields that are models already and therefore not in the table
+    classes  the allowed classes by name; by default all registered models
+    unit     contextual unit of the fields declared with `custom_field`
     """
     if not isinstance(table, Mapping):
         raise ParameterError(f'{place}: {table!r} is not a table; write model = "..." and its parameters under it.')
-    if "library" in table and "model" not in table:
+    if "library" in table and "model" not in table and classes is None:
         return _from_catalogue(table, place)
     if not isinstance(table.get("model"), str):
-        raise ParameterError(f'{place}: no model is named; write model = "Braid", say, and its parameters under it.')
-    cls = model_class(table["model"], f"{place}, model")
+        choice = f"one of {', '.join(classes)}" if classes else 'such as "Braid"'
+        raise ParameterError(
+            f'{place}: no model is named; write model = "...", {choice}, and its parameters under it.'
+        )
+    cls = model_class(table["model"], f"{place}, model", classes)
     given = {key: value for key, value in table.items() if key != "model"}
     for key in given:
         with located_errors(place):
@@ -40,8 +60,11 @@ def build(table: Mapping[str, Any], place: Location, ready: Mapping[str, Any] | 
     declared = {p.name: p for p in parameters(cls)}
     hints = typing.get_type_hints(cls)
     _check_present(cls, {**given, **(ready or {})}, hints, place)
+    readers = {f.name: f.metadata["read"] for f in dataclasses.fields(cls) if "read" in f.metadata}
     values = {
-        key: _numbers(value, declared[key], hints[key], place)
+        key: readers[key](value, unit, f"{place}, {key}")
+        if key in readers
+        else _numbers(value, declared[key], hints[key], place)
         if key in declared
         else _part(value, hints[key], key, place)
         for key, value in given.items()
@@ -65,11 +88,15 @@ def _check_present(cls: type[Any], given: Mapping[str, Any], hints: Mapping[str,
         optional = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
         if not field.init or optional or field.name in given:
             continue
-        facts = field.metadata
-        what = (
-            f"[{facts['unit']}] ({facts['symbol']}, {facts['meaning']})" if facts else f"({_words(hints[field.name])})"
-        )
+        what = _describe_field(field, hints[field.name])
         raise ParameterError(f"{place}: {cls.__name__} needs '{field.name}' {what}; it is missing.")
+
+
+def _describe_field(field: dataclasses.Field[Any], hint: Any) -> str:
+    facts = field.metadata
+    if "unit" in facts:
+        return f"[{facts['unit']}] ({facts['symbol']}, {facts['meaning']})"
+    return f"({facts['meaning'] if facts else _words(hint)})"
 
 
 def _numbers(value: Any, declared: Parameter, hint: Any, place: Location) -> Any:

@@ -1,4 +1,4 @@
-"""Many runs of one scenario: what varies, how it is sampled, what is kept, and which input it comes from."""
+"""Parameter studies: varied parameters, designs of experiments, metrics and sensitivities of a scenario."""
 
 from .executors import dask_cluster, process_pool
 from .result import StudyResult

@@ -1,7 +1,7 @@
-"""Which runs a study makes: the design of its experiments.
+"""Designs of experiments: grid, Monte Carlo, Latin hypercube, Sobol and Saltelli.
 
-Every design places its points in the unit cube; a variation turns each coordinate into a value. So one design serves
-levels and distributions of any kind.
+Each design places its points in the unit cube; the variation of each parameter converts a coordinate to a value. The
+same designs therefore serve for levels and for all distributions.
 """
 
 from __future__ import annotations
@@ -15,17 +15,19 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ParameterError
+from ..library.build import custom_field
 from .distributions import LevelSet, Variation
-from .parse import key, whole
+from .fields import read_count
 
 MAX_RUNS = 10_000_000
-"""RunSplit of one study whose table fits a usual memory."""
+"""Maximum number of runs of a study, whose table fits into the memory of a usual computer."""
 HALF_CELL = 2.0**-31
-"""Half the distance of Sobol points of 30 bits; no share is nearer to 0 or 1, where normal values are infinite."""
+"""Half the spacing of Sobol points with 30 bits: the minimum distance of a coordinate from 0 and 1, where the quantiles
+of a normal distribution are infinite."""
 
 
 class Design(abc.ABC):
-    """How the points of a study are spread."""
+    """Design of experiments."""
 
     @abc.abstractmethod
     def run_count(self, variations: Sequence[Variation]) -> int:
@@ -36,17 +38,20 @@ class Design(abc.ABC):
         """The points (N, d) in the unit cube."""
 
     def values(self, variations: Sequence[Variation]) -> Array:
-        """What is varied, run by run (N, d). Raises ParameterError for variations that do not go with the design."""
+        """The values (N, d) of the varied parameters, one row per run.
+
+        Raises ParameterError for variations that the design does not support.
+        """
         runs = self.run_count(variations)
         if runs > MAX_RUNS:
-            raise ParameterError(f"{type(self).__name__}: {runs:.3g} runs; a study has {MAX_RUNS} at most.")
-        shares = np.clip(self._unit_points(variations), HALF_CELL, 1.0 - HALF_CELL)
-        return np.column_stack([variation.ppf(shares[:, i]) for i, variation in enumerate(variations)])
+            raise ParameterError(f"{type(self).__name__}: {runs:.3g} runs; the maximum is {MAX_RUNS}.")
+        points = np.clip(self._unit_points(variations), HALF_CELL, 1.0 - HALF_CELL)
+        return np.column_stack([variation.ppf(points[:, i]) for i, variation in enumerate(variations)])
 
 
 @dataclasses.dataclass(frozen=True)
 class Grid(Design):
-    """Every combination of the levels; the last of what varies changes fastest."""
+    """Full factorial design: all combinations of the levels; the last parameter changes fastest."""
 
     def run_count(self, variations: Sequence[Variation]) -> int:
         return math.prod(len(self._levels(variation)) for variation in variations)
@@ -54,27 +59,27 @@ class Grid(Design):
     def _levels(self, variation: Variation) -> tuple[float, ...]:
         if not isinstance(variation, LevelSet):
             raise ParameterError(
-                f"Grid: {variation} has no levels; give a list or a Range, or take a design that samples, like "
+                f"Grid: {variation} has no levels; give a list or a Range, or use a sampling design such as "
                 "LatinHypercube."
             )
         return variation.values
 
     def _unit_points(self, variations: Sequence[Variation]) -> Array:
         sizes = [len(self._levels(variation)) for variation in variations]
-        places = np.unravel_index(np.arange(math.prod(sizes)), sizes)
-        return np.column_stack([(place + 0.5) / size for place, size in zip(places, sizes, strict=True)])
+        indices = np.unravel_index(np.arange(math.prod(sizes)), sizes)
+        return np.column_stack([(index + 0.5) / size for index, size in zip(indices, sizes, strict=True)])
 
 
 @dataclasses.dataclass(frozen=True)
 class SampledDesign(Design):
-    """A design of `count` points by chance, the same for the same seed."""
+    """Random design of `count` points, reproducible by its seed."""
 
-    count: int = key(whole, "number of points")
-    seed: int = key(whole, "where the generator of random numbers begins", default=0)
+    count: int = custom_field(read_count, "number of points")
+    seed: int = custom_field(read_count, "seed of the random number generator", default=0)
 
     def __post_init__(self) -> None:
         if self.count < 1:
-            raise ParameterError(f"{type(self).__name__}: count is {self.count}; at least one point is needed.")
+            raise ParameterError(f"{type(self).__name__}: count is {self.count}; it must be at least 1.")
 
     def run_count(self, variations: Sequence[Variation]) -> int:
         return self.count
@@ -83,20 +88,20 @@ class SampledDesign(Design):
         if self.count & (self.count - 1):
             below = 1 << (self.count.bit_length() - 1)
             raise ParameterError(
-                f"{type(self).__name__}: count is {self.count}; Sobol points keep their balance for powers of two "
-                f"only. Take {below} or {2 * below}."
+                f"{type(self).__name__}: count is {self.count}; Sobol points are balanced only if their number is a "
+                f"power of two. Use {below} or {2 * below}."
             )
 
 
 class MonteCarlo(SampledDesign):
-    """Independent points. A study with a greater count begins with the same ones."""
+    """Independent random points. With a larger count, the points of the smaller design come first."""
 
     def _unit_points(self, variations: Sequence[Variation]) -> Array:
         return np.random.default_rng(self.seed).random((self.count, len(variations)))
 
 
 class LatinHypercube(SampledDesign):
-    """Each variable takes each of `count` equal parts of its range once.
+    """Latin hypercube: each parameter takes each of `count` equiprobable intervals exactly once.
 
     McKay, Beckman, Conover, Technometrics 21 (1979) 239-245.
     """
@@ -109,7 +114,7 @@ class LatinHypercube(SampledDesign):
 
 
 class Sobol(SampledDesign):
-    """Scrambled Sobol points, which fill the cube evenly; `count` is a power of two. A greater one adds to them."""
+    """Scrambled Sobol points, a low-discrepancy sequence; `count` is a power of two. A larger count adds points."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -120,10 +125,10 @@ class Sobol(SampledDesign):
 
 
 class Saltelli(SampledDesign):
-    """Points for variance-based sensitivities: `count` base points, a power of two, make count (d + 2) runs.
+    """Design for variance-based sensitivities: `count` base points, a power of two, give count (d + 2) runs.
 
-    Two Sobol samples A and B of d variables; for each base point the runs A, then A with one variable after the other
-    taken from B, then B. Saltelli et al., Computer Physics Communications 181 (2010) 259-270.
+    Two Sobol samples A and B of d parameters. For each base point: the run A, the d runs A with one parameter taken
+    from B, and the run B. Saltelli et al., Computer Physics Communications 181 (2010) 259-270.
     """
 
     def __post_init__(self) -> None:
@@ -143,7 +148,8 @@ class Saltelli(SampledDesign):
         return table.reshape(-1, d)
 
 
-DESIGNS = (Grid, LatinHypercube, Sobol, MonteCarlo, Saltelli)
+DESIGNS = {cls.__name__: cls for cls in (Grid, LatinHypercube, Sobol, MonteCarlo, Saltelli)}
+"""The designs that a study file may name."""
 
 
 def _sobol_points(dimension: int, count: int, seed: int) -> Array:
