@@ -1,8 +1,9 @@
-"""A study gives the same results to the last bit however it was run.
+"""Parameter studies: the results are bit-identical for every kind of execution.
 
-Killed and resumed, in one process or several, in threads or on a Dask cluster: results.csv, the kept chunks and the
-figures are equal byte by byte. A chunk is computed anew exactly when something that it depends on has changed. A run
-that fails leaves its reason and stops no other. Every study that cannot be is refused in one line that says where.
+Killed and resumed, in one process or several, in threads or on a Dask cluster: results.csv, the chunk files and the
+figures are identical byte by byte. A chunk is computed again if and only if something that it depends on has changed. A
+failed run is recorded with its reason and stops no other run. An invalid study is rejected with one line that names the
+location.
 """
 
 from __future__ import annotations
@@ -100,14 +101,14 @@ def edited(folder: Path, old: str, new: str, file: str = "study.toml") -> Path:
 
 
 def run(folder: Path, out: str = "out", executor=None):
-    """The study's result, and results.csv; figures take longer than all the rest."""
+    """The result of the study; writes results.csv without the report, whose figures take most of the time."""
     result = run_study(load_study(folder / "study.toml"), folder / out, executor)
     save_table(result.table(), folder / out / "results.csv")
     return result
 
 
 def contents(out: Path) -> dict[str, bytes]:
-    """Everything that a study writes, but the page, which carries the date."""
+    """All files of a study except for the page, which contains the date."""
     return {
         p.relative_to(out).as_posix(): p.read_bytes() for p in out.rglob("*") if p.is_file() and p.suffix != ".html"
     }
@@ -134,7 +135,7 @@ runpy.run_module("airmuscle", run_name="__main__", alter_sys=True)
 
 
 def started(folder: Path, chunks: int, *options: str) -> subprocess.Popen:
-    """A study that has kept as many chunks and is still running; Ctrl-C reaches it as it does from a terminal."""
+    """A running study that has saved at least `chunks` chunks; SIGINT reaches it as from a terminal."""
     process = subprocess.Popen(
         [sys.executable, "-c", HEARING, *command(folder, *options)[3:]],
         stdout=subprocess.PIPE,
@@ -150,10 +151,10 @@ def started(folder: Path, chunks: int, *options: str) -> subprocess.Popen:
     return process
 
 
-# The same to the last bit
+# Bit-identical results
 
 
-def test_a_study_that_was_killed_goes_on_and_ends_bit_equal(folder: Path):
+def test_a_killed_study_is_resumed_with_bit_identical_results(folder: Path):
     edited(folder, "count = 22", "count = 400")
     process = started(folder, 3, "--workers", "2")
     os.killpg(process.pid, signal.SIGKILL)
@@ -203,7 +204,7 @@ def test_workers_exit_within_a_second_when_their_parent_is_killed(folder: Path):
         time.sleep(0.01)
 
 
-def test_a_new_study_is_not_said_to_be_resumed_and_a_finished_one_is(folder: Path):
+def test_only_a_resumed_study_is_reported_as_resumed(folder: Path):
     arguments = ["sweep", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1"]
     first, second = (CliRunner().invoke(app, arguments) for _ in range(2))
     assert "resuming" not in first.stderr
@@ -212,7 +213,7 @@ def test_a_new_study_is_not_said_to_be_resumed_and_a_finished_one_is(folder: Pat
 
 
 @pytest.mark.parametrize("workers", ["1", "2"])
-def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(folder: Path, workers: str):
+def test_ctrl_c_saves_completed_runs_and_says_how_to_resume(folder: Path, workers: str):
     edited(folder, "count = 22", "count = 2000")
     process = started(folder, 3, "--workers", workers)
     os.killpg(process.pid, signal.SIGINT)
@@ -226,7 +227,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(folder: Path, workers: 
     assert not (folder / "out" / "results.csv").exists()
 
 
-def test_ctrl_c_while_workers_begin_is_no_traceback_of_theirs():
+def test_ctrl_c_while_workers_start_gives_no_traceback():
     with process_pool(2) as executor:
         tasks = [executor.submit(os.getpid) for _ in range(2)]
         for _ in range(40):
@@ -236,7 +237,7 @@ def test_ctrl_c_while_workers_begin_is_no_traceback_of_theirs():
         assert len({task.result() for task in tasks}) in {1, 2}
 
 
-def test_ctrl_c_that_python_loses_is_remembered(monkeypatch):
+def test_a_sigint_that_python_discards_is_not_lost(monkeypatch):
     lost = []
     monkeypatch.setattr(sys, "unraisablehook", lost.append)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -316,15 +317,15 @@ def test_a_run_is_what_simulate_gives(folder: Path):
     assert scenario.plant.mechanism.contraction == result.study.values[5, 1]
 
 
-def test_where_the_runs_of_a_chunk_begin_is_found_at_once_and_is_what_each_finds_alone(folder: Path):
+def test_initial_states_computed_together_equal_those_computed_individually(folder: Path):
     study = load_study(folder / "study.toml")
-    rests = study.initial_states(range(22))
-    assert [rest == study.scenario(run).start for run, rest in enumerate(rests)] == [True] * 22
-    assert study.scenario(3, rests[3]).start == rests[3]
-    assert len({rest["air_mass"] for rest in rests}) == 22
+    states = study.initial_states(range(22))
+    assert [state == study.scenario(run).start for run, state in enumerate(states)] == [True] * 22
+    assert study.scenario(3, states[3]).start == states[3]
+    assert len({state["air_mass"] for state in states}) == 22
 
 
-def test_a_number_may_follow_any_that_varies(folder: Path):
+def test_a_parameter_may_follow_any_varied_parameter(folder: Path):
     content = (folder / "study.toml").read_text(encoding="utf-8")
     follow = '[follow]\n"circuit.fill.critical_ratio" = "mechanism.contraction"\n[design]'
     (folder / "study.toml").write_text(content.replace("[design]", follow), encoding="utf-8")
@@ -332,7 +333,7 @@ def test_a_number_may_follow_any_that_varies(folder: Path):
     assert study.scenario(5).plant.circuit.fill.critical_ratio == study.values[5, 1]
 
 
-def test_a_start_that_varies_or_is_no_rest_is_found_run_by_run(folder: Path):
+def test_a_varied_initial_state_is_computed_run_by_run(folder: Path):
     edited(
         folder, '"mechanism.contraction" =', '"run.start.pressure" = { model = "Uniform", low = 0, high = 1e5 }\n"x" ='
     )
@@ -344,11 +345,11 @@ def test_a_start_that_varies_or_is_no_rest_is_found_run_by_run(folder: Path):
     assert not run(folder).failed.size
 
 
-# What is computed anew
+# Chunks that are computed again
 
 
 def computed_anew(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """The chunks that a further run of the study computes."""
+    """The chunks that another execution of the study computes."""
     found = []
     original = chunk.compute_chunk
     monkeypatch.setattr(chunk, "compute_chunk", lambda study, index: found.append(index) or original(study, index))
@@ -372,14 +373,14 @@ EVERYTHING = list(range(6))
         ('radius = "10 mm"', 'radius = "10.1 mm"', "muscle.toml", EVERYTHING),
     ],
 )
-def test_a_chunk_is_computed_anew_when_what_it_depends_on_changes(folder, monkeypatch, old, new, file, expected):
+def test_a_chunk_is_computed_again_if_something_it_depends_on_changes(folder, monkeypatch, old, new, file, expected):
     run(folder)
     assert computed_anew(folder, monkeypatch) == []
     edited(folder, old, new, file)
     assert computed_anew(folder, monkeypatch) == expected
 
 
-def test_another_program_computes_everything_anew(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_another_program_version_computes_all_chunks_again(folder: Path, monkeypatch: pytest.MonkeyPatch):
     run(folder)
     monkeypatch.setattr(fingerprint.metadata, "version", lambda name: "another")
     fingerprint.program_fingerprint.cache_clear()
@@ -391,7 +392,7 @@ def test_another_program_computes_everything_anew(folder: Path, monkeypatch: pyt
         fingerprint.program_fingerprint.cache_clear()
 
 
-def test_a_chunk_that_is_damaged_is_computed_anew(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_damaged_chunk_is_computed_again(folder: Path, monkeypatch: pytest.MonkeyPatch):
     result = run(folder)
     file = folder / "out" / "chunks" / chunk.chunk_file_name(result.study, 2)
     whole = file.read_bytes()
@@ -401,7 +402,7 @@ def test_a_chunk_that_is_damaged_is_computed_anew(folder: Path, monkeypatch: pyt
         assert file.read_bytes() == whole
 
 
-def test_a_chunk_appears_whole_or_not_at_all(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_chunk_is_written_atomically(folder: Path, monkeypatch: pytest.MonkeyPatch):
     study = load_study(folder / "study.toml")
 
     def refusing(*given):
@@ -413,8 +414,8 @@ def test_a_chunk_appears_whole_or_not_at_all(folder: Path, monkeypatch: pytest.M
     assert not {p.name for p in folder.iterdir()} - {"muscle.toml", "scenario.toml", "study.toml"}
 
 
-def test_the_way_in_which_a_start_is_given_is_an_input_too(folder: Path):
-    """At rest, or held where it happens to rest: equal for the scenario itself, but not for what varies."""
+def test_the_fingerprint_depends_on_how_the_initial_state_is_specified(folder: Path):
+    """In equilibrium, or at a fixed position of equal value: the same nominal scenario, but not the same varied runs."""
     edited(folder, 'model = "Isometric"\ncontraction = 0.05', 'model = "HangingMass"\nmass = "5 kg"', "scenario.toml")
     edited(
         folder,
@@ -430,8 +431,8 @@ def test_the_way_in_which_a_start_is_given_is_an_input_too(folder: Path):
     assert held.fingerprint() != at_rest.fingerprint()
 
 
-def test_a_reason_is_the_same_from_wherever_the_study_was_read(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    """A worker knows the study by its whole path, and reasons are results."""
+def test_a_failure_reason_does_not_depend_on_the_path_of_the_study(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    """A worker reads the study by its absolute path, and failure reasons are part of the results."""
     edited(folder, "[design]", '"run.duration" = ["0 s"]\n[design]')
     monkeypatch.chdir(folder)
     here, elsewhere = (chunk.compute_chunk(load_study(path), 0) for path in ("study.toml", folder / "study.toml"))
@@ -439,18 +440,18 @@ def test_a_reason_is_the_same_from_wherever_the_study_was_read(folder: Path, mon
     assert here.failure_reasons[0].startswith("scenario.toml, [run], duration is 0.0; it must be greater than zero")
 
 
-def test_a_worker_leaves_ctrl_c_to_the_process_that_it_works_for():
+def test_a_worker_ignores_sigint():
     with process_pool(2) as executor:
         assert executor.submit(signal.getsignal, signal.SIGINT).result() == signal.SIG_IGN
 
 
-def test_a_worker_that_reads_another_study_refuses(folder: Path):
+def test_a_worker_rejects_a_different_study(folder: Path):
     study = load_study(folder / "study.toml")
     with pytest.raises(FileError, match="a worker process has read a different study"):
         chunk.run_chunk(str(study.path), "0" * 64, 0)
 
 
-def test_a_worker_that_dies_is_an_error_that_says_how_to_go_on(folder: Path):
+def test_a_dead_worker_is_an_error_that_says_how_to_resume(folder: Path):
     study = load_study(edited(folder, "count = 22", "count = 2000"))
     with process_pool(2) as executor:
 
@@ -464,10 +465,10 @@ def test_a_worker_that_dies_is_an_error_that_says_how_to_go_on(folder: Path):
     assert 1 <= len(list((folder / "out" / "chunks").glob("*.npz"))) < 500
 
 
-# Runs that fail
+# Failed runs
 
 
-def test_a_run_that_fails_leaves_its_reason_and_stops_no_other(folder: Path):
+def test_a_failed_run_is_recorded_with_its_reason_and_stops_no_other(folder: Path):
     edited(folder, "[design]", '"command.fill[0][1]" = [1, 2]\n[design]')
     result = run(folder)
     opened = result.study.values[:, 2] == 2
@@ -481,7 +482,7 @@ def test_a_run_that_fails_leaves_its_reason_and_stops_no_other(folder: Path):
     assert all(row["pressure [Pa]"] == "" for row, o in zip(rows, opened, strict=True) if o)
 
 
-def test_a_value_beyond_its_bounds_fails_its_run_alone(folder: Path):
+def test_a_value_outside_its_bounds_fails_only_its_own_run(folder: Path):
     edited(folder, 'std = "0.2e-9 m3/(s Pa)"', 'std = "3e-9 m3/(s Pa)"')
     result = run(folder)
     assert np.array_equal(result.failed, np.flatnonzero(result.study.values[:, 0] < 0))
@@ -489,7 +490,7 @@ def test_a_value_beyond_its_bounds_fails_its_run_alone(folder: Path):
     assert "allowed are" in result.failure_reasons[result.failed[0]]
 
 
-def test_what_nobody_foresaw_fails_its_run_alone(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_an_unexpected_exception_fails_only_its_own_run(folder: Path, monkeypatch: pytest.MonkeyPatch):
     calls = []
 
     def failing(*given, **named):
@@ -503,7 +504,7 @@ def test_what_nobody_foresaw_fails_its_run_alone(folder: Path, monkeypatch: pyte
     assert [r for r in result.failure_reasons if r] == ["ZeroDivisionError: by nothing"]
 
 
-def test_a_study_of_failures_alone_says_so(folder: Path):
+def test_a_study_in_which_all_runs_fail_is_an_error(folder: Path):
     edited(folder, "[design]", '"command.fill[0][1]" = [2]\n[design]')
     done = CliRunner().invoke(
         app, ["sweep", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1"]
@@ -513,10 +514,10 @@ def test_a_study_of_failures_alone_says_so(folder: Path):
     assert (folder / "out" / "results.csv").exists()
 
 
-# What varies
+# Varied parameters
 
 
-def test_numbers_of_command_and_run_vary_too(folder: Path):
+def test_parameters_of_command_and_run_may_vary(folder: Path):
     edited(
         folder,
         "[design]",
@@ -532,14 +533,14 @@ def test_numbers_of_command_and_run_vary_too(folder: Path):
     assert scenario.duration == duration == 0.5
 
 
-def test_a_number_follows_another(folder: Path):
+def test_a_parameter_follows_another(folder: Path):
     edited(folder, "[design]", '[follow]\n"circuit.discharge.conductance" = "circuit.fill.conductance"\n[design]')
     circuit = load_study(folder / "study.toml").scenario(7).plant.circuit
     assert circuit.discharge.conductance == circuit.fill.conductance != 3e-9
 
 
-def test_a_scenario_may_stand_in_the_study(folder: Path):
-    beside = run(folder, "beside")
+def test_the_scenario_may_be_part_of_the_study_file(folder: Path):
+    separate = run(folder, "separate")
     inside = (
         SCENARIO.replace("[plant", "[scenario.plant")
         .replace("[command", "[scenario.command")
@@ -547,7 +548,7 @@ def test_a_scenario_may_stand_in_the_study(folder: Path):
     )
     edited(folder, 'scenario = "scenario.toml"\n', "")
     edited(folder, "[vary]", f"{inside}\n[vary]")
-    assert np.array_equal(run(folder, "inside").scalars, beside.scalars)
+    assert np.array_equal(run(folder, "inside").scalars, separate.scalars)
 
 
 def test_the_example_runs(tmp_path: Path):
@@ -563,7 +564,7 @@ def test_the_example_runs(tmp_path: Path):
     assert np.isfinite(result.scalars).all()
 
 
-def test_the_study_of_the_page_can_be_read(tmp_path: Path):
+def test_the_study_in_the_documentation_is_valid(tmp_path: Path):
     page = (ROOT / "docs" / "sweep.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
     shutil.copy(ROOT / "examples" / "fill_discharge.toml", tmp_path)
@@ -575,10 +576,10 @@ def test_the_study_of_the_page_can_be_read(tmp_path: Path):
     assert len(study) == 256
 
 
-# Outputs
+# Output files
 
 
-def test_the_table_has_one_row_a_run_with_units(folder: Path):
+def test_the_table_has_one_row_per_run_with_units(folder: Path):
     result = run(folder)
     rows = list(csv.DictReader((folder / "out" / "results.csv").open(encoding="utf-8")))
     assert list(rows[0]) == [
@@ -594,7 +595,9 @@ def test_the_table_has_one_row_a_run_with_units(folder: Path):
 
 def test_an_unknown_metric_is_an_error_with_the_nearest_name(folder: Path):
     result = run(folder)
-    with pytest.raises(ColumnError, match=r"no metric 'presure'; the metrics are pressure, reached, course.* 'pressure'"):
+    with pytest.raises(
+        ColumnError, match=r"no metric 'presure'; the metrics are pressure, reached, course.* 'pressure'"
+    ):
         result["presure"]
 
 
@@ -624,7 +627,7 @@ def test_the_command_names_its_report_last(folder: Path):
     assert "Two valves: 22 runs, MonteCarlo(count=22, seed=3)" in done.stdout
 
 
-# Studies that cannot be
+# Invalid studies
 
 BAD = [
     ("circuit.fill.conductance", "circuit.fil.conductance", "no parameter 'circuit.fil.conductance'. Did you mean 'circuit.fill.conductance'?"),
@@ -682,7 +685,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("old", "new", "message"), BAD)
-def test_a_study_that_cannot_be_is_refused(folder: Path, old: str, new: str, message: str):
+def test_an_invalid_study_is_rejected(folder: Path, old: str, new: str, message: str):
     with pytest.raises(AirmuscleError) as refused:
         load_study(edited(folder, old, new))
     assert message in str(refused.value)
@@ -690,7 +693,7 @@ def test_a_study_that_cannot_be_is_refused(folder: Path, old: str, new: str, mes
 
 
 @pytest.mark.parametrize("table", ["vary", "metrics"])
-def test_an_empty_or_missing_table_is_refused(folder: Path, table: str):
+def test_an_empty_or_missing_table_is_rejected(folder: Path, table: str):
     whole = (folder / "study.toml").read_text(encoding="utf-8")
     start = whole.index(f"[{table}]")
     end = whole.find("[design]") if table == "vary" else len(whole)
@@ -700,7 +703,7 @@ def test_an_empty_or_missing_table_is_refused(folder: Path, table: str):
             load_study(folder / "study.toml")
 
 
-def test_places_that_cannot_be_are_refused(folder: Path):
+def test_invalid_executors_and_folders_are_rejected(folder: Path):
     with pytest.raises(InputError, match="workers is 0; it must be at least 1"), process_pool(0):
         pass
     (folder / "file").write_text("", encoding="utf-8")
@@ -712,11 +715,14 @@ def test_places_that_cannot_be_are_refused(folder: Path):
     assert "--workers and --dask exclude each other" in both.stderr
 
 
-def test_a_cluster_that_does_not_answer_is_refused(monkeypatch: pytest.MonkeyPatch):
+def test_a_cluster_that_does_not_respond_is_rejected(monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr("airmuscle.study.executors.CONNECT_TIMEOUT", 0.5)
     for address in ("tcp://127.0.0.1:1", "nonsense://here"):
-        with pytest.raises(InputError, match=f"no response from a Dask scheduler at '{address}'"), dask_cluster(address):
+        with (
+            pytest.raises(InputError, match=f"no response from a Dask scheduler at '{address}'"),
+            dask_cluster(address),
+        ):
             pass
 
 

@@ -1,8 +1,8 @@
-"""Designs and distributions keep what their names promise.
+"""Designs of experiments and distributions have their defining properties.
 
-A distribution turns shares into values: rising, within its ends, half of all below the median. A grid holds every
-combination once; a Latin hypercube every part of every range once; a greater Monte Carlo or Sobol study begins with the
-points of the smaller one; Saltelli's runs exchange one variable at a time. The same seed gives the same points.
+The quantiles of a distribution are monotonic and within its support. A grid contains each combination once, a Latin
+hypercube each equiprobable interval once; a larger Monte Carlo or Sobol design begins with the points of the smaller one;
+Saltelli's design exchanges one parameter at a time. Equal seeds give equal points.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ def distributions(draw) -> Variation:
 
 @settings(deadline=None)
 @given(distributions(), st.lists(st.floats(1e-9, 1 - 1e-9), min_size=2, max_size=20))
-def test_values_rise_with_the_shares_and_stay_within_the_ends(variation, shares):
-    values = variation.ppf(np.sort(shares))
+def test_quantiles_are_monotonic_and_within_the_support(variation, probabilities):
+    values = variation.ppf(np.sort(probabilities))
     low, high = variation.support
     assert (np.diff(values) >= 0).all()
     assert (values >= low - 1e-9 * abs(low)).all()
@@ -65,9 +65,9 @@ def test_values_rise_with_the_shares_and_stay_within_the_ends(variation, shares)
 @given(distributions())
 def test_a_truncated_distribution_keeps_the_shape_of_its_middle(variation):
     if isinstance(variation, Truncated):
-        law = variation.inner.scipy_distribution()
-        share = law.cdf(variation.ppf(np.array([0.25, 0.5, 0.75])))
-        assert (share - 0.2) / 0.7 == pytest.approx([0.25, 0.5, 0.75], abs=1e-6)
+        inner = variation.inner.scipy_distribution()
+        probability = inner.cdf(variation.ppf(np.array([0.25, 0.5, 0.75])))
+        assert (probability - 0.2) / 0.7 == pytest.approx([0.25, 0.5, 0.75], abs=1e-6)
 
 
 EVEN = (np.arange(100_000) + 0.5) / 100_000
@@ -84,13 +84,13 @@ EVEN = (np.arange(100_000) + 0.5) / 100_000
         (LevelSet((1.0, 2.0, 6.0)), 3.0, np.sqrt(14 / 3)),
     ],
 )
-def test_mean_and_deviation_are_those_of_the_text_books(variation, mean, deviation):
+def test_mean_and_standard_deviation_are_those_of_the_textbooks(variation, mean, deviation):
     values = variation.ppf(EVEN)
     assert values.mean() == pytest.approx(mean, abs=2e-4)
     assert values.std() == pytest.approx(deviation, rel=2e-3)
 
 
-def test_a_file_gives_values_in_units_and_deviations_as_differences():
+def test_values_have_units_and_standard_deviations_are_differences():
     place = Location("study.toml", "", None)
     found = read_variation({"model": "Normal", "mean": "6.5 bara", "std": "0.1 bara"}, "Pa", place)
     assert found.mean == pytest.approx(548675.0)
@@ -104,7 +104,7 @@ def test_a_file_gives_values_in_units_and_deviations_as_differences():
 
 @settings(deadline=None)
 @given(st.lists(st.integers(1, 5), min_size=1, max_size=4), st.floats(0.1, 10))
-def test_a_grid_holds_every_combination_once_the_last_fastest(sizes, step):
+def test_a_grid_contains_each_combination_once_the_last_fastest(sizes, step):
     lists = [[step * (i + 7 * k) for i in range(size)] for k, size in enumerate(sizes)]
     values = Grid().values([LevelSet(tuple(each)) for each in lists])
     assert [tuple(row) for row in values] == list(itertools.product(*lists))
@@ -112,20 +112,20 @@ def test_a_grid_holds_every_combination_once_the_last_fastest(sizes, step):
 
 @settings(deadline=None)
 @given(st.integers(1, 40), st.integers(1, 5), st.integers(0, 1000))
-def test_a_latin_hypercube_has_every_part_of_every_range_once(count, variables, seed):
+def test_a_latin_hypercube_contains_each_interval_once(count, variables, seed):
     values = LatinHypercube(count, seed).values([Uniform(0.0, 1.0)] * variables)
     parts = np.sort(np.floor(values * count), axis=0)
     assert (parts == np.arange(count)[:, None]).all()
 
 
 @pytest.mark.parametrize("design", [MonteCarlo, Sobol])
-def test_a_greater_study_begins_with_the_points_of_the_smaller_one(design):
+def test_a_larger_design_begins_with_the_points_of_the_smaller_one(design):
     variations = [Normal(0.0, 1.0), Uniform(0.0, 1.0), LevelSet((1.0, 2.0))]
     assert np.array_equal(design(64, 5).values(variations)[:16], design(16, 5).values(variations))
 
 
 @pytest.mark.parametrize("design", [MonteCarlo, Sobol, LatinHypercube, Saltelli])
-def test_the_seed_decides(design):
+def test_equal_seeds_give_equal_points(design):
     variations = [Uniform(0.0, 1.0)] * 2
     assert np.array_equal(design(8, 5).values(variations), design(8, 5).values(variations))
     assert not np.array_equal(design(8, 5).values(variations), design(8, 6).values(variations))
@@ -168,6 +168,6 @@ def test_no_value_of_a_normal_distribution_is_infinite():
         (lambda: Grid().values([LevelSet(tuple(range(2, 5000)))] * 3), "the maximum is 10000000"),
     ],
 )
-def test_what_cannot_be_is_refused(make, message):
+def test_an_invalid_design_or_distribution_is_rejected(make, message):
     with pytest.raises(ParameterError, match=message):
         make()

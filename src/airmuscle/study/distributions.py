@@ -214,18 +214,18 @@ VARIATIONS: dict[str, type[Any]] = {"Range": Range, **DISTRIBUTIONS, "Truncated"
 """The variations that a study file may name."""
 
 
-def read_variation(value: Any, unit: str, place: Location) -> Variation:
+def read_variation(value: Any, unit: str, location: Location) -> Variation:
     """The variation in a list or table of a study file. Raises ParameterError, UnitError or UnknownNameError."""
     if isinstance(value, list):
         if not value:
-            raise ParameterError(f"{place}: the list is empty; give at least one value.")
-        return LevelSet(tuple(finite(item, unit, f"{place}[{i}]") for i, item in enumerate(value)))
+            raise ParameterError(f"{location}: the list is empty; give at least one value.")
+        return LevelSet(tuple(finite(item, unit, f"{location}[{i}]") for i, item in enumerate(value)))
     if not isinstance(value, Mapping):
         raise ParameterError(
-            f'{place} is {value!r}; write a list of values, or a distribution such as {{ model = "Uniform", low = ..., '
-            "high = ... }."
+            f'{location} is {value!r}; write a list of values, or a distribution such as {{ model = "Uniform", '
+            "low = ..., high = ... }."
         )
-    variation = build(value, place, classes=VARIATIONS, unit=unit)
+    variation = build(value, location, classes=VARIATIONS, unit=unit)
     return variation.levels if isinstance(variation, Range) else variation
 
 

@@ -88,7 +88,7 @@ def _initialise_worker(stop_event: Any) -> None:
 
 
 def _exit_with_parent() -> None:
-    """End this worker as soon as its parent has ended; a killed parent cannot tell its workers to stop.
+    """End this worker as soon as its parent has ended; a killed parent cannot stop its workers.
 
     The parent holds the other end of a pipe, which the operating system closes when the parent ends.
     """
@@ -99,7 +99,7 @@ def _exit_with_parent() -> None:
 
 
 def check_running() -> None:
-    """Raise KeyboardInterrupt in a worker that has been told to stop."""
+    """Raise KeyboardInterrupt in a worker whose pool has been stopped."""
     if _stop_event is not None and _stop_event.is_set():
         raise KeyboardInterrupt
 

@@ -96,10 +96,10 @@ def _read_finished(file: Path) -> Chunk:
 
 def _nominal_values(study: Study) -> dict[str, float]:
     """The scalar metrics of the nominal scenario; NaN if its run fails."""
-    (outcome,) = simulate_all([study.template.scenario], metric_times(study))
-    if isinstance(outcome, str):
+    (recording,) = simulate_all([study.template.scenario], metric_times(study))
+    if isinstance(recording, str):
         return dict.fromkeys(study.scalars, np.nan)
-    return {name: metric.value(outcome["time"], outcome[metric.column]) for name, metric in study.scalars.items()}
+    return {name: metric.value(recording["time"], recording[metric.column]) for name, metric in study.scalars.items()}
 
 
 def _combine(study: Study, chunks: Sequence[Chunk], nominal: dict[str, float]) -> StudyResult:
