@@ -1,7 +1,7 @@
-"""A bench file becomes the same Recording however a laboratory writes it, or an error that says what to do.
+"""Reader of text files: the same table gives the same Recording in every text format, or an error with a remedy.
 
-Delimiter, decimal sign, encoding and the place of the units change nothing. Gauge or absolute follows from the
-unit. A message names file, line, value and remedy.
+Delimiter, decimal sign, encoding and the position of the units do not matter. The unit states whether a pressure is gauge
+or absolute. An error message names file, line, value and remedy.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def refusal(path: Path, kind: type[InputError], **options) -> str:
     return str(caught.value)
 
 
-# Forms in which the same table occurs
+# Formats of the same table
 
 GERMAN = PLAIN.replace(",", ";").replace("0.", "0,").replace("200.5", "200,5")
 FORMS = {
@@ -76,7 +76,7 @@ FORMS = {
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_every_form_gives_the_same_recording(bench, form: str):
+def test_every_format_gives_the_same_recording(bench, form: str):
     same(read_csv(bench(FORMS[form])))
 
 
@@ -87,13 +87,13 @@ def test_latin_1_is_read(bench):
     assert recording["temperature"] == pytest.approx([293.15, 294.15])
 
 
-def test_the_case_of_a_letter_tells_time_from_temperature_and_speed_from_volume(bench):
+def test_the_symbols_t_and_v_are_case_sensitive(bench):
     recording = read_csv(bench("t [s],T [K],v [mm/s],V [m3]\n0,293,1,0.001\n1,294,2,0.002\n"))
     same(recording, {"time": [0, 1], "temperature": [293, 294], "speed": [1e-3, 2e-3], "volume": [1e-3, 2e-3]})
 
 
 @pytest.mark.parametrize("text", ["k [%]", "eps [%]", "Epsilon [%]", "contraction_%", "CONTRACTION (%)", "ε / %"])
-def test_contraction_has_many_names(bench, text: str):
+def test_synonyms_of_contraction(bench, text: str):
     assert read_csv(bench(f"{text}\n-2\n25\n"))["contraction"] == pytest.approx([-0.02, 0.25])
 
 
@@ -102,7 +102,7 @@ def test_columns_of_several_muscles_keep_their_prefix(bench):
     same(recording, {"left.pressure": [1e5, 3e5], "right.pressure": [2e5, 4e5]})
 
 
-# Gauge or absolute, and what else the reader is told
+# Gauge or absolute pressure, notes and constants
 
 
 @pytest.mark.parametrize("unit", ["bara", "bar(a)", "bar abs"])
@@ -119,7 +119,7 @@ def test_absolute_pressure_becomes_gauge(bench, unit: str):
     ("heading", "factor"),
     [("p [psig]", 6894.757293168361), ("p_kPag", 1e3), ("pressure [kPa(g)]", 1e3), ("p / barg", 1e5)],
 )
-def test_a_unit_that_says_gauge_is_believed_without_a_note(bench, heading: str, factor: float):
+def test_a_gauge_unit_needs_no_note(bench, heading: str, factor: float):
     recording = read_csv(bench(f"{heading}\n3\n4\n"))
     assert recording["pressure"] == pytest.approx([3 * factor, 4 * factor])
     assert recording.notes == ()
@@ -128,25 +128,22 @@ def test_a_unit_that_says_gauge_is_believed_without_a_note(bench, heading: str, 
 @pytest.mark.parametrize(
     "heading", ["pressure_kPa(a)", "pressure [kPa(a)]", "pressure (kPa(a))", "p / kPa(a)", "p kPaa"]
 )
-def test_absolute_is_understood_in_every_form(bench, heading: str):
+def test_absolute_units_are_recognised_in_every_format(bench, heading: str):
     assert read_csv(bench(f"{heading}\n300\n400\n"))["pressure"] == pytest.approx([3e5 - 101325, 4e5 - 101325])
 
 
-def test_a_plain_unit_is_gauge_and_the_recording_says_so(bench):
+def test_an_unspecified_unit_is_read_as_gauge_with_a_note(bench):
     recording = read_csv(bench(PLAIN))
     assert recording.notes == (
         "The pressure is read as gauge: the unit 'kPa' does not state it. Write bara or kPa(a) for an absolute pressure.",
     )
 
 
-def test_unknown_numbers_are_kept_and_unknown_text_left_out_with_a_note(bench):
+def test_unknown_numeric_columns_are_kept_and_texts_ignored_with_a_note(bench):
     recording = read_csv(bench("pressure [barg],presure [bar],valve,operator\n1,2,3,Bob\n4,5,6,Eve\n"))
     same(recording, {"pressure": [1e5, 4e5], "presure [bar]": [2, 5], "valve": [3, 6]})
     notes = " ".join(recording.notes)
-    assert (
-        "'presure [bar]' is not a known quantity and is kept without conversion. Did you mean 'pressure'?"
-        in notes
-    )
+    assert "'presure [bar]' is not a known quantity and is kept without conversion. Did you mean 'pressure'?" in notes
     assert "Column 'operator' contains text and is ignored." in notes
 
 
@@ -159,13 +156,13 @@ def test_a_resting_length_gives_the_contraction(bench):
 
 
 @pytest.mark.parametrize("remark", ["# resting_length [mm] = 300", "% resting_length: 300 mm", "#resting_length = 0.3"])
-def test_the_file_may_state_the_resting_length_itself(bench, remark: str):
+def test_the_file_may_state_the_resting_length(bench, remark: str):
     recording = read_csv(bench(f'{remark}\n# specimen = "DMSP-20"\n# by: Bob = the operator\n{PLAIN}'))
     assert recording.constants == {"resting_length": 0.3, "specimen": "DMSP-20"}
     assert read_csv(bench(f"{remark}\n{PLAIN}"), resting_length=0.4).constants["resting_length"] == 0.4
 
 
-def test_units_that_the_file_does_not_state_may_be_given(bench):
+def test_missing_units_may_be_given(bench):
     path = bench("p,eps,F\n1,0,3\n2,0.1,4\n")
     recording = read_csv(path, units={"pressure": "bar", "F": "kN"}, specimen="old one")
     same(recording, {"pressure": [1e5, 2e5], "contraction": [0, 0.1], "force": [3e3, 4e3]})
@@ -176,7 +173,7 @@ def test_units_that_the_file_does_not_state_may_be_given(bench):
     assert "Did you mean 'pressure'?" in said
 
 
-# What is refused, and how
+# Errors
 
 
 def test_a_missing_file(tmp_path: Path):
@@ -224,7 +221,7 @@ def test_an_empty_cell_is_named_with_its_line_in_the_file(bench):
 
 
 @pytest.mark.parametrize("cell", ["nan", "NaN", "inf", "-inf"])
-def test_what_is_not_finite(bench, cell: str):
+def test_a_value_that_is_not_finite(bench, cell: str):
     said = refusal(bench(f"time [s],force [N]\n0,1\n1,{cell}\n2,3\n3,nan\n"), ColumnError)
     assert f"bench.csv, line 3: force is {float(cell)}; it must be finite" in said
     assert "non-finite cells in the column: 2" in said
@@ -245,9 +242,11 @@ def test_ragged_rows(bench, row: str):
     assert "decimal comma" not in said
 
 
-def test_two_decimal_signs_are_not_guessed(bench):
+def test_two_decimal_signs_are_rejected(bench):
     said = refusal(bench("time [s];force [N]\n0;1,234\n1;0.5\n"), ColumnError)
-    assert "bench.csv, line 2: the comma in '1,234' is ambiguous, because line 3 contains a decimal point ('0.5')" in said
+    assert (
+        "bench.csv, line 2: the comma in '1,234' is ambiguous, because line 3 contains a decimal point ('0.5')" in said
+    )
 
 
 @pytest.mark.parametrize(
@@ -300,7 +299,7 @@ def test_a_pressure_below_absolute_zero(bench):
     assert read_csv(bench("pressure [kPa]\n-90\n"))["pressure"] == pytest.approx([-9e4])
 
 
-def test_per_cent_under_a_ratio(bench):
+def test_percent_read_as_a_ratio(bench):
     said = refusal(bench("contraction [1]\n0\n12.5\n"), ColumnError)
     assert "bench.csv, line 3: contraction 12.5 is outside the plausible range -0.5 to 1" in said
     assert "'contraction [%]'" in said
@@ -313,18 +312,20 @@ def test_a_length_in_the_wrong_unit(bench):
     assert "line 3: length is -1 m; it must be positive" in refusal(bench("length [m]\n1\n-1\n"), ColumnError)
 
 
-def test_a_resting_length_that_is_none(bench):
+def test_an_invalid_resting_length(bench):
     assert "resting_length is -1 m; it must be positive" in refusal(bench(PLAIN), ColumnError, resting_length=-1.0)
     assert "carries no unit" in refusal(bench(PLAIN), UnitError, resting_length="300")
 
 
-def test_a_column_that_is_asked_for_and_not_there(bench):
-    with pytest.raises(ColumnError, match=r"bench\.csv: no column 'presure'; the columns are .*Did you mean 'pressure'\?"):
+def test_a_missing_column(bench):
+    with pytest.raises(
+        ColumnError, match=r"bench\.csv: no column 'presure'; the columns are .*Did you mean 'pressure'\?"
+    ):
         read_csv(bench(PLAIN))["presure"]
 
 
-def test_a_long_file_is_read_in_a_moment(bench):
-    """The fast parser and the careful one agree."""
+def test_the_fast_parser_equals_the_parser_by_cell(bench):
+    """A numeric table is parsed by NumPy, a table with texts cell by cell."""
     values = np.random.default_rng(1).normal(0, 100, (20_000, 3))
     values[:, 0] = np.arange(20_000)
     rows = [",".join(map(repr, row)) for row in values.tolist()]
@@ -335,7 +336,7 @@ def test_a_long_file_is_read_in_a_moment(bench):
         assert np.array_equal(careful[name], values[:, i])
 
 
-def test_a_stated_unit_goes_before_the_files_own_and_says_so(tmp_path):
+def test_a_given_unit_overrides_that_of_the_file_with_a_note(tmp_path):
     path = tmp_path / "bench.csv"
     path.write_text("pressure [bar],force [N]\n30,1\n60,2\n", encoding="utf-8")
     recording = read_csv(path, units={"pressure": "psig"})
