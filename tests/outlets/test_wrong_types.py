@@ -100,7 +100,7 @@ CASES = {
     "fit of a name": (lambda: fit("Sarosi2012", RUN), "fit: Sarosi2012 is no characteristic"),
     "fit to nothing": (lambda: fit(MUSCLE.contractile, None), "fit: None is no Recording, as read"),
     "save a plant": (lambda: save(PLANT, "muscle.toml"), "save: Plant.* is not an Entry"),
-    "write a plant": (lambda: write_csv(PLANT, "run.csv"), "write_csv: Plant.* is no Recording"),
+    "write a plant": (lambda: write_csv(PLANT, "run.csv"), "write_csv: Plant.* is not a Recording"),
 }  # fmt: skip
 
 
@@ -115,12 +115,12 @@ def test_a_wrong_type_is_refused_in_words(wrong, message, tmp_path: Path, monkey
 @pytest.mark.parametrize(
     ("wrong", "error", "message"),
     [
-        (lambda: read_csv(5), FileError, "read_csv: 5 is no path"),
-        (lambda: read(None), FileError, "read: None is no path; name a file, a folder"),
-        (lambda: write_csv(RUN, None), FileError, "write_csv: None is no path"),
+        (lambda: read_csv(5), FileError, "read_csv: 5 is not a path"),
+        (lambda: read(None), FileError, "read: None is not a path. Pass a file, a folder"),
+        (lambda: write_csv(RUN, None), FileError, "write_csv: None is not a path"),
         (lambda: save(ENTRY, None), FileError, "save: None is not a path"),
         (lambda: load_data(5), UnknownNameError, "no data set '5'; there are"),
-        (lambda: RUN[3], ColumnError, "a bench: no column '3'; there are time, fill"),
+        (lambda: RUN[3], ColumnError, "a bench: no column '3'; the columns are time, fill"),
         (lambda: SampledSignal.recorded(RUN, {"fill": 3}), ColumnError, "a bench: no column '3'"),
     ],
 )

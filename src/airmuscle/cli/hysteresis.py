@@ -169,8 +169,8 @@ def _as_data(found: LoopFit) -> dict[str, Any]:
     return {
         "origin": found.loop.recording.origin,
         "run": found.loop.run.kind.name,
-        "held": found.loop.run.column,
-        "value": found.loop.run.value,
+        "held": found.loop.run.constant_column,
+        "value": found.loop.run.constant_value,
         "recommended": type(found.recommended.friction).__name__ if found.recommended else None,
         "enters_a_plant": found.enters_a_plant,
         "laws": [

@@ -75,7 +75,7 @@ def _told(path: Path | None, *, column: list[str] | None, **given: Any) -> Colum
     from ..recording.mapping import read_mapping
 
     base = read_mapping(path) if path else ColumnMapping()
-    return base.with_given(columns=pairs("--column", column), **given)
+    return base.with_overrides(columns=pairs("--column", column), **given)
 
 
 def _recordings(files: list[str], told: ColumnMapping, units: dict[str, str]) -> tuple[Recording, ...]:
@@ -111,19 +111,19 @@ def as_data(seen: Inspection) -> dict[str, Any]:
         "constants": dict(recording.constants),
         "notes": list(recording.notes),
         "sampling": _sampling(seen.sampling) if seen.sampling else None,
-        "sensors": [dataclasses.asdict(sensor) | {"deviation": sensor.deviation} for sensor in seen.sensors.values()],
+        "sensors": [dataclasses.asdict(sensor) | {"deviation": sensor.std} for sensor in seen.sensors.values()],
         "runs": [
-            {"kind": run.kind.name, "first_row": run.stretch.start + 1, "last_row": run.stretch.stop,
-             "held": run.column, "value": run.value, "swept": run.swept} for run in seen.runs
+            {"kind": run.kind.name, "first_row": run.interval.start + 1, "last_row": run.interval.stop,
+             "held": run.constant_column, "value": run.constant_value, "swept": run.swept_columns} for run in seen.runs
         ],
         "branches": [
-            {"branch": b.name, "first_row": b.stretch.start + 1, "last_row": b.stretch.stop,
+            {"branch": b.name, "first_row": b.interval.start + 1, "last_row": b.interval.stop,
              "start_pressure": b.start_pressure, "end_pressure": b.end_pressure} for b in seen.branches
         ],
         "branch_agreement": seen.branch_agreement,
         "plateaus": [
-            {"first_row": p.stretch.start + 1, "last_row": p.stretch.stop, "values": dict(p.values),
-             "deviations": dict(p.deviations)} for p in seen.plateaus
+            {"first_row": p.interval.start + 1, "last_row": p.interval.stop, "values": dict(p.values),
+             "deviations": dict(p.standard_errors)} for p in seen.plateaus
         ],
         "quasi_static": seen.quasi_static,
         "suspected_glitches": [dataclasses.asdict(o) | {"row": o.row + 1} for o in seen.outliers],
@@ -134,12 +134,12 @@ def as_data(seen: Inspection) -> dict[str, Any]:
 def _sampling(timing: Sampling) -> dict[str, Any]:
     return {
         "rate": timing.rate,
-        "step": timing.step,
+        "step": timing.sample_time,
         "jitter": timing.jitter,
         "duration": timing.duration,
-        "gaps": [{"after_row": gap.row + 1, "start": gap.start, "length": gap.length} for gap in timing.gaps],
-        "repeating_rows": [row + 1 for row in timing.repeats],
-        "backward_rows": [row + 1 for row in timing.backward],
+        "gaps": [{"after_row": gap.row + 1, "start": gap.start, "length": gap.duration} for gap in timing.gaps],
+        "repeating_rows": [row + 1 for row in timing.repeated_rows],
+        "backward_rows": [row + 1 for row in timing.backward_rows],
     }
 
 

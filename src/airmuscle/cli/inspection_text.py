@@ -52,7 +52,7 @@ def summary(seen: Inspection) -> Iterator[str]:
     if seen.branch_agreement is not None:
         yield f"branches agree with the file's own column in {seen.branch_agreement:.1%} of the rows"
     if seen.sampling:
-        held = sum(len(plateau.stretch) for plateau in seen.plateaus)
+        held = sum(len(plateau.interval) for plateau in seen.plateaus)
         yield f"plateaus: {len(seen.plateaus)} with {held} rows; quasi-static are {seen.quasi_static:.0%} of all rows"
     if seen.outliers:
         yield f"suspected glitches: {len(seen.outliers)}, kept: {_cut([_of_outlier(o) for o in seen.outliers])}"
@@ -61,9 +61,9 @@ def summary(seen: Inspection) -> Iterator[str]:
 
 
 def _scale(name: str) -> tuple[float, str]:
-    from ..recording.plot import scale
+    from ..recording.display_units import display_scale
 
-    return scale(name)
+    return display_scale(name)
 
 
 def _cut(parts: list[str]) -> str:
@@ -72,7 +72,7 @@ def _cut(parts: list[str]) -> str:
 
 
 def _rows(text: str, part: Any) -> str:
-    return f"{text}, rows {part.stretch.start + 1} to {part.stretch.stop}"
+    return f"{text}, rows {part.interval.start + 1} to {part.interval.stop}"
 
 
 def _of_sampling(timing: Sampling) -> str:
@@ -81,12 +81,12 @@ def _of_sampling(timing: Sampling) -> str:
 
 
 def _of_run(seen: Inspection, run: Run) -> str:
-    if len(run.swept) == 1 and run.column is None:
-        return _rows(f"only the {run.swept[0]} was measured", run)
-    if run.column is None or run.value is None:
+    if len(run.swept_columns) == 1 and run.constant_column is None:
+        return _rows(f"only the {run.swept_columns[0]} was measured", run)
+    if run.constant_column is None or run.constant_value is None:
         return _rows(run.kind.name, run)
-    factor, unit = _scale(run.column)
-    return _rows(f"{run.kind.name} at {run.column} {run.value * factor:.4g} {unit}", run)
+    factor, unit = _scale(run.constant_column)
+    return _rows(f"{run.kind.name} at {run.constant_column} {run.constant_value * factor:.4g} {unit}", run)
 
 
 def _of_outlier(outlier: Outlier) -> str:

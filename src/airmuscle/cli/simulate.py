@@ -59,11 +59,11 @@ def simulate(
 
 
 def _range(recording: Recording) -> dict[str, dict[str, float | str]]:
-    from ..recording.recording import header
+    from ..recording.recording import column_heading
 
     return {
         name: {
-            "column": header(name),
+            "column": column_heading(name),
             "min": float(recording[name].min()),
             "max": float(recording[name].max()),
             "last": float(recording[name][-1]),

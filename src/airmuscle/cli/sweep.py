@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def sweep(
     study: Annotated[
         Path,
-        typer.Argument(metavar="STUDY.toml", help="A file with scenario, [vary], [design] and [outcome]."),
+        typer.Argument(metavar="STUDY.toml", help="A file with scenario, [vary], [design] and [metrics]."),
     ],
     out: Folder = Path("study"),
     workers: Annotated[
@@ -60,7 +60,7 @@ def sweep(
     else:
         _print(result)
     if result.failed.size == len(result.study):
-        raise SimulationError(f"all {len(result.study)} runs failed; the first because: {result.reasons[0]}")
+        raise SimulationError(f"all {len(result.study)} runs failed; the first because: {result.failure_reasons[0]}")
     if not json:
         typer.echo(f"results: {out / 'results.csv'}")
         typer.echo(f"report: {page}")
@@ -70,27 +70,27 @@ def _run(study: Study, out: Path, workers: int | None, dask: str | None) -> Stud
     """The study's result; when it ends early, a line says what is kept and how to go on."""
     from ..core.errors import AirmuscleError
     from ..study import run_study
-    from ..study.run import runs_kept
+    from ..study.run import count_finished_runs
 
     try:
         with _bar(study.title) as show, _executor(study, workers, dask) as executor:
             return run_study(study, out, executor, show)
     except (AirmuscleError, KeyboardInterrupt):
-        if done := runs_kept(study, out):  # counted where they lie: one may have come while all was stopping
-            kept = f"{done} of {len(study)} runs are kept in {out / 'chunks'}"
-            typer.echo(f"{kept}; the same command goes on from there", err=True)
+        if done := count_finished_runs(study, out):  # counted on disk: a run may have been completed during the abort
+            saved = f"{done} of {len(study)} runs are saved in {out / 'chunks'}"
+            typer.echo(f"{saved}; the same command resumes from there", err=True)
         raise
 
 
 def _executor(
     study: Study, workers: int | None, dask: str | None
 ) -> contextlib.AbstractContextManager[Executor | None]:
-    from ..study import dask_cluster, processes
-    from ..study.executors import cores_here
+    from ..study import dask_cluster, process_pool
+    from ..study.executors import available_cores
 
     if dask is not None:
         return dask_cluster(dask)
-    return processes(min(workers or cores_here(), len(study.chunks)))
+    return process_pool(min(workers or available_cores(), len(study.chunks)))
 
 
 @contextlib.contextmanager
@@ -105,13 +105,15 @@ def _bar(title: str) -> Iterator[Callable[[int, int], None]]:
 
         def show(done: int, of: int) -> None:
             check_interrupted()
+            if done and bar.tasks[task].total is None:  # the first call states the runs saved by an earlier command
+                typer.echo(f"resuming: {done} of {of} runs are already saved", err=True)
             bar.update(task, completed=done, total=of)
 
         yield show
 
 
 def _print(result: StudyResult) -> None:
-    from ..study.chapter import reasons_table, sensitivity_table
+    from ..study.chapter import failure_table, sensitivity_table
 
     study, indices = result.study, result.indices()
     failed = f", {result.failed.size} failed" if result.failed.size else ""
@@ -121,7 +123,7 @@ def _print(result: StudyResult) -> None:
     if indices:
         _print_table(sensitivity_table(study, indices))
     if result.failed.size:
-        _print_table(reasons_table(result))
+        _print_table(failure_table(result))
 
 
 def _print_table(table: Table) -> None:
@@ -156,9 +158,9 @@ def _as_data(result: StudyResult) -> dict[str, Any]:
         "title": study.title,
         "runs": len(study),
         "failed": int(result.failed.size),
-        "varied": [number.path for number in study.numbers],
-        "outcomes": {
-            name: {key: values[i] for key, values in statistics.items() if key != "outcome"}
+        "varied": [number.path for number in study.parameters],
+        "metrics": {
+            name: {key: values[i] for key, values in statistics.items() if key != "metric"}
             for i, name in enumerate(study.scalars)
         },
         "sensitivities": indices,

@@ -52,4 +52,4 @@ def _deviation(run: Recording, quantity: str, timed: bool) -> float:
     sensor = estimate_sensors(Recording({quantity: values}, run.origin)).get(quantity)
     if sensor is None:
         return 0.0
-    return sensor.deviation if timed else float(sensor.resolution / np.sqrt(12.0))
+    return sensor.std if timed else float(sensor.resolution / np.sqrt(12.0))

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import dataclasses
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -47,23 +47,41 @@ TEXT_KEYS = ("title", "provenance", "note", "warning")
 """Keys of an entry file with a text as value; the first two are required."""
 _CHECK_UNITS = {"upstream": ABSOLUTE, "downstream": ABSOLUTE, "flow": "m3/s", "tolerance": "m3/s"}
 
+Reader = Callable[[Any, str, str], Any]
+"""Reads the value of a field, given the contextual unit and the location for error messages."""
 
-def build(table: Mapping[str, Any], location: Location, given: Mapping[str, Any] | None = None) -> Any:
+
+def custom_field(read: Reader, meaning: str, **field: Any) -> Any:
+    """Declare a dataclass field that `read` reads from a file, instead of a parameter with a fixed unit."""
+    return dataclasses.field(metadata={"read": read, "meaning": meaning}, **field)
+
+
+def build(
+    table: Mapping[str, Any],
+    location: Location,
+    given: Mapping[str, Any] | None = None,
+    *,
+    classes: Mapping[str, type[Any]] | None = None,
+    unit: str = "1",
+) -> Any:
     """The model that a table describes. Raises ParameterError, UnitError or UnknownNameError with the location.
 
-    `given` are fields that are models already and are not in the table.
+    given    fields that are models already and are not in the table
+    classes  the allowed classes by name; by default all registered models
+    unit     contextual unit of the fields declared with `custom_field`
     """
     if not isinstance(table, Mapping):
         raise ParameterError(
             f'{location} is {table!r}; it must be a table. Write model = "..." and its parameters in it.'
         )
-    if "library" in table and "model" not in table:
+    if "library" in table and "model" not in table and classes is None:
         return _library_orifice(table, location)
     if not isinstance(table.get("model"), str):
+        choice = f"one of {', '.join(classes)}" if classes else 'such as model = "Braid"'
         raise ParameterError(
-            f'{location}: the model is not named; write model = "...", such as model = "Braid", and its parameters.'
+            f'{location}: the model is not named; write model = "...", {choice}, and its parameters.'
         )
-    cls = model_class(table["model"], f"{location}, model")
+    cls = model_class(table["model"], f"{location}, model", classes)
     fields = {key: value for key, value in table.items() if key != "model"}
     for key in fields:
         with located_errors(location):
@@ -71,8 +89,11 @@ def build(table: Mapping[str, Any], location: Location, given: Mapping[str, Any]
     declared = {p.name: p for p in parameters(cls)}
     hints = typing.get_type_hints(cls)
     check_required(cls, {**fields, **(given or {})}, hints, location)
+    readers = {f.name: f.metadata["read"] for f in dataclasses.fields(cls) if "read" in f.metadata}
     values = {
-        key: read_parameter(value, declared[key], hints[key], location)
+        key: readers[key](value, unit, f"{location}, {key}")
+        if key in readers
+        else read_parameter(value, declared[key], hints[key], location)
         if key in declared
         else _build_part(value, hints[key], key, location)
         for key, value in fields.items()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+from collections.abc import Mapping
 from typing import Any
 
 from .. import characteristic, control, friction, geometry, mechanism, muscle, plant, pneumatics, simulation
@@ -32,13 +33,12 @@ def model_names() -> tuple[str, ...]:
     return tuple(sorted(_registry()))
 
 
-def model_class(name: str, where: str) -> type[Any]:
-    """The class of a name. Raises UnknownNameError, whose message begins with `where`."""
+def model_class(name: str, where: str, classes: Mapping[str, type[Any]] | None = None) -> type[Any]:
+    """The class of this name in `classes`, by default all models; `where` opens the message of UnknownNameError."""
     if not isinstance(name, str):
         raise UnknownNameError(f'{where} is {name!r}; it must be a name in quotes, such as "Braid".')
-    known = _registry()
+    known = _registry() if classes is None else classes
     if name not in known:
-        raise UnknownNameError(
-            f"{where}: no model '{name}'; there are {', '.join(model_names())}.{suggestion(name, known)}"
-        )
+        names = model_names() if classes is None else tuple(classes)
+        raise UnknownNameError(f"{where}: no model '{name}'; there are {', '.join(names)}.{suggestion(name, known)}")
     return known[name]

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..core.plotting import BLACK, BLUE, RED, legend_below, new_figure
 from ..core.reference import cite
-from ..recording.plot import scale
-from ..recording.recording import header
+from ..recording.display_units import display_scale
+from ..recording.recording import column_heading
 from .chapter import Chapter, Plot, Table
 from .uncertainty_chapter import NORMAL
 
@@ -53,7 +53,7 @@ def _estimates(fit: DynamicFit, title: str, remarks: Sequence[str]) -> Chapter:
 
 
 def _in_words(value: float, name: str) -> str:
-    factor, unit = scale(name)
+    factor, unit = display_scale(name)
     return f"{value * factor:.4g} {unit}"
 
 
@@ -132,9 +132,9 @@ def _record(fit: DynamicFit, number: int) -> Chapter:
     measured, modelled, errors = course.experiment.recording, fit.modelled(number), fit.residuals(number)
     columns: dict[str, Any] = {"time [s]": course.times}
     for name in course.names:
-        columns[f"measured {header(name)}"] = measured[name]
-        columns[f"modelled {header(name)}"] = modelled[name]
-        columns[f"error of {header(name)}"] = errors[name]
+        columns[f"measured {column_heading(name)}"] = measured[name]
+        columns[f"modelled {column_heading(name)}"] = modelled[name]
+        columns[f"error of {column_heading(name)}"] = errors[name]
     rms = ", ".join(f"{name} {_in_words(fit.rms(name, number), name)}" for name in course.names)
     stem = f"record-{number + 1}"
     return Chapter(
@@ -156,7 +156,7 @@ def _course(fit: DynamicFit, number: int) -> Any:
         height_ratios=(2, 1),
     )  # fmt: skip
     for i, name in enumerate(course.names):
-        (factor, unit), (upper, lower) = scale(name), axes[:, i]
+        (factor, unit), (upper, lower) = display_scale(name), axes[:, i]
         dots = {"linestyle": "none", "marker": ".", "markersize": 3}
         upper.plot(course.times, factor * course.experiment.recording[name], color=BLUE, label="measured", **dots)
         upper.plot(course.times, factor * modelled[name], color=RED, label="modelled")

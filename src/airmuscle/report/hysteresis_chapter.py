@@ -101,12 +101,12 @@ def _laws(found: LoopFit, suffix: str) -> Table:
 
 def _measured(loop: HysteresisLoop) -> Any:
     """Force over what is swept, by branch; rows that do not count are faint."""
-    from ..recording.plot import scale
+    from ..recording.display_units import display_scale
     from ..recording.segment import motion_direction
 
     recording = loop.recording
-    name = "contraction" if "contraction" in loop.run.swept or "length" in loop.run.swept else "pressure"
-    factor, unit = scale(name)
+    name = "contraction" if "contraction" in loop.run.swept_columns or "length" in loop.run.swept_columns else "pressure"
+    factor, unit = display_scale(name)
     way = motion_direction(loop.slide.path(recording), recording.columns.get("time"))
     figure, axes = new_figure(width=6.0, height=3.9)
     axes.plot(recording[name] * factor, recording["force"], color=BLACK, linewidth=0.5, alpha=0.3)

@@ -12,7 +12,7 @@ from ..control.controller import relative_unit
 from ..control.inputs import PiecewiseLinear
 from ..core.plotting import BLACK, BLUE, legend_below, new_figure
 from ..recording import Recording
-from ..recording.plot import scale
+from ..recording.display_units import display_scale
 from ..scenario.scenario import Scenario, column_units
 from .chapter import Plot, Table
 from .parameters import parameter_table
@@ -27,7 +27,7 @@ def loop_plot(scenario: Scenario, loop: ControlLoop, recording: Recording) -> Pl
     given = loop.setpoint.segments(loop.controller.setpoints, start, end - start)
     figure, axes = new_figure(len(names), 1, height=0.9 + 1.9 * len(names), sharex=True, squeeze=False)
     for name, axis in zip(names, axes[:, 0], strict=True):
-        factor, shown = scale(name)
+        factor, shown = display_scale(name)
         unit = shown or units.get(name, "")
         if name in recording:
             axis.plot(time, recording[name] * factor, color=BLUE, label="measured")

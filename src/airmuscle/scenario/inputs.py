@@ -96,7 +96,7 @@ def _read_file_points(table: Mapping[str, Any], units: Mapping[str, str], locati
     with located_errors(location):
         recording = read_csv(location.folder / path)
         if columns is None:
-            names = {*recording, *(stated_unit(heading)[0] for heading in recording)}
+            names = {*recording, *(split_unit(heading)[0] for heading in recording)}
             columns = {name: name for name in inputs if name in names}
             if not columns:
                 raise ColumnError(

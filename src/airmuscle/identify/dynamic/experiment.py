@@ -12,7 +12,7 @@ from ...control.inputs import InputSignal, check_input_signal
 from ...core import tree
 from ...core.errors import ParameterError, suggestion
 from ...recording import Recording
-from ...recording.recording import header
+from ...recording.recording import column_heading
 from .initial_conditions import InitialConditions
 
 
@@ -148,6 +148,6 @@ def _nuisance(experiment: Experiment, what: StartTime | StartValue, record: int)
             known = ", ".join(experiment.start.known)
             raise ParameterError(f"the start does not take '{what.name}' as known; it takes {known}.")
         value, symbol = experiment.start.known[what.name], f"{what.name}_0"
-        unit = header(what.name).partition("[")[2].rstrip("]") or "SI"
+        unit = column_heading(what.name).partition("[")[2].rstrip("]") or "SI"
     name = f"{what} of record {record + 1}"
     return Unknown(name, what, record, value, value - what.margin, value + what.margin, unit, symbol, str(what))

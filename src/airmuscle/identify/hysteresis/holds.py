@@ -10,9 +10,9 @@ import numpy as np
 from ...core.arrays import Array
 from ...recording import Recording
 from ...recording.segment import Interval, find_plateaus
-from ...recording.segment.runs import BAND
-from ...recording.segment.sensor import noise_of
-from ...recording.segment.stretch import level_stretches
+from ...recording.segment.runs import RELATIVE_BAND
+from ...recording.segment.sensor import estimate_noise
+from ...recording.segment.interval import level_intervals
 
 FEWEST = 12
 """Rows that a fit of creep needs."""
@@ -32,10 +32,13 @@ def find_holds(recording: Recording) -> Iterator[Hold]:
     """The holds of a recording among its plateaus of pressure; none without time."""
     force, contraction = recording["force"], recording["contraction"]
     for plateau in find_plateaus(recording):
-        if len(plateau.stretch) >= FEWEST and np.ptp(force[plateau.stretch.rows]) <= BAND * np.abs(force).max():
-            yield Hold(plateau.stretch, "contraction")
+        if (
+            len(plateau.interval) >= FEWEST
+            and np.ptp(force[plateau.interval.rows]) <= RELATIVE_BAND * np.abs(force).max()
+        ):
+            yield Hold(plateau.interval, "contraction")
             continue
-        for level in level_stretches(contraction, STILL, within=plateau.stretch):
+        for level in level_intervals(contraction, STILL, within=plateau.interval):
             still = _arrived(contraction, level)
             if len(still) >= FEWEST:
                 yield Hold(still, "force")
@@ -44,5 +47,5 @@ def find_holds(recording: Recording) -> Iterator[Hold]:
 def _arrived(values: Array, level: Interval) -> Interval:
     """The stretch without the rows on the way to its level and away from it."""
     inside = values[level.rows]
-    near = np.flatnonzero(np.abs(inside - np.median(inside)) <= max(STILL / 10.0, 4.0 * noise_of(inside)))
+    near = np.flatnonzero(np.abs(inside - np.median(inside)) <= max(STILL / 10.0, 4.0 * estimate_noise(inside)))
     return Interval(level.start + int(near[0]), level.start + int(near[-1]) + 1) if near.size else Interval(0, 0)

@@ -20,7 +20,7 @@ from ...recording.segment import (
     motion_direction,
     quasi_static_rows,
 )
-from ...recording.segment.runs import BAND, STROKE
+from ...recording.segment.runs import RELATIVE_BAND, CONTRACTION_BAND
 from .fit import (
     Given,
     Mask,
@@ -51,11 +51,11 @@ class HysteresisLoop:
     @property
     def in_words(self) -> str:
         """`isobaric at 300 kPa`, as the recording shows it."""
-        if self.run.column is None or self.run.value is None:
+        if self.run.constant_column is None or self.run.constant_value is None:
             return self.run.kind.name
-        shown = {"pressure": f"{self.run.value / 1e3:.4g} kPa", "force": f"{self.run.value:.4g} N",
-                 "contraction": f"{self.run.value:.2%}"}  # fmt: skip
-        return f"{self.run.kind.name} at {shown.get(self.run.column, f'{self.run.value:.4g} m')}"
+        shown = {"pressure": f"{self.run.constant_value / 1e3:.4g} kPa", "force": f"{self.run.constant_value:.4g} N",
+                 "contraction": f"{self.run.constant_value:.2%}"}  # fmt: skip
+        return f"{self.run.kind.name} at {shown.get(self.run.constant_column, f'{self.run.constant_value:.4g} m')}"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def find_loops(
 def _loop(
     recording: Recording, sensed: Mapping[str, Sensor], law: Characteristic | None, degree: int, all_rows: bool
 ) -> HysteresisLoop:
-    longest = max(find_runs(recording, sensed), key=lambda run: len(run.stretch))
+    longest = max(find_runs(recording, sensed), key=lambda run: len(run.interval))
     slide: Slide = OnPressure() if longest.kind is ISOMETRIC else OnContraction()
     if law is not None:
         static: StaticCurve = Given(law)
@@ -125,7 +125,7 @@ def _counting(recording: Recording, sensed: Mapping[str, Sensor], all_rows: bool
     force = recording["force"]
     pulls = (force > 0) & np.isfinite(force)
     if "force" in sensed:
-        pulls &= sensed["force"].sides(force) == 0
+        pulls &= sensed["force"].censoring(force) == 0
     return pulls if all_rows else pulls & quasi_static_rows(recording, sensed)
 
 
@@ -142,10 +142,10 @@ def _check_two_directions(recording: Recording, way: np.ndarray, chosen: Mask) -
 
 def _same(one: Run, other: Run) -> bool:
     """Whether two runs hold the same quantity at the same level, as closely as one run holds it."""
-    if one.kind is not other.kind or one.column != other.column or one.value is None or other.value is None:
+    if one.kind is not other.kind or one.constant_column != other.constant_column or one.constant_value is None or other.constant_value is None:
         return False
-    band = STROKE if one.column == "contraction" else BAND * max(abs(one.value), abs(other.value))
-    return abs(one.value - other.value) <= band
+    band = CONTRACTION_BAND if one.constant_column == "contraction" else RELATIVE_BAND * max(abs(one.constant_value), abs(other.constant_value))
+    return abs(one.constant_value - other.constant_value) <= band
 
 
 def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str], None] | None = None) -> LoopFit:
