@@ -75,7 +75,7 @@ def test_a_surface_gives_its_forces_back(degree: int):
     recording = points(truth.force)
     found = fit(ContractileSurface.blank(degree, **WIDE), recording)
     assert found.rank == len(exponents(degree))
-    assert np.abs(found.errors).max() < 1e-9
+    assert np.abs(found.residuals).max() < 1e-9
     boxed = truth.with_validity_range(found.validity_range.pressure, found.validity_range.contraction)
     refitted = fit(boxed, points(boxed.force))
     assert refitted.values == pytest.approx(boxed.coefficients, abs=1e-8)
@@ -141,7 +141,7 @@ def hung(law: HungLoad, noise: float = 0.0) -> Recording:
 def test_a_law_in_contraction_is_fitted_in_contraction(kind: type[HungLoad]):
     truth = HungLoad(0.25, 1.4e5, 3e-4)
     found = fit(kind(0.1, 5e4, 1e-4), hung(truth))
-    assert found.direction.quantity == "contraction"
+    assert found.fitted_quantity.name == "contraction"
     assert found.values == pytest.approx([0.25, 1.4e5, 3e-4], rel=1e-8)
 
 
@@ -149,7 +149,7 @@ def test_exact_derivatives_and_differences_agree_on_the_uncertainty():
     recording = hung(HungLoad(0.25, 1.4e5, 3e-4), noise=2e-3)
     exact, differences = (fit(kind(0.1, 5e4, 1e-4), recording) for kind in (HungLoad, Untraced))
     assert differences.values == pytest.approx(exact.values, rel=1e-6)
-    assert differences.standard_deviations == pytest.approx(exact.standard_deviations, rel=1e-6)
+    assert differences.standard_errors == pytest.approx(exact.standard_errors, rel=1e-6)
 
 
 def test_a_law_in_pressure_is_fitted_in_pressure():
@@ -159,7 +159,7 @@ def test_a_law_in_pressure_is_fitted_in_pressure():
     pressure = truth.pressure(contraction, force)
     recording = Recording({"pressure": pressure, "contraction": contraction, "force": force}, "bench")
     found = fit(NeededPressure(0.0, 1e6, 1.0), recording)
-    assert found.direction.quantity == "pressure"
+    assert found.fitted_quantity.name == "pressure"
     assert found.values == pytest.approx([6e4, 5e6, 700.0], rel=1e-9)
 
 
@@ -167,7 +167,7 @@ def test_several_recordings_are_fitted_together():
     runs = tuple(points(surface(2).force, n=5, seed=seed) for seed in (1, 2, 3))
     found = fit(ContractileSurface.blank(2, **WIDE), runs)
     assert found.rows_used == 15
-    assert np.abs(found.errors).max() < 1e-9
+    assert np.abs(found.residuals).max() < 1e-9
 
 
 # How sure
@@ -184,7 +184,7 @@ def repeats(count: int, noise: float) -> list[Fit]:
 def test_standard_deviations_are_those_of_repeated_experiments():
     fits = repeats(800, noise=4.0)
     values = np.array([found.values for found in fits])
-    stated = np.sqrt(np.mean([found.standard_deviations**2 for found in fits], axis=0))
+    stated = np.sqrt(np.mean([found.standard_errors**2 for found in fits], axis=0))
     # 800 repeats leave 2.5 % of a deviation open: four times that is allowed
     assert values.std(axis=0, ddof=1) / stated == pytest.approx(np.ones(6), abs=0.1)
     assert np.sqrt(np.mean([found.sigma**2 for found in fits])) == pytest.approx(4.0, rel=0.02)
@@ -201,7 +201,7 @@ def test_robust_standard_deviations_are_those_of_repeated_experiments():
         rows = clean.with_columns(force=clean["force"] + noise)
         fits.append(fit(ContractileSurface.blank(1, **WIDE), rows, loss=Huber(6.0)))
     scatter = np.std([found.values for found in fits], axis=0, ddof=1)
-    stated = np.sqrt(np.mean([found.standard_deviations**2 for found in fits], axis=0))
+    stated = np.sqrt(np.mean([found.standard_errors**2 for found in fits], axis=0))
     assert scatter / stated == pytest.approx(np.ones(3), abs=0.15)
 
 
@@ -216,7 +216,7 @@ def test_a_fit_equals_lmfit():
         start.add(name, value=0.0)
     peer = lmfit.minimize(lambda p: matrix @ [p[name].value for name in names] - measured, start)
     assert found.values == pytest.approx([peer.params[name].value for name in names], rel=1e-6)
-    assert found.standard_deviations == pytest.approx([peer.params[name].stderr for name in names], rel=1e-5)
+    assert found.standard_errors == pytest.approx([peer.params[name].stderr for name in names], rel=1e-5)
     assert found.correlations[0, 9] == pytest.approx(peer.params["a0"].correl["a9"], abs=1e-6)
     assert found.sigma == pytest.approx(np.sqrt(peer.redchi), rel=1e-9)
 
@@ -236,7 +236,7 @@ def test_a_weighted_fit_equals_curve_fit():
     )
     found = fit(Sarosi2012(*start), recording, sigma=sigma, censoring=UNCENSORED)
     assert found.values == pytest.approx(peer * scale, rel=1e-5)
-    assert found.standard_deviations == pytest.approx(np.sqrt(np.diag(covariance)) * scale, rel=1e-4)
+    assert found.standard_errors == pytest.approx(np.sqrt(np.diag(covariance)) * scale, rel=1e-4)
 
 
 def test_figures_of_quality_are_their_formulas():
@@ -247,7 +247,7 @@ def test_figures_of_quality_are_their_formulas():
     assert found.rmse == pytest.approx(np.sqrt(np.mean(errors**2)))
     assert found.sigma == pytest.approx(np.sqrt(np.sum(errors**2) / 37))
     assert found.r2 == pytest.approx(1 - np.sum(errors**2) / np.sum((measured - measured.mean()) ** 2))
-    assert found.correlation_index == pytest.approx(np.sqrt(found.r2))
+    assert found.ik == pytest.approx(np.sqrt(found.r2))
     worst = int(np.argmax(np.abs(errors)))
     extreme = found.max_error
     assert extreme.error == pytest.approx(errors[worst])
@@ -258,7 +258,7 @@ def test_a_law_worse_than_the_mean_has_no_correlation_index():
     recording = points(lambda p, c: 100.0 + 0.0 * p + np.sin(1e4 * c), n=60)
     found = fit(TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.0), recording, fixed=("geometry.radius",))
     assert found.r2 < 0
-    assert found.correlation_index is None
+    assert found.ik is None
     assert f"1 - SSE/SST = {found.r2:.4g}" in str(found)
 
 
@@ -279,8 +279,8 @@ def test_points_at_zero_force_do_not_bend_the_surface():
     found, as_zeros = fit(start, recording), fit(start, recording, censoring=UNCENSORED)
     assert 50 < found.rows_censored < 100
     taut = recording["force"] > 0
-    assert np.abs(found.errors).max() < 1e-8
-    assert np.abs(as_zeros.errors[taut]).max() > 10.0
+    assert np.abs(found.residuals).max() < 1e-8
+    assert np.abs(as_zeros.residuals[taut]).max() > 10.0
     assert as_zeros.rows_censored == 0
 
 
@@ -355,7 +355,7 @@ def test_no_other_coefficients_are_better(seed: int, degree: int, loss: Loss):
     force = np.maximum(random.normal(0, 1, 40), 0)
     found = fit(ContractileSurface.blank(degree), Recording({**columns, "force": force}, "noise"), loss=loss)
     errors = found.model.polynomial(columns["pressure"], columns["contraction"]) - force
-    errors = np.where(found.sides * errors < 0, 0.0, errors)
+    errors = np.where(found.censoring * errors < 0, 0.0, errors)
     influence = errors * loss.rho((errors / loss.scale) ** 2)[1]
     assert np.abs(sheet(degree, found.recording).T @ influence).max() < 1e-6
 
@@ -368,7 +368,7 @@ def test_both_solvers_find_the_same_robust_and_censored_fit(loss):
     start = dataclasses.replace(direct.model, coefficients=(50.0,) * 6, **WIDE)
     iterated = fit(Clamped(start), recording, loss=loss)
     assert iterated.values == pytest.approx(direct.values, rel=1e-6)
-    assert iterated.standard_deviations == pytest.approx(direct.standard_deviations, rel=1e-5)
+    assert iterated.standard_errors == pytest.approx(direct.standard_errors, rel=1e-5)
     assert iterated.names[0] == "inner.coefficients[0]"
 
 
@@ -397,7 +397,7 @@ def test_a_robust_loss_of_any_scale_settles_where_no_change_helps(name: str, deg
     assert found.rank == len(exponents(degree))
 
     def total(values: np.ndarray) -> float:
-        return float(np.sum(loss.rho((found.problem.errors(found.problem.modelled(values)) / scale) ** 2)[0]))
+        return float(np.sum(loss.rho((found.problem.residuals(found.problem.predict(values)) / scale) ** 2)[0]))
 
     random, least = np.random.default_rng(3), total(found.values)
     for size in (1e-3, 1e-2, 0.1, 1.0):
@@ -437,7 +437,7 @@ def test_units_and_scales_change_nothing(force_scale: float, pressure_scale: flo
         ),
     )
     assert other.values == pytest.approx(force_scale * found.values, rel=1e-6, abs=1e-7 * force_scale)
-    assert other.standard_deviations == pytest.approx(force_scale * found.standard_deviations, rel=1e-6)
+    assert other.standard_errors == pytest.approx(force_scale * found.standard_errors, rel=1e-6)
     assert (other.r2, other.condition) == pytest.approx((found.r2, found.condition), rel=1e-6)
 
 
@@ -568,7 +568,7 @@ def test_a_parameter_on_its_bound_is_flagged_and_has_no_deviation():
 
 def test_as_many_points_as_parameters_leave_the_deviations_unknown():
     found = fit(ContractileSurface.blank(1, **WIDE), points(surface(1).force, n=3))
-    assert np.isnan(found.standard_deviations).all()
+    assert np.isnan(found.standard_errors).all()
     assert "As many points as parameters: the standard deviations are unknown." in found.notes
 
 

@@ -14,14 +14,14 @@ from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
 from ..recording import Recording
-from .cross_validation import GroupSplit, natural
+from .cross_validation import GroupSplit, default_split
 from .loss import LeastSquares
 from .problem import FitProblem
 from .result import Fit
-from .solve import design, is_linear, solve
+from .solver import design_matrix, is_linear, solve
 
-Places = npt.NDArray[np.intp]
-_LEAST = 1e-10
+RowIndices = npt.NDArray[np.intp]
+_MIN_EIGENVALUE = 1e-10
 """Least eigenvalue of a refit's normal matrix, in the basis where that of all rows is one (chosen)."""
 
 
@@ -31,15 +31,15 @@ class Bootstrap:
 
     fit: Fit
     values: Array
-    parts: int
+    group_count: int
     seed: int
 
     @property
-    def standard_deviations(self) -> Array:
+    def standard_errors(self) -> Array:
         return np.asarray(np.nanstd(self.values, axis=0, ddof=1))
 
     @property
-    def lost(self) -> int:
+    def failed_refits(self) -> int:
         """Refits whose runs do not determine the parameters."""
         return int(np.isnan(self.values).any(axis=1).sum())
 
@@ -72,15 +72,17 @@ def bootstrap(
     Raises IdentificationError.
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    which, count = _parts(fit, runs, by or natural(runs))
+    which, count = _assign_groups(fit, runs, by or default_split(runs))
     drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=refits).astype(float)
     problem = fit.problem
     at_once = is_linear(problem) and isinstance(fit.loss, LeastSquares)
-    values = _linear(problem, fit.values, which, drawn) if at_once else _one_by_one(fit, which, drawn, progress)
+    values = (
+        _refit_linear(problem, fit.values, which, drawn) if at_once else _refit_iteratively(fit, which, drawn, progress)
+    )
     return Bootstrap(fit, values, count, seed)
 
 
-def _parts(fit: Fit, runs: Sequence[Recording], by: GroupSplit) -> tuple[Places, int]:
+def _assign_groups(fit: Fit, runs: Sequence[Recording], by: GroupSplit) -> tuple[RowIndices, int]:
     """The number of the part that each fitted row belongs to, and how many there are."""
     labels = np.concatenate(by.labels(runs))
     columns = [np.concatenate([run[name] for run in runs]) for name in ("pressure", "contraction", "force")]
@@ -92,22 +94,22 @@ def _parts(fit: Fit, runs: Sequence[Recording], by: GroupSplit) -> tuple[Places,
     names, which = np.unique(labels, return_inverse=True)
     if names.size < 3:
         raise IdentificationError(
-            f"only {names.size} {by.word}s to draw from: no scatter can be told. Give more runs, or draw by "
+            f"only {names.size} {by.group_name}s to draw from: no scatter can be told. Give more runs, or draw by "
             "Levels('contraction')."
         )
     return which, int(names.size)
 
 
-def _linear(problem: FitProblem, values: Array, which: Places, drawn: Array) -> Array:
+def _refit_linear(problem: FitProblem, values: Array, which: RowIndices, drawn: Array) -> Array:
     """All refits from the normal matrices of the parts: one product of (refits, parts) with (parts, P^2 + P)."""
-    matrix, constant = design(problem)
-    counting = problem.counting(matrix @ values + constant)
+    matrix, constant = design_matrix(problem)
+    counting = problem.active_rows(matrix @ values + constant)
     scale = np.linalg.norm(matrix[counting], axis=0)
     # An orthonormal basis of the whole design keeps the normal matrices near the identity.
     weighted = problem.weights[counting, None] * (matrix[counting] / scale)
     triangle: Array = np.asarray(np.linalg.qr(weighted, mode="r"))
     rows = np.linalg.solve(triangle.T, weighted.T).T
-    goal = problem.weights[counting] * (problem.goal - constant)[counting]
+    goal = problem.weights[counting] * (problem.target - constant)[counting]
     size = rows.shape[1]
     sums = np.zeros((drawn.shape[1], size * size + size))
     for part in range(drawn.shape[1]):
@@ -116,22 +118,24 @@ def _linear(problem: FitProblem, values: Array, which: Places, drawn: Array) -> 
         sums[part, size * size :] = here.T @ goal[which[counting] == part]
     both = drawn @ sums
     normal, right = both[:, : size * size].reshape(-1, size, size), both[:, size * size :]
-    determined = _determined(normal)
+    determined = _has_full_rank(normal)
     found = np.full(right.shape, np.nan)
     found[determined] = np.linalg.solve(normal[determined], right[determined][..., None])[..., 0]
     return np.asarray(np.linalg.solve(triangle, found.T).T / scale)
 
 
-def _determined(normal: Array) -> npt.NDArray[np.bool_]:
+def _has_full_rank(normal: Array) -> npt.NDArray[np.bool_]:
     """Which normal matrices have full rank; all at once where all have, which Cholesky's factors tell soonest."""
     with contextlib.suppress(np.linalg.LinAlgError):
         pivots = np.diagonal(np.linalg.cholesky(normal), axis1=1, axis2=2)
-        if (pivots**2 > _LEAST).all():
+        if (pivots**2 > _MIN_EIGENVALUE).all():
             return np.ones(len(normal), dtype=bool)
-    return np.asarray(np.linalg.eigvalsh(normal)[:, 0] > _LEAST)
+    return np.asarray(np.linalg.eigvalsh(normal)[:, 0] > _MIN_EIGENVALUE)
 
 
-def _one_by_one(fit: Fit, which: Places, drawn: Array, progress: Callable[[float], None] | None = None) -> Array:
+def _refit_iteratively(
+    fit: Fit, which: RowIndices, drawn: Array, progress: Callable[[float], None] | None = None
+) -> Array:
     found = np.full((drawn.shape[0], len(fit.estimates)), np.nan)
     for i, counts in enumerate(drawn):
         if progress is not None:
@@ -141,8 +145,8 @@ def _one_by_one(fit: Fit, which: Places, drawn: Array, progress: Callable[[float
         problem = dataclasses.replace(
             fit.problem,
             data=fit.problem.data.rows(kept),
-            goal=fit.problem.goal[kept],
-            sides=fit.problem.sides[kept],
+            target=fit.problem.target[kept],
+            censoring=fit.problem.censoring[kept],
             weights=fit.problem.weights[kept] * np.sqrt(times[kept]),
         )
         try:

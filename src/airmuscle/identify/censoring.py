@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ..characteristic.base import Characteristic, ForceLaw
 from ..recording import Recording
 from ..recording.segment import estimate_sensors
-from .weights import deviations
+from .weights import sensor_deviations
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Censoring:
     min_force: float = 0.0
     max_force: float = math.inf
 
-    def sides(self, force: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def signs(self, force: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """By row: 0 measured, 1 cut off below (the truth is less), -1 cut off above."""
         return (force <= self.min_force) * 1.0 - (force >= self.max_force) * 1.0
 
@@ -36,7 +36,7 @@ UNCENSORED = Censoring(-math.inf, math.inf)
 """Every row is fitted as it stands."""
 
 
-def censoring_of(law: Characteristic) -> Censoring:
+def default_censoring(law: Characteristic) -> Censoring:
     """What a fit assumes: the range that a law in force is clamped to, from zero where it has none.
 
     Laws in contraction or pressure come from hung loads, of which zero is one like any other: nothing is cut off.
@@ -46,13 +46,13 @@ def censoring_of(law: Characteristic) -> Censoring:
     return Censoring(getattr(law, "min_force", 0.0), getattr(law, "max_force", math.inf))
 
 
-def within_sensor(censoring: Censoring, law: Characteristic, runs: Sequence[Recording]) -> Censoring:
+def narrow_to_sensor(censoring: Censoring, law: Characteristic, runs: Sequence[Recording]) -> Censoring:
     """The range narrowed to what the force sensor of the runs can read, where it shows an end at which it is cut off.
 
     Told only where all runs state their time and come from one rig; laws in force alone, which can use a bound.
     """
     timed = bool(runs) and all("time" in run.columns and "force" in run.columns and len(run) for run in runs)
-    if not isinstance(law, ForceLaw) or not timed or deviations(runs, "force") is not None:
+    if not isinstance(law, ForceLaw) or not timed or sensor_deviations(runs, "force") is not None:
         return censoring
     sensor = estimate_sensors(runs)["force"]
     near = 0.25 * sensor.resolution

@@ -33,17 +33,17 @@ def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, reading
     """
     from scipy.special import stdtrit
 
-    spare = int(np.count_nonzero(fit.sides == 0)) - len(fit.estimates)
+    spare = int(np.count_nonzero(fit.censoring == 0)) - len(fit.estimates)
     if spare <= 0 or not np.isfinite(fit.sigma):
         raise IdentificationError(f"{fit.recording.origin}: as many points as parameters, so no band can be told.")
     if not 0 < level < 1:
         raise IdentificationError(f"the level of a band is {level:g}; it must lie between 0 and 1, as 0.95 does.")
-    columns = {name: points[name] for name in fit.direction.arguments}
+    columns = {name: points[name] for name in fit.fitted_quantity.arguments}
     rest = points.constants.get(RESTING_LENGTH)
     if rest is not None:
         columns[RESTING_LENGTH] = np.full(len(points), float(rest))
     problem = dataclasses.replace(fit.problem, data=Recording(columns, points.origin))
-    value, slopes = problem.modelled(fit.values), problem.slopes(fit.values)
+    value, slopes = problem.predict(fit.values), problem.jacobian(fit.values)
     covariance = np.nan_to_num(fit.covariance, nan=0.0)
     variance = np.einsum("ni,ij,nj->n", slopes, covariance, slopes)
     half = float(stdtrit(spare, 0.5 + level / 2)) * np.sqrt(np.maximum(variance, 0.0) + reading * fit.sigma**2)

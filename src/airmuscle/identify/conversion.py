@@ -15,7 +15,7 @@ from ..recording import Recording
 from .censoring import UNCENSORED
 from .static_fit import fit
 
-POINTS = 24
+GRID_POINTS = 24
 """Pressures and contractions that the other law is fitted to; one more of each judges it."""
 
 
@@ -24,21 +24,21 @@ class ModelConversion:
     """The other model with the parameters that bring it nearest, and its errors in force over the validity range."""
 
     model: Characteristic
-    rms: float
+    rmse: float
     """Root mean square difference [N], at points between those of the fit."""
     max_error: float
     """The greatest difference [N], other less first."""
-    pressure: float
+    max_error_pressure: float
     """Where it stands [Pa]."""
-    contraction: float
+    max_error_contraction: float
     """Where it stands [1]."""
-    judged: Recording
+    check_points: Recording
     """The points between, where the first law pulls, with its force and the `error` of the other [N]."""
 
     def __str__(self) -> str:
         return (
-            f"{type(self.model).__name__}: rms {self.rms:.4g} N, greatest {self.max_error:.4g} N at "
-            f"{self.pressure / 1e3:.4g} kPa and {self.contraction:.2%}"
+            f"{type(self.model).__name__}: rms {self.rmse:.4g} N, greatest {self.max_error:.4g} N at "
+            f"{self.max_error_pressure / 1e3:.4g} kPa and {self.max_error_contraction:.2%}"
         )
 
 
@@ -48,13 +48,13 @@ def convert(characteristic: Characteristic, other: Characteristic, validity_rang
     `other` gives the structure and the start values, as in `fit`. Raises IdentificationError where the validity range does not
     determine it, NoSolution where the first law pulls nowhere on it.
     """
-    given = on_grid(characteristic, validity_range, POINTS)
+    given = sample_on_grid(characteristic, validity_range, GRID_POINTS)
     law: Any = other
     if hasattr(law, "max_force") and law.max_force <= float(given["force"].max()):
         law = dataclasses.replace(law, max_force=2.0 * float(given["force"].max()))
     model = fit(law, given, censoring=UNCENSORED).model
-    judged = on_grid(characteristic, validity_range, POINTS + 1)
-    difference = _forces(model, judged["pressure"], judged["contraction"]) - judged["force"]
+    judged = sample_on_grid(characteristic, validity_range, GRID_POINTS + 1)
+    difference = _evaluate_force(model, judged["pressure"], judged["contraction"]) - judged["force"]
     lacking = np.flatnonzero(~np.isfinite(difference))
     if lacking.size:
         p, c = judged["pressure"][lacking[0]], judged["contraction"][lacking[0]]
@@ -70,7 +70,7 @@ def convert(characteristic: Characteristic, other: Characteristic, validity_rang
     )  # fmt: skip
 
 
-def on_grid(law: Characteristic, validity_range: ValidityRange, count: int) -> Recording:
+def sample_on_grid(law: Characteristic, validity_range: ValidityRange, count: int) -> Recording:
     """The forces of a law on a grid of the validity range, denser towards its edges; points without force or slack left out.
 
     Raises NoSolution where none is left.
@@ -79,7 +79,7 @@ def on_grid(law: Characteristic, validity_range: ValidityRange, count: int) -> R
     (p_low, p_high), (c_low, c_high) = validity_range.pressure, validity_range.contraction
     pressure, contraction = np.meshgrid(p_low + (p_high - p_low) * places, c_low + (c_high - c_low) * places)
     p, c = pressure.ravel(), contraction.ravel()
-    force = _forces(law, p, c)
+    force = _evaluate_force(law, p, c)
     pulls = force > 0
     if not pulls.any():
         raise SolveError(f"{type(law).__name__} pulls nowhere on the validity range: nothing to convert.")
@@ -87,7 +87,7 @@ def on_grid(law: Characteristic, validity_range: ValidityRange, count: int) -> R
     return Recording(columns, type(law).__name__)
 
 
-def _forces(law: Characteristic, pressure: Array, contraction: Array) -> Array:
+def _evaluate_force(law: Characteristic, pressure: Array, contraction: Array) -> Array:
     """Forces [N]; NaN where the law has none, found by halving the points."""
     try:
         found = np.asarray(law.force(pressure, contraction), dtype=float)
@@ -95,6 +95,6 @@ def _forces(law: Characteristic, pressure: Array, contraction: Array) -> Array:
         if pressure.size == 1:
             return np.array([np.nan])
         half = pressure.size // 2
-        parts = (_forces(law, pressure[s], contraction[s]) for s in (slice(None, half), slice(half, None)))
+        parts = (_evaluate_force(law, pressure[s], contraction[s]) for s in (slice(None, half), slice(half, None)))
         return np.concatenate(list(parts))
     return np.asarray(found + np.zeros(pressure.size))

@@ -20,22 +20,22 @@ class CorrelationIndex:
     Reference: Borzikova et al., the index beside their plane curves.
     """
 
-    explained: float
+    r_squared: float
     """1 - SSE/SST [1], at most 1; this is R2."""
 
     @property
-    def exists(self) -> bool:
+    def is_defined(self) -> bool:
         """Whether there is an index at all."""
-        return self.explained >= 0.0
+        return self.r_squared >= 0.0
 
     @property
     def value(self) -> float | None:
         """IK [1], or None where it does not exist; never NaN."""
-        return math.sqrt(self.explained) if self.exists else None
+        return math.sqrt(self.r_squared) if self.is_defined else None
 
     def __str__(self) -> str:
         if self.value is None:
-            return f"no index: 1 - SSE/SST = {self.explained:.4g} is negative"
+            return f"no index: 1 - SSE/SST = {self.r_squared:.4g} is negative"
         return f"IK = {self.value:.4f}"
 
 

@@ -20,14 +20,14 @@ from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
 from ..recording import Recording
 from .censoring import UNCENSORED
-from .dynamic.identifiability import EXACT, Undetermined, identifiable
+from .dynamic.identifiability import EXACT_RANK_TOLERANCE, UndeterminedCombination, analyse_identifiability
 from .problem import make_problem
 
-LEVELS = 13
+LEVEL_COUNT = 13
 """Levels of pressure, and of contraction, among the candidates; chosen."""
-FEWEST = 3
+MIN_POINTS = 3
 """A candidate with fewer points within the limits is no run; chosen."""
-RIDGE = 1e-9
+REGULARISATION = 1e-9
 """Information that every direction has before the first run, so that runs can be compared one by one."""
 
 
@@ -43,38 +43,38 @@ class BenchLimits:
 class PlannedRun:
     """A static run: one quantity held at a level while the other is swept, with the tension to expect."""
 
-    held: str
+    constant: str
     pressure: Array
     contraction: Array
     force: Array
 
     @property
     def swept(self) -> str:
-        return "contraction" if self.held == "pressure" else "pressure"
+        return "contraction" if self.constant == "pressure" else "pressure"
 
     @property
     def level(self) -> float:
-        return float(getattr(self, self.held)[0])
+        return float(getattr(self, self.constant)[0])
 
     @property
-    def ends(self) -> tuple[float, float]:
+    def sweep_limits(self) -> tuple[float, float]:
         """First and last value of what is swept."""
         values = getattr(self, self.swept)
         return float(values[0]), float(values[-1])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Plan:
+class ExperimentPlan:
     """The runs to measure, in rising order of what is held, and what they will tell."""
 
     runs: tuple[PlannedRun, ...]
     names: tuple[str, ...]
     values: Array
-    deviations: Array
+    standard_errors: Array
     """Standard deviation to expect of every parameter."""
-    gain: float
+    relative_d_efficiency: float
     """Root of det M per parameter over that of as many runs spread evenly: how much information a run carries."""
-    undetermined: tuple[Undetermined, ...]
+    undetermined: tuple[UndeterminedCombination, ...]
 
     def recording(self) -> Recording:
         """The points in order, to be followed on the bench: run, pressure, contraction, and the force to expect."""
@@ -91,7 +91,7 @@ def optimal_design(
     points: int = 15,
     sigma: float = 1.0,
     fixed: Collection[str] = (),
-) -> Plan:
+) -> ExperimentPlan:
     """The D-optimal choice of isobaric and isometric runs for fitting a characteristic, started from its own values.
 
     points  of a run, evenly spread over what is swept
@@ -100,34 +100,38 @@ def optimal_design(
 
     Raises IdentificationError where the bench leaves no runs, ParameterError for limits that make no sense.
     """
-    if runs < 1 or points < FEWEST or not sigma > 0 or not bench.max_force > 0:
+    if runs < 1 or points < MIN_POINTS or not sigma > 0 or not bench.max_force > 0:
         raise ParameterError(
-            f"plan needs one run or more of {FEWEST} points or more, sigma and greatest force above 0."
+            f"plan needs one run or more of {MIN_POINTS} points or more, sigma and greatest force above 0."
         )
-    candidates = possible_runs(characteristic, bench, points)
-    names, values, designs = _designs(characteristic, candidates, fixed)
+    candidates = candidate_runs(characteristic, bench, points)
+    names, values, designs = _jacobians(characteristic, candidates, fixed)
     information = np.array([design.T @ design for design in designs])
-    chosen = _exchanged(information, _greedy(information, runs))
-    chosen.sort(key=lambda i: (candidates[i].held != "pressure", candidates[i].level))
+    chosen = _exchange(information, _select_greedily(information, runs))
+    chosen.sort(key=lambda i: (candidates[i].constant != "pressure", candidates[i].level))
     even = np.unique(np.linspace(0, len(candidates) - 1, runs).astype(int))
     difference = (
-        _logarithm(information, chosen) - _logarithm(information, even) + values.size * np.log(even.size / runs)
+        _log_determinant(information, chosen)
+        - _log_determinant(information, even)
+        + values.size * np.log(even.size / runs)
     )
     scales = np.where(values == 0, 1.0, np.abs(values))
-    found = identifiable(np.vstack([designs[i] for i in chosen]) / scales / sigma, names, scales, tolerance=EXACT)
+    found = analyse_identifiability(
+        np.vstack([designs[i] for i in chosen]) / scales / sigma, names, scales, tolerance=EXACT_RANK_TOLERANCE
+    )
     deviations = np.sqrt(np.diag(found.inverse())) * scales
     gain = float(np.exp(difference / values.size))
-    return Plan(tuple(candidates[i] for i in chosen), names, values, deviations, gain, found.undetermined)
+    return ExperimentPlan(tuple(candidates[i] for i in chosen), names, values, deviations, gain, found.undetermined)
 
 
-def possible_runs(characteristic: Characteristic, bench: BenchLimits, points: int) -> list[PlannedRun]:
+def candidate_runs(characteristic: Characteristic, bench: BenchLimits, points: int) -> list[PlannedRun]:
     """Isobaric and isometric runs on even levels, each cut to where the tension is positive and within the limit."""
     sides = {"pressure": bench.validity_range.pressure, "contraction": bench.validity_range.contraction}
     found = []
     for held, swept in (("pressure", "contraction"), ("contraction", "pressure")):
         (low, high), (first, last) = sides[held], sides[swept]
-        for level in np.linspace(low, high, LEVELS):
-            found += _run(characteristic, bench, held, float(level), np.linspace(first, last, 201), points)
+        for level in np.linspace(low, high, LEVEL_COUNT):
+            found += _feasible_run(characteristic, bench, held, float(level), np.linspace(first, last, 201), points)
     if not found:
         raise IdentificationError(
             f"{type(characteristic).__name__} pulls nowhere between 0 and {bench.max_force:g} N within the "
@@ -136,39 +140,41 @@ def possible_runs(characteristic: Characteristic, bench: BenchLimits, points: in
     return found
 
 
-def _run(
+def _feasible_run(
     law: Characteristic, bench: BenchLimits, held: str, level: float, sweep: Array, points: int
 ) -> list[PlannedRun]:
-    allowed = sweep[_allowed(law, bench, held, level, sweep)]
-    if allowed.size < FEWEST:
+    allowed = sweep[_is_feasible(law, bench, held, level, sweep)]
+    if allowed.size < MIN_POINTS:
         return []
     values = np.linspace(allowed[0], allowed[-1], points)
-    values = values[_allowed(law, bench, held, level, values)]
-    if values.size < FEWEST:
+    values = values[_is_feasible(law, bench, held, level, values)]
+    if values.size < MIN_POINTS:
         return []
-    pressure, contraction = _places(held, level, values)
+    pressure, contraction = _coordinates(held, level, values)
     return [PlannedRun(held, pressure, contraction, np.asarray(law.force(pressure, contraction), dtype=float))]
 
 
-def _allowed(law: Characteristic, bench: BenchLimits, held: str, level: float, values: Array) -> npt.NDArray[np.bool_]:
-    force = np.asarray(law.force(*_places(held, level, values)), dtype=float)
+def _is_feasible(
+    law: Characteristic, bench: BenchLimits, held: str, level: float, values: Array
+) -> npt.NDArray[np.bool_]:
+    force = np.asarray(law.force(*_coordinates(held, level, values)), dtype=float)
     return np.asarray(np.isfinite(force) & (force > 0) & (force <= bench.max_force))
 
 
-def _places(held: str, level: float, values: Array) -> tuple[Array, Array]:
+def _coordinates(held: str, level: float, values: Array) -> tuple[Array, Array]:
     steady = np.full(values.size, level)
     return (steady, values) if held == "pressure" else (values, steady)
 
 
-def _designs(
+def _jacobians(
     law: Characteristic, candidates: Sequence[PlannedRun], fixed: Collection[str]
 ) -> tuple[tuple[str, ...], Array, list[Array]]:
     """Names and values of the free parameters, and every candidate's design by parameters relative to their size."""
     columns = {n: np.concatenate([getattr(r, n) for r in candidates]) for n in ("pressure", "contraction", "force")}
     data = Recording(columns, "candidate runs")
     problem = make_problem(law, data, UNCENSORED, np.ones(len(data)), fixed)
-    values = problem.start
-    slopes = problem.slopes(values) * np.where(values == 0, 1.0, np.abs(values))
+    values = problem.initial_values
+    slopes = problem.jacobian(values) * np.where(values == 0, 1.0, np.abs(values))
     if not np.isfinite(slopes).all():
         raise IdentificationError(
             f"{type(law).__name__} is not smooth within the bench's limits; raise the least pressure or contraction."
@@ -178,30 +184,30 @@ def _designs(
     return paths, values, np.split(slopes, ends)
 
 
-def _logarithm(information: Array, chosen: Sequence[int] | Array) -> float:
+def _log_determinant(information: Array, chosen: Sequence[int] | Array) -> float:
     """log det of the information of these runs, with the ridge in units of what all runs together tell."""
     size = information.shape[1]
     lengths = np.sqrt(np.maximum(np.diag(information.sum(axis=0)), 1e-300))
     even = information[list(chosen)].sum(axis=0) / np.outer(lengths, lengths)
-    return float(np.linalg.slogdet(even + RIDGE * np.eye(size))[1])
+    return float(np.linalg.slogdet(even + REGULARISATION * np.eye(size))[1])
 
 
-def _greedy(information: Array, runs: int) -> list[int]:
+def _select_greedily(information: Array, runs: int) -> list[int]:
     chosen: list[int] = []
     for _ in range(runs):
-        gains = [_logarithm(information, [*chosen, i]) for i in range(len(information))]
+        gains = [_log_determinant(information, [*chosen, i]) for i in range(len(information))]
         chosen.append(int(np.argmax(gains)))
     return chosen
 
 
-def _exchanged(information: Array, chosen: list[int]) -> list[int]:
+def _exchange(information: Array, chosen: list[int]) -> list[int]:
     """Each run exchanged for a better one until none is."""
-    best, improved = _logarithm(information, chosen), True
+    best, improved = _log_determinant(information, chosen), True
     while improved:
         improved = False
         for k in range(len(chosen)):
             rest = chosen[:k] + chosen[k + 1 :]
-            gains = [_logarithm(information, [*rest, i]) for i in range(len(information))]
+            gains = [_log_determinant(information, [*rest, i]) for i in range(len(information))]
             if max(gains) > best + 1e-9:
                 best, improved = max(gains), True
                 chosen = [*rest, int(np.argmax(gains))]

@@ -13,8 +13,8 @@ from ..core.arrays import Array
 from ..core.errors import AirmuscleError, IdentificationError
 from ..recording import Recording
 from .candidates import Candidate, standard_candidates
-from .cross_validation import GroupSplit, Labels, natural, parts
-from .force_of import force_of
+from .cross_validation import GroupSplit, Labels, default_split, label_folds
+from .force_evaluation import evaluate_force
 from .loss import LeastSquares, Loss
 from .result import Fit
 from .static_fit import fit
@@ -24,8 +24,8 @@ from .static_fit import fit
 class FoldScore:
     """What a law that had not seen a part says of it."""
 
-    part: str
-    rms: float
+    fold: str
+    rmse: float
     """Root mean square error in force [N]."""
     rows: int
 
@@ -36,33 +36,33 @@ class RankedModel:
 
     candidate: Candidate
     fit: Fit
-    in_sample: float
+    in_sample_rmse: float
     """Root mean square error in force [N] on the rows that it was fitted to."""
-    cross_validated: float
+    cross_validated_rmse: float
     """The same on parts that were left out, each row once [N]."""
     aicc: float
     """n ln(SSE/n) + 2 K + 2 K (K + 1)/(n - K - 1), errors in force, K with the noise's own."""
-    left_out: tuple[FoldScore, ...]
+    fold_scores: tuple[FoldScore, ...]
 
     @property
-    def parameters(self) -> int:
+    def parameter_count(self) -> int:
         return len(self.fit.estimates)
 
 
 @dataclasses.dataclass(frozen=True)
-class Excluded:
+class ExcludedModel:
     """A candidate that the data cannot determine, and why."""
 
     name: str
-    why: str
+    reason: str
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Comparison:
     """Contenders from the least cross-validated error upwards, and those that were excluded; `print` it."""
 
-    contenders: tuple[RankedModel, ...]
-    excluded: tuple[Excluded, ...]
+    ranking: tuple[RankedModel, ...]
+    excluded: tuple[ExcludedModel, ...]
     leave_out: GroupSplit
     recommended: RankedModel
     reason: str
@@ -74,7 +74,7 @@ class Comparison:
 
     def __getitem__(self, name: str) -> RankedModel:
         """A contender by its name."""
-        found = {contender.candidate.name: contender for contender in self.contenders}
+        found = {contender.candidate.name: contender for contender in self.ranking}
         if name not in found:
             raise IdentificationError(f"no contender '{name}'; there are {', '.join(found)}.")
         return found[name]
@@ -82,11 +82,11 @@ class Comparison:
     def __str__(self) -> str:
         head = f"{'law':<40}{'parameters':>11}{'in sample':>12}{'left out':>12}{'AICc':>12}"
         rows = [
-            f"{c.candidate.name:<40}{c.parameters:>11}{c.in_sample:>10.4g} N{c.cross_validated:>10.4g} N{c.aicc:>12.1f}"
-            for c in self.contenders
+            f"{c.candidate.name:<40}{c.parameter_count:>11}{c.in_sample_rmse:>10.4g} N{c.cross_validated_rmse:>10.4g} N{c.aicc:>12.1f}"
+            for c in self.ranking
         ]
-        out = [f"excluded: {e.name}. {e.why}" for e in self.excluded]
-        said = f"Left out in turn: each {self.leave_out.word}, so the ranking is for {self.purpose}."
+        out = [f"excluded: {e.name}. {e.reason}" for e in self.excluded]
+        said = f"Left out in turn: each {self.leave_out.group_name}, so the ranking is for {self.purpose}."
         return "\n".join([said, "", head, *rows, "", self.reason, *out])
 
 
@@ -109,30 +109,30 @@ def compare(
     is determined.
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    how = leave_out or natural(runs)
-    labels, names = parts(runs, how)
+    how = leave_out or default_split(runs)
+    labels, names = label_folds(runs, how)
     contenders, excluded = [], []
     for candidate in candidates if candidates is not None else standard_candidates(runs):
         if progress is not None:
             progress(candidate.name)
         try:
-            contenders.append(_judged(candidate, runs, labels, names, loss))
+            contenders.append(_cross_validate(candidate, runs, labels, names, loss))
         except AirmuscleError as error:
-            excluded.append(Excluded(candidate.name, str(error)))
+            excluded.append(ExcludedModel(candidate.name, str(error)))
     if not contenders:
-        whys = "\n".join(f"{e.name}: {e.why}" for e in excluded)
+        whys = "\n".join(f"{e.name}: {e.reason}" for e in excluded)
         raise IdentificationError(f"the data determine none of the {len(excluded)} candidates.\n{whys}")
-    contenders.sort(key=lambda c: (c.cross_validated, c.parameters))
-    chosen, reason = _recommended(contenders, how)
+    contenders.sort(key=lambda c: (c.cross_validated_rmse, c.parameter_count))
+    chosen, reason = _recommend(contenders, how)
     return Comparison(tuple(contenders), tuple(excluded), how, chosen, reason)
 
 
-def _judged(
+def _cross_validate(
     candidate: Candidate, runs: Sequence[Recording], labels: Sequence[Labels], names: Sequence[str], loss: Loss
 ) -> RankedModel:
     whole = fit(candidate.law, runs, loss=loss, fixed=candidate.fixed)
     ceiling = 3 * max(float(np.nanmax(run["force"])) for run in runs)
-    everywhere = errors_in_force(whole.model, runs, ceiling)
+    everywhere = force_residuals(whole.model, runs, ceiling)
     left_out, errors = [], []
     for name in names:
         others = [run.rows(own != name) for run, own in zip(runs, labels, strict=True) if (own != name).any()]
@@ -141,7 +141,7 @@ def _judged(
             model = fit(whole.model, others, loss=loss, fixed=candidate.fixed).model
         except AirmuscleError as error:
             raise IdentificationError(f"Without {name} it is not determined: {error}") from None
-        found = errors_in_force(model, these, ceiling)
+        found = force_residuals(model, these, ceiling)
         if found.size:
             left_out.append(FoldScore(name, _rms(found), found.size))
             errors.append(found)
@@ -151,7 +151,7 @@ def _judged(
     )  # fmt: skip
 
 
-def errors_in_force(model: Characteristic, runs: Sequence[Recording], ceiling: float) -> Array:
+def force_residuals(model: Characteristic, runs: Sequence[Recording], ceiling: float) -> Array:
     """Model less measured force [N] at the rows where the muscle pulled, each run by the law of its length."""
     found = []
     for run in runs:
@@ -160,7 +160,7 @@ def errors_in_force(model: Characteristic, runs: Sequence[Recording], ceiling: f
         rest = run.constants.get("resting_length")
         if rest is not None and hasattr(law, "of_length"):
             law = law.of_length(float(rest))
-        found.append(force_of(law, rows["pressure"], rows["contraction"], ceiling) - rows["force"])
+        found.append(evaluate_force(law, rows["pressure"], rows["contraction"], ceiling) - rows["force"])
     return np.concatenate(found)
 
 
@@ -176,25 +176,25 @@ def _aicc(errors: Array, parameters: int) -> float:
     return float(n * np.log(max(float(np.mean(errors**2)), 1e-300)) + 2 * k + 2 * k * (k + 1) / (n - k - 1))
 
 
-def _recommended(contenders: Sequence[RankedModel], how: GroupSplit) -> tuple[RankedModel, str]:
+def _recommend(contenders: Sequence[RankedModel], how: GroupSplit) -> tuple[RankedModel, str]:
     best = contenders[0]
-    close = [c for c in contenders if _excess(c, best) <= 0]
-    chosen = min(close, key=lambda c: (c.parameters, c.cross_validated))
+    close = [c for c in contenders if _excess_error(c, best) <= 0]
+    chosen = min(close, key=lambda c: (c.parameter_count, c.cross_validated_rmse))
     said = f"Recommended for {how.purpose}: {chosen.candidate.name}, "
-    said += f"{chosen.cross_validated:.4g} N on each {how.word} left out"
+    said += f"{chosen.cross_validated_rmse:.4g} N on each {how.group_name} left out"
     if chosen is best:
-        return chosen, f"{said}, the least of all, with {chosen.parameters} parameters."
+        return chosen, f"{said}, the least of all, with {chosen.parameter_count} parameters."
     return chosen, (
-        f"{said} with {chosen.parameters} parameters: {best.candidate.name} has {best.cross_validated:.4g} N with "
-        f"{best.parameters}, which is not better by more than one standard error of the difference."
+        f"{said} with {chosen.parameter_count} parameters: {best.candidate.name} has {best.cross_validated_rmse:.4g} N with "
+        f"{best.parameter_count}, which is not better by more than one standard error of the difference."
     )
 
 
-def _excess(contender: RankedModel, best: RankedModel) -> float:
+def _excess_error(contender: RankedModel, best: RankedModel) -> float:
     """Mean square error beyond the best's, less one standard error of that difference over the parts."""
-    pairs = zip(contender.left_out, best.left_out, strict=True)
-    difference = np.array([a.rms**2 - b.rms**2 for a, b in pairs])
-    rows = np.array([part.rows for part in best.left_out], dtype=float)
+    pairs = zip(contender.fold_scores, best.fold_scores, strict=True)
+    difference = np.array([a.rmse**2 - b.rmse**2 for a, b in pairs])
+    rows = np.array([part.rows for part in best.fold_scores], dtype=float)
     mean = float(np.average(difference, weights=rows))
     spread = float(np.sqrt(np.average((difference - mean) ** 2, weights=rows) / max(difference.size - 1, 1)))
     return mean - spread

@@ -23,32 +23,32 @@ RESTING_LENGTH = "resting_length"
 
 
 @dataclasses.dataclass(frozen=True)
-class Direction:
+class FittedQuantity:
     """Which of the three a law gives: the method that a fit compares, its arguments and its answer."""
 
     method: str
     arguments: tuple[str, str]
-    quantity: str
+    name: str
 
     @property
     def unit(self) -> str:
-        return QUANTITIES[self.quantity].unit
+        return QUANTITIES[self.name].unit
 
 
-FORCE = Direction("unclamped", ("pressure", "contraction"), "force")
-CONTRACTION = Direction("contraction", ("pressure", "force"), "contraction")
-PRESSURE = Direction("pressure", ("contraction", "force"), "pressure")
+FORCE = FittedQuantity("unclamped", ("pressure", "contraction"), "force")
+CONTRACTION = FittedQuantity("contraction", ("pressure", "force"), "contraction")
+PRESSURE = FittedQuantity("pressure", ("contraction", "force"), "pressure")
 
 
-def by_specimen(law: Any, data: Recording) -> list[tuple[Any, npt.NDArray[np.intp]]]:
+def split_by_length(law: Any, data: Recording) -> list[tuple[Any, npt.NDArray[np.intp]]]:
     """The law of each length of muscle in the data, and its rows: one law for all where it knows of no lengths."""
     if RESTING_LENGTH not in data.columns or not hasattr(law, "of_length"):
         return [(law, np.arange(len(data)))]
     lengths = data[RESTING_LENGTH]
-    return [(_of_length(law, float(length)), np.flatnonzero(lengths == length)) for length in np.unique(lengths)]
+    return [(_with_length(law, float(length)), np.flatnonzero(lengths == length)) for length in np.unique(lengths)]
 
 
-def _of_length(law: Any, length: float) -> Any:
+def _with_length(law: Any, length: float) -> Any:
     """As `law.of_length`, but unchecked: a search may pass where the law has no meaning."""
     leaves = tree.leaves(law)
     return tree.unflatten(law, [length if leaf.path == RESTING_LENGTH else leaf.value for leaf in leaves])
@@ -57,12 +57,12 @@ def _of_length(law: Any, length: float) -> Any:
 def evaluate(law: Any, method: str, arguments: tuple[str, str], data: Recording) -> Array:
     """What a law, or that of each length, gives at every row; shape (N,)."""
     found = np.zeros(len(data))
-    for specimen, rows in by_specimen(law, data):
+    for specimen, rows in split_by_length(law, data):
         found[rows] = getattr(specimen, method)(*(data[name][rows] for name in arguments))
     return found
 
 
-def direction_of(law: Characteristic) -> Direction:
+def fitted_quantity_of(law: Characteristic) -> FittedQuantity:
     """The direction in which a law is given, where its errors are compared."""
     for kind, direction in ((ForceLaw, FORCE), (ContractionLaw, CONTRACTION), (PressureLaw, PRESSURE)):
         if isinstance(law, kind):
@@ -75,11 +75,11 @@ class FitProblem:
     """N points and the P parameters to be found from them."""
 
     law: Any
-    direction: Direction
+    fitted_quantity: FittedQuantity
     data: Recording
-    goal: Array
+    target: Array
     """Measured values, or the bound of a row that was cut off, in the law's direction; shape (N,)."""
-    sides: Array
+    censoring: Array
     """0 where the law shall meet the goal, 1 where it may lie below, -1 where it may lie above; shape (N,)."""
     weights: Array
     """By which the errors are multiplied, 1 in the mean; shape (N,)."""
@@ -89,11 +89,11 @@ class FitProblem:
 
     @property
     def arguments(self) -> tuple[Array, Array]:
-        first, second = self.direction.arguments
+        first, second = self.fitted_quantity.arguments
         return self.data[first], self.data[second]
 
     @property
-    def start(self) -> Array:
+    def initial_values(self) -> Array:
         return np.array([self.leaves[i].value for i in self.free], dtype=float)
 
     @property
@@ -119,61 +119,61 @@ class FitProblem:
             found[i] = float(value)
         return found
 
-    def modelled(self, values: Array) -> Array:
+    def predict(self, values: Array) -> Array:
         """What the law gives with these parameters; shape (N,)."""
         law = tree.unflatten(self.law, self.leaf_values(values))
         with np.errstate(all="ignore"):  # what is not finite is refused, or the search steps back from it
-            return evaluate(law, self.direction.method, self.direction.arguments, self.data)
+            return evaluate(law, self.fitted_quantity.method, self.fitted_quantity.arguments, self.data)
 
-    def errors(self, modelled: Array) -> Array:
+    def residuals(self, modelled: Array) -> Array:
         """Weighted errors; a row that was cut off has one only where the law contradicts it."""
-        difference = modelled - self.goal
-        return self.weights * np.where(self.sides * difference < 0, 0.0, difference)
+        difference = modelled - self.target
+        return self.weights * np.where(self.censoring * difference < 0, 0.0, difference)
 
-    def counting(self, modelled: Array) -> npt.NDArray[np.bool_]:
+    def active_rows(self, modelled: Array) -> npt.NDArray[np.bool_]:
         """The rows that have a say: those measured, and those cut off that the law contradicts."""
-        return np.asarray((self.sides == 0) | (self.sides * (modelled - self.goal) > 0))
+        return np.asarray((self.censoring == 0) | (self.censoring * (modelled - self.target) > 0))
 
-    def slopes(self, values: Array) -> Array:
+    def jacobian(self, values: Array) -> Array:
         """The derivatives of `modelled` by the free parameters, shape (N, P): exact where the law can be traced."""
-        if _can_be_traced(self.law):
+        if _is_traceable(self.law):
             law = tree.unflatten(self.law, self.leaf_values(values))
             found = np.empty((len(self.data), len(self.leaves)))
-            for specimen, rows in by_specimen(law, self.data):
+            for specimen, rows in split_by_length(law, self.data):
                 arguments = (values[rows] for values in self.arguments)
-                found[rows] = autodiff.jacobian(specimen, self.direction.method, *arguments)[1]
+                found[rows] = autodiff.jacobian(specimen, self.fitted_quantity.method, *arguments)[1]
             return found[:, list(self.free)]
-        return self._differences(values)
+        return self._finite_differences(values)
 
-    def _differences(self, values: Array) -> Array:
+    def _finite_differences(self, values: Array) -> Array:
         low, high = self.bounds
         columns = []
         for i, value in enumerate(values):
-            step = np.cbrt(np.finfo(float).eps) * max(abs(value), abs(self.start[i]), 1e-8)
+            step = np.cbrt(np.finfo(float).eps) * max(abs(value), abs(self.initial_values[i]), 1e-8)
             up, down = values.copy(), values.copy()
             up[i], down[i] = min(value + step, high[i]), max(value - step, low[i])
-            columns.append((self.modelled(up) - self.modelled(down)) / (up[i] - down[i]))
+            columns.append((self.predict(up) - self.predict(down)) / (up[i] - down[i]))
         return np.column_stack(columns)
 
 
-def _can_be_traced(thing: Any) -> bool:
+def _is_traceable(thing: Any) -> bool:
     """Whether a law and all models inside it are closed-form."""
     if isinstance(thing, tuple):
-        return all(_can_be_traced(item) for item in thing)
+        return all(_is_traceable(item) for item in thing)
     kind: type[Any] = type(thing)
     if not dataclasses.is_dataclass(kind):
         return True
     inside = (getattr(thing, field.name) for field in dataclasses.fields(thing))
-    return autodiff.is_traceable(kind) and all(_can_be_traced(item) for item in inside)
+    return autodiff.is_traceable(kind) and all(_is_traceable(item) for item in inside)
 
 
 def make_problem(
     law: Characteristic, data: Recording, censoring: Censoring, weights: Array, fixed: Collection[str]
 ) -> FitProblem:
     """The problem of fitting a law to points. Raises IdentificationError where it cannot be posed."""
-    direction = direction_of(law)
-    sides = censoring.sides(data["force"])
-    goal = data[direction.quantity]
+    direction = fitted_quantity_of(law)
+    sides = censoring.signs(data["force"])
+    goal = data[direction.name]
     if direction is FORCE:
         goal = np.where(sides > 0, censoring.min_force, np.where(sides < 0, censoring.max_force, goal))
     elif direction is PRESSURE:

@@ -10,15 +10,15 @@ from ..core.errors import IdentificationError
 from .loss import LeastSquares
 from .problem import FitProblem
 from .result import Fit
-from .solve import is_linear, solve
+from .solver import is_linear, solve
 
-_TIED = 0.99
+_HIGH_CORRELATION = 0.99
 """Correlation from which two parameters count as tied (chosen)."""
-_LOOSE = 0.5
+_HIGH_RELATIVE_ERROR = 0.5
 """Standard deviation, over the value, from which a parameter counts as loose (chosen)."""
-_DOUBLINGS = 12
+_MAX_DOUBLINGS = 12
 """Steps outwards, each twice the one before: 4096 standard deviations without an end are none."""
-_HALVINGS = 18
+_BISECTIONS = 18
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,7 +44,7 @@ def weakly_determined(fit: Fit) -> tuple[str, ...]:
     return tuple(
         e.name
         for e, tie in zip(fit.estimates, tied, strict=True)
-        if not e.on_bound and (tie > _TIED or (curved and e.stderr > _LOOSE * abs(e.value)))
+        if not e.on_bound and (tie > _HIGH_CORRELATION or (curved and e.stderr > _HIGH_RELATIVE_ERROR * abs(e.value)))
     )
 
 
@@ -59,45 +59,45 @@ def profile(fit: Fit, name: str, *, level: float = 0.95) -> ProfileLikelihood:
     if not isinstance(fit.loss, LeastSquares):
         raise IdentificationError("a profile needs a fit by least squares; a robust loss is no likelihood of noise.")
     estimate = fit[name]
-    spare = int(np.count_nonzero(fit.sides == 0)) - len(fit.estimates)
+    spare = int(np.count_nonzero(fit.censoring == 0)) - len(fit.estimates)
     if spare <= 0 or not np.isfinite(estimate.stderr):
         raise IdentificationError(f"{name} stands on a bound, or no point is to spare: it has no profile.")
     index = fit.names.index(name)
-    least = _squares(fit.problem, fit.values)
+    least = _sum_of_squares(fit.problem, fit.values)
     ceiling = least * (1 + float(stdtrit(spare, 0.5 + level / 2)) ** 2 / spare)
-    low, high = (_end(fit, index, sign * estimate.stderr, ceiling) for sign in (-1, 1))
+    low, high = (_find_limit(fit, index, sign * estimate.stderr, ceiling) for sign in (-1, 1))
     return ProfileLikelihood(name, estimate.unit, estimate.value, low, high, level)
 
 
-def _squares(problem: FitProblem, values: np.ndarray) -> float:
-    return float(np.sum(problem.errors(problem.modelled(values)) ** 2))
+def _sum_of_squares(problem: FitProblem, values: np.ndarray) -> float:
+    return float(np.sum(problem.residuals(problem.predict(values)) ** 2))
 
 
-def _end(fit: Fit, index: int, step: float, ceiling: float) -> float:
+def _find_limit(fit: Fit, index: int, step: float, ceiling: float) -> float:
     """Where the profile passes the ceiling on one side; infinite where it never does, or a bound comes first."""
     problem, estimate = fit.problem, fit.estimates[index]
     leaf = problem.free[index]
     low, high = problem.leaves[leaf].declared.bounds
     others = tuple(i for i in problem.free if i != leaf)
     inside, outside = estimate.value, estimate.value
-    for doubling in range(_DOUBLINGS):
+    for doubling in range(_MAX_DOUBLINGS):
         inside, outside = outside, float(np.clip(estimate.value + step * 2.0**doubling, low, high))
         if inside == outside:  # at the bound, and still no worse
             return -np.inf if step < 0 else np.inf
-        if _constrained_squares(problem, others, leaf, outside) > ceiling:
+        if _constrained_sum_of_squares(problem, others, leaf, outside) > ceiling:
             break
     else:
         return -np.inf if step < 0 else np.inf
-    for _ in range(_HALVINGS):
+    for _ in range(_BISECTIONS):
         middle = (inside + outside) / 2
-        above = _constrained_squares(problem, others, leaf, middle) > ceiling
+        above = _constrained_sum_of_squares(problem, others, leaf, middle) > ceiling
         inside, outside = (inside, middle) if above else (middle, outside)
     return (inside + outside) / 2
 
 
-def _constrained_squares(problem: FitProblem, others: tuple[int, ...], leaf: int, value: float) -> float:
+def _constrained_sum_of_squares(problem: FitProblem, others: tuple[int, ...], leaf: int, value: float) -> float:
     """The least sum of squares with one leaf held at a value."""
     leaves = list(problem.leaves)
     leaves[leaf] = dataclasses.replace(leaves[leaf], value=value)
     held = dataclasses.replace(problem, leaves=tuple(leaves), free=others)
-    return _squares(held, solve(held, LeastSquares()).values if others else np.zeros(0))
+    return _sum_of_squares(held, solve(held, LeastSquares()).values if others else np.zeros(0))

@@ -16,7 +16,7 @@ from ..core.errors import ParameterError, suggestion
 from ..recording import Recording
 from .correlation_index import CorrelationIndex
 from .loss import Loss
-from .problem import CONTRACTION, FORCE, Direction, FitProblem, evaluate
+from .problem import CONTRACTION, FORCE, FitProblem, FittedQuantity, evaluate
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,14 +62,14 @@ class Fit:
     """Standard deviation of the errors, N - P in the denominator."""
     rmse: float
     max_error: WorstPoint
-    index: CorrelationIndex | None
+    correlation_index: CorrelationIndex | None
     """1 - SSE/SST and its root; None where the measured values do not vary."""
     rows_censored: int
     rows_dropped: int
     recording: Recording
     """The rows that were used: pressure, contraction, force."""
-    direction: Direction
-    sides: npt.NDArray[np.float64]
+    fitted_quantity: FittedQuantity
+    censoring: npt.NDArray[np.float64]
     """By row: 0 measured, else cut off: the model may lie below (1) or above (-1)."""
     problem: FitProblem
     """What was posed, for refits: points, goals, weights and the free parameters."""
@@ -94,13 +94,13 @@ class Fit:
         return np.array([estimate.value for estimate in self.estimates])
 
     @property
-    def standard_deviations(self) -> Array:
+    def standard_errors(self) -> Array:
         return np.array([estimate.stderr for estimate in self.estimates])
 
     @property
     def covariance(self) -> Array:
         """Of the estimates, in their order, shape (P, P); NaN for a parameter on a bound."""
-        return np.asarray(self.correlations * np.outer(self.standard_deviations, self.standard_deviations))
+        return np.asarray(self.correlations * np.outer(self.standard_errors, self.standard_errors))
 
     @property
     def rows_used(self) -> int:
@@ -110,25 +110,25 @@ class Fit:
     @property
     def r2(self) -> float | None:
         """1 - SSE/SST over the measured rows; None where they do not vary."""
-        return None if self.index is None else self.index.explained
+        return None if self.correlation_index is None else self.correlation_index.r_squared
 
     @property
-    def correlation_index(self) -> float | None:
+    def ik(self) -> float | None:
         """sqrt(R2), or None where it does not exist."""
-        return None if self.index is None else self.index.value
+        return None if self.correlation_index is None else self.correlation_index.value
 
     @property
     def modelled(self) -> Array:
         """What the fitted model gives at the rows that were used, as a user of it sees it: clamped."""
-        return evaluate(self.model, self.direction.quantity, self.direction.arguments, self.recording)
+        return evaluate(self.model, self.fitted_quantity.name, self.fitted_quantity.arguments, self.recording)
 
     @property
-    def errors(self) -> Array:
+    def residuals(self) -> Array:
         """Model less measured by row, clamped as the model is."""
-        return self.modelled - self.recording[self.direction.quantity]
+        return self.modelled - self.recording[self.fitted_quantity.name]
 
     @property
-    def ranges(self) -> dict[str, tuple[float, float]]:
+    def data_ranges(self) -> dict[str, tuple[float, float]]:
         """Where there was data, in pressure, contraction and force: outside the fit says nothing."""
         columns = ((name, self.recording[name]) for name in ("pressure", "contraction", "force"))
         return {name: (float(values.min()), float(values.max())) for name, values in columns}
@@ -136,7 +136,7 @@ class Fit:
     @property
     def validity_range(self) -> ValidityRange:
         """The validity range of validity in pressure and contraction. Raises ParameterError where either did not vary."""
-        ranges = self.ranges
+        ranges = self.data_ranges
         return ValidityRange(*ranges["pressure"], *ranges["contraction"])
 
     def plot(self) -> Any:
@@ -147,7 +147,7 @@ class Fit:
 
     def __str__(self) -> str:
         rows = [("parameter", "", "value", "2 sd", "unit", "meaning")]
-        rows += [(e.name, e.label, f"{e.value:.6g}", _twice(e), e.unit, e.meaning) for e in self.estimates]
+        rows += [(e.name, e.label, f"{e.value:.6g}", _two_stderr(e), e.unit, e.meaning) for e in self.estimates]
         widths = [max(len(row[i]) for row in rows) for i in range(5)]
         table = ["  ".join([*(c.ljust(w) for c, w in zip(row, widths, strict=False)), row[5]]).rstrip() for row in rows]
         notes = [f"note: {note}" for note in self.notes]
@@ -158,31 +158,35 @@ class Fit:
         """The figures of the fit as lines of name and text with units."""
         worst = self.max_error
         place = f"at {worst.pressure / 1e3:.4g} kPa, {worst.contraction:.2%}, {worst.force:.4g} N"
-        index = "not defined: the measured values do not vary" if self.index is None else str(self.index)
+        index = (
+            "not defined: the measured values do not vary"
+            if self.correlation_index is None
+            else str(self.correlation_index)
+        )
         r2 = f"{self.r2:.6f}" if self.r2 is not None else "not defined"
-        ranges = self.ranges
+        ranges = self.data_ranges
         (p0, p1), (c0, c1), (f0, f1) = ranges["pressure"], ranges["contraction"], ranges["force"]
         return [
             ("rows", f"{self.rows_used} used, {self.rows_censored} of them cut off; {self.rows_dropped} dropped"),
-            ("rms error", self.in_words(self.rmse)),
-            ("greatest error", f"{self.in_words(worst.error)} {place}"),
-            ("sigma", self.in_words(self.sigma)),
+            ("rms error", self.format_residual(self.rmse)),
+            ("greatest error", f"{self.format_residual(worst.error)} {place}"),
+            ("sigma", self.format_residual(self.sigma)),
             ("R2", r2),
             ("correlation index", index),
             ("rank, condition", f"{self.rank} of {len(self.estimates)}, {self.condition:.3g}"),
             ("valid for", f"{p0 / 1e3:.4g} to {p1 / 1e3:.4g} kPa, {c0:.2%} to {c1:.2%}, {f0:.4g} to {f1:.4g} N"),
         ]
 
-    def in_words(self, error: float) -> str:
+    def format_residual(self, error: float) -> str:
         """An error of the fitted quantity with the unit that people use for it."""
-        if self.direction is FORCE:
+        if self.fitted_quantity is FORCE:
             return f"{error:.4g} N"
-        return f"{error:.4%}" if self.direction is CONTRACTION else f"{error / 1e3:.4g} kPa"
+        return f"{error:.4%}" if self.fitted_quantity is CONTRACTION else f"{error / 1e3:.4g} kPa"
 
     def _repr_html_(self) -> str:
         cells = "".join(
             f"<tr><td>{html.escape(e.name)}</td><td>{html.escape(e.label)}</td>"
-            f"<td>{e.value:.6g} &plusmn; {_twice(e)}</td>"
+            f"<td>{e.value:.6g} &plusmn; {_two_stderr(e)}</td>"
             f"<td>{html.escape(e.unit)}</td><td>{html.escape(e.meaning)}</td></tr>"
             for e in self.estimates
         )
@@ -193,7 +197,7 @@ class Fit:
         return f"{head}<table>{titles}{cells}</table>{lines}{notes}"
 
 
-def _twice(estimate: Estimate) -> str:
+def _two_stderr(estimate: Estimate) -> str:
     if estimate.on_bound:
         return "on bound"
     return f"{2 * estimate.stderr:.3g}" if np.isfinite(estimate.stderr) else "unknown"

@@ -14,16 +14,16 @@ from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
 from ..recording import Recording
-from .censoring import Censoring, censoring_of, within_sensor
+from .censoring import Censoring, default_censoring, narrow_to_sensor
 from .correlation_index import correlation_index
 from .loss import LeastSquares, Loss
-from .problem import RESTING_LENGTH, FitProblem, direction_of, evaluate, make_problem
+from .problem import RESTING_LENGTH, FitProblem, evaluate, fitted_quantity_of, make_problem
 from .result import Estimate, Fit, WorstPoint
-from .solve import Solution, solve
-from .statistics import Statistics, statistics
-from .weights import deviations
+from .solver import Solution, solve
+from .statistics import FitStatistics, compute_statistics
+from .weights import sensor_deviations
 
-POINT = ("pressure", "contraction", "force")
+POINT_COLUMNS = ("pressure", "contraction", "force")
 ILL_CONDITIONED = 1e5
 """Condition of the scaled design above which a note is made (chosen): half of the digits of a float are lost."""
 
@@ -51,18 +51,18 @@ def fit(
     Raises IdentificationError where the points cannot determine the parameters, and says which.
     """
     _check_types(characteristic, recording)
-    data, dropped = _points(recording)
-    by_rig = None if sigma is not None else _by_rig(characteristic, recording)
-    weights = _weights(data, dropped, sigma if by_rig is None else _by_row(by_rig, recording))
+    data, dropped = _join_recordings(recording)
+    by_rig = None if sigma is not None else _deviations_by_recording(characteristic, recording)
+    weights = _row_weights(data, dropped, sigma if by_rig is None else _repeat_by_row(by_rig, recording))
     data, weights = data.rows(~dropped), weights[~dropped]
-    law = _with_validity_range(_of_length(characteristic, data), data)
+    law = _with_validity_range(_with_length(characteristic, data), data)
     runs = [recording] if isinstance(recording, Recording) else list(recording)
-    problem = make_problem(law, data, censoring or within_sensor(censoring_of(law), law, runs), weights, fixed)
+    problem = make_problem(law, data, censoring or narrow_to_sensor(default_censoring(law), law, runs), weights, fixed)
     solution = solve(problem, loss)
-    found = statistics(problem, solution, loss)
-    notes = (*_notes(problem, found, loss, int(np.count_nonzero(dropped))), *_of_rigs(by_rig, problem))
-    notes += _narrow(problem, solution, loss)
-    return _result(problem, solution, found, loss, int(np.count_nonzero(dropped)), notes)
+    found = compute_statistics(problem, solution, loss)
+    notes = (*_collect_notes(problem, found, loss, int(np.count_nonzero(dropped))), *_weighting_notes(by_rig, problem))
+    notes += _loss_scale_notes(problem, solution, loss)
+    return _build_result(problem, solution, found, loss, int(np.count_nonzero(dropped)), notes)
 
 
 def _check_types(characteristic: object, recording: object) -> None:
@@ -74,10 +74,10 @@ def _check_types(characteristic: object, recording: object) -> None:
             raise ParameterError(f"fit: {str(run)[:80]} is no Recording, as read, read_csv and simulate return it.")
 
 
-def _points(recording: Recording | Sequence[Recording]) -> tuple[Recording, npt.NDArray[np.bool_]]:
+def _join_recordings(recording: Recording | Sequence[Recording]) -> tuple[Recording, npt.NDArray[np.bool_]]:
     """Pressure, contraction and force of one or several recordings, and the rows where one of them is missing."""
     runs = [recording] if isinstance(recording, Recording) else list(recording)
-    columns = {name: np.concatenate([run[name] for run in runs]) for name in POINT} if runs else {}
+    columns = {name: np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS} if runs else {}
     origins = list(dict.fromkeys(run.origin for run in runs))
     few = len(origins) <= 3
     origin = " + ".join(origins if few else [*origins[:2], f"{len(origins) - 2} more"]) or "no recording"
@@ -97,7 +97,7 @@ def _points(recording: Recording | Sequence[Recording]) -> tuple[Recording, npt.
     return Recording(columns, origin, {} if rest is None else {"resting_length": rest}), missing
 
 
-def _weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLike | None) -> Array:
+def _row_weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLike | None) -> Array:
     if sigma is None:
         return np.ones(len(data))
     deviations = np.broadcast_to(np.asarray(sigma, dtype=float), (len(data),))
@@ -107,27 +107,27 @@ def _weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLi
     return np.asarray(weights / np.sqrt(np.mean(weights[~dropped] ** 2)))
 
 
-def _by_rig(law: Characteristic, recording: Recording | Sequence[Recording]) -> Array | None:
+def _deviations_by_recording(law: Characteristic, recording: Recording | Sequence[Recording]) -> Array | None:
     """The sensors' deviations by recording, where there are several that differ."""
     if isinstance(recording, Recording) or len(recording) < 2:
         return None
-    return deviations(recording, direction_of(law).quantity)
+    return sensor_deviations(recording, fitted_quantity_of(law).name)
 
 
-def _by_row(by_rig: Array, recording: Any) -> Array:
+def _repeat_by_row(by_rig: Array, recording: Any) -> Array:
     return np.repeat(by_rig, [len(run) for run in recording])
 
 
-def _of_rigs(by_rig: Array | None, problem: FitProblem) -> list[str]:
+def _weighting_notes(by_rig: Array | None, problem: FitProblem) -> list[str]:
     if by_rig is None:
         return []
     return [
         "The recordings come from rigs whose sensors differ: rows weigh by standard deviations of "
-        f"{min(by_rig):.3g} to {max(by_rig):.3g} {problem.direction.unit}; sigma=1.0 counts all alike."
+        f"{min(by_rig):.3g} to {max(by_rig):.3g} {problem.fitted_quantity.unit}; sigma=1.0 counts all alike."
     ]
 
 
-def _of_length(law: Any, data: Recording) -> Any:
+def _with_length(law: Any, data: Recording) -> Any:
     """A law for muscles of any length as that of the muscle in the data, where there is one."""
     rest = data.constants.get(RESTING_LENGTH)
     return law.of_length(float(rest)) if rest is not None and hasattr(law, "of_length") else law
@@ -150,46 +150,46 @@ def _with_validity_range(law: Characteristic, data: Recording) -> Characteristic
     return boxed
 
 
-def _result(
-    problem: FitProblem, solution: Solution, found: Statistics, loss: Loss, dropped: int, notes: tuple[str, ...]
+def _build_result(
+    problem: FitProblem, solution: Solution, found: FitStatistics, loss: Loss, dropped: int, notes: tuple[str, ...]
 ) -> Fit:
-    data, quantity = problem.data, problem.direction.quantity
+    data, quantity = problem.data, problem.fitted_quantity.name
     model = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
-    clamped = evaluate(model, quantity, problem.direction.arguments, data)
-    measured = problem.sides == 0
+    clamped = evaluate(model, quantity, problem.fitted_quantity.arguments, data)
+    measured = problem.censoring == 0
     errors = clamped - data[quantity]
     # a row cut off is wrong only where the law contradicts it; what it reads is not what was there
-    contradicted = np.where(measured, errors, problem.errors(clamped) / problem.weights)
+    contradicted = np.where(measured, errors, problem.residuals(clamped) / problem.weights)
     worst = int(np.argmax(np.abs(contradicted)))
     varies = bool(np.ptp(data[quantity][measured]) > 0)
     return Fit(
         model=model,
-        estimates=_estimates(problem, solution, found),
+        estimates=_build_estimates(problem, solution, found),
         correlations=found.correlations,
         rank=found.rank,
         condition=found.condition,
         sigma=found.sigma,
         rmse=float(np.sqrt(np.mean(errors[measured] ** 2))),
-        max_error=WorstPoint(float(contradicted[worst]), *(float(data[name][worst]) for name in POINT)),
-        index=correlation_index(data[quantity][measured], clamped[measured]) if varies else None,
+        max_error=WorstPoint(float(contradicted[worst]), *(float(data[name][worst]) for name in POINT_COLUMNS)),
+        correlation_index=correlation_index(data[quantity][measured], clamped[measured]) if varies else None,
         rows_censored=int(np.count_nonzero(~measured)),
         rows_dropped=dropped,
         recording=data,
-        direction=problem.direction,
-        sides=problem.sides,
+        fitted_quantity=problem.fitted_quantity,
+        censoring=problem.censoring,
         problem=dataclasses.replace(problem, law=model, leaves=tuple(tree.leaves(model))),
         loss=loss,
         notes=notes,
     )
 
 
-def _estimates(problem: FitProblem, solution: Solution, found: Statistics) -> tuple[Estimate, ...]:
+def _build_estimates(problem: FitProblem, solution: Solution, found: FitStatistics) -> tuple[Estimate, ...]:
     leaves = (problem.leaves[i] for i in problem.free)
     columns = zip(
         leaves,
         problem.labels,
         solution.values.tolist(),
-        found.deviations.tolist(),
+        found.standard_errors.tolist(),
         found.on_bound.tolist(),
         strict=True,
     )
@@ -199,11 +199,11 @@ def _estimates(problem: FitProblem, solution: Solution, found: Statistics) -> tu
     )
 
 
-def _notes(problem: FitProblem, found: Statistics, loss: Loss, dropped: int) -> tuple[str, ...]:
+def _collect_notes(problem: FitProblem, found: FitStatistics, loss: Loss, dropped: int) -> tuple[str, ...]:
     """What a reader of the fit must know, in sentences."""
     notes = []
-    cut_off = int(np.count_nonzero(problem.sides))
-    at_zero = int(np.count_nonzero((problem.data["force"] <= 0) & (problem.sides == 0)))
+    cut_off = int(np.count_nonzero(problem.censoring))
+    at_zero = int(np.count_nonzero((problem.data["force"] <= 0) & (problem.censoring == 0)))
     if dropped:
         notes.append(f"{dropped} rows with a missing value (NaN) were left out.")
     if cut_off:
@@ -211,9 +211,9 @@ def _notes(problem: FitProblem, found: Statistics, loss: Loss, dropped: int) -> 
             f"{cut_off} rows are cut off at the ends of the range of force and count only where the law contradicts "
             "them; censoring=UNCENSORED fits them as they stand."
         )
-    if found.measured_rank < found.rank:
+    if found.uncensored_rank < found.rank:
         notes.append(
-            f"The measured rows determine {found.measured_rank} of {found.rank} parameters; the others only have "
+            f"The measured rows determine {found.uncensored_rank} of {found.rank} parameters; the others only have "
             "bounds, where the rows are cut off, and stand as near to these as they can."
         )
     if at_zero:
@@ -221,21 +221,24 @@ def _notes(problem: FitProblem, found: Statistics, loss: Loss, dropped: int) -> 
             f"{at_zero} rows at zero force or below are fitted as they stand; give censoring=Censoring() if the muscle "
             "was slack there."
         )
-    notes += _other_lengths(problem)
-    notes += [f"{name} stopped at its bound; the value is not a measured one." for name in _bounded(problem, found)]
+    notes += _length_notes(problem)
+    notes += [
+        f"{name} stopped at its bound; the value is not a measured one."
+        for name in _parameters_on_bound(problem, found)
+    ]
     if not np.isfinite(found.sigma):
         notes.append("As many points as parameters: the standard deviations are unknown.")
     if found.condition > ILL_CONDITIONED:
         notes.append(f"The parameters are nearly indistinct (condition {found.condition:.2g}).")
     if not isinstance(loss, LeastSquares):
-        notes.append(f"Robust: {loss}, in {problem.direction.unit}.")
+        notes.append(f"Robust: {loss}, in {problem.fitted_quantity.unit}.")
     return tuple(notes)
 
 
-def _narrow(problem: FitProblem, solution: Solution, loss: Loss) -> tuple[str, ...]:
+def _loss_scale_notes(problem: FitProblem, solution: Solution, loss: Loss) -> tuple[str, ...]:
     """A robust loss so narrow that nearly every row is an outlier to it."""
-    measured = problem.sides == 0
-    errors = np.abs(problem.errors(solution.modelled))[measured]
+    measured = problem.censoring == 0
+    errors = np.abs(problem.residuals(solution.modelled))[measured]
     inside = int(np.count_nonzero(errors <= loss.scale))
     if isinstance(loss, LeastSquares) or inside >= errors.size / 2:
         return ()
@@ -245,7 +248,7 @@ def _narrow(problem: FitProblem, solution: Solution, loss: Loss) -> tuple[str, .
     )
 
 
-def _other_lengths(problem: FitProblem) -> list[str]:
+def _length_notes(problem: FitProblem) -> list[str]:
     """A law made for another specimen: its contraction, and so its parameters, mean something else."""
     rest = problem.data.constants.get("resting_length")
     return [
@@ -255,5 +258,5 @@ def _other_lengths(problem: FitProblem) -> list[str]:
     ]
 
 
-def _bounded(problem: FitProblem, found: Statistics) -> list[str]:
+def _parameters_on_bound(problem: FitProblem, found: FitStatistics) -> list[str]:
     return [problem.leaves[i].path for i, bound in zip(problem.free, found.on_bound, strict=True) if bound]

@@ -9,35 +9,35 @@ import numpy.typing as npt
 
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
-from .censored_least_squares import RANK_TOLERANCE, measured_rank
+from .censored_least_squares import RANK_TOLERANCE, uncensored_rank
 from .loss import Loss
 from .problem import FitProblem
-from .solve import Solution
+from .solver import Solution
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Statistics:
+class FitStatistics:
     """What the design at the solution says; parameters on a bound have no deviation (NaN)."""
 
     rank: int
-    measured_rank: int
+    uncensored_rank: int
     """Rank without the rows that are cut off."""
     condition: float
     """Greatest over least singular value of the design, its columns brought to length 1."""
     sigma: float
     """Standard deviation of the errors, in the unit of the fitted quantity; NaN without spare points."""
-    deviations: Array
+    standard_errors: Array
     correlations: Array
     on_bound: npt.NDArray[np.bool_]
 
 
-def statistics(problem: FitProblem, solution: Solution, loss: Loss) -> Statistics:
+def compute_statistics(problem: FitProblem, solution: Solution, loss: Loss) -> FitStatistics:
     """Statistics of a solution. Raises IdentificationError where parameters cannot be told apart."""
     values, modelled, slopes = solution
     on_bound = _on_bound(problem, values)
-    counting = problem.counting(modelled)
+    counting = problem.active_rows(modelled)
     matrix = problem.weights[counting, None] * slopes[np.ix_(counting, ~on_bound)]
-    errors = problem.errors(modelled)[counting]
+    errors = problem.residuals(modelled)[counting]
     norms = np.linalg.norm(matrix, axis=0)
     even = matrix / np.where(norms > 0, norms, 1.0)
     # R of the QR factors has the singular values and directions of the tall design, and is quicker to take apart
@@ -48,26 +48,26 @@ def statistics(problem: FitProblem, solution: Solution, loss: Loss) -> Statistic
     lost = singular <= RANK_TOLERANCE * singular[0] if singular.size else np.zeros(0, dtype=bool)
     if lost.any():
         shares = np.sqrt(np.sum(directions[lost] ** 2, axis=0))
-        raise IdentificationError(_indistinct(problem, ~on_bound, shares, int(np.count_nonzero(~lost))))
-    scatter = _scatter(errors, even.shape[1], loss)
+        raise IdentificationError(_rank_deficiency_message(problem, ~on_bound, shares, int(np.count_nonzero(~lost))))
+    scatter = _residual_std(errors, even.shape[1], loss)
     inverse = (directions.T / singular**2) @ directions
     lengths = np.sqrt(np.diag(inverse))
     deviations, correlations = np.full(values.size, np.nan), np.full((values.size, values.size), np.nan)
     deviations[~on_bound] = scatter * lengths / norms
     correlations[np.ix_(~on_bound, ~on_bound)] = inverse / np.outer(lengths, lengths)
     condition = float(singular[0] / singular[-1]) if singular.size else 1.0
-    measured = measured_rank(problem, slopes[:, ~on_bound]) if problem.sides.any() else singular.size
-    return Statistics(singular.size, measured, condition, scatter, deviations, correlations, on_bound)
+    measured = uncensored_rank(problem, slopes[:, ~on_bound]) if problem.censoring.any() else singular.size
+    return FitStatistics(singular.size, measured, condition, scatter, deviations, correlations, on_bound)
 
 
 def _on_bound(problem: FitProblem, values: Array) -> npt.NDArray[np.bool_]:
     """Which parameters were stopped by a bound; the search keeps a hair's breadth away from it."""
     low, high = problem.bounds
-    near = 1e-6 * np.maximum(np.abs(values), np.abs(problem.start))
+    near = 1e-6 * np.maximum(np.abs(values), np.abs(problem.initial_values))
     return (values - low <= near) | (high - values <= near)
 
 
-def _scatter(errors: Array, parameters: int, loss: Loss) -> float:
+def _residual_std(errors: Array, parameters: int, loss: Loss) -> float:
     """The sigma that makes sigma^2 (J^T J)^-1 the covariance.
 
     For least squares it is sqrt(SSE/(N - P)); for a loss with influence psi(e) = e rho' it is
@@ -81,11 +81,13 @@ def _scatter(errors: Array, parameters: int, loss: Loss) -> float:
     return float(np.sqrt(np.sum((errors * first) ** 2) / spare) / np.mean(first + 2 * z * second))
 
 
-def _indistinct(problem: FitProblem, kept: npt.NDArray[np.bool_], shares: Array, rank: int) -> str:
+def _rank_deficiency_message(problem: FitProblem, kept: npt.NDArray[np.bool_], shares: Array, rank: int) -> str:
     labels = [label for label, keep in zip(problem.labels, kept, strict=True) if keep]
     names = [label for label, share in zip(labels, shares, strict=True) if share > 1e-3 * shares.max()]
-    first, second = problem.direction.arguments
-    counts = [f"{levels(values)} of {name}" for name, values in zip((first, second), problem.arguments, strict=True)]
+    first, second = problem.fitted_quantity.arguments
+    counts = [
+        f"{count_levels(values)} of {name}" for name, values in zip((first, second), problem.arguments, strict=True)
+    ]
     path = problem.leaves[problem.free[int(np.flatnonzero(kept)[int(np.argmax(shares))])]].path
     said = f"cannot tell apart {', '.join(names)}" if len(names) > 1 else f"do not act on {names[0]}"
     return (
@@ -95,7 +97,7 @@ def _indistinct(problem: FitProblem, kept: npt.NDArray[np.bool_], shares: Array,
     )
 
 
-def levels(values: Array) -> int:
+def count_levels(values: Array) -> int:
     """How many different values there are, to a millionth of their range."""
     span = float(np.ptp(values)) if values.size else 0.0
     return int(np.unique(np.round((values - values.min()) / span * 1e6)).size) if span > 0 else 1

@@ -12,16 +12,16 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.arrays import Array
-from .censored_least_squares import least_squares_of
+from .censored_least_squares import solve_censored_least_squares
 from .problem import FitProblem
 
-_PLACES = 16
+_GUESS_COUNT = 16
 """Places at which the projected errors are looked at, the start among them (chosen)."""
-_SEARCHES = 2
+_SEARCH_COUNT = 2
 """Searches, from the best of these (chosen)."""
-_SPREAD = 4.0
+_SPREAD_FACTOR = 4.0
 """Factor up and down by which the places lie around the start (chosen)."""
-_SHARE = 0.01
+_RANGE_FRACTION = 0.01
 """Part of the range between its bounds by which a parameter is moved besides, so that a zero moves too (chosen)."""
 
 
@@ -31,24 +31,24 @@ def linear_fields(law: Any) -> tuple[str, ...]:
     return (named,) if isinstance(named, str) else tuple(named)
 
 
-def linear_leaves(problem: FitProblem) -> npt.NDArray[np.bool_]:
+def is_linear_parameter(problem: FitProblem) -> npt.NDArray[np.bool_]:
     """Which of the free parameters stand in these fields."""
     fields = linear_fields(problem.law)
     return np.array([problem.leaves[i].path.partition("[")[0] in fields for i in problem.free], dtype=bool)
 
 
-def projected_start(problem: FitProblem) -> Array:
+def find_initial_values(problem: FitProblem) -> Array:
     """The best free parameters by variable projection; the start itself where none is better."""
-    linear = linear_leaves(problem)
+    linear = is_linear_parameter(problem)
     if linear.all() or not linear.any():
-        return problem.start
+        return problem.initial_values
     projection = _Projection(problem, linear)
-    places = sorted(_places(problem, ~linear), key=projection.squares)
-    best = min((projection.searched(place) for place in places[:_SEARCHES]), key=projection.squares)
+    places = sorted(_initial_guesses(problem, ~linear), key=projection.sum_of_squares)
+    best = min((projection.search(place) for place in places[:_SEARCH_COUNT]), key=projection.sum_of_squares)
     low, high = problem.bounds
-    values = np.clip(projection.completed(best), low, high)
-    found, before = (_squares(problem.errors(problem.modelled(v))) for v in (values, problem.start))
-    return values if found < before else problem.start
+    values = np.clip(projection.complete(best), low, high)
+    found, before = (_sum_of_squares(problem.residuals(problem.predict(v))) for v in (values, problem.initial_values))
+    return values if found < before else problem.initial_values
 
 
 class _Projection:
@@ -57,53 +57,53 @@ class _Projection:
     def __init__(self, problem: FitProblem, linear: npt.NDArray[np.bool_]) -> None:
         self._problem, self._linear = problem, linear
         self._bounds = tuple(bound[~linear] for bound in problem.bounds)
-        self._scale = np.where(problem.start[~linear] != 0, np.abs(problem.start[~linear]), 1.0)
+        self._scale = np.where(problem.initial_values[~linear] != 0, np.abs(problem.initial_values[~linear]), 1.0)
 
-    def completed(self, others: Array) -> Array:
+    def complete(self, others: Array) -> Array:
         """All free parameters: these, and the linear ones that go with them; NaN where the law is not finite."""
         values = np.zeros(self._linear.size)
         values[~self._linear] = others
-        constant = self._problem.modelled(values)
-        slopes = self._problem.slopes(values)[:, self._linear]
+        constant = self._problem.predict(values)
+        slopes = self._problem.jacobian(values)[:, self._linear]
         finite = np.isfinite(slopes).all() and np.isfinite(constant).all()
-        values[self._linear] = least_squares_of(self._problem, slopes, constant) if finite else np.nan
+        values[self._linear] = solve_censored_least_squares(self._problem, slopes, constant) if finite else np.nan
         return values
 
-    def errors(self, others: Array) -> Array:
-        return self._problem.errors(self._problem.modelled(self.completed(others)))
+    def residuals(self, others: Array) -> Array:
+        return self._problem.residuals(self._problem.predict(self.complete(others)))
 
-    def squares(self, others: Array) -> float:
-        return _squares(self.errors(others))
+    def sum_of_squares(self, others: Array) -> float:
+        return _sum_of_squares(self.residuals(others))
 
-    def searched(self, start: Array) -> Array:
+    def search(self, start: Array) -> Array:
         """The least from one place, or the place itself where the search fails."""
         from scipy.optimize import least_squares
 
-        if not np.isfinite(self.squares(start)):
+        if not np.isfinite(self.sum_of_squares(start)):
             return start
         low, high = (bound / self._scale for bound in self._bounds)
         inside = np.clip(start / self._scale, low + 1e-9, high - 1e-9)
         try:
             found = least_squares(
-                lambda x: self.errors(x * self._scale), inside, bounds=(low, high), x_scale="jac", max_nfev=60
+                lambda x: self.residuals(x * self._scale), inside, bounds=(low, high), x_scale="jac", max_nfev=60
             )
         except ValueError:  # it came where the law is not finite
             return start
         return np.asarray(found.x * self._scale)
 
 
-def _places(problem: FitProblem, chosen: npt.NDArray[np.bool_]) -> list[Array]:
+def _initial_guesses(problem: FitProblem, chosen: npt.NDArray[np.bool_]) -> list[Array]:
     """The start and places around it, within the bounds, the same every time."""
-    start = problem.start[chosen]
+    start = problem.initial_values[chosen]
     low, high = (bound[chosen] for bound in problem.bounds)
     random = np.random.default_rng(1)
     width = np.where(np.isfinite(high - low), high - low, 0.0)
     places = [start]
-    for _ in range(_PLACES - 1):
-        factor, moved = _SPREAD ** random.uniform(-1, 1, start.size), random.uniform(-1, 1, start.size)
-        places.append(np.clip(start * factor + _SHARE * width * moved, low, high))
+    for _ in range(_GUESS_COUNT - 1):
+        factor, moved = _SPREAD_FACTOR ** random.uniform(-1, 1, start.size), random.uniform(-1, 1, start.size)
+        places.append(np.clip(start * factor + _RANGE_FRACTION * width * moved, low, high))
     return places
 
 
-def _squares(errors: Array) -> float:
+def _sum_of_squares(errors: Array) -> float:
     return float(errors @ errors) if np.isfinite(errors).all() else np.inf

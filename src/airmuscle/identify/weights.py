@@ -11,11 +11,11 @@ from ..core.errors import ColumnError
 from ..recording import Recording
 from ..recording.segment import estimate_sensors
 
-APART = 2.0
+MIN_SENSOR_RATIO = 2.0
 """Ratio of neighbouring deviations from which on two sensors differ (chosen: one sensor's estimates scatter less)."""
 
 
-def deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
+def sensor_deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
     """The standard deviation [SI] of one reading in each recording; None where all readings weigh alike.
 
     Noise and rounding count where every recording states its time; else rounding alone, since the order of other rows
@@ -26,7 +26,7 @@ def deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
     each = []
     for run in runs:
         try:
-            each.append(_deviation(run, quantity, timed))
+            each.append(_sensor_deviation(run, quantity, timed))
         except ColumnError:
             return None
         if not each[-1] > 0:  # the others need not be looked at
@@ -35,7 +35,7 @@ def deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
     order = np.argsort(alone)
     if not alone.size:
         return None
-    rigs = np.split(order, np.flatnonzero(alone[order][1:] > APART * alone[order][:-1]) + 1)
+    rigs = np.split(order, np.flatnonzero(alone[order][1:] > MIN_SENSOR_RATIO * alone[order][:-1]) + 1)
     if len(rigs) < 2:
         return None
     found = np.empty(alone.size)
@@ -44,7 +44,7 @@ def deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
     return found
 
 
-def _deviation(run: Recording, quantity: str, timed: bool) -> float:
+def _sensor_deviation(run: Recording, quantity: str, timed: bool) -> float:
     """Of one recording's sensor; 0 where it shows nothing."""
     values = run[quantity][np.isfinite(run[quantity])]
     if not values.size:

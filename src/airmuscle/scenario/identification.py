@@ -39,8 +39,8 @@ import numpy as np
 
 from ..core import tree
 from ..core.errors import ParameterError
-from ..identify.dynamic import DynamicFit, Experiment, InitialConditions, StartTime, StartValue, fit_dynamic
-from ..identify.dynamic.experiment import Own, Shared
+from ..identify.dynamic import DynamicFit, Experiment, InitialConditions, InitialValue, StartTime, fit_dynamic
+from ..identify.dynamic.experiment import ParameterPaths, RecordUnknown
 from ..library.build import build
 from ..library.catalogue import parsed
 from ..library.location import Location, check_keys, checked, finite, located_errors, text
@@ -70,8 +70,8 @@ class DynamicStudy:
     commands: tuple[Mapping[str, Any], ...]
     """The command of every record as its file states it, to be written again."""
     observed: Mapping[str, float]
-    free: tuple[Shared, ...]
-    own: tuple[Own, ...] = ()
+    free: tuple[ParameterPaths, ...]
+    own: tuple[RecordUnknown, ...] = ()
     bounds: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     starts: int = 1
     seed: int = 0
@@ -89,11 +89,11 @@ class DynamicStudy:
         plant, origin = found.plant(record), self.experiments[record].recording.origin
         note = f"{self.title}: numbers found from {', '.join(e.recording.origin for e in self.experiments)}."
         assert isinstance(plant, Plant)
-        course = found.problem.courses[record]
-        known = dict(course.experiment.start.known)
+        course = found.problem.record_models[record]
+        known = dict(course.experiment.initial_conditions.known)
         for k in course.mine:
-            what = course.unknowns[k].what
-            if isinstance(what, StartValue):
+            what = course.unknowns[k].target
+            if isinstance(what, InitialValue):
                 known[what.name] = float(found.values[k])
         coordinates = plant.mechanism.coordinates
         held = {name for c in coordinates for name in (c.name, c.speed) if c.name in known}
@@ -190,7 +190,7 @@ def _observed(table: Mapping[str, Any], plant: Plant, place: Location) -> dict[s
     return found
 
 
-def _shared(given: Any, where: str) -> Shared:
+def _shared(given: Any, where: str) -> ParameterPaths:
     if isinstance(given, str):
         return given
     if isinstance(given, list) and given and all(isinstance(path, str) for path in given):
@@ -198,12 +198,12 @@ def _shared(given: Any, where: str) -> Shared:
     raise ParameterError(f"{where} holds {given!r}; each is a path in quotes, or a list of paths that share a value.")
 
 
-def _own(table: Mapping[str, Any], plant: Plant, place: Location) -> tuple[Own, ...]:
-    found: list[Own] = [_shared(item, f"{place}, own") for item in _list(table, "own", place)]
+def _own(table: Mapping[str, Any], plant: Plant, place: Location) -> tuple[RecordUnknown, ...]:
+    found: list[RecordUnknown] = [_shared(item, f"{place}, own") for item in _list(table, "own", place)]
     if "start_time" in table:
         found.append(StartTime(_positive(table["start_time"], "s", f"{place}, start_time")))
     for name, margin in _table(table, "start", place, needed=False).items():
-        found.append(StartValue(name, _positive(margin, _unit(name, plant), f"{place}, start, {name}")))
+        found.append(InitialValue(name, _positive(margin, _unit(name, plant), f"{place}, start, {name}")))
     return tuple(found)
 
 
@@ -297,7 +297,7 @@ class _Record:
         pressure = values.pop("pressure", usual)
         with located_errors(at):
             return (
-                InitialConditions.held(plant, pressure, **values)
+                InitialConditions.at_coordinates(plant, pressure, **values)
                 if values
                 else InitialConditions.at_rest(plant, pressure)
             )

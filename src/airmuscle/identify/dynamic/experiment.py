@@ -26,7 +26,7 @@ class Experiment:
 
     recording: Recording
     command: InputSignal
-    start: InitialConditions
+    initial_conditions: InitialConditions
     start_time: float = 0.0
     plant: System | None = None
 
@@ -46,7 +46,7 @@ class StartTime:
 
 
 @dataclasses.dataclass(frozen=True)
-class StartValue:
+class InitialValue:
     """A value that the start takes as known, as an unknown: `StartValue("pressure", 2e3)`."""
 
     name: str
@@ -57,8 +57,8 @@ class StartValue:
         return f"start {self.name}"
 
 
-Shared = str | tuple[str, ...]
-Own = Shared | StartTime | StartValue
+ParameterPaths = str | tuple[str, ...]
+RecordUnknown = ParameterPaths | StartTime | InitialValue
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Unknown:
     """One number to find: leaves of the plant that share it, or a start's time or value, of one record or of all."""
 
     name: str
-    what: tuple[str, ...] | StartTime | StartValue
+    target: tuple[str, ...] | StartTime | InitialValue
     record: int | None
     value: float
     low: float
@@ -78,40 +78,40 @@ class Unknown:
     @property
     def paths(self) -> tuple[str, ...]:
         """The leaves that take this number; none for what acts on the start alone."""
-        return self.what if isinstance(self.what, tuple) else ()
+        return self.target if isinstance(self.target, tuple) else ()
 
     @property
     def scale(self) -> float:
         """The size of a change that counts."""
-        if isinstance(self.what, StartTime | StartValue):
-            return self.what.margin
+        if isinstance(self.target, StartTime | InitialValue):
+            return self.target.margin
         span = self.high - self.low
         return abs(self.value) or (span if np.isfinite(span) else 1.0)
 
     @property
-    def search(self) -> tuple[float, float]:
+    def search_range(self) -> tuple[float, float]:
         """Where starts are spread: within the bounds, and a factor of three either way."""
-        if isinstance(self.what, StartTime | StartValue):
+        if isinstance(self.target, StartTime | InitialValue):
             return self.low, self.high
         reach = (self.value / 3, self.value * 3) if self.value else (-self.scale, self.scale)
         return max(self.low, min(reach)), min(self.high, max(reach))
 
 
-def unknowns(
+def make_unknowns(
     plant: System,
     experiments: Sequence[Experiment],
-    free: Sequence[Shared],
-    own: Sequence[Own],
+    free: Sequence[ParameterPaths],
+    own: Sequence[RecordUnknown],
     bounds: Mapping[str, tuple[float, float]],
 ) -> tuple[Unknown, ...]:
     """The shared unknowns, then those of each record. Raises ParameterError for what the plant lacks."""
-    found = [_leaf(plant, what, None, bounds) for what in free]
+    found = [_plant_unknown(plant, what, None, bounds) for what in free]
     for i, experiment in enumerate(experiments):
         for what in own:
-            if isinstance(what, StartTime | StartValue):
-                found.append(_nuisance(experiment, what, i))
+            if isinstance(what, StartTime | InitialValue):
+                found.append(_record_unknown(experiment, what, i))
             else:
-                found.append(_leaf(experiment.plant or plant, what, i, bounds))
+                found.append(_plant_unknown(experiment.plant or plant, what, i, bounds))
     names = [u.name for u in found]
     for name in bounds:
         if name not in {u.name.partition(" of record")[0] for u in found}:
@@ -121,7 +121,9 @@ def unknowns(
     return tuple(found)
 
 
-def _leaf(plant: System, what: Shared, record: int | None, bounds: Mapping[str, tuple[float, float]]) -> Unknown:
+def _plant_unknown(
+    plant: System, what: ParameterPaths, record: int | None, bounds: Mapping[str, tuple[float, float]]
+) -> Unknown:
     paths = (what,) if isinstance(what, str) else what
     leaves = {leaf.path: leaf for leaf in tree.leaves(plant)}
     for path in paths:
@@ -140,14 +142,14 @@ def _leaf(plant: System, what: Shared, record: int | None, bounds: Mapping[str, 
     return Unknown(name, paths, record, leaf.value, low, high, d.unit, d.symbol, d.meaning)
 
 
-def _nuisance(experiment: Experiment, what: StartTime | StartValue, record: int) -> Unknown:
+def _record_unknown(experiment: Experiment, what: StartTime | InitialValue, record: int) -> Unknown:
     if isinstance(what, StartTime):
         value, unit, symbol = experiment.start_time, "s", "t_0"
     else:
-        if what.name not in experiment.start.known:
-            known = ", ".join(experiment.start.known)
+        if what.name not in experiment.initial_conditions.known:
+            known = ", ".join(experiment.initial_conditions.known)
             raise ParameterError(f"the start does not take '{what.name}' as known; it takes {known}.")
-        value, symbol = experiment.start.known[what.name], f"{what.name}_0"
+        value, symbol = experiment.initial_conditions.known[what.name], f"{what.name}_0"
         unit = header(what.name).partition("[")[2].rstrip("]") or "SI"
     name = f"{what} of record {record + 1}"
     return Unknown(name, what, record, value, value - what.margin, value + what.margin, unit, symbol, str(what))

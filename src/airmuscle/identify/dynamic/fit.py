@@ -13,17 +13,17 @@ from ...core.arrays import Array
 from ...core.errors import IdentificationError, ParameterError
 from ...simulation.integrators import Integrator, Rodas4
 from ..result import Estimate
-from .experiment import Experiment, Own, Shared, unknowns
-from .identifiability import Identifiability, identifiable
+from .experiment import Experiment, ParameterPaths, RecordUnknown, make_unknowns
+from .identifiability import Identifiability, analyse_identifiability
 from .levenberg_marquardt import LevenbergMarquardt
-from .problem import MOST, DynamicFitProblem
-from .record_model import RecordModel, observations
+from .problem import MAX_RUNS, DynamicFitProblem
+from .record_model import RecordModel, count_readings
 from .result import DynamicFit
 
-CORRELATED = 0.3
+MAX_AUTOCORRELATION = 0.3
 """Correlation of neighbouring residuals from which on they are called model error, not noise; chosen."""
 
-FIRST_LOOK, HOPELESS = 20, 1000.0
+SCREENING_RUNS, SCREENING_RATIO = 20, 1000.0
 """RunSplit after which a start whose sum of squares is so many times the least of all is left where it stands; chosen.
 
 In nine problems of 40 to 100 starts, what came to the best optimum was within that of it after 14 runs at most."""
@@ -33,9 +33,9 @@ def fit_dynamic(
     plant: System,
     experiments: Sequence[Experiment],
     *,
-    free: Sequence[Shared],
+    free: Sequence[ParameterPaths],
     observed: Mapping[str, float],
-    own: Sequence[Own] = (),
+    own: Sequence[RecordUnknown] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     starts: int = 1,
     seed: int = 0,
@@ -57,63 +57,63 @@ def fit_dynamic(
     """
     if not experiments or not observed or starts < 1:
         raise ParameterError("fit_dynamic needs at least one record, one observed quantity and one start.")
-    wanted = unknowns(plant, experiments, free, own, bounds or {})
+    wanted = make_unknowns(plant, experiments, free, own, bounds or {})
     method = method or Rodas4()
     courses = tuple(RecordModel(plant, e, i, wanted, observed, method) for i, e in enumerate(experiments))
     problem = DynamicFitProblem(courses, wanted, np.array(list(observed.values()), dtype=float))
     _check_row_count(problem)
-    outcomes = sorted(_solved(problem, spread(problem, starts, seed)), key=lambda outcome: outcome[1])
+    outcomes = sorted(_solve_all(problem, initial_guesses(problem, starts, seed)), key=lambda outcome: outcome[1])
     best, cost = outcomes[0]
     if not np.isfinite(cost):
         problem.residuals(np.array([u.value for u in wanted]) / problem.scales)  # raises the reason, if it is one
         raise IdentificationError("the plant could not be run from any start; look at the bounds and the start.")
-    return _result(problem, best, np.array([c for _, c in outcomes]))
+    return _build_result(problem, best, np.array([c for _, c in outcomes]))
 
 
-def _solved(problem: DynamicFitProblem, begins: Sequence[Array]) -> list[tuple[Array, float]]:
+def _solve_all(problem: DynamicFitProblem, begins: Sequence[Array]) -> list[tuple[Array, float]]:
     """The least squares from every start, on all cores: the kernels leave Python to the others while they run."""
     if len(begins) == 1:
         return [problem.solve(begins[0])]
     pool = ThreadPoolExecutor(min(len(begins), os.cpu_count() or 1))
     try:
-        searches = list(pool.map(lambda z: _searched(problem.search(z), FIRST_LOOK), begins))
+        searches = list(pool.map(lambda z: _run_search(problem.search(z), SCREENING_RUNS), begins))
         least = min(one.cost for one in searches)
-        hopeful = [one for one in searches if not one.ended and one.cost <= HOPELESS * least]
-        list(pool.map(lambda one: _searched(one, MOST), hopeful))
+        hopeful = [one for one in searches if not one.ended and one.cost <= SCREENING_RATIO * least]
+        list(pool.map(lambda one: _run_search(one, MAX_RUNS), hopeful))
         return [(one.x, one.cost) for one in searches]
     finally:
         pool.shutdown(cancel_futures=True)
 
 
-def _searched(search: LevenbergMarquardt, most: int) -> LevenbergMarquardt:
+def _run_search(search: LevenbergMarquardt, most: int) -> LevenbergMarquardt:
     search.run(most)
     return search
 
 
 def _check_row_count(problem: DynamicFitProblem) -> None:
-    count = observations(problem.courses)
+    count = count_readings(problem.record_models)
     if count <= len(problem.unknowns):
         raise IdentificationError(
             f"{count} readings cannot determine {len(problem.unknowns)} unknowns; give more rows or free fewer."
         )
-    if not (problem.deviations > 0).all():
+    if not (problem.sensor_deviations > 0).all():
         raise ParameterError("the standard deviation of an observed quantity must be positive, in SI.")
 
 
-def spread(problem: DynamicFitProblem, count: int, seed: int) -> list[Array]:
+def initial_guesses(problem: DynamicFitProblem, count: int, seed: int) -> list[Array]:
     """The plant's own values, then a Latin hypercube, even in the logarithm where the range is positive."""
     own = np.array([u.value for u in problem.unknowns])
     rng, cells = np.random.default_rng(seed), count - 1
     columns = []
     for unknown in problem.unknowns:
-        low, high = unknown.search
+        low, high = unknown.search_range
         share = (rng.permutation(cells) + rng.random(cells)) / max(cells, 1)
         even = low * (high / low) ** share if low > 0 else low + share * (high - low)
         columns.append(even)
     return [own / problem.scales, *(np.column_stack(columns) / problem.scales)]
 
 
-def _result(problem: DynamicFitProblem, scaled: Array, costs: Array) -> DynamicFit:
+def _build_result(problem: DynamicFitProblem, scaled: Array, costs: Array) -> DynamicFit:
     errors, slopes = problem.residuals(scaled)
     low, high = problem.bounds
     near = 1e-6 * np.maximum(np.abs(scaled), 1.0)
@@ -121,7 +121,7 @@ def _result(problem: DynamicFitProblem, scaled: Array, costs: Array) -> DynamicF
     inner = np.flatnonzero(~on_bound)
     scatter = float(np.sqrt(np.sum(errors**2) / (errors.size - inner.size)))
     names = [problem.unknowns[k].name for k in inner]
-    found = identifiable(slopes[:, inner], names, np.ones(inner.size), scatter)
+    found = analyse_identifiability(slopes[:, inner], names, np.ones(inner.size), scatter)
     inverse = np.full((scaled.size, scaled.size), np.nan)
     inverse[np.ix_(inner, inner)] = found.inverse() * scatter**2
     deviations = np.sqrt(np.diag(inverse))
@@ -133,11 +133,11 @@ def _result(problem: DynamicFitProblem, scaled: Array, costs: Array) -> DynamicF
     )
     correlations = inverse / np.outer(deviations, deviations)
     return DynamicFit(
-        problem, estimates, correlations, found, scatter, costs, _notes(problem, errors, found, estimates)
+        problem, estimates, correlations, found, scatter, costs, _collect_notes(problem, errors, found, estimates)
     )
 
 
-def _notes(
+def _collect_notes(
     problem: DynamicFitProblem, errors: Array, found: Identifiability, estimates: Sequence[Estimate]
 ) -> tuple[str, ...]:
     notes = [str(open_one) for open_one in found.undetermined]
@@ -145,7 +145,7 @@ def _notes(
         if estimate.on_bound:
             notes.append(f"{estimate.name} stands on its bound, {estimate.value:.4g} {estimate.unit}")
     together = float(np.sum(errors[1:] * errors[:-1]) / max(np.sum(errors**2), 1e-300))
-    if together > CORRELATED:
+    if together > MAX_AUTOCORRELATION:
         factor = np.sqrt((1 + together) / (1 - together))
         notes.append(
             f"neighbouring residuals are alike (correlation {together:.2f}): what is left is model error rather than "

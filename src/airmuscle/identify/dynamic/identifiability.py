@@ -14,17 +14,17 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 
-OPEN = 0.5
+MAX_RELATIVE_ERROR = 0.5
 """A combination whose standard deviation exceeds this fraction of its size counts as not determined; chosen."""
-PART = 0.1
+MIN_SHARE = 0.1
 """A parameter takes part in a direction from this share of the greatest on; chosen."""
 RANK_TOLERANCE = 1e-7
 """Singular values below this fraction of the greatest are zero where slopes come from a run; chosen."""
-EXACT = 1e-13
+EXACT_RANK_TOLERANCE = 1e-13
 """The same where slopes are exact to rounding; chosen."""
 
 VOLUMES = ("volume", "rest_volume", "growth_volume", "radius", "resting_length", "braid_angle", "coefficients")
-ADVICE: tuple[tuple[tuple[str, ...], tuple[str, ...], str], ...] = (
+REMEDIES: tuple[tuple[tuple[str, ...], tuple[str, ...], str], ...] = (
     (("conductance",), VOLUMES,
      "measure the volume by itself (weigh the water that fills the muscle), or fill a rigid vessel of known volume "
      "through the same valve"),
@@ -40,30 +40,34 @@ ADVICE: tuple[tuple[tuple[str, ...], tuple[str, ...], str], ...] = (
 
 
 @dataclasses.dataclass(frozen=True)
-class Undetermined:
+class UndeterminedCombination:
     """One combination of parameters that the records leave open, and the experiment that would determine it."""
 
     shares: tuple[tuple[str, float], ...]
     """Parameters that take part, each with its relative change when the greatest changes by one."""
-    deviation: float
+    relative_stderr: float
     """Standard deviation along the combination, a fraction of the parameters' size; infinite where nothing moves."""
-    experiment: str
+    remedy: str
 
     def __str__(self) -> str:
         names = [name for name, _ in self.shares]
         if len(names) == 1:
-            return f"the records hardly depend on {names[0]} ({self._size()}). To determine it, {self.experiment}."
+            return (
+                f"the records hardly depend on {names[0]} ({self._describe_error()}). To determine it, {self.remedy}."
+            )
         moves = ", ".join(f"{name} {share:+.2f} %" for name, share in self.shares)
         return (
-            f"the records cannot tell apart {' and '.join([', '.join(names[:-1]), names[-1]])} ({self._size()}): they "
-            f"stay the same when these change together ({moves}). To separate them, {self.experiment}."
+            f"the records cannot tell apart {' and '.join([', '.join(names[:-1]), names[-1]])} ({self._describe_error()}): they "
+            f"stay the same when these change together ({moves}). To separate them, {self.remedy}."
         )
 
-    def _size(self) -> str:
-        if not np.isfinite(self.deviation):
+    def _describe_error(self) -> str:
+        if not np.isfinite(self.relative_stderr):
             return "not at all determined"
         return (
-            f"open to {self.deviation:.0%} of their size" if len(self.shares) > 1 else f"open to {self.deviation:.0%}"
+            f"open to {self.relative_stderr:.0%} of their size"
+            if len(self.shares) > 1
+            else f"open to {self.relative_stderr:.0%}"
         )
 
 
@@ -71,34 +75,34 @@ class Undetermined:
 class Identifiability:
     """Singular values of the scaled design, greatest first, its right singular vectors as rows, and what stays open."""
 
-    singular: Array
-    directions: Array
-    undetermined: tuple[Undetermined, ...]
+    singular_values: Array
+    right_singular_vectors: Array
+    undetermined: tuple[UndeterminedCombination, ...]
     tolerance: float
 
     @property
     def rank(self) -> int:
         """Directions along which the records move at all."""
-        return int(np.count_nonzero(_counts(self.singular, self.tolerance)))
+        return int(np.count_nonzero(_is_nonzero(self.singular_values, self.tolerance)))
 
     @property
     def condition(self) -> float:
         """Greatest over least singular value."""
-        least = float(self.singular[-1]) if self.singular.size else 1.0
-        return float(self.singular[0]) / least if least > 0 else float("inf")
+        least = float(self.singular_values[-1]) if self.singular_values.size else 1.0
+        return float(self.singular_values[0]) / least if least > 0 else float("inf")
 
     def inverse(self) -> Array:
         """(J^T J)^-1 of the scaled design; NaN for parameters that take part in a direction without any trace."""
-        counts = _counts(self.singular, self.tolerance)
-        kept = self.directions[counts]
-        found = (kept.T / self.singular[counts] ** 2) @ kept
-        lost = (np.abs(self.directions[~counts]) > 1e-3).any(axis=0)
+        counts = _is_nonzero(self.singular_values, self.tolerance)
+        kept = self.right_singular_vectors[counts]
+        found = (kept.T / self.singular_values[counts] ** 2) @ kept
+        lost = (np.abs(self.right_singular_vectors[~counts]) > 1e-3).any(axis=0)
         found[lost, :] = np.nan
         found[:, lost] = np.nan
         return np.asarray(found)
 
 
-def identifiable(
+def analyse_identifiability(
     slopes: Array, names: Sequence[str], scales: Array, scatter: float = 1.0, tolerance: float = RANK_TOLERANCE
 ) -> Identifiability:
     """What a design determines: slopes (R, P) of residuals in standard deviations by parameters of these sizes.
@@ -110,26 +114,30 @@ def identifiable(
     triangle = np.linalg.qr(design, mode="r")
     short = design.shape[1] - len(triangle)
     _, singular, directions = np.linalg.svd(np.vstack([triangle, np.zeros((short, design.shape[1]))]))
-    counts = _counts(singular, tolerance)
+    counts = _is_nonzero(singular, tolerance)
     deviations = np.where(counts, scatter / np.where(counts, singular, 1.0), np.inf)
-    open_ones = [_undetermined(v, d, names) for v, d in zip(directions, deviations, strict=True) if d > OPEN]
+    open_ones = [
+        _describe_combination(v, d, names)
+        for v, d in zip(directions, deviations, strict=True)
+        if d > MAX_RELATIVE_ERROR
+    ]
     return Identifiability(singular, directions, tuple(reversed(open_ones)), tolerance)
 
 
-def _counts(singular: Array, tolerance: float) -> npt.NDArray[np.bool_]:
+def _is_nonzero(singular: Array, tolerance: float) -> npt.NDArray[np.bool_]:
     return np.asarray(singular > tolerance * singular[:1])
 
 
-def _undetermined(direction: Array, deviation: float, names: Sequence[str]) -> Undetermined:
+def _describe_combination(direction: Array, deviation: float, names: Sequence[str]) -> UndeterminedCombination:
     share = direction / direction[np.argmax(np.abs(direction))]
-    order = [int(i) for i in np.argsort(-np.abs(share)) if abs(share[i]) >= PART]
+    order = [int(i) for i in np.argsort(-np.abs(share)) if abs(share[i]) >= MIN_SHARE]
     parts = tuple((names[i], float(share[i])) for i in order)
-    return Undetermined(parts, float(deviation), _advice([name for name, _ in parts]))
+    return UndeterminedCombination(parts, float(deviation), _find_remedy([name for name, _ in parts]))
 
 
-def _advice(names: Sequence[str]) -> str:
+def _find_remedy(names: Sequence[str]) -> str:
     kinds = {name.partition(" of record")[0].rpartition(".")[2].partition("[")[0] for name in names}
-    for first, second, experiment in ADVICE:
+    for first, second, experiment in REMEDIES:
         if len(kinds) > 1 and kinds & set(first) and kinds & set(second):
             return experiment
     if len(names) == 1:

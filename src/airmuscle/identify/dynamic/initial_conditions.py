@@ -18,14 +18,14 @@ from ...plant.plant import Plant
 if TYPE_CHECKING:
     from ...compile.function import Function
 
-NUDGE = 100.0
+PRESSURE_STEP = 100.0
 """A little more gauge pressure [Pa], by which states that settle with it are found."""
-_WHY = {
+_FAILURES = {
     1: "where the search came to, some state changes none of what is asked",
     2: "the search left all bounds",
     3: "the search did not come to an end",
 }
-_conditions: dict[Any, Function] = {}
+_compiled_conditions: dict[Any, Function] = {}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -46,18 +46,18 @@ class InitialConditions:
         speeds = [c.speed for c in plant.mechanism.coordinates]
         places = [c.name for c in plant.mechanism.coordinates]
         state = find_equilibrium(plant, pressure=pressure)
-        known, still, equal = _settled(plant, state, pressure, (*speeds, *places))
+        known, still, equal = _steady_conditions(plant, state, pressure, (*speeds, *places))
         known |= dict.fromkeys(speeds, 0.0)
         return cls({"pressure": pressure, **known}, state, (*still, *speeds), equal)
 
     @classmethod
-    def held(cls, plant: Plant, pressure: float, **coordinates: float) -> InitialConditions:
+    def at_coordinates(cls, plant: Plant, pressure: float, **coordinates: float) -> InitialConditions:
         """A plant of one muscle at a gauge pressure [Pa], its coordinates known, at rest unless speeds are given.
 
         Walls and tubes are settled at this pressure, and go with it where it is an unknown.
         """
         state = plant.state_at(pressure=pressure, **coordinates)
-        known, still, equal = _settled(plant, state, pressure)
+        known, still, equal = _steady_conditions(plant, state, pressure)
         return cls({"pressure": pressure, **known}, state, still, equal)
 
     def check_plant(self, system: System, values: Mapping[str, Any]) -> None:
@@ -75,7 +75,7 @@ class InitialConditions:
             )
 
 
-def _settled(
+def _steady_conditions(
     plant: Plant, state: Mapping[str, float], pressure: float, left: Sequence[str] = ()
 ) -> tuple[dict[str, float], tuple[str, ...], tuple[tuple[str, str], ...]]:
     """How the states besides the air mass are fixed: those that a little more pressure leaves alone are known.
@@ -84,7 +84,7 @@ def _settled(
     """
     moving = {c.name: state[c.name] for c in plant.mechanism.coordinates}
     moving |= {c.speed: state[c.speed] for c in plant.mechanism.coordinates}
-    other = plant.state_at(pressure=pressure + NUDGE, **moving)
+    other = plant.state_at(pressure=pressure + PRESSURE_STEP, **moving)
     shown = plant.outputs(state, dict.fromkeys(plant.inputs, 0.0))
     known, still, equal = {}, [], []
     for name, value in state.items():
@@ -99,14 +99,14 @@ def _settled(
     return known, tuple(still), tuple(equal)
 
 
-def conditions(system: System, start: InitialConditions) -> Function:
+def compile_conditions(system: System, start: InitialConditions) -> Function:
     """The function (state, leaves) -> (values known and rates to vanish, their slopes by state, by leaf)."""
     import casadi
 
     from ...compile.function import Function
 
     key = (tree.structure(system), tuple(start.known), start.stationary, start.equal)
-    if key not in _conditions:
+    if key not in _compiled_conditions:
         model, p = autodiff.symbolic(system)
         x = casadi.SX.sym("x", len(system.states))
         state = {s.name: x[i] for i, s in enumerate(system.states)}
@@ -120,11 +120,11 @@ def conditions(system: System, start: InitialConditions) -> Function:
             *(casadi.SX(values[a] - values[b]) for a, b in start.equal),
         )
         outputs = {"values": g, "by_state": casadi.jacobian(g, x), "by_leaf": casadi.jacobian(g, p)}
-        _conditions[key] = Function({"x": x, "leaves": p}, outputs)
-    return _conditions[key]
+        _compiled_conditions[key] = Function({"x": x, "leaves": p}, outputs)
+    return _compiled_conditions[key]
 
 
-def solved(
+def solve_initial_state(
     function: Function, start: InitialConditions, leaves: Array, known: Array, guess: Array, sizes: Array
 ) -> tuple[Array, Array, Array]:
     """The state (n,) with these leaves and known values, and its slopes by known value (n, k) and by leaf (n, p).
@@ -143,7 +143,7 @@ def solved(
         raise IdentificationError(
             f"no state meets the start {dict(zip(start.known, known.tolist(), strict=True))} with "
             f"{', '.join(start.stationary) or 'nothing'} at rest and "
-            f"{', '.join(f'{a} = {b}' for a, b in start.equal) or 'nothing'} equal: {_WHY[status]}."
+            f"{', '.join(f'{a} = {b}' for a, b in start.equal) or 'nothing'} equal: {_FAILURES[status]}."
         )
     inverse = sizes[:, None] * np.linalg.inv(by_state * sizes)
     return x, inverse[:, : known.size], -inverse @ by_leaf

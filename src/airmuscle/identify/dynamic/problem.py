@@ -11,14 +11,14 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError
 from .experiment import Unknown
-from .levenberg_marquardt import LevenbergMarquardt, descended
-from .record_model import MOST_STEPS, RecordModel, stacked
+from .levenberg_marquardt import LevenbergMarquardt, minimise
+from .record_model import MAX_STEPS, RecordModel, stack_residuals
 
-MOST = 200
+MAX_RUNS = 200
 """RunSplit after which any start is left where it stands."""
 
 
-FEW_STEPS, MANY = 10_000, 20
+MIN_STEP_BUDGET, STEP_BUDGET_FACTOR = 10_000, 20
 """A run is left after so many steps, or so many times those of its search's best run where that is more; chosen."""
 
 
@@ -26,9 +26,9 @@ FEW_STEPS, MANY = 10_000, 20
 class DynamicFitProblem:
     """Residuals over unknowns in units of their scales."""
 
-    courses: tuple[RecordModel, ...]
+    record_models: tuple[RecordModel, ...]
     unknowns: tuple[Unknown, ...]
-    deviations: Array
+    sensor_deviations: Array
 
     @functools.cached_property
     def scales(self) -> Array:
@@ -46,28 +46,30 @@ class DynamicFitProblem:
         errors, slopes, _ = self.run(scaled)
         return errors, slopes
 
-    def run(self, scaled: Array, most_steps: int = MOST_STEPS) -> tuple[Array, Array, int]:
+    def run(self, scaled: Array, most_steps: int = MAX_STEPS) -> tuple[Array, Array, int]:
         """The same, and the steps of the longest run, which fails beyond `most_steps`."""
-        return stacked(self.courses, scaled * self.scales, self.deviations, self.scales, most_steps)
+        return stack_residuals(
+            self.record_models, scaled * self.scales, self.sensor_deviations, self.scales, most_steps
+        )
 
-    def solve(self, scaled: Array, held: Sequence[int] = (), most: int = MOST) -> tuple[Array, float]:
+    def solve(self, scaled: Array, held: Sequence[int] = (), most: int = MAX_RUNS) -> tuple[Array, float]:
         """The least squares from a start, some unknowns held: unknowns and sum of squares, infinite where it fails."""
         loose, whole = [k for k in range(scaled.size) if k not in held], scaled.copy()
-        found = descended(*self._asked(scaled, loose), most)
+        found = minimise(*self._restrict(scaled, loose), most)
         whole[loose] = found.x
         return whole, found.cost
 
     def search(self, scaled: Array) -> LevenbergMarquardt:
         """The search from a start, which can be left and taken up again."""
-        return LevenbergMarquardt(*self._asked(scaled, range(scaled.size)))
+        return LevenbergMarquardt(*self._restrict(scaled, range(scaled.size)))
 
-    def _asked(self, scaled: Array, loose: Sequence[int]) -> tuple[_Guarded, Array, Array, Array]:
+    def _restrict(self, scaled: Array, loose: Sequence[int]) -> tuple[_GuardedResiduals, Array, Array, Array]:
         """Residuals over the loose unknowns, their start and their bounds."""
         (low, high), places = self.bounds, list(loose)
-        return _Guarded(self, scaled, places), scaled[places], low[places], high[places]
+        return _GuardedResiduals(self, scaled, places), scaled[places], low[places], high[places]
 
 
-class _Guarded:
+class _GuardedResiduals:
     """Residuals of a problem over some of its unknowns, None where they cannot be had.
 
     Nor where a run takes far more steps than the best one so far, which comes of plants far from anything physical.
@@ -75,7 +77,7 @@ class _Guarded:
 
     def __init__(self, problem: DynamicFitProblem, scaled: Array, loose: Sequence[int]) -> None:
         self._problem, self._scaled, self._loose = problem, scaled, loose
-        self._least, self._most_steps = np.inf, MOST_STEPS
+        self._least, self._most_steps = np.inf, MAX_STEPS
 
     def __call__(self, x: Array) -> tuple[Array, Array] | None:
         problem, at = self._problem, self._scaled.copy()
@@ -86,5 +88,5 @@ class _Guarded:
             return None
         cost = float(errors @ errors)
         if cost < self._least:
-            self._least, self._most_steps = cost, min(MOST_STEPS, max(FEW_STEPS, MANY * steps))
+            self._least, self._most_steps = cost, min(MAX_STEPS, max(MIN_STEP_BUDGET, STEP_BUDGET_FACTOR * steps))
         return errors, slopes if len(self._loose) == at.size else slopes[:, self._loose]

@@ -11,10 +11,10 @@ from .result import DynamicFit
 
 NORMAL_95 = 1.96
 """Root of the growth of the sum of squares, in variances of the residuals, at the ends of a 95 % interval."""
-REACH = 4.0
+MAX_STANDARD_ERRORS = 4.0
 """Standard deviations that a profile looks to either side, at most twice its value."""
 
-BETTER = 0.1
+MIN_IMPROVEMENT = 0.1
 """A sum of squares that is less by this says that the fit had not come to its end; chosen."""
 
 
@@ -25,20 +25,20 @@ class DynamicProfile:
     name: str
     unit: str
     values: Array
-    growth: Array
-    others: Array
+    cost_increase: Array
+    estimates: Array
     """The estimates at every value, (M, P)."""
 
     @property
     def interval(self) -> tuple[float, float]:
         """Where the growth passes 1.96 squared; NaN at an end where it does not within the values looked at."""
-        best = int(np.argmin(self.growth))
-        distance = np.sqrt(np.maximum(self.growth - self.growth[best], 0.0))
-        below = self._crossing(self.values[: best + 1][::-1], distance[: best + 1][::-1])
-        return below, self._crossing(self.values[best:], distance[best:])
+        best = int(np.argmin(self.cost_increase))
+        distance = np.sqrt(np.maximum(self.cost_increase - self.cost_increase[best], 0.0))
+        below = self._find_crossing(self.values[: best + 1][::-1], distance[: best + 1][::-1])
+        return below, self._find_crossing(self.values[best:], distance[best:])
 
     @staticmethod
-    def _crossing(values: Array, distance: Array) -> float:
+    def _find_crossing(values: Array, distance: Array) -> float:
         over = np.flatnonzero(distance > NORMAL_95)
         if not over.size:
             return float("nan")
@@ -48,12 +48,16 @@ class DynamicProfile:
 
     def __str__(self) -> str:
         low, high = (f"{end:.4g}" if np.isfinite(end) else "open" for end in self.interval)
-        rows = "".join(f"\n  {v:.5g}: {g:.3g}" for v, g in zip(self.values, self.growth, strict=True))
-        better = "\n  a better fit lies on the way: fit again from there" if self.growth.min() < -BETTER else ""
+        rows = "".join(f"\n  {v:.5g}: {g:.3g}" for v, g in zip(self.values, self.cost_increase, strict=True))
+        better = (
+            "\n  a better fit lies on the way: fit again from there"
+            if self.cost_increase.min() < -MIN_IMPROVEMENT
+            else ""
+        )
         return f"{self.name} [{self.unit}], 95 % from {low} to {high}; growth of the sum of squares:{rows}{better}"
 
 
-def profile(fit: DynamicFit, name: str, points: int) -> DynamicProfile:
+def compute_profile(fit: DynamicFit, name: str, points: int) -> DynamicProfile:
     """The profile of one estimate at `points` values to either side, from the optimum outwards."""
     problem = fit.problem
     k = [e.name for e in fit.estimates].index(fit[name].name)
@@ -61,7 +65,7 @@ def profile(fit: DynamicFit, name: str, points: int) -> DynamicProfile:
     (low, high), variance = (bound[k] for bound in problem.bounds), max(fit.residual_std, 1e-300) ** 2
     deviation = fit.estimates[k].stderr / problem.scales[k]
     span = min(high - low, 2.0 * abs(best[k]) or 1.0)
-    reach = min(REACH * deviation, span) if np.isfinite(deviation) else span
+    reach = min(MAX_STANDARD_ERRORS * deviation, span) if np.isfinite(deviation) else span
     rows = [(best[k], fit.costs[0], best)]
     for side in (-1.0, 1.0):
         at = best.copy()

@@ -15,10 +15,10 @@ from ...core.arrays import Array
 from ...core.errors import IdentificationError, ParameterError
 from ...simulation.integrators import INTERRUPTED, Integrator
 from ...simulation.sensitivity import WithSensitivities
-from .experiment import Experiment, StartTime, StartValue, Unknown
-from .initial_conditions import conditions, solved
+from .experiment import Experiment, InitialValue, StartTime, Unknown
+from .initial_conditions import compile_conditions, solve_initial_state
 
-MOST_STEPS = 1_000_000
+MAX_STEPS = 1_000_000
 """Steps after which a run is given up."""
 
 
@@ -34,29 +34,29 @@ class RecordModel:
         self.plant, self.experiment, self.method = experiment.plant or plant, experiment, method
         self.unknowns = unknowns
         self.mine = [k for k, u in enumerate(unknowns) if u.record in (None, number)]
-        self.columns = [k for k in self.mine if not isinstance(unknowns[k].what, StartTime)]
+        self.columns = [k for k in self.mine if not isinstance(unknowns[k].target, StartTime)]
         self.names = tuple(observed)
-        self.times = _rising(experiment)
+        self.times = _check_times(experiment)
         self.measured = np.column_stack([experiment.recording[name] for name in self.names])
         self.kept = np.isfinite(self.measured)
         self.whole = bool(self.kept.all())
         groups = tuple(unknowns[k].paths for k in self.columns) or ((),)
         scales = tuple(unknowns[k].scale for k in self.columns) or (1.0,)
-        self.ready = compile_system(_sensitive(self.plant, groups, scales, self.names, experiment))
+        self.ready = compile_system(_add_sensitivities(self.plant, groups, scales, self.names, experiment))
         self._nominal = self.ready.nominal()
         place = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.plant))}
         moved = [(place[path], k) for k in self.mine for path in unknowns[k].paths]
         self._moved = np.array([i for i, _ in moved], dtype=int), np.array([k for _, k in moved], dtype=int)
         self._leaves = tree.flatten(self.plant)
-        self._conditions = conditions(self.plant, experiment.start)
-        self._known = np.array(list(experiment.start.known.values()), dtype=float)
-        self._own_values = [(j, i) for j, k in enumerate(self.columns) for i in _place_known(unknowns[k], experiment)]
+        self._conditions = compile_conditions(self.plant, experiment.initial_conditions)
+        self._known = np.array(list(experiment.initial_conditions.known.values()), dtype=float)
+        self._own_values = [(j, i) for j, k in enumerate(self.columns) for i in _known_index(unknowns[k], experiment)]
         self._shares = np.zeros((self._leaves.size, len(self.columns)))
         for j, k in enumerate(self.columns):
             self._shares[[place[path] for path in unknowns[k].paths], j] = 1.0
         self._sizes = np.array([s.nominal for s in self.plant.states])
-        self._guess = np.array([experiment.start.guess[s.name] for s in self.plant.states])
-        self._last_clock: _Clock | None = None
+        self._guess = np.array([experiment.initial_conditions.guess[s.name] for s in self.plant.states])
+        self._last_clock: _TimeGrid | None = None
 
     def leaves(self, values: Array) -> Array:
         """The plant's leaves with the unknowns at `values`."""
@@ -65,13 +65,13 @@ class RecordModel:
         found[places] = values[unknowns]
         return found
 
-    def start(self, values: Array) -> tuple[Array, Array]:
+    def initial_state(self, values: Array) -> tuple[Array, Array]:
         """The state at the start (n,) and its derivatives by every column (n, K)."""
         known = self._known.copy()
         for j, i in self._own_values:
             known[i] = values[self.columns[j]]
-        state, by_known, by_leaf = solved(
-            self._conditions, self.experiment.start, self.leaves(values), known, self._guess, self._sizes
+        state, by_known, by_leaf = solve_initial_state(
+            self._conditions, self.experiment.initial_conditions, self.leaves(values), known, self._guess, self._sizes
         )
         slopes = by_leaf @ self._shares
         for j, i in self._own_values:
@@ -80,10 +80,10 @@ class RecordModel:
 
     def start_time(self, values: Array) -> float:
         """Where the run begins on the record's clock [s]."""
-        shifts = [values[k] for k in self.mine if isinstance(self.unknowns[k].what, StartTime)]
+        shifts = [values[k] for k in self.mine if isinstance(self.unknowns[k].target, StartTime)]
         return float(shifts[0]) if shifts else self.experiment.start_time
 
-    def evaluate(self, values: Array, most_steps: int = MOST_STEPS) -> Modelled:
+    def evaluate(self, values: Array, most_steps: int = MAX_STEPS) -> ModelOutputs:
         """What the model gives at the record's rows.
 
         Raises IdentificationError where the run fails or its start does not exist.
@@ -92,19 +92,19 @@ class RecordModel:
         count, columns = len(self.names), self.ready.sizes.outputs // len(self.names) - 2
         by_column = outputs[:, count:-count].reshape(-1, count, columns)
         if len(self.columns) == len(self.unknowns):
-            return Modelled(outputs[:, :count], by_column, steps)
+            return ModelOutputs(outputs[:, :count], by_column, steps)
         slopes = np.zeros((*self.measured.shape, len(self.unknowns)))
         slopes[:, :, self.columns] = by_column[:, :, : len(self.columns)]
         for k in self.mine:
-            if isinstance(self.unknowns[k].what, StartTime):
+            if isinstance(self.unknowns[k].target, StartTime):
                 slopes[:, :, k] = np.where(before[:, None], 0.0, -outputs[:, -count:])
-        return Modelled(outputs[:, :count], slopes, steps)
+        return ModelOutputs(outputs[:, :count], slopes, steps)
 
     def _outputs(self, values: Array, most_steps: int) -> tuple[Array, npt.NDArray[np.bool_], int]:
         from ...compile.cache.kernel import evaluate
 
-        state, slopes = self.start(values)
-        clock = self._clock(self.start_time(values))
+        state, slopes = self.initial_state(values)
+        clock = self._time_grid(self.start_time(values))
         leaves = self.ready.parameters.copy()
         leaves[: self._leaves.size] = self.leaves(values)
         ready = self.ready.at(leaves, self._nominal)
@@ -121,45 +121,45 @@ class RecordModel:
             )
         results = np.empty((clock.times.size, ready.sizes.outputs))
         evaluate(ready.address["outputs"], ready.precomputed, course.rows, clock.inputs, results)
-        return results, clock.before, course.steps
+        return results, clock.before_start, course.steps
 
-    def _clock(self, begin: float) -> _Clock:
+    def _time_grid(self, begin: float) -> _TimeGrid:
         """The record seen from where the run begins; the last one is kept, as most fits ask for one alone."""
         known = self._last_clock
-        if known is None or known.begin != begin:
+        if known is None or known.start_time != begin:
             clock = self.times - begin
             times, inputs = np.maximum(clock, 0.0), self.plant.inputs
             segments = self.experiment.command.segments(inputs, 0.0, max(float(clock[-1]), 1e-9))
             under = np.ascontiguousarray(segments.inputs_at(times, 0.0))
-            self._last_clock = known = _Clock(begin, times, clock < 0, segments, under)
+            self._last_clock = known = _TimeGrid(begin, times, clock < 0, segments, under)
         return known
 
 
-class Modelled(NamedTuple):
+class ModelOutputs(NamedTuple):
     """What the model gives at the rows (N, Q), its derivatives by all unknowns (N, Q, P), and the steps of the run."""
 
     values: Array
-    slopes: Array
+    jacobian: Array
     steps: int
 
 
-class _Clock(NamedTuple):
+class _TimeGrid(NamedTuple):
     """Rows of a record counted from the start of the run, and the command there."""
 
-    begin: float
+    start_time: float
     times: Array
-    before: npt.NDArray[np.bool_]
+    before_start: npt.NDArray[np.bool_]
     segments: PiecewiseLinear
     inputs: Array
 
 
-def _place_known(unknown: Unknown, experiment: Experiment) -> list[int]:
+def _known_index(unknown: Unknown, experiment: Experiment) -> list[int]:
     """Where among the start's known values an unknown stands, if it is one of them."""
-    known, what = list(experiment.start.known), unknown.what
-    return [known.index(what.name)] if isinstance(what, StartValue) else []
+    known, what = list(experiment.initial_conditions.known), unknown.target
+    return [known.index(what.name)] if isinstance(what, InitialValue) else []
 
 
-def _rising(experiment: Experiment) -> Array:
+def _check_times(experiment: Experiment) -> Array:
     times = experiment.recording["time"]
     bad = np.flatnonzero(~(np.diff(times) >= 0))
     if bad.size or not times.size:
@@ -168,7 +168,7 @@ def _rising(experiment: Experiment) -> Array:
     return times
 
 
-def _sensitive(
+def _add_sensitivities(
     plant: System, groups: tuple[tuple[str, ...], ...], scales: tuple[float, ...], names: tuple[str, ...],
     experiment: Experiment,
 ) -> WithSensitivities:  # fmt: skip
@@ -178,8 +178,8 @@ def _sensitive(
         raise ParameterError(f"{experiment.recording.origin}: {error}") from None
 
 
-def stacked(
-    courses: Sequence[RecordModel], values: Array, deviations: Array, scales: Array, most_steps: int = MOST_STEPS
+def stack_residuals(
+    courses: Sequence[RecordModel], values: Array, deviations: Array, scales: Array, most_steps: int = MAX_STEPS
 ) -> tuple[Array, Array, int]:
     """Residuals (R,) in standard deviations, model less measured, rows without a reading left out.
 
@@ -196,6 +196,6 @@ def stacked(
     return *joined, longest
 
 
-def observations(courses: Sequence[RecordModel]) -> Any:
+def count_readings(courses: Sequence[RecordModel]) -> Any:
     """How many readings take part."""
     return sum(int(course.kept.sum()) for course in courses)

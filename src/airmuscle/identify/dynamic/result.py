@@ -53,25 +53,25 @@ class DynamicFit:
         return self.problem.unknowns
 
     @property
-    def reached(self) -> int:
+    def starts_at_optimum(self) -> int:
         """How many starts came to the best sum of squares, within a thousandth."""
         return int(np.count_nonzero(self.costs <= 1.001 * self.costs[0] + 1e-9))
 
     def plant(self, record: int = 0) -> System:
         """The plant of one record with what was found put in."""
-        course = self.problem.courses[record]
+        course = self.problem.record_models[record]
         return tree.with_parameters(course.plant, [float(v) for v in course.leaves(self.values)])
 
     def modelled(self, record: int = 0) -> Recording:
         """What the fitted plant gives at the rows of one record."""
-        course = self.problem.courses[record]
+        course = self.problem.record_models[record]
         values = course.evaluate(self.values).values
         columns = {name: values[:, i] for i, name in enumerate(course.names)}
         return Recording({"time": course.times, **columns}, f"fit to {course.experiment.recording.origin}")
 
     def residuals(self, record: int = 0) -> Recording:
         """Model less measured at the rows of one record."""
-        course, model = self.problem.courses[record], self.modelled(record)
+        course, model = self.problem.record_models[record], self.modelled(record)
         errors = {name: model[name] - course.experiment.recording[name] for name in course.names}
         return Recording({"time": course.times, **errors}, f"residuals of {course.experiment.recording.origin}")
 
@@ -81,31 +81,31 @@ class DynamicFit:
 
     def profile(self, name: str, points: int = 9) -> DynamicProfile:
         """How the sum of squares grows as one estimate is held at other values and all others are found anew."""
-        from .profile import profile
+        from .profile import compute_profile
 
-        return profile(self, name, points)
+        return compute_profile(self, name, points)
 
     def __str__(self) -> str:
         rows = [("parameter", "", "value", "2 sd", "unit", "meaning")]
-        rows += [(e.name, e.label, f"{e.value:.6g}", _twice(e), e.unit, e.meaning) for e in self.estimates]
+        rows += [(e.name, e.label, f"{e.value:.6g}", _two_stderr(e), e.unit, e.meaning) for e in self.estimates]
         widths = [max(len(row[i]) for row in rows) for i in range(5)]
         table = ["  ".join([*(c.ljust(w) for c, w in zip(row, widths, strict=False)), row[5]]).rstrip() for row in rows]
-        return "\n".join([*table, "", *self._figures(), *(f"note: {note}" for note in self.notes)])
+        return "\n".join([*table, "", *self._summary_lines(), *(f"note: {note}" for note in self.notes)])
 
-    def _figures(self) -> list[str]:
+    def _summary_lines(self) -> list[str]:
         lines = []
-        for i, course in enumerate(self.problem.courses):
+        for i, course in enumerate(self.problem.record_models):
             parts = ", ".join(f"{name} {self.rms(name, i):.4g}" for name in course.names)
             lines.append(f"record {i + 1}, {course.experiment.recording.origin}: rms {parts} (SI)")
         found = self.identifiability
         lines.append(
-            f"residuals {self.residual_std:.3g} sensor deviations; rank {found.rank} of {found.singular.size} off bounds"
+            f"residuals {self.residual_std:.3g} sensor deviations; rank {found.rank} of {found.singular_values.size} off bounds"
         )
-        lines.append(f"{self.reached} of {self.costs.size} starts came to the same optimum")
+        lines.append(f"{self.starts_at_optimum} of {self.costs.size} starts came to the same optimum")
         return lines
 
 
-def _twice(estimate: Estimate) -> Any:
+def _two_stderr(estimate: Estimate) -> Any:
     if estimate.on_bound:
         return "on bound"
     return f"{2 * estimate.stderr:.3g}" if np.isfinite(estimate.stderr) else "unknown"

@@ -6,11 +6,11 @@ import numpy as np
 
 from ...core.arrays import Array
 
-PLACES = 24
+BIN_COUNT = 24
 """Places along the path at which branches are compared (chosen)."""
 
 
-def between(path: Array, values: Array, other_path: Array, other_values: Array) -> Array:
+def binned_difference(path: Array, values: Array, other_path: Array, other_values: Array) -> Array:
     """Differences of two branches, the second less the first, at places of the path where both have rows.
 
     Give errors from one common static curve, not forces: within a place a steep curve would look like a difference.
@@ -18,13 +18,13 @@ def between(path: Array, values: Array, other_path: Array, other_values: Array) 
     if not path.size or not other_path.size:
         return np.empty(0)
     low, high = max(path.min(), other_path.min()), min(path.max(), other_path.max())
-    edges = np.linspace(low, high, PLACES + 1)
-    means = _means(path, values, edges), _means(other_path, other_values, edges)
+    edges = np.linspace(low, high, BIN_COUNT + 1)
+    means = _bin_means(path, values, edges), _bin_means(other_path, other_values, edges)
     found: Array = means[1] - means[0]
     return np.asarray(found[np.isfinite(found)])
 
 
-def _means(path: Array, values: Array, edges: Array) -> Array:
+def _bin_means(path: Array, values: Array, edges: Array) -> Array:
     place = np.digitize(path, edges[1:-1])
     inside = (path >= edges[0]) & (path <= edges[-1])
     counts = np.bincount(place[inside], minlength=edges.size - 1)
@@ -33,10 +33,10 @@ def _means(path: Array, values: Array, edges: Array) -> Array:
     return means
 
 
-def gap(path: Array, values: Array, way: Array) -> Array:
+def branch_gap(path: Array, values: Array, way: Array) -> Array:
     """Falling less rising branches, at places along the path; `way` is 1 where a row rises, -1 where it falls."""
     up, down = way > 0, way < 0
-    return between(path[up], values[up], path[down], values[down])
+    return binned_difference(path[up], values[up], path[down], values[down])
 
 
 def repeat_difference(
@@ -44,4 +44,4 @@ def repeat_difference(
 ) -> Array:
     """What a second run of the same loop gives beyond the first, branch by branch, at places along the path."""
     pairs = ((way > 0, other_way > 0), (way < 0, other_way < 0))
-    return np.concatenate([between(path[a], values[a], other_path[b], other_values[b]) for a, b in pairs])
+    return np.concatenate([binned_difference(path[a], values[a], other_path[b], other_values[b]) for a, b in pairs])

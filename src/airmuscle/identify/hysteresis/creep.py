@@ -11,12 +11,12 @@ from ...core.arrays import Array
 from ...core.declaration import model, parameter
 from ...core.errors import IdentificationError, ParameterError
 from ...recording import Recording
-from .evidence import effective_rows, f_test
-from .result import RARE
+from ..model_evidence import effective_sample_size, f_test_p_value
+from .result import SIGNIFICANCE_LEVEL
 
-TRIED = 40
+GRID_SIZE = 40
 """Time constants tried, spread evenly in their logarithm over what the record can tell (chosen)."""
-APART = 3.0
+MIN_RATIO = 3.0
 """Least ratio of two time constants; closer ones cannot be told apart, and their amplitudes run away (chosen)."""
 
 
@@ -40,7 +40,7 @@ class Creep:
                 "each for every part."
             )
 
-    def at(self, time: Any) -> Any:
+    def value_at(self, time: Any) -> Any:
         """The value at times [s] from the start of the hold."""
         elapsed = np.asarray(time, dtype=float)
         found = self.initial + 0.0 * elapsed
@@ -55,9 +55,9 @@ class CreepFit:
 
     creep: Creep
     rmse: float
-    rmses: tuple[float, ...]
+    rmse_by_order: tuple[float, ...]
     """With no part, one, two."""
-    chances: tuple[float, ...]
+    p_values: tuple[float, ...]
     """Probability that the first, the second part would do as well by chance (F test)."""
     duration: float
     unit: str = ""
@@ -72,7 +72,7 @@ class CreepFit:
             for a, tau in zip(self.creep.amplitudes, self.creep.time_constants, strict=True)
         )
         found = ("no creep", "one time constant", "two time constants")[count]
-        rms = ", ".join(f"{value:.3g}" for value in self.rmses)
+        rms = ", ".join(f"{value:.3g}" for value in self.rmse_by_order)
         text = f"The data justify {found}{f' ({parts})' if parts else ''}; rms error with none, one, two: {rms}{unit}."
         if count and max(self.creep.time_constants) > self.duration / 2:
             text += f" The record of {self.duration:.3g} s is too short for the longest: its end is extrapolated."
@@ -90,42 +90,42 @@ def fit_creep(recording: Recording, quantity: str) -> CreepFit:
         raise IdentificationError(
             f"{recording.origin}: creep needs 12 rows of a hold at least, in rising time; there are {time.size}."
         )
-    found = [_plain(values), _best(time, values, 1), _best(time, values, 2)]
-    squares = [float(np.mean((creep.at(time) - values) ** 2)) for creep in found]
-    rows = effective_rows(found[-1].at(time) - values)
-    chances = tuple(f_test(squares[i], squares[i + 1], rows, 3 + 2 * i, 2) for i in (0, 1))
+    found = [_fit_constant(values), _fit_elements(time, values, 1), _fit_elements(time, values, 2)]
+    squares = [float(np.mean((creep.value_at(time) - values) ** 2)) for creep in found]
+    rows = effective_sample_size(found[-1].value_at(time) - values)
+    chances = tuple(f_test_p_value(squares[i], squares[i + 1], rows, 3 + 2 * i, 2) for i in (0, 1))
     count = 0
-    while count < 2 and chances[count] < RARE:
+    while count < 2 and chances[count] < SIGNIFICANCE_LEVEL:
         count += 1
     rmses = tuple(float(np.sqrt(square)) for square in squares)
     unit = "N" if quantity == "force" else ""
     return CreepFit(found[count], rmses[count], rmses, chances, float(time[-1]), unit)
 
 
-def _plain(values: Array) -> Creep:
+def _fit_constant(values: Array) -> Creep:
     return Creep(float(np.mean(values)))
 
 
-def _best(time: Array, values: Array, count: int) -> Creep:
+def _fit_elements(time: Array, values: Array, count: int) -> Creep:
     """The time constants by search from the best of a grid; initial value and amplitudes by linear least squares."""
     from scipy.optimize import least_squares
 
-    low, high, apart = np.log(np.median(np.diff(time))), np.log(2.0 * time[-1]), np.log(APART)
-    grid = np.linspace(low, high, TRIED)[1:-1]
+    low, high, apart = np.log(np.median(np.diff(time))), np.log(2.0 * time[-1]), np.log(MIN_RATIO)
+    grid = np.linspace(low, high, GRID_SIZE)[1:-1]
     steps = grid - low + 1.01 * apart
     starts = [(g,) for g in grid] if count == 1 else [(a, b) for a in grid for b in steps[::3] if a + b < high]
-    first = min(starts, key=lambda x: float(np.sum(_remainder(np.array(x), time, values) ** 2)))
+    first = min(starts, key=lambda x: float(np.sum(_residuals(np.array(x), time, values) ** 2)))
     bounds = ([low, apart][:count], [high, max(high - low, 2.0 * apart)][:count])
-    logs = np.cumsum(least_squares(_remainder, first, bounds=bounds, args=(time, values)).x)
-    coefficients = np.linalg.lstsq(_columns(logs, time), values, rcond=None)[0]
+    logs = np.cumsum(least_squares(_residuals, first, bounds=bounds, args=(time, values)).x)
+    coefficients = np.linalg.lstsq(_design_matrix(logs, time), values, rcond=None)[0]
     return Creep(float(coefficients[0]), tuple(coefficients[1:]), tuple(np.exp(logs)))
 
 
-def _columns(logs: Array, time: Array) -> Array:
+def _design_matrix(logs: Array, time: Array) -> Array:
     return np.column_stack([np.ones_like(time), *(1.0 - np.exp(-time / np.exp(log)) for log in logs)])
 
 
-def _remainder(steps: Array, time: Array, values: Array) -> Array:
+def _residuals(steps: Array, time: Array, values: Array) -> Array:
     """Errors for the logarithm of the first time constant, and how far that of the second lies above it."""
-    columns = _columns(np.cumsum(steps), time)
+    columns = _design_matrix(np.cumsum(steps), time)
     return np.asarray(columns @ np.linalg.lstsq(columns, values, rcond=None)[0] - values)

@@ -14,9 +14,9 @@ from ...recording.segment.runs import BAND
 from ...recording.segment.sensor import noise_of
 from ...recording.segment.stretch import level_stretches
 
-FEWEST = 12
+MIN_ROWS = 12
 """Rows that a fit of creep needs."""
-STILL = 5e-4
+LENGTH_TOLERANCE = 5e-4
 """Contraction within which a frame holds the length (chosen)."""
 
 
@@ -24,7 +24,7 @@ STILL = 5e-4
 class Hold:
     """Rows of a hold, and which quantity creeps in it: the contraction under a load, the force at a length."""
 
-    stretch: Interval
+    interval: Interval
     quantity: str
 
 
@@ -32,17 +32,17 @@ def find_holds(recording: Recording) -> Iterator[Hold]:
     """The holds of a recording among its plateaus of pressure; none without time."""
     force, contraction = recording["force"], recording["contraction"]
     for plateau in find_plateaus(recording):
-        if len(plateau.stretch) >= FEWEST and np.ptp(force[plateau.stretch.rows]) <= BAND * np.abs(force).max():
+        if len(plateau.stretch) >= MIN_ROWS and np.ptp(force[plateau.stretch.rows]) <= BAND * np.abs(force).max():
             yield Hold(plateau.stretch, "contraction")
             continue
-        for level in level_stretches(contraction, STILL, within=plateau.stretch):
-            still = _arrived(contraction, level)
-            if len(still) >= FEWEST:
+        for level in level_stretches(contraction, LENGTH_TOLERANCE, within=plateau.stretch):
+            still = _trim_to_level(contraction, level)
+            if len(still) >= MIN_ROWS:
                 yield Hold(still, "force")
 
 
-def _arrived(values: Array, level: Interval) -> Interval:
+def _trim_to_level(values: Array, level: Interval) -> Interval:
     """The stretch without the rows on the way to its level and away from it."""
     inside = values[level.rows]
-    near = np.flatnonzero(np.abs(inside - np.median(inside)) <= max(STILL / 10.0, 4.0 * noise_of(inside)))
+    near = np.flatnonzero(np.abs(inside - np.median(inside)) <= max(LENGTH_TOLERANCE / 10.0, 4.0 * noise_of(inside)))
     return Interval(level.start + int(near[0]), level.start + int(near[-1]) + 1) if near.size else Interval(0, 0)

@@ -22,16 +22,16 @@ from ...recording.segment import (
 )
 from ...recording.segment.runs import BAND, STROKE
 from .fit import (
-    Given,
-    Mask,
-    OnContraction,
-    OnPressure,
+    ContractionPath,
+    FixedCharacteristic,
+    FrictionPath,
     PolynomialCurve,
-    Slide,
+    PressurePath,
+    RowMask,
     StaticCurve,
-    candidates,
-    course,
     fit_hysteresis,
+    initial_friction_laws,
+    make_loop_series,
 )
 from .result import HysteresisFit
 
@@ -42,14 +42,14 @@ class HysteresisLoop:
 
     recording: Recording
     run: Run
-    slide: Slide
+    friction_path: FrictionPath
     static: StaticCurve
-    chosen: Mask
-    repeat: tuple[Recording, Mask] | None = None
+    fitted_rows: RowMask
+    repeat: tuple[Recording, RowMask] | None = None
     """Another run of the same kind at the same level, which judges."""
 
     @property
-    def in_words(self) -> str:
+    def description(self) -> str:
         """`isobaric at 300 kPa`, as the recording shows it."""
         if self.run.column is None or self.run.value is None:
             return self.run.kind.name
@@ -72,9 +72,9 @@ class LoopFit:
         return next((fit for fit in self.fits if fit.justified), None)
 
     @property
-    def enters_a_plant(self) -> bool:
+    def usable_in_plant(self) -> bool:
         """Whether what rubs is the muscle's motion: friction on the pressure describes isometric loops only."""
-        return isinstance(self.loop.slide, OnContraction)
+        return isinstance(self.loop.friction_path, ContractionPath)
 
 
 def find_loops(
@@ -93,22 +93,22 @@ def find_loops(
     """
     sensed, found = estimate_sensors(recordings), list[HysteresisLoop]()
     for recording in recordings:
-        loop = _loop(recording, sensed, characteristic, degree, all_rows)
-        twin = next((i for i, other in enumerate(found) if _same(other.run, loop.run)), None)
+        loop = _make_loop(recording, sensed, characteristic, degree, all_rows)
+        twin = next((i for i, other in enumerate(found) if _is_same_level(other.run, loop.run)), None)
         if twin is None:
             found.append(loop)
         elif found[twin].repeat is None:
-            found[twin] = dataclasses.replace(found[twin], repeat=(recording, loop.chosen))
+            found[twin] = dataclasses.replace(found[twin], repeat=(recording, loop.fitted_rows))
     return tuple(found)
 
 
-def _loop(
+def _make_loop(
     recording: Recording, sensed: Mapping[str, Sensor], law: Characteristic | None, degree: int, all_rows: bool
 ) -> HysteresisLoop:
     longest = max(find_runs(recording, sensed), key=lambda run: len(run.stretch))
-    slide: Slide = OnPressure() if longest.kind is ISOMETRIC else OnContraction()
+    slide: FrictionPath = PressurePath() if longest.kind is ISOMETRIC else ContractionPath()
     if law is not None:
-        static: StaticCurve = Given(law)
+        static: StaticCurve = FixedCharacteristic(law)
     elif longest.kind in (ISOBARIC, ISOMETRIC):
         static = PolynomialCurve("contraction" if longest.kind is ISOBARIC else "pressure", degree)
     else:
@@ -116,12 +116,14 @@ def _loop(
             f"{recording.origin}: the run is {longest.kind.name}, so that pressure and contraction move together and "
             "no curve in one of them stands for the muscle without friction. Give its characteristic."
         )
-    chosen = _counting(recording, sensed, all_rows)
-    _check_two_directions(recording, motion_direction(slide.path(recording), recording.columns.get("time")), chosen)
+    chosen = _select_rows(recording, sensed, all_rows)
+    _check_two_directions(
+        recording, motion_direction(slide.displacement(recording), recording.columns.get("time")), chosen
+    )
     return HysteresisLoop(recording, longest, slide, static, chosen)
 
 
-def _counting(recording: Recording, sensed: Mapping[str, Sensor], all_rows: bool) -> Mask:
+def _select_rows(recording: Recording, sensed: Mapping[str, Sensor], all_rows: bool) -> RowMask:
     force = recording["force"]
     pulls = (force > 0) & np.isfinite(force)
     if "force" in sensed:
@@ -129,7 +131,7 @@ def _counting(recording: Recording, sensed: Mapping[str, Sensor], all_rows: bool
     return pulls if all_rows else pulls & quasi_static_rows(recording, sensed)
 
 
-def _check_two_directions(recording: Recording, way: np.ndarray, chosen: Mask) -> None:
+def _check_two_directions(recording: Recording, way: np.ndarray, chosen: RowMask) -> None:
     for direction, word in ((1, "rises"), (-1, "falls")):
         rows, counting = np.count_nonzero(way == direction), np.count_nonzero((way == direction) & chosen)
         if not counting:
@@ -140,7 +142,7 @@ def _check_two_directions(recording: Recording, way: np.ndarray, chosen: Mask) -
             )
 
 
-def _same(one: Run, other: Run) -> bool:
+def _is_same_level(one: Run, other: Run) -> bool:
     """Whether two runs hold the same quantity at the same level, as closely as one run holds it."""
     if one.kind is not other.kind or one.column != other.column or one.value is None or other.value is None:
         return False
@@ -150,15 +152,15 @@ def _same(one: Run, other: Run) -> bool:
 
 def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str], None] | None = None) -> LoopFit:
     """Every friction law fitted to a loop, by AICc. `progress` is called with the name of each law."""
-    plain = course(loop.recording, loop.static, loop.slide, loop.chosen)
+    plain = make_loop_series(loop.recording, loop.static, loop.friction_path, loop.fitted_rows)
     fits, failed = list[HysteresisFit](), dict[str, str]()
-    for start in candidates(plain.path[loop.chosen], plain.remainder(None), elements):
+    for start in initial_friction_laws(plain.path[loop.fitted_rows], plain.fitted_residuals(None), elements):
         name = type(start).__name__
         if progress is not None:
             progress(name)
         try:
             fits.append(
-                fit_hysteresis(start, loop.recording, static=loop.static, slide=loop.slide, chosen=loop.chosen,
+                fit_hysteresis(start, loop.recording, static=loop.static, slide=loop.friction_path, chosen=loop.fitted_rows,
                                repeat=loop.repeat)
             )  # fmt: skip
         except IdentificationError as error:

@@ -25,17 +25,17 @@ class LoadRange(NamedTuple):
     max_force: float
 
     @classmethod
-    def of_recording(cls, recording: Recording) -> LoadRange:
+    def from_recording(cls, recording: Recording) -> LoadRange:
         """The smallest validity range that holds every row."""
         p, f = recording["pressure"], recording["force"]
         return cls(float(p.min()), float(p.max()), float(f.min()), float(f.max()))
 
     @classmethod
-    def of_law(cls, law: Characteristic) -> LoadRange:
+    def from_law(cls, law: Characteristic) -> LoadRange:
         """The validity range in which a law answers."""
         return cls(*law.pressure_range, *law.force_range)
 
-    def scaled(self, pressure: Array, force: Array) -> tuple[Array, Array]:
+    def scale(self, pressure: Array, force: Array) -> tuple[Array, Array]:
         """Pressure and force as numbers that run from -1 to 1 on the validity range."""
         x = 2 * (pressure - self.min_pressure) / (self.max_pressure - self.min_pressure) - 1
         y = 2 * (force - self.min_force) / (self.max_force - self.min_force) - 1
@@ -52,7 +52,7 @@ class Basis(abc.ABC):
     """Functions of pressure and force that a surface is a sum of."""
 
     @abc.abstractmethod
-    def columns(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
+    def design_matrix(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
         """Their values at N points [Pa, N], one column each, by degree in pressure and then in force."""
 
 
@@ -63,7 +63,7 @@ class Monomials(Basis):
     pressure_unit: float = 1.0
     force_unit: float = 1.0
 
-    def columns(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
+    def design_matrix(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
         degrees = [pressure_degree, force_degree]
         return np.asarray(polynomial.polyvander2d(pressure / self.pressure_unit, force / self.force_unit, degrees))
 
@@ -74,22 +74,24 @@ class Chebyshev(Basis):
 
     validity_range: LoadRange
 
-    def columns(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
+    def design_matrix(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
         return np.asarray(
-            chebyshev.chebvander2d(*self.validity_range.scaled(pressure, force), [pressure_degree, force_degree])
+            chebyshev.chebvander2d(*self.validity_range.scale(pressure, force), [pressure_degree, force_degree])
         )
 
-    def in_bar_and_newton(self, coefficients: Array, pressure_degree: int, force_degree: int) -> Array:
+    def to_bar_and_newton(self, coefficients: Array, pressure_degree: int, force_degree: int) -> Array:
         """The same sum as coefficients of p^i F^j in bar and newton, in the same order."""
         validity_range = self.validity_range
-        by_pressure = _monomials(validity_range.min_pressure / bar, validity_range.max_pressure / bar, pressure_degree)
-        by_force = _monomials(validity_range.min_force, validity_range.max_force, force_degree)
+        by_pressure = _chebyshev_to_monomials(
+            validity_range.min_pressure / bar, validity_range.max_pressure / bar, pressure_degree
+        )
+        by_force = _chebyshev_to_monomials(validity_range.min_force, validity_range.max_force, force_degree)
         table = coefficients.reshape(pressure_degree + 1, force_degree + 1)
         return (by_pressure @ table @ by_force.T).ravel()
 
 
 @functools.lru_cache(maxsize=64)  # a bootstrap refits one validity range a thousand times
-def _monomials(low: float, high: float, degree: int) -> Array:
+def _chebyshev_to_monomials(low: float, high: float, degree: int) -> Array:
     """Column i holds the coefficients of T_i, scaled to low..high, by the powers of the unscaled variable."""
     powers = np.zeros((degree + 1, degree + 1))
     for i in range(degree + 1):
@@ -109,7 +111,7 @@ class Conditioning:
     """Greatest over least singular value; infinite where the rank is short."""
 
     @classmethod
-    def of(cls, columns: Array) -> Conditioning:
+    def from_design_matrix(cls, columns: Array) -> Conditioning:
         """Of a design matrix (N, coefficients), exact beyond the 1e16 at which singular values drown in rounding.
 
         Columns brought to length 1 have a pseudo-inverse that can be trusted; its rows take the lengths back.
@@ -128,5 +130,5 @@ class Conditioning:
 
 def conditioning(recording: Recording, basis: Basis, pressure_degree: int = 4, force_degree: int = 2) -> Conditioning:
     """How well the points of a recording determine a surface's coefficients in a basis."""
-    columns = basis.columns(recording["pressure"], recording["force"], pressure_degree, force_degree)
-    return Conditioning.of(columns)
+    columns = basis.design_matrix(recording["pressure"], recording["force"], pressure_degree, force_degree)
+    return Conditioning.from_design_matrix(columns)

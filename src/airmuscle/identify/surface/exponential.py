@@ -26,19 +26,19 @@ class SurfaceFit:
     model: BorzikovaExponential
     procedure: str
     points: int
-    dropped: int
+    points_dropped: int
     """Points that the procedure could not use: k >= k_max has no logarithm."""
-    rms: float
+    rmse: float
     """Root mean square of the errors in contraction [1]."""
     max_error: float
     """The greatest error in contraction [1], without its sign."""
-    index: CorrelationIndex
+    correlation_index: CorrelationIndex
     conditioning: Conditioning
 
     def __str__(self) -> str:
-        left_out = f", {self.dropped} of them not used (k >= k_max)" if self.dropped else ""
+        left_out = f", {self.points_dropped} of them not used (k >= k_max)" if self.points_dropped else ""
         return (
-            f"{self.procedure}: rms {self.rms:.4%}, at most {self.max_error:.4%}, {self.index} over "
+            f"{self.procedure}: rms {self.rmse:.4%}, at most {self.max_error:.4%}, {self.correlation_index} over "
             f"{self.points} points{left_out}; {self.conditioning}"
         )
 
@@ -52,16 +52,18 @@ class SurfaceProblem:
     pressure_degree: int
     force_degree: int
     basis: Chebyshev
-    columns: Array
+    design_matrix: Array
     contraction: Array
 
     @classmethod
-    def of(cls, recording: Recording, saturation: float, pressure_degree: int, force_degree: int) -> SurfaceProblem:
+    def from_recording(
+        cls, recording: Recording, saturation: float, pressure_degree: int, force_degree: int
+    ) -> SurfaceProblem:
         """The problem that a recording poses. Raises IdentificationError where it cannot be solved."""
         _check_usable(recording, pressure_degree, force_degree)
         pressure, force = recording["pressure"], recording["force"]
-        basis = Chebyshev(LoadRange.of_recording(recording))
-        columns = basis.columns(pressure, force, pressure_degree, force_degree)
+        basis = Chebyshev(LoadRange.from_recording(recording))
+        columns = basis.design_matrix(pressure, force, pressure_degree, force_degree)
         contraction = recording["contraction"]
         problem = cls(recording, saturation, pressure_degree, force_degree, basis, columns, contraction)
         problem.check_determined(columns)
@@ -69,9 +71,9 @@ class SurfaceProblem:
 
     def check_determined(self, columns: Array) -> None:
         """Raise IdentificationError where these rows of the design leave coefficients open."""
-        found = Conditioning.of(columns)
+        found = Conditioning.from_design_matrix(columns)
         if found.rank < found.coefficients:
-            loads = _listed(self.recording["force"])
+            loads = _list_loads(self.recording["force"])
             raise IdentificationError(
                 f"{self.recording.origin}: {len(columns)} points under {loads} determine {found.rank} of the "
                 f"{found.coefficients} coefficients (degree {self.pressure_degree} in pressure, "
@@ -79,23 +81,23 @@ class SurfaceProblem:
                 f"{self.pressure_degree + 1} pressures at the least, or lower a degree."
             )
 
-    def modelled(self, coefficients: Array) -> Array:
+    def predict(self, coefficients: Array) -> Array:
         """Contraction at the points, from Chebyshev coefficients of v."""
-        return np.asarray(self.saturation * (1.0 - np.exp(self.columns @ coefficients)))
+        return np.asarray(self.saturation * (1.0 - np.exp(self.design_matrix @ coefficients)))
 
-    def slopes(self, coefficients: Array) -> Array:
+    def jacobian(self, coefficients: Array) -> Array:
         """Exact derivatives of `modelled` by the coefficients, shape (N, coefficients)."""
-        return np.asarray(-self.saturation * np.exp(self.columns @ coefficients)[:, None] * self.columns)
+        return np.asarray(-self.saturation * np.exp(self.design_matrix @ coefficients)[:, None] * self.design_matrix)
 
     def linear_targets(self) -> tuple[Array, Array]:
         """Targets and weights with which a linear fit of v nearly is one of k; k >= k_max is held below."""
         remaining = np.maximum(1.0 - self.contraction / self.saturation, 0.01)
         return np.log(remaining), remaining
 
-    def fit(self, coefficients: Array, procedure: str, dropped: int = 0) -> SurfaceFit:
+    def build_fit(self, coefficients: Array, procedure: str, dropped: int = 0) -> SurfaceFit:
         """The fit that these Chebyshev coefficients of v are."""
         degrees = (self.pressure_degree, self.force_degree)
-        plain = self.basis.in_bar_and_newton(coefficients, *degrees)
+        plain = self.basis.to_bar_and_newton(coefficients, *degrees)
         law = BorzikovaExponential(tuple(plain), *self.basis.validity_range, *degrees, saturation=self.saturation)
         modelled = np.asarray(law.contraction(self.recording["pressure"], self.recording["force"]))
         errors = modelled - self.contraction
@@ -103,15 +105,15 @@ class SurfaceProblem:
             model=law,
             procedure=procedure,
             points=len(self.recording),
-            dropped=dropped,
-            rms=float(np.sqrt(np.mean(errors**2))),
+            points_dropped=dropped,
+            rmse=float(np.sqrt(np.mean(errors**2))),
             max_error=float(np.abs(errors).max()),
-            index=correlation_index(self.contraction, modelled),
-            conditioning=Conditioning.of(self.columns),
+            correlation_index=correlation_index(self.contraction, modelled),
+            conditioning=Conditioning.from_design_matrix(self.design_matrix),
         )
 
 
-def linearised(
+def fit_linearised(
     recording: Recording, saturation: float, *, pressure_degree: int = 4, force_degree: int = 2
 ) -> SurfaceFit:
     """Fit v to ln(1 - k/k_max) by linear least squares, as the paper does.
@@ -119,15 +121,15 @@ def linearised(
     `recording` has pressure [Pa], force [N] and contraction [1]; `saturation` is k_max [1]. Points with k >=
     k_max have no logarithm: they are left out, and the fit says how many. Raises IdentificationError.
     """
-    problem = SurfaceProblem.of(recording, saturation, pressure_degree, force_degree)
+    problem = SurfaceProblem.from_recording(recording, saturation, pressure_degree, force_degree)
     usable = problem.contraction < saturation
-    problem.check_determined(problem.columns[usable])
+    problem.check_determined(problem.design_matrix[usable])
     targets = np.log(1.0 - problem.contraction[usable] / saturation)
-    coefficients = np.linalg.lstsq(problem.columns[usable], targets, rcond=None)[0]
-    return problem.fit(np.asarray(coefficients, dtype=float), "linearised least squares", int((~usable).sum()))
+    coefficients = np.linalg.lstsq(problem.design_matrix[usable], targets, rcond=None)[0]
+    return problem.build_fit(np.asarray(coefficients, dtype=float), "linearised least squares", int((~usable).sum()))
 
 
-def nonlinear(
+def fit_nonlinear(
     recording: Recording, saturation: float, *, pressure_degree: int = 4, force_degree: int = 2
 ) -> SurfaceFit:
     """Fit k itself by least squares, S(A) = Sum (k_i - f(p_i, F_i, A))^2, with exact derivatives.
@@ -137,13 +139,13 @@ def nonlinear(
     """
     from scipy.optimize import least_squares
 
-    problem = SurfaceProblem.of(recording, saturation, pressure_degree, force_degree)
+    problem = SurfaceProblem.from_recording(recording, saturation, pressure_degree, force_degree)
     targets, weights = problem.linear_targets()
-    start = np.linalg.lstsq(weights[:, None] * problem.columns, weights * targets, rcond=None)[0]
+    start = np.linalg.lstsq(weights[:, None] * problem.design_matrix, weights * targets, rcond=None)[0]
     found = least_squares(
-        lambda c: problem.modelled(c) - problem.contraction,
+        lambda c: problem.predict(c) - problem.contraction,
         start,
-        jac=problem.slopes,
+        jac=problem.jacobian,
         method="lm",
         xtol=1e-15,
         ftol=1e-15,
@@ -154,7 +156,7 @@ def nonlinear(
             f"{recording.origin}: least squares on k did not converge ({found.message}). "
             "Lower a degree, or ask for the linearised fit."
         )
-    return problem.fit(np.asarray(found.x), "nonlinear least squares")
+    return problem.build_fit(np.asarray(found.x), "nonlinear least squares")
 
 
 def _check_usable(recording: Recording, pressure_degree: int, force_degree: int) -> None:
@@ -181,7 +183,7 @@ def _check_usable(recording: Recording, pressure_degree: int, force_degree: int)
             )
 
 
-def _listed(forces: Array) -> str:
+def _list_loads(forces: Array) -> str:
     loads = np.unique(forces)
     if loads.size > 6:
         return f"{loads.size} loads between {loads[0]:g} and {loads[-1]:g} N"

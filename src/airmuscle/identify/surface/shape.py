@@ -20,51 +20,55 @@ from ...core.errors import IdentificationError
 from ...recording import Recording
 from ..result import Fit
 from ..static_fit import fit
-from .breaks import MonotonicityViolation, Rule, breaks_of
-from .enclosure import constrained, enclosure
+from .bernstein import bernstein_coefficients, solve_constrained_least_squares
+from .monotonicity import MonotonicityRule, MonotonicityViolation, find_violations
 
-_MARGIN = 1e-9
+_MIN_SLOPE = 1e-9
 """Least slope on the validity range scaled to -1..1, in parts of the greatest force, so that rounding turns none round; chosen."""
-FALLS_WITH_PRESSURE = Rule("force falls with pressure", "force", 0, -1.0)
-RISES_WITH_CONTRACTION = Rule("force rises with contraction", "force", 1, 1.0)
+FALLS_WITH_PRESSURE = MonotonicityRule("force falls with pressure", "force", 0, -1.0)
+RISES_WITH_CONTRACTION = MonotonicityRule("force rises with contraction", "force", 1, 1.0)
 
 
-def shape_breaks(
+def find_shape_violations(
     law: ForceLaw, validity_range: ValidityRange, *, points: int = 101
 ) -> tuple[MonotonicityViolation, ...]:
     """The places of a validity range where a muscle's force falls with pressure or rises with contraction, largest first."""
     sides = (np.linspace(*validity_range.pressure, points), np.linspace(*validity_range.contraction, points))
-    return breaks_of(law, (FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION), *np.meshgrid(*sides, indexing="ij"))
+    return find_violations(law, (FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION), *np.meshgrid(*sides, indexing="ij"))
 
 
-def broken_by(fit: Fit, *, points: int = 101) -> tuple[MonotonicityViolation, ...]:
+def shape_violations_of_fit(fit: Fit, *, points: int = 101) -> tuple[MonotonicityViolation, ...]:
     """The places in the data's validity range where a fitted law breaks a rule; none for laws that are no closed-form force."""
     law = fit.model
-    if not isinstance(law, ForceLaw) or not law.traceable or not all(low < high for low, high in fit.ranges.values()):
+    if (
+        not isinstance(law, ForceLaw)
+        or not law.traceable
+        or not all(low < high for low, high in fit.data_ranges.values())
+    ):
         return ()
-    return shape_breaks(law, fit.validity_range, points=points)
+    return find_shape_violations(law, fit.validity_range, points=points)
 
 
 @dataclasses.dataclass(frozen=True)
-class ShapedFit:
+class ShapeConstrainedFit:
     """A surface that keeps its shape, its error, and that of the surface without conditions."""
 
     model: ContractileSurface
     rmse: float
     """Root mean square error over the fitted rows [N]."""
-    unconstrained: float
+    unconstrained_rmse: float
     """The same without conditions [N]: what they cost is the difference."""
-    broken: tuple[MonotonicityViolation, ...]
+    unconstrained_violations: tuple[MonotonicityViolation, ...]
     """Where the surface without conditions breaks a rule."""
 
 
-def fit_shaped(
+def fit_shape_constrained(
     surface: ContractileSurface,
     recording: Recording | Sequence[Recording],
     *,
     free: Recording | None = None,
     cells: tuple[int, int] = (6, 6),
-) -> ShapedFit:
+) -> ShapeConstrainedFit:
     """Fit a surface by least squares among those whose force never falls with p nor rises with eps on the validity range.
 
     `free` holds points (pressure, contraction) at which the muscle hangs free: there the force is made zero. The
@@ -77,20 +81,24 @@ def fit_shaped(
     loose = fit(surface, runs)
     law = loose.model
     assert isinstance(law, ContractileSurface)
-    counting = loose.problem.counting(loose.problem.modelled(loose.values))
+    counting = loose.problem.active_rows(loose.problem.predict(loose.values))
     data = loose.recording.rows(counting)
     matrix = np.array(law.basis(data["pressure"], data["contraction"])).T
-    goal = loose.problem.goal[counting]
+    goal = loose.problem.target[counting]
     rows = shape_constraints(law.degree, cells)
     scale = float(np.abs(goal).max())
-    basis = _through(law, free)
-    found = basis @ constrained(matrix @ basis, goal / scale, rows @ basis, _MARGIN if free is None else 0.0)
+    basis = _free_contraction_basis(law, free)
+    found = basis @ solve_constrained_least_squares(
+        matrix @ basis, goal / scale, rows @ basis, _MIN_SLOPE if free is None else 0.0
+    )
     model = dataclasses.replace(law, coefficients=tuple(float(a) for a in scale * found))
     errors = matrix @ (scale * found) - goal
-    return ShapedFit(model, float(np.sqrt(np.mean(errors**2))), loose.rmse, shape_breaks(law, law.validity_range))
+    return ShapeConstrainedFit(
+        model, float(np.sqrt(np.mean(errors**2))), loose.rmse, find_shape_violations(law, law.validity_range)
+    )
 
 
-def _through(law: ContractileSurface, free: Recording | None) -> Array:
+def _free_contraction_basis(law: ContractileSurface, free: Recording | None) -> Array:
     """A basis of the coefficients whose force at the free points is zero."""
     size = len(law.coefficients)
     if free is None:
@@ -109,18 +117,18 @@ def _through(law: ContractileSurface, free: Recording | None) -> Array:
 def shape_constraints(degree: int, cells: tuple[int, int]) -> Array:
     """Rows g: a surface keeps its shape on the validity range if all g @ coefficients >= 0; `cells` by pressure, contraction."""
     chosen = [j * (degree + 1) + i for i, j in exponents(degree)]
-    rises = np.kron(_enclosure(degree, cells[0], slope=True), _enclosure(degree, cells[1], slope=False))
-    falls = -np.kron(_enclosure(degree, cells[0], slope=False), _enclosure(degree, cells[1], slope=True))
+    rises = np.kron(_bernstein_matrix(degree, cells[0], slope=True), _bernstein_matrix(degree, cells[1], slope=False))
+    falls = -np.kron(_bernstein_matrix(degree, cells[0], slope=False), _bernstein_matrix(degree, cells[1], slope=True))
     return np.vstack([rises[:, chosen], falls[:, chosen]])
 
 
-def _enclosure(degree: int, cells: int, *, slope: bool) -> Array:
+def _bernstein_matrix(degree: int, cells: int, *, slope: bool) -> Array:
     """Bernstein coefficients, on even cells of -1..1, of 1, x, .. x^degree or their slopes, one column each."""
     if not slope:
-        return enclosure(lambda x: np.asarray(polynomial.polyvander(x, degree)), degree + 1, cells)
+        return bernstein_coefficients(lambda x: np.asarray(polynomial.polyvander(x, degree)), degree + 1, cells)
     powers = np.arange(1, degree + 1)
 
     def slopes(x: Array) -> Array:
         return np.column_stack([np.zeros(x.size), polynomial.polyvander(x, degree - 1) * powers])
 
-    return enclosure(slopes, degree, cells)
+    return bernstein_coefficients(slopes, degree, cells)

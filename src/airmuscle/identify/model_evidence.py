@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...core.arrays import Array
+from ..core.arrays import Array
 
 
-def effective_rows(errors: Array) -> float:
+def effective_sample_size(errors: Array) -> float:
     """How many independent rows say as much as these N errors in the order of time: N (1 - r)/(1 + r).
 
     r is the correlation of neighbours, at least 0. Reference: Bayley and Hammersley (1946), "The 'effective' number
@@ -32,7 +32,7 @@ def aicc(mean_square: float, rows: float, parameters: int) -> float:
     return rows * float(np.log(max(mean_square, 1e-300))) + 2.0 * k + 2.0 * k * (k + 1) / (rows - k - 1)
 
 
-def f_test(plain: float, richer: float, rows: float, parameters: int, added: int) -> float:
+def f_test_p_value(plain: float, richer: float, rows: float, parameters: int, added: int) -> float:
     """Probability that `added` idle parameters would lower the mean square error from `plain` to `richer` by chance.
 
     `parameters` are those of the richer model. 1 where no row is to spare.

@@ -16,7 +16,7 @@ from ...core.arrays import Array
 from ...core.errors import IdentificationError
 
 
-def enclosure(columns: Callable[[Array], Array], size: int, cells: int) -> Array:
+def bernstein_coefficients(columns: Callable[[Array], Array], size: int, cells: int) -> Array:
     """Bernstein coefficients, on even cells of -1..1, of polynomials of degree below `size`, one column each.
 
     `columns` gives their values at N points, shape (N, polynomials).
@@ -30,7 +30,7 @@ def enclosure(columns: Callable[[Array], Array], size: int, cells: int) -> Array
     return np.asarray(np.vstack(cut))
 
 
-def constrained(matrix: Array, right: Array, rows: Array, least: float) -> Array:
+def solve_constrained_least_squares(matrix: Array, right: Array, rows: Array, least: float) -> Array:
     """The x that minimises |matrix x - right| subject to rows x >= least.
 
     With matrix = Q R and z = R x - Q^T right it is the shortest z with rows R^-1 z >= least - rows R^-1 Q^T

@@ -9,11 +9,11 @@ import numpy as np
 from ..characteristic.base import ContractionLaw, ForceLaw
 from ..core.arrays import Array
 
-LEVELS = 801
+FORCE_GRID_POINTS = 801
 """Forces tried between zero and the ceiling; between two of them the law is taken as straight."""
 
 
-def force_of(law: Any, pressure: Array, contraction: Array, ceiling: float) -> Array:
+def evaluate_force(law: Any, pressure: Array, contraction: Array, ceiling: float) -> Array:
     """Forces [N] at N points, none left out. A comparison must judge every law on the same rows.
 
     `ceiling` [N] bounds the answer of laws that are given in contraction or pressure. What those ask for more
@@ -23,18 +23,18 @@ def force_of(law: Any, pressure: Array, contraction: Array, ceiling: float) -> A
         if isinstance(law, ForceLaw):
             found = np.asarray(law.force(pressure, contraction), dtype=float) + np.zeros(pressure.size)
         else:
-            found = _searched(law, pressure, contraction, ceiling)
+            found = _invert_on_grid(law, pressure, contraction, ceiling)
     return np.asarray(np.nan_to_num(found, nan=0.0, posinf=ceiling, neginf=-ceiling))
 
 
-def _searched(law: Any, pressure: Array, contraction: Array, ceiling: float) -> Array:
-    forces = np.linspace(0.0, ceiling, LEVELS)
+def _invert_on_grid(law: Any, pressure: Array, contraction: Array, ceiling: float) -> Array:
+    forces = np.linspace(0.0, ceiling, FORCE_GRID_POINTS)
     if isinstance(law, ContractionLaw):
         lack = contraction[:, None] - np.asarray(law.contraction(pressure[:, None], forces))
     else:
         lack = np.asarray(law.pressure(contraction[:, None], forces)) - pressure[:, None]
     reached = np.asarray(lack >= 0)
-    first = np.where(reached.any(axis=1), reached.argmax(axis=1), LEVELS - 1)
+    first = np.where(reached.any(axis=1), reached.argmax(axis=1), FORCE_GRID_POINTS - 1)
     rows = np.arange(pressure.size)
     before = np.maximum(first - 1, 0)
     high, low = lack[rows, first], lack[rows, before]
