@@ -33,7 +33,7 @@ def fitted(result: Fit, start: Entry, files: list[Path]) -> Entry:
 
     summary = dict(result.summary())
     names = ", ".join(f.name for f in files)
-    note = f"Fitted to {names}: rms error {summary['rms error']}, greatest {summary['greatest error']}."
+    note = f"Fitted to {names}: rms error {summary['rms error']}, maximum {summary['maximum error']}."
     title = f"{type(result.model).__name__} fitted to {', '.join(f.stem for f in files)}"
     return dataclasses.replace(
         start, name="muscle", title=title, provenance="fitted", note=note, warning="", characteristic=result.model,

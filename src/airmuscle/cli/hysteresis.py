@@ -140,7 +140,7 @@ def _print(found: Sequence[LoopFit], creep: Sequence[str]) -> None:
         typer.echo(f"{each.loop.recording.origin}: {each.loop.description}. {counted(each.loop)}")
         rows = [
             (type(f.friction).__name__, f"{f.rmse_without_friction:.3g} to {f.rmse:.3g} N", _judge(f),
-             f"{f.aicc_gain:.4g}", "< 1e-300" if f.p_value < 1e-300 else f"{f.p_value:.2g}",
+             f"{f.aicc_reduction:.4g}", "< 1e-300" if f.p_value < 1e-300 else f"{f.p_value:.2g}",
              "yes" if f.justified else "no")
             for f in each.fits
         ]  # fmt: skip
@@ -181,7 +181,7 @@ def _as_data(found: LoopFit) -> dict[str, Any]:
                 "law": type(f.friction).__name__, "parameters": {p.path: p.value for p in leaves(f.friction)},
                 "rmse": f.rmse, "plain_rmse": f.rmse_without_friction, "gap": f.gap, "gap_left": f.residual_gap,
                 "repeat_rmse": f.repeat_rmse, "plain_repeat_rmse": f.repeat_rmse_without_friction,
-                "repeatability": f.repeatability, "aicc_gain": f.aicc_gain, "chance": f.p_value,
+                "repeatability": f.repeatability, "aicc_gain": f.aicc_reduction, "chance": f.p_value,
                 "justified": f.justified, "not_determined": list(f.undetermined),
             }
             for f in found.fits

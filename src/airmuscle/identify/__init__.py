@@ -1,4 +1,4 @@
-"""Parameters from measurements: `fit` and what it returns, `compare` and what stands around them."""
+"""Static identification: fits, uncertainty, model selection, conversion and shape constraints."""
 
 from .bootstrapping import Bootstrap, bootstrap
 from .candidates import Candidate, standard_candidates

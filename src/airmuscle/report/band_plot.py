@@ -47,7 +47,7 @@ def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
     for i, level in enumerate(levels):
         points = _along(fit, roles, float(level))
         try:
-            law, reading = (confidence_band(fit, points, level=LEVEL, reading=r) for r in (False, True))
+            law, reading = (confidence_band(fit, points, level=LEVEL, prediction=r) for r in (False, True))
         except IdentificationError:
             return None
         colour = plotting.LINES[i % len(plotting.LINES)]

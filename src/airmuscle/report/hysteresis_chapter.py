@@ -91,7 +91,7 @@ def _laws(found: LoopFit, suffix: str) -> Table:
             **({"rms on second run [N]": [f.repeat_rmse for f in fits]} if repeated else {}),
             "gap before [N]": [f.gap for f in fits],
             "gap left [N]": [f.residual_gap for f in fits],
-            "AICc falls by": [f.aicc_gain for f in fits],
+            "AICc falls by": [f.aicc_reduction for f in fits],
             "by chance": [f.p_value for f in fits],
             "justified": ["yes" if f.justified else "no" for f in fits],
             "not determined": [", ".join(f.undetermined) for f in fits],

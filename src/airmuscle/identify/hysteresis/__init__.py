@@ -1,4 +1,4 @@
-"""Friction and creep from loops, with a verdict whether the data justify them."""
+"""Identification of friction and creep from hysteresis loops, with tests whether the data justify them."""
 
 from .creep import Creep, fit_creep
 from .fit import (

@@ -19,27 +19,28 @@ from ...core.tree import Leaf
 from ...friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, PrandtlIshlinskii
 from ...recording import Recording
 from ...recording.segment import motion_direction
-from .result import MILLIMETRES, Axis, HysteresisFit, LoopSeries, assess_fit
+from .result import HysteresisFit, assess_fit
+from .series import MILLIMETRES, Axis, LoopSeries
 
 RowMask = npt.NDArray[np.bool_]
 
 
 class FrictionPath(abc.ABC):
-    """What rubs: how far the friction has slid in each row of a recording."""
+    """The displacement along which the friction slides, as a function of the recorded columns."""
 
     @abc.abstractmethod
     def displacement(self, recording: Recording) -> Array:
-        """Displacement [m] by row, shape (N,)."""
+        """Displacement [m] at every row, shape (N,)."""
 
     @property
     def axis(self) -> Axis:
-        """What figures draw instead of metres."""
+        """The axis of figures."""
         return MILLIMETRES
 
 
 @model
 class ContractionPath(FrictionPath):
-    """x = eps L0: friction against shortening, which loops at constant pressure or load show."""
+    """x = eps L0: friction against shortening, visible in loops at constant pressure or load."""
 
     def displacement(self, recording: Recording) -> Array:
         return np.asarray(recording["contraction"] * _resting_length(recording))
@@ -47,10 +48,10 @@ class ContractionPath(FrictionPath):
 
 @model
 class PressurePath(FrictionPath):
-    """x = c p: friction of threads that shift as the pressure rises, which a muscle held at one length shows.
+    """x = c p: friction of braid threads that shift with pressure, visible in a muscle at constant length.
 
-    Only k_i c, a force by pressure, is determined; c is chosen, 1 mm for each 100 kPa, so that the laws keep their
-    units. Such a friction describes isometric loops and does not enter a plant.
+    Only k_i c, a force by pressure, is determined; c is chosen as 1 mm for each 100 kPa, so that the friction laws keep
+    their units. Such a friction describes isometric loops only and cannot be part of a plant.
     """
 
     displacement_per_pressure: float = parameter(
@@ -66,20 +67,20 @@ class PressurePath(FrictionPath):
 
 
 class StaticCurve(abc.ABC):
-    """The force without friction: a known part, and columns whose coefficients are found along with the friction."""
+    """The force without friction: a known part, and columns whose coefficients are fitted with the friction."""
 
     @abc.abstractmethod
     def known_force(self, recording: Recording) -> Array:
-        """Force [N] by row that is not fitted."""
+        """The known part of the force [N] at every row, shape (N,)."""
 
     @abc.abstractmethod
     def design_matrix(self, recording: Recording) -> Array:
-        """Shape (N, coefficients)."""
+        """The columns whose coefficients are fitted, shape (N, coefficients)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class FixedCharacteristic(StaticCurve):
-    """A characteristic that stands, and a constant offset of the force beside it."""
+    """A known characteristic with a fitted constant offset of the force."""
 
     characteristic: Characteristic
 
@@ -92,7 +93,7 @@ class FixedCharacteristic(StaticCurve):
 
 @dataclasses.dataclass(frozen=True)
 class PolynomialCurve(StaticCurve):
-    """A polynomial in one column, `pressure` in isometric runs and `contraction` in isobaric ones."""
+    """A fitted polynomial in one column: `pressure` in isometric runs, `contraction` in isobaric runs."""
 
     column: str
     degree: int = 3
@@ -101,23 +102,30 @@ class PolynomialCurve(StaticCurve):
         return np.zeros(len(recording))
 
     def design_matrix(self, recording: Recording) -> Array:
-        scale = 1e5 if self.column == "pressure" else 0.1  # coefficients of one size, whatever the run
+        scale = 1e5 if self.column == "pressure" else 0.1  # so that the coefficients have similar magnitudes
         return np.vander(recording[self.column] / scale, self.degree + 1)
 
 
 def initial_friction_laws(path: Array, force: Array, elements: int = 8) -> tuple[Friction, ...]:
-    """A start for every friction law, sized by a path [m] and the forces [N] along it."""
-    reach, size = float(np.ptp(path)), max(float(np.std(force)), 1e-3)
-    if not reach > 0:
-        raise IdentificationError("the path does not move, so that nothing rubs; give a run that goes up and down.")
-    limits = tuple(reach * np.geomspace(0.01, 0.7, elements))
-    stiffness, even = 10 * size / reach, (size / elements / reach,) * elements
+    """Every friction law with initial parameters, scaled by a path [m] and the forces [N] along it.
+
+    `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii. Raises IdentificationError for a constant
+    path.
+    """
+    stroke, amplitude = float(np.ptp(path)), max(float(np.std(force)), 1e-3)
+    if not stroke > 0:
+        raise IdentificationError(
+            "the displacement of the friction is constant, so it cannot be identified. Give a run with a rising and a "
+            "falling branch."
+        )
+    limits = tuple(stroke * np.geomspace(0.01, 0.7, elements))
+    stiffness, equal = 10 * amplitude / stroke, (amplitude / elements / stroke,) * elements
     return (
-        Dahl(stiffness, size),
-        LuGre(stiffness, size, 0.2 * size, reach / 5.0),
-        BoucWen(stiffness, size, 1.5, 0.6),
-        MaxwellSlip(even, limits),
-        PrandtlIshlinskii(even, limits, (0.1 * size, -0.1 * size), (0.0, 0.0)),
+        Dahl(stiffness, amplitude),
+        LuGre(stiffness, amplitude, 0.2 * amplitude, stroke / 5.0),
+        BoucWen(stiffness, amplitude, 1.5, 0.6),
+        MaxwellSlip(equal, limits),
+        PrandtlIshlinskii(equal, limits, (0.1 * amplitude, -0.1 * amplitude), (0.0, 0.0)),
     )
 
 
@@ -125,82 +133,88 @@ def fit_hysteresis(
     friction: Friction,
     recording: Recording,
     *,
-    static: StaticCurve,
-    slide: FrictionPath = ContractionPath(),
-    chosen: RowMask | None = None,
+    static_curve: StaticCurve,
+    friction_path: FrictionPath = ContractionPath(),
+    fitted_rows: RowMask | None = None,
     repeat: tuple[Recording, RowMask | None] | None = None,
 ) -> HysteresisFit:
-    """The friction that explains what a static curve leaves of a loop, and whether the data justify it.
+    """Fit a friction law to the difference between a loop and its static curve, and test whether the data justify it.
 
-    `friction` gives the law and its start; see `candidates`. The path is followed through every row from the first,
-    where the bristles are relaxed; errors count in the `chosen` rows, the quasi-static ones where the muscle pulls.
-    Coefficients of `static` are found together with the friction, and once more without it, for a fair comparison.
-    `repeat` is a second run of the same loop with its chosen rows: it gives the floor of repeatability, and a judge.
-    Raises IdentificationError where there are too few rows or the path does not move.
+    friction       the law with its initial parameters, see `initial_friction_laws`
+    static_curve   the force without friction; its coefficients are fitted with the friction, and once more without it
+                   for a fair comparison
+    friction_path  the displacement along which the friction slides
+    fitted_rows    mask of the rows whose residuals are minimised: quasi-static rows with a positive force. The path
+                   includes all rows from the first, where the bristles are relaxed
+    repeat         a second run of the same loop with its mask, for the repeatability and the error on other data
+
+    Raises IdentificationError where there are too few rows or the path is constant.
     """
-    run = make_loop_series(recording, static, slide, chosen)
+    run = make_loop_series(recording, static_curve, friction_path, fitted_rows)
     free = [leaf for leaf in tree.leaves(friction) if leaf.declared.fitted]
     if run.fitted_rows.sum() <= len(free) + run.design_matrix.shape[1] + 2 or not np.ptp(run.path) > 0:
         raise IdentificationError(
-            f"{recording.origin}: {int(run.fitted_rows.sum())} chosen rows along a path of {np.ptp(run.path):.3g} m cannot "
-            f"determine {len(free)} parameters of {type(friction).__name__} and {run.design_matrix.shape[1]} of the static "
-            "curve. Give a run that goes up and down, or choose more rows."
+            f"{recording.origin}: {int(run.fitted_rows.sum())} fitted rows along a path of {np.ptp(run.path):.3g} m "
+            f"cannot determine {len(free)} parameters of {type(friction).__name__} and {run.design_matrix.shape[1]} of "
+            "the static curve. Give a run with a rising and a falling branch, or include more rows."
         )
-    found = _fit_stiffnesses(friction, run) if friction.linear_in else _fit_iteratively(friction, run)
-    other = make_loop_series(repeat[0], static, slide, repeat[1]) if repeat else None
-    return assess_fit(found, len(free), run, other)
+    fitted = _fit_stiffnesses(friction, run) if friction.linear_in else _fit_iteratively(friction, run)
+    second_run = make_loop_series(repeat[0], static_curve, friction_path, repeat[1]) if repeat else None
+    return assess_fit(fitted, len(free), run, second_run)
 
 
 def make_loop_series(
-    recording: Recording, static: StaticCurve, slide: FrictionPath, chosen: RowMask | None
+    recording: Recording, static_curve: StaticCurve, friction_path: FrictionPath, fitted_rows: RowMask | None
 ) -> LoopSeries:
-    """A run as a fit of friction sees it."""
-    goal = recording["force"] - static.known_force(recording)
-    rows = np.isfinite(goal) if chosen is None else np.asarray(chosen, dtype=bool) & np.isfinite(goal)
+    """The arrays of a run for a fit of friction."""
+    target = recording["force"] - static_curve.known_force(recording)
+    finite = np.isfinite(target)
+    rows = finite if fitted_rows is None else np.asarray(fitted_rows, dtype=bool) & finite
     time = recording.columns.get("time")
-    path = slide.displacement(recording)
-    way = motion_direction(path, time)
-    return LoopSeries(recording.origin, path, time, goal, static.design_matrix(recording), rows, way, slide.axis)
+    path = friction_path.displacement(recording)
+    matrix = static_curve.design_matrix(recording)
+    direction = motion_direction(path, time)
+    return LoopSeries(recording.origin, path, time, target, matrix, rows, direction, friction_path.axis)
 
 
 def _fit_stiffnesses(friction: Any, run: LoopSeries) -> Friction:
-    """Stiffnesses of elements with given limits: least squares without a search, none of them negative."""
+    """Stiffnesses of elements with given limits, by non-negative linear least squares."""
     from scipy.optimize import lsq_linear
 
     terms = friction.terms(run.path)[run.fitted_rows]
-    weight = np.linalg.norm(terms, axis=0)
-    weight = np.where(weight > 0, weight, 1.0)
-    design = np.hstack([run.design_matrix[run.fitted_rows], -terms / weight])
-    lowest = np.concatenate([np.full(run.design_matrix.shape[1], -np.inf), np.zeros(terms.shape[1])])
-    solved = lsq_linear(design, run.target[run.fitted_rows], (lowest, np.inf), method="bvls")
-    stiffnesses = np.maximum(solved.x[run.design_matrix.shape[1] :], 0.0) / weight
-    changed: Friction = dataclasses.replace(friction, **{friction.linear_in: tuple(stiffnesses)})
-    return changed
+    norms = np.linalg.norm(terms, axis=0)
+    norms = np.where(norms > 0, norms, 1.0)
+    matrix = np.hstack([run.design_matrix[run.fitted_rows], -terms / norms])
+    lower = np.concatenate([np.full(run.design_matrix.shape[1], -np.inf), np.zeros(terms.shape[1])])
+    result = lsq_linear(matrix, run.target[run.fitted_rows], (lower, np.inf), method="bvls")
+    stiffnesses = np.maximum(result.x[run.design_matrix.shape[1] :], 0.0) / norms
+    fitted: Friction = dataclasses.replace(friction, **{friction.linear_in: tuple(stiffnesses)})
+    return fitted
 
 
 def _fit_iteratively(friction: Friction, run: LoopSeries) -> Friction:
-    """Least squares over the free parameters; the static curve is solved for at every step."""
+    """Nonlinear least squares over the free parameters; the static curve is solved for at every evaluation."""
     from scipy.optimize import least_squares
 
     all_leaves = list(tree.leaves(friction))
     free = [i for i, leaf in enumerate(all_leaves) if leaf.declared.fitted]
-    scales = [_SearchCoordinate.from_leaf(all_leaves[i]) for i in free]
+    coordinates = [_SearchCoordinate.from_leaf(all_leaves[i]) for i in free]
 
     def law(x: Sequence[float]) -> Friction:
         values = [leaf.value for leaf in all_leaves]
-        for i, scale, coordinate in zip(free, scales, x, strict=True):
-            values[i] = scale.parameter_value(float(coordinate))
+        for i, coordinate, value in zip(free, coordinates, x, strict=True):
+            values[i] = coordinate.parameter_value(float(value))
         return tree.unflatten(friction, values)
 
-    start = [s.start for s in scales]
-    bounds = ([s.low for s in scales], [s.high for s in scales])
-    solved = least_squares(lambda x: run.fitted_residuals(law(x)), start, bounds=bounds, x_scale=1.0, max_nfev=60)
-    return tree.with_parameters(friction, [leaf.value for leaf in tree.leaves(law(solved.x))])
+    start = [c.start for c in coordinates]
+    bounds = ([c.low for c in coordinates], [c.high for c in coordinates])
+    result = least_squares(lambda x: run.fitted_residuals(law(x)), start, bounds=bounds, x_scale=1.0, max_nfev=60)
+    return tree.with_parameters(friction, [leaf.value for leaf in tree.leaves(law(result.x))])
 
 
 @dataclasses.dataclass(frozen=True)
 class _SearchCoordinate:
-    """A parameter as the search sees it: its logarithm where it is positive throughout, else by its size."""
+    """A parameter as a search coordinate: its logarithm if its lower bound is positive, else scaled by its size."""
 
     start: float
     low: float
@@ -216,7 +230,7 @@ class _SearchCoordinate:
         return cls(leaf.value / size, low / size, high / size, size)
 
     def parameter_value(self, coordinate: float) -> float:
-        """The parameter for a coordinate of the search."""
+        """The parameter for a value of the coordinate."""
         return coordinate * self.size if self.size else float(np.exp(coordinate))
 
 

@@ -1,4 +1,4 @@
-"""Where a law does what no muscle does: force or contraction with a slope of the wrong sign."""
+"""Monotonicity violations of a static law: regions where force or contraction has a slope of the wrong sign."""
 
 from __future__ import annotations
 
@@ -13,45 +13,44 @@ from ...core.arrays import Array
 
 Range = tuple[float, float]
 _ROUNDING = 1e-9
-"""Slopes below this part of the greatest are rounding; chosen."""
+"""Slopes below this fraction of the maximum slope are rounding errors; chosen."""
 
 
 @dataclasses.dataclass(frozen=True)
 class MonotonicityRule:
-    """What the `quantity` that a law gives must not do along one of its arguments."""
+    """A forbidden sign of the slope of the `quantity` that a law gives, with respect to one of its arguments."""
 
     description: str
+    """A violation of the rule in words."""
     quantity: str
     argument: int
-    """0 pressure, 1 the other one."""
+    """0 pressure, 1 the second argument."""
     sign: float
-    """That of a slope which breaks the rule."""
+    """Sign of a slope that violates the rule."""
 
 
 @dataclasses.dataclass(frozen=True)
 class MonotonicityViolation:
-    """One connected place of a validity range where a law breaks a rule."""
+    """One connected region of a validity range where a law violates a rule."""
 
     rule: MonotonicityRule
     pressure: Range
-    """Gauge pressures [Pa] between which it lies."""
+    """Limits of the region in gauge pressure [Pa]."""
     second_argument: Range
-    """Contractions [1], or forces [N] of a law in contraction, between which it lies."""
+    """Limits of the region in contraction [1], or in force [N] for a law that gives contraction."""
     area_fraction: float
-    """Its part of the validity range [1]."""
+    """Fraction of the validity range that the region covers [1]."""
     worst_point: tuple[float, float]
-    """Gauge pressure [Pa] and contraction or force where the rule is broken most."""
+    """Gauge pressure [Pa] and second argument at the maximum violation."""
     worst_slope: float
     """The slope there [SI]."""
 
     def __str__(self) -> str:
-        (p0, p1), (low, high, worst) = (
-            self.pressure,
-            (self._format_second(v) for v in (*self.second_argument, self.worst_point[1])),
-        )
+        (p0, p1), (low, high) = self.pressure, (self._format_second(v) for v in self.second_argument)
         return (
             f"{self.rule.description} between {p0 / 1e3:.4g} and {p1 / 1e3:.4g} kPa, {low} and {high} "
-            f"({self.area_fraction:.1%} of the validity range), most at {self.worst_point[0] / 1e3:.4g} kPa and {worst}"
+            f"({self.area_fraction:.1%} of the validity range), most at {self.worst_point[0] / 1e3:.4g} kPa and "
+            f"{self._format_second(self.worst_point[1])}"
         )
 
     def _format_second(self, value: float) -> str:
@@ -59,31 +58,36 @@ class MonotonicityViolation:
 
 
 def find_violations(
-    law: Any, rules: Sequence[MonotonicityRule], pressure: Array, across: Array
+    law: Any, rules: Sequence[MonotonicityRule], pressure: Array, second_argument: Array
 ) -> tuple[MonotonicityViolation, ...]:
-    """The places on a grid, both shape (N, M), where exact slopes break one of the rules, largest first."""
-    found: list[MonotonicityViolation] = []
+    """The regions where exact slopes at grid points violate one of the rules, largest first.
+
+    `pressure` [Pa] and `second_argument` (contraction [1] or force [N]) are grids, shape (N, M) each.
+    """
+    violations: list[MonotonicityViolation] = []
     for rule in rules:
-        against = rule.sign * np.asarray(autodiff.derivative(law, rule.quantity, pressure, across, wrt=rule.argument))
-        felt = np.where(against > _ROUNDING * np.abs(against).max(), against, 0.0)
-        found += _connected_regions(rule, felt, pressure, across)
-    return tuple(sorted(found, key=lambda b: -b.area_fraction))
+        slope = autodiff.derivative(law, rule.quantity, pressure, second_argument, wrt=rule.argument)
+        excess = rule.sign * np.asarray(slope)
+        significant = np.where(excess > _ROUNDING * np.abs(excess).max(), excess, 0.0)
+        violations += _connected_regions(rule, significant, pressure, second_argument)
+    return tuple(sorted(violations, key=lambda v: -v.area_fraction))
 
 
 def _connected_regions(
-    rule: MonotonicityRule, heights: Array, pressure: Array, across: Array
+    rule: MonotonicityRule, excess: Array, pressure: Array, second_argument: Array
 ) -> list[MonotonicityViolation]:
-    """The connected places where `heights` are above zero."""
+    """The connected regions where `excess` is positive."""
     from scipy import ndimage
 
-    labels, count = ndimage.label(heights > 0)
-    found = []
+    labels, count = ndimage.label(excess > 0)
+    regions = []
     for label in range(1, count + 1):
-        here = labels == label
-        at = np.unravel_index(int(np.argmax(np.where(here, heights, -np.inf))), heights.shape)
-        along, beside = ((float(v[here].min()), float(v[here].max())) for v in (pressure, across))
-        worst = (float(pressure[at]), float(across[at]))
-        found.append(
-            MonotonicityViolation(rule, along, beside, float(here.mean()), worst, rule.sign * float(heights[at]))
+        inside = labels == label
+        worst = np.unravel_index(int(np.argmax(np.where(inside, excess, -np.inf))), excess.shape)
+        limits, second_limits = ((float(v[inside].min()), float(v[inside].max())) for v in (pressure, second_argument))
+        worst_point = (float(pressure[worst]), float(second_argument[worst]))
+        worst_slope = rule.sign * float(excess[worst])
+        regions.append(
+            MonotonicityViolation(rule, limits, second_limits, float(inside.mean()), worst_point, worst_slope)
         )
-    return found
+    return regions
