@@ -125,7 +125,7 @@ def fitted(variant: Model, found: Recording, starts: int) -> DynamicFit:
     """The variant fitted to one record; start, start time and supply pressure are its nuisances."""
     return fit_dynamic(
         variant.plant, [experiment(variant.plant, found)], free=variant.free, observed={variant.sensed: SENSOR},
-        bounds=variant.bounds(), own=variant.own(False), starts=starts,
+        bounds=variant.bounds(), per_record=variant.own(False), starts=starts,
     )  # fmt: skip
 
 
@@ -134,7 +134,7 @@ def predicted(fit: DynamicFit, variant: Model, found: Recording, wall: bool) -> 
     settled = fit.plant()
     assert isinstance(settled, Plant)
     again = fit_dynamic(
-        settled, [experiment(settled, found, wall)], free=(), own=variant.own(wall), observed={variant.sensed: SENSOR},
+        settled, [experiment(settled, found, wall)], free=(), per_record=variant.own(wall), observed={variant.sensed: SENSOR},
         bounds={variant.supply: BOUNDS["supply.pressure"]},
     )  # fmt: skip
     return again.rms(variant.sensed)
@@ -144,7 +144,7 @@ def show_record(name: str, fits: list[DynamicFit]) -> None:
     """Residuals of every variant, the last one's estimates, and the profiles of what matters."""
     inside = min((f for f, m in zip(fits, MODELS, strict=True) if m.sensed == "pressure" and "lag" not in m.name),
                  key=lambda f: f.rms("pressure"))  # fmt: skip
-    print(f"\n## {name}: {locate_pressure_sensor(inside=inside, before=fits[-1])}")
+    print(f"\n## {name}: {locate_pressure_sensor(in_muscle=inside, in_line=fits[-1])}")
     for variant, fit in zip(MODELS, fits, strict=True):
         bound = [e.name for e in fit.estimates if e.on_bound]
         words = f"; on bounds: {', '.join(bound)}" if bound else ""

@@ -101,7 +101,7 @@ def test_what_the_simulation_used_is_found_within_the_stated_bands():
         muscle__spring__stiffness=0.8,
     )  # fmt: skip
     fit = fit_dynamic(
-        start, experiments, free=FREE, own=("circuit.supply.pressure", StartTime(0.05)), observed=SENSORS, starts=4
+        start, experiments, free=FREE, per_record=("circuit.supply.pressure", StartTime(0.05)), observed=SENSORS, starts=4
     )
     expected = [truth(plants[0], e.name) for e in fit.estimates[:7]]
     expected += [
@@ -202,7 +202,7 @@ def test_the_start_pressure_is_a_nuisance():
     run = simulate(plant, command, duration=0.5, start=plant.state_at(pressure=40e3), output=0.005)
     wrong = Experiment(noisy(run, 1, pressure=300.0), command, InitialConditions.at_coordinates(plant, 36e3))
     fit = fit_dynamic(
-        plant, [wrong], free=("circuit.fill.conductance",), own=(InitialValue("pressure", 8e3),),
+        plant, [wrong], free=("circuit.fill.conductance",), per_record=(InitialValue("pressure", 8e3),),
         observed={"pressure": 300.0},
     )  # fmt: skip
     found = fit["start pressure of record 1"]
@@ -214,7 +214,7 @@ def test_the_derivative_of_a_start_at_rest_is_that_of_the_equilibrium():
     plant = moving()
     start, path = InitialConditions.at_rest(plant, 2e5), "muscle.spring.stiffness"
     experiment = Experiment(simulate(plant, FILL, duration=0.1), FILL, start)
-    fit = fit_dynamic(plant, [experiment], free=(path,), own=(InitialValue("pressure", 1e4),), observed=SENSORS)
+    fit = fit_dynamic(plant, [experiment], free=(path,), per_record=(InitialValue("pressure", 1e4),), observed=SENSORS)
     state, slopes = fit.problem.record_models[0].initial_state(np.array([4000.0, 2e5]))
     up, down = (find_equilibrium(changed(plant, muscle__spring__stiffness=f), pressure=2e5) for f in (1.001, 0.999))
     higher, lower = (find_equilibrium(plant, pressure=p) for p in (2e5 + 100, 2e5 - 100))
@@ -276,15 +276,15 @@ def test_a_fill_tells_whether_it_was_sensed_before_the_muscle(sensed):
     before = fit_dynamic(
         plant, [Experiment(recording, OPEN, record.initial_conditions)], free=line, observed={"tube.pressure": 500.0}
     )
-    found = locate_pressure_sensor(inside=inside, before=before)
+    found = locate_pressure_sensor(in_muscle=inside, in_line=before)
     assert found.is_upstream == (sensed == "tube.pressure")
-    assert str(found).startswith("looks sensed before the muscle") == (sensed == "tube.pressure")
+    assert str(found).startswith("the sensor is probably upstream of the muscle") == (sensed == "tube.pressure")
     assert inside.rms("pressure") == found.rms_in_muscle
     assert found.pressure_rise == np.ptp(values)
     other = dataclasses.replace(record, recording=noisy(record.recording, 3, **{sensed: 1.0}))
     elsewhere = fit_dynamic(plant, [other], free=line, observed={sensed: 500.0})
     with pytest.raises(IdentificationError, match="different rows"):
-        locate_pressure_sensor(inside=inside, before=elsewhere)
+        locate_pressure_sensor(in_muscle=inside, in_line=elsewhere)
 
 
 def test_the_heat_through_the_wall_is_found_from_the_pressure_of_a_fill_and_a_hold():
@@ -309,7 +309,7 @@ def test_a_leak_is_found_from_a_hold_with_shut_valves():
     record = Experiment(noisy(run, 8, pressure=300.0), rest, start)
     guess = changed(plant, circuit__leak__conductance=4.0)
     fit = fit_dynamic(guess, [record], free=("circuit.leak.conductance",), observed={"pressure": 300.0},
-                      own=(InitialValue("pressure", 2e4),))  # fmt: skip
+                      per_record=(InitialValue("pressure", 2e4),))  # fmt: skip
     leak = fit["circuit.leak.conductance"]
     assert abs(leak.value - 2e-11) < 3.5 * leak.stderr
     assert leak.stderr < 0.02 * leak.value
@@ -346,7 +346,7 @@ def test_model_error_is_called_so():
         ({"bounds": {"gas.exponent": (1.0, 2.0)}}, "bounds of 'gas.exponent', which is not free"),
         ({"bounds": {"circuit.fill.conductance": (1e-8, 1e-7)}}, "its bounds are 1e-08 to 1e-07"),
         ({"free": ()}, "nothing is free"),
-        ({"own": (InitialValue("presure", 1.0),)}, "does not take 'presure' as known"),
+        ({"per_record": (InitialValue("presure", 1.0),)}, "does not take 'presure' as known"),
         ({"starts": 0}, "one start"),
         ({"observed": {"pressure": 0.0}}, "must be positive"),
     ],
@@ -449,7 +449,7 @@ def test_an_interrupted_run_ends_the_fit(monkeypatch):
 def test_a_heavier_load_is_another_plant_of_the_same_structure():
     light, heavy = moving(), dataclasses.replace(moving(), mechanism=HangingMass(8.0))
     records = [recorded(light, 1), dataclasses.replace(recorded(heavy, 2), plant=heavy)]
-    fit = fit_dynamic(light, records, free=("muscle.damper.damping",), own=("mechanism.mass",), observed=SENSORS)
+    fit = fit_dynamic(light, records, free=("muscle.damper.damping",), per_record=("mechanism.mass",), observed=SENSORS)
     for found, expected in zip(fit.estimates[1:], (5.0, 8.0), strict=True):
         assert abs(found.value - expected) < 3.5 * found.stderr
     assert fit.plant(1).mechanism.mass == fit.estimates[2].value

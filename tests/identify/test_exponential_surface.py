@@ -237,7 +237,7 @@ def test_where_there_is_no_index_it_is_said():
     found = correlation_index([0.0, 1.0, 2.0], [10.0, 10.0, 10.0])
     assert (found.is_defined, found.value) == (False, None)
     assert found.r_squared == pytest.approx(1 - 245 / 2)
-    assert str(found) == "no index: 1 - SSE/SST = -121.5 is negative"
+    assert str(found) == "undefined, because 1 - SSE/SST = -121.5 is negative"
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ def test_the_law_of_lengths_is_chosen_by_leaving_specimens_out(truth):
 
 
 def test_one_length_alone_does_not_determine_how_length_acts():
-    with pytest.raises(IdentificationError, match="cannot tell apart"):
+    with pytest.raises(IdentificationError, match="cannot separate"):
         fit(InverseLength(blank_surface(2), blank_surface(1), 0.2, 0.1), [measured(TRUTHS[1], 0.2)])
 
 

@@ -72,7 +72,7 @@ def test_with_any_level_left_out_a_fit_settles_or_names_what_nothing_tells_apart
                 assert np.isfinite(fit(candidate.law, recording.rows(labels != left_out)).values).all()
             except IdentificationError as error:
                 reasons.append(str(error))
-    assert [r for r in reasons if "cannot tell apart" not in r and "do not act on" not in r] == []
+    assert [r for r in reasons if "cannot separate" not in r and "do not depend on" not in r] == []
 
 
 def test_the_better_of_two_optima_is_found():
@@ -139,4 +139,4 @@ def test_a_fold_that_leaves_the_exponential_open_is_excluded_by_name():
         recording, [candidate, Candidate("plane", blank_surface(1, 4e3))], leave_out=LevelSplit("contraction")
     )
     (excluded,) = found.excluded
-    assert "cannot tell apart a_1, a_2, a_3" in excluded.reason
+    assert "cannot separate a_1, a_2, a_3" in excluded.reason

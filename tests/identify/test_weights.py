@@ -100,6 +100,6 @@ def test_the_command_line_weighs_by_sensor_unless_told(tmp_path):
         json.loads(CliRunner().invoke(app, ["fit", *files, *law, *more]).stdout)["notes"]
         for more in ((), ("--equal-weights",))
     ]
-    assert [any("rigs whose sensors differ" in note for note in each) for each in notes] == [True, False]
+    assert [any("test rigs with different sensors" in note for note in each) for each in notes] == [True, False]
     page = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
     assert "sigma=1.0" not in page

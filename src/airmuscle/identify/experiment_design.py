@@ -20,7 +20,7 @@ from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
 from ..recording import Recording
 from .censoring import UNCENSORED
-from .dynamic.identifiability import EXACT_RANK_TOLERANCE, UndeterminedCombination, analyse_identifiability
+from .identifiability import EXACT_RANK_TOLERANCE, UndeterminedCombination, analyse_identifiability
 from .problem import make_problem
 
 LEVEL_COUNT = 13

@@ -80,7 +80,7 @@ class DynamicStudy:
     def fit(self) -> DynamicFit:
         """The numbers found; see `identify.dynamic.fit_dynamic`."""
         return fit_dynamic(
-            self.plant, self.experiments, free=self.free, observed=self.observed, own=self.own, bounds=self.bounds,
+            self.plant, self.experiments, free=self.free, observed=self.observed, per_record=self.own, bounds=self.bounds,
             starts=self.starts, seed=self.seed, method=self.method,
         )  # fmt: skip
 
@@ -91,7 +91,7 @@ class DynamicStudy:
         assert isinstance(plant, Plant)
         course = found.problem.record_models[record]
         known = dict(course.experiment.initial_conditions.known)
-        for k in course.mine:
+        for k in course.unknown_indices:
             what = course.unknowns[k].target
             if isinstance(what, InitialValue):
                 known[what.name] = float(found.values[k])

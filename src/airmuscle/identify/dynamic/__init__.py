@@ -1,8 +1,8 @@
-"""Parameters of a plant from records in time: fill, discharge, release; and what such records cannot tell."""
+"""Dynamic identification: plant parameters from transient records (fill, discharge, release)."""
 
+from ..identifiability import analyse_identifiability
 from .experiment import Experiment, InitialValue, StartTime
 from .fit import fit_dynamic
-from .identifiability import analyse_identifiability
 from .initial_conditions import InitialConditions
 from .result import DynamicFit
 from .sensing import locate_pressure_sensor

@@ -89,7 +89,8 @@ class HysteresisFit:
 
     def plot(self) -> Any:
         """The loop, the friction force and the residuals; a Matplotlib figure."""
-        title = f"{self.series.origin}: rms error {self.rmse_without_friction:.3g} N without, {self.rmse:.3g} N with friction"
+        rms = f"{self.rmse_without_friction:.3g} N without, {self.rmse:.3g} N with friction"
+        title = f"{self.series.origin}: rms error {rms}"
         return plot_hysteresis(self.series, self.friction, self.coefficients, title)
 
     def __str__(self) -> str:
