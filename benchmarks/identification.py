@@ -13,7 +13,7 @@ from sensitivities import DURATION, FREE, SENSORS, case
 
 from airmuscle.core import tree
 from airmuscle.identify.dynamic import fit_dynamic
-from airmuscle.identify.dynamic.fit import spread
+from airmuscle.identify.dynamic.fit import initial_guesses
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics.gas import GAS_CONSTANT
 from airmuscle.simulation.integrators import Rodas4
@@ -109,7 +109,7 @@ def fitted(opponent: Opponent, start: Array) -> tuple[float, float, int]:
 
 def section(rounds: int) -> Section:
     problem, record = case().problem(Rodas4()), case()
-    starts = [z for z in spread(problem, STARTS, 0)[1:] if np.isfinite(problem.solve(z)[1])]
+    starts = [z for z in initial_guesses(problem, STARTS, 0)[1:] if np.isfinite(problem.solve(z)[1])]
     own: list[float] = []
     others: dict[Opponent, list[tuple[float, float, int]]] = {opponent: [] for opponent in OPPONENTS}
     fit_dynamic(record.plant, [record.experiment], free=FREE, observed=SENSORS)
@@ -120,7 +120,14 @@ def section(rounds: int) -> Section:
         for opponent, found in others.items():
             found.append(fitted(opponent, start))
     runnable = int(np.isfinite(fit.costs).sum())
-    rows = [("`fit_dynamic`", of_time(Times(tuple(own)).median), "", f"{fit.reached} of {runnable} that can be run")]
+    rows = [
+        (
+            "`fit_dynamic`",
+            of_time(Times(tuple(own)).median),
+            "",
+            f"{fit.starts_at_optimum} of {runnable} that can be run",
+        )
+    ]
     ratios = []
     for opponent, found in others.items():
         seconds = Times(tuple(taken * runnable for taken, _, _ in found))

@@ -20,8 +20,8 @@ import pandas as pd
 
 from airmuscle.core.errors import IdentificationError
 from airmuscle.identify import BlockSplit, SpecimenSplit, compare, fit
-from airmuscle.identify.candidates import Candidate, standard_candidates, surface
-from airmuscle.identify.model_selection import errors_in_force
+from airmuscle.identify.candidates import Candidate, blank_surface, standard_candidates
+from airmuscle.identify.model_selection import force_residuals
 from airmuscle.recording import Recording
 
 NAME = re.compile(r"_cut(\d+)cm_held([\d.]+)cm_test(\d+)\.csv$")
@@ -87,14 +87,14 @@ def line(name: str, parameters: int, errors: Sequence[float], least: float) -> s
 def judged(candidate: Candidate, train: list[Recording], test: list[Recording], specimens: list[str]) -> list[float]:
     """Error on the next repeat, and on each specimen that was left out; NaN where the others do not determine it."""
     law, fixed = candidate.law, candidate.fixed
-    errors = [rms(errors_in_force(fit(law, train, fixed=fixed).model, test, CEILING))]
+    errors = [rms(force_residuals(fit(law, train, fixed=fixed).model, test, CEILING))]
     for name in specimens:
         try:
             model = fit(law, of_specimen(train, name, others=True), fixed=fixed).model
         except IdentificationError:  # two lengths do not determine it
             errors.append(np.nan)
             continue
-        errors.append(rms(errors_in_force(model, of_specimen(test, name), CEILING)))
+        errors.append(rms(force_residuals(model, of_specimen(test, name), CEILING)))
     return errors
 
 
@@ -126,7 +126,7 @@ def main() -> None:
     each = [best_rank(of_specimen(train, name), of_specimen(test, name)) for name in specimens]
     print(line("a surface of 21 for each length", 63, [rms(np.concatenate(each))], least))
     print(line("  by length", 21, [rms(e) for e in each], least))
-    candidates = [Candidate("one surface of degree 5 for all", surface(5)), *standard_candidates(train)]
+    candidates = [Candidate("one surface of degree 5 for all", blank_surface(5)), *standard_candidates(train)]
     for candidate in candidates:
         if hasattr(candidate.law, "with_resting_length") or candidate is candidates[0]:
             try:

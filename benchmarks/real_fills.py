@@ -18,10 +18,10 @@ from airmuscle.identify.dynamic import (
     DynamicFit,
     Experiment,
     InitialConditions,
+    InitialValue,
     StartTime,
-    StartValue,
     fit_dynamic,
-    where_sensed,
+    locate_pressure_sensor,
 )
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle, SwellingWall
@@ -63,10 +63,10 @@ class Model:
         """What the paths of the valves begin with."""
         return "circuit.circuit." if isinstance(self.plant.circuit, WithTubes) else "circuit."
 
-    def own(self, wall: bool) -> tuple[str | StartTime | StartValue, ...]:
+    def own(self, wall: bool) -> tuple[str | StartTime | InitialValue, ...]:
         """What every record has for itself; with the start of its wall, if asked."""
-        nuisances = (StartTime(0.012), StartValue("pressure", 3e3), self.supply)
-        return (*nuisances, StartValue("wall_volume", 1e-5)) if wall else nuisances
+        nuisances = (StartTime(0.012), InitialValue("pressure", 3e3), self.supply)
+        return (*nuisances, InitialValue("wall_volume", 1e-5)) if wall else nuisances
 
     def bounds(self) -> dict[str, tuple[float, float]]:
         """Physical bounds of what is free."""
@@ -113,7 +113,7 @@ def experiment(start_plant: Plant, found: Recording, wall: bool = False) -> Expe
     """The fill as an experiment that begins at the first row that leaves the start."""
     pressure, first = found["pressure"], float(np.median(found["pressure"][:2]))
     begin = float(found["time"][max(int(np.argmax(pressure > first + 5e3)) - 1, 0)])
-    start = InitialConditions.held(start_plant, first)
+    start = InitialConditions.at_coordinates(start_plant, first)
     if wall:  # known, so that it can be an unknown of its own
         known = {**start.known, "wall_volume": start.guess["wall_volume"]}
         still = tuple(name for name in start.stationary if name != "wall_volume")
@@ -125,7 +125,7 @@ def fitted(variant: Model, found: Recording, starts: int) -> DynamicFit:
     """The variant fitted to one record; start, start time and supply pressure are its nuisances."""
     return fit_dynamic(
         variant.plant, [experiment(variant.plant, found)], free=variant.free, observed={variant.sensed: SENSOR},
-        bounds=variant.bounds(), own=variant.own(False), starts=starts,
+        bounds=variant.bounds(), per_record=variant.own(False), starts=starts,
     )  # fmt: skip
 
 
@@ -134,7 +134,7 @@ def predicted(fit: DynamicFit, variant: Model, found: Recording, wall: bool) -> 
     settled = fit.plant()
     assert isinstance(settled, Plant)
     again = fit_dynamic(
-        settled, [experiment(settled, found, wall)], free=(), own=variant.own(wall), observed={variant.sensed: SENSOR},
+        settled, [experiment(settled, found, wall)], free=(), per_record=variant.own(wall), observed={variant.sensed: SENSOR},
         bounds={variant.supply: BOUNDS["supply.pressure"]},
     )  # fmt: skip
     return again.rms(variant.sensed)
@@ -144,7 +144,7 @@ def show_record(name: str, fits: list[DynamicFit]) -> None:
     """Residuals of every variant, the last one's estimates, and the profiles of what matters."""
     inside = min((f for f, m in zip(fits, MODELS, strict=True) if m.sensed == "pressure" and "lag" not in m.name),
                  key=lambda f: f.rms("pressure"))  # fmt: skip
-    print(f"\n## {name}: {where_sensed(inside=inside, before=fits[-1])}")
+    print(f"\n## {name}: {locate_pressure_sensor(in_muscle=inside, in_line=fits[-1])}")
     for variant, fit in zip(MODELS, fits, strict=True):
         bound = [e.name for e in fit.estimates if e.on_bound]
         words = f"; on bounds: {', '.join(bound)}" if bound else ""

@@ -19,7 +19,7 @@ from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import PiecewiseLinear, Schedule
 from airmuscle.core import tree
 from airmuscle.identify.dynamic import Experiment, InitialConditions
-from airmuscle.identify.dynamic.experiment import unknowns
+from airmuscle.identify.dynamic.experiment import make_unknowns
 from airmuscle.identify.dynamic.problem import DynamicFitProblem
 from airmuscle.identify.dynamic.record_model import RecordModel
 from airmuscle.plant.plant import Plant
@@ -65,7 +65,7 @@ class Case(NamedTuple):
     experiment: Experiment
 
     def problem(self, method: Integrator) -> DynamicFitProblem:
-        wanted = unknowns(self.plant, [self.experiment], FREE, (), {})
+        wanted = make_unknowns(self.plant, [self.experiment], FREE, (), {})
         course = RecordModel(self.plant, self.experiment, 0, wanted, SENSORS, method)
         return DynamicFitProblem((course,), wanted, np.array(list(SENSORS.values())))
 
@@ -87,7 +87,7 @@ def simulation(method: Integrator) -> Callable[[], Array]:
     """The kernel, and all outputs at the rows."""
     ready, segments = compile_system(case().plant), case().segments
     times = case().experiment.recording["time"]
-    start = np.array([case().experiment.start.guess[s.name] for s in case().plant.states])
+    start = np.array([case().experiment.initial_conditions.guess[s.name] for s in case().plant.states])
     under, results = np.ascontiguousarray(segments.inputs_at(times, 0.0)), np.empty((times.size, ready.sizes.outputs))
 
     def run() -> Array:
@@ -141,7 +141,7 @@ def with_jax(form: str) -> Callable[[], tuple[Array, Array]]:
     plant, leaves = case().plant, list(tree.leaves(case().plant))
     places = [[leaf.path for leaf in leaves].index(path) for path in FREE]
     values = np.array([leaves[place].value for place in places])
-    start, by_start = case().problem(RungeKutta4(STEP)).courses[0].start(values)
+    start, by_start = case().problem(RungeKutta4(STEP)).record_models[0].initial_state(values)
     t, names = trace_system(plant), [s.name for s in plant.states]
     outputs = list(t.output_names)
     seen = [t.o[outputs.index(name)] if name in outputs else t.x[names.index(name)] for name in SENSORS]

@@ -21,8 +21,8 @@ from airmuscle.characteristic import (
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify import Candidate, SpecimenSplit, compare, fit
-from airmuscle.identify.candidates import standard_candidates, surface
-from airmuscle.library.build import build
+from airmuscle.identify.candidates import blank_surface, standard_candidates
+from airmuscle.library.build import Location, build
 from airmuscle.library.entry import Entry
 from airmuscle.library.location import Location
 from airmuscle.library.write import to_toml
@@ -49,8 +49,8 @@ def measured(law, length: float, *, noise: float = 0.0, seed: int = 1) -> Record
 def blank(truth):
     """The law with nothing known of it."""
     if isinstance(truth, EffectiveLength):
-        return EffectiveLength(surface(2), 0.4, 0.005)
-    return type(truth)(surface(2), surface(1), 0.4, 0.2)
+        return EffectiveLength(blank_surface(2), 0.4, 0.005)
+    return type(truth)(blank_surface(2), blank_surface(1), 0.4, 0.2)
 
 
 @pytest.mark.parametrize("truth", TRUTHS, ids=lambda law: type(law).__name__)
@@ -68,15 +68,15 @@ def test_a_family_is_recovered_and_speaks_of_a_length_never_measured(truth):
 @pytest.mark.parametrize("truth", TRUTHS, ids=lambda law: type(law).__name__)
 def test_the_law_of_lengths_is_chosen_by_leaving_specimens_out(truth):
     runs = [measured(truth, length, noise=2.0) for length in (*LENGTHS, 0.3)]
-    candidates = [Candidate(type(t).__name__, blank(t)) for t in TRUTHS] + [Candidate("no length", surface(2))]
+    candidates = [Candidate(type(t).__name__, blank(t)) for t in TRUTHS] + [Candidate("no length", blank_surface(2))]
     found = compare(runs, candidates, leave_out=SpecimenSplit())
-    assert found.contenders[0].candidate.name == type(truth).__name__
-    assert found["no length"].cross_validated > 5 * found.contenders[0].cross_validated
+    assert found.ranking[0].candidate.name == type(truth).__name__
+    assert found["no length"].cross_validated_rmse > 5 * found.ranking[0].cross_validated_rmse
 
 
 def test_one_length_alone_does_not_determine_how_length_acts():
-    with pytest.raises(IdentificationError, match="cannot tell apart"):
-        fit(InverseLength(surface(2), surface(1), 0.2, 0.1), [measured(TRUTHS[1], 0.2)])
+    with pytest.raises(IdentificationError, match="cannot separate"):
+        fit(InverseLength(blank_surface(2), blank_surface(1), 0.2, 0.1), [measured(TRUTHS[1], 0.2)])
 
 
 def test_a_dead_length_is_tondus_end_correction():

@@ -19,7 +19,7 @@ from airmuscle.characteristic.tabulated import Tabulated
 from airmuscle.core import tree
 from airmuscle.core.errors import AirmuscleWarning, IdentificationError
 from airmuscle.identify import UNCENSORED, confidence_band, fit
-from airmuscle.identify.problem import direction_of
+from airmuscle.identify.problem import fitted_quantity_of
 from airmuscle.identify.profile_likelihood import weakly_determined
 from airmuscle.library import catalogue, files
 from airmuscle.recording import Recording
@@ -51,7 +51,7 @@ def simulated(
     random = np.random.default_rng(seed)
     low, high = max(validity_range.contraction[0], least), validity_range.contraction[1]
     pressure = random.uniform(*validity_range.pressure, 400)
-    direction = direction_of(law)
+    direction = fitted_quantity_of(law)
     if isinstance(law, ForceLaw):
         contraction = random.uniform(low, high, 400)
         columns = {
@@ -68,10 +68,10 @@ def simulated(
         inside = (columns["pressure"] > 0) & (columns["pressure"] < 8e5)
         columns = {key: values[inside] for key, values in columns.items()}
     exact = Recording(columns, "simulated")
-    truth = exact[direction.quantity]
+    truth = exact[direction.name]
     noise = 0.005 * float(np.ptp(truth))
     noisy = truth + noise * random.standard_normal(len(exact))
-    return exact.with_columns(**{direction.quantity: noisy}), exact, noise
+    return exact.with_columns(**{direction.name: noisy}), exact, noise
 
 
 def disturbed(law, fixed: tuple[str, ...]):
@@ -93,7 +93,7 @@ def test_a_law_is_recovered_within_its_bands(name: str):
     found = fit(disturbed(inner, fixed), noisy, censoring=UNCENSORED, fixed=fixed)
     assert found.sigma == pytest.approx(noise, rel=0.15)
     stated = confidence_band(found, exact, level=0.999)
-    truth = exact[found.direction.quantity]
+    truth = exact[found.fitted_quantity.name]
     held = (stated.low <= truth) & (truth <= stated.high)
     assert held.mean() > 0.97
     assert np.sqrt(np.mean((stated.value - truth) ** 2)) < 0.5 * noise

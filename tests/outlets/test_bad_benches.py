@@ -124,7 +124,7 @@ def test_a_saturated_force_sensor_gives_bounds_not_values(tmp_path):
     found = fit(ContractileSurface.blank(3, max_force=1e5), runs)
     high = np.concatenate([run["force"] for run in runs]) >= 500.0
     assert high.sum() > 100
-    assert (found.sides[high] == -1).all()
+    assert (found.censoring[high] == -1).all()
     assert found.rmse < 1.0
     as_it_stands = fit(ContractileSurface.blank(3, max_force=1e5), runs, censoring=UNCENSORED)
     assert as_it_stands.rmse > 10.0
@@ -133,7 +133,7 @@ def test_a_saturated_force_sensor_gives_bounds_not_values(tmp_path):
 
 def test_a_sensor_without_limits_changes_nothing(tmp_path):
     runs = read([ramp(tmp_path / f"run{i}.csv", p, seed=i) for i, p in enumerate((2e5, 3e5))], resting_length=0.3)
-    assert (fit(ContractileSurface.blank(1, max_force=1e5), runs).sides <= 0).sum() == sum(
+    assert (fit(ContractileSurface.blank(1, max_force=1e5), runs).censoring <= 0).sum() == sum(
         (run["force"] > 0).sum() for run in runs
     )
 

@@ -94,15 +94,15 @@ CSV = {
         bench("pressure [bar],contraction,force [N]", [[p, (301 - x) / 3, f] for p, x, f in rows()]),
         r"line 7: contraction 3.5 is outside the plausible range -0.5 to 1. For values in percent, rename .* 'contraction \[%\]'",
     ),
-    "no force": (bench("pressure [bar],length [mm]", rows(0, 1)), r"no column 'force'; the columns are pressure, length"),
-    "twice": (bench(f"force [N],{HEAD}", rows(2, 0, 1, 2)), r"columns 'force \[N\]' and 'force \[N\]' both contain the"),
-    "few points": (bench(table=rows()[:3] + rows()[5:7]), r"6 parameters to be found, but only 5 points"),
+    "no force": (bench("pressure [bar],length [mm]", rows(0, 1)), r"no column 'force'; there are pressure, length"),
+    "twice": (bench(f"force [N],{HEAD}", rows(2, 0, 1, 2)), r"columns 'force \[N\]' and 'force \[N\]' both hold the"),
+    "few points": (bench(table=rows()[:3] + rows()[5:7]), r"6 free parameters, but only 5 rows"),
     "one pressure": (bench(table=[[3, *r] for r in rows(1, 2)]), r"pressure is 300000 Pa in every row.*several levels"),
     "two pressures": (
         bench(table=[[1 if p < 3 else 4, *rest] for p, *rest in rows()]),
-        r"cannot tell apart a\(1\), a\(q\^2\) .*\(rank 5 of 6 parameters\).*2 of pressure, 7 of contraction. Measure at more",
+        r"cannot separate a\(1\), a\(q\^2\) .*\(rank 5 of 6 parameters\).*2 of pressure, 7 of contraction. Measure at more",
     ),
-    "slack": (bench(table=[[p, length, 0] for p, length, _ in rows()]), r"all 35 rows are cut off .*Fit rows in which"),
+    "slack": (bench(table=[[p, length, 0] for p, length, _ in rows()]), r"all 35 rows are censored .*Give rows with"),
 }  # fmt: skip
 
 
@@ -139,8 +139,8 @@ def test_what_other_programs_write_is_read(tmp_path: Path, content: bytes):
         (("--resting-length", "300 N"), "resting_length: unit 'N' cannot be converted to 'm'"),
         (("--resting-length", "300"), "resting_length: '300' has no unit"),
         (("--unit", "presure=bar"), "a unit is given for 'presure', but .* Did you mean 'pressure'"),
-        (("--fix", "coefficient"), "no parameter 'coefficient' to hold fixed; .* Did you mean 'coefficients'"),
-        (("--robust", "-1 N"), "is -1.0; it must be greater than zero"),
+        (("--fix", "coefficient"), "no parameter 'coefficient' to be fixed; .* Did you mean 'coefficients'"),
+        (("--robust", "-1 N"), "is -1.0; it must be positive"),
     ],
 )
 def test_a_bad_option_of_fit(tmp_path: Path, option: tuple[str, str], message: str):

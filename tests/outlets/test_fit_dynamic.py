@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.core.tree import leaves
-from airmuscle.identify.dynamic import StartTime, StartValue
+from airmuscle.identify.dynamic import InitialValue, StartTime
 from airmuscle.mechanism import HangingMass
 from airmuscle.recording import Recording, read_csv
 from airmuscle.recording.csv_writer import write_csv
@@ -150,14 +150,14 @@ def test_a_study_says_what_it_was_told(folder):
     )  # fmt: skip
     study = load_dynamic_fit(path)
     first, second = study.experiments
-    assert study.own == ("circuit.supply.pressure", StartTime(0.05), StartValue("pressure", 2e3))
+    assert study.own == ("circuit.supply.pressure", StartTime(0.05), InitialValue("pressure", 2e3))
     assert (study.seed, study.starts, study.bounds) == (3, 2, {"gas.exponent": (1.01, 1.4)})
     assert study.method.rtol == 1e-7
     assert study.observed == pytest.approx({"pressure": 500.0, "position": 5e-5})
     assert (first.plant.mechanism, second.plant.mechanism) == (HangingMass(10.0), HangingMass(12.0))
     assert (second.recording["time"].min(), second.recording["time"].max()) == pytest.approx((0.3, 1.0), abs=0.011)
-    assert second.start.known["pressure"] == pytest.approx(np.median(second.recording["pressure"][:3]))
-    assert first.start.known["pressure"] == 6e4
+    assert second.initial_conditions.known["pressure"] == pytest.approx(np.median(second.recording["pressure"][:3]))
+    assert first.initial_conditions.known["pressure"] == 6e4
     assert second.command.segments(("fill", "discharge"), 0.0, 1.0).values.tolist() == [[1.0, 0.0]]
 
 
@@ -198,7 +198,9 @@ def test_an_unloaded_muscle_behind_a_tube_is_fitted_and_written_too(folder, tmp_
     (folder / "fill.toml").write_text(UNLOADED, encoding="utf-8")
     study = load_dynamic_fit(folder / "fill.toml")
     (experiment,) = study.experiments
-    assert experiment.start.known["pressure"] == pytest.approx(np.median(experiment.recording["pressure"][:3]))
+    assert experiment.initial_conditions.known["pressure"] == pytest.approx(
+        np.median(experiment.recording["pressure"][:3])
+    )
     result = airmuscle("fit-dynamic", folder / "fill.toml", "--out", tmp_path / "out", "--json")
     assert result.exit_code == 0, result.stderr
     (found,) = json.loads(result.stdout)["parameters"]

@@ -21,13 +21,13 @@ from airmuscle.identify import (
     LevelSplit,
     bootstrap,
     confidence_band,
+    find_shape_violations,
     fit,
-    fit_shaped,
+    fit_shape_constrained,
     profile,
-    shape_breaks,
     weakly_determined,
 )
-from airmuscle.identify.candidates import surface
+from airmuscle.identify.candidates import blank_surface
 from airmuscle.library.catalogue import load
 from airmuscle.recording import Recording
 from airmuscle.recording.csv_writer import write_csv
@@ -62,7 +62,7 @@ def test_bootstrap_and_profiles_are_those_of_the_library(tmp_path):
     result = airmuscle("fit", tmp_path / "bench.csv", *SURFACE, *asked, "--json", "--out", tmp_path / "fit")
     assert result.exit_code == 0, result.stderr
     said = json.loads(result.stdout)
-    found = fit(surface(2), recording)
+    found = fit(blank_surface(2), recording)
     drawn = bootstrap(found, recording, refits=50, by=LevelSplit("pressure"))
     ends = dict(zip(found.names, drawn.intervals().tolist(), strict=True))
     assert said["bootstrap"]["refits"] == 50
@@ -99,8 +99,10 @@ def test_a_shape_on_request_is_the_one_written(tmp_path):
     result = airmuscle("fit", tmp_path / "bench.csv", *degree, "--shape", "--out", tmp_path / "fit")
     assert "shape: rms" in result.stdout
     law = load(tmp_path / "fit" / "muscle.toml").characteristic
-    assert shape_breaks(law, law.validity_range, points=201) == ()
-    assert law.coefficients == pytest.approx(fit_shaped(surface(4), recording).model.coefficients, abs=1e-6)
+    assert find_shape_violations(law, law.validity_range, points=201) == ()
+    assert law.coefficients == pytest.approx(
+        fit_shape_constrained(blank_surface(4), recording).model.coefficients, abs=1e-6
+    )
     assert "keeps a muscle&#39;s shape" in (tmp_path / "fit" / "report.html").read_text("utf-8")
 
 
@@ -179,7 +181,7 @@ def test_the_report_names_options_too(tmp_path):
 
 
 def test_the_figure_draws_the_band_that_the_library_gives(tmp_path):
-    found = fit(surface(2), bench(tmp_path / "bench.csv"))
+    found = fit(blank_surface(2), bench(tmp_path / "bench.csv"))
     plot = band_plot(found)
     left, right = plot.figure.axes
     curve, half = left.lines[0], right.lines[0]

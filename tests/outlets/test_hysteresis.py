@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.friction import MaxwellSlip
-from airmuscle.identify.hysteresis import OnPressure, find_holds, find_loops
+from airmuscle.identify.hysteresis import PressurePath, find_holds, find_loops
 from airmuscle.identify.hysteresis.plot import plot_loops
 from airmuscle.library.catalogue import load
 from airmuscle.library.location import Location
@@ -110,7 +110,7 @@ def test_friction_on_the_pressure_is_reported_and_not_written(tmp_path):
 
 
 def test_figures_of_it_stand_over_the_pressure():
-    axes = plot_loops(SLIP, OnPressure().axis).axes[0]
+    axes = plot_loops(SLIP, PressurePath().axis).axes[0]
     assert axes.get_xlabel() == "gauge pressure [kPa]"
     drawn = np.concatenate([line.get_xdata() for line in axes.lines])
     assert drawn.max() == pytest.approx(2.0 * SLIP.presliding_distance * 1e5, rel=1e-6), "1 mm stands for 100 kPa"
@@ -150,7 +150,7 @@ def test_quick_rows_do_not_count_unless_told_to(tmp_path):
 def test_a_hold_begins_where_the_length_has_arrived(two):
     (recording,) = read(two[0], resting_length=0.3)
     (found,) = find_holds(recording)
-    assert (found.stretch.start, found.stretch.stop, found.quantity) == (899, 940, "force")
+    assert (found.interval.start, found.interval.stop, found.quantity) == (899, 940, "force")
     weight = recording.with_columns(force=np.full(len(recording), 200.0))
     assert {hold.quantity for hold in find_holds(weight)} == {"contraction"}
 
@@ -160,5 +160,5 @@ def test_rows_on_the_way_to_a_hold_are_none_of_it():
     contraction = np.concatenate([np.linspace(0.0897, 0.1, 103, endpoint=False), np.full(40, 0.1)])
     rows = {"time": 0.5 * np.arange(143), "pressure": np.full(143, 3e5), "contraction": contraction}
     force = np.linspace(100.0, 300.0, 143)
-    found = max(find_holds(Recording({**rows, "force": force}, "hold")), key=lambda hold: len(hold.stretch))
-    assert (found.stretch.start, found.stretch.stop) == (103, 143)
+    found = max(find_holds(Recording({**rows, "force": force}, "hold")), key=lambda hold: len(hold.interval))
+    assert (found.interval.start, found.interval.stop) == (103, 143)

@@ -54,13 +54,13 @@ def convert(
       airmuscle convert fit/muscle.toml Sarosi2012 --max-pressure "5 bar"
     """
     from ..identify import convert as converted
-    from ..identify.conversion import POINTS, on_grid
+    from ..identify.conversion import GRID_POINTS, sample_on_grid
     from ..library.catalogue import load_law
     from ..library.write import save
 
     entry = load_law(name)
     validity_range = _validity_range(entry, (min_pressure, max_pressure, min_contraction, max_contraction))
-    grid = on_grid(entry.characteristic, validity_range, POINTS)
+    grid = sample_on_grid(entry.characteristic, validity_range, GRID_POINTS)
     rest = getattr(entry.geometry, "resting_length", None)
     start = start_of(model, [grid if rest is None else grid.with_constants(resting_length=rest)], degree, "MODEL")
     found = converted(entry.characteristic, start.entry.characteristic, validity_range)
@@ -118,9 +118,9 @@ def _by_pressure(found: ModelConversion, validity_range: ValidityRange) -> list[
     edges = np.linspace(*validity_range.pressure, BANDS + 1)
     rows = []
     for low, high in itertools.pairwise(edges):
-        here = (found.judged["pressure"] >= low) & (found.judged["pressure"] <= high)
+        here = (found.check_points["pressure"] >= low) & (found.check_points["pressure"] <= high)
         if here.any():
-            error, force = found.judged["error"][here], found.judged["force"][here]
+            error, force = found.check_points["error"][here], found.check_points["force"][here]
             rows.append({"min_pressure": float(low), "max_pressure": float(high),
                          "rms": float(np.sqrt(np.mean(error**2))), "max": float(np.abs(error).max()),
                          "max_force": float(force.max())})  # fmt: skip
@@ -136,9 +136,9 @@ def _as_data(found: ModelConversion, validity_range: ValidityRange) -> dict[str,
         "model": type(found.model).__name__,
         "parameters": {leaf.path: leaf.value for leaf in leaves(found.model)},
         "validity_range": dataclasses.asdict(validity_range),
-        "rms": found.rms,
+        "rms": found.rmse,
         "max": found.max_error,
-        "greatest_at": {"pressure": found.pressure, "contraction": found.contraction},
+        "greatest_at": {"pressure": found.max_error_pressure, "contraction": found.max_error_contraction},
         "by_pressure": _by_pressure(found, validity_range),
     }
 

@@ -156,8 +156,8 @@ def _identified(start: InitialLaw, recordings: list[Recording], asked: FitReques
 def loss_of(robust: str | None, law: Characteristic) -> Any:
     from ..core.units import quantity
     from ..identify import Huber, LeastSquares
-    from ..identify.problem import direction_of
+    from ..identify.problem import fitted_quantity_of
 
     if robust is None:
         return LeastSquares()
-    return Huber(quantity(robust, direction_of(law).unit, where="--robust"))
+    return Huber(quantity(robust, fitted_quantity_of(law).unit, where="--robust"))

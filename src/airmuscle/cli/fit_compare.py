@@ -45,7 +45,7 @@ def compared(files: list[Path], recordings: list[Recording], characteristic: str
 
 def _worded(found: Comparison) -> Comparison:
     """The reasons of exclusions with the remedies of the command line."""
-    excluded = tuple(dataclasses.replace(each, why=in_options(each.why)) for each in found.excluded)
+    excluded = tuple(dataclasses.replace(each, reason=in_options(each.reason)) for each in found.excluded)
     return dataclasses.replace(found, excluded=excluded)
 
 
@@ -75,19 +75,19 @@ def _as_data(found: Comparison) -> dict[str, Any]:
     return {
         "recommended": found.recommended.candidate.name,
         "reason": found.reason,
-        "left_out": found.leave_out.word,
+        "left_out": found.leave_out.group_name,
         "purpose": found.purpose,
         "ranking": [
             {
                 "law": c.candidate.name,
-                "parameters": c.parameters,
-                "in_sample": c.in_sample,
-                "cross_validated": c.cross_validated,
+                "parameters": c.parameter_count,
+                "in_sample": c.in_sample_rmse,
+                "cross_validated": c.cross_validated_rmse,
                 "aicc": c.aicc,
-                "parts": {part.part: part.rms for part in c.left_out},
+                "parts": {part.fold: part.rmse for part in c.fold_scores},
             }
-            for c in found.contenders
+            for c in found.ranking
         ],
-        "excluded": {e.name: e.why for e in found.excluded},
+        "excluded": {e.name: e.reason for e in found.excluded},
         "fit": as_data(found.recommended.fit),
     }

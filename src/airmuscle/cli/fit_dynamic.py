@@ -127,15 +127,17 @@ def _as_data(found: DynamicFit, profiles: Sequence[DynamicProfile], remarks: Seq
         "parameters": [dataclasses.asdict(estimate) for estimate in found.estimates],
         "records": [
             {"origin": course.experiment.recording.origin, "rms": {n: found.rms(n, i) for n in course.names}}
-            for i, course in enumerate(found.problem.courses)
+            for i, course in enumerate(found.problem.record_models)
         ],
         "scatter": found.residual_std,
         "rank": found.identifiability.rank,
-        "starts_at_optimum": found.reached,
+        "starts_at_optimum": found.starts_at_optimum,
         "not_determined": [
-            {"shares": dict(each.shares), "deviation": each.deviation, "experiment": each.experiment}
+            {"shares": dict(each.shares), "deviation": each.relative_stderr, "experiment": each.remedy}
             for each in found.identifiability.undetermined
         ],
-        "profiles": {p.name: {"values": p.values, "growth": p.growth, "interval": list(p.interval)} for p in profiles},
+        "profiles": {
+            p.name: {"values": p.values, "growth": p.cost_increase, "interval": list(p.interval)} for p in profiles
+        },
         "notes": [*found.notes, *remarks],
     }

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from ..identify.cross_validation import GroupSplit
     from ..identify.result import Fit
-    from ..identify.surface.shape import ShapedFit
+    from ..identify.surface.shape import ShapeConstrainedFit
     from ..library.entry import Entry
     from ..recording import Recording
     from ..report.chapter import Chapter
@@ -83,7 +83,7 @@ class FitExtras:
     """The answers, for report, terminal and file."""
 
     sure: Uncertainty
-    shaped: ShapedFit | None
+    shaped: ShapeConstrainedFit | None
     free: int
     none_weak: bool
 
@@ -97,24 +97,24 @@ class FitExtras:
 
     def lines(self) -> list[str]:
         """The same for a terminal."""
-        from ..identify.surface.shape import broken_by
+        from ..identify.surface.shape import shape_violations_of_fit
 
         said = self.sure.lines()
         if self.none_weak:
             said.append("profile: no parameter is nearly undetermined; the standard deviations stand")
         if self.shaped is None:
-            return [*said, *(f"note: {each}" for each in broken_by(self.sure.fit))]
-        cost = f"rms {self.shaped.rmse:.4g} N with it, {self.shaped.unconstrained:.4g} N without"
-        return [*said, f"shape: {cost}", *(f"without it {each}" for each in self.shaped.broken)]
+            return [*said, *(f"note: {each}" for each in shape_violations_of_fit(self.sure.fit))]
+        cost = f"rms {self.shaped.rmse:.4g} N with it, {self.shaped.unconstrained_rmse:.4g} N without"
+        return [*said, f"shape: {cost}", *(f"without it {each}" for each in self.shaped.unconstrained_violations)]
 
     def as_data(self) -> dict[str, Any]:
         """The same as plain data, SI."""
-        from ..identify.surface.shape import broken_by
+        from ..identify.surface.shape import shape_violations_of_fit
 
-        broken = broken_by(self.sure.fit) if self.shaped is None else self.shaped.broken
+        broken = shape_violations_of_fit(self.sure.fit) if self.shaped is None else self.shaped.unconstrained_violations
         found = {**self.sure.as_data(), "shape_breaks": [_broken(each) for each in broken]}
         if self.shaped is not None:
-            found["shaped"] = {"rmse": self.shaped.rmse, "unconstrained": self.shaped.unconstrained}
+            found["shaped"] = {"rmse": self.shaped.rmse, "unconstrained": self.shaped.unconstrained_rmse}
         return found
 
     def shaped_entry(self, entry: Entry) -> Entry:
@@ -155,10 +155,10 @@ def _point(text: str) -> tuple[float, float]:
     return quantity(pressure, "Pa", where="--free"), found
 
 
-def _shaped(fit: Fit, recordings: Sequence[Recording], free: tuple[tuple[float, float], ...]) -> ShapedFit:
+def _shaped(fit: Fit, recordings: Sequence[Recording], free: tuple[tuple[float, float], ...]) -> ShapeConstrainedFit:
     from ..characteristic import ContractileSurface
     from ..core.errors import ParameterError
-    from ..identify import fit_shaped
+    from ..identify import fit_shape_constrained
     from ..recording import Recording
 
     if not isinstance(fit.model, ContractileSurface):
@@ -170,8 +170,8 @@ def _shaped(fit: Fit, recordings: Sequence[Recording], free: tuple[tuple[float, 
     if free:
         pressure, contraction = zip(*free, strict=True)
         points = Recording({"pressure": list(pressure), "contraction": list(contraction)}, "--free")  # type: ignore[dict-item]
-    return fit_shaped(fit.model, recordings, free=points)
+    return fit_shape_constrained(fit.model, recordings, free=points)
 
 
 def _broken(each: Any) -> dict[str, Any]:
-    return {**dataclasses.asdict(each), "rule": each.rule.words}
+    return {**dataclasses.asdict(each), "rule": each.rule.description}

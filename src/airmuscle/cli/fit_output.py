@@ -33,7 +33,7 @@ def fitted(result: Fit, start: Entry, files: list[Path]) -> Entry:
 
     summary = dict(result.summary())
     names = ", ".join(f.name for f in files)
-    note = f"Fitted to {names}: rms error {summary['rms error']}, greatest {summary['greatest error']}."
+    note = f"Fitted to {names}: rms error {summary['rms error']}, maximum {summary['maximum error']}."
     title = f"{type(result.model).__name__} fitted to {', '.join(f.stem for f in files)}"
     return dataclasses.replace(
         start, name="muscle", title=title, provenance="fitted", note=note, warning="", characteristic=result.model,
@@ -47,20 +47,20 @@ def as_data(result: Fit) -> dict[str, Any]:
 
     return {
         "model": type(result.model).__name__,
-        "quantity": result.direction.quantity,
-        "unit": result.direction.unit,
+        "quantity": result.fitted_quantity.name,
+        "unit": result.fitted_quantity.unit,
         "parameters": [dataclasses.asdict(estimate) for estimate in result.estimates],
         "rmse": result.rmse,
         "max_error": dataclasses.asdict(result.max_error),
         "sigma": result.sigma,
         "r2": result.r2,
-        "correlation_index": result.correlation_index,
+        "correlation_index": result.ik,
         "rank": result.rank,
         "condition": result.condition,
         "rows_used": result.rows_used,
         "rows_censored": result.rows_censored,
         "rows_dropped": result.rows_dropped,
-        "valid_for": result.ranges,
+        "valid_for": result.data_ranges,
         "notes": list(result.notes),
     }
 

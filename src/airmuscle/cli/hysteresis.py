@@ -85,8 +85,8 @@ def hysteresis(
 
 def _chosen(found: Sequence[LoopFit]) -> HysteresisFit | None:
     """The friction to write: that of the loop with most independent rows among those a plant can take."""
-    usable = [each.recommended for each in found if each.recommended is not None and each.enters_a_plant]
-    return max(usable, key=lambda fit: fit.effective_rows, default=None)
+    usable = [each.recommended for each in found if each.recommended is not None and each.usable_in_plant]
+    return max(usable, key=lambda fit: fit.effective_sample_size, default=None)
 
 
 def _creep(recordings: Sequence[Recording]) -> list[str]:
@@ -95,12 +95,12 @@ def _creep(recordings: Sequence[Recording]) -> list[str]:
 
     said = []
     for recording in recordings:
-        found = max(find_holds(recording), key=lambda hold: len(hold.stretch), default=None)
+        found = max(find_holds(recording), key=lambda hold: len(hold.interval), default=None)
         if found is None:
             said.append(f"{recording.origin}: pressure and load, or pressure and length, are never held for 12 rows.")
             continue
-        rows = f"{found.stretch.start + 1} to {found.stretch.stop}"
-        verdict = fit_creep(recording.rows(found.stretch.rows), found.quantity).verdict
+        rows = f"{found.interval.start + 1} to {found.interval.stop}"
+        verdict = fit_creep(recording.rows(found.interval.rows), found.quantity).verdict
         said.append(f"{recording.origin}, {found.quantity} in rows {rows}: {verdict}")
     return said
 
@@ -128,7 +128,7 @@ def _with_friction(entry: Entry, chosen: HysteresisFit) -> Entry:
     """The muscle with what was found; checks of the muscle without friction stay, being of its law."""
     import dataclasses
 
-    note = f"{entry.note} Friction from {chosen.course.origin}: {chosen.verdict}".strip()
+    note = f"{entry.note} Friction from {chosen.series.origin}: {chosen.verdict}".strip()
     return dataclasses.replace(entry, name="muscle", friction=chosen.friction, note=note)
 
 
@@ -136,10 +136,10 @@ def _print(found: Sequence[LoopFit], creep: Sequence[str]) -> None:
     from ..report.hysteresis_chapter import counted
 
     for each in found:
-        typer.echo(f"{each.loop.recording.origin}: {each.loop.in_words}. {counted(each.loop)}")
+        typer.echo(f"{each.loop.recording.origin}: {each.loop.description}. {counted(each.loop)}")
         rows = [
-            (type(f.friction).__name__, f"{f.plain_rmse:.3g} to {f.rmse:.3g} N", _judge(f),
-             f"{f.aicc_gain:.4g}", "< 1e-300" if f.chance < 1e-300 else f"{f.chance:.2g}",
+            (type(f.friction).__name__, f"{f.rmse_without_friction:.3g} to {f.rmse:.3g} N", _judge(f),
+             f"{f.aicc_reduction:.4g}", "< 1e-300" if f.p_value < 1e-300 else f"{f.p_value:.2g}",
              "yes" if f.justified else "no")
             for f in each.fits
         ]  # fmt: skip
@@ -147,7 +147,7 @@ def _print(found: Sequence[LoopFit], creep: Sequence[str]) -> None:
         print_table(heads, rows, right=heads[3:5])
         best = each.recommended
         typer.echo(str(best) if best is not None else "The data justify no friction in this loop.")
-        if best is not None and not each.enters_a_plant:
+        if best is not None and not each.usable_in_plant:
             typer.echo("note: friction on the pressure describes isometric loops only; it does not enter a plant.")
         for name, why in each.failed.items():
             typer.echo(f"note: {name} was not fitted: {why}")
@@ -159,7 +159,9 @@ def _print(found: Sequence[LoopFit], creep: Sequence[str]) -> None:
 def _judge(fit: HysteresisFit) -> str:
     import math
 
-    return f"{fit.plain_repeat_rmse:.3g} to {fit.repeat_rmse:.3g} N" if math.isfinite(fit.repeat_rmse) else ""
+    return (
+        f"{fit.repeat_rmse_without_friction:.3g} to {fit.repeat_rmse:.3g} N" if math.isfinite(fit.repeat_rmse) else ""
+    )
 
 
 def _as_data(found: LoopFit) -> dict[str, Any]:
@@ -172,14 +174,14 @@ def _as_data(found: LoopFit) -> dict[str, Any]:
         "held": found.loop.run.constant_column,
         "value": found.loop.run.constant_value,
         "recommended": type(found.recommended.friction).__name__ if found.recommended else None,
-        "enters_a_plant": found.enters_a_plant,
+        "enters_a_plant": found.usable_in_plant,
         "laws": [
             {
                 "law": type(f.friction).__name__, "parameters": {p.path: p.value for p in leaves(f.friction)},
-                "rmse": f.rmse, "plain_rmse": f.plain_rmse, "gap": f.gap, "gap_left": f.gap_left,
-                "repeat_rmse": f.repeat_rmse, "plain_repeat_rmse": f.plain_repeat_rmse,
-                "repeatability": f.repeatability, "aicc_gain": f.aicc_gain, "chance": f.chance,
-                "justified": f.justified, "not_determined": list(f.unsettled),
+                "rmse": f.rmse, "plain_rmse": f.rmse_without_friction, "gap": f.gap, "gap_left": f.residual_gap,
+                "repeat_rmse": f.repeat_rmse, "plain_repeat_rmse": f.repeat_rmse_without_friction,
+                "repeatability": f.repeatability, "aicc_gain": f.aicc_reduction, "chance": f.p_value,
+                "justified": f.justified, "not_determined": list(f.undetermined),
             }
             for f in found.fits
         ],

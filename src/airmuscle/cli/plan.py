@@ -11,7 +11,7 @@ from .options import Json, Name, OptionalFolder
 from .terminal import print_json, print_table
 
 if TYPE_CHECKING:
-    from ..identify.experiment_design import Plan, PlannedRun
+    from ..identify.experiment_design import ExperimentPlan, PlannedRun
 
 
 def plan(
@@ -63,7 +63,7 @@ def plan(
         typer.echo(f"points to follow: {out / 'plan.csv'}")
 
 
-def _write(found: Plan, out: Path) -> None:
+def _write(found: ExperimentPlan, out: Path) -> None:
     from ..recording.csv_writer import write_csv
     from ..report.output_folder import atomic_folder, check_writable
 
@@ -77,32 +77,33 @@ def _words(quantity: str, value: float) -> str:
 
 
 def _row(number: int, run: PlannedRun) -> tuple[str, ...]:
-    held = f"{run.held} {_words(run.held, run.level)}"
-    ends = " to ".join(_words(run.swept, end) for end in run.ends)
+    held = f"{run.constant} {_words(run.constant, run.level)}"
+    ends = " to ".join(_words(run.swept, end) for end in run.sweep_limits)
     forces = f"{run.force.max():.4g} to {run.force.min():.4g} N"
     return str(number), held, f"{run.swept} {ends}", str(run.force.size), forces
 
 
-def _print(found: Plan) -> None:
+def _print(found: ExperimentPlan) -> None:
     rows = [_row(i + 1, run) for i, run in enumerate(found.runs)]
     print_table(("run", "hold", "sweep", "points", "force to expect"), rows, right=("run", "points"))
-    parameters = zip(found.names, found.values, found.deviations, strict=True)
+    parameters = zip(found.names, found.values, found.standard_errors, strict=True)
     rows = [(n, f"{v:.5g}", f"{2 * d:.2g}") for n, v, d in parameters]
     print_table(("parameter", "value now", "2 sd to expect"), rows, right=("value now", "2 sd to expect"))
-    typer.echo(f"each run tells {found.gain:.2f} times as much as one of as many runs spread evenly")
+    typer.echo(f"each run tells {found.relative_d_efficiency:.2f} times as much as one of as many runs spread evenly")
     for remark in found.undetermined:
         typer.echo(f"note: {remark}")
 
 
-def _as_data(found: Plan) -> dict[str, Any]:
+def _as_data(found: ExperimentPlan) -> dict[str, Any]:
     return {
         "runs": [
-            {"held": r.held, "level": r.level, "swept": r.swept, "ends": r.ends, "points": r.force.size}
+            {"held": r.constant, "level": r.level, "swept": r.swept, "ends": r.sweep_limits, "points": r.force.size}
             for r in found.runs
         ],
         "parameters": {
-            n: {"value": v, "deviation": d} for n, v, d in zip(found.names, found.values, found.deviations, strict=True)
+            n: {"value": v, "deviation": d}
+            for n, v, d in zip(found.names, found.values, found.standard_errors, strict=True)
         },
-        "gain": found.gain,
+        "gain": found.relative_d_efficiency,
         "notes": [str(remark) for remark in found.undetermined],
     }

@@ -40,14 +40,14 @@ def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
     """Curves of the fitted law with 95 % bands, and half their width beside; None where no band can be told."""
     from ..identify.confidence_bands import confidence_band
 
-    answer, roles = fit.direction.quantity, _ROLES[fit.direction.quantity]
+    answer, roles = fit.fitted_quantity.name, _ROLES[fit.fitted_quantity.name]
     levels = levels_of(fit.recording[roles.held], MOST)
     figure, (left, right) = plotting.new_figure(1, 2, width=7.4, height=3.7)
     (factor, unit), (across, across_unit) = _DRAWN[answer], _DRAWN[roles.along]
     for i, level in enumerate(levels):
         points = _along(fit, roles, float(level))
         try:
-            law, reading = (confidence_band(fit, points, level=LEVEL, reading=r) for r in (False, True))
+            law, reading = (confidence_band(fit, points, level=LEVEL, prediction=r) for r in (False, True))
         except IdentificationError:
             return None
         colour = plotting.LINES[i % len(plotting.LINES)]
@@ -75,7 +75,7 @@ _CAPTION = (
 
 def _along(fit: Fit, roles: _Roles, level: float) -> Recording:
     """Points over the data's range at one level, of the length of muscle that most rows have."""
-    low, high = fit.ranges[roles.along]
+    low, high = fit.data_ranges[roles.along]
     columns = {roles.along: np.linspace(low, high, POINTS), roles.held: np.full(POINTS, level)}
     lengths = fit.recording.columns.get("resting_length")
     constants = {} if lengths is None else {"resting_length": float(np.median(lengths))}
@@ -83,9 +83,9 @@ def _along(fit: Fit, roles: _Roles, level: float) -> Recording:
 
 
 def _points(axes: Any, fit: Fit, roles: _Roles, factor: float, across: float) -> None:
-    measured = fit.recording.rows(fit.sides == 0)
+    measured = fit.recording.rows(fit.censoring == 0)
     style = {"marker": ".", "linestyle": "none", "markersize": 2, "color": plotting.BLACK, "alpha": 0.35}
-    axes.plot(across * measured[roles.along], factor * measured[fit.direction.quantity], label="measured", **style)
-    values = factor * measured[fit.direction.quantity]
+    axes.plot(across * measured[roles.along], factor * measured[fit.fitted_quantity.name], label="measured", **style)
+    values = factor * measured[fit.fitted_quantity.name]
     margin = 0.08 * float(np.ptp(values)) or 1.0
     axes.set_ylim(float(values.min()) - margin, float(values.max()) + margin)

@@ -25,7 +25,7 @@ def compare_chapter(found: Comparison) -> Chapter:
     return Chapter(
         paper="comparison",
         title="Which law to take",
-        summary=f"{found.reason}\n\nLeft out in turn: each {found.leave_out.word}. All errors are in force, over the "
+        summary=f"{found.reason}\n\nLeft out in turn: each {found.leave_out.group_name}. All errors are in force, over the "
         "rows in which the muscle pulled.",
         tables=tuple(table for table in (_ranking(found), _excluded(found), _parts(found)) if table is not None),
         plots=(
@@ -37,15 +37,15 @@ def compare_chapter(found: Comparison) -> Chapter:
 
 
 def _ranking(found: Comparison) -> Table:
-    contenders = found.contenders
+    contenders = found.ranking
     return Table(
         "ranking",
         "Laws by their error on what was left out",
         {
             "law": [c.candidate.name for c in contenders],
-            "parameters": [c.parameters for c in contenders],
-            "in sample [N]": [c.in_sample for c in contenders],
-            "left out [N]": [c.cross_validated for c in contenders],
+            "parameters": [c.parameter_count for c in contenders],
+            "in sample [N]": [c.in_sample_rmse for c in contenders],
+            "left out [N]": [c.cross_validated_rmse for c in contenders],
             "AICc": [c.aicc for c in contenders],
         },
     )
@@ -54,27 +54,27 @@ def _ranking(found: Comparison) -> Table:
 def _excluded(found: Comparison) -> Table | None:
     if not found.excluded:
         return None
-    columns = {"law": [e.name for e in found.excluded], "why": [e.why for e in found.excluded]}
+    columns = {"law": [e.name for e in found.excluded], "why": [e.reason for e in found.excluded]}
     return Table("excluded", "Laws that these data do not determine", columns)
 
 
 def _parts(found: Comparison) -> Table:
-    parts = {part.part: None for c in found.contenders for part in c.left_out}
+    parts = {part.fold: None for c in found.ranking for part in c.fold_scores}
     columns: dict[str, Any] = {"part": list(parts)}
-    for contender in found.contenders:
-        errors = {part.part: part.rms for part in contender.left_out}
+    for contender in found.ranking:
+        errors = {part.fold: part.rmse for part in contender.fold_scores}
         columns[f"{contender.candidate.name} [N]"] = [errors.get(part, float("nan")) for part in parts]
     return Table("left-out-parts", "Errors by part", columns, shown=False)
 
 
 def _by_part(found: Comparison) -> Any:
     figure, axes = new_figure(width=7.0, height=3.6)
-    for i, contender in enumerate(found.contenders[:_CURVES]):
-        errors = [part.rms for part in contender.left_out]
+    for i, contender in enumerate(found.ranking[:_CURVES]):
+        errors = [part.rmse for part in contender.fold_scores]
         axes.plot(errors, MARKERS[i], color=LINES[i], linestyle=":", linewidth=0.8, label=contender.candidate.name)
-    names = [part.part for part in found.contenders[0].left_out]
+    names = [part.fold for part in found.ranking[0].fold_scores]
     axes.set_xticks(range(len(names)), [_short(name) for name in names], rotation=30, ha="right")
-    axes.set(ylabel=f"rms error, {found.leave_out.word} left out [N]", yscale="log")
+    axes.set(ylabel=f"rms error, {found.leave_out.group_name} left out [N]", yscale="log")
     legend_outside(axes)
     return figure
 
@@ -85,13 +85,13 @@ def _short(name: str) -> str:
 
 def residuals(fit: Fit) -> Any:
     """Model less measured against pressure, contraction and force."""
-    factor, unit = _SHOWN[fit.direction.quantity]
+    factor, unit = _SHOWN[fit.fitted_quantity.name]
     figure, places = new_figure(1, 3, width=7.5, height=2.8, sharey=True)
     for axes, (name, (scale, word)) in zip(places, _SHOWN.items(), strict=True):
-        axes.plot(fit.recording[name] * scale, fit.errors * factor, "o", color=BLUE, markersize=2.5, alpha=0.6)
+        axes.plot(fit.recording[name] * scale, fit.residuals * factor, "o", color=BLUE, markersize=2.5, alpha=0.6)
         axes.axhline(0.0, color="black", linewidth=0.8)
         axes.set(xlabel=f"measured {name} [{word}]")
-    places[0].set(ylabel=f"model less measured\n{fit.direction.quantity} [{unit}]")
+    places[0].set(ylabel=f"model less measured\n{fit.fitted_quantity.name} [{unit}]")
     return figure
 
 

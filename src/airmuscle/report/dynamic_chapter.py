@@ -26,21 +26,21 @@ def dynamic_chapters(
     found = [_estimates(fit, title, remarks)]
     if profiles:
         found.append(_profiles(profiles))
-    return [*found, *(_record(fit, i) for i in range(len(fit.problem.courses)))]
+    return [*found, *(_record(fit, i) for i in range(len(fit.problem.record_models)))]
 
 
 def _estimates(fit: DynamicFit, title: str, remarks: Sequence[str]) -> Chapter:
     known = fit.identifiability
     said = [
-        f"Residuals of {fit.residual_std:.3g} standard deviations of the sensors; {known.rank} of {known.singular.size} "
-        f"unknowns off their bounds are determined; {fit.reached} of {fit.costs.size} starts came to this optimum.",
+        f"Residuals of {fit.residual_std:.3g} standard deviations of the sensors; {known.rank} of {known.singular_values.size} "
+        f"unknowns off their bounds are determined; {fit.starts_at_optimum} of {fit.costs.size} starts came to this optimum.",
         *(f"{note[:1].upper()}{note[1:].rstrip('.')}." for note in fit.notes),
         *remarks,
     ]
     rms = {
-        "record": [c.experiment.recording.origin for c in fit.problem.courses for _ in c.names],
-        "quantity": [name for c in fit.problem.courses for name in c.names],
-        "rms error": [_in_words(fit.rms(n, i), n) for i, c in enumerate(fit.problem.courses) for n in c.names],
+        "record": [c.experiment.recording.origin for c in fit.problem.record_models for _ in c.names],
+        "quantity": [name for c in fit.problem.record_models for name in c.names],
+        "rms error": [_in_words(fit.rms(n, i), n) for i, c in enumerate(fit.problem.record_models) for n in c.names],
     }
     tables = [_numbers(fit), *_open(fit), Table("rms", "Errors by record", rms), _correlations(fit)]
     return Chapter(
@@ -79,8 +79,8 @@ def _open(fit: DynamicFit) -> list[Table]:
         return []
     columns: dict[str, Any] = {
         "these move together": [", ".join(f"{name} {share:+.2g}" for name, share in each.shares) for each in found],
-        "standard deviation, of their size": [each.deviation for each in found],
-        "what would tell them apart": [each.experiment for each in found],
+        "standard deviation, of their size": [each.relative_stderr for each in found],
+        "what would tell them apart": [each.remedy for each in found],
     }
     return [Table("not-determined", "What the records do not determine", columns)]
 
@@ -114,10 +114,10 @@ def _curves(profiles: Sequence[DynamicProfile]) -> Any:
     rows = -(-len(profiles) // columns)
     figure, axes = new_figure(rows, columns, width=2.5 * columns + 0.6, height=2.4 * rows + 0.4, squeeze=False)
     for axis, profile in zip(axes.ravel(), profiles, strict=False):
-        axis.plot(profile.values, profile.growth, "o-", color=BLUE, markersize=3)
+        axis.plot(profile.values, profile.cost_increase, "o-", color=BLUE, markersize=3)
         axis.axhline(NORMAL**2, color=RED, linewidth=0.8, linestyle="--")
         axis.set_title(profile.name, fontsize=8)
-        axis.set(xlabel=f"[{profile.unit}]", ylim=(-0.5, min(max(float(profile.growth.max()), 6.0), 25.0)))
+        axis.set(xlabel=f"[{profile.unit}]", ylim=(-0.5, min(max(float(profile.cost_increase.max()), 6.0), 25.0)))
         axis.locator_params(axis="x", nbins=4)
     for axis in axes[:, 0]:
         axis.set_ylabel("growth [variances]")
@@ -127,7 +127,7 @@ def _curves(profiles: Sequence[DynamicProfile]) -> Any:
 
 
 def _record(fit: DynamicFit, number: int) -> Chapter:
-    course = fit.problem.courses[number]
+    course = fit.problem.record_models[number]
     origin = course.experiment.recording.origin
     measured, modelled, errors = course.experiment.recording, fit.modelled(number), fit.residuals(number)
     columns: dict[str, Any] = {"time [s]": course.times}
@@ -148,7 +148,7 @@ def _record(fit: DynamicFit, number: int) -> Chapter:
 
 def _course(fit: DynamicFit, number: int) -> Any:
     """For every observed quantity an axis with both, and one with the residuals."""
-    course = fit.problem.courses[number]
+    course = fit.problem.record_models[number]
     modelled, errors = fit.modelled(number), fit.residuals(number)
     count = len(course.names)
     figure, axes = new_figure(

@@ -59,7 +59,7 @@ def _correlations(fit: Fit) -> Table:
 
 
 def _rows(fit: Fit) -> Table:
-    unit = fit.direction.unit
+    unit = fit.fitted_quantity.unit
     return Table(
         "rows",
         "Measured and modelled",
@@ -67,9 +67,9 @@ def _rows(fit: Fit) -> Table:
             "pressure [Pa]": fit.recording["pressure"],
             "contraction [1]": fit.recording["contraction"],
             "force [N]": fit.recording["force"],
-            f"modelled {fit.direction.quantity} [{unit}]": fit.modelled,
-            f"error [{unit}]": fit.errors,
-            "cut off": (fit.sides != 0).astype(int),
+            f"modelled {fit.fitted_quantity.name} [{unit}]": fit.modelled,
+            f"error [{unit}]": fit.residuals,
+            "cut off": (fit.censoring != 0).astype(int),
         },
         shown=False,
     )
@@ -83,7 +83,7 @@ def _isobars(fit: Fit, entry: Entry) -> Plot:
 
 def _shape(fit: Fit) -> list[Table]:
     """Where the fitted law breaks what every muscle keeps, if it does anywhere."""
-    from ..identify.surface.shape import broken_by
+    from ..identify.surface.shape import shape_violations_of_fit
 
-    found = broken_by(fit)
+    found = shape_violations_of_fit(fit)
     return [breaks_table(found, "shape", "Where the law behaves as no muscle does")] if found else []

@@ -35,12 +35,12 @@ def _chapter(found: LoopFit, suffix: str) -> Chapter:
         law = type(shown.friction).__name__
         plots.append(Plot(f"friction{suffix}", f"What {law} explains of the loop.", shown.plot()))
         inner = f"{law} with the fitted numbers: from rest, around the outer loop and through two minor loops."
-        plots.append(Plot(f"minor-loops{suffix}", inner, plot_loops(shown.friction, loop.slide.axis)))
+        plots.append(Plot(f"minor-loops{suffix}", inner, plot_loops(shown.friction, loop.friction_path.axis)))
         tables.append(parameter_table(shown.friction, f"parameters{suffix}", f"Parameters of {law}"))
         references = shown.friction.references
     return Chapter(
         paper=f"friction{suffix}",
-        title=f"{loop.recording.origin}: {loop.in_words}",
+        title=f"{loop.recording.origin}: {loop.description}",
         summary="\n\n".join(_said(found, shown)),
         tables=tuple(tables),
         plots=tuple(plots),
@@ -55,7 +55,7 @@ def _said(found: LoopFit, shown: HysteresisFit | None) -> list[str]:
         said.append(f"The data justify none of the laws; {type(shown.friction).__name__} is shown as the nearest.")
     if shown is not None:
         said.append(shown.verdict)
-    if not found.enters_a_plant:
+    if not found.usable_in_plant:
         said.append(
             "The muscle was held at one length, so that its threads were moved by the pressure: only a force by "
             "pressure is determined. Such a friction describes isometric loops and does not enter a plant. Run a loop "
@@ -70,8 +70,8 @@ def counted(loop: HysteresisLoop) -> str:
     """How many rows of either branch count."""
     from ..recording.segment import motion_direction
 
-    way = motion_direction(loop.slide.path(loop.recording), loop.recording.columns.get("time"))
-    up, down = (int(np.count_nonzero((way == sign) & loop.chosen)) for sign in (1, -1))
+    way = motion_direction(loop.friction_path.displacement(loop.recording), loop.recording.columns.get("time"))
+    up, down = (int(np.count_nonzero((way == sign) & loop.fitted_rows)) for sign in (1, -1))
     text = f"{up} rows on the way up and {down} on the way down count, of {len(loop.recording)}."
     if 10 * min(up, down) < max(up, down):
         text += " One branch has hardly any: let all rows count, or run the loop more slowly."
@@ -86,15 +86,15 @@ def _laws(found: LoopFit, suffix: str) -> Table:
         "Friction laws, the most telling first",
         {
             "law": [type(f.friction).__name__ for f in fits],
-            "rms without [N]": [f.plain_rmse for f in fits],
+            "rms without [N]": [f.rmse_without_friction for f in fits],
             "rms [N]": [f.rmse for f in fits],
             **({"rms on second run [N]": [f.repeat_rmse for f in fits]} if repeated else {}),
             "gap before [N]": [f.gap for f in fits],
-            "gap left [N]": [f.gap_left for f in fits],
-            "AICc falls by": [f.aicc_gain for f in fits],
-            "by chance": [f.chance for f in fits],
+            "gap left [N]": [f.residual_gap for f in fits],
+            "AICc falls by": [f.aicc_reduction for f in fits],
+            "by chance": [f.p_value for f in fits],
             "justified": ["yes" if f.justified else "no" for f in fits],
-            "not determined": [", ".join(f.unsettled) for f in fits],
+            "not determined": [", ".join(f.undetermined) for f in fits],
         },
     )
 
@@ -107,16 +107,16 @@ def _measured(loop: HysteresisLoop) -> Any:
     recording = loop.recording
     name = "contraction" if "contraction" in loop.run.swept_columns or "length" in loop.run.swept_columns else "pressure"
     factor, unit = display_scale(name)
-    way = motion_direction(loop.slide.path(recording), recording.columns.get("time"))
+    way = motion_direction(loop.friction_path.displacement(recording), recording.columns.get("time"))
     figure, axes = new_figure(width=6.0, height=3.9)
     axes.plot(recording[name] * factor, recording["force"], color=BLACK, linewidth=0.5, alpha=0.3)
     for sign, colour, word in ((1, BLUE, "rising"), (-1, RED, "falling")):
         for rows, alpha, label in (
-            ((way == sign) & ~loop.chosen, 0.05, None),
-            ((way == sign) & loop.chosen, 0.8, word),
+            ((way == sign) & ~loop.fitted_rows, 0.05, None),
+            ((way == sign) & loop.fitted_rows, 0.8, word),
         ):
             style = {"marker": "o", "linestyle": "none", "markersize": 3, "alpha": alpha, "color": colour}
             axes.plot(recording[name][rows] * factor, recording["force"][rows], label=label, **style)
-    axes.set(xlabel=f"{name} [{unit}]", ylabel="force [N]", title=f"{recording.origin}: {loop.in_words}")
+    axes.set(xlabel=f"{name} [{unit}]", ylabel="force [N]", title=f"{recording.origin}: {loop.description}")
     legend_below(figure, axes)
     return figure

@@ -56,20 +56,20 @@ class Uncertainty:
         if self.bootstrap is not None:
             found["bootstrap"] = {
                 "refits": len(self.bootstrap.values),
-                "parts": self.bootstrap.parts,
-                "lost": self.bootstrap.lost,
+                "parts": self.bootstrap.group_count,
+                "lost": self.bootstrap.failed_refits,
                 "seed": self.bootstrap.seed,
-                "deviations": dict(zip(self.fit.names, self.bootstrap.standard_deviations.tolist(), strict=True)),
+                "deviations": dict(zip(self.fit.names, self.bootstrap.standard_errors.tolist(), strict=True)),
                 "intervals": dict(zip(self.fit.names, self.bootstrap.intervals().tolist(), strict=True)),
             }
         return found
 
 
 def _drawn(drawn: Bootstrap) -> str:
-    lost = f"; {drawn.lost} of them did not determine the parameters" if drawn.lost else ""
-    if drawn.lost > MOST_LOST * len(drawn.values):
+    lost = f"; {drawn.failed_refits} of them did not determine the parameters" if drawn.failed_refits else ""
+    if drawn.failed_refits > MOST_LOST * len(drawn.values):
         lost += ", too many to trust the rest: give more runs, or a law with fewer parameters"
-    return f"bootstrap: {len(drawn.values)} refits to {drawn.parts} parts drawn anew, seed {drawn.seed}{lost}"
+    return f"bootstrap: {len(drawn.values)} refits to {drawn.group_count} parts drawn anew, seed {drawn.seed}{lost}"
 
 
 def uncertainty_chapter(found: Uncertainty) -> Chapter:
@@ -92,7 +92,7 @@ def uncertainty_chapter(found: Uncertainty) -> Chapter:
 
 def _table(found: Uncertainty) -> Table:
     estimates = found.fit.estimates
-    half = NORMAL * found.fit.standard_deviations
+    half = NORMAL * found.fit.standard_errors
     columns: dict[str, Any] = {
         "parameter": [e.name for e in estimates],
         "value (SI)": [e.value for e in estimates],

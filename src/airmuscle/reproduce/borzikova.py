@@ -13,7 +13,7 @@ from ..characteristic.base import ContractionLaw
 from ..characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
 from ..core.constants import STANDARD_GRAVITY
 from ..identify.surface.basis import Chebyshev, LoadRange, conditioning
-from ..identify.surface.exponential import linearised, nonlinear
+from ..identify.surface.exponential import fit_linearised, fit_nonlinear
 from ..recording import Recording
 from ..report.chapter import AtLeast, Chapter, Claim, Equal
 from .borzikova_figures import plots
@@ -54,14 +54,14 @@ def surface_claim(name: str, law: ContractionLaw, curves: PlaneCurves) -> Claim:
     """
     found = index_on_curves(law, curves)
     if found.value is None:
-        note = f"No index exists: SSE > SST, and 1 - SSE/SST = {found.explained:.4g} stands in its place."
+        note = f"No index exists: SSE > SST, and 1 - SSE/SST = {found.r_squared:.4g} stands in its place."
     else:
         note = f"Index over 15 even pressures of each curve, 0 to {curves.max_pressure / 1e5:g} bar."
     return Claim(
         PAPER,
         f"{name}: correlation index on the three plane curves, against the least that is printed for these",
         AtLeast(min(c.printed_index for c in curves.curves), 0.0005),
-        found.explained if found.value is None else found.value,
+        found.r_squared if found.value is None else found.value,
         "1",
         note,
     )
@@ -69,7 +69,7 @@ def surface_claim(name: str, law: ContractionLaw, curves: PlaneCurves) -> Claim:
 
 def rank_claim(recording: Recording) -> Claim:
     """Whether the data determine the coefficients of equation (1)."""
-    found = conditioning(recording, Chebyshev(LoadRange.of_recording(recording)))
+    found = conditioning(recording, Chebyshev(LoadRange.from_recording(recording)))
     loads = np.unique(recording["force"]).size
     return Claim(
         PAPER,
@@ -83,14 +83,14 @@ def rank_claim(recording: Recording) -> Claim:
 
 def procedure_claim(recording: Recording, saturation: float) -> Claim:
     """Whether the spreadsheet's linearisation gives the least S(A), as the paper takes it to."""
-    by_logarithm, by_contraction = linearised(recording, saturation), nonlinear(recording, saturation)
+    by_logarithm, by_contraction = fit_linearised(recording, saturation), fit_nonlinear(recording, saturation)
     return Claim(
         PAPER,
         "the linearised fit of equation (1) gives the least S(A): its rms over that of least squares on k",
         Equal(1.0, 0.005),
-        by_logarithm.rms / by_contraction.rms,
+        by_logarithm.rmse / by_contraction.rmse,
         "1",
-        f"Plane curves rounded to 0.5 %: rms {by_logarithm.rms:.4%} linearised, {by_contraction.rms:.4%} by least "
+        f"Plane curves rounded to 0.5 %: rms {by_logarithm.rmse:.4%} linearised, {by_contraction.rmse:.4%} by least "
         "squares on k; the logarithm weighs points near k_max too heavily. Tolerance chosen.",
     )
 

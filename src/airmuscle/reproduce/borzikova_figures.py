@@ -86,7 +86,7 @@ def plane_curves(curves: PlaneCurves) -> Plot:
 def surface(curves: PlaneCurves, law: ContractionLaw) -> Plot:
     """Figure 5: the surface."""
     figure, axes = new_figure(height=4.4, subplot_kw={"projection": "3d", "computed_zorder": False})
-    pressure, force = LoadRange.of_law(law).grid(36, 31)
+    pressure, force = LoadRange.from_law(law).grid(36, 31)
     contraction = 100 * np.asarray(law.contraction(pressure, force))
     axes.plot_surface(
         pressure / bar, force, contraction, cmap="cividis", alpha=0.85, rstride=1, cstride=1,
@@ -117,7 +117,7 @@ def residuals(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Plot:
     left.set(xlabel=PRESSURE, ylabel="repaired direct - plane curve [%]")
     left.set_title("on the plane curves", fontsize=9)
     left.legend(loc="upper right", frameon=False, fontsize=8)
-    pressure, force = LoadRange.of_law(laws[REPAIRED]).grid(141, 141)
+    pressure, force = LoadRange.from_law(laws[REPAIRED]).grid(141, 141)
     difference = 100 * (laws[REPAIRED].contraction(pressure, force) - laws[EXPONENTIAL].contraction(pressure, force))
     limit = float(np.ceil(np.abs(difference).max()))
     filled = right.contourf(pressure / bar, force, difference, np.linspace(-limit, limit, 17), cmap="PuOr")
@@ -147,7 +147,7 @@ def impossible_places(laws: Mapping[str, ContractionLaw]) -> Plot:
     levels = np.arange(-5, 41, 5)
     for axes, name in zip(panels, names, strict=True):
         law = laws[name]
-        pressure, force = LoadRange.of_law(law).grid(201, 201)
+        pressure, force = LoadRange.from_law(law).grid(201, 201)
         contraction = 100 * np.asarray(law.contraction(pressure, force))
         for argument, sign, colour in ((1, 1.0, RED), (0, -1.0, BLUE)):
             slope = sign * autodiff.derivative(law, "contraction", pressure, force, wrt=argument)

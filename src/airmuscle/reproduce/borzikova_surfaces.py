@@ -12,7 +12,7 @@ from ..characteristic.borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExp
 from ..core.errors import AirmuscleWarning
 from ..identify.correlation_index import CorrelationIndex, correlation_index
 from ..identify.surface.basis import LoadRange
-from ..identify.surface.monotone import monotone
+from ..identify.surface.monotone import fit_monotone
 from ..library.catalogue import load_law
 from ..recording import Recording
 
@@ -40,12 +40,12 @@ def surfaces(curves: PlaneCurves = SAM_30X290) -> dict[str, ContractionLaw]:
     assert isinstance(exponential, BorzikovaExponential)
     saturation = curves.curves[0].saturation
     return {
-        AS_EXPONENT: BorzikovaExponential(printed.coefficients, *LoadRange.of_law(printed), saturation=saturation),
+        AS_EXPONENT: BorzikovaExponential(printed.coefficients, *LoadRange.from_law(printed), saturation=saturation),
         PRINTED: printed,
         MISPRINT_MENDED: with_a02(printed, MENDED_A02),
         REPAIRED: repaired,
         EXPONENTIAL: exponential,
-        MONOTONE: monotone(curves.sample(), saturation).model,
+        MONOTONE: fit_monotone(curves.sample(), saturation).model,
     }
 
 

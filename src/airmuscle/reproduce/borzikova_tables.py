@@ -11,8 +11,8 @@ from ..characteristic.base import ContractionLaw
 from ..characteristic.borzikova import PlaneCurves
 from ..core.units import bar, percent
 from ..identify.surface.basis import Basis, Chebyshev, LoadRange, Monomials, conditioning
-from ..identify.surface.exponential import SurfaceFit, linearised, nonlinear
-from ..identify.surface.monotone import monotonicity_breaks
+from ..identify.surface.exponential import SurfaceFit, fit_linearised, fit_nonlinear
+from ..identify.surface.monotone import find_monotonicity_violations
 from ..recording import Recording
 from ..report.chapter import Table
 from .borzikova_surfaces import (
@@ -103,7 +103,7 @@ def surface_table(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Ta
             columns[f"rms at {curve.force:g} N [%]"].append(_rms_text(errors[upper["force"] == curve.force]))
         columns["rms [%]"].append(_rms_text(errors))
         columns["greatest error [%]"].append(f"{100 * np.abs(errors).max():.3g}")
-        columns["1 - SSE/SST [1]"].append(f"{index.explained:.5g}")
+        columns["1 - SSE/SST [1]"].append(f"{index.r_squared:.5g}")
         columns["index [1]"].append("none" if index.value is None else f"{index.value:.4f}")
     return Table(
         "borzikova_surfaces",
@@ -152,7 +152,7 @@ def coefficient_table(curves: PlaneCurves) -> Table:
     """The exact coefficients of equation (1), and how far both procedures come from them."""
     exact = curves.interpolate()
     data, saturation = curves.sample(), curves.curves[0].saturation
-    fits = [procedure(data, saturation).model.coefficients for procedure in (linearised, nonlinear)]
+    fits = [procedure(data, saturation).model.coefficients for procedure in (fit_linearised, fit_nonlinear)]
     powers = [(i, j) for i in range(exact.pressure_degree + 1) for j in range(exact.force_degree + 1)]
     return Table(
         "borzikova_coefficients",
@@ -172,9 +172,9 @@ def procedure_table(data: Recording, saturation: float) -> Table:
     cases = {"undisturbed": data, "rounded to 0.5 %": rounded(data), "noise, sd 0.5 %, seed 0": noisy(data, 0)}
     pairs = {name: _both(recording, saturation) for name, recording in cases.items()}
     drawn = [_both(noisy(data, seed), saturation) for seed in SEEDS]
-    means = [float(np.mean([pair[n].rms for pair in drawn])) for n in (0, 1)]
+    means = [float(np.mean([pair[n].rmse for pair in drawn])) for n in (0, 1)]
     names = [*pairs, f"noise, sd 0.5 %, mean of {len(SEEDS)} seeds"]
-    rms = [[*(pair[n].rms for pair in pairs.values()), means[n]] for n in (0, 1)]
+    rms = [[*(pair[n].rmse for pair in pairs.values()), means[n]] for n in (0, 1)]
     return Table(
         "borzikova_procedures",
         "LinearModel fit (the paper's) against least squares on k",
@@ -183,8 +183,8 @@ def procedure_table(data: Recording, saturation: float) -> Table:
             "rms, linearised [%]": [f"{100 * r:.4f}" for r in rms[0]],
             "rms, least squares [%]": [f"{100 * r:.4f}" for r in rms[1]],
             "points not used by the linearised fit": [
-                *(str(pair[0].dropped) for pair in pairs.values()),
-                f"{sum(pair[0].dropped for pair in drawn)} in all",
+                *(str(pair[0].points_dropped) for pair in pairs.values()),
+                f"{sum(pair[0].points_dropped for pair in drawn)} in all",
             ],
         },
         note="15 even pressures on each of three curves; ln(1 - k/k_max) needs k < k_max.",
@@ -192,12 +192,12 @@ def procedure_table(data: Recording, saturation: float) -> Table:
 
 
 def _both(recording: Recording, saturation: float) -> tuple[SurfaceFit, SurfaceFit]:
-    return linearised(recording, saturation), nonlinear(recording, saturation)
+    return fit_linearised(recording, saturation), fit_nonlinear(recording, saturation)
 
 
 def conditioning_table(data: Recording) -> Table:
     """How well the data determine the 15 coefficients, in four scalings and with a load left out."""
-    validity_range = LoadRange.of_recording(data)
+    validity_range = LoadRange.from_recording(data)
     scalings: dict[str, Basis] = {
         "bar, N": Monomials(bar, 1.0),
         "Pa, N": Monomials(1.0, 1.0),
@@ -220,7 +220,7 @@ def conditioning_table(data: Recording) -> Table:
 
 def break_table(laws: Mapping[str, ContractionLaw]) -> Table:
     """The places where a surface is impossible."""
-    judged = {name: monotonicity_breaks(laws[name]) for name in USABLE}
+    judged = {name: find_monotonicity_violations(laws[name]) for name in USABLE}
     found = [(name, b) for name, breaks in judged.items() for b in breaks]
     kept = [name for name, breaks in judged.items() if not breaks]
     return Table(
@@ -228,12 +228,12 @@ def break_table(laws: Mapping[str, ContractionLaw]) -> Table:
         "Where a surface breaks monotonicity inside its validity range",
         {
             "surface": [name for name, _ in found],
-            "rule broken": [b.rule.words for _, b in found],
+            "rule broken": [b.rule.description for _, b in found],
             "pressure [bar]": [f"{b.pressure[0] / bar:.2f} to {b.pressure[1] / bar:.2f}" for _, b in found],
-            "force [N]": [f"{b.across[0]:.0f} to {b.across[1]:.0f}" for _, b in found],
-            "part of the validity range [%]": [f"{100 * b.share:.1f}" for _, b in found],
-            "most at [bar]": [f"{b.worst[0] / bar:.2f}" for _, b in found],
-            "most at [N]": [f"{b.worst[1]:.0f}" for _, b in found],
+            "force [N]": [f"{b.second_argument[0]:.0f} to {b.second_argument[1]:.0f}" for _, b in found],
+            "part of the validity range [%]": [f"{100 * b.area_fraction:.1f}" for _, b in found],
+            "most at [bar]": [f"{b.worst_point[0] / bar:.2f}" for _, b in found],
+            "most at [N]": [f"{b.worst_point[1]:.0f}" for _, b in found],
         },
         note=f"Nowhere: {', '.join(kept) or 'none of them'}.",
     )

@@ -13,7 +13,7 @@ from ..core.plotting import LINES, legend_outside, new_figure
 from ..core.reference import cite
 from ..geometry.base import Geometry
 from ..identify import Fit
-from ..identify.censored_least_squares import measured_rank
+from ..identify.censored_least_squares import uncensored_rank
 from ..library import catalogue
 from ..report.chapter import Chapter, Claim, Equal, Plot, Table
 from . import hosovsky_causes as causing
@@ -32,7 +32,7 @@ each verdict on the quick release says whether it survives the whole range of ev
 def surface_claims(found: Fit) -> tuple[Claim, ...]:
     """The form of the contractile surface, counted and measured."""
     law = surface()
-    measured = measured_rank(found.problem, found.problem.slopes(found.values))
+    measured = uncensored_rank(found.problem, found.problem.jacobian(found.values))
     force = law.force(np.linspace(0, 1e6, 51)[:, None], np.linspace(-0.05, 0.4, 46)[None, :])
     return (
         Claim(PAPER, "coefficients of a polynomial of total degree five", Equal(21, 0), len(exponents(5)), "1"),

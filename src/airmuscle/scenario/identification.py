@@ -37,8 +37,8 @@ from typing import Any
 
 from ..core import tree
 from ..core.errors import ParameterError
-from ..identify.dynamic import DynamicFit, Experiment, StartTime, StartValue, fit_dynamic
-from ..identify.dynamic.experiment import Own, Shared
+from ..identify.dynamic import DynamicFit, Experiment, StartTime, InitialValue, fit_dynamic
+from ..identify.dynamic.experiment import RecordUnknown, ParameterPaths
 from ..library.build import build
 from ..library.files import read_toml
 from ..library.location import Location, check_keys, check_type, read_finite_number, read_text
@@ -62,8 +62,8 @@ class DynamicFitSetup:
     commands: tuple[Mapping[str, Any], ...]
     """The table [command] of each record as written in its file, for the scenarios of the result."""
     observed: Mapping[str, float]
-    free: tuple[Shared, ...]
-    own: tuple[Own, ...] = ()
+    free: tuple[ParameterPaths, ...]
+    own: tuple[RecordUnknown, ...] = ()
     bounds: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     starts: int = 1
     seed: int = 0
@@ -72,7 +72,7 @@ class DynamicFitSetup:
     def fit(self) -> DynamicFit:
         """The result of the fit; see `airmuscle.identify.dynamic.fit_dynamic`."""
         return fit_dynamic(
-            self.plant, self.experiments, free=self.free, observed=self.observed, own=self.own, bounds=self.bounds,
+            self.plant, self.experiments, free=self.free, observed=self.observed, per_record=self.own, bounds=self.bounds,
             starts=self.starts, seed=self.seed, method=self.method,
         )  # fmt: skip
 
@@ -81,16 +81,16 @@ class DynamicFitSetup:
         plant, origin = fit.plant(record), self.experiments[record].recording.origin
         note = f"{self.title}: parameters estimated from {', '.join(e.recording.origin for e in self.experiments)}."
         assert isinstance(plant, Plant)
-        course = fit.problem.courses[record]
-        known = dict(course.experiment.start.known)
-        for k in course.mine:
-            what = course.unknowns[k].what
-            if isinstance(what, StartValue):
+        record_model = fit.problem.record_models[record]
+        known = dict(record_model.experiment.initial_conditions.known)
+        for k in record_model.unknown_indices:
+            what = record_model.unknowns[k].target
+            if isinstance(what, InitialValue):
                 known[what.name] = float(fit.values[k])
         coordinates = plant.mechanism.coordinates
         given = {name for c in coordinates for name in (c.name, c.speed) if c.name in known}
         start = {name: value for name, value in known.items() if name == "pressure" or name in given}
-        duration = float(course.times[-1]) - course.start_time(fit.values)
+        duration = float(record_model.times[-1]) - record_model.start_time(fit.values)
         run = {"duration": duration, "start": start}
         return scenario_toml(f"{self.title}, {origin}", plant, self.commands[record], run, note)
 
@@ -181,7 +181,7 @@ def _read_observed(table: Mapping[str, Any], plant: Plant, location: Location) -
     return observed
 
 
-def _read_shared(value: Any, where: str) -> Shared:
+def _read_shared(value: Any, where: str) -> ParameterPaths:
     if isinstance(value, str):
         return value
     if isinstance(value, list) and value and all(isinstance(path, str) for path in value):
@@ -191,13 +191,13 @@ def _read_shared(value: Any, where: str) -> Shared:
     )
 
 
-def _read_own(table: Mapping[str, Any], plant: Plant, location: Location) -> tuple[Own, ...]:
-    own: list[Own] = [_read_shared(item, f"{location}, own") for item in _read_list(table, "own", location)]
+def _read_own(table: Mapping[str, Any], plant: Plant, location: Location) -> tuple[RecordUnknown, ...]:
+    own: list[RecordUnknown] = [_read_shared(item, f"{location}, own") for item in _read_list(table, "own", location)]
     if "start_time" in table:
         own.append(StartTime(_read_positive(table["start_time"], "s", f"{location}, start_time")))
     for name, margin in optional_table(table, "start", location).items():
         unit = signal_unit(name, plant) or "1"
-        own.append(StartValue(name, _read_positive(margin, unit, f"{location}, start, {name}")))
+        own.append(InitialValue(name, _read_positive(margin, unit, f"{location}, start, {name}")))
     return tuple(own)
 
 
