@@ -24,7 +24,7 @@ from airmuscle.control.control_loop import ControlLoop
 from airmuscle.control.driver import PWM, SolenoidDriver, WithDrivers
 from airmuscle.control.inputs import ZERO_INPUT, Periodic, SampledSignal, Schedule
 from airmuscle.core.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownNameError
-from airmuscle.report.run_chapter import in_words, run_chapter
+from airmuscle.report.run_chapter import describe_input, run_chapter
 from airmuscle.scenario.scenario import load_scenario
 from airmuscle.scenario.schema import scenario_schema
 from airmuscle.study.study import load_study
@@ -319,7 +319,7 @@ def test_a_loop_without_drivers_is_drawn_to_its_end(tmp_path: Path):
     (had,) = [line.get_xydata() for line in plot.figure.axes[0].lines]
     assert plot.caption == "Inputs of the plant."
     assert had[-1, 0] == 0.3
-    assert in_words(scenario.command).endswith("; beside: none")
+    assert describe_input(scenario.command).endswith("; beside: none")
     assert not isinstance(scenario.command.as_open_loop(run), WithDrivers)
 
 

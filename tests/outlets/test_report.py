@@ -26,9 +26,9 @@ from airmuscle.core import plotting
 from airmuscle.core.errors import FileError, SolveError, UnknownNameError
 from airmuscle.core.reference import Reference
 from airmuscle.report.chapter import AtLeast, AtMost, Chapter, Claim, Equal, Plot, Table
-from airmuscle.report.html import GREATEST_VECTOR
+from airmuscle.report.html import MAX_SVG_BYTES
 from airmuscle.report.output_folder import atomic_folder, check_writable
-from airmuscle.report.wording import number, published
+from airmuscle.report.formatting import format_number, format_published
 from airmuscle.report.write import as_json, write_report
 from airmuscle.reproduce import run
 
@@ -175,7 +175,7 @@ def test_a_dense_figure_enters_the_page_as_pixels(tmp_path: Path):
     axes.plot(*scatter, ".")
     chapter = Chapter("p", "t", "s", plots=(Plot("dense", "Dense", figure),))
     page = write_report([chapter], tmp_path, date=DATE)
-    assert (tmp_path / "figures" / "dense.svg").stat().st_size > GREATEST_VECTOR
+    assert (tmp_path / "figures" / "dense.svg").stat().st_size > MAX_SVG_BYTES
     assert Links(page.read_text(encoding="utf-8")).loaded[0].startswith("data:image/png;base64,")
 
 
@@ -264,12 +264,12 @@ def test_asking_whether_a_folder_is_writable_leaves_nothing(tmp_path: Path):
     ],
 )
 def test_numbers_read_to_six_digits(value: object, text: str):
-    assert number(value) == text
+    assert format_number(value) == text
 
 
 def test_a_bound_reads_as_one():
-    assert published(Claim("p", "c", AtMost(2.0, 0.5), 1.0, "1")) == "≤ 2 ± 0.5"
-    assert published(Claim("p", "c", None, 1.0, "1")) == "–"
+    assert format_published(Claim("p", "c", AtMost(2.0, 0.5), 1.0, "1")) == "≤ 2 ± 0.5"
+    assert format_published(Claim("p", "c", None, 1.0, "1")) == "–"
 
 
 # Reproducing
@@ -343,4 +343,4 @@ def test_a_chosen_bound_is_never_given_out_as_published():
     assert claim.verdict == "holds"
     assert claim.as_dict()["published"] is None
     assert claim.as_dict()["tolerance"] == 0.04
-    assert published(claim) == "≤ 0.04 (chosen)"
+    assert format_published(claim) == "≤ 0.04 (chosen)"

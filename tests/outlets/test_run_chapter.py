@@ -10,7 +10,7 @@ import pytest
 
 from airmuscle.control.driver import PWM, WithDrivers
 from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
-from airmuscle.report.run_chapter import MOST_PIECES, in_words, run_chapter
+from airmuscle.report.run_chapter import MAX_DRIVER_SEGMENTS, describe_input, run_chapter
 from airmuscle.scenario.scenario import load_scenario
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
@@ -28,7 +28,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
     ],
 )  # fmt: skip
 def test_a_command_in_words(command, words: str):
-    assert in_words(command) == words
+    assert describe_input(command) == words
 
 
 def drawn(command, duration: float):
@@ -48,7 +48,7 @@ def test_of_a_long_command_the_beginning_is_drawn_beside_what_the_driver_was_tol
     plot, lines = drawn(command, 0.5)
     assert plot.caption == "Inputs of the plant; the first 300 pieces; dashed, what the drivers were told."
     had, told = lines["what the plant had"], lines["command"]
-    assert had[-1, 0] == told[-1, 0] == pytest.approx(MOST_PIECES * 0.5e-3)
+    assert had[-1, 0] == told[-1, 0] == pytest.approx(MAX_DRIVER_SEGMENTS * 0.5e-3)
     assert np.array_equal(told[:, 1], [0.5, 0.5])
 
 

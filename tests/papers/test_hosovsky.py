@@ -19,15 +19,15 @@ from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.recording import Recording
 from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_PRINTED
 from airmuscle.reproduce import hosovsky
-from airmuscle.reproduce import hosovsky_causes as causing
+from airmuscle.reproduce import hosovsky_effects as causing
 from airmuscle.reproduce import hosovsky_fill as filling
 from airmuscle.reproduce import hosovsky_release as releasing
-from airmuscle.reproduce.hosovsky_plant import MATRIX, Numbers, hanging, latched, plant, surface, surface_fit
+from airmuscle.reproduce.hosovsky_plant import MATRIX, UnpublishedParameters, hanging_load, latched_load, plant, surface, surface_fit
 from airmuscle.reproduce.hosovsky_schedule import FILLING
 from airmuscle.simulation.integrators import DormandPrince8, RungeKutta4
 from airmuscle.simulation.simulate import simulate
 
-NUMBERS = Numbers()
+NUMBERS = UnpublishedParameters()
 
 
 @pytest.fixture(scope="module")
@@ -71,8 +71,8 @@ def test_what_has_no_printed_number_is_never_said_to_hold(fill):
 
 
 def test_exchanged_pressures_turn_the_verdicts_of_the_release():
-    low, high = releasing.pair(NUMBERS)
-    ranges = releasing.over_ranges(NUMBERS)
+    low, high = releasing.release_pair(NUMBERS)
+    ranges = releasing.range_table(NUMBERS)
     right = [c.verdict for c in releasing.claims(low, high, ranges)]
     wrong = [c.verdict for c in releasing.claims(high, low, ranges)]
     assert right[:2] == [HOLDS, HOLDS]
@@ -122,8 +122,8 @@ def test_refitting_the_surface_from_simulated_runs_returns_what_went_in():
 
 
 def ramp(law: ContractileSurface, contraction: float) -> Recording:
-    muscle = Muscle(law, plant(NUMBERS, latched()).muscles[0].geometry, LinearSpring(0.0), LinearDamper(300.0))
-    system = Plant(muscle, plant(NUMBERS, latched()).circuits[0], Isometric(contraction), Isothermal())
+    muscle = Muscle(law, plant(NUMBERS, latched_load()).muscles[0].geometry, LinearSpring(0.0), LinearDamper(300.0))
+    system = Plant(muscle, plant(NUMBERS, latched_load()).circuits[0], Isometric(contraction), Isothermal())
     opening = SampledSignal({"fill": ((0.0, 0.0), (4.0, 0.2))})
     return simulate(system, opening, duration=20.0, start=system.state_at(pressure=40e3), output=0.2)
 
@@ -131,7 +131,7 @@ def ramp(law: ContractileSurface, contraction: float) -> Recording:
 @pytest.mark.parametrize(("method", "coarse", "order"), [(RungeKutta4, 4e-3, 4), (DormandPrince8, 5e-2, 8)])
 def test_a_taut_closed_muscle_without_kinks_is_solved_at_the_order_of_the_method(method, coarse, order):
     """No clamp, no valve, no slack: what the paper's own plant cannot show, since its kinks dominate the error."""
-    ideal = Muscle.ideal(plant(NUMBERS, latched()).muscles[0].geometry)
+    ideal = Muscle.ideal(plant(NUMBERS, latched_load()).muscles[0].geometry)
     system = Plant(ideal, ClosedChamber(), HangingMass(20.0), Isothermal())
     rest = find_equilibrium(system, pressure=300e3)
     start = rest | {"position": rest["position"] - 0.004}
@@ -147,7 +147,7 @@ def test_a_taut_closed_muscle_without_kinks_is_solved_at_the_order_of_the_method
 
 @pytest.fixture(scope="module")
 def effects():
-    return causing.effects(NUMBERS, causing.Suspected())
+    return causing.compute_effects(NUMBERS, causing.SuspectedCauses())
 
 
 def test_every_suspected_cause_is_exchanged_and_changes_the_courses(effects):
@@ -175,7 +175,7 @@ def test_every_suspected_cause_is_exchanged_and_changes_the_courses(effects):
 def test_a_component_in_the_limit_of_the_printed_one_changes_nothing(nothing):
     """Each exchanged component contains the printed one; so what the table shows is the cause and nothing else."""
     base = causing._run(causing.PRINTED, NUMBERS)
-    effect = causing._effect(base, null := causing.Exchanged("none", "none", **nothing), causing._run(null, NUMBERS))
+    effect = causing._effect(base, null := causing.Substitution("none", "none", **nothing), causing._run(null, NUMBERS))
     assert np.abs(effect.pressure).max() < 1e3
     assert np.abs(effect.contraction).max() < 5e-4
 
@@ -183,7 +183,7 @@ def test_a_component_in_the_limit_of_the_printed_one_changes_nothing(nothing):
 def test_the_effects_are_differences_of_two_runs(effects):
     adiabatic = next(e for e in effects if e.exchanged.what == "first law, adiabatic")
     runs = [
-        simulate(plant(NUMBERS, hanging(NUMBERS), gas=gas), filling.SCHEDULE, duration=25.0, output=adiabatic.time)
+        simulate(plant(NUMBERS, hanging_load(NUMBERS), gas=gas), filling.SCHEDULE, duration=25.0, output=adiabatic.time)
         for gas in (Isothermal(), EnergyBalance(0.0))
     ]
     np.testing.assert_allclose(runs[1]["pressure"] - runs[0]["pressure"], adiabatic.pressure, atol=30.0)
@@ -192,7 +192,7 @@ def test_the_effects_are_differences_of_two_runs(effects):
 
 def test_heat_is_what_changes_filling_most_and_more_than_discharging(effects):
     """Neither line, flow law nor spring comes near it, and it does what the paper saw; a volume would not."""
-    table = causing.table(effects).columns
+    table = causing.effect_table(effects).columns
     filled = np.abs(table["pressure, filling: greatest change [kPa]"])
     causes = np.array(table["cause"])
     heat = filled[(causes == "heat") & (np.array(table["exchanged"]) == "first law, hA = 0.5 W/K")][0]
@@ -206,11 +206,11 @@ def test_heat_is_what_changes_filling_most_and_more_than_discharging(effects):
 
 def test_more_heat_transfer_turns_what_the_report_says(effects):
     """The words are computed: with a wall that takes all heat the cause drops behind the others."""
-    warm = dataclasses.replace(causing.Suspected().heat_transfer, value=2000.0)
-    suspected = dataclasses.replace(causing.Suspected(), heat_transfer=warm)
+    warm = dataclasses.replace(causing.SuspectedCauses().heat_transfer, value=2000.0)
+    suspected = dataclasses.replace(causing.SuspectedCauses(), heat_transfer=warm)
     row = "heat (first law, hA = {:g} W/K)".format
-    assert row(0.5) in causing.in_words(effects)
-    chosen = [e for e in causing.exchanges(NUMBERS, suspected) if e.what in ("first law, hA = 2000 W/K", "none")]
+    assert row(0.5) in causing.describe_effects(effects)
+    chosen = [e for e in causing.substitutions(NUMBERS, suspected) if e.component in ("first law, hA = 2000 W/K", "none")]
     base = causing._run(causing.PRINTED, NUMBERS)
     heat, spring = (causing._effect(base, e, causing._run(e, NUMBERS)) for e in chosen)
     assert abs(heat.largest("pressure", FILLING)) < abs(spring.largest("pressure", FILLING))
@@ -218,7 +218,7 @@ def test_more_heat_transfer_turns_what_the_report_says(effects):
 
 def test_every_chosen_number_stands_in_the_chapter_with_its_range():
     chapter = hosovsky.chapter()
-    behind = (NUMBERS, causing.Suspected())
+    behind = (NUMBERS, causing.SuspectedCauses())
     assert {what for what, _, _ in chapter.chosen} == {
         getattr(numbers, f.name).meaning for numbers in behind for f in dataclasses.fields(numbers)
     }

@@ -112,11 +112,11 @@ def _write(
     from ..library.write import part_lines
     from ..report.hysteresis_chapter import hysteresis_chapters
     from ..report.output_folder import atomic_folder
-    from ..report.write import fill
+    from ..report.write import write_into
 
     name = None if chosen is None else "friction.toml" if entry is None else "muscle.toml"
     with atomic_folder(out) as place:
-        fill(place, hysteresis_chapters(found, creep), title="Friction")
+        write_into(place, hysteresis_chapters(found, creep), title="Friction")
         if chosen is not None and entry is not None:
             save(_with_friction(entry, chosen), place / "muscle.toml")
         elif chosen is not None:
@@ -134,10 +134,10 @@ def _with_friction(entry: Entry, chosen: HysteresisFit) -> Entry:
 
 
 def _print(found: Sequence[LoopFit], creep: Sequence[str]) -> None:
-    from ..report.hysteresis_chapter import counted
+    from ..report.hysteresis_chapter import describe_row_counts
 
     for each in found:
-        typer.echo(f"{each.loop.recording.origin}: {each.loop.in_words}. {counted(each.loop)}")
+        typer.echo(f"{each.loop.recording.origin}: {each.loop.in_words}. {describe_row_counts(each.loop)}")
         rows = [
             (type(f.friction).__name__, f"{f.plain_rmse:.3g} to {f.rmse:.3g} N", _judge(f),
              f"{f.aicc_gain:.4g}", "< 1e-300" if f.chance < 1e-300 else f"{f.chance:.2g}",

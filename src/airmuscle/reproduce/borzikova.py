@@ -19,11 +19,11 @@ from .borzikova_figures import plots
 from .borzikova_surfaces import (
     AS_EXPONENT,
     EXPONENTIAL,
-    MISPRINT_MENDED,
+    MISPRINT_CORRECTED,
     PRINTED,
-    REPAIRED,
+    CORRECTED,
     index_on_curves,
-    rounded,
+    round_contraction,
     surfaces,
 )
 from .borzikova_tables import CATALOGUE_TABLE, CATALOGUE_TEXT, tables
@@ -137,12 +137,12 @@ def catalogue_claims(curves: PlaneCurves) -> tuple[Claim, ...]:
 
 def claims(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> tuple[Claim, ...]:
     """All claims of the paper, judged with these curves and surfaces."""
-    judged = (AS_EXPONENT, PRINTED, MISPRINT_MENDED, REPAIRED, EXPONENTIAL)
+    judged = (AS_EXPONENT, PRINTED, MISPRINT_CORRECTED, CORRECTED, EXPONENTIAL)
     return (
         *curve_claims(curves),
         *(surface_claim(name, laws[name], curves) for name in judged),
         rank_claim(curves.sample()),
-        procedure_claim(rounded(curves.sample()), curves.curves[0].saturation),
+        procedure_claim(round_contraction(curves.sample()), curves.curves[0].saturation),
         load_claim(),
         *catalogue_claims(curves),
     )

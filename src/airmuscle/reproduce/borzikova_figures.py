@@ -14,7 +14,7 @@ from ..core.plotting import BLACK, BLUE, DASHES, LINES, MARKERS, ORANGE, RED, le
 from ..core.units import bar
 from ..identify.surface.basis import LoadRange
 from ..report.chapter import Plot
-from .borzikova_surfaces import EXPONENTIAL, MISPRINT_MENDED, MONOTONE, REPAIRED
+from .borzikova_surfaces import EXPONENTIAL, MISPRINT_CORRECTED, MONOTONE, CORRECTED
 
 PRESSURE, FORCE, CONTRACTION = "gauge pressure [bar]", "force [N]", "contraction [%]"
 
@@ -27,7 +27,7 @@ def plots(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> tuple[Plot
         plane_curves(curves),
         surface(curves, laws[EXPONENTIAL]),
         residuals(curves, laws),
-        impossible_places(laws),
+        violations(laws),
         monotone_fit(curves, laws[MONOTONE]),
     )
 
@@ -55,7 +55,7 @@ def dead_zone(curves: PlaneCurves) -> Plot:
 def points(curves: PlaneCurves) -> Plot:
     """Figure 3: the points."""
     figure, axes = new_figure()
-    _markers(axes, curves)
+    _draw_points(axes, curves)
     axes.set(xlabel=PRESSURE, ylabel=CONTRACTION)
     legend_outside(axes)
     caption = (
@@ -69,7 +69,7 @@ def plane_curves(curves: PlaneCurves) -> Plot:
     """Figure 4: the plane curves."""
     figure, axes = new_figure()
     pressures = _pressures(curves)
-    _markers(axes, curves)
+    _draw_points(axes, curves)
     for curve, colour, dash in zip(curves.curves, LINES, DASHES, strict=False):
         label = f"{curve.force:g} N, printed index {curve.printed_index:g}"
         axes.plot(pressures / bar, 100 * curve.contraction(pressures), color=colour, linestyle=dash, label=label)
@@ -112,13 +112,13 @@ def residuals(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Plot:
     figure, (left, right) = new_figure(1, 2, width=7.6, height=3.3)
     pressures = _pressures(curves)
     for curve, colour, dash in zip(curves.curves, LINES, DASHES, strict=False):
-        error = laws[REPAIRED].contraction(pressures, curve.force) - curve.contraction(pressures)
+        error = laws[CORRECTED].contraction(pressures, curve.force) - curve.contraction(pressures)
         left.plot(pressures / bar, 100 * error, color=colour, linestyle=dash, label=f"{curve.force:g} N")
     left.set(xlabel=PRESSURE, ylabel="repaired direct - plane curve [%]")
     left.set_title("on the plane curves", fontsize=9)
     left.legend(loc="upper right", frameon=False, fontsize=8)
-    pressure, force = LoadRange.of_law(laws[REPAIRED]).grid(141, 141)
-    difference = 100 * (laws[REPAIRED].contraction(pressure, force) - laws[EXPONENTIAL].contraction(pressure, force))
+    pressure, force = LoadRange.of_law(laws[CORRECTED]).grid(141, 141)
+    difference = 100 * (laws[CORRECTED].contraction(pressure, force) - laws[EXPONENTIAL].contraction(pressure, force))
     limit = float(np.ceil(np.abs(difference).max()))
     filled = right.contourf(pressure / bar, force, difference, np.linspace(-limit, limit, 17), cmap="PuOr")
     for curve in curves.curves:
@@ -129,7 +129,7 @@ def residuals(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Plot:
     scale = figure.colorbar(filled, ax=right)
     scale.set_label("difference in contraction [%]", fontsize=9)
     scale.ax.tick_params(labelsize=8)
-    worst = np.abs(laws[MISPRINT_MENDED].contraction(pressures, 260.0) - curves.at(260.0).contraction(pressures)).max()
+    worst = np.abs(laws[MISPRINT_CORRECTED].contraction(pressures, 260.0) - curves.at(260.0).contraction(pressures)).max()
     caption = (
         "Left: the repaired direct surface against the plane curves (with a_02 mended alone it is off by up to "
         f"{100 * worst:.0f} % under 260 N). Right: the two surfaces against each other; dotted, the loads at which "
@@ -138,9 +138,9 @@ def residuals(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Plot:
     return Plot("borzikova_residuals", caption, figure)
 
 
-def impossible_places(laws: Mapping[str, ContractionLaw]) -> Plot:
+def violations(laws: Mapping[str, ContractionLaw]) -> Plot:
     """Where surfaces rise with force or fall with pressure."""
-    names = (REPAIRED, EXPONENTIAL, MONOTONE)
+    names = (CORRECTED, EXPONENTIAL, MONOTONE)
     figure, panels = new_figure(1, 3, width=7.6, height=3.3, sharey=True)
     levels = np.arange(-5, 41, 5)
     for axes, name in zip(panels, names, strict=True):
@@ -157,7 +157,7 @@ def impossible_places(laws: Mapping[str, ContractionLaw]) -> Plot:
         axes.set_title(name, fontsize=9)
         axes.grid(visible=False)
     panels[0].set_ylabel(FORCE)
-    _shades(figure)
+    _violation_legend(figure)
     caption = (
         "Contraction in per cent (lines) inside the validity range, and where a surface is impossible: red, contraction rises "
         "with force; blue, it falls with pressure. The monotone fit has no such place."
@@ -165,7 +165,7 @@ def impossible_places(laws: Mapping[str, ContractionLaw]) -> Plot:
     return Plot("borzikova_monotonicity", caption, figure)
 
 
-def _shades(figure: Any) -> None:
+def _violation_legend(figure: Any) -> None:
     from matplotlib.patches import Patch
 
     shown = [
@@ -179,7 +179,7 @@ def monotone_fit(curves: PlaneCurves, law: ContractionLaw) -> Plot:
     """What it costs to be possible."""
     figure, axes = new_figure()
     pressures = _pressures(curves)
-    _markers(axes, curves)
+    _draw_points(axes, curves)
     for curve, colour, dash in zip(curves.curves, LINES, DASHES, strict=False):
         fitted = 100 * np.asarray(law.contraction(pressures, curve.force))
         axes.plot(pressures / bar, fitted, color=colour, linestyle=dash, label=f"{curve.force:g} N, monotone fit")
@@ -202,7 +202,7 @@ def _pressures(curves: PlaneCurves) -> np.ndarray:
     return np.linspace(0.0, curves.max_pressure, 351)
 
 
-def _markers(axes: Any, curves: PlaneCurves) -> None:
+def _draw_points(axes: Any, curves: PlaneCurves) -> None:
     data = curves.sample()
     for curve, colour, marker in zip(curves.curves, LINES, MARKERS, strict=False):
         rows = data.rows(data["force"] == curve.force)

@@ -16,14 +16,14 @@ from ..identify.surface.monotone import monotone
 from ..library.catalogue import load
 from ..recording import Recording
 
-MISPRINT = 2
+MISPRINT_INDEX = 2
 """Place of a_02, whose exponent is misprinted, among the coefficients."""
-MENDED_A02 = -7.55e-5
+CORRECTED_A02 = -7.55e-5
 
 AS_EXPONENT = "printed matrix as exponent of (1)"
 PRINTED = "direct, as printed"
-MISPRINT_MENDED = "direct, a_02 mended alone"
-REPAIRED = "direct, repaired"
+MISPRINT_CORRECTED = "direct, a_02 mended alone"
+CORRECTED = "direct, repaired"
 EXPONENTIAL = "exponential (1), by us"
 MONOTONE = "exponential (1), monotone"
 
@@ -42,8 +42,8 @@ def surfaces(curves: PlaneCurves = SAM_30X290) -> dict[str, ContractionLaw]:
     return {
         AS_EXPONENT: BorzikovaExponential(printed.coefficients, *LoadRange.of_law(printed), saturation=saturation),
         PRINTED: printed,
-        MISPRINT_MENDED: with_a02(printed, MENDED_A02),
-        REPAIRED: repaired,
+        MISPRINT_CORRECTED: with_a02(printed, CORRECTED_A02),
+        CORRECTED: repaired,
         EXPONENTIAL: exponential,
         MONOTONE: monotone(curves.sample(), saturation).model,
     }
@@ -51,7 +51,7 @@ def surfaces(curves: PlaneCurves = SAM_30X290) -> dict[str, ContractionLaw]:
 
 def with_a02(law: BorzikovaDirect, a02: float) -> BorzikovaDirect:
     """The surface with another coefficient of F^2."""
-    coefficients = (*law.coefficients[:MISPRINT], a02, *law.coefficients[MISPRINT + 1 :])
+    coefficients = (*law.coefficients[:MISPRINT_INDEX], a02, *law.coefficients[MISPRINT_INDEX + 1 :])
     return dataclasses.replace(law, coefficients=coefficients)
 
 
@@ -61,12 +61,12 @@ def index_on_curves(law: ContractionLaw, curves: PlaneCurves) -> CorrelationInde
     return correlation_index(data["contraction"], law.contraction(data["pressure"], data["force"]))
 
 
-def rounded(recording: Recording, step: float = 0.005) -> Recording:
+def round_contraction(recording: Recording, step: float = 0.005) -> Recording:
     """The recording with contractions rounded to a step [1]."""
     return recording.with_columns(contraction=np.round(recording["contraction"] / step) * step)
 
 
-def noisy(recording: Recording, seed: int, deviation: float = 0.005) -> Recording:
+def add_noise(recording: Recording, seed: int, deviation: float = 0.005) -> Recording:
     """The recording with normal noise of a standard deviation [1] on its contractions."""
     noise = deviation * np.random.default_rng(seed).standard_normal(len(recording))
     return recording.with_columns(contraction=recording["contraction"] + noise)

@@ -19,15 +19,15 @@ from .borzikova_surfaces import (
     EXPONENTIAL,
     MONOTONE,
     PRINTED,
-    REPAIRED,
+    CORRECTED,
     index_on_curves,
-    noisy,
-    rounded,
+    add_noise,
+    round_contraction,
 )
 
 SEEDS = range(100)
 """Of the noise drawn to compare the procedures; the first is the one shown alone."""
-USABLE = (REPAIRED, EXPONENTIAL, MONOTONE)
+USABLE = (CORRECTED, EXPONENTIAL, MONOTONE)
 """The surfaces that one might compute with."""
 
 CATALOGUE_TABLE = {
@@ -56,8 +56,8 @@ def tables(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> tuple[Tab
         coefficient_table(curves),
         procedure_table(data, saturation),
         conditioning_table(data),
-        break_table(laws),
-        dip_table(curves, laws),
+        violation_table(laws),
+        minimum_table(curves, laws),
         *catalogue_tables(),
         Table(
             "borzikova_points",
@@ -92,7 +92,7 @@ def curve_table(curves: PlaneCurves) -> Table:
 
 def surface_table(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Table:
     """Errors and indices of every surface on the plane curves."""
-    upper = _above_quarter_bar(curves)
+    upper = _sample_above_quarter_bar(curves)
     columns: dict[str, list[Any]] = {"surface": [], **{f"rms at {c.force:g} N [%]": [] for c in curves.curves}}
     columns |= {key: [] for key in ("rms [%]", "greatest error [%]", "1 - SSE/SST [1]", "index [1]")}
     for name, law in laws.items():
@@ -113,7 +113,7 @@ def surface_table(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Ta
     )
 
 
-def _above_quarter_bar(curves: PlaneCurves) -> Recording:
+def _sample_above_quarter_bar(curves: PlaneCurves) -> Recording:
     data = curves.sample(141)
     return data.rows(data["pressure"] >= 0.25 * bar)
 
@@ -125,7 +125,7 @@ def _rms_text(errors: np.ndarray) -> str:
 def exponent_table(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Table:
     """What the exponent of equation (1) is on the curves, and what the printed matrix would make of it."""
     pressures = np.linspace(0.0, curves.max_pressure, 351)
-    printed, mended = laws[PRINTED], laws[REPAIRED]
+    printed, mended = laws[PRINTED], laws[CORRECTED]
     # the direct surface is this polynomial in per cent, so its contraction gives the sum
     return Table(
         "borzikova_exponent",
@@ -169,9 +169,9 @@ def coefficient_table(curves: PlaneCurves) -> Table:
 
 def procedure_table(data: Recording, saturation: float) -> Table:
     """The paper's linearisation against least squares on k, on disturbed data."""
-    cases = {"undisturbed": data, "rounded to 0.5 %": rounded(data), "noise, sd 0.5 %, seed 0": noisy(data, 0)}
-    pairs = {name: _both(recording, saturation) for name, recording in cases.items()}
-    drawn = [_both(noisy(data, seed), saturation) for seed in SEEDS]
+    cases = {"undisturbed": data, "rounded to 0.5 %": round_contraction(data), "noise, sd 0.5 %, seed 0": add_noise(data, 0)}
+    pairs = {name: _fit_both(recording, saturation) for name, recording in cases.items()}
+    drawn = [_fit_both(add_noise(data, seed), saturation) for seed in SEEDS]
     means = [float(np.mean([pair[n].rms for pair in drawn])) for n in (0, 1)]
     names = [*pairs, f"noise, sd 0.5 %, mean of {len(SEEDS)} seeds"]
     rms = [[*(pair[n].rms for pair in pairs.values()), means[n]] for n in (0, 1)]
@@ -191,7 +191,7 @@ def procedure_table(data: Recording, saturation: float) -> Table:
     )
 
 
-def _both(recording: Recording, saturation: float) -> tuple[SurfaceFit, SurfaceFit]:
+def _fit_both(recording: Recording, saturation: float) -> tuple[SurfaceFit, SurfaceFit]:
     return linearised(recording, saturation), nonlinear(recording, saturation)
 
 
@@ -218,7 +218,7 @@ def conditioning_table(data: Recording) -> Table:
     )
 
 
-def break_table(laws: Mapping[str, ContractionLaw]) -> Table:
+def violation_table(laws: Mapping[str, ContractionLaw]) -> Table:
     """The places where a surface is impossible."""
     judged = {name: monotonicity_breaks(laws[name]) for name in USABLE}
     found = [(name, b) for name, breaks in judged.items() for b in breaks]
@@ -239,7 +239,7 @@ def break_table(laws: Mapping[str, ContractionLaw]) -> Table:
     )
 
 
-def dip_table(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Table:
+def minimum_table(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Table:
     """The least contraction that a surface has between the two greater loads."""
     loads = sorted(c.force for c in curves.curves)[-2:]
     pressure, force = LoadRange(0.0, curves.max_pressure, loads[0], loads[1]).grid(351, 651)

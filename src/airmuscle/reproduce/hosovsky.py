@@ -16,10 +16,10 @@ from ..identify import Fit
 from ..identify.censored_least_squares import measured_rank
 from ..library import catalogue
 from ..report.chapter import Chapter, Claim, Equal, Plot, Table
-from . import hosovsky_causes as causing
+from . import hosovsky_effects as causing
 from . import hosovsky_fill as filling
 from . import hosovsky_release as releasing
-from .hosovsky_plant import MAPS, MATRIX, MATRIX_CATALOGUE, PAPER, Numbers, muscle, surface, surface_fit
+from .hosovsky_plant import FORCE_MAPS, MATRIX, MATRIX_CATALOGUE, PAPER, UnpublishedParameters, muscle, surface, surface_fit
 
 SUMMARY = """The muscle of Hosovsky et al. has a contractile element given by a polynomial of total degree five in
 contraction and pressure (21 coefficients, clamped to 0..1200 N), a parallel spring and a damper; two on/off valves
@@ -45,7 +45,7 @@ def surface_claims(found: Fit) -> tuple[Claim, ...]:
 
 def surface_figure() -> Plot:
     """The surface's isobars through the measured points, as the paper's Fig. 2 shows its surface."""
-    law, data = surface(), catalogue.load_data(MAPS[0])
+    law, data = surface(), catalogue.load_data(FORCE_MAPS[0])
     figure, axes = new_figure()
     contraction = np.linspace(0.0, 0.26, 200)
     for i, pressure in enumerate((675e3, 525e3, 375e3, 250e3, 135e3)):
@@ -59,67 +59,67 @@ def surface_figure() -> Plot:
     return Plot("hosovsky_surface", caption, figure)
 
 
-def coefficients() -> Table:
+def coefficient_table() -> Table:
     """The fitted coefficients in plain units, p in bar: what the paper leaves out, for this muscle."""
-    plain = {name: surface(name).plain_coefficients(1e5) for name in MAPS}
+    plain = {name: surface(name).plain_coefficients(1e5) for name in FORCE_MAPS}
     powers = exponents(5)
     columns: dict[str, list[float] | list[int]] = {
         "power of contraction": [i for i, _ in powers],
         "power of pressure": [j for _, j in powers],
     }
-    for name in MAPS:
+    for name in FORCE_MAPS:
         columns[f"{name} [N/bar^j]"] = [plain[name][power] for power in powers]
     note = "F = Sum a_ij eps^i p^j with eps as a ratio and p gauge in bar; inside the validity range of its data only"
     return Table("hosovsky_coefficients", "The 21 coefficients in plain units", columns, note)
 
 
-def chapter(numbers: Numbers | None = None, suspected: causing.Suspected | None = None) -> Chapter:
+def chapter(numbers: UnpublishedParameters | None = None, suspected: causing.SuspectedCauses | None = None) -> Chapter:
     """The chapter of the report; `numbers` and those of the suspected causes are what the paper does not print."""
-    numbers, suspected = numbers or Numbers(), suspected or causing.Suspected()
+    numbers, suspected = numbers or UnpublishedParameters(), suspected or causing.SuspectedCauses()
     fill = filling.run_fill(numbers)
-    effects = causing.effects(numbers, suspected)
-    low, high = releasing.pair(numbers)
-    ranges = releasing.over_ranges(numbers)
+    effects = causing.compute_effects(numbers, suspected)
+    low, high = releasing.release_pair(numbers)
+    ranges = releasing.range_table(numbers)
     return Chapter(
         PAPER,
         "Hosovsky et al.: muscle dynamics after Hill",
         SUMMARY,
         claims=(
             *surface_claims(surface_fit()),
-            *filling.claims(fill, causing.in_words(effects)),
+            *filling.claims(fill, causing.describe_effects(effects)),
             *releasing.claims(low, high, ranges),
         ),
         tables=(
-            causing.table(effects),
+            causing.effect_table(effects),
             ranges,
-            coefficients(),
+            coefficient_table(),
             maxwell_table(numbers),
-            _extrapolation(fill, low, high),
-            *_series(fill, low, high),
+            _extrapolation_table(fill, low, high),
+            *_time_series(fill, low, high),
         ),
         plots=(
             surface_figure(),
             filling.valve_figure(MATRIX, fill.plant.ambient.temperature),
             filling.figure_3(fill),
-            causing.figure(effects),
+            causing.effect_plot(effects),
             releasing.figure_4(low, high),
         ),
-        references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(catalogue.load(MAPS[0]))),
-        chosen=(*numbers.rows(), *suspected.rows()),
+        references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(catalogue.load(FORCE_MAPS[0]))),
+        chosen=(*numbers.as_rows(), *suspected.as_rows()),
     )
 
 
-def maxwell_table(numbers: Numbers) -> Table:
+def maxwell_table(numbers: UnpublishedParameters) -> Table:
     """How far muscle force and volume are from one potential, for the fitted surfaces and the measured muscles' law."""
     shape = muscle(numbers).geometry
     laws: dict[str, tuple[Characteristic, Geometry]]
-    laws = {f"surface fitted to {name}, before the clamp": (surface_fit(name).model, shape) for name in MAPS}
+    laws = {f"surface fitted to {name}, before the clamp": (surface_fit(name).model, shape) for name in FORCE_MAPS}
     for name in ("dmsp-20-300", "dmsp-10-250"):
         entry = catalogue.load(name)
         laws[f"Martens-Boblan 2017, {name}"] = (entry.characteristic, entry.muscle.geometry)
     validity_ranges = [
-        surface(MAPS[0]).validity_range,
-        surface(MAPS[1]).validity_range,
+        surface(FORCE_MAPS[0]).validity_range,
+        surface(FORCE_MAPS[1]).validity_range,
         *(catalogue.load(n).validity_range for n in ("dmsp-20-300", "dmsp-10-250")),
     ]
     found = [
@@ -138,7 +138,7 @@ def maxwell_table(numbers: Numbers) -> Table:
     return Table("hosovsky_maxwell", "Maxwell defect of fitted muscles over their validity range", columns, note)
 
 
-def _extrapolation(fill: filling.Fill, low: releasing.Release, high: releasing.Release) -> Table:
+def _extrapolation_table(fill: filling.FillRun, low: releasing.Release, high: releasing.Release) -> Table:
     """When and how far the runs left the validity range in which the surface has data."""
     runs = {"fill and discharge": fill.adaptive, f"release from {low.pressure / 1e3:g} kPa": low.run}
     runs[f"release from {high.pressure / 1e3:g} kPa"] = high.run
@@ -147,7 +147,7 @@ def _extrapolation(fill: filling.Fill, low: releasing.Release, high: releasing.R
     return Table("hosovsky_boxes", "Where the runs left the data of the contractile surface", columns)
 
 
-def _series(fill: filling.Fill, low: releasing.Release, high: releasing.Release) -> tuple[Table, ...]:
+def _time_series(fill: filling.FillRun, low: releasing.Release, high: releasing.Release) -> tuple[Table, ...]:
     """The runs behind Figs. 3 and 4, for the data folder."""
     runs = {"hosovsky_fill": fill.adaptive, "hosovsky_release_low": low.run, "hosovsky_release_high": high.run}
     names = (("time", "s"), ("pressure", "Pa"), ("contraction", "1"), ("position", "m"), ("force", "N"))

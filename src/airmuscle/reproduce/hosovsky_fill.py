@@ -13,12 +13,12 @@ from ..recording import Recording
 from ..report.chapter import AtMost, Claim, Equal, Plot
 from ..simulation.integrators import DormandPrince8, Integrator, Rodas4
 from ..simulation.simulate import simulate
-from .hosovsky_plant import MATRIX, PAPER, Numbers, hanging, plant
+from .hosovsky_plant import MATRIX, PAPER, UnpublishedParameters, hanging_load, plant
 from .hosovsky_schedule import DISCHARGING, DURATION, FILLING, SCHEDULE
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Fill:
+class FillRun:
     """The run of Fig. 3 by both methods."""
 
     plant: Plant
@@ -26,17 +26,17 @@ class Fill:
     adaptive: Recording
 
 
-def run_fill(numbers: Numbers, valve: Valve = MATRIX) -> Fill:
+def run_fill(numbers: UnpublishedParameters, valve: Valve = MATRIX) -> FillRun:
     """25 s with ode8 at 1e-4 s as printed, and with Rodas4 at rtol 1e-8."""
-    system = plant(numbers, hanging(numbers), valve=valve)
-    return Fill(system, _run(system, DormandPrince8(1e-4)), _run(system, Rodas4(1e-8)))
+    system = plant(numbers, hanging_load(numbers), valve=valve)
+    return FillRun(system, _run(system, DormandPrince8(1e-4)), _run(system, Rodas4(1e-8)))
 
 
 def _run(system: Plant, method: Integrator) -> Recording:
     return simulate(system, SCHEDULE, duration=DURATION, method=method)
 
 
-def figure_3(fill: Fill) -> Plot:
+def figure_3(fill: FillRun) -> Plot:
     """Muscle pressure and displacement over time, as the paper's Fig. 3, whose measured line has no numbers."""
     run = fill.adaptive
     figure, axes = new_figure(2, 1, height=4.6, sharex=True)
@@ -70,7 +70,7 @@ def valve_figure(valve: Valve, temperature: float) -> Plot:
     )
 
 
-def choke_ends_at(plant: Plant) -> tuple[float, float]:
+def end_of_choked_flow(plant: Plant) -> tuple[float, float]:
     """The muscle's absolute pressure [Pa] at which the filling flow begins to fall, and its growth in a row [Pa]."""
     spacing = np.append(np.arange(FILLING[0], FILLING[0] + 1.0, 1e-4), DURATION)
     run = simulate(plant, SCHEDULE, duration=DURATION, method=Rodas4(1e-8), output=spacing)
@@ -80,7 +80,7 @@ def choke_ends_at(plant: Plant) -> tuple[float, float]:
     return float(pressure[subsonic]), float(np.diff(pressure).max())
 
 
-def claims(fill: Fill, explained: str = "") -> tuple[Claim, ...]:
+def claims(fill: FillRun, explained: str = "") -> tuple[Claim, ...]:
     """What the paper says of valve, solver and fill, held against the run; `explained` says what makes it deviate."""
     valve = fill.plant.circuits[0].fill  # type: ignore[attr-defined]
     per_minute = valve.conductance * 1e5 * 60e3
@@ -88,7 +88,7 @@ def claims(fill: Fill, explained: str = "") -> tuple[Claim, ...]:
     apart = float(np.abs(fill.printed_method["position"] - fill.adaptive["position"]).max())
     apart_p = float(np.abs(fill.printed_method["pressure"] - fill.adaptive["pressure"]).max())
     full = fill.adaptive["pressure"][np.searchsorted(fill.adaptive["time"], FILLING[1])] + fill.plant.ambient.pressure
-    choke_end, row = choke_ends_at(fill.plant)
+    choke_end, row = end_of_choked_flow(fill.plant)
     return (
         Claim(PAPER, "sonic conductance of the MATRIX valve in usual units", Equal(15.70, 0.005), per_minute,
               "NL/(min bar)",

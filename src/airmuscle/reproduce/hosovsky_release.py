@@ -14,11 +14,11 @@ from ..recording import Recording
 from ..report.chapter import AtLeast, AtMost, Claim, Plot, Table
 from ..simulation.integrators import Rodas4
 from ..simulation.simulate import simulate
-from .hosovsky_plant import MAPS, PAPER, Numbers, latched, plant
+from .hosovsky_plant import FORCE_MAPS, PAPER, UnpublishedParameters, latched_load, plant
 
 RELEASED_AT, DURATION = 0.5, 6.0
 SCHEDULE = Schedule({"held": ((0.0, 1.0), (RELEASED_AT, 0.0))})
-COMPARABLE = 0.30
+MAX_DAMPING_DIFFERENCE = 0.30
 """Dampings count as comparable when they differ by at most this fraction of the larger (chosen)."""
 
 
@@ -34,9 +34,9 @@ class Release:
     decay_rate: float
 
 
-def release(numbers: Numbers, pressure: float, data: str = MAPS[0]) -> Release:
+def release(numbers: UnpublishedParameters, pressure: float, data: str = FORCE_MAPS[0]) -> Release:
     """Clamped at zero contraction at a gauge pressure [Pa], valves shut, then let go."""
-    system = plant(numbers, latched(), data=data)
+    system = plant(numbers, latched_load(), data=data)
     run = simulate(
         system, SCHEDULE, duration=DURATION, start=system.state_at(pressure=pressure), method=Rodas4(1e-9), output=1e-3
     )
@@ -64,7 +64,7 @@ def damping(time: npt.NDArray[Any], position: npt.NDArray[Any], speed: npt.NDArr
     return float(ratio), half_decrement / float(np.mean(np.diff(at[:4])))
 
 
-def pair(numbers: Numbers, data: str = MAPS[0]) -> tuple[Release, Release]:
+def release_pair(numbers: UnpublishedParameters, data: str = FORCE_MAPS[0]) -> tuple[Release, Release]:
     """Both initial pressures, the lower first."""
     return (
         release(numbers, numbers.low_pressure.value, data),
@@ -72,7 +72,7 @@ def pair(numbers: Numbers, data: str = MAPS[0]) -> tuple[Release, Release]:
     )
 
 
-def compared(low: Release, high: Release) -> dict[str, float]:
+def compare_releases(low: Release, high: Release) -> dict[str, float]:
     """The four statements as numbers: two differences that must be positive, two relative differences of damping."""
 
     def apart(a: float, b: float) -> float:
@@ -86,15 +86,15 @@ def compared(low: Release, high: Release) -> dict[str, float]:
     }
 
 
-def over_ranges(numbers: Numbers) -> Table:
+def range_table(numbers: UnpublishedParameters) -> Table:
     """The four statements with every chosen number at both ends of its range, and on the second force map."""
-    cases = [("as chosen", numbers, MAPS[0]), ("surface fitted to the tool table", numbers, MAPS[1])]
-    for name, value in numbers.corners():
+    cases = [("as chosen", numbers, FORCE_MAPS[0]), ("surface fitted to the tool table", numbers, FORCE_MAPS[1])]
+    for name, value in numbers.range_ends():
         if name == "load":  # hangs on the muscle in fill and discharge only
             continue
         unit = getattr(numbers, name).unit
-        cases.append((f"{name.replace('_', ' ')} {value:g} {unit}", numbers.varied(name, value), MAPS[0]))
-    found = [compared(*pair(case, data)) for _, case, data in cases]
+        cases.append((f"{name.replace('_', ' ')} {value:g} {unit}", numbers.with_value(name, value), FORCE_MAPS[0]))
+    found = [compare_releases(*release_pair(case, data)) for _, case, data in cases]
     columns: dict[str, Any] = {"varied": [name for name, _, _ in cases]}
     for key, unit in (
         ("acceleration", "m/s2"),
@@ -103,15 +103,15 @@ def over_ranges(numbers: Numbers) -> Table:
         ("absolute damping", "1"),
     ):
         columns[f"{key}, difference [{unit}]"] = [row[key] for row in found]
-    note = f"differences of damping relative to the larger; comparable up to {COMPARABLE:g} (chosen)"
+    note = f"differences of damping relative to the larger; comparable up to {MAX_DAMPING_DIFFERENCE:g} (chosen)"
     return Table("hosovsky_release_ranges", "Quick release over the range of every chosen number", columns, note)
 
 
 def claims(low: Release, high: Release, ranges: Table) -> tuple[Claim, ...]:
     """The paper's statements on Fig. 4; each note says whether it holds over all chosen ranges."""
-    values = compared(low, high)
+    values = compare_releases(low, high)
     columns = list(ranges.columns.values())[1:]
-    alike, more = AtMost(COMPARABLE, chosen=True), AtLeast(0.0)
+    alike, more = AtMost(MAX_DAMPING_DIFFERENCE, chosen=True), AtLeast(0.0)
     statements = (
         ("a higher initial pressure gives a higher first acceleration: difference", "acceleration", more, "m/s2"),
         ("a higher initial pressure gives a larger greatest contraction: difference", "contraction", more, "%"),

@@ -40,7 +40,7 @@ def reproduce(
     interrupted, or whose later paper fails, still writes the chapters that are complete. Raises UnknownName,
     FileError, and what a chapter raises.
     """
-    chosen = named(papers)
+    chosen = select_papers(papers)
     check_writable(folder)
     chapters: list[Chapter] = []
     try:
@@ -55,7 +55,7 @@ def reproduce(
     return write_report(chapters, folder, title=TITLE)
 
 
-def named(papers: Sequence[str] | None) -> list[str]:
+def select_papers(papers: Sequence[str] | None) -> list[str]:
     """The full names of these papers, each once, in the report's order; all if there are none."""
     wanted = {complete(paper, PAPERS, "paper") for paper in papers or PAPERS}
     return [name for name in PAPERS if name in wanted]

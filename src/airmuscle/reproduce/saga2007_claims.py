@@ -18,19 +18,19 @@ from .saga2007_muscle import (
     DEFAULT,
     LINES,
     PRESSURE,
-    READINGS,
-    exact,
-    mechanics,
+    INTERPRETATIONS,
+    exact_meridian,
+    exact_mechanics,
     pressure_along,
-    reached,
-    reading,
+    contraction_at,
+    interpretation,
     with_rings,
 )
 
 PAPER = "saga2007"
 LOW_PRESSURE = 0.04e6
 """What counts as low [Pa]: a quarter of the pressure axis of Fig. 8; chosen."""
-ACCURATE = 0.15
+ACCURACY_LIMIT = 0.15
 """The error of the pressure that counts as accurate; chosen."""
 FIG_2 = (0.05, 0.10, 0.15, 0.20, 0.25)
 """The contractions that Fig. 2 shows."""
@@ -42,7 +42,7 @@ def _claim(text: str, printed: PublishedValue, found: float, unit: str, name: st
 
 def contraction_claim(law: Characteristic, name: str) -> Claim:
     """Claim 1: more than 35 % at 0.11 MPa, taken as unloaded."""
-    found = reached(law, PRESSURE, 0.0)
+    found = contraction_at(law, PRESSURE, 0.0)
     end = found >= law.contraction_range[1] * (1 - 1e-6)
     note = "No load is stated; taken as none. "
     note += "The model asks for less than 0.11 MPa over all its reach and runs away." if end else ""
@@ -53,15 +53,15 @@ def contraction_claim(law: Characteristic, name: str) -> Claim:
 
 def lifting_claim(law: Characteristic, name: str) -> Claim:
     """Claim 2: 200 N at 0.11 MPa by a contraction of 35 % or more, both at once as the introduction has it."""
-    found = reached(law, PRESSURE, 200.0)
+    found = contraction_at(law, PRESSURE, 200.0)
     note = "The contraction at 0.11 MPa under 200 N."
     note += " As a maximum of its own, at small contraction, 200 N is met." if 0 < found < 0.1 else ""
     return _claim("2. About 200 N at 0.11 MPa by 35 % or more", AtLeast(35.0), 100 * found, "%", name, note)
 
 
-def ceiling_claim() -> Claim:
+def force_limit_claim() -> Claim:
     """Claim 2 against mechanics: what fibres that do not stretch can pull at all, without any rubber."""
-    found = PRESSURE * float(exact(LINES["A"]).geometry.area(0.35))
+    found = PRESSURE * float(exact_meridian(LINES["A"]).geometry.area(0.35))
     note = (
         "The most that inextensible fibres of 72 mm on ends of 12 mm can pull, by virtual work and without rubber; "
         "either rubber line lowers it. Claims 1 and 2 cannot hold together."
@@ -69,7 +69,7 @@ def ceiling_claim() -> Claim:
     return _claim("2. 200 N at 0.11 MPa and 35 %", AtLeast(200.0), found, "N", "any rubber", note)
 
 
-def start_claims(law: Saga2007, name: str) -> tuple[Claim, Claim]:
+def initial_pressure_claims(law: Saga2007, name: str) -> tuple[Claim, Claim]:
     """Claim 3 and the sentence that speaks against it: low pressure at the start, or high."""
     first, later = (float(law.balancing_pressure(c, 0.0)) for c in (0.01, 0.10))
     needed = max(law.starting_pressure, first)
@@ -99,11 +99,11 @@ def ring_claim(law: Saga2007, name: str, force: float) -> Claim:
     ratio = min(float(np.min(more / fewer)) for fewer, more in itertools.pairwise(runs))
     where = f"{name}, {force:g} N"
     note = "Least ratio, up to 35 %, of the pressure with a ring more to that without. "
-    note += "Rings as equal segments in series are inferred." + (_unstable(law, force))
+    note += "Rings as equal segments in series are inferred." + (_stability_note(law, force))
     return _claim("4. No ring contracts most", AtLeast(1.0), ratio, "1", where, note)
 
 
-def _unstable(law: Saga2007, force: float) -> str:
+def _stability_note(law: Saga2007, force: float) -> str:
     falling = any(with_rings(law, n).snapping_load > force for n in (1, 2))
     return " Where pressure falls, equal segments are unstable: they do not contract alike." if falling else ""
 
@@ -128,7 +128,7 @@ def strength_claims(law: Saga2007, name: str, force: float) -> tuple[Claim, ...]
 
 def accuracy_claims(law: Saga2007, name: str) -> tuple[Claim, ...]:
     """Claim 5, with the exact meridian in place of the lost measurements, and where the rubber test ends."""
-    truth = exact(law.rubber, law.geometry.rings)
+    truth = exact_meridian(law.rubber, law.geometry.rings)
     low, high = np.linspace(0.01, 0.20, 20), np.linspace(0.25, 0.40, 16)
     below, above = (
         100 * float(np.max(np.abs(law.balancing_pressure(c, 100.0) / truth.balance_at(c, 100.0).pressure - 1)))
@@ -139,8 +139,8 @@ def accuracy_claims(law: Saga2007, name: str) -> tuple[Claim, ...]:
     end = 100 * law.contraction_at_strain(RUBBER_TEST_STRAIN)
     strain_note = "Where the rubber in the middle passes a strain of 3, the end of the rubber test; (10) with (2), (3)."
     return (
-        _claim("5. Accurate below 20 %", AtMost(100 * ACCURATE, chosen=True), below, "%", f"{name}, 100 N", note),
-        _claim("5. Departs above 20 %", AtLeast(100 * ACCURATE, chosen=True), above, "%", f"{name}, 100 N", note),
+        _claim("5. Accurate below 20 %", AtMost(100 * ACCURACY_LIMIT, chosen=True), below, "%", f"{name}, 100 N", note),
+        _claim("5. Departs above 20 %", AtLeast(100 * ACCURACY_LIMIT, chosen=True), above, "%", f"{name}, 100 N", note),
         _claim("5. The model departs at 20 %", Equal(20.0, 2.0), end, "%", "outline (2), (3)", strain_note),
     )
 
@@ -157,14 +157,14 @@ def feed_forward_claim(law: Saga2007, name: str, force: float) -> Claim:
     """Claim 7: the share of wanted contractions that the pressure of the formula brings about, starting from rest."""
     wanted = np.linspace(0.01, 0.35, 35)
     pressures = law.balancing_pressure(wanted, force)
-    met = sum(_returns(law, float(p), force, float(c)) for p, c in zip(pressures, wanted, strict=True))
+    met = sum(_reaches_target(law, float(p), force, float(c)) for p, c in zip(pressures, wanted, strict=True))
     note = "Share of the contractions 1 to 35 % that the formula's pressure leads to, from rest and to 1e-9. "
     note += "Where pressure falls with contraction the muscle snaps past what was wanted." if met < wanted.size else ""
     text = "7. The closed form serves feed-forward control"
     return _claim(text, AtLeast(1.0), met / wanted.size, "1", f"{name}, {force:g} N", note.strip())
 
 
-def _returns(law: Saga2007, pressure: float, force: float, wanted: float) -> bool:
+def _reaches_target(law: Saga2007, pressure: float, force: float, wanted: float) -> bool:
     try:
         return abs(float(law.contraction(pressure, force)) - wanted) < 1e-9
     except SolveError:
@@ -183,7 +183,7 @@ def claims_of(law: Saga2007, name: str) -> tuple[Claim, ...]:
     return (
         contraction_claim(law, name),
         lifting_claim(law, name),
-        *start_claims(law, name),
+        *initial_pressure_claims(law, name),
         *(ring_claim(law, name, force) for force in (0.0, 100.0)),
         *strength_claims(law, name, 200.0),
         *accuracy_claims(law, name),
@@ -196,17 +196,17 @@ def claims_of(law: Saga2007, name: str) -> tuple[Claim, ...]:
 def all_claims() -> tuple[Claim, ...]:
     """The default reading in full, and the other readings and the exact meridian where they decide otherwise."""
     default = "w 2, q 1, line B"
-    printed_a = reading(LINES["A"], 2.0, 1.0)
-    others = {name: law for name, law in READINGS.items() if law != DEFAULT}
-    truths = {f"exact meridian, line {name}": exact(line) for name, line in LINES.items()}
+    printed_a = interpretation(LINES["A"], 2.0, 1.0)
+    others = {name: law for name, law in INTERPRETATIONS.items() if law != DEFAULT}
+    truths = {f"exact meridian, line {name}": exact_meridian(line) for name, line in LINES.items()}
     found = [
         *claims_of(DEFAULT, default),
         *(contraction_claim(law, name) for name, law in truths.items()),
         *(lifting_claim(law, name) for name, law in (others | truths).items()),
-        ceiling_claim(),
-        *start_claims(printed_a, "w 2, q 1, line A"),
+        force_limit_claim(),
+        *initial_pressure_claims(printed_a, "w 2, q 1, line A"),
         ring_claim(printed_a, "w 2, q 1, line A", 0.0),
-        *accuracy_claims(mechanics(LINES["A"]), "exact mechanics, line A")[:2],
+        *accuracy_claims(exact_mechanics(LINES["A"]), "exact mechanics, line A")[:2],
         feed_forward_claim(printed_a, "w 2, q 1, line A", 0.0),
     ]
     return tuple(sorted(found, key=lambda claim: claim.claim[:2] if claim.claim[0].isdigit() else "9"))

@@ -10,7 +10,7 @@ from ..characteristic.saga2007 import RUBBER_TEST_STRAIN, Saga2007
 from ..core.plotting import BLACK, DASHES, LINES, legend_outside, new_figure
 from ..report.chapter import Plot
 from .saga2007_claims import FIG_2
-from .saga2007_muscle import DEFAULT, READINGS, circle, exact, pressure_along, reading, with_rings
+from .saga2007_muscle import DEFAULT, INTERPRETATIONS, circular_meridian, exact_meridian, pressure_along, interpretation, with_rings
 from .saga2007_muscle import LINES as RUBBER
 from .saga2007_pairs import errors, ideal_errors
 
@@ -20,14 +20,14 @@ MPA = 1e-6
 
 def plots() -> tuple[Plot, ...]:
     """All figures, in the order of the report."""
-    drawn = (outlines, rubber, contraction_over_pressure, force_over_contraction, snap_through, readings, pairs)
+    drawn = (outlines, rubber, contraction_over_pressure, force_over_contraction, snap_through, interpretations, pairs)
     return tuple(draw() for draw in drawn)
 
 
 def outlines() -> Plot:
     """As Fig. 2: the parabola at six contractions, the exact outline without rubber beside it."""
     figure, axes = new_figure(height=3.3)
-    truth = exact(RUBBER["A"]).geometry
+    truth = exact_meridian(RUBBER["A"]).geometry
     for i, c in enumerate((0.0, *FIG_2)):
         for tube, dash in ((DEFAULT.geometry, "-"), (truth, ":")):
             x, r = tube.outline(c)
@@ -62,7 +62,7 @@ def rubber() -> Plot:
     )
 
 
-def _run(axes: Any, law: Saga2007, force: float, i: int, label: str) -> None:
+def _draw_contraction(axes: Any, law: Saga2007, force: float, i: int, label: str) -> None:
     """Contraction over pressure at one load: thin where pressure falls with contraction, which is not stable."""
     needed = pressure_along(law, CONTRACTION, force) * MPA
     rising = np.append(np.diff(needed) > 0, True)
@@ -77,9 +77,9 @@ def contraction_over_pressure() -> Plot:
     figure, (left, right) = new_figure(1, 2, width=7.2, height=3.4, sharey=True)
     for i, (force, load) in enumerate(((100.0, "100 N"), (0.0, "no load"))):
         for n, rings in enumerate(("no ring", "1 ring", "2 rings")):
-            _run(left, with_rings(DEFAULT, n), force, 3 * i + n, f"{rings}, {load}")
+            _draw_contraction(left, with_rings(DEFAULT, n), force, 3 * i + n, f"{rings}, {load}")
     for i, force in enumerate((0.0, 50.0, 100.0, 200.0)):
-        _run(right, DEFAULT, force, i, f"{force:g} N")
+        _draw_contraction(right, DEFAULT, force, i, f"{force:g} N")
     ticks = (0.0, 0.05, 0.1, 0.15)
     left.set(xlabel="gauge pressure [MPa]", ylabel="contraction [%]", xlim=(0, 0.16), ylim=(0, 40), xticks=ticks)
     right.set(xlabel="gauge pressure [MPa]", xlim=(0, 0.16), xticks=ticks)
@@ -98,7 +98,7 @@ def force_over_contraction() -> Plot:
     """The second test of the paper: the load varied at held pressure."""
     figure, axes = new_figure(height=3.4)
     contraction = np.linspace(0.005, 0.4, 160)
-    truth = exact(DEFAULT.rubber)
+    truth = exact_meridian(DEFAULT.rubber)
     for i, pressure in enumerate((0.08e6, 0.11e6, 0.16e6)):
         label = f"{pressure * MPA:g} MPa"
         axes.plot(100 * contraction, DEFAULT.force(pressure, contraction), color=LINES[i], label=f"{label}, (19)")
@@ -109,7 +109,7 @@ def force_over_contraction() -> Plot:
             color=LINES[i],
             label=f"{label}, exact",
         )
-        held = circle(DEFAULT.rubber).force(pressure, contraction)
+        held = circular_meridian(DEFAULT.rubber).force(pressure, contraction)
         axes.plot(100 * contraction, held, ":", color=LINES[i], label=f"{label}, circle")
     axes.set(xlabel="contraction [%]", ylabel="tension [N]", xlim=(0, 40), ylim=(0, 400))
     legend_outside(axes)
@@ -124,11 +124,11 @@ def force_over_contraction() -> Plot:
 def snap_through() -> Plot:
     """Pressure over contraction with line A: a balloon's fall and rise."""
     figure, (left, right) = new_figure(1, 2, width=7.2, height=3.4)
-    law = reading(RUBBER["A"], 2.0, 1.0)
+    law = interpretation(RUBBER["A"], 2.0, 1.0)
     for i, force in enumerate((0.0, 30.0, law.snapping_load, 120.0)):
-        _pressure(left, law, force, i, f"{force:.3g} N")
-    for i, (name, law) in enumerate((n, r) for n, r in READINGS.items() if n.endswith("A")):
-        _pressure(right, law, 0.0, i, name.removesuffix(", line A"))
+        _draw_pressure(left, law, force, i, f"{force:.3g} N")
+    for i, (name, law) in enumerate((n, r) for n, r in INTERPRETATIONS.items() if n.endswith("A")):
+        _draw_pressure(right, law, 0.0, i, name.removesuffix(", line A"))
     left.set(xlabel="contraction [%]", ylabel="gauge pressure [MPa]", xlim=(0, 50), ylim=(0, 0.12))
     right.set(xlabel="contraction [%]", xlim=(0, 50), ylim=(0, 0.12))
     left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, title="w 2, q 1")
@@ -142,7 +142,7 @@ def snap_through() -> Plot:
     )
 
 
-def _pressure(axes: Any, law: Saga2007, force: float, i: int, label: str) -> None:
+def _draw_pressure(axes: Any, law: Saga2007, force: float, i: int, label: str) -> None:
     contraction = np.concatenate([np.geomspace(1e-5, 0.01, 40), np.linspace(0.011, 0.5, 200)])
     needed = law.balancing_pressure(contraction, force) * MPA
     axes.plot(100 * contraction, needed, ls=DASHES[i], color=LINES[i], label=label)
@@ -151,15 +151,15 @@ def _pressure(axes: Any, law: Saga2007, force: float, i: int, label: str) -> Non
         axes.plot(100 * contraction[lowest], needed[lowest], "o", color=LINES[i])
 
 
-def readings() -> Plot:
+def interpretations() -> Plot:
     """The readings side by side against the exact meridian, at 100 N."""
     figure, panels = new_figure(1, 2, width=7.2, height=3.8, sharey=True)
     for axes, (name, line) in zip(panels, RUBBER.items(), strict=True):
-        chosen = [(n, r) for n, r in READINGS.items() if n.endswith(name)]
+        chosen = [(n, r) for n, r in INTERPRETATIONS.items() if n.endswith(name)]
         for i, (label, law) in enumerate(chosen):
             needed = pressure_along(law, CONTRACTION, 100.0) * MPA
             axes.plot(100 * CONTRACTION, needed, ls=DASHES[i], color=LINES[i], label=label.partition(", line")[0])
-        truth = pressure_along(exact(line), CONTRACTION, 100.0) * MPA
+        truth = pressure_along(exact_meridian(line), CONTRACTION, 100.0) * MPA
         axes.plot(100 * CONTRACTION, truth, color=BLACK, lw=2.0, label="exact meridian")
         axes.set(xlabel="contraction [%]", title=f"line {name}, 100 N", xlim=(0, 40), ylim=(0, 0.3))
     panels[0].set_ylabel("gauge pressure [MPa]")

@@ -28,15 +28,15 @@ DEFAULT = Saga2007(StraightFibre(LENGTH, DIAMETER, meridian=Parabola()), LINE_B,
 LINES = {"A": LINE_A, "B": LINE_B}
 
 
-def reading(rubber: RubberLine, projection_factor: float, slope_factor: float, rings: int = 0) -> Saga2007:
+def interpretation(rubber: RubberLine, projection_factor: float, slope_factor: float, rings: int = 0) -> Saga2007:
     """Table 1 in one reading, with the fibre sum over the half and the rubber along the axis."""
     law = replace(DEFAULT, rubber=rubber, projection_factor=projection_factor, slope_factor=slope_factor)
     return with_rings(law, rings)
 
 
-def mechanics(rubber: RubberLine, rings: int = 0) -> Saga2007:
+def exact_mechanics(rubber: RubberLine, rings: int = 0) -> Saga2007:
     """The only reading that is exact mechanics, short of the parabola itself."""
-    return replace(reading(rubber, 1.0, 2.0, rings), fibre_sum=EvenSpread(), rubber_integral=AlongArc())
+    return replace(interpretation(rubber, 1.0, 2.0, rings), fibre_sum=EvenSpread(), rubber_integral=AlongArc())
 
 
 def with_rings(law: Saga2007, rings: int) -> Saga2007:
@@ -44,26 +44,26 @@ def with_rings(law: Saga2007, rings: int) -> Saga2007:
     return replace(law, geometry=replace(law.geometry, rings=rings))
 
 
-READINGS: dict[str, Saga2007] = {
-    f"w {w}, q {q}, line {name}": reading(line, float(w), float(q))
+INTERPRETATIONS: dict[str, Saga2007] = {
+    f"w {w}, q {q}, line {name}": interpretation(line, float(w), float(q))
     for w in (2, 1)
     for q in (1, 2)
     for name, line in LINES.items()
-} | {f"exact mechanics, line {name}": mechanics(line) for name, line in LINES.items()}
+} | {f"exact mechanics, line {name}": exact_mechanics(line) for name, line in LINES.items()}
 """The readings side by side, w projection, q slope; the last two have w 1, q 2, M = m/pi and rubber along the arc."""
 
 
-def exact(rubber: RubberLine, rings: int = 0) -> ExactMeridian:
+def exact_meridian(rubber: RubberLine, rings: int = 0) -> ExactMeridian:
     """The muscle without an assumed outline."""
     return ExactMeridian(PleatedTube(LENGTH, DIAMETER, rings), rubber, WALL)
 
 
-def circle(rubber: RubberLine, rings: int = 0) -> CircleVirtualWork:
+def circular_meridian(rubber: RubberLine, rings: int = 0) -> CircleVirtualWork:
     """The muscle with a circular meridian and virtual work."""
     return CircleVirtualWork(StraightFibre(LENGTH, DIAMETER, rings), rubber, WALL)
 
 
-def reached(law: Characteristic, pressure: float, force: float) -> float:
+def contraction_at(law: Characteristic, pressure: float, force: float) -> float:
     """The contraction [1] that a pressure [Pa] reaches under a load [N]: the greatest that needs no more than it.
 
     Zero where the tube stays straight, the end of the law's reach where the muscle runs away.

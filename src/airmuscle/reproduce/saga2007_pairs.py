@@ -23,7 +23,7 @@ from ..geometry.parabola import Parabola, TrueArcParabola
 from ..geometry.pleated import PleatedTube
 from ..geometry.straight_fibre import FibreTube, StraightFibre
 from ..report.chapter import Table
-from .saga2007_muscle import DIAMETER, LENGTH, LINES, WALL, exact
+from .saga2007_muscle import DIAMETER, LENGTH, LINES, WALL, exact_meridian
 
 OUTLINES: dict[str, FibreTube] = {
     "parabola (3)": StraightFibre(LENGTH, DIAMETER, meridian=Parabola()),
@@ -37,7 +37,7 @@ EVEN_SPREAD = 1 / np.pi
 """M/m of evenly spread fibres, which every outline of revolution needs."""
 
 
-class Share(NamedTuple):
+class ForceBalance(NamedTuple):
     """F = p area - rubber."""
 
     area: Array
@@ -47,7 +47,7 @@ class Share(NamedTuple):
 
 
 @model
-class Stored:
+class SegmentEnergy:
     """The rubber's energy of one segment over contraction, to be differentiated."""
 
     tube: StraightFibre
@@ -58,10 +58,10 @@ class Stored:
         return WALL * self.rubber.energy(segment.arc_excess, segment.arc_excess_squared, segment.end_radius)
 
 
-def _energy_growth(tube: FibreTube, rubber: RubberLine, contraction: Array) -> Array:
+def _energy_derivative(tube: FibreTube, rubber: RubberLine, contraction: Array) -> Array:
     """dU/deps [J] of one segment; the exact outline, which has no formula, by differences."""
     if isinstance(tube, StraightFibre):
-        return np.asarray(autodiff.derivative(Stored(tube, rubber), "energy", contraction))
+        return np.asarray(autodiff.derivative(SegmentEnergy(tube, rubber), "energy", contraction))
 
     if not (rubber.slope or rubber.intercept):
         return np.zeros_like(contraction)
@@ -75,57 +75,57 @@ def _energy_growth(tube: FibreTube, rubber: RubberLine, contraction: Array) -> A
     return (8 * narrow - wide) / (12 * step)
 
 
-def _lever(segment: Segment, sine_or_slope: Value, radius: Value, rubber: Value) -> Share:
+def _moment_balance(segment: Segment, sine_or_slope: Value, radius: Value, rubber: Value) -> ForceBalance:
     lever = EVEN_SPREAD * sine_or_slope
-    return Share(segment.half_section / lever - np.pi * radius**2, rubber / lever)
+    return ForceBalance(segment.half_section / lever - np.pi * radius**2, rubber / lever)
 
 
-def closures(
+def force_balances(
     tube: FibreTube, rubber: RubberLine, contraction: Array, along: RubberIntegral = AlongArc()
-) -> dict[str, Share]:
+) -> dict[str, ForceBalance]:
     """The three closures of one outline over contraction, w = 1 and M = m/pi; the rubber of the balances `along`."""
     segment = tube.segment(contraction)
     hoop = WALL * along.hoop_stress(rubber, segment)
     growth = tube.volume_growth(contraction) / tube.resting_length
     return {
-        "end balance": _lever(segment, segment.end_slope, segment.end_radius, hoop),
-        "middle balance": _lever(segment, segment.end_sine, segment.largest_radius, hoop),
-        "virtual work": Share(growth, _energy_growth(tube, rubber, contraction) / tube.fibre_length),
+        "end balance": _moment_balance(segment, segment.end_slope, segment.end_radius, hoop),
+        "middle balance": _moment_balance(segment, segment.end_sine, segment.largest_radius, hoop),
+        "virtual work": ForceBalance(growth, _energy_derivative(tube, rubber, contraction) / tube.fibre_length),
     }
 
 
-def pressure(share: Share, force: float) -> Array:
+def balance_pressure(share: ForceBalance, force: float) -> Array:
     """(F + rubber)/area [Pa]; NaN where the area is not positive: past the pole nothing balances."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(share.area > 0, (force + share.rubber) / share.area, np.nan)
 
 
 @functools.lru_cache(maxsize=16)
-def _shares(rubber: RubberLine, contraction: tuple[float, ...]) -> dict[tuple[str, str], Share]:
+def _all_balances(rubber: RubberLine, contraction: tuple[float, ...]) -> dict[tuple[str, str], ForceBalance]:
     """All 15 pairs (outline, closure), kept for the loads that ask for them."""
     at = np.array(contraction)
     return {
         (outline, closure): share
         for outline, tube in OUTLINES.items()
-        for closure, share in closures(tube, rubber, at).items()
+        for closure, share in force_balances(tube, rubber, at).items()
     }
 
 
 def pressures(rubber: RubberLine, force: float, contraction: Array) -> dict[tuple[str, str], Array]:
     """The pressure [Pa] of each of the 15 pairs (outline, closure)."""
-    return {pair: pressure(share, force) for pair, share in _shares(rubber, tuple(contraction)).items()}
+    return {pair: balance_pressure(share, force) for pair, share in _all_balances(rubber, tuple(contraction)).items()}
 
 
 def ideal_errors(contraction: Array) -> dict[tuple[str, str], Array]:
     """Error of F/p of each pair against the exact meridian, both without rubber [1]."""
     truth = np.asarray(PleatedTube(LENGTH, DIAMETER).area(contraction))
-    found = _shares(RubberLine(0.0, 0.0), tuple(contraction))
+    found = _all_balances(RubberLine(0.0, 0.0), tuple(contraction))
     return {pair: share.area / truth - 1 for pair, share in found.items()}
 
 
 def errors(rubber: RubberLine, force: float, contraction: Array) -> dict[tuple[str, str], Array]:
     """Error of the pressure of each pair against the exact meridian with rubber [1]; NaN where either has none."""
-    truth = np.asarray(exact(rubber).balance_at(contraction, force).pressure)
+    truth = np.asarray(exact_meridian(rubber).balance_at(contraction, force).pressure)
     return {pair: found / truth - 1 for pair, found in pressures(rubber, force, contraction).items()}
 
 

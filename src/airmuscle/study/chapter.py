@@ -10,7 +10,7 @@ import numpy as np
 from ..core.reference import cite
 from ..report.chapter import Chapter, Table
 from ..report.output_folder import atomic_folder
-from ..report.write import fill, save_table
+from ..report.write import write_into, save_table
 from .distributions import LevelSet, Variation
 from .plots import plots
 from .result import StudyResult
@@ -34,7 +34,7 @@ def write_study(result: StudyResult, folder: Path | str) -> Path:
         if study.courses:
             times = {f"{name}_time": course.instants for name, course in study.courses.items()}
             np.savez(place / COURSES, **times, **result.courses)  # type: ignore[arg-type]
-        fill(place, [study_chapter(result)], title="Parameter study")
+        write_into(place, [study_chapter(result)], title="Parameter study")
     return Path(folder) / "report.html"
 
 
