@@ -19,7 +19,16 @@ from ..report.chapter import Chapter, Claim, Equal, Plot, Table
 from . import hosovsky_effects as causing
 from . import hosovsky_fill as filling
 from . import hosovsky_release as releasing
-from .hosovsky_plant import FORCE_MAPS, MATRIX, MATRIX_CATALOGUE, PAPER, UnpublishedParameters, muscle, surface, surface_fit
+from .hosovsky_plant import (
+    FORCE_MAPS,
+    MATRIX,
+    MATRIX_CATALOGUE,
+    PAPER,
+    UnpublishedParameters,
+    muscle,
+    surface,
+    surface_fit,
+)
 
 SUMMARY = """The muscle of Hosovsky et al. has a contractile element given by a polynomial of total degree five in
 contraction and pressure (21 coefficients, clamped to 0..1200 N), a parallel spring and a damper; two on/off valves

@@ -33,7 +33,9 @@ SPACING = 4e-3
 class SuspectedCauses:
     """The numbers of the suspected causes; the paper prints only the length of the line, for the sensor's."""
 
-    line_length: ChosenValue = ChosenValue(1.0, 0.5, 2.0, "m", "line from valve to muscle", "printed for the sensor's line")
+    line_length: ChosenValue = ChosenValue(
+        1.0, 0.5, 2.0, "m", "line from valve to muscle", "printed for the sensor's line"
+    )
     line_diameter: ChosenValue = ChosenValue(4e-3, 2.5e-3, 6e-3, "m", "its inner diameter")
     critical_ratio: ChosenValue = ChosenValue(0.25, 0.2, 0.5, "1", "critical ratio of the valve with its fittings")
     index: ChosenValue = ChosenValue(0.65, 0.5, 0.7, "1", "subsonic index of the valve")
@@ -149,7 +151,8 @@ def _run(exchanged: Substitution, numbers: UnpublishedParameters) -> Recording:
 def _effect(base: Recording, exchanged: Substitution, run: Recording) -> Effect:
     pressure, contraction = run[exchanged.pressure_column] - base["pressure"], run["contraction"] - base["contraction"]
     delays = [
-        _response_time(run["time"], run[exchanged.pressure_column], *phase) - _response_time(base["time"], base["pressure"], *phase)
+        _response_time(run["time"], run[exchanged.pressure_column], *phase)
+        - _response_time(base["time"], base["pressure"], *phase)
         for phase in (FILLING, DISCHARGING)
     ]
     return Effect(exchanged, base["time"], pressure, contraction, (delays[0], delays[1]))

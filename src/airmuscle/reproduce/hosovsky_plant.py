@@ -55,7 +55,9 @@ class UnpublishedParameters:
     load: ChosenValue = ChosenValue(10.0, 2.0, 20.0, "kg", "load in fill and discharge")
     stiffness: ChosenValue = ChosenValue(1000.0, 0.0, 4000.0, "N/m", "parallel spring, constant as in the paper")
     damping: ChosenValue = ChosenValue(200.0, 100.0, 400.0, "N s/m", "damper, constant as in the paper")
-    length: ChosenValue = ChosenValue(0.300, 0.200, 0.400, "m", "resting length", "of the measured specimen; the range is chosen")
+    length: ChosenValue = ChosenValue(
+        0.300, 0.200, 0.400, "m", "resting length", "of the measured specimen; the range is chosen"
+    )
     braid_angle: ChosenValue = ChosenValue(
         0.42616, 0.38, 0.50, "rad", "braid angle of the volume", "Martens and Boblan 2017; the range is chosen"
     )

@@ -1,7 +1,7 @@
-"""Five outlines by three closures of the straight-fibre muscle, each held against its exact meridian.
+"""Pairs of outline and closure of the straight-fibre muscle, compared with its exact meridian.
 
-The outline says what shape the fibres take, the closure which balance gives the force; the previous model, of
-Ferraresi et al. 2001, is the circle with the balance at the middle.
+The outline is the shape of the fibres, the closure the balance that determines the force: five outlines and three
+closures. The previous model, Ferraresi et al. 2001, is the circle with the balance at the middle.
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ OUTLINES: dict[str, FibreTube] = {
 }
 CONTRACTIONS = np.array([0.01, 0.05, 0.10, 0.20, 0.30, 0.40])
 EVEN_SPREAD = 1 / np.pi
-"""M/m of evenly spread fibres, which every outline of revolution needs."""
+"""M/m of evenly distributed fibres, as required for every outline of revolution."""
 
 
 class ForceBalance(NamedTuple):
-    """F = p area - rubber."""
+    """Force balance F = p area - rubber."""
 
     area: Array
     """F/p without rubber [m2]."""
     rubber: Array
-    """What the rubber takes [N]."""
+    """Force of the rubber [N]."""
 
 
 @model
 class SegmentEnergy:
-    """The rubber's energy of one segment over contraction, to be differentiated."""
+    """Elastic energy of the rubber of one segment as a function of contraction."""
 
     tube: StraightFibre
     rubber: RubberLine
@@ -59,15 +59,15 @@ class SegmentEnergy:
 
 
 def _energy_derivative(tube: FibreTube, rubber: RubberLine, contraction: Array) -> Array:
-    """dU/deps [J] of one segment; the exact outline, which has no formula, by differences."""
+    """Return dU/deps [J] of one segment; for the exact outline, which is not closed-form, by finite differences."""
     if isinstance(tube, StraightFibre):
         return np.asarray(autodiff.derivative(SegmentEnergy(tube, rubber), "energy", contraction))
 
     if not (rubber.slope or rubber.intercept):
         return np.zeros_like(contraction)
 
-    def energy(at: Array) -> Array:
-        segment = tube.segment(at)
+    def energy(values: Array) -> Array:
+        segment = tube.segment(values)
         return np.asarray(WALL * rubber.energy(segment.arc_excess, segment.arc_excess_squared, tube.end_radius))
 
     step = 1e-3 * contraction
@@ -83,7 +83,10 @@ def _moment_balance(segment: Segment, sine_or_slope: Value, radius: Value, rubbe
 def force_balances(
     tube: FibreTube, rubber: RubberLine, contraction: Array, along: RubberIntegral = AlongArc()
 ) -> dict[str, ForceBalance]:
-    """The three closures of one outline over contraction, w = 1 and M = m/pi; the rubber of the balances `along`."""
+    """Return the three closures of one outline over contraction, with w = 1 and M = m/pi.
+
+    `along` is the rubber integral of the two balances.
+    """
     segment = tube.segment(contraction)
     hoop = WALL * along.hoop_stress(rubber, segment)
     growth = tube.volume_growth(contraction) / tube.resting_length
@@ -94,49 +97,54 @@ def force_balances(
     }
 
 
-def balance_pressure(share: ForceBalance, force: float) -> Array:
-    """(F + rubber)/area [Pa]; NaN where the area is not positive: past the pole nothing balances."""
+def balance_pressure(balance: ForceBalance, force: float) -> Array:
+    """Return (F + rubber)/area [Pa]; NaN where the area is not positive: beyond the pole there is no equilibrium."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(share.area > 0, (force + share.rubber) / share.area, np.nan)
+        return np.where(balance.area > 0, (force + balance.rubber) / balance.area, np.nan)
 
 
 @functools.lru_cache(maxsize=16)
 def _all_balances(rubber: RubberLine, contraction: tuple[float, ...]) -> dict[tuple[str, str], ForceBalance]:
-    """All 15 pairs (outline, closure), kept for the loads that ask for them."""
-    at = np.array(contraction)
+    """Return the balances of all 15 pairs (outline, closure); cached, as they do not depend on the load."""
+    contractions = np.array(contraction)
     return {
-        (outline, closure): share
+        (outline, closure): balance
         for outline, tube in OUTLINES.items()
-        for closure, share in force_balances(tube, rubber, at).items()
+        for closure, balance in force_balances(tube, rubber, contractions).items()
     }
 
 
 def pressures(rubber: RubberLine, force: float, contraction: Array) -> dict[tuple[str, str], Array]:
-    """The pressure [Pa] of each of the 15 pairs (outline, closure)."""
-    return {pair: balance_pressure(share, force) for pair, share in _all_balances(rubber, tuple(contraction)).items()}
+    """Return the pressure [Pa] of each of the 15 pairs (outline, closure)."""
+    return {
+        pair: balance_pressure(balance, force) for pair, balance in _all_balances(rubber, tuple(contraction)).items()
+    }
 
 
 def ideal_errors(contraction: Array) -> dict[tuple[str, str], Array]:
-    """Error of F/p of each pair against the exact meridian, both without rubber [1]."""
-    truth = np.asarray(PleatedTube(LENGTH, DIAMETER).area(contraction))
-    found = _all_balances(RubberLine(0.0, 0.0), tuple(contraction))
-    return {pair: share.area / truth - 1 for pair, share in found.items()}
+    """Return the relative error of F/p of each pair, compared with the exact meridian, both without rubber [1]."""
+    reference = np.asarray(PleatedTube(LENGTH, DIAMETER).area(contraction))
+    balances = _all_balances(RubberLine(0.0, 0.0), tuple(contraction))
+    return {pair: balance.area / reference - 1 for pair, balance in balances.items()}
 
 
 def errors(rubber: RubberLine, force: float, contraction: Array) -> dict[tuple[str, str], Array]:
-    """Error of the pressure of each pair against the exact meridian with rubber [1]; NaN where either has none."""
-    truth = np.asarray(exact_meridian(rubber).balance_at(contraction, force).pressure)
-    return {pair: found / truth - 1 for pair, found in pressures(rubber, force, contraction).items()}
+    """Return the relative pressure error of each pair, compared with the exact meridian with rubber [1].
+
+    NaN where either of the two is undefined.
+    """
+    reference = np.asarray(exact_meridian(rubber).balance_at(contraction, force).pressure)
+    return {pair: value / reference - 1 for pair, value in pressures(rubber, force, contraction).items()}
 
 
 def tables() -> tuple[Table, ...]:
-    """The 15 pairs without rubber, and with it under two loads."""
-    found = [_table("ideal", "tension over pressure, no rubber", ideal_errors(CONTRACTIONS))]
+    """Return the errors of the 15 pairs without rubber, and with rubber at two loads."""
+    result = [_table("ideal", "tension per pressure, without rubber", ideal_errors(CONTRACTIONS))]
     for name, line in LINES.items():
         for force in (0.0, 100.0):
             title = f"pressure with rubber line {name} at {force:g} N"
-            found.append(_table(f"{name}_{force:g}N".lower(), title, errors(line, force, CONTRACTIONS)))
-    return tuple(found)
+            result.append(_table(f"{name}_{force:g}N".lower(), title, errors(line, force, CONTRACTIONS)))
+    return tuple(result)
 
 
 def _table(name: str, title: str, rows: dict[tuple[str, str], Array]) -> Table:
@@ -145,16 +153,10 @@ def _table(name: str, title: str, rows: dict[tuple[str, str], Array]) -> Table:
         "closure": [closure for _, closure in rows],
     }
     for i, c in enumerate(CONTRACTIONS):
-        columns[f"error at {c:.0%} [%]"] = [round(100 * float(row[i]), 2) for row in rows.values()]
+        columns[f"error at {100 * c:g} % [%]"] = [round(100 * float(row[i]), 2) for row in rows.values()]
     note = (
-        "Against the exact meridian of the same muscle. w = 1, M = m/pi, rubber along the arc. nan: past the pole, "
-        "or no exact shape (line A unloaded at 1 %). The previous model is the circle with the middle balance."
+        r"Compared with the exact meridian of the same muscle; \(w = 1\), \(M = m/\pi\), rubber along the arc. No "
+        "value: beyond the pole, or no exact outline (line A without load at 1 %). The previous model is the circle "
+        "with the middle balance."
     )
-    return Table(f"saga2007_pairs_{name}", f"Error of outline and closure: {title}", columns, note)
-
-
-if __name__ == "__main__":
-    for table in tables():
-        print(f"\n{table.title}")
-        for row in zip(*table.columns.values(), strict=True):
-            print("  ".join(f"{cell!s:>22}" if isinstance(cell, str) else f"{cell:9.2f}" for cell in row))
+    return Table(f"saga2007_pairs_{name}", f"Error of the pairs of outline and closure: {title}", columns, note)
