@@ -26,9 +26,9 @@ from airmuscle.core import plotting
 from airmuscle.core.errors import FileError, SolveError, UnknownNameError
 from airmuscle.core.reference import Reference
 from airmuscle.report.chapter import AtLeast, AtMost, Chapter, Claim, Equal, Plot, Table
+from airmuscle.report.formatting import format_number, format_published
 from airmuscle.report.html import MAX_SVG_BYTES
 from airmuscle.report.output_folder import atomic_folder, check_writable
-from airmuscle.report.formatting import format_number, format_published
 from airmuscle.report.write import as_json, write_report
 from airmuscle.reproduce import run
 

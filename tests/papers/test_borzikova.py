@@ -14,12 +14,12 @@ from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_PRINTED
 from airmuscle.reproduce import borzikova
 from airmuscle.reproduce.borzikova_surfaces import (
     AS_EXPONENT,
-    EXPONENTIAL,
+    CORRECTED,
     CORRECTED_A02,
+    EXPONENTIAL,
     MISPRINT_CORRECTED,
     MONOTONE,
     PRINTED,
-    CORRECTED,
     index_on_curves,
     round_contraction,
     surfaces,

@@ -22,7 +22,15 @@ from airmuscle.reproduce import hosovsky
 from airmuscle.reproduce import hosovsky_effects as causing
 from airmuscle.reproduce import hosovsky_fill as filling
 from airmuscle.reproduce import hosovsky_release as releasing
-from airmuscle.reproduce.hosovsky_plant import MATRIX, UnpublishedParameters, hanging_load, latched_load, plant, surface, surface_fit
+from airmuscle.reproduce.hosovsky_plant import (
+    MATRIX,
+    UnpublishedParameters,
+    hanging_load,
+    latched_load,
+    plant,
+    surface,
+    surface_fit,
+)
 from airmuscle.reproduce.hosovsky_schedule import FILLING
 from airmuscle.simulation.integrators import DormandPrince8, RungeKutta4
 from airmuscle.simulation.simulate import simulate

@@ -28,7 +28,14 @@ from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_PRINTED
 from airmuscle.reproduce import saga2007_claims as claims
 from airmuscle.reproduce import saga2007_pairs as pairs
 from airmuscle.reproduce.saga2007 import chapter
-from airmuscle.reproduce.saga2007_muscle import DEFAULT, circular_meridian, exact_meridian, exact_mechanics, interpretation, with_rings
+from airmuscle.reproduce.saga2007_muscle import (
+    DEFAULT,
+    circular_meridian,
+    exact_mechanics,
+    exact_meridian,
+    interpretation,
+    with_rings,
+)
 from airmuscle.reproduce.saga2007_tables import virtual_work
 
 UNHURRIED = settings(deadline=None)  # a law is traced at its first call

@@ -66,9 +66,12 @@ def _stage(paper: str) -> Iterator[None]:
 
 
 def _print_claims(claims: list[Claim]) -> None:
-    from ..report.formatting import format_number, format_published, count_verdicts
+    from ..report.formatting import count_verdicts, format_number, format_published
 
-    rows = [(c.paper, c.claim, format_published(c), format_number(c.reproduced), _unit(c), _verdict(c.verdict)) for c in claims]
+    rows = [
+        (c.paper, to_plain(c.claim), format_published(c), format_number(c.reproduced), _unit(c), _verdict(c.verdict))
+        for c in claims
+    ]
     headers = ("paper", "claim", "published", "reproduced", "unit", "verdict")
     print_table(headers, rows, right=("published", "reproduced"))
     counts = count_verdicts(tuple(claims))

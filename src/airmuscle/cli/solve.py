@@ -177,11 +177,12 @@ def _as_data(entry: Entry, point: WorkingPoint, validity_range: ValidityRange | 
 
 def _write(entry: Entry, point: WorkingPoint, validity_range: ValidityRange | None, out: Path) -> None:
     from ..core.plotting import save
-    from ..report.isobar_plot import isobar_plot, compute_isobars, isobar_table
+    from ..report.isobar_plot import compute_isobars, isobar_plot, isobar_table
     from ..report.output_folder import atomic_folder
     from ..report.write import save_table
 
     with atomic_folder(out) as place:
         curves = compute_isobars(entry.characteristic, validity_range, point)
         save_table(isobar_table(curves), place / "isobars.csv")
-        save(isobar_plot(entry.characteristic, entry.title, curves, validity_range, point).figure, place / "isobars.png")
+        plot = isobar_plot(entry.characteristic, entry.title, curves, validity_range, point)
+        save(plot.figure, place / "isobars.png")

@@ -46,8 +46,8 @@ def dead_zone(curves: PlaneCurves) -> Plot:
     axes.set(xlabel=PRESSURE, ylabel=CONTRACTION, xlim=(0, pressures[-1] / bar))
     legend_outside(axes)
     caption = (
-        "Dead zone and saturation, as in Fig. 2 of the paper, from its plane curves. The dead zone is the pressure range "
-        f"in which the contraction at {heavy.force:g} N is below 1 % (chosen): up to {dead:.2f} bar."
+        "Dead zone and saturation, as in Fig. 2 of the paper, from its plane curves. The dead zone is the pressure "
+        f"range in which the contraction at {heavy.force:g} N is below 1 % (chosen): up to {dead:.2f} bar."
     )
     return Plot("borzikova_dead_zone", caption, figure)
 
@@ -134,7 +134,7 @@ def residuals(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Plot:
     ).max()
     caption = (
         r"Left: error of the corrected direct surface on the plane curves (with only \(a_{02}\) corrected, up to "
-        f"{100 * max_error:.0f} % at 260 N). Right: difference of the two surfaces; dotted: the loads of the plane curves."
+        f"{100 * max_error:.0f} % at 260 N). Right: difference of the two surfaces; dotted: loads of the plane curves."
     )
     return Plot("borzikova_residuals", caption, figure)
 

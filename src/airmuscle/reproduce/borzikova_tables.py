@@ -86,7 +86,7 @@ def curve_table(curves: PlaneCurves) -> Table:
             f"contraction at {end / bar:g} bar [%]": [round(100 * float(c.contraction(end)), 3) for c in rows],
             "turning points [bar]": [", ".join(f"{p / bar:.3f}" for p in c.turning_pressures()) for c in rows],
         },
-        note="Beyond a turning point within 0 to 3.5 bar the contraction decreases with pressure, which is not physical.",
+        note="Next to a turning point within 0 to 3.5 bar the contraction falls with pressure, which is not physical.",
     )
 
 

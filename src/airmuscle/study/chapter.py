@@ -10,7 +10,7 @@ import numpy as np
 from ..core.reference import cite
 from ..report.chapter import Chapter, Table
 from ..report.output_folder import atomic_folder
-from ..report.write import write_into, save_table
+from ..report.write import save_table, write_into
 from .distributions import LevelSet, Variation
 from .plots import plots
 from .result import StudyResult
