@@ -16,8 +16,8 @@ from airmuscle.characteristic import (
     LogarithmicLength,
     RubberLine,
     VirtualWork,
-    as_force_law,
 )
+from airmuscle.characteristic import as_force_law
 from airmuscle.characteristic.validity_range import ValidityRange
 from airmuscle.geometry.catenary import Catenary
 from airmuscle.geometry.chebyshev import as_polynomial

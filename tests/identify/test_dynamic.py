@@ -17,15 +17,8 @@ from airmuscle.core import tree
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.friction import Dahl
 from airmuscle.geometry import Vessel
-from airmuscle.identify.dynamic import (
-    Experiment,
-    InitialConditions,
-    StartTime,
-    StartValue,
-    fit_dynamic,
-    identifiable,
-    where_sensed,
-)
+from airmuscle.identify.dynamic import Experiment, InitialConditions, StartTime, StartValue, fit_dynamic, where_sensed
+from airmuscle.identify.dynamic import identifiable
 from airmuscle.mechanism import HangingMass, Isometric
 from airmuscle.muscle import Muscle, SwellingWall
 from airmuscle.plant.plant import Plant

@@ -67,6 +67,7 @@ def _stage(paper: str) -> Iterator[None]:
 
 def _print_claims(claims: list[Claim]) -> None:
     from ..report.formatting import count_verdicts, format_number, format_published
+    from ..report.formula import to_plain
 
     rows = [
         (c.paper, to_plain(c.claim), format_published(c), format_number(c.reproduced), _unit(c), _verdict(c.verdict))
