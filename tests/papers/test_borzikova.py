@@ -1,6 +1,7 @@
-"""The chapter on Borzikova et al. judges the paper by computing: other coefficients give other verdicts.
+"""The verdicts on Borzíková et al. are computed: other coefficients give other verdicts.
 
-The printed matrix is neither the exponent of equation (1) nor, for a misprint, the direct surface; repaired it is.
+The printed matrix is neither the exponent of equation (1) nor, because of a misprint, the direct surface; corrected,
+it is the latter.
 """
 
 import dataclasses
@@ -74,12 +75,12 @@ def test_the_misprint_put_back_changes_the_verdict(laws):
 
 
 @pytest.mark.parametrize(
-    ("place", "repaired", "printed", "digit"), [(5, 0.002404, 0.0024, 5e-5), (8, -0.002259, -0.0023, 5e-5)]
+    ("place", "corrected", "printed", "digit"), [(5, 0.002404, 0.0024, 5e-5), (8, -0.002259, -0.0023, 5e-5)]
 )
-def test_the_repair_is_within_rounding_and_matters(laws, place, repaired, printed, digit):
+def test_the_correction_is_within_rounding_and_matters(laws, place, corrected, printed, digit):
     coefficients = list(laws[CORRECTED].coefficients)
-    assert coefficients[place] == repaired
-    assert abs(repaired - printed) < digit
+    assert coefficients[place] == corrected
+    assert abs(corrected - printed) < digit
     coefficients[place] = printed
     assert rms(dataclasses.replace(laws[CORRECTED], coefficients=tuple(coefficients)), 260.0) > 0.5
 
@@ -107,7 +108,7 @@ def test_where_no_index_exists_the_explained_part_stands_in_its_place(laws):
     found = borzikova.surface_claim(PRINTED, laws[PRINTED], CURVES)
     assert index_on_curves(laws[PRINTED], CURVES).value is None
     assert found.reproduced == pytest.approx(-576.65, abs=0.01)
-    assert "No index exists" in found.note
+    assert "The index does not exist" in found.note
 
 
 def test_the_printed_matrix_cannot_be_the_exponent(laws):
@@ -122,14 +123,14 @@ def test_the_printed_matrix_cannot_be_the_exponent(laws):
     assert ranges[260.0] == pytest.approx((-520.5, -504.9), abs=0.05)
 
 
-def test_the_repaired_surface_lies_within_037_per_cent_of_the_curves(laws):
+def test_the_corrected_surface_lies_within_037_per_cent_of_the_curves(laws):
     errors = [rms(laws[CORRECTED], c.force) for c in CURVES.curves]
     assert errors == pytest.approx([0.57, 0.21, 0.20], abs=0.006)
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(0.37, abs=0.005)
     assert index_on_curves(laws[CORRECTED], CURVES).value == pytest.approx(0.99905, abs=5e-6)
 
 
-def test_with_the_misprint_alone_mended_it_is_off_by_a_sixth_at_260_newton(laws):
+def test_with_only_the_misprint_corrected_it_is_off_by_a_sixth_at_260_newton(laws):
     assert 16.0 < rms(laws[MISPRINT_CORRECTED], 260.0, least=0.0) < rms(laws[MISPRINT_CORRECTED], 260.0) < 17.0
 
 
@@ -175,7 +176,7 @@ def test_the_library_holds_the_monotone_fit_of_the_chapter(laws):
     assert np.abs(difference).max() < 1e-7
 
 
-def test_the_chapter_is_whole():
+def test_the_chapter_is_complete():
     chapter = borzikova.chapter()
     assert chapter.paper == "borzikova"
     assert {c.verdict for c in chapter.claims} == {HOLDS, DIFFERS, NOT_PRINTED}
@@ -187,4 +188,4 @@ def test_the_chapter_is_whole():
     }
     breaks = next(t for t in chapter.tables if t.name == "borzikova_breaks")
     assert set(breaks.columns["surface"]) == {CORRECTED, EXPONENTIAL}
-    assert breaks.note == f"Nowhere: {MONOTONE}."
+    assert breaks.note == f"Without violations: {MONOTONE}."

@@ -449,8 +449,8 @@ def test_verdicts_change_with_the_fibre_sum_and_the_projection_factor():
     assert verdict(claims.lifting_claim(replace(law, projection_factor=1.0), "")) == DIFFERS
     assert verdict(claims.initial_pressure_claims(DEFAULT, "")[0]) == HOLDS
     assert verdict(claims.initial_pressure_claims(replace(DEFAULT, projection_factor=1.0), "")[0]) == DIFFERS
-    mended = claims.accuracy_claims(replace(DEFAULT, projection_factor=1.0, slope_factor=2.0), "")[0]
-    assert (verdict(claims.accuracy_claims(DEFAULT, "")[0]), verdict(mended)) == (DIFFERS, DIFFERS)
+    corrected = claims.accuracy_claims(replace(DEFAULT, projection_factor=1.0, slope_factor=2.0), "")[0]
+    assert (verdict(claims.accuracy_claims(DEFAULT, "")[0]), verdict(corrected)) == (DIFFERS, DIFFERS)
     assert verdict(claims.accuracy_claims(exact_mechanics(LINE_A), "")[0]) == HOLDS
     even = replace(exact_mechanics(LINE_A), fibre_sum=GivenSum(8.0))
     assert verdict(claims.accuracy_claims(even, "")[0]) == DIFFERS

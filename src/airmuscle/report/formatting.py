@@ -24,8 +24,10 @@ SMALLEST_P = 1e-3
 _RELATIONS = {AtLeast: "≥ ", AtMost: "≤ "}
 _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 _EXPONENT = re.compile(r"(?:\b1|(\d(?:\.\d+)?))e([-+]?)0*(\d+)\b")
-_POWER = re.compile(r"(?<=[A-Za-z])\^?([23])(?![0-9A-Za-z])")
-_SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+_NUMBERS = re.compile(rf"{_NUMBER.pattern}((, | to ){_NUMBER.pattern})*")
+_NEGATIVE_ZERO = re.compile(r"(?<![\w.])-(?=0(\.0*)?(?![\d.]))")
+_POWER = re.compile(r"(?<=[A-Za-z])(?:\^?([23])|\^([ij]))(?![0-9A-Za-z])")
+_SUPERSCRIPTS = str.maketrans("0123456789ij", "⁰¹²³⁴⁵⁶⁷⁸⁹ⁱʲ")
 
 
 def format_number(value: Any, digits: int = DIGITS) -> str:
@@ -49,7 +51,13 @@ def format_number(value: Any, digits: int = DIGITS) -> str:
 
 
 def format_cell(value: Any) -> str:
-    """Return a table cell: numbers as `format_number` does, also those that are stored as text with more digits."""
+    """Return a table cell: numbers as `format_number` does, also those stored as text, in typographic form."""
+    if isinstance(value, str) and not _NUMBERS.fullmatch(value):
+        return value
+    return typographic(_NEGATIVE_ZERO.sub("", _rounded(value)))
+
+
+def _rounded(value: Any) -> str:
     if is_number_text(value) and not value.lstrip("-+").isdigit():
         mantissa = value.partition("e")[0].lstrip("-+0.")
         if "e" in value or sum(map(str.isdigit, mantissa)) > DIGITS:
@@ -76,7 +84,7 @@ def format_quantity(value: float, unit: str) -> str:
 
 def format_unit(unit: str) -> str:
     """Return a unit with superscripts, `m³/(s Pa)`; empty for the unit 1."""
-    return "" if unit == "1" else _POWER.sub(lambda match: match[1].translate(_SUPERSCRIPTS), unit)
+    return "" if unit == "1" else _POWER.sub(lambda match: (match[1] or match[2]).translate(_SUPERSCRIPTS), unit)
 
 
 def typographic(text: str) -> str:

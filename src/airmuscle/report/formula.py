@@ -13,7 +13,11 @@ import re
 from xml.etree import ElementTree
 
 _FORMULA = re.compile(r"\\\((.+?)\\\)")
+_FORMULA_WITH_PUNCTUATION = re.compile(r"([(\[]*)\\\((.+?)\\\)([)\],.;:%]*)")
+_NO_WRAP = '<span class="nowrap">{}</span>'
+"""Browsers break lines between a formula and the punctuation next to it."""
 _NAME = re.compile(r"(?P<base>[A-Za-z]+)(?:_(?P<index>[A-Za-z0-9]+))?")
+_UNIT_SPACE = re.compile(r"(?<=\d) (?=%|(?:k?N|[kM]?Pa|[mc]?m|k?g|m?s|bar|K|rad|Hz)\b)")
 _GREEK = {
     name: rf"\{name}"
     for name in ("alpha", "beta", "gamma", "delta", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "pi", "rho",
@@ -29,8 +33,18 @@ _SPACED = "=+-<>≤≥≈≠"
 
 def to_mathml(text: str) -> str:
     r"""Return HTML: the text escaped, every formula \(...\) replaced by a MathML element."""
-    parts = _FORMULA.split(text)  # text and formulas alternate
-    return "".join(html.escape(part) if i % 2 == 0 else _mathml(part) for i, part in enumerate(parts))
+    result, end = "", 0
+    for match in _FORMULA_WITH_PUNCTUATION.finditer(text):
+        before, latex, after = match.groups()
+        formula = _escape(before) + _mathml(latex) + _escape(after)
+        result += _escape(text[end : match.start()]) + (_NO_WRAP.format(formula) if before or after else formula)
+        end = match.end()
+    return result + _escape(text[end:])
+
+
+def _escape(text: str) -> str:
+    """Return HTML with a no-break space between a number and its unit."""
+    return _UNIT_SPACE.sub("\N{NO-BREAK SPACE}", html.escape(text))
 
 
 def to_plain(text: str) -> str:
@@ -65,7 +79,7 @@ def _symbol_latex(match: re.Match[str]) -> str:
 def _mathml(latex: str) -> str:
     from latex2mathml.converter import convert  # needed by reports only
 
-    return convert(latex)
+    return convert(latex).replace("<mo>&#x0002F;</mo>", '<mo lspace="0" rspace="0">&#x0002F;</mo>')
 
 
 @functools.cache

@@ -28,6 +28,8 @@ from .versions import versions
 
 MAX_SVG_BYTES = 600_000
 """Figures with a larger SVG are embedded as PNG: a dense chart would make the page slow."""
+MAX_LINE = 26
+"""Characters of a text in a table cell that is not wrapped."""
 SYMBOL, UNIT = "symbol", "unit"
 """Headers of columns with a special format."""
 _BRACKETS = re.compile(r"\s*\[([^\]]*)\]$")
@@ -52,6 +54,7 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
         paragraphs=paragraphs,
         rows=table_rows,
         is_numeric=is_numeric,
+        is_short=is_short,
     )
     template = resources.files(__package__).joinpath("template.html").read_text(encoding="utf-8")
     claims = tuple(claim for chapter in chapters for claim in chapter.claims)
@@ -76,8 +79,7 @@ def render_cell(header: str, value: Any) -> str:
         return to_mathml(symbol_formula(value))
     if header == UNIT and isinstance(value, str):
         return to_mathml(format_unit(value))
-    text = format_cell(value)
-    return to_mathml(text if isinstance(value, str) and not is_number_text(value) else typographic(text))
+    return to_mathml(format_cell(value))
 
 
 def render_header(header: str) -> str:
@@ -109,6 +111,11 @@ def anchor(text: str) -> str:
 def paragraphs(text: str) -> list[str]:
     """Return the paragraphs of a text, which are separated by blank lines."""
     return [" ".join(part.split()) for part in re.split(r"\n\s*\n", text) if part.strip()]
+
+
+def is_short(value: Any) -> bool:
+    """Whether a cell is shown on one line."""
+    return isinstance(value, str) and len(to_plain(value)) <= MAX_LINE
 
 
 def is_numeric(values: Sequence[Any]) -> bool:
