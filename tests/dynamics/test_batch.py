@@ -22,7 +22,7 @@ from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.pneumatics.gas import Isothermal
-from airmuscle.reproduce.hosovsky_plant import Numbers, hanging
+from airmuscle.reproduce.hosovsky_plant import UnpublishedParameters, hanging_load
 from airmuscle.reproduce.hosovsky_plant import plant as third_paper
 from airmuscle.simulation.batch import BatchSolution, Single, simulate_batch, thread_pool, variations
 from airmuscle.simulation.integrators import DormandPrince8, ExplicitRungeKutta, Rodas4, RungeKutta4
@@ -35,7 +35,7 @@ FAST = RungeKutta4(1e-3)
 
 
 def paper():
-    return third_paper(Numbers(), hanging(Numbers()))
+    return third_paper(UnpublishedParameters(), hanging_load(UnpublishedParameters()))
 
 
 def plain():

@@ -373,7 +373,7 @@ def test_a_muscle_file_with_a_bad_table(tmp_path: Path, text: str, message: str)
 @pytest.mark.parametrize("name", ["taken", "taken/below", "a" * 300])
 def test_a_folder_that_cannot_be_made(tmp_path: Path, name: str):
     (tmp_path / "taken").write_text("a file", encoding="utf-8")
-    with pytest.raises(FileError, match=r"cannot be written to: .*Name a folder that you may write to"):
+    with pytest.raises(FileError, match=r"cannot be written to: .*Specify a folder with write permission"):
         check_writable(tmp_path / name)
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 
@@ -391,7 +391,7 @@ def test_a_name_that_is_taken_leaves_the_folder_as_it_was(tmp_path: Path, blocke
     target.mkdir()
     (target / blocked).mkdir() if is_folder else (target / blocked).write_text("a file", encoding="utf-8")
     kind = "folder" if is_folder else "file"
-    with pytest.raises(FileError, match=rf"a {kind} of that name is there \(.*{blocked}\)"):
+    with pytest.raises(FileError, match=rf"a {kind} of this name exists \(.*{blocked}\)"):
         write_a_run(target)
     assert [path.name for path in target.rglob("*")] == [blocked]
 

@@ -394,8 +394,8 @@ def test_a_run_that_fails_keeps_what_it_has_and_says_why(scenario: Path, tmp_pat
     rows = np.array([[float(cell) for cell in line.split(",")] for line in lines if line[0].isdigit()])
     assert 5.0 < rows[-1, 0] <= float(found[1])
     assert np.isfinite(rows).all()
-    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
-    assert "A run of 25 s that ended early, at " in page
+    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
+    assert "Simulation of 25 s, ended early at " in page
     assert f"<p>{error.removeprefix('error: ').capitalize()[:30]}" in page, "the last note says why"
 
 
@@ -408,12 +408,12 @@ def test_the_report_of_a_run_shows_inputs_parameters_sources_and_notes(scenario:
     scenario.write_text(f"{named}\n{driver}\n[output]\ncolumns = ['force']", encoding="utf-8")
     result = airmuscle("simulate", scenario, "--out", tmp_path / "run")
     assert result.exit_code == 0, result.output
-    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
     for text in (
-        "A run of 0.5 s. The recording is recording.csv.",
+        "Simulation of 0.5 s. All columns are in recording.csv.",
         "was outside the validity range of its characteristic in pressure",
-        "Inputs of the plant; dashed, what the drivers were told.",
-        "fill 1 from 0.1 s, 0 from 0.3 s; driven: fill by PWM(frequency=50.0, smallest_pulse=0.0), SolenoidDriver(opening_delay=",
+        "Inputs applied to the plant; dashed: commands to the drivers.",
+        "fill 1 from 0.1 s, 0 from 0.3 s; drivers: fill: PWM(frequency=50.0, smallest_pulse=0.0), SolenoidDriver(opening_delay=",
         "<td>muscle.contractile.wall_thickness</td>",
         "Rodas4(rtol=1e-06)",
         "Martens",
@@ -493,7 +493,7 @@ def test_an_interrupted_reproduction_is_polite(tmp_path: Path, one_paper: types.
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path):
     (tmp_path / "taken").write_text("a file")
     result = airmuscle("reproduce", "--out", tmp_path / "taken")
-    assert_failed(result, ".*taken: cannot be written to: .*Name a folder that you may write to")
+    assert_failed(result, ".*taken: cannot be written to: .*Specify a folder with write permission")
     assert (tmp_path / "taken").read_text() == "a file"
 
 

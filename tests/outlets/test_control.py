@@ -24,7 +24,7 @@ from airmuscle.control.control_loop import ControlLoop
 from airmuscle.control.driver import PWM, SolenoidDriver, WithDrivers
 from airmuscle.control.inputs import ZERO_INPUT, Periodic, SampledSignal, Schedule
 from airmuscle.core.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownNameError
-from airmuscle.report.run_chapter import in_words, run_chapter
+from airmuscle.report.run_chapter import describe_input, run_chapter
 from airmuscle.scenario.scenario import load_scenario
 from airmuscle.scenario.schema import scenario_schema
 from airmuscle.study.study import load_study
@@ -305,16 +305,16 @@ def test_the_report_shows_set_point_and_measurement_with_units():
     assert np.array_equal(lines["measured"][:, 1], run["pressure"] * 1e-3)
     assert loop.figure.axes[0].get_ylabel() == "pressure\n[kPa]"
     assert all("setpoint" not in axis.get_ylabel() for axis in whole.figure.axes)
-    had = {line.get_label(): line.get_xydata() for line in inputs.figure.axes[0].lines}
-    assert set(had) == {"command", "what the plant had"}
-    assert inputs.caption.endswith("dashed, what the drivers were told.")
+    applied = {line.get_label(): line.get_xydata() for line in inputs.figure.axes[0].lines}
+    assert set(applied) == {"command", "applied input"}
+    assert inputs.caption.endswith("; dashed: commands to the drivers.")
     table = chapter.tables[1]
     assert table.title == "Parameters of the controller, PID"
     assert dict(zip(table.columns["parameter"], table.columns["unit"], strict=True))["gain"] == "1/Pa"
     assert "astrom-hagglund-1995" in [r.key for r in chapter.references]
     settings = {name: value for name, value, _ in chapter.chosen}
-    assert settings["command"].startswith(
-        "every 0.02 s PID commands fill, discharge; set point: pressure 100000 from 0 s,"
+    assert settings["inputs"].startswith(
+        "PID, sample time 0.02 s, manipulated inputs fill, discharge; set point: pressure 100000 from 0 s,"
     )
 
 
@@ -322,10 +322,10 @@ def test_a_loop_without_drivers_is_drawn_to_its_end(tmp_path: Path):
     scenario = load_scenario(written(tmp_path, ('period = "5 ms"', 'period = "0.5 ms"')))
     run = scenario.simulate()
     plot = run_chapter(scenario, run).plots[-1]
-    (had,) = [line.get_xydata() for line in plot.figure.axes[0].lines]
-    assert plot.caption == "Inputs of the plant."
-    assert had[-1, 0] == 0.3
-    assert in_words(scenario.command).endswith("; beside: none")
+    (applied,) = [line.get_xydata() for line in plot.figure.axes[0].lines]
+    assert plot.caption == "Inputs applied to the plant."
+    assert applied[-1, 0] == 0.3
+    assert describe_input(scenario.command).endswith("; other inputs: none")
     assert not isinstance(scenario.command.as_open_loop(run), WithDrivers)
 
 

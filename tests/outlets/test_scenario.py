@@ -33,7 +33,7 @@ from airmuscle.mechanism import HangingMass, Isometric, WithLatch
 from airmuscle.muscle import LinearDamper
 from airmuscle.pneumatics import ClosedChamber
 from airmuscle.pneumatics.gas import Isothermal, Polytropic
-from airmuscle.report.run_chapter import _inputs
+from airmuscle.report.run_chapter import _input_plot
 from airmuscle.scenario.scenario import load_scenario
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
 
@@ -233,8 +233,8 @@ lag = {{ model = "SecondOrderLag", frequency = "20 Hz", damping_ratio = 0.7 }}
     text = GOOD[:i] + regulator + GOOD[j:].replace(FILL, 'setpoint = [["0.1 s", "2 bar"], ["0.2 s", 1e5]]')
     scenario = load_scenario(written(tmp_path, text=text))
     assert scenario.command == Schedule({"setpoint": ((0.1, 2e5), (0.2, 1e5))})
-    assert "setpoint\n[Pa]" in [axis.get_ylabel() for axis in _inputs(scenario, scenario.simulate()).figure.axes]
-    with pytest.raises(UnitError, match=r"\[command\], setpoint: unit 'mm' cannot be converted to 'Pa'"):
+    assert "setpoint\n[Pa]" in [axis.get_ylabel() for axis in _input_plot(scenario, scenario.simulate()).figure.axes]
+    with pytest.raises(UnitError, match=r"\[command\], setpoint: unit 'mm' cannot become 'Pa'"):
         load_scenario(written(tmp_path, ('"2 bar"', '"2 mm"'), text=text))
 
 

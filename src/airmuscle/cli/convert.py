@@ -79,7 +79,7 @@ def _validity_range(entry: Entry, given: tuple[str | None, str | None, str | Non
     from ..characteristic.validity_range import ValidityRange
     from ..core.errors import ParameterError
     from ..core.units import quantity
-    from ..report.chart import validity_range_of
+    from ..report.isobar_plot import validity_range_of
 
     names = ("min_pressure", "max_pressure", "min_contraction", "max_contraction")
     own = validity_range_of(entry.characteristic, entry.validity_range)

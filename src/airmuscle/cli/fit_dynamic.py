@@ -107,7 +107,7 @@ def _write(
 ) -> list[Path]:
     from ..report.dynamic_chapter import dynamic_chapters
     from ..report.output_folder import atomic_folder
-    from ..report.write import fill
+    from ..report.write import write_into
 
     names = []
     with atomic_folder(out) as place:
@@ -115,7 +115,7 @@ def _write(
             suffix = f"-{i + 1}" if len(study.experiments) > 1 else ""
             names.append(f"scenario{suffix}.toml")
             (place / names[-1]).write_text(study.scenario(found, i), encoding="utf-8")
-        fill(place, dynamic_chapters(found, study.title, profiles, remarks), title="Dynamic fit")
+        write_into(place, dynamic_chapters(found, study.title, profiles, remarks), title="Dynamic fit")
     return [out / name for name in names]
 
 

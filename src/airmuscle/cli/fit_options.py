@@ -93,7 +93,7 @@ class FitExtras:
         from ..report.uncertainty_chapter import uncertainty_chapter
 
         shape = [] if self.shaped is None else [shape_chapter(self.shaped, self.sure.fit, self.free)]
-        return [*shape, *([uncertainty_chapter(self.sure)] if self.sure.asked else [])]
+        return [*shape, *([uncertainty_chapter(self.sure)] if self.sure.requested else [])]
 
     def lines(self) -> list[str]:
         """The same for a terminal."""

@@ -72,10 +72,10 @@ def write(result: Fit, entry: Entry, recordings: list[Recording], out: Path, cha
     from ..library.write import save
     from ..report.fit_chapter import fit_chapter
     from ..report.output_folder import atomic_folder
-    from ..report.write import fill
+    from ..report.write import write_into
 
     with atomic_folder(out) as place:
         save(entry, place / "muscle.toml")
         notes = tuple(dict.fromkeys(note for run in recordings for note in run.notes))
         worded = dataclasses.replace(result, notes=tuple(in_options(note) for note in result.notes))
-        fill(place, [*chapters, fit_chapter(worded, entry, notes)], title="Fit")
+        write_into(place, [*chapters, fit_chapter(worded, entry, notes)], title="Fit")

@@ -111,11 +111,11 @@ def _write(
     from ..library.write import part_toml, save
     from ..report.hysteresis_chapter import hysteresis_chapters
     from ..report.output_folder import atomic_folder
-    from ..report.write import fill
+    from ..report.write import write_into
 
     name = None if chosen is None else "friction.toml" if entry is None else "muscle.toml"
     with atomic_folder(out) as place:
-        fill(place, hysteresis_chapters(found, creep), title="Friction")
+        write_into(place, hysteresis_chapters(found, creep), title="Friction")
         if chosen is not None and entry is not None:
             save(_with_friction(entry, chosen), place / "muscle.toml")
         elif chosen is not None:
@@ -133,10 +133,10 @@ def _with_friction(entry: Entry, chosen: HysteresisFit) -> Entry:
 
 
 def _print(found: Sequence[LoopFit], creep: Sequence[str]) -> None:
-    from ..report.hysteresis_chapter import counted
+    from ..report.hysteresis_chapter import describe_row_counts
 
     for each in found:
-        typer.echo(f"{each.loop.recording.origin}: {each.loop.description}. {counted(each.loop)}")
+        typer.echo(f"{each.loop.recording.origin}: {each.loop.description}. {describe_row_counts(each.loop)}")
         rows = [
             (type(f.friction).__name__, f"{f.rmse_without_friction:.3g} to {f.rmse:.3g} N", _judge(f),
              f"{f.aicc_reduction:.4g}", "< 1e-300" if f.p_value < 1e-300 else f"{f.p_value:.2g}",

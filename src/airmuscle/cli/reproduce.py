@@ -66,12 +66,16 @@ def _stage(paper: str) -> Iterator[None]:
 
 
 def _print_claims(claims: list[Claim]) -> None:
-    from ..report.wording import number, published, tally
+    from ..report.formatting import count_verdicts, format_number, format_published
+    from ..report.formula import to_plain
 
-    rows = [(c.paper, c.claim, published(c), number(c.reproduced), _unit(c), _verdict(c.verdict)) for c in claims]
+    rows = [
+        (c.paper, to_plain(c.claim), format_published(c), format_number(c.reproduced), _unit(c), _verdict(c.verdict))
+        for c in claims
+    ]
     headers = ("paper", "claim", "published", "reproduced", "unit", "verdict")
     print_table(headers, rows, right=("published", "reproduced"))
-    counts = tally(tuple(claims))
+    counts = count_verdicts(tuple(claims))
     typer.echo(f"{len(claims)} claims: " + ", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
 
 
@@ -82,6 +86,6 @@ def _unit(claim: Claim) -> str:
 def _verdict(verdict: str) -> Text:
     from rich.text import Text
 
-    from ..report.wording import MARKS
+    from ..report.formatting import MARKS
 
     return Text(f"{MARKS[verdict]} {verdict}", style=COLOURS[verdict], no_wrap=True)

@@ -91,7 +91,7 @@ def _parameters(part: str, thing: Any) -> list[dict[str, Any]]:
 
 
 def _print(entry: dict[str, Any]) -> None:
-    from ..report.wording import number
+    from ..report.formatting import format_number
 
     typer.echo(f"{entry['name']}: {entry['title']}")
     typer.echo(f"provenance: {entry['provenance']}")
@@ -100,13 +100,18 @@ def _print(entry: dict[str, Any]) -> None:
             typer.echo(f"{key}: {entry[key]}")
     typer.echo("made of: " + ", ".join(f"{part} {model}" for part, model in entry["models"].items()) + "\n")
     rows = [
-        (p["name"], p["symbol"], number(p["value"]), _unit(p["unit"]), p["meaning"], _bounds(p["bounds"]))
+        (p["name"], p["symbol"], format_number(p["value"], 6), _unit(p["unit"]), p["meaning"], _bounds(p["bounds"]))
         for p in _shortened(entry["parameters"])
     ]
     print_table(("parameter", "symbol", "value", "unit", "meaning", "bounds"), rows, right=("value",))
     if entry["checks"]:
         checks = [
-            (c["quantity"], _given(c["given"]), f"{number(c['equals'])} ± {number(c['tolerance'])}", c["source"])
+            (
+                c["quantity"],
+                _given(c["given"]),
+                f"{format_number(c['equals'], 6)} ± {format_number(c['tolerance'], 6)}",
+                c["source"],
+            )
             for c in entry["checks"]
         ]
         typer.echo()

@@ -73,10 +73,10 @@ def _range(recording: Recording) -> dict[str, dict[str, float | str]]:
 
 
 def _print(scenario: Scenario, recording: Recording) -> None:
-    from ..report.wording import number
+    from ..report.formatting import format_number
 
     typer.echo(f"{scenario.title}: {len(recording)} rows over {scenario.duration:g} s")
-    rows = [tuple(number(v) for v in found.values()) for found in _range(recording).values()]
+    rows = [tuple(format_number(v) for v in found.values()) for found in _range(recording).values()]
     print_table(("column", "min", "max", "last"), rows, right=("min", "max", "last"))
     for note in recording.notes:
         typer.echo(f"note: {note}")
@@ -86,8 +86,8 @@ def _write(scenario: Scenario, recording: Recording, out: Path) -> None:
     from ..recording.csv_writer import write_csv
     from ..report.output_folder import atomic_folder
     from ..report.run_chapter import run_chapter
-    from ..report.write import fill
+    from ..report.write import write_into
 
     with atomic_folder(out) as place:
         write_csv(scenario.select_columns(recording), place / "recording.csv")
-        fill(place, [run_chapter(scenario, recording)], title="Simulation")
+        write_into(place, [run_chapter(scenario, recording)], title="Simulation")

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..characteristic.base import Characteristic
     from ..characteristic.validity_range import ValidityRange
     from ..library.entry import Entry
-    from ..report.chart import Point
+    from ..report.isobar_plot import WorkingPoint
 
 UNITS = {"pressure": "Pa", "contraction": "1", "force": "N"}
 
@@ -46,8 +46,8 @@ def solve(
       airmuscle solve dmsp-20-300 --contraction "12 %" --force "100 N" --out chart
       airmuscle solve my/muscle.toml --pressure "400 kPa" --contraction 0.1 --json
     """
-    from ..library.catalogue import load_law
-    from ..report.chart import point_text, validity_range_of
+    from ..library.catalogue import load
+    from ..report.isobar_plot import describe_point, validity_range_of
 
     texts = {"pressure": pressure, "contraction": contraction, "force": force}
     missing = [quantity for quantity, text in texts.items() if text is None]
@@ -66,15 +66,15 @@ def solve(
         print_table(("quantity", "value", ""), _rows(entry, point, missing[0]), right=("value",))
     if out is not None:
         _write(entry, point, validity_range, out)
-        typer.echo(f"chart: {out / 'isobars.png'}, data: {out / 'isobars.csv'} ({point_text(point)})", err=json)
+        typer.echo(f"chart: {out / 'isobars.png'}, data: {out / 'isobars.csv'} ({describe_point(point)})", err=json)
 
 
-def _solved(characteristic: Characteristic, texts: dict[str, str | None]) -> Point:
+def _solved(characteristic: Characteristic, texts: dict[str, str | None]) -> WorkingPoint:
     from ..characteristic.base import ForceLaw
     from ..core.errors import SolveError
     from ..core.units import quantity
     from ..pneumatics.gas import Ambient, check_above_vacuum
-    from ..report.chart import Point, point_text
+    from ..report.isobar_plot import WorkingPoint, describe_point
 
     given = {name: quantity(text, UNITS[name], where=f"--{name}") for name, text in texts.items() if text is not None}
     if "pressure" in given:
@@ -82,10 +82,10 @@ def _solved(characteristic: Characteristic, texts: dict[str, str | None]) -> Poi
     if "contraction" in given and isinstance(characteristic, ForceLaw):  # others refuse by themselves
         _check_reachable(characteristic, given["contraction"])
     (wanted,) = UNITS.keys() - given.keys()
-    point = Point(**given, **{wanted: float(getattr(characteristic, wanted)(*given.values()))})
+    point = WorkingPoint(**given, **{wanted: float(getattr(characteristic, wanted)(*given.values()))})
     if not math.isfinite(sum(point)) or (wanted == "contraction" and not -0.5 <= point.contraction < 1.0):
         raise SolveError(
-            f"{type(characteristic).__name__} answers with {point_text(point)}, which no muscle can be. "
+            f"{type(characteristic).__name__} answers with {describe_point(point)}, which no muscle can be. "
             "The question lies far outside the range of its numbers (airmuscle show)."
         )
     return point
@@ -104,7 +104,7 @@ def _check_reachable(characteristic: Characteristic, contraction: float) -> None
         )
 
 
-def _stiffness(entry: Entry, point: Point) -> float | None:
+def _stiffness(entry: Entry, point: WorkingPoint) -> float | None:
     """-dF/deps at constant pressure [N]; None where the law has no single force at this point."""
     from ..core.errors import PhysicsError
 
@@ -114,7 +114,7 @@ def _stiffness(entry: Entry, point: Point) -> float | None:
         return None
 
 
-def _warn(point: Point, validity_range: ValidityRange | None) -> None:
+def _warn(point: WorkingPoint, validity_range: ValidityRange | None) -> None:
     import warnings
 
     from ..core.errors import AirmuscleWarning
@@ -140,7 +140,7 @@ def _resting_length(entry: Entry) -> float | None:
     return next(found, None)
 
 
-def _rows(entry: Entry, point: Point, wanted: str) -> list[tuple[str, str, str]]:
+def _rows(entry: Entry, point: WorkingPoint, wanted: str) -> list[tuple[str, str, str]]:
     values = {
         "pressure": f"{point.pressure / 1e3:.6g} kPa",
         "contraction": f"{100 * point.contraction:.4g} %",
@@ -161,7 +161,7 @@ def _rows(entry: Entry, point: Point, wanted: str) -> list[tuple[str, str, str]]
     return [*rows, ("stiffness", per_length, "at constant pressure")]
 
 
-def _as_data(entry: Entry, point: Point, validity_range: ValidityRange | None, wanted: str) -> dict[str, Any]:
+def _as_data(entry: Entry, point: WorkingPoint, validity_range: ValidityRange | None, wanted: str) -> dict[str, Any]:
     return {
         "name": entry.name,
         "solved": wanted,
@@ -175,13 +175,14 @@ def _as_data(entry: Entry, point: Point, validity_range: ValidityRange | None, w
     }
 
 
-def _write(entry: Entry, point: Point, validity_range: ValidityRange | None, out: Path) -> None:
+def _write(entry: Entry, point: WorkingPoint, validity_range: ValidityRange | None, out: Path) -> None:
     from ..core.plotting import save
-    from ..report.chart import chart, isobars, table
+    from ..report.isobar_plot import compute_isobars, isobar_plot, isobar_table
     from ..report.output_folder import atomic_folder
     from ..report.write import save_table
 
     with atomic_folder(out) as place:
-        curves = isobars(entry.characteristic, validity_range, point)
-        save_table(table(curves), place / "isobars.csv")
-        save(chart(entry.characteristic, entry.title, curves, validity_range, point).figure, place / "isobars.png")
+        curves = compute_isobars(entry.characteristic, validity_range, point)
+        save_table(isobar_table(curves), place / "isobars.csv")
+        plot = isobar_plot(entry.characteristic, entry.title, curves, validity_range, point)
+        save(plot.figure, place / "isobars.png")

@@ -127,9 +127,12 @@ def _print(result: StudyResult) -> None:
 
 
 def _print_table(table: Table) -> None:
-    from ..report.wording import number, rows
+    from ..report.formatting import format_number, table_rows
 
-    words = [tuple(value if isinstance(value, str) else _short(number(value)) for value in row) for row in rows(table)]
+    words = [
+        tuple(value if isinstance(value, str) else _short(format_number(value)) for value in row)
+        for row in table_rows(table)
+    ]
     numeric = [h.strip() for h, values in table.columns.items() if not isinstance(next(iter(values)), str)]
     print_table([header.strip() for header in table.columns], words, right=numeric)
 

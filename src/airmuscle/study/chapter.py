@@ -10,7 +10,7 @@ import numpy as np
 from ..core.reference import cite
 from ..report.chapter import Chapter, Table
 from ..report.output_folder import atomic_folder
-from ..report.write import fill, save_table
+from ..report.write import save_table, write_into
 from .distributions import LevelSet, Variation
 from .plots import study_plots
 from .result import StudyResult
@@ -29,12 +29,12 @@ def write_study(result: StudyResult, folder: Path | str) -> Path:
     The files are written atomically: all or none. Raises FileError if the folder cannot be written to.
     """
     study = result.study
-    with atomic_folder(folder) as directory:
-        save_table(result.table(), directory / RESULTS_FILE)
+    with atomic_folder(folder) as place:
+        save_table(result.table(), place / RESULTS)
         if study.time_series:
-            times = {f"{name}_time": series.times for name, series in study.time_series.items()}
-            np.savez(directory / TIME_SERIES_FILE, **times, **result.time_series)  # type: ignore[arg-type]
-        fill(directory, [study_chapter(result)], title="Parameter study")
+            times = {f"{name}_time": course.times for name, course in study.time_series.items()}
+            np.savez(place / COURSES, **times, **result.time_series)  # type: ignore[arg-type]
+        write_into(place, [study_chapter(result)], title="Parameter study")
     return Path(folder) / "report.html"
 
 
