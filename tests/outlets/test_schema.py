@@ -193,7 +193,7 @@ def test_a_broken_scenario_is_found_by_the_schema_and_refused_by_the_program(
         ('wall_thickness = "1.8 mm"\n', "", ".characteristic: none of"),
         ('quantity = "force"', 'quantity = "stiffness"', ".check[0].quantity: none of"),
         ('equals = "328.0 N"', "", ".check[0]: lacks equals"),
-        ("max_contraction", "max_contractoin", ".validity_range: greatest_contractoin is not known"),
+        ("max_contraction", "max_contractoin", ".validity_range: max_contractoin is not known"),
     ],
 )
 def test_a_broken_muscle_is_found_by_the_schema_and_refused_by_the_program(was: str, becomes: str, fault: str):
@@ -229,4 +229,4 @@ def test_the_command_prints_or_writes_what_editors_read(tmp_path: Path):
     assert "cannot be written to" in refused.stderr
     nameless = CliRunner().invoke(app, ["schema", "--out", ""])
     assert nameless.exit_code == 2
-    assert "wants the name of a file" in nameless.stderr
+    assert "--out must be a file name" in nameless.stderr

@@ -175,10 +175,10 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(folder: Path, workers: 
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "of 2000 runs are kept in" in said
-    assert "the same command goes on from there" in said
+    assert "of 2000 runs are saved in" in said
+    assert "the same command resumes from there" in said
     assert "Traceback" not in said
-    (kept,) = re.findall(r"(\d+) of 2000 runs are kept", said)
+    (kept,) = re.findall(r"(\d+) of 2000 runs are saved", said)
     assert int(kept) == 4 * len(list((folder / "out" / "chunks").glob("*.npz")))
     assert not (folder / "out" / "results.csv").exists()
 
@@ -221,6 +221,8 @@ def test_ctrl_c_that_python_loses_is_remembered(monkeypatch):
             working()
         check_interrupted()  # forgotten once the block has raised it
         with pytest.raises(KeyboardInterrupt), deferred_sigint():
+            interrupted_import()
+        with pytest.raises(KeyboardInterrupt), deferred_sigint(), deferred_sigint():  # blocks may be nested
             interrupted_import()
         with pytest.raises(ImportError), deferred_sigint():
             raise ImportError
@@ -466,7 +468,7 @@ def test_a_study_of_failures_alone_says_so(folder: Path):
         app, ["sweep", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1"]
     )
     assert done.exit_code == 1
-    assert "all 22 runs failed; the first because: " in done.stderr
+    assert "all 22 runs failed; reason of the first: " in done.stderr
     assert (folder / "out" / "results.csv").exists()
 
 

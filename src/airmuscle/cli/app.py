@@ -16,7 +16,7 @@ import typer
 from typer.core import TyperGroup
 
 from ..core.errors import AirmuscleError, AirmuscleWarning, suggestion
-from .interruption import INTERRUPTED, deferred_sigint
+from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
 from .remedies import in_options
 from .terminal import echo, printable
 
@@ -68,8 +68,10 @@ class LazyCommands(TyperGroup):
         row = _ROWS.get(cmd_name)
         if row is None:
             return None
+        function = getattr(importlib.import_module(f".{row.module}", __package__), row.function)
+        check_interrupted()
         command = typer.Typer(**SETTINGS)
-        command.command(row.name)(getattr(importlib.import_module(f".{row.module}", __package__), row.function))
+        command.command(row.name)(function)
         return typer.main.get_command(command)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:

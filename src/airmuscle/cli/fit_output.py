@@ -28,7 +28,7 @@ def print_results(lines: Sequence[str], out: Path) -> None:
 
 
 def fitted_entry(result: Fit, initial: Entry, files: list[Path]) -> Entry:
-    """The initial entry with the fitted characteristic, a new provenance, and without its checks, which no longer apply."""
+    """The initial entry with the fitted characteristic and a new provenance, without its checks."""
     summary = dict(result.summary())
     names = ", ".join(f.name for f in files)
     note = f"Fitted to {names}: rms error {summary['rms error']}, maximum error {summary['greatest error']}."

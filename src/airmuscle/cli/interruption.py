@@ -16,7 +16,7 @@ _received = threading.Event()
 
 @contextlib.contextmanager
 def deferred_sigint() -> Iterator[None]:
-    """Within the block SIGINT raises KeyboardInterrupt; if that exception is lost, the end of the block raises it again.
+    """Within the block SIGINT raises KeyboardInterrupt; if that exception is lost, the end of the block raises it.
 
     Python discards exceptions raised in a destructor or in the callback of a weak reference, and imports run many of
     these; an extension module whose import is interrupted raises ImportError instead. Blocks may be nested. Outside

@@ -69,7 +69,7 @@ def encoding_of(content: bytes) -> str:
 
 def is_comment(line: str) -> bool:
     """Whether a line is a comment; only for lines that hold something."""
-    return line.lstrip()[0] in "#%"
+    return line.lstrip().startswith(("#", "%"))
 
 
 def holds_something(line: str) -> bool:
