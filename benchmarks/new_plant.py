@@ -34,7 +34,7 @@ REASON = (
 ONE_RUN = """
 import sys
 from filling import runs
-from airmuscle.simulate import simulate
+from airmuscle import simulate
 run = runs()[int(sys.argv[1])]
 simulate(run.system, run.command, duration=0.1, start=run.start)
 """
