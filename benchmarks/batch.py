@@ -118,8 +118,8 @@ def make_c_batch(
     count, size = parameters.shape[1], -(-parameters.shape[1] // lanes) * lanes
     padded = np.ascontiguousarray(np.pad(parameters, ((0, 0), (0, size - count)), mode="edge"))
     instants = np.ascontiguousarray(np.repeat(np.array(SWITCHED)[:, None], size, axis=1))
-    pointer, whole = ctypes.c_void_p, ctypes.c_long
-    library.batch.argtypes = [pointer, pointer, pointer, whole, whole, whole, whole, ctypes.c_double]
+    pointer, long = ctypes.c_void_p, ctypes.c_long
+    library.batch.argtypes = [pointer, pointer, pointer, long, long, long, long, ctypes.c_double]
 
     def call(cores: int) -> Array:
         state = np.ascontiguousarray(np.repeat(start[:, None], size, axis=1))

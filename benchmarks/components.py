@@ -183,15 +183,22 @@ def measure(composed: Run, single: Run | None, rounds: int) -> tuple[tuple[tuple
     if single:
         check_rates(ready["single system"], ready["components"], single.start)
     derivatives = time_variants({n: make_calls(ready[n], run.start) for n, run in both.items()}, rounds)
-    whole = time_variants({n: kernel(run, ready[n], Rodas4(RTOL)) for n, run in both.items()}, rounds)
+    simulations = time_variants({n: kernel(run, ready[n], Rodas4(RTOL)) for n, run in both.items()}, rounds)
     last = derivatives[list(both)[-1]].minimum
     rows, size = [], len(composed.system.states)
     for name, run in both.items():
         steps = Rodas4(RTOL).run(ready[name], run.segments, 0.0, run.vector, run.times).steps
-        cells = (derivatives[name].minimum / CALLS, whole[name].median, whole[name].minimum)
+        cells = (derivatives[name].minimum / CALLS, simulations[name].median, simulations[name].minimum)
         ratio = f"{derivatives[name].minimum / last:.3g}" if single else ""
         rows.append(
-            (str(size), name, *map(format_time, cells), str(steps), format_time(whole[name].median / steps), ratio)
+            (
+                str(size),
+                name,
+                *map(format_time, cells),
+                str(steps),
+                format_time(simulations[name].median / steps),
+                ratio,
+            )
         )
     if not single:
         return tuple(rows), ()

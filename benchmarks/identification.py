@@ -90,7 +90,7 @@ def fit_scipy(settings: ScipySettings, start: Array) -> tuple[float, float, int]
 
     plant, recording = case().plant, case().experiment.recording
     leaves, problem = list(tree.leaves(plant)), case().problem(Rodas4())
-    places = [[leaf.path for leaf in leaves].index(path) for path in FREE]
+    indices = [[leaf.path for leaf in leaves].index(path) for path in FREE]
     measured = np.column_stack([recording[name] for name in SENSORS])
     count = 0
 
@@ -98,8 +98,8 @@ def fit_scipy(settings: ScipySettings, start: Array) -> tuple[float, float, int]
         nonlocal count
         count += 1
         numbers = [leaf.value for leaf in leaves]
-        for place, value in zip(places, scaled * problem.scales, strict=True):
-            numbers[place] = float(value)
+        for index, value in zip(indices, scaled * problem.scales, strict=True):
+            numbers[index] = float(value)
         return ((simulate_scipy(tree.unflatten(plant, numbers), settings) - measured) / list(SENSORS.values())).ravel()
 
     begin = time.perf_counter()

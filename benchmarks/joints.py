@@ -118,13 +118,13 @@ class JointWithHeat(Joint):
         opened = ops.maximum(spool, 0.0), ops.maximum(-spool, 0.0)
         incoming, through = self._flows(side, state, pressure, *opened)
         wall = self.ambient.temperature
-        carried = (HEAT_CAPACITY + GAS_CONSTANT) * through * ops.where(through >= 0, wall, temperature)
+        energy_flow = (HEAT_CAPACITY + GAS_CONSTANT) * through * ops.where(through >= 0, wall, temperature)
         heat = self.heat_transfer * (wall - temperature)
         tension = self.muscle.tension(gauge(pressure, self.ambient), contraction, speed)
         return tension, {
             f"{side}.air_mass": through,
             f"{side}.tube_mass": incoming - through,
-            f"{side}.energy": carried - pressure * growth + heat,
+            f"{side}.energy": energy_flow - pressure * growth + heat,
             f"{side}.spool": (inputs[f"{side}.fill"] - inputs[f"{side}.discharge"] - spool) / self.spool_lag,
         }
 

@@ -200,9 +200,9 @@ def ten_states(system: JointWithHeat) -> Callable[[Sequence[float]], Rates]:
         elif spool < 0.0:
             incoming = spool * valve(t, outside)
         through = tube(t, p)
-        carried = cp * through * (wall if through >= 0.0 else temperature)
+        energy_flow = cp * through * (wall if through >= 0.0 else temperature)
         work = p * k * (3.0 * css - 1.0) * speed * per_length
-        heating = carried - work + transfer * (wall - temperature)
+        heating = energy_flow - work + transfer * (wall - temperature)
         tension = force(p - outside, contraction, speed)
         return tension, through, incoming - through, heating, (goal - spool) * inverse_lag
 

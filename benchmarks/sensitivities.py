@@ -141,8 +141,8 @@ def make_jax_variant(form: str) -> Callable[[], tuple[Array, Array]]:
     jax.config.update("jax_enable_x64", True)
     stacked = form == FORMS[1]
     plant, leaves = case().plant, list(tree.leaves(case().plant))
-    places = [[leaf.path for leaf in leaves].index(path) for path in FREE]
-    values = np.array([leaves[place].value for place in places])
+    indices = [[leaf.path for leaf in leaves].index(path) for path in FREE]
+    values = np.array([leaves[index].value for index in indices])
     start, by_start = case().problem(RungeKutta4(STEP)).courses[0].start(values)
     t, names = trace_system(plant), [s.name for s in plant.states]
     outputs = list(t.output_names)
@@ -151,12 +151,12 @@ def make_jax_variant(form: str) -> Callable[[], tuple[Array, Array]]:
     observed = instructions([t.x, t.u, t.p], [casadi.vertcat(*seen)])
     recording, count = case().experiment.recording, round(DURATION / STEP)
     openings = case().segments.inputs_at((np.arange(count) + 0.5) * STEP, 0.0)
-    held = jnp.asarray(openings.reshape(-1, round(SPACING / STEP), openings.shape[1]))
+    inputs_of_rows = jnp.asarray(openings.reshape(-1, round(SPACING / STEP), openings.shape[1]))
 
     def residual(scaled: Any) -> Any:
         p: list[Any] = [leaf.value for leaf in leaves]
-        for k, place in enumerate(places):
-            p[place] = scaled[k] * values[k]
+        for k, index in enumerate(indices):
+            p[index] = scaled[k] * values[k]
 
         def moved(x: Any, h: float, k: Any) -> Any:
             return tuple(a + h * b for a, b in zip(x, k, strict=True))
@@ -176,9 +176,9 @@ def make_jax_variant(form: str) -> Callable[[], tuple[Array, Array]]:
             return end, end
 
         begin = tuple(start[i] + (by_start[i] * values) @ (scaled - 1.0) for i in range(start.size))
-        rows = jax.lax.scan(row, jnp.stack(begin) if stacked else begin, held)[1]
+        rows = jax.lax.scan(row, jnp.stack(begin) if stacked else begin, inputs_of_rows)[1]
         columns = [jnp.concatenate([begin[i][None], rows[:, i] if stacked else rows[i]]) for i in range(start.size)]
-        modelled = evaluate_in_jax(observed, (columns, [0.0] * held.shape[2], p))
+        modelled = evaluate_in_jax(observed, (columns, [0.0] * inputs_of_rows.shape[2], p))
         errors = [(y - recording[name]) / size for y, (name, size) in zip(modelled, SENSORS.items(), strict=True)]
         return jnp.stack(errors, axis=1).ravel()
 

@@ -37,8 +37,8 @@ def test_the_hand_written_rates_are_equal_beyond_the_validity_range(pressure, po
     """At points where the force is within its limits, so that the extrapolation is used."""
     case = runs()[3]
     y = np.array(list(case.system.state_at(pressure=pressure, position=position, speed=0.1).values()))
-    found = rodas4.hand_written_rates(case)(np.array([1.0, 0.5]))[0](0.0, y)
-    np.testing.assert_allclose(found, compile_system(case.system).rates(y, [1.0, 0.5]), rtol=1e-12)
+    rates = rodas4.hand_written_rates(case)(np.array([1.0, 0.5]))[0](0.0, y)
+    np.testing.assert_allclose(rates, compile_system(case.system).rates(y, [1.0, 0.5]), rtol=1e-12)
 
 
 def test_different_equations_are_detected():
@@ -54,9 +54,9 @@ def test_lsoda_computes_the_same_solution():
     reference = rodas4.kernel(case, ready, Rodas4(1e-11))()
     for solve in (rodas4.lsoda, rodas4.odeint_lsoda):
         for rates in (rodas4.hand_written_rates(case), rodas4.machine_code_rates(ready)):
-            found = solve(case, rates, 1e-8)
-            assert found.shape == reference.shape
-            assert case.error(found, reference) < 1e-8
+            solution = solve(case, rates, 1e-8)
+            assert solution.shape == reference.shape
+            assert case.error(solution, reference) < 1e-8
 
 
 @pytest.mark.skipif(not ode8.compilers(), reason="no C compiler on the path")
@@ -69,8 +69,8 @@ def test_the_c_code_computes_the_same_steps(tmp_path):
     times = np.linspace(0.0, 0.2, 21)
     expected = DormandPrince8(ode8.STEP).run(ready, segments, 0.0, short.vector, times).rows
     for library in ode8.compile_libraries(tmp_path).values():
-        found = ode8.make_c_run(short, library, segments)()[:21]
-        np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-12)
+        rows = ode8.make_c_run(short, library, segments)()[:21]
+        np.testing.assert_allclose(rows, expected, rtol=1e-11, atol=1e-12)
 
 
 def test_c_numpy_and_lanes_compute_the_same_batch(tmp_path):

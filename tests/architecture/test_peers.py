@@ -43,9 +43,9 @@ def reference(run):
 def test_a_peer_computes_the_same_solution(module, solver, states):
     pytest.importorskip(module)
     run = runs()[states]
-    found = solver(run, compile_system(run.system))(1e-8)()
-    assert found.shape == (2501, states)
-    assert run.error(found, reference(run)) < 1e-8
+    solution = solver(run, compile_system(run.system))(1e-8)()
+    assert solution.shape == (2501, states)
+    assert run.error(solution, reference(run)) < 1e-8
 
 
 @pytest.mark.skipif("gcc" not in ode8.compilers(), reason="no gcc on the path")
@@ -61,8 +61,8 @@ def test_casadi_with_gcc_computes_the_same_solution_and_leaves_no_files(tmp_path
 def test_diffrax_computes_the_same_solution():
     pytest.importorskip("diffrax")
     run = runs()[3]
-    found = peer_solvers.diffrax_kvaerno5(run, compile_system(run.system))(1e-8)()
-    assert run.error(found, reference(run)) < 1e-7
+    solution = peer_solvers.diffrax_kvaerno5(run, compile_system(run.system))(1e-8)()
+    assert run.error(solution, reference(run)) < 1e-7
 
 
 def test_a_peer_that_is_not_installed_is_omitted_with_a_note(monkeypatch):

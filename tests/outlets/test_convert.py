@@ -65,7 +65,7 @@ def test_a_stated_end_takes_the_place_of_the_muscles(tmp_path):
 
 def test_the_table_is_printed(tmp_path):
     said = airmuscle("convert", MUSCLE, "ContractileSurface", "--degree", 2, "--out", tmp_path / "m.toml").stdout
-    assert "MartensBoblan2017, over 35 to 675 kPa and 1.33% to 26.00%" in said
+    assert "MartensBoblan2017, over 35 to 675 kPa and 1.333 % to 26 %" in said
     assert "pressure [kPa]" in said
     assert "maximum error [N]" in said
     assert said.splitlines()[-1] == f"muscle: {tmp_path / 'm.toml'}"

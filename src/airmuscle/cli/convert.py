@@ -22,7 +22,7 @@ from ..library.entry import Entry
 from ..report.chart import validity_range_of
 from .initial_law import find_initial_law
 from .options import Json, Name
-from .terminal import echo, print_json, print_table
+from .terminal import echo, percent, print_json, print_table
 
 BANDS = 6
 """Pressure intervals of the validity range for which errors are printed."""
@@ -48,7 +48,7 @@ def convert(
     max_pressure: Limit = None,
     min_contraction: Limit = None,
     max_contraction: Limit = None,
-    degree: Annotated[int, typer.Option(min=1, max=9, help="Total degree of a ContractileSurface.")] = 5,
+    degree: Annotated[int, typer.Option(min=1, max=9, metavar="N", help="Total degree of a ContractileSurface.")] = 5,
     json: Json = False,
 ) -> None:
     """Approximate one characteristic by another.
@@ -144,7 +144,7 @@ def _to_dict(conversion: ModelConversion, validity_range: ValidityRange) -> dict
 def _print(entry: Entry, conversion: ModelConversion, validity_range: ValidityRange) -> None:
     (p0, p1), (c0, c1) = validity_range.pressure, validity_range.contraction
     echo(f"{entry.name}, {type(entry.characteristic).__name__}, over {p0 / 1e3:.4g} to {p1 / 1e3:.4g} kPa and "
-         f"{c0:.2%} to {c1:.2%}")  # fmt: skip
+         f"{percent(c0)} to {percent(c1)}")  # fmt: skip
     echo(f"{conversion}\n")
     rows = [
         (f"{row['min_pressure'] / 1e3:.4g} to {row['max_pressure'] / 1e3:.4g}",

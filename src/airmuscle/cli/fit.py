@@ -94,7 +94,7 @@ def fit(
     ambient: AmbientPressure = None,
     unit: Units = None,
     mapping: Mapping = None,
-    degree: Annotated[int, typer.Option(min=1, max=9, help="Total degree of a ContractileSurface.")] = 5,
+    degree: Annotated[int, typer.Option(min=1, max=9, metavar="N", help="Total degree of a ContractileSurface.")] = 5,
     fix: Fixed = None,
     robust: Robust = None,
     uncensored: Uncensored = False,

@@ -32,9 +32,12 @@ Profiled = Annotated[
         help="Profile likelihood of this parameter; 'weak': of all undetermined ones. Repeatable.",
     ),
 ]
-Points = Annotated[int, typer.Option(min=2, max=50, help="Values of a profile on either side of the estimate.")]
+Points = Annotated[
+    int, typer.Option(min=2, max=50, metavar="N", help="Values of a profile on either side of the estimate.")
+]
 Starts = Annotated[
-    int | None, typer.Option(min=1, max=10_000, help="Number of initial guesses; default: that of the file.")
+    int | None,
+    typer.Option(min=1, max=10_000, metavar="N", help="Number of initial guesses; default: that of the file."),
 ]
 
 

@@ -34,9 +34,11 @@ UseCharacteristic = Annotated[
         help="Take the muscle's characteristic plus an offset as the friction-free curve; default: a polynomial.",
     ),
 ]
-Degree = Annotated[int, typer.Option(min=0, max=9, help="Degree of the polynomial friction-free curve.")]
+Degree = Annotated[int, typer.Option(min=0, max=9, metavar="N", help="Degree of the polynomial friction-free curve.")]
 AllRows = Annotated[bool, typer.Option("--all-rows", help="Include rows in which pressure or length change quickly.")]
-Elements = Annotated[int, typer.Option(min=1, max=30, help="Number of elements of MaxwellSlip and PrandtlIshlinskii.")]
+Elements = Annotated[
+    int, typer.Option(min=1, max=30, metavar="N", help="Number of elements of MaxwellSlip and PrandtlIshlinskii.")
+]
 Creep = Annotated[bool, typer.Option("--creep", help="Also fit creep to the longest hold phase of every file.")]
 
 
@@ -60,8 +62,8 @@ def hysteresis(
     \b
     The type of a run (isobaric, isometric) is detected; a second run at the same level validates the first.
     Statistical tests decide whether the data justify a friction model.
-    Writes DIR/report.html and, if a model that a plant can use is justified, DIR/muscle.toml with --muscle, else
-    DIR/friction.toml.
+    Writes DIR/report.html. If a model that a plant can use is justified, it is written to DIR/muscle.toml (with
+    --muscle) or to DIR/friction.toml.
 
     \b
     Examples:

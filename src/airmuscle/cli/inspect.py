@@ -23,7 +23,7 @@ from .terminal import echo, print_json, print_table
 
 Files = Annotated[
     list[str],
-    typer.Argument(metavar="FILE...", help="Files, folders or glob patterns: CSV, Excel, MAT, TDMS, MDF."),
+    typer.Argument(metavar="FILES", help="Files, folders or glob patterns: CSV, Excel, MAT, TDMS, MDF."),
 ]
 Columns = Annotated[
     list[str] | None,
@@ -63,7 +63,7 @@ def inspect(
 
     \b
     Shows how the files are interpreted: columns and units, sampling, runs, branches, plateaus and suspected outliers.
-    The data are not changed. With --out, DIR gets one figure per recording.
+    The data are not changed. With --out, one figure per recording is written to DIR.
     Sensor properties are estimated from all files together, as from one test rig.
 
     \b

@@ -14,7 +14,7 @@ from ..library.catalogue import load
 from ..recording import write_csv
 from ..report.output_folder import atomic_folder, check_writable
 from .options import Json, Name, OptionalFolder
-from .terminal import echo, print_json, print_table
+from .terminal import echo, percent, print_json, print_table
 
 
 def plan(
@@ -28,11 +28,14 @@ def plan(
     min_contraction: Annotated[
         str, typer.Option(metavar="QUANTITY", help="Minimum contraction; negative if the bench stretches the muscle.")
     ] = "0 %",
-    runs: Annotated[int, typer.Option(min=1, max=100, help="Number of runs.")] = 6,
-    points: Annotated[int, typer.Option(min=3, max=1000, help="Number of points per run.")] = 15,
+    runs: Annotated[int, typer.Option(min=1, max=100, metavar="N", help="Number of runs.")] = 6,
+    points: Annotated[int, typer.Option(min=3, max=1000, metavar="N", help="Number of points per run.")] = 15,
     sigma: Annotated[
         float,
-        typer.Option(help="Standard deviation of a measured value, in the SI unit of the fitted quantity (mostly N)."),
+        typer.Option(
+            metavar="NUMBER",
+            help="Standard deviation of a measured value, in the SI unit of the fitted quantity (mostly N).",
+        ),
     ] = 1.0,
     fix: Annotated[
         list[str] | None,
@@ -46,7 +49,7 @@ def plan(
     \b
     The runs are isobaric or isometric, within the limits of the test bench. They are D-optimal for fitting the
     characteristic of the muscle, linearised at its present parameter values.
-    With --out, DIR/plan.csv gets the points in order, with the expected force.
+    With --out, DIR/plan.csv contains the points in order, with the expected force.
 
     \b
     Examples:
@@ -74,7 +77,7 @@ def _write(design: Plan, out: Path) -> None:
 
 
 def _format(name: str, value: float) -> str:
-    return f"{value / 1e3:.4g} kPa" if name == "pressure" else f"{value:.2%}"
+    return f"{value / 1e3:.4g} kPa" if name == "pressure" else percent(value)
 
 
 def _row(number: int, run: PlannedRun) -> tuple[str, ...]:

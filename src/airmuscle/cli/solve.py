@@ -22,7 +22,7 @@ from ..report.chart import Point, chart, isobars, point_text, table, validity_ra
 from ..report.output_folder import atomic_folder
 from ..report.write import save_table
 from .options import Json, Name, OptionalFolder
-from .terminal import echo, print_json, print_table
+from .terminal import echo, percent, print_json, print_table
 
 UNITS = {"pressure": "Pa", "contraction": "1", "force": "N"}
 
@@ -45,7 +45,7 @@ def solve(
 
     \b
     If several solutions exist, the result is the one reached from the state of rest.
-    With --out, DIR gets isobars.png and isobars.csv: force over contraction, with the operating point.
+    With --out, DIR/isobars.png and DIR/isobars.csv show force over contraction, with the operating point.
 
     \b
     Examples:
@@ -95,7 +95,7 @@ def _check_contraction(characteristic: Characteristic, contraction: float) -> No
         hint = f" For a percentage, write '{contraction:g} %'." if as_percentage else ""
         raise GeometryLimitError(
             f"--contraction: {100 * contraction:.6g} % is outside the range of {type(characteristic).__name__}, "
-            f"{100 * low:.4g} to {100 * high:.4g} %.{hint}"
+            f"{100 * low:.4g} to {percent(high)}.{hint}"
         )
 
 
@@ -114,7 +114,7 @@ def _warn(point: Point, validity_range: ValidityRange | None) -> None:
         (p_low, p_high), (c_low, c_high) = validity_range.pressure, validity_range.contraction
         warnings.warn(
             "the operating point is outside the validity range of the characteristic, "
-            f"{p_low / 1e3:.4g} to {p_high / 1e3:.4g} kPa and {c_low:.2%} to {c_high:.2%}: "
+            f"{p_low / 1e3:.4g} to {p_high / 1e3:.4g} kPa and {percent(c_low)} to {percent(c_high)}: "
             "the result is an extrapolation.",
             AirmuscleWarning,
             stacklevel=2,
@@ -130,7 +130,7 @@ def _resting_length(entry: Entry) -> float | None:
 def _rows(entry: Entry, point: Point, unknown: str) -> list[tuple[str, str, str]]:
     values = {
         "pressure": f"{point.pressure / 1e3:.6g} kPa",
-        "contraction": f"{100 * point.contraction:.4g} %",
+        "contraction": percent(point.contraction),
         "force": f"{point.force:.6g} N",
     }
     remarks = {"pressure": "gauge"}

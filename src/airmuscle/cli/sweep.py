@@ -30,7 +30,7 @@ def sweep(
     ],
     out: Folder = Path("study"),
     workers: Annotated[
-        int | None, typer.Option(min=1, max=1024, help="Number of local processes; default: one per core.")
+        int | None, typer.Option(min=1, max=1024, metavar="N", help="Number of local processes; default: one per core.")
     ] = None,
     dask: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Use a running Dask cluster, such as tcp://host:8786.")

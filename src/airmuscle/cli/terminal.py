@@ -56,6 +56,11 @@ def without_markup(text: str) -> str:
     return escape(printable(text))
 
 
+def percent(ratio: float) -> str:
+    """A ratio as a percentage with four significant digits: `12.5 %`."""
+    return f"{100 * ratio:.4g} %"
+
+
 def _is_printable(character: str) -> bool:
     return character.isprintable() or character in "\n\t" or unicodedata.category(character) == "Zs"
 
