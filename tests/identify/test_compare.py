@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 import airmuscle as am
 from airmuscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.cli.app import app
-from airmuscle.cli.fit_options import part_of
+from airmuscle.cli.fit_options import parse_split
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify import BlockSplit, Candidate, LevelSplit, RunSplit, SpecimenSplit, compare
@@ -185,7 +185,7 @@ def test_what_is_left_out_decides_what_the_law_is_for():
     [("run", RunSplit()), ("specimen", SpecimenSplit()), ("block", BlockSplit()), ("pressure", LevelSplit("pressure"))],
 )
 def test_the_command_knows_each_way_by_a_word(word: str, how):
-    assert part_of(word) == how
+    assert parse_split(word) == how
 
 
 def test_each_way_of_leaving_out_has_a_purpose_of_its_own():

@@ -103,7 +103,7 @@ ARGUMENTS = ["plan", "tondu-lopez", "--max-pressure", "5 bar", "--max-force", "4
 def test_the_command_prints_a_table_and_writes_points_to_follow(tmp_path):
     done = CliRunner().invoke(app, [*ARGUMENTS, "--out", str(tmp_path / "bench")])
     assert done.exit_code == 0, done.output
-    assert "force to expect" in done.output
+    assert "expected force" in done.output
     points = read_csv(tmp_path / "bench" / "plan.csv")
     assert set(points["run"]) == {1.0, 2.0, 3.0, 4.0}
     assert points["force"].max() <= 400.0
@@ -114,7 +114,7 @@ def test_the_command_prints_json():
     done = CliRunner().invoke(app, [*ARGUMENTS, "--json"])
     found = json.loads(done.output)
     assert len(found["runs"]) == 4
-    assert found["gain"] > 1.0
+    assert found["relative_efficiency"] > 1.0
 
 
 def test_a_limit_without_its_unit_is_one_line():

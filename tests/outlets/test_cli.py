@@ -1,14 +1,17 @@
-"""The command line does what its help says, and ends as it promises.
+"""The command line: help, exit codes, output that agrees with the library, messages without raw bytes.
 
-Exit code 0 is well, 1 the work failed (one line on stderr, no traceback, nothing half written), 2 wrong usage,
-130 interrupted. What it prints and writes agrees with the library. `list` starts at once.
+Exit code 0: success. 1: failure (one line on stderr, no traceback, no partial files). 2: wrong usage. 130: interrupted,
+also while modules are imported. `list` and `--help` import no more than they need.
 """
 
 from __future__ import annotations
 
 import csv
+import importlib
 import json
+import os
 import re
+import signal
 import subprocess
 import sys
 import tomllib
@@ -20,8 +23,9 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from airmuscle.characteristic.contractile_surface import ContractileSurface
-from airmuscle.cli.app import app
+from airmuscle.cli.app import COMMANDS, app
 from airmuscle.cli.cite import as_bibtex
+from airmuscle.cli.terminal import print_json, print_table, printable
 from airmuscle.core.errors import UnknownNameError
 from airmuscle.core.reference import Reference
 from airmuscle.library.catalogue import load
@@ -60,7 +64,7 @@ def airmuscle(*arguments: object) -> Result:
 
 
 def shell(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
-    """The true command, in a process of its own."""
+    """The command in a process of its own."""
     command = [sys.executable, "-m", "airmuscle", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, **options)  # type: ignore[call-overload, no-any-return]
 
@@ -75,22 +79,41 @@ def assert_failed(result: Result, message: str) -> None:
 
 # Help and usage
 
-COMMANDS = (
+NAMES = (
     "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "plan",
     "simulate", "sweep", "schema",
 )  # fmt: skip
 
 
-def test_the_commands_stand_in_the_order_of_use():
-    listed = re.findall(r"^  ([\w-]+)  ", airmuscle("--help").output.partition("Commands:")[2], re.MULTILINE)
-    assert listed == list(COMMANDS)
+def test_the_help_lists_the_commands_in_the_order_of_use():
+    listed = re.findall(r"^  ([\w-]+)  +(.*)$", airmuscle("--help").output.partition("Commands:")[2], re.MULTILINE)
+    assert listed == [(row.name, row.summary) for row in COMMANDS]
+    assert tuple(row.name for row in COMMANDS) == NAMES
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_help_has_examples(command: str):
-    result = airmuscle(command, "--help")
+@pytest.mark.parametrize("row", COMMANDS, ids=NAMES)
+def test_every_command_has_its_summary_and_examples_in_its_help(row):
+    function = getattr(importlib.import_module(f"airmuscle.cli.{row.module}"), row.function)
+    assert function.__doc__.splitlines()[0] == row.summary
+    result = airmuscle(row.name, "--help")
     assert result.exit_code == 0
-    assert re.search(rf"^ +airmuscle {command}", result.output, re.MULTILINE)
+    assert row.summary in " ".join(result.output.split())
+    assert re.search(rf"^ +airmuscle {row.name}", result.output, re.MULTILINE)
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["list"]])
+def test_a_command_module_is_imported_only_when_it_is_called(arguments: list[str]):
+    modules = [row.module for row in COMMANDS if row.name not in arguments]
+    code = (
+        f"from airmuscle.cli.app import app; app({arguments!r}, standalone_mode=False); import sys; print(*sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert not {f"airmuscle.cli.{name}" for name in modules} & set(done.stdout.splitlines()[-1].split())
+
+
+def test_an_unknown_command_names_the_nearest_one():
+    assert "No such command 'sovle'. Did you mean 'solve'?" in airmuscle("sovle").stderr
 
 
 @pytest.mark.parametrize(
@@ -205,7 +228,7 @@ def test_any_two_give_the_third(wanted: str):
     solved = json.loads(airmuscle("solve", MUSCLE, *given, "--json").output)
     assert solved["solved"] == wanted
     assert {name: solved[name] for name in point} == pytest.approx(point, rel=1e-9)
-    assert solved["inside_data"] is True
+    assert solved["inside_validity_range"] is True
     assert solved["stiffness"] == pytest.approx(float(law.stiffness(3e5, 0.12)), rel=1e-6)
 
 
@@ -260,8 +283,8 @@ def test_a_point_outside_the_data_is_a_warning():
         airmuscle("solve", MUSCLE, f"--pressure={p} kPa", "--contraction=0.1", "--json") for p in (300, 750)
     )
     assert inside.stderr == ""
-    assert re.match(r"warning: the working point lies outside the range .*35 to 675 kPa", outside.stderr)
-    assert json.loads(outside.stdout)["inside_data"] is False
+    assert re.match(r"warning: the operating point is outside the validity range .*35 to 675 kPa", outside.stderr)
+    assert json.loads(outside.stdout)["inside_validity_range"] is False
 
 
 @pytest.mark.parametrize(
@@ -325,8 +348,8 @@ def test_fit_starts_from_a_library_entry_and_keeps_what_is_fixed(tmp_path: Path)
 @pytest.mark.parametrize(
     ("rows", "options", "message"),
     [
-        (36, ("--characteristic", "Saga2007"), "--characteristic: Saga2007 needs values to start from"),
-        (36, ("--characteristic", "ContractileSurfac"), "no muscle or law 'ContractileSurfac'"),
+        (36, ("--characteristic", "Saga2007"), "--characteristic: Saga2007 needs initial values"),
+        (36, ("--characteristic", "ContractileSurfac"), "no library entry 'ContractileSurfac'"),
         (20, ("--characteristic", "ContractileSurface"), ".*has 21 parameters to be found, but only 19 points"),
         (
             36,
@@ -385,7 +408,7 @@ def test_a_run_that_fails_keeps_what_it_has_and_says_why(scenario: Path, tmp_pat
     result = airmuscle("simulate", scenario, "--out", tmp_path / "run")
     assert result.exit_code == 1
     kept, error = result.stderr.splitlines()[-2:]
-    assert kept == f"what was computed until then stands in {tmp_path / 'run'}"
+    assert kept == f"partial results were written to {tmp_path / 'run'}"
     found = re.fullmatch(
         r"error: the run ended at (\S+) of 25 s because .* steps, at air_mass .* kg, .*\. \S+ .*\.", error
     )
@@ -497,10 +520,10 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path):
     assert (tmp_path / "taken").read_text() == "a file"
 
 
-# The true command
+# The command in a process of its own
 
 
-def test_the_true_command_ends_with_the_promised_codes():
+def test_a_process_ends_with_the_documented_exit_codes():
     well = shell("solve", MUSCLE, "--pressure", "3 bar", "--force", "100 N", "--json")
     assert (well.returncode, well.stderr) == (0, "")
     assert json.loads(well.stdout)["solved"] == "contraction"
@@ -529,3 +552,104 @@ def test_every_example_of_the_help_is_valid_toml_where_it_names_a_file():
     assert named
     for name in named:
         assert "plant" in tomllib.loads((root / name).read_text(encoding="utf-8"))
+
+
+# Interruptions
+
+SLOW_IMPORT = """
+import importlib.abc, signal, sys, time
+from airmuscle.cli import main
+
+class SlowFinder(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == MODULE:
+            print("importing", flush=True)
+            try:
+                time.sleep(60)
+            except KeyboardInterrupt:
+                if KIND == "extension":
+                    raise ImportError("initialization failed") from None
+                if KIND == "module":
+                    raise
+
+MODULE, KIND = sys.argv[1:]
+sys.meta_path.insert(0, SlowFinder())
+signal.signal(signal.SIGINT, signal.default_int_handler)  # it is ignored where the tests run in the background
+sys.argv[1:] = ["solve", "dmsp-20", "--pressure", "3 bar", "--force", "100 N"]
+main()
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="SIGINT cannot be sent to one process")
+@pytest.mark.parametrize("kind", ["module", "extension", "exception discarded"])
+@pytest.mark.parametrize("module", ["typer", "airmuscle.cli.app", "airmuscle.cli.solve", "rich.table"])
+def test_an_interrupted_import_is_one_line_and_exit_code_130(module: str, kind: str):
+    command = [sys.executable, "-c", SLOW_IMPORT, module, kind]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert "importing\n" in iter(process.stdout.readline, "")
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+    assert (process.returncode, errors) == (130, "interrupted\n")
+
+
+# Messages without raw bytes
+
+
+def assert_printable(text: str) -> None:
+    assert [c for c in text if not c.isprintable() and c != "\n"] == []
+
+
+@pytest.mark.parametrize(
+    ("command", "suffix"),
+    [("fit --characteristic ContractileSurface", "csv"), ("inspect", "csv"), ("inspect", "txt"), ("hysteresis", "tdms"),
+     ("show", "toml"), ("simulate", "toml"), ("sweep", "toml"), ("fit-dynamic", "toml")],
+)  # fmt: skip
+@pytest.mark.parametrize(
+    "content", [bytes(range(256)) * 8, b"\x1b[2J\x07 = \x1b]0;title\x07\n" * 20], ids=["all", "escapes"]
+)
+def test_binary_input_is_not_printed_raw(tmp_path: Path, command: str, suffix: str, content: bytes):
+    file = tmp_path / f"input\x1b[31m.{suffix}"
+    file.write_bytes(content)
+    result = airmuscle(*command.split(), file)
+    assert result.exit_code == 1, result.output
+    assert result.stderr.startswith("error: ")
+    assert_printable(result.output)
+
+
+def test_control_characters_of_a_file_that_can_be_read_are_escaped_in_tables_json_and_progress(tmp_path: Path):
+    rows = [f"{t},{t}" for t in range(10)]
+    (tmp_path / "x.csv").write_text("\n".join(["time [s],my\x1b[2J\x9b [kPa]", *rows]), encoding="utf-8")
+    options = ("--column", "2=pressure [kPa]")
+    for arguments in ((), options, (*options, "--json")):
+        assert_printable(airmuscle("inspect", tmp_path / "x.csv", *arguments).output)
+
+
+@pytest.mark.parametrize(
+    "arguments", [["\x1b[31mlist"], ["list", "\x1b[31m"], ["list", "--\x1b[31m"], ["show", "\x1b[31m"], ["plan", "x", "--max-pressure", "\x1b"]]
+)  # fmt: skip
+def test_control_characters_of_arguments_are_escaped(arguments: list[str]):
+    result = airmuscle(*arguments)
+    assert result.exit_code in (1, 2)
+    assert_printable(result.output)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="arguments are bytes on POSIX only")
+@pytest.mark.parametrize("command", [[b"show"], [b"simulate"], [b"list"]])
+def test_an_argument_that_cannot_be_decoded_is_shown_with_its_bytes(command: list[bytes]):
+    done = subprocess.run([sys.executable, "-m", "airmuscle", *command, b"no\xffname"], capture_output=True, timeout=60)
+    assert done.returncode in (1, 2)
+    assert b"no\\xffname" in done.stderr
+    assert b"Traceback" not in done.stderr
+
+
+def test_printable_keeps_text_and_escapes_the_rest(capsys: pytest.CaptureFixture[str]):
+    assert printable("Hošovský, 5 °C\u202f\t½\n") == "Hošovský, 5 °C\u202f\t½\n"
+    assert printable("a\x1b[0m\r\x7f\x9b\udcff\u202e") == "a\\x1b[0m\\r\\x7f\\x9b\\xff\\u202e"
+    print_json({"a": "\x1b\x9b\udcff\u202e", "b": float("nan")})
+    printed = capsys.readouterr().out
+    assert_printable(printed)
+    assert json.loads(printed) == {"a": "\x1b\x9b\udcff\u202e", "b": None}
+    print_table(("p [kPa]", ":smile:"), [("\x1b[2J", "[red]x[/red]")])
+    printed = capsys.readouterr().out
+    assert_printable(printed)
+    assert all(text in printed for text in ("p [kPa]", ":smile:", "\\x1b[2J", "[red]x[/red]"))

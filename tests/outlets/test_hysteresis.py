@@ -81,8 +81,8 @@ def test_without_a_muscle_the_friction_stands_in_a_table_that_a_plant_takes(two,
     data = json.loads(result.stdout)
     assert data["written"] == str(tmp_path / "friction.toml")
     (found,) = data["loops"]
-    assert found["recommended"] == found["laws"][0]["law"]
-    assert found["laws"][0]["repeat_rmse"] is None, "one run has no second"
+    assert found["recommended"] == found["models"][0]["model"]
+    assert found["models"][0]["repeat_rmse"] is None, "one run has no second"
     table = tomllib.loads((tmp_path / "friction.toml").read_text(encoding="utf-8"))
     muscle = build_muscle({"library": MUSCLE, **table}, Location("scenario.toml", "plant.muscle", tmp_path))
     assert type(muscle.friction).__name__ == found["recommended"]
@@ -91,9 +91,11 @@ def test_without_a_muscle_the_friction_stands_in_a_table_that_a_plant_takes(two,
 def test_a_loop_without_friction_writes_none(tmp_path):
     file = loop(tmp_path / "loop.csv", 3, friction=None, turns=TURNS[-3:])
     again = loop(tmp_path / "again.csv", 4, friction=None, turns=TURNS[-3:])
-    result = airmuscle("hysteresis", file, again, *LENGTH, "--muscle", MUSCLE, "--given", "--out", tmp_path / "out")
-    assert "The data justify no friction in this loop." in result.stdout
-    assert "no friction to write" in result.stdout
+    result = airmuscle(
+        "hysteresis", file, again, *LENGTH, "--muscle", MUSCLE, "--use-characteristic", "--out", tmp_path / "out"
+    )
+    assert "The data justify no friction model for this loop." in result.stdout
+    assert "no friction file: no model that a plant can use is justified" in result.stdout
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"report.html", "figures", "data"}
 
 
@@ -105,7 +107,7 @@ def test_friction_on_the_pressure_is_reported_and_not_written(tmp_path):
     write_csv(Recording(columns, "ramp"), tmp_path / "ramp.csv")
     result = airmuscle("hysteresis", tmp_path / "ramp.csv", *LENGTH, "--degree", 1, "--out", tmp_path / "out")
     assert "isometric at 5.00%" in result.stdout
-    assert "does not enter a plant" in result.stdout
+    assert "a plant cannot use it" in result.stdout
     assert not list((tmp_path / "out").glob("*.toml"))
 
 

@@ -66,7 +66,7 @@ def test_json_contains_the_results_of_the_library(tmp_path: Path):
     force = next(sensor for sensor in found["sensors"] if sensor["name"] == "force")
     assert (force["resolution"], force["lower_limit"], force["upper_limit"]) == (pytest.approx(0.5), -5.0, None)
     assert found["runs"] == [
-        {"kind": "isometric", "first_row": 1, "last_row": ROWS, "held": "contraction",
+        {"kind": "isometric", "first_row": 1, "last_row": ROWS, "constant": "contraction",
          "value": pytest.approx(0.1), "swept": ["pressure", "force"]}
     ]  # fmt: skip
     assert [(b["branch"], b["first_row"], b["last_row"]) for b in found["branches"]] == [
@@ -74,7 +74,7 @@ def test_json_contains_the_results_of_the_library(tmp_path: Path):
         ("deflating", 201, ROWS),
     ]
     assert len(found["plateaus"]) == len(expected.plateaus) == 40
-    assert [(o["column"], o["row"]) for o in found["suspected_glitches"]] == [("force", 96)]
+    assert [(o["column"], o["row"]) for o in found["suspected_outliers"]] == [("force", 96)]
     assert found["quasi_static"] == expected.quasi_static
     assert any("sensor saturates at its lower limit" in finding["text"] for finding in found["findings"])
     assert any("read as gauge" in note for note in found["notes"])
@@ -89,8 +89,8 @@ def test_the_text_output(tmp_path: Path):
         "runs: isometric at contraction 10 %, rows 1 to 400",
         "branches: inflating, rows 1 to 200; deflating, rows 201 to 400",
         "plateaus: 40 with",
-        "suspected glitches: 1, kept: force in row 96",
-        "note: the force sensor saturates at its lower limit, -5 N",
+        "suspected outliers: 1, not removed: force in row 96",
+        "note: the force stands still at its lowest reading, -5 N",
     ):
         assert said in text
     assert "PROBLEM" not in text
@@ -161,9 +161,9 @@ def test_options_and_mapping_are_equivalent(tmp_path: Path):
     ("arguments", "code", "expected"),
     [
         (("none.csv",), 1, "cannot be read"),
-        (("run.csv", "--column", "p"), 2, "--column wants NAME=TEXT"),
-        (("run.csv", "--column", "x=pressure [bar]"), 1, "the mapping names column 'x', but the columns are t [s]"),
-        (("run.csv", "--unit", "pressure=mm"), 1, "cannot be converted to 'Pa'"),
+        (("run.csv", "--column", "p"), 2, "--column must be NAME=TEXT"),
+        (("run.csv", "--column", "x=pressure [bar]"), 1, "the mapping names column 'x', but there are t [s]"),
+        (("run.csv", "--unit", "pressure=mm"), 1, "cannot become 'Pa'"),
         ((), 2, "Missing argument"),
     ],
 )

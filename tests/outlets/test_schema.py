@@ -231,4 +231,4 @@ def test_the_command_prints_or_writes_what_editors_read(tmp_path: Path):
     assert "cannot be written to" in refused.stderr
     nameless = CliRunner().invoke(app, ["schema", "--out", ""])
     assert nameless.exit_code == 2
-    assert "wants the name of a file" in nameless.stderr
+    assert "--out must be a file name" in nameless.stderr

@@ -266,6 +266,8 @@ def test_a_sigint_that_python_discards_is_not_lost(monkeypatch):
         check_interrupted()  # forgotten once the block has raised it
         with pytest.raises(KeyboardInterrupt), deferred_sigint():
             interrupted_import()
+        with pytest.raises(KeyboardInterrupt), deferred_sigint(), deferred_sigint():  # blocks may be nested
+            interrupted_import()
         with pytest.raises(ImportError), deferred_sigint():
             raise ImportError
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -510,7 +512,7 @@ def test_a_study_in_which_all_runs_fail_is_an_error(folder: Path):
         app, ["sweep", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1"]
     )
     assert done.exit_code == 1
-    assert "all 22 runs failed; the first because: " in done.stderr
+    assert "all 22 runs failed; reason of the first: " in done.stderr
     assert (folder / "out" / "results.csv").exists()
 
 

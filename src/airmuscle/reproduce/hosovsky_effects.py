@@ -14,9 +14,9 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.plotting import DASHES, LINES, new_figure
-from ..muscle import CubicSpring, LaggingWall, LinearSpring, Spring, Wall
+from ..muscle import CubicSpring, ViscoelasticWall, LinearSpring, Spring, Wall
 from ..plant.plant import Plant
-from ..pneumatics import DistributedTube, IndexedValve, Orifice, Tube, TubeModel, Valve
+from ..pneumatics import DistributedTube, SubsonicIndexValve, Orifice, Tube, TubeModel, Valve
 from ..pneumatics.gas import EnergyBalance, Gas, Polytropic
 from ..recording import Recording
 from ..report.chapter import Plot, Table
@@ -88,11 +88,11 @@ def substitutions(parameters: UnpublishedParameters, suspected: SuspectedCauses)
     s, stiffness = suspected, parameters.stiffness.value
     length, diameter, dead = s.line_length.value, s.line_diameter.value, s.dead_volume.value
     critical = dataclasses.replace(MATRIX, critical_ratio=s.critical_ratio.value)
-    lumped, heat = Tube.of_size(length, diameter), EnergyBalance(s.heat_transfer.value)
-    indexed = IndexedValve(MATRIX.conductance, MATRIX.critical_ratio, s.index.value)
+    lumped, heat = Tube.from_dimensions(length, diameter), EnergyBalance(s.heat_transfer.value)
+    indexed = SubsonicIndexValve(MATRIX.conductance, MATRIX.critical_ratio, s.index.value)
     laminar = dataclasses.replace(MATRIX, laminar_ratio=s.laminar_ratio.value)
     hardening = CubicSpring(stiffness, s.hardening.value)
-    wall = LaggingWall(s.wall_compliance.value, s.wall_time_constant.value)
+    wall = ViscoelasticWall(s.wall_compliance.value, s.wall_time_constant.value)
     angles = parameters.braid_angle
     return (
         Substitution("line", "volume and resistance", tube=lumped),
