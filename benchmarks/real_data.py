@@ -20,7 +20,7 @@ import pandas as pd
 
 from airmuscle.core.errors import IdentificationError
 from airmuscle.identify import BlockSplit, SpecimenSplit, compare, fit
-from airmuscle.identify.candidates import Candidate, blank_surface, standard_candidates
+from airmuscle.identify.candidates import Candidate, standard_candidates
 from airmuscle.identify.model_selection import force_residuals
 from airmuscle.recording import Recording
 
@@ -128,7 +128,7 @@ def main() -> None:
     each = [single_surface_errors(select_specimen(train, name), select_specimen(test, name)) for name in specimens]
     print(format_row("one surface of degree 5 per length", 63, [rms(np.concatenate(each))], floor))
     print(format_row("  each length", 21, [rms(e) for e in each], floor))
-    candidates = [Candidate("one surface of degree 5 for all lengths", surface(5)), *standard_candidates(train)]
+    candidates = [Candidate("one surface of degree 5 for all lengths", blank_surface(5)), *standard_candidates(train)]
     for candidate in candidates:
         if hasattr(candidate.law, "with_resting_length") or candidate is candidates[0]:
             try:

@@ -63,7 +63,7 @@ class Model:
         """Common prefix of the valve paths."""
         return "circuit.circuit." if isinstance(self.plant.circuit, WithTubes) else "circuit."
 
-    def nuisances(self, wall: bool) -> tuple[str | StartTime | StartValue, ...]:
+    def nuisances(self, wall: bool) -> tuple[str | StartTime | InitialValue, ...]:
         """Nuisance parameters of each record; with the initial wall volume if `wall`."""
         names = (StartTime(0.012), InitialValue("pressure", 3e3), self.supply)
         return (*names, InitialValue("wall_volume", 1e-5)) if wall else names

@@ -23,7 +23,9 @@ def load_generator():
 
 
 def test_the_page_is_up_to_date():
-    assert (DOCS / "nomenclature.md").read_text(encoding="utf-8") == load_generator().page(), "run docs/make_nomenclature.py"
+    assert (DOCS / "nomenclature.md").read_text(encoding="utf-8") == load_generator().page(), (
+        "run docs/make_nomenclature.py"
+    )
 
 
 def public_arguments():

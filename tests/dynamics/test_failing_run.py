@@ -222,7 +222,10 @@ def test_a_part_of_another_kind_is_named(make, message):
         (lambda: WithLatch(3), "WithLatch: inner must be an instance of Mechanism; it is 3"),
         (lambda: MusclesInSeries(3, (1.0,)), "MusclesInSeries: inner must be an instance of Mechanism"),
         (lambda: WithEndStops(3, 0.0, 0.1, HuntCrossley(1e9)), "WithEndStops: inner must be an instance of Mechanism"),
-        (lambda: WithEndStops(HangingMass(1.0), 0.0, 0.1, 3), "WithEndStops: contact must be an instance of HuntCrossley"),
+        (
+            lambda: WithEndStops(HangingMass(1.0), 0.0, 0.1, 3),
+            "WithEndStops: contact must be an instance of HuntCrossley",
+        ),
     ],
 )
 def test_a_part_of_a_mechanism_is_one(make, message):

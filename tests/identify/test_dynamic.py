@@ -101,7 +101,12 @@ def test_what_the_simulation_used_is_found_within_the_stated_bands():
         muscle__spring__stiffness=0.8,
     )  # fmt: skip
     fit = fit_dynamic(
-        start, experiments, free=FREE, per_record=("circuit.supply.pressure", StartTime(0.05)), observed=SENSORS, starts=4
+        start,
+        experiments,
+        free=FREE,
+        per_record=("circuit.supply.pressure", StartTime(0.05)),
+        observed=SENSORS,
+        starts=4,
     )
     expected = [truth(plants[0], e.name) for e in fit.estimates[:7]]
     expected += [

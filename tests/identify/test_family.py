@@ -22,7 +22,7 @@ from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify import Candidate, SpecimenSplit, compare, fit
 from airmuscle.identify.candidates import blank_surface, standard_candidates
-from airmuscle.library.build import Location, build
+from airmuscle.library.build import build
 from airmuscle.library.entry import Entry
 from airmuscle.library.location import Location
 from airmuscle.library.write import to_toml

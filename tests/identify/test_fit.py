@@ -550,7 +550,9 @@ def test_points_beyond_the_reach_of_a_law_are_named():
 
 
 def test_an_unknown_name_to_hold():
-    with pytest.raises(ParameterError, match=r"no parameter 'end_corection' to be fixed.*Did you mean 'end_correction'"):
+    with pytest.raises(
+        ParameterError, match=r"no parameter 'end_corection' to be fixed.*Did you mean 'end_correction'"
+    ):
         fit(TonduLopez2000(Braid(0.01, 0.45, 0.3)), points(surface(2).force), fixed=("end_corection",))
 
 
@@ -577,7 +579,10 @@ def test_a_recording_of_another_specimen_is_noted():
         resting_length=0.25
     )
     found = fit(TonduLopez2000(Braid(0.0095, 0.5, 0.3), 1.1), recording, fixed=("geometry.radius",))
-    assert "The muscle in the recording has a resting length of 0.25 m, but geometry.resting_length is 0.3 m." in found.notes
+    assert (
+        "The muscle in the recording has a resting length of 0.25 m, but geometry.resting_length is 0.3 m."
+        in found.notes
+    )
 
 
 # Measured muscles
@@ -633,7 +638,16 @@ def test_a_fit_prints_its_parameters_and_figures():
     assert f"{found['end_correction'].value:.6g}" in text
     assert f"{twice:.3g}" in text
     assert "how much more the middle contracts than the whole muscle" in text
-    for said in ("rms error", " N at ", " kPa, ", "residual std", "R2", "correlation index", "rank, condition", "data range"):
+    for said in (
+        "rms error",
+        " N at ",
+        " kPa, ",
+        "residual std",
+        "R2",
+        "correlation index",
+        "rank, condition",
+        "data range",
+    ):
         assert said in text
     assert "<table>" in found._repr_html_()
 

@@ -306,7 +306,8 @@ def test_a_run_that_cannot_be(plant: Plant):
             simulate(plant, Schedule({}), **{"duration": 1.0, **given})
     for opening in (7.0, -0.5):
         with pytest.raises(
-            ParameterError, match=rf"the input 'fill' is {opening:g} before 1 s; allowed range: 0 to 1 \(opening, 0 closed"
+            ParameterError,
+            match=rf"the input 'fill' is {opening:g} before 1 s; allowed range: 0 to 1 \(opening, 0 closed",
         ):
             simulate(plant, Schedule({"fill": ((0, opening),)}), duration=1.0)
         with pytest.raises(ParameterError, match=rf"the input 'fill' is {opening:g}"):

@@ -234,8 +234,16 @@ REFUSED = {
     "bounds of another kind": ("[1.01, 1.4]", '["1 m", 1.4]', "unit 'm' cannot be converted to"),
     "a start beyond its bounds": ("[1.01, 1.4]", "[1.2, 1.4]", "gas.exponent starts at 1.1; its bounds are 1.2 to 1.4"),
     "a deviation of zero": ('"500 Pa"', '"0 Pa"', "the standard deviation of a sensor must be greater than zero"),
-    "a deviation of another kind": ('"500 Pa"', '"500 mm"', "[observed], pressure: unit 'mm' cannot be converted to 'Pa'"),
-    "a column that is not there": ('"height"', '"heigth"', "no column 'heigth'; the columns are time, pressure, height"),
+    "a deviation of another kind": (
+        '"500 Pa"',
+        '"500 mm"',
+        "[observed], pressure: unit 'mm' cannot be converted to 'Pa'",
+    ),
+    "a column that is not there": (
+        '"height"',
+        '"heigth"',
+        "no column 'heigth'; the columns are time, pressure, height",
+    ),
     "no such output": (
         'position = { deviation = "50 um"',
         "heading = { deviation = 5e-5",

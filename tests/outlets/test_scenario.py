@@ -388,7 +388,12 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             ParameterError,
             r"\[command\]: .*'fill' must name its instants in rising",
         ),
-        (FILL, "fill = [[0.1, 7]]", ParameterError, r"\[command\]: the input 'fill' is 7 before 0.3 s; allowed range: 0"),
+        (
+            FILL,
+            "fill = [[0.1, 7]]",
+            ParameterError,
+            r"\[command\]: the input 'fill' is 7 before 0.3 s; allowed range: 0",
+        ),
         (FILL, "fill = [[0, -0.5]]", ParameterError, r"\[command\]: the input 'fill' is -0.5 before"),
         (
             FILL,

@@ -10,7 +10,7 @@ import typer
 
 from ..core import reference
 from ..core.reference import Reference
-from ..library.find import find
+from ..library.catalogue import load
 from .options import Json, Name
 from .terminal import echo, print_json
 

@@ -16,10 +16,11 @@ from ..core.errors import ParameterError
 from ..core.units import quantity
 from ..identify import ModelConversion
 from ..identify import convert as convert_model
-from ..identify.conversion import POINTS, on_grid
-from ..library.catalogue import load, save
+from ..identify.conversion import GRID_POINTS, sample_on_grid
+from ..library.catalogue import load_law
 from ..library.entry import Entry
-from ..report.chart import validity_range_of
+from ..library.write import save
+from ..report.isobar_plot import validity_range_of
 from .initial_law import find_initial_law
 from .options import Json, Name
 from .terminal import echo, percent, print_json, print_table
@@ -66,7 +67,7 @@ def convert(
     entry = load_law(name)
     limits = (min_pressure, max_pressure, min_contraction, max_contraction)
     validity_range = _validity_range(entry, dict(zip(LIMIT_UNITS, limits, strict=True)))
-    grid = sample_on_grid(entry.characteristic, validity_range, POINTS)
+    grid = sample_on_grid(entry.characteristic, validity_range, GRID_POINTS)
     length = getattr(entry.geometry, "resting_length", None)
     data = grid if length is None else grid.with_constants(resting_length=length)
     initial = find_initial_law(model, [data], degree, "MODEL")
@@ -116,7 +117,7 @@ def _converted_entry(entry: Entry, conversion: ModelConversion, validity_range: 
 
 def _errors_by_pressure(conversion: ModelConversion, validity_range: ValidityRange) -> list[dict[str, float]]:
     """Errors [N] in intervals of pressure."""
-    points = conversion.judged
+    points = conversion.check_points
     rows = []
     for low, high in itertools.pairwise(np.linspace(*validity_range.pressure, BANDS + 1)):
         inside = (points["pressure"] >= low) & (points["pressure"] <= high)
@@ -134,9 +135,9 @@ def _to_dict(conversion: ModelConversion, validity_range: ValidityRange) -> dict
         "model": type(conversion.model).__name__,
         "parameters": {leaf.path: leaf.value for leaf in leaves(conversion.model)},
         "validity_range": dataclasses.asdict(validity_range),
-        "rms": conversion.rms,
+        "rms": conversion.rmse,
         "max": conversion.max_error,
-        "max_at": {"pressure": conversion.pressure, "contraction": conversion.contraction},
+        "max_at": {"pressure": conversion.max_error_pressure, "contraction": conversion.max_error_contraction},
         "by_pressure": _errors_by_pressure(conversion, validity_range),
     }
 

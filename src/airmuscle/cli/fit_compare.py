@@ -46,7 +46,7 @@ def compare_models(
 
 def _with_option_names(comparison: Comparison) -> Comparison:
     """The comparison whose reasons of exclusion name command-line options instead of Python arguments."""
-    excluded = tuple(dataclasses.replace(each, why=in_options(each.why)) for each in comparison.excluded)
+    excluded = tuple(dataclasses.replace(each, reason=in_options(each.reason)) for each in comparison.excluded)
     return dataclasses.replace(comparison, excluded=excluded)
 
 
@@ -78,7 +78,7 @@ def _to_dict(comparison: Comparison) -> dict[str, Any]:
                 "in_sample": c.in_sample_rmse,
                 "cross_validated": c.cross_validated_rmse,
                 "aicc": c.aicc,
-                "groups": {score.part: score.rmse for score in c.fold_scores},
+                "groups": {score.fold: score.rmse for score in c.fold_scores},
             }
             for c in comparison.ranking
         ],

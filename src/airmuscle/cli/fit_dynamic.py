@@ -14,8 +14,8 @@ from ..identify.dynamic.profile import DynamicProfile
 from ..recording.segment import inspect
 from ..report.dynamic_chapter import dynamic_chapters
 from ..report.output_folder import atomic_folder, check_writable
-from ..report.write import fill
-from ..scenario.identification import DynamicStudy, load_study
+from ..report.write import write_into
+from ..scenario.identification import DynamicFitSetup, load_dynamic_fit
 from .options import Folder, Json
 from .terminal import echo, print_json
 
@@ -86,7 +86,7 @@ def fit_dynamic(
     echo(f"report: {out / 'report.html'}")
 
 
-def _findings(study: DynamicStudy) -> list[str]:
+def _findings(study: DynamicFitSetup) -> list[str]:
     """Data-quality problems of the records."""
     return [
         f"{experiment.recording.origin}: {finding.text}"
@@ -103,7 +103,7 @@ def _profiled_names(fit: DynamicFit, names: Sequence[str]) -> list[str]:
 
 
 def _write(
-    study: DynamicStudy, fit: DynamicFit, profiles: Sequence[DynamicProfile], findings: Sequence[str], out: Path
+    study: DynamicFitSetup, fit: DynamicFit, profiles: Sequence[DynamicProfile], findings: Sequence[str], out: Path
 ) -> list[Path]:
     """Write the report and one scenario per record; returns the paths of the scenarios."""
     names = []
@@ -128,9 +128,11 @@ def _to_dict(fit: DynamicFit, profiles: Sequence[DynamicProfile], findings: Sequ
         "rank": fit.identifiability.rank,
         "starts_at_optimum": fit.starts_at_optimum,
         "undetermined": [
-            {"shares": dict(each.shares), "deviation": each.deviation, "experiment": each.experiment}
+            {"shares": dict(each.shares), "deviation": each.relative_stderr, "experiment": each.remedy}
             for each in fit.identifiability.undetermined
         ],
-        "profiles": {p.name: {"values": p.values, "growth": p.growth, "interval": list(p.interval)} for p in profiles},
+        "profiles": {
+            p.name: {"values": p.values, "growth": p.cost_increase, "interval": list(p.interval)} for p in profiles
+        },
         "notes": [*fit.notes, *findings],
     }

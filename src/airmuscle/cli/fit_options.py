@@ -22,15 +22,14 @@ from ..identify import (
     LevelSplit,
     Loss,
     RunSplit,
-    ShapedFit,
+    ShapeConstrainedFit,
     SpecimenSplit,
     bootstrap,
-    fit_shaped,
     profile,
     weakly_determined,
 )
-from ..identify.problem import direction_of
-from ..identify.surface.shape import broken_by
+from ..identify.problem import fitted_quantity_of
+from ..identify.surface.shape import fit_shape_constrained, shape_violations_of_fit
 from ..library.entry import Entry
 from ..recording import Recording
 from ..report.chapter import Chapter
@@ -101,7 +100,7 @@ class FitExtras:
     """Results beyond the fit, for the report, the terminal and JSON."""
 
     uncertainty: Uncertainty
-    shaped: ShapedFit | None
+    shaped: ShapeConstrainedFit | None
     free_contractions: int
     """Number of points at which the force is constrained to zero."""
     none_weak: bool
@@ -121,14 +120,22 @@ class FitExtras:
         if self.shaped is None:
             return [*lines, *(f"note: {violation}" for violation in shape_violations_of_fit(self.uncertainty.fit))]
         errors = f"rms error {self.shaped.rmse:.4g} N, unconstrained {self.shaped.unconstrained_rmse:.4g} N"
-        return [*lines, f"shape: {errors}", *(f"unconstrained: {violation}" for violation in self.shaped.broken)]
+        return [
+            *lines,
+            f"shape: {errors}",
+            *(f"unconstrained: {violation}" for violation in self.shaped.unconstrained_violations),
+        ]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, all numbers SI."""
-        violations = shape_violations_of_fit(self.uncertainty.fit) if self.shaped is None else self.shaped.broken
+        violations = (
+            shape_violations_of_fit(self.uncertainty.fit)
+            if self.shaped is None
+            else self.shaped.unconstrained_violations
+        )
         data = {**self.uncertainty.as_data(), "shape_violations": [_violation_to_dict(each) for each in violations]}
         if self.shaped is not None:
-            data["shaped"] = {"rmse": self.shaped.rmse, "unconstrained": self.shaped.unconstrained}
+            data["shaped"] = {"rmse": self.shaped.rmse, "unconstrained": self.shaped.unconstrained_rmse}
         return data
 
     def constrained_entry(self, entry: Entry) -> Entry:
@@ -157,7 +164,7 @@ def loss_of(robust: str | None, law: Characteristic) -> Loss:
     """The loss that --robust gives, with its threshold in the unit of the fitted quantity; squared loss without it."""
     if robust is None:
         return LeastSquares()
-    return Huber(quantity(robust, direction_of(law).unit, where="--robust"))
+    return Huber(quantity(robust, fitted_quantity_of(law).unit, where="--robust"))
 
 
 def _parse_point(text: str) -> tuple[float, float]:
@@ -171,7 +178,9 @@ def _parse_point(text: str) -> tuple[float, float]:
     return quantity(pressure, "Pa", where="--free-contraction"), value
 
 
-def _fit_shaped(fit: Fit, recordings: Sequence[Recording], points: tuple[tuple[float, float], ...]) -> ShapedFit:
+def _fit_shaped(
+    fit: Fit, recordings: Sequence[Recording], points: tuple[tuple[float, float], ...]
+) -> ShapeConstrainedFit:
     if not isinstance(fit.model, ContractileSurface):
         raise ParameterError(
             f"--shape: the shape of {type(fit.model).__name__} is given by its formula; only a ContractileSurface can "

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from ..identify import Fit
-from ..library.catalogue import save
 from ..library.entry import Entry
+from ..library.write import save
 from ..recording import Recording
 from ..report.chapter import Chapter
 from ..report.fit_chapter import fit_chapter
 from ..report.output_folder import atomic_folder
-from ..report.write import fill
+from ..report.write import write_into
 from .remedies import in_options
 from .terminal import echo
 

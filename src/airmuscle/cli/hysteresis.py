@@ -12,13 +12,13 @@ import typer
 
 from ..core import leaves
 from ..identify.hysteresis import HysteresisFit, LoopFit, find_holds, find_loops, fit_creep, fit_loop
-from ..library.catalogue import load, save
+from ..library.catalogue import load_law
 from ..library.entry import Entry
-from ..library.write import part_lines
+from ..library.write import part_toml, save
 from ..recording import Recording
-from ..report.hysteresis_chapter import counted, hysteresis_chapters
+from ..report.hysteresis_chapter import describe_row_counts, hysteresis_chapters
 from ..report.output_folder import atomic_folder, check_writable
-from ..report.write import fill
+from ..report.write import write_into
 from .bench_files import AmbientPressure, Files, Length, Units, read_recordings
 from .options import Folder, Json, Mapping
 from .terminal import echo, print_json, print_table
@@ -122,14 +122,14 @@ def _write(
         if selected is not None and entry is not None:
             save(_with_friction(entry, selected), folder / "muscle.toml")
         elif selected is not None:
-            lines = [f"# {selected.verdict}", *part_lines("friction", selected.friction)]
-            (folder / "friction.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+            text = f"# {selected.verdict}\n{part_toml('friction', selected.friction)}"
+            (folder / "friction.toml").write_text(text, encoding="utf-8")
     return out / name if name else None
 
 
 def _with_friction(entry: Entry, fit: HysteresisFit) -> Entry:
     """The muscle with the friction; its checks are kept, because they apply to the characteristic alone."""
-    note = f"{entry.note} Friction from {fit.course.origin}: {fit.verdict}".strip()
+    note = f"{entry.note} Friction from {fit.series.origin}: {fit.verdict}".strip()
     return dataclasses.replace(entry, name="muscle", friction=fit.friction, note=note)
 
 
@@ -160,7 +160,9 @@ def _p_value(probability: float) -> str:
 
 def _second_run_errors(fit: HysteresisFit) -> str:
     """The rms errors on the second run, without and with friction; empty without a second run."""
-    return f"{fit.repeat_rmse_without_friction:.3g} to {fit.repeat_rmse:.3g} N" if math.isfinite(fit.repeat_rmse) else ""
+    return (
+        f"{fit.repeat_rmse_without_friction:.3g} to {fit.repeat_rmse:.3g} N" if math.isfinite(fit.repeat_rmse) else ""
+    )
 
 
 def _to_dict(fit: LoopFit) -> dict[str, Any]:
@@ -169,15 +171,15 @@ def _to_dict(fit: LoopFit) -> dict[str, Any]:
         "origin": fit.loop.recording.origin,
         "run": fit.loop.run.kind.name,
         "constant": fit.loop.run.constant_column,
-        "value": fit.loop.run.value,
+        "value": fit.loop.run.constant_value,
         "recommended": type(fit.recommended.friction).__name__ if fit.recommended else None,
-        "usable_in_plant": fit.enters_a_plant,
+        "usable_in_plant": fit.usable_in_plant,
         "models": [
             {
                 "model": type(f.friction).__name__, "parameters": {p.path: p.value for p in leaves(f.friction)},
-                "rmse": f.rmse, "rmse_without": f.plain_rmse, "gap": f.gap_left, "gap_without": f.gap,
-                "repeat_rmse": f.repeat_rmse, "repeat_rmse_without": f.plain_repeat_rmse,
-                "repeatability": f.repeatability, "aicc_difference": 0.0 - f.aicc_gain, "p_value": f.chance,
+                "rmse": f.rmse, "rmse_without": f.rmse_without_friction, "gap": f.residual_gap, "gap_without": f.gap,
+                "repeat_rmse": f.repeat_rmse, "repeat_rmse_without": f.repeat_rmse_without_friction,
+                "repeatability": f.repeatability, "aicc_difference": 0.0 - f.aicc_reduction, "p_value": f.p_value,
                 "justified": f.justified, "undetermined": list(f.undetermined),
             }
             for f in fit.fits

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from ..core.errors import ParameterError
 from ..identify import standard_candidates
-from ..library.catalogue import load
+from ..library.catalogue import load_law
 from ..library.entry import Entry
 from ..library.models import model_class, model_names
 from ..recording import Recording

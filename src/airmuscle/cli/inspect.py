@@ -117,10 +117,10 @@ def _to_dict(inspection: Inspection) -> dict[str, Any]:
         "constants": dict(recording.constants),
         "notes": list(recording.notes),
         "sampling": _sampling_to_dict(inspection.sampling) if inspection.sampling else None,
-        "sensors": [dataclasses.asdict(sensor) | {"deviation": sensor.deviation} for sensor in sensors],
+        "sensors": [dataclasses.asdict(sensor) | {"deviation": sensor.std} for sensor in sensors],
         "runs": [
             {"kind": run.kind.name, "first_row": run.interval.start + 1, "last_row": run.interval.stop,
-             "constant": run.constant_column, "value": run.value, "swept": run.swept} for run in inspection.runs
+             "constant": run.constant_column, "value": run.constant_value, "swept": run.swept_columns} for run in inspection.runs
         ],
         "branches": [
             {"branch": b.name, "first_row": b.interval.start + 1, "last_row": b.interval.stop,
@@ -129,7 +129,7 @@ def _to_dict(inspection: Inspection) -> dict[str, Any]:
         "branch_agreement": inspection.branch_agreement,
         "plateaus": [
             {"first_row": p.interval.start + 1, "last_row": p.interval.stop, "values": dict(p.values),
-             "deviations": dict(p.deviations)} for p in inspection.plateaus
+             "deviations": dict(p.standard_errors)} for p in inspection.plateaus
         ],
         "quasi_static": inspection.quasi_static,
         "suspected_outliers": [dataclasses.asdict(o) | {"row": o.row + 1} for o in inspection.outliers],
@@ -140,10 +140,10 @@ def _to_dict(inspection: Inspection) -> dict[str, Any]:
 def _sampling_to_dict(sampling: Sampling) -> dict[str, Any]:
     return {
         "rate": sampling.rate,
-        "step": sampling.step,
+        "step": sampling.sample_time,
         "jitter": sampling.jitter,
         "duration": sampling.duration,
-        "gaps": [{"after_row": gap.row + 1, "start": gap.start, "length": gap.length} for gap in sampling.gaps],
+        "gaps": [{"after_row": gap.row + 1, "start": gap.start, "length": gap.duration} for gap in sampling.gaps],
         "repeating_rows": [row + 1 for row in sampling.repeated_rows],
         "backward_rows": [row + 1 for row in sampling.backward_rows],
     }

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..recording.plot import scale
+from ..recording.display_units import display_scale
 from ..recording.segment import Inspection, Outlier, Run, Sampling
 
 COLUMNS = ("column", "unit in file", "min", "max", "unit", "resolution", "noise", "saturated at")
@@ -19,7 +19,7 @@ def column_rows(inspection: Inspection) -> Iterator[tuple[str, ...]]:
     """Rows of the table of columns, in display units."""
     recording = inspection.recording
     for name in recording:
-        factor, unit = scale(name)
+        factor, unit = display_scale(name)
         values, sensor = recording[name] * factor, inspection.sensors.get(name)
         limits = (sensor.lower_limit, sensor.upper_limit) if sensor else ()
         yield (
@@ -37,7 +37,7 @@ def column_rows(inspection: Inspection) -> Iterator[tuple[str, ...]]:
 def summary(inspection: Inspection) -> Iterator[str]:
     """Constants, sampling, runs, branches, plateaus, outliers, notes and findings, one line each."""
     for name, value in inspection.recording.constants.items():
-        factor, unit = scale("length" if name == "resting_length" else "pressure" if name == "ambient" else "")
+        factor, unit = display_scale("length" if name == "resting_length" else "pressure" if name == "ambient" else "")
         yield f"{name}: {value * factor:.6g} {unit}" if isinstance(value, float) and unit else f"{name}: {value}"
     if inspection.sampling:
         yield f"sampling: {_describe_sampling(inspection.sampling)}"
@@ -77,11 +77,11 @@ def _describe_run(run: Run) -> str:
         return _with_rows(f"only the {run.swept_columns[0]} was measured", run)
     if run.constant_column is None or run.constant_value is None:
         return _with_rows(run.kind.name, run)
-    factor, unit = scale(run.constant_column)
+    factor, unit = display_scale(run.constant_column)
     return _with_rows(f"{run.kind.name} at {run.constant_column} {run.constant_value * factor:.4g} {unit}", run)
 
 
 def _describe_outlier(outlier: Outlier) -> str:
-    factor, unit = scale(outlier.column)
+    factor, unit = display_scale(outlier.column)
     values = f"{outlier.value * factor:.4g} {unit}, neighbours {outlier.expected * factor:.4g} {unit}"
     return f"{outlier.column} in row {outlier.row + 1} ({values})"

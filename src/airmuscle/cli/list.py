@@ -8,8 +8,7 @@ import tomllib
 from pathlib import Path
 
 from ..characteristic import ForceLaw
-from ..library import valve_catalogue
-from ..library.catalogue import DATA, FOLDER, list_library, measured_names
+from ..library.files import DATA, LAWS, VALVES, list_data, list_laws, list_valves
 from ..library.models import model_class
 from .options import Json
 from .terminal import print_json, print_table
@@ -47,8 +46,8 @@ def list_entries(json: Json = False) -> None:
 def library_rows() -> list[ListRow]:
     """All library entries, valves and data sets, read from the files without building any model."""
     return [
-        *(_entry_row(FOLDER / f"{name}.toml") for name in list_laws()),
-        *(_valve_row(valve_catalogue.LAWS / f"{name}.toml") for name in valve_catalogue.valve_names()),
+        *(_entry_row(LAWS / f"{name}.toml") for name in list_laws()),
+        *(_valve_row(VALVES / f"{name}.toml") for name in list_valves()),
         *(_data_row(DATA / f"{name}.csv") for name in list_data()),
     ]
 

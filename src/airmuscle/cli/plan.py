@@ -9,8 +9,8 @@ import typer
 
 from ..characteristic import ValidityRange
 from ..core.units import quantity
-from ..identify.experiment_design import BenchLimits, Plan, PlannedRun, optimal_design
-from ..library.catalogue import load
+from ..identify.experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
+from ..library.catalogue import load_law
 from ..recording import write_csv
 from ..report.output_folder import atomic_folder, check_writable
 from .options import Json, Name, OptionalFolder
@@ -59,7 +59,9 @@ def plan(
     pressures = [quantity(text, "Pa", where="pressure limits") for text in (min_pressure, max_pressure)]
     contractions = [quantity(text, "1", where="contraction limits") for text in (min_contraction, max_contraction)]
     limits = BenchLimits(ValidityRange(*pressures, *contractions), quantity(max_force, "N", where="--max-force"))
-    design = optimal_design(load_law(name).characteristic, limits, runs=runs, points=points, sigma=sigma, fixed=fix or ())
+    design = optimal_design(
+        load_law(name).characteristic, limits, runs=runs, points=points, sigma=sigma, fixed=fix or ()
+    )
     if out is not None:
         _write(design, out)
     if json:
@@ -70,7 +72,7 @@ def plan(
         echo(f"plan: {out / 'plan.csv'}")
 
 
-def _write(design: Plan, out: Path) -> None:
+def _write(design: ExperimentPlan, out: Path) -> None:
     check_writable(out)
     with atomic_folder(out) as folder:
         write_csv(design.recording(), folder / "plan.csv")
@@ -81,32 +83,34 @@ def _format(name: str, value: float) -> str:
 
 
 def _row(number: int, run: PlannedRun) -> tuple[str, ...]:
-    constant = f"{run.held} {_format(run.held, run.level)}"
-    ends = " to ".join(_format(run.swept, end) for end in run.ends)
+    constant = f"{run.constant} {_format(run.constant, run.level)}"
+    ends = " to ".join(_format(run.swept, end) for end in run.sweep_limits)
     forces = f"{run.force.max():.4g} to {run.force.min():.4g} N"
     return str(number), constant, f"{run.swept} {ends}", str(run.force.size), forces
 
 
-def _print(design: Plan) -> None:
+def _print(design: ExperimentPlan) -> None:
     rows = [_row(i + 1, run) for i, run in enumerate(design.runs)]
     print_table(("run", "constant", "sweep", "points", "expected force"), rows, right=("run", "points"))
     parameters = zip(design.names, design.values, design.standard_errors, strict=True)
     headers = ("parameter", "present value", "expected 2 stderr")
     print_table(headers, [(n, f"{v:.5g}", f"{2 * d:.2g}") for n, v, d in parameters], right=headers[1:])
-    echo(f"relative D-efficiency {design.relative_d_efficiency:.2f}, compared with the same number of evenly spaced runs")
+    echo(
+        f"relative D-efficiency {design.relative_d_efficiency:.2f}, compared with the same number of evenly spaced runs"
+    )
     for remark in design.undetermined:
         echo(f"note: {remark}")
 
 
-def _to_dict(design: Plan) -> dict[str, Any]:
+def _to_dict(design: ExperimentPlan) -> dict[str, Any]:
     """A plan as plain data, all numbers SI."""
-    parameters = zip(design.names, design.values, design.deviations, strict=True)
+    parameters = zip(design.names, design.values, design.standard_errors, strict=True)
     return {
         "runs": [
-            {"constant": r.held, "level": r.level, "swept": r.swept, "ends": r.ends, "points": r.force.size}
+            {"constant": r.constant, "level": r.level, "swept": r.swept, "ends": r.sweep_limits, "points": r.force.size}
             for r in design.runs
         ],
         "parameters": {name: {"value": value, "stderr": stderr} for name, value, stderr in parameters},
-        "relative_efficiency": design.gain,
+        "relative_efficiency": design.relative_d_efficiency,
         "notes": [str(remark) for remark in design.undetermined],
     }

@@ -12,7 +12,7 @@ import typer
 
 from ..core.errors import AirmuscleError
 from ..report.chapter import DIFFERS, HOLDS, NOT_PRINTED, Chapter, Claim
-from ..report.wording import MARKS, number, published, tally
+from ..report.formatting import MARKS, count_verdicts, format_number, format_published
 from ..reproduce import reproduce as reproduce_papers
 from .options import Folder
 from .terminal import echo, print_table
@@ -64,7 +64,10 @@ def _show_stage(paper: str) -> Iterator[None]:
 
 
 def _print_claims(claims: list[Claim]) -> None:
-    rows = [(c.paper, c.claim, format_published(c), format_number(c.reproduced), _unit(c), _verdict(c.verdict)) for c in claims]
+    rows = [
+        (c.paper, c.claim, format_published(c), format_number(c.reproduced), _unit(c), _verdict(c.verdict))
+        for c in claims
+    ]
     headers = ("paper", "claim", "published", "reproduced", "unit", "verdict")
     print_table(headers, rows, right=("published", "reproduced"))
     counts = count_verdicts(tuple(claims))

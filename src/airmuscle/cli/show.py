@@ -6,16 +6,16 @@ import math
 from typing import Any
 
 from ..core import cite, leaves
+from ..library.catalogue import load
 from ..library.entry import Entry
-from ..library.find import find
-from ..library.valve_catalogue import ValveEntry
-from ..report.wording import number
+from ..library.valve_entry import ValveEntry
+from ..report.formatting import format_number
 from .options import Json, Name
 from .terminal import echo, print_json, print_table
 
 PARTS = (
     "characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "validity_range",
-    "valve", "exhaust", "response",
+    "valve", "exhaust", "switching_times",
 )  # fmt: skip
 MAX_VALUES = 30
 """Longest list of values that the table shows completely."""
@@ -60,7 +60,7 @@ def entry_to_dict(entry: Entry | ValveEntry) -> dict[str, Any]:
         "checks": [
             {
                 "quantity": check.quantity,
-                "given": dict(check.given),
+                "given": dict(check.conditions),
                 "equals": check.equals,
                 "tolerance": check.tolerance,
                 "source": check.source,
@@ -100,7 +100,12 @@ def _print(entry: dict[str, Any]) -> None:
     print_table(("parameter", "symbol", "value", "unit", "meaning", "bounds"), rows, right=("value",))
     if entry["checks"]:
         checks = [
-            (c["quantity"], _point(c["given"]), f"{format_number(c['equals'])} ± {format_number(c['tolerance'])}", c["source"])
+            (
+                c["quantity"],
+                _point(c["given"]),
+                f"{format_number(c['equals'])} ± {format_number(c['tolerance'])}",
+                c["source"],
+            )
             for c in entry["checks"]
         ]
         echo()

@@ -9,11 +9,11 @@ import typer
 
 from ..core.errors import SimulationError
 from ..recording import Recording, write_csv
-from ..recording.recording import header
+from ..recording.recording import column_heading
+from ..report.formatting import format_number
 from ..report.output_folder import atomic_folder, check_writable
 from ..report.run_chapter import run_chapter
-from ..report.wording import number
-from ..report.write import fill
+from ..report.write import write_into
 from ..scenario.scenario import Scenario, load_scenario
 from .options import Folder, Json
 from .terminal import echo, print_json, print_table

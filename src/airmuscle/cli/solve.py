@@ -14,11 +14,18 @@ from ..core import leaves
 from ..core.errors import AirmuscleWarning, GeometryLimitError, PhysicsError, SolveError
 from ..core.plotting import save
 from ..core.units import quantity
-from ..library.catalogue import load
+from ..library.catalogue import load_law
 from ..library.entry import Entry
 from ..pneumatics import Ambient
 from ..pneumatics.gas import check_above_vacuum
-from ..report.chart import Point, chart, isobars, point_text, table, validity_range_of
+from ..report.isobar_plot import (
+    WorkingPoint,
+    compute_isobars,
+    describe_point,
+    isobar_plot,
+    isobar_table,
+    validity_range_of,
+)
 from ..report.output_folder import atomic_folder
 from ..report.write import save_table
 from .options import Json, Name, OptionalFolder
@@ -71,7 +78,7 @@ def solve(
         echo(f"chart: {out / 'isobars.png'}, data: {out / 'isobars.csv'} ({describe_point(point)})", err=json)
 
 
-def _solve(characteristic: Characteristic, texts: dict[str, str | None]) -> Point:
+def _solve(characteristic: Characteristic, texts: dict[str, str | None]) -> WorkingPoint:
     """The operating point. Raises SolveError, GeometryLimitError or UnitError."""
     values = {name: quantity(text, UNITS[name], where=f"--{name}") for name, text in texts.items() if text is not None}
     if "pressure" in values:
@@ -99,7 +106,7 @@ def _check_contraction(characteristic: Characteristic, contraction: float) -> No
         )
 
 
-def _stiffness(entry: Entry, point: Point) -> float | None:
+def _stiffness(entry: Entry, point: WorkingPoint) -> float | None:
     """-dF/deps at constant pressure [N]; None where the force is not unique or not defined."""
     try:
         return float(entry.characteristic.stiffness(point.pressure, point.contraction))
@@ -107,7 +114,7 @@ def _stiffness(entry: Entry, point: Point) -> float | None:
         return None
 
 
-def _warn(point: Point, validity_range: ValidityRange | None) -> None:
+def _warn(point: WorkingPoint, validity_range: ValidityRange | None) -> None:
     if point.force < 0:
         warnings.warn("the force is negative; a muscle cannot push and is slack here.", AirmuscleWarning, stacklevel=2)
     if validity_range is not None and not validity_range.contains(point.pressure, point.contraction):
@@ -127,7 +134,7 @@ def _resting_length(entry: Entry) -> float | None:
     return next(lengths, None)
 
 
-def _rows(entry: Entry, point: Point, unknown: str) -> list[tuple[str, str, str]]:
+def _rows(entry: Entry, point: WorkingPoint, unknown: str) -> list[tuple[str, str, str]]:
     values = {
         "pressure": f"{point.pressure / 1e3:.6g} kPa",
         "contraction": percent(point.contraction),
@@ -148,7 +155,7 @@ def _rows(entry: Entry, point: Point, unknown: str) -> list[tuple[str, str, str]
     return [*rows, ("stiffness", per_length, "at constant pressure")]
 
 
-def _to_dict(entry: Entry, point: Point, validity_range: ValidityRange | None, unknown: str) -> dict[str, Any]:
+def _to_dict(entry: Entry, point: WorkingPoint, validity_range: ValidityRange | None, unknown: str) -> dict[str, Any]:
     """The operating point as plain data, all numbers SI."""
     inside = None if validity_range is None else bool(validity_range.contains(point.pressure, point.contraction))
     return {
@@ -162,8 +169,11 @@ def _to_dict(entry: Entry, point: Point, validity_range: ValidityRange | None, u
     }
 
 
-def _write(entry: Entry, point: Point, validity_range: ValidityRange | None, out: Path) -> None:
+def _write(entry: Entry, point: WorkingPoint, validity_range: ValidityRange | None, out: Path) -> None:
     with atomic_folder(out) as folder:
-        curves = isobars(entry.characteristic, validity_range, point)
+        curves = compute_isobars(entry.characteristic, validity_range, point)
         save_table(isobar_table(curves), folder / "isobars.csv")
-        save(compute_isobars(entry.characteristic, entry.title, curves, validity_range, point).figure, folder / "isobars.png")
+        save(
+            isobar_plot(entry.characteristic, entry.title, curves, validity_range, point).figure,
+            folder / "isobars.png",
+        )

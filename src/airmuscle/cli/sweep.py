@@ -12,12 +12,11 @@ import typer
 
 from ..core.errors import AirmuscleError, InputError, SimulationError
 from ..report.chapter import Table
-from ..report.wording import number
-from ..report.wording import rows as rows_of
-from ..study import Study, StudyResult, dask_cluster, load_study, processes, run_study
-from ..study.chapter import reasons_table, sensitivity_table, write_study
-from ..study.executors import cores_here
-from ..study.run import runs_kept
+from ..report.formatting import format_number, table_rows
+from ..study import Study, StudyResult, dask_cluster, load_study, run_study
+from ..study.chapter import failure_table, sensitivity_table, write_study
+from ..study.executors import available_cores, process_pool
+from ..study.run import count_finished_runs
 from .interruption import check_interrupted
 from .options import Folder, Json
 from .terminal import echo, print_json, print_table
@@ -115,7 +114,10 @@ def _print(result: StudyResult) -> None:
 
 
 def _print_table(table: Table) -> None:
-    rows = [tuple(value if isinstance(value, str) else _round(format_number(value)) for value in r) for r in rows_of(table)]
+    rows = [
+        tuple(value if isinstance(value, str) else _round(format_number(value)) for value in r)
+        for r in table_rows(table)
+    ]
     numeric = [h.strip() for h, values in table.columns.items() if not isinstance(next(iter(values)), str)]
     print_table([header.strip() for header in table.columns], rows, right=numeric)
 

@@ -78,9 +78,7 @@ def build(
         return _library_orifice(table, location)
     if not isinstance(table.get("model"), str):
         choice = f"one of {', '.join(classes)}" if classes else 'such as model = "Braid"'
-        raise ParameterError(
-            f'{location}: the model is not named; write model = "...", {choice}, and its parameters.'
-        )
+        raise ParameterError(f'{location}: the model is not named; write model = "...", {choice}, and its parameters.')
     cls = model_class(table["model"], f"{location}, model", classes)
     fields = {key: value for key, value in table.items() if key != "model"}
     for key in fields:

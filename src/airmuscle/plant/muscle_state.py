@@ -41,7 +41,7 @@ def muscle_state(
     pressure = gauge_pressure(air.pressure, ambient)
     pull = muscle.compute_force(pressure, inner, contraction, speed, state)
     rates = muscle.rates(state, pressure, pull.inner_speed)
-    growth = muscle.geometry.volume_growth(inner) * pull.inner_speed / muscle.geometry.resting_length
+    growth = muscle.geometry.volume_derivative(inner) * pull.inner_speed / muscle.geometry.resting_length
     growth = sum((rates[s.name] for s in muscle.wall.states), growth)
     return MuscleState(
         contraction, speed, volume, air, pressure, pull.tension, pull.friction, inner, pull.inner_speed, growth, state,

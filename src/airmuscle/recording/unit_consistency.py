@@ -11,10 +11,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ..core.constants import STANDARD_GRAVITY
 from ..core.errors import AirmuscleWarning, UnitError
 from ..core.units import conversion
 from .columns import quantity_of
-from .interpret import STANDARD_GRAVITY
 from .recording import Recording
 
 SAME_MAGNITUDE = 1.5

@@ -49,7 +49,7 @@ def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
     for i, level in enumerate(levels):
         points = _curve_points(fit, curve, float(level))
         try:
-            confidence, prediction = (confidence_band(fit, points, level=LEVEL, reading=r) for r in (False, True))
+            confidence, prediction = (confidence_band(fit, points, level=LEVEL, prediction=r) for r in (False, True))
         except IdentificationError:
             return None
         colour = plotting.LINES[i % len(plotting.LINES)]
@@ -80,7 +80,9 @@ def _curve_points(fit: Fit, curve: _CurveAxes, level: float) -> Recording:
 def _draw_measured(axes: Any, fit: Fit, curve: _CurveAxes, factor: float, x_factor: float) -> None:
     measured = fit.recording.rows(fit.censoring == 0)
     style = {"marker": ".", "linestyle": "none", "markersize": 2, "color": plotting.BLACK, "alpha": 0.35}
-    axes.plot(x_factor * measured[curve.varying], factor * measured[fit.fitted_quantity.name], label="measured", **style)
+    axes.plot(
+        x_factor * measured[curve.varying], factor * measured[fit.fitted_quantity.name], label="measured", **style
+    )
     values = factor * measured[fit.fitted_quantity.name]
     margin = 0.08 * float(np.ptp(values)) or 1.0
     axes.set_ylim(float(values.min()) - margin, float(values.max()) + margin)

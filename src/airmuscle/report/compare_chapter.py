@@ -36,13 +36,13 @@ def compare_chapter(comparison: Comparison) -> Chapter:
 
 
 def _ranking(comparison: Comparison) -> Table:
-    contenders = comparison.contenders
+    contenders = comparison.ranking
     return Table(
         "ranking",
         "Ranking by cross-validation error",
         {
             "law": [c.candidate.name for c in contenders],
-            "parameters": [c.parameters for c in contenders],
+            "parameters": [c.parameter_count for c in contenders],
             "in-sample rms error [N]": [c.in_sample_rmse for c in contenders],
             "cross-validation rms error [N]": [c.cross_validated_rmse for c in contenders],
             "AICc": [c.aicc for c in contenders],
@@ -53,15 +53,15 @@ def _ranking(comparison: Comparison) -> Table:
 def _excluded(comparison: Comparison) -> Table | None:
     if not comparison.excluded:
         return None
-    columns = {"law": [e.name for e in comparison.excluded], "reason": [e.why for e in comparison.excluded]}
+    columns = {"law": [e.name for e in comparison.excluded], "reason": [e.reason for e in comparison.excluded]}
     return Table("excluded", "Laws whose parameters the data do not determine", columns)
 
 
 def _fold_table(comparison: Comparison) -> Table:
-    parts = {part.part: None for c in comparison.ranking for part in c.fold_scores}
+    parts = {part.fold: None for c in comparison.ranking for part in c.fold_scores}
     columns: dict[str, Any] = {"fold": list(parts)}
     for contender in comparison.ranking:
-        errors = {part.part: part.rmse for part in contender.fold_scores}
+        errors = {part.fold: part.rmse for part in contender.fold_scores}
         columns[f"{contender.candidate.name} [N]"] = [errors.get(part, float("nan")) for part in parts]
     return Table("left-out-parts", "Errors by fold", columns, shown=False)
 
@@ -71,7 +71,7 @@ def _fold_figure(comparison: Comparison) -> Any:
     for i, contender in enumerate(comparison.ranking[:_MAX_CURVES]):
         errors = [part.rmse for part in contender.fold_scores]
         axes.plot(errors, MARKERS[i], color=LINES[i], linestyle=":", linewidth=0.8, label=contender.candidate.name)
-    names = [part.part for part in comparison.ranking[0].fold_scores]
+    names = [part.fold for part in comparison.ranking[0].fold_scores]
     axes.set_xticks(range(len(names)), [_shorten(name) for name in names], rotation=30, ha="right")
     axes.set(ylabel=f"rms error, {comparison.leave_out.group_name} left out [N]", yscale="log")
     legend_outside(axes)

@@ -42,7 +42,9 @@ def _estimates(fit: DynamicFit, title: str, remarks: Sequence[str]) -> Chapter:
     rms = {
         "record": [c.experiment.recording.origin for c in fit.problem.record_models for _ in c.names],
         "quantity": [name for c in fit.problem.record_models for name in c.names],
-        "rms residual": [_with_unit(fit.rms(n, i), n) for i, c in enumerate(fit.problem.record_models) for n in c.names],
+        "rms residual": [
+            _with_unit(fit.rms(n, i), n) for i, c in enumerate(fit.problem.record_models) for n in c.names
+        ],
     }
     tables = [
         _estimate_table(fit),
@@ -88,7 +90,7 @@ def _undetermined_table(fit: DynamicFit) -> list[Table]:
         "combination (relative changes)": [
             ", ".join(f"{name} {share:+.2g}" for name, share in each.shares) for each in undetermined
         ],
-        "relative standard deviation": [each.deviation for each in undetermined],
+        "relative standard deviation": [each.relative_stderr for each in undetermined],
         "experiment that determines it": [each.remedy for each in undetermined],
     }
     return [Table("not-determined", "Parameter combinations that the records do not determine", columns)]

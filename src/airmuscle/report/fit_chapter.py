@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..core.reference import cite
 from ..identify import Fit
-from ..identify.surface.shape import broken_by
+from ..identify.surface.shape import shape_violations_of_fit
 from ..library.entry import Entry
 from .band_plot import band_plot
 from .chapter import Chapter, Plot, Table

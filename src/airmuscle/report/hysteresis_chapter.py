@@ -10,7 +10,7 @@ import numpy as np
 from ..core.plotting import BLACK, BLUE, RED, legend_below, new_figure
 from ..identify.hysteresis import HysteresisFit, HysteresisLoop, LoopFit
 from ..identify.hysteresis.plot import plot_loops
-from ..recording.plot import scale
+from ..recording.display_units import display_scale
 from ..recording.segment import motion_direction
 from .chapter import Chapter, Plot, Table
 from .formatting import P_VALUE
@@ -92,7 +92,7 @@ def _law_table(loop_fit: LoopFit, suffix: str) -> Table:
             "branch gap without friction [N]": [f.gap for f in fits],
             "remaining branch gap [N]": [f.residual_gap for f in fits],
             "reduction of AICc": [f.aicc_reduction for f in fits],
-            P_VALUE: [f.chance for f in fits],
+            P_VALUE: [f.p_value for f in fits],
             "justified": ["yes" if f.justified else "no" for f in fits],
             "not determined": [", ".join(f.undetermined) for f in fits],
         },
@@ -102,7 +102,9 @@ def _law_table(loop_fit: LoopFit, suffix: str) -> Table:
 def _loop_figure(loop: HysteresisLoop) -> Any:
     """Return a figure of the force over the varied quantity, by branch; rows that are not used are light."""
     recording = loop.recording
-    name = "contraction" if "contraction" in loop.run.swept_columns or "length" in loop.run.swept_columns else "pressure"
+    name = (
+        "contraction" if "contraction" in loop.run.swept_columns or "length" in loop.run.swept_columns else "pressure"
+    )
     factor, unit = display_scale(name)
     direction = motion_direction(loop.friction_path.displacement(recording), recording.columns.get("time"))
     figure, axes = new_figure(width=6.0, height=3.9)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..core.plotting import DASHES, LINES, legend_outside, new_figure
-from ..identify import Fit, ShapedFit
-from ..identify.surface.breaks import MonotonicityViolation
+from ..identify import Fit, ShapeConstrainedFit
+from ..identify.surface.monotonicity import MonotonicityViolation
 from .chapter import Chapter, Plot, Table
 from .levels import levels_of
 
@@ -17,10 +17,14 @@ MAX_CURVES = 5
 POINTS = 161
 
 
-def shape_chapter(shaped: ShapedFit, unconstrained: Fit, free: int) -> Chapter:
+def shape_chapter(shaped: ShapeConstrainedFit, unconstrained: Fit, free: int) -> Chapter:
     """Return the chapter of a constrained fit and its cost; `free` is the number of points of free contraction."""
     zero = f", and it is zero at {free} points of free contraction" if free else ""
-    verdict = "satisfies these constraints too" if not shaped.unconstrained_violations else "violates them in the regions of the table"
+    verdict = (
+        "satisfies these constraints too"
+        if not shaped.unconstrained_violations
+        else "violates them in the regions of the table"
+    )
     return Chapter(
         paper="shape",
         title="Shape-constrained surface",
@@ -28,7 +32,11 @@ def shape_chapter(shaped: ShapedFit, unconstrained: Fit, free: int) -> Chapter:
         f"decrease with pressure and does not increase with contraction{zero}. Its rms error is {shaped.rmse:.4g} N, "
         f"compared with {shaped.unconstrained_rmse:.4g} N of the unconstrained surface, which {verdict}. The uncertainties "
         "and bands below are those of the unconstrained surface.",
-        tables=(violation_table(shaped.unconstrained_violations, "shape-loose", "Monotonicity violations of the unconstrained surface"),)
+        tables=(
+            violation_table(
+                shaped.unconstrained_violations, "shape-loose", "Monotonicity violations of the unconstrained surface"
+            ),
+        )
         if shaped.unconstrained_violations
         else (),
         plots=(Plot("shaped", "Solid: constrained. Dashed: unconstrained.", _surface_figure(shaped, unconstrained)),),
@@ -46,15 +54,15 @@ def violation_table(violations: Sequence[MonotonicityViolation], name: str, titl
             "to [kPa]": [each.pressure[1] / 1e3 for each in violations],
             "from [%]": [100 * each.second_argument[0] for each in violations],
             "to [%]": [100 * each.second_argument[1] for each in violations],
-            "fraction of the validity range [%]": [100 * each.share for each in violations],
-            "worst at [kPa]": [each.worst[0] / 1e3 for each in violations],
-            "worst at [%]": [100 * each.worst[1] for each in violations],
+            "fraction of the validity range [%]": [100 * each.area_fraction for each in violations],
+            "worst at [kPa]": [each.worst_point[0] / 1e3 for each in violations],
+            "worst at [%]": [100 * each.worst_point[1] for each in violations],
         },
         "Gauge pressure and contraction. `airmuscle fit --shape` fits a surface without such regions.",
     )
 
 
-def _surface_figure(shaped: ShapedFit, unconstrained: Fit) -> Any:
+def _surface_figure(shaped: ShapeConstrainedFit, unconstrained: Fit) -> Any:
     figure, axes = new_figure(width=6.6, height=3.9)
     contraction = np.linspace(*unconstrained.data_ranges["contraction"], POINTS)
     for i, pressure in enumerate(levels_of(unconstrained.recording["pressure"], MAX_CURVES)):

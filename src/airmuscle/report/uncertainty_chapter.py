@@ -67,12 +67,10 @@ class Uncertainty:
 
 
 def _describe_bootstrap(bootstrap: Bootstrap) -> str:
-    failed = f"; {bootstrap.lost} of them did not determine the parameters" if bootstrap.lost else ""
-    if bootstrap.lost > MAX_FAILED_SHARE * len(bootstrap.values):
+    failed = f"; {bootstrap.failed_refits} of them did not determine the parameters" if bootstrap.failed_refits else ""
+    if bootstrap.failed_refits > MAX_FAILED_SHARE * len(bootstrap.values):
         failed += ", so the intervals are not reliable: add runs, or use a law with fewer parameters"
-    return (
-        f"bootstrap: {len(bootstrap.values)} refits, {bootstrap.parts} blocks resampled, seed {bootstrap.seed}{failed}"
-    )
+    return f"bootstrap: {len(bootstrap.values)} refits, {bootstrap.group_count} blocks resampled, seed {bootstrap.seed}{failed}"
 
 
 def uncertainty_chapter(uncertainty: Uncertainty) -> Chapter:

@@ -126,8 +126,8 @@ def procedure_claim(recording: Recording, saturation: float) -> Claim:
         Equal(1.0, 0.005),
         by_logarithm.rmse / by_contraction.rmse,
         "1",
-        f"Plane curves rounded to 0.5 %: rms error {100 * by_logarithm.rms:.4g} % linearised, "
-        rf"{100 * by_contraction.rms:.4g} % by least squares on \(k\); the logarithm gives points near "
+        f"Plane curves rounded to 0.5 %: rms error {100 * by_logarithm.rmse:.4g} % linearised, "
+        rf"{100 * by_contraction.rmse:.4g} % by least squares on \(k\); the logarithm gives points near "
         r"\(k_\text{max}\) too much weight. The tolerance is chosen.",
     )
 

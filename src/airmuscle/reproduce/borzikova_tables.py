@@ -180,9 +180,9 @@ def procedure_table(data: Recording, saturation: float) -> Table:
     }
     pairs = {name: _fit_both(recording, saturation) for name, recording in cases.items()}
     noise_fits = [_fit_both(add_noise(data, seed), saturation) for seed in SEEDS]
-    means = [float(np.mean([pair[n].rms for pair in noise_fits])) for n in (0, 1)]
+    means = [float(np.mean([pair[n].rmse for pair in noise_fits])) for n in (0, 1)]
     names = [*pairs, f"noise 0.5 %, mean of {len(SEEDS)} seeds"]
-    rms = [[*(pair[n].rms for pair in pairs.values()), means[n]] for n in (0, 1)]
+    rms = [[*(pair[n].rmse for pair in pairs.values()), means[n]] for n in (0, 1)]
     return Table(
         "borzikova_procedures",
         r"Linearised fit of the paper and least squares on \(k\)",

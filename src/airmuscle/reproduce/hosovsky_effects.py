@@ -14,9 +14,9 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.plotting import DASHES, LINES, new_figure
-from ..muscle import CubicSpring, ViscoelasticWall, LinearSpring, Spring, Wall
+from ..muscle import CubicSpring, LinearSpring, Spring, ViscoelasticWall, Wall
 from ..plant.plant import Plant
-from ..pneumatics import DistributedTube, SubsonicIndexValve, Orifice, Tube, TubeModel, Valve
+from ..pneumatics import DistributedTube, Orifice, SubsonicIndexValve, Tube, TubeModel, Valve
 from ..pneumatics.gas import EnergyBalance, Gas, Polytropic
 from ..recording import Recording
 from ..report.chapter import Plot, Table

@@ -129,6 +129,6 @@ def hanging_load(parameters: UnpublishedParameters) -> HangingMass:
     return HangingMass(parameters.load.value)
 
 
-def latched_load() -> Held:
+def latched_load() -> WithLatch:
     """Return the latched load of the quick release."""
     return WithLatch(HangingMass(RELEASED_MASS))

@@ -135,7 +135,8 @@ def accuracy_claims(law: Saga2007, name: str) -> tuple[Claim, ...]:
     reference = exact_meridian(law.rubber, law.geometry.rings)
     low, high = np.linspace(0.01, 0.20, 20), np.linspace(0.25, 0.40, 16)
     below, above = (
-        100 * float(np.max(np.abs(law.equilibrium_pressure(c, 100.0) / reference.shape_at_force(c, 100.0).pressure - 1)))
+        100
+        * float(np.max(np.abs(law.equilibrium_pressure(c, 100.0) / reference.shape_at_force(c, 100.0).pressure - 1)))
         for c in (low, high)
     )
     note = "Maximum pressure error at 100 N relative to the exact meridian; the measurements are lost. "

@@ -123,7 +123,7 @@ def pressures(rubber: RubberLine, force: float, contraction: Array) -> dict[tupl
 
 def ideal_errors(contraction: Array) -> dict[tuple[str, str], Array]:
     """Return the relative error of F/p of each pair, compared with the exact meridian, both without rubber [1]."""
-    reference = np.asarray(PleatedTube(LENGTH, DIAMETER).area(contraction))
+    reference = np.asarray(PleatedTube(LENGTH, DIAMETER).effective_area(contraction))
     balances = _all_balances(RubberLine(0.0, 0.0), tuple(contraction))
     return {pair: balance.area / reference - 1 for pair, balance in balances.items()}
 

@@ -130,7 +130,9 @@ def virtual_work_table() -> Table:
     columns["circular meridian, virtual work [N]"] = np.round(
         circular_meridian(LINES["B"]).force(PRESSURE, contraction), 2
     )
-    columns["exact meridian [N]"] = np.round(exact_meridian(LINES["B"]).shape_at_pressure(PRESSURE, contraction).force, 2)
+    columns["exact meridian [N]"] = np.round(
+        exact_meridian(LINES["B"]).shape_at_pressure(PRESSURE, contraction).force, 2
+    )
     note = (
         "At 0.11 MPa. A negative tension is a push; no value: there is no outline. A balance that differs from the "
         "virtual work of its own outline generates or dissipates energy on a closed path; the tensions of the circular "

@@ -37,8 +37,8 @@ from typing import Any
 
 from ..core import tree
 from ..core.errors import ParameterError
-from ..identify.dynamic import DynamicFit, Experiment, StartTime, InitialValue, fit_dynamic
-from ..identify.dynamic.experiment import RecordUnknown, ParameterPaths
+from ..identify.dynamic import DynamicFit, Experiment, InitialValue, StartTime, fit_dynamic
+from ..identify.dynamic.experiment import ParameterPaths, RecordUnknown
 from ..library.build import build
 from ..library.files import read_toml
 from ..library.location import Location, check_keys, check_type, read_finite_number, read_text

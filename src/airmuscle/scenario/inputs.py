@@ -23,7 +23,7 @@ from ..library.build import build, load_valve
 from ..library.location import Location, check_keys, check_type, located_errors, read_finite_number, read_text
 from ..library.models import model_class
 from ..recording import read_csv
-from ..recording.heading import stated_unit
+from ..recording.heading import split_unit
 
 RESERVED_KEYS = ("model", "period", "file", "columns", "drivers")
 """Keys of the table that are not inputs."""

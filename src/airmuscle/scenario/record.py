@@ -99,7 +99,7 @@ class Record:
         pressure = values.pop("pressure", default)
         with located_errors(inner):
             if values:
-                return InitialConditions.held(plant, pressure, **values)
+                return InitialConditions.at_coordinates(plant, pressure, **values)
             return InitialConditions.at_rest(plant, pressure)
 
 

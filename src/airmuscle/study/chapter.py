@@ -30,10 +30,10 @@ def write_study(result: StudyResult, folder: Path | str) -> Path:
     """
     study = result.study
     with atomic_folder(folder) as place:
-        save_table(result.table(), place / RESULTS)
+        save_table(result.table(), place / RESULTS_FILE)
         if study.time_series:
             times = {f"{name}_time": course.times for name, course in study.time_series.items()}
-            np.savez(place / COURSES, **times, **result.time_series)  # type: ignore[arg-type]
+            np.savez(place / TIME_SERIES_FILE, **times, **result.time_series)  # type: ignore[arg-type]
         write_into(place, [study_chapter(result)], title="Parameter study")
     return Path(folder) / "report.html"
 

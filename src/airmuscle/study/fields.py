@@ -10,30 +10,32 @@ import re
 from typing import Any
 
 from ..core.errors import ParameterError
-from ..library.location import finite
+from ..library.location import read_finite_number
 
 _NUMBER = re.compile(r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 def read_quantity(value: Any, unit: str, where: str) -> float:
     """A finite number in the contextual unit. Raises ParameterError or UnitError."""
-    return finite(value, unit, where)
+    return read_finite_number(value, unit, where)
 
 
 def read_difference(value: Any, unit: str, where: str) -> float:
     """A difference of two quantities, converted without the offset of its unit (degC, bara)."""
-    number = finite(value, unit, where)
-    return number - finite(_NUMBER.sub("0", value, count=1), unit, where) if isinstance(value, str) else number
+    number = read_finite_number(value, unit, where)
+    return (
+        number - read_finite_number(_NUMBER.sub("0", value, count=1), unit, where) if isinstance(value, str) else number
+    )
 
 
 def read_ratio(value: Any, unit: str, where: str) -> float:
     """A dimensionless number, or a percentage as text."""
-    return finite(value, "1", where)
+    return read_finite_number(value, "1", where)
 
 
 def read_time(value: Any, unit: str, where: str) -> float:
     """A time [s]."""
-    return finite(value, "s", where)
+    return read_finite_number(value, "s", where)
 
 
 def read_count(value: Any, unit: str, where: str) -> int:

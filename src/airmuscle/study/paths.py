@@ -117,7 +117,10 @@ def _input_parameters(table: Mapping[str, Any], scenario: Scenario) -> Iterator[
     units = column_units(scenario.plant, scenario.start, scenario.command)
     for name, value in table.items():
         if isinstance(scenario.command, ControlLoop) and name == "controller":
-            yield from ((("command", name, *keys), unit) for keys, unit in controller_number_paths(value, scenario.command, units))
+            yield from (
+                (("command", name, *keys), unit)
+                for keys, unit in controller_number_paths(value, scenario.command, units)
+            )
         elif name == "period":
             yield ("command", name), "s"
         elif isinstance(value, list):

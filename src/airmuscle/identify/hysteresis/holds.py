@@ -10,9 +10,9 @@ import numpy as np
 from ...core.arrays import Array
 from ...recording import Recording
 from ...recording.segment import Interval, find_plateaus
+from ...recording.segment.interval import level_intervals
 from ...recording.segment.runs import RELATIVE_BAND
 from ...recording.segment.sensor import estimate_noise
-from ...recording.segment.interval import level_intervals
 
 MIN_ROWS = 12
 """Minimum number of rows for a fit of creep."""
@@ -32,7 +32,10 @@ def find_holds(recording: Recording) -> Iterator[Hold]:
     """The holds among the pressure plateaus of a recording; none without a time column."""
     force, contraction = recording["force"], recording["contraction"]
     for plateau in find_plateaus(recording):
-        if len(plateau.interval) >= MIN_ROWS and np.ptp(force[plateau.interval.rows]) <= RELATIVE_BAND * np.abs(force).max():
+        if (
+            len(plateau.interval) >= MIN_ROWS
+            and np.ptp(force[plateau.interval.rows]) <= RELATIVE_BAND * np.abs(force).max()
+        ):
             yield Hold(plateau.interval, "contraction")
             continue
         for level in level_intervals(contraction, LENGTH_TOLERANCE, within=plateau.interval):
@@ -44,5 +47,7 @@ def find_holds(recording: Recording) -> Iterator[Hold]:
 def _trim_to_level(values: Array, level: Interval) -> Interval:
     """The interval without the transitions to and from its level."""
     inside = values[level.rows]
-    near = np.flatnonzero(np.abs(inside - np.median(inside)) <= max(LENGTH_TOLERANCE / 10.0, 4.0 * estimate_noise(inside)))
+    near = np.flatnonzero(
+        np.abs(inside - np.median(inside)) <= max(LENGTH_TOLERANCE / 10.0, 4.0 * estimate_noise(inside))
+    )
     return Interval(level.start + int(near[0]), level.start + int(near[-1]) + 1) if near.size else Interval(0, 0)

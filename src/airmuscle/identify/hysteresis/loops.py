@@ -20,7 +20,7 @@ from ...recording.segment import (
     motion_direction,
     quasi_static_rows,
 )
-from ...recording.segment.runs import RELATIVE_BAND, CONTRACTION_BAND
+from ...recording.segment.runs import CONTRACTION_BAND, RELATIVE_BAND
 from .fit import (
     ContractionPath,
     FixedCharacteristic,
@@ -148,9 +148,18 @@ def _check_two_directions(recording: Recording, direction: np.ndarray, fitted_ro
 
 def _is_same_level(one: Run, other: Run) -> bool:
     """Whether two runs have the same constant quantity and level, within the tolerance of one run."""
-    if one.kind is not other.kind or one.constant_column != other.constant_column or one.constant_value is None or other.constant_value is None:
+    if (
+        one.kind is not other.kind
+        or one.constant_column != other.constant_column
+        or one.constant_value is None
+        or other.constant_value is None
+    ):
         return False
-    band = CONTRACTION_BAND if one.constant_column == "contraction" else RELATIVE_BAND * max(abs(one.constant_value), abs(other.constant_value))
+    band = (
+        CONTRACTION_BAND
+        if one.constant_column == "contraction"
+        else RELATIVE_BAND * max(abs(one.constant_value), abs(other.constant_value))
+    )
     return abs(one.constant_value - other.constant_value) <= band
 
 
