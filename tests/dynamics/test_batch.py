@@ -288,7 +288,7 @@ def test_plants_that_differ_in_their_circuit_alone_share_the_search_for_rest(mon
     ("varied", "message"),
     [
         ({"mechanism.mas": [1.0]}, r"Plant has no parameter 'mechanism.mas'. Did you mean 'mechanism.mass'\?"),
-        ({"mechanism.mass": [5.0, np.nan]}, r"row 1: 'mechanism.mass' \(m, .*\) is nan kg; allowed are finite values"),
+        ({"mechanism.mass": [5.0, np.nan]}, r"row 1: 'mechanism.mass' \(m, .*\) is nan kg; allowed range: finite values"),
         ({"mechanism.mass": [5.0, 5.0, -2.0, -3.0]}, r"row 2: .* is -2 kg; .*from 0.* \(1 further rows too\)"),
         ({"mechanism.mass": []}, "there are no plants; give at least one row"),
         ({"mechanism.mass": [[1.0]]}, r"must be a column \(N,\), one value a plant; its shape is \(1, 1\)"),

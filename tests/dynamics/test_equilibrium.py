@@ -284,5 +284,5 @@ def test_a_state_at_three_pressures_of_two_muscles_is_refused():
 
 def test_an_input_beyond_its_range_is_refused():
     valve = ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(80.0), muscle_count=2)
-    with pytest.raises(ParameterError, match=r"the input 'command' is 2; allowed are -1 to 1"):
+    with pytest.raises(ParameterError, match=r"the input 'command' is 2; allowed range: -1 to 1"):
         find_equilibrium(Plant((LEFT, RIGHT), valve, JOINT), pressure=1e5, inputs={"command": 2.0})

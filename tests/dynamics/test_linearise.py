@@ -176,7 +176,7 @@ def test_an_own_system_is_linearised_like_a_plant():
         (lambda s: linearise(HANGING, {"position": 0.0}), "the start lacks air_mass, speed"),
         (lambda s: linearise(HANGING, {**s, "speed": float("nan")}), "must be finite"),
         (lambda s: linearise(HANGING, s, {"fil": 1.0}), "no input 'fil'"),
-        (lambda s: linearise(HANGING, s, {"fill": 1.5}), "the input 'fill' is 1.5; allowed are 0 to 1"),
+        (lambda s: linearise(HANGING, s, {"fill": 1.5}), "the input 'fill' is 1.5; allowed range: 0 to 1"),
         (lambda s: linearise(HANGING, s).select(outputs=("presure",)), "no output 'presure'.*Did you mean 'pressure'"),
         (lambda s: linearise(HANGING, s).frequency_response([-1.0]), "must be finite and not negative"),
         (lambda s: linearise(joint(), joint_start(joint()), {"fill": 1.0}), "no input 'fill'; there are left.fill"),

@@ -78,7 +78,7 @@ CURVE = PolynomialCurve("contraction", 2)
 @pytest.mark.parametrize("law", TRUE, ids=name)
 def test_the_friction_that_made_a_loop_is_found_again(law):
     run = isobaric(law)
-    fit = fit_hysteresis(start_of(law), run, static=CURVE, slide=ContractionPath())
+    fit = fit_hysteresis(start_of(law), run, static_curve=CURVE, friction_path=ContractionPath())
     made, found = (x.force_along(fit.series.path) for x in (law, fit.friction))
     assert np.abs(made - found - np.mean(made - found)).max() < 0.25
     assert fit.rmse == pytest.approx(0.2, rel=0.1)
@@ -89,9 +89,9 @@ def test_the_friction_that_made_a_loop_is_found_again(law):
 
 
 def test_the_parameters_of_dahl_and_of_the_slips_come_back():
-    dahl = fit_hysteresis(start_of(TRUE[0]), isobaric(TRUE[0]), static=CURVE).friction
+    dahl = fit_hysteresis(start_of(TRUE[0]), isobaric(TRUE[0]), static_curve=CURVE).friction
     assert (dahl.stiffness, dahl.coulomb_force) == pytest.approx((3e4, 20.0), rel=0.02)
-    slips = fit_hysteresis(start_of(SLIP), isobaric(SLIP), static=CURVE).friction
+    slips = fit_hysteresis(start_of(SLIP), isobaric(SLIP), static_curve=CURVE).friction
     assert slips.stiffnesses == pytest.approx(SLIP.stiffnesses, rel=0.03)
 
 
@@ -99,7 +99,7 @@ def test_a_given_characteristic_takes_the_place_of_the_curve():
     law = VirtualWork(Braid(0.01, 0.4363, LENGTH))
     run = isobaric(SLIP)
     force = law.force(run["pressure"], run["contraction"]) + 3.0 - SLIP.force_along(run["contraction"] * LENGTH)
-    fit = fit_hysteresis(start_of(SLIP), run.with_columns(force=force), static=FixedCharacteristic(law))
+    fit = fit_hysteresis(start_of(SLIP), run.with_columns(force=force), static_curve=FixedCharacteristic(law))
     assert fit.coefficients == pytest.approx([3.0], abs=1e-6)
     assert fit.friction.stiffnesses == pytest.approx(SLIP.stiffnesses, rel=1e-6)
 
@@ -110,8 +110,8 @@ def test_an_isometric_ramp_shows_friction_on_the_pressure():
     friction = MaxwellSlip((3e3, 1e3), (4e-4, 2e-3))
     force = 5e-4 * pressure - friction.force_along(slide.displacement_per_pressure * pressure)
     run = Recording({"pressure": pressure, "force": force}, "ramp")
-    fit = fit_hysteresis(MaxwellSlip((1.0, 1.0), friction.limits), run, static=PolynomialCurve("pressure", 1),
-                         slide=slide)  # fmt: skip
+    fit = fit_hysteresis(MaxwellSlip((1.0, 1.0), friction.limits), run, static_curve=PolynomialCurve("pressure", 1),
+                         friction_path=slide)  # fmt: skip
     assert fit.friction.stiffnesses == pytest.approx(friction.stiffnesses, rel=1e-3)
 
 
@@ -121,10 +121,10 @@ def test_lugre_uses_the_time_of_the_rows():
     path, time = run["contraction"] * LENGTH, np.cumsum(np.repeat([0.02, 0.1, 1.0, 0.05, 0.1, 0.5], 60))
     rng = np.random.default_rng(2)
     force = run["force"] - law.force_along(path, time) + 0.1 * rng.standard_normal(time.size)
-    fit = fit_hysteresis(LuGre(1e4, 20.0, 3.0, 0.01), run.with_columns(time=time, force=force), static=CURVE)
+    fit = fit_hysteresis(LuGre(1e4, 20.0, 3.0, 0.01), run.with_columns(time=time, force=force), static_curve=CURVE)
     assert fit.rmse < 0.15
     assert fit.friction.coulomb_force == pytest.approx(10.0, rel=0.1)
-    slow = fit_hysteresis(Dahl(1e4, 20.0), run.with_columns(time=time, force=force), static=CURVE)
+    slow = fit_hysteresis(Dahl(1e4, 20.0), run.with_columns(time=time, force=force), static_curve=CURVE)
     assert slow.rmse > 3 * fit.rmse
 
 
@@ -133,9 +133,9 @@ def test_without_friction_none_is_claimed():
     claims = 0
     for seed in range(60):
         run = isobaric(None, noise=1.0, seed=seed)
-        claims += fit_hysteresis(start_of(SLIP), run, static=CURVE).justified
+        claims += fit_hysteresis(start_of(SLIP), run, static_curve=CURVE).justified
     assert claims <= 1
-    assert "do not justify" in fit_hysteresis(start_of(SLIP), isobaric(None, 1.0), static=CURVE).verdict
+    assert "do not justify" in fit_hysteresis(start_of(SLIP), isobaric(None, 1.0), static_curve=CURVE).verdict
 
 
 def test_drifting_errors_count_as_few_rows():
@@ -150,11 +150,11 @@ def test_drifting_errors_count_as_few_rows():
 
 def test_a_friction_that_does_not_carry_over_to_the_second_run_is_not_justified():
     first, same, without = isobaric(SLIP, seed=1), isobaric(SLIP, seed=2), isobaric(None, seed=3)
-    good = fit_hysteresis(start_of(SLIP), first, static=CURVE, repeat=(same, None))
+    good = fit_hysteresis(start_of(SLIP), first, static_curve=CURVE, repeat=(same, None))
     assert good.justified
     assert good.repeat_rmse == pytest.approx(0.2, rel=0.15)
     assert good.repeatability < 0.3
-    bad = fit_hysteresis(start_of(SLIP), first, static=CURVE, repeat=(without, None))
+    bad = fit_hysteresis(start_of(SLIP), first, static_curve=CURVE, repeat=(without, None))
     assert bad.repeat_rmse > 3 > bad.repeat_rmse_without_friction
     assert not bad.justified
 
@@ -187,7 +187,7 @@ def test_the_criteria_meet_their_definitions():
 def test_candidates_are_sized_by_the_data_and_all_of_them_fit():
     run = isobaric(SLIP)
     path = run["contraction"] * LENGTH
-    fits = [fit_hysteresis(f, run, static=CURVE) for f in initial_friction_laws(path, SLIP.force_along(path))]
+    fits = [fit_hysteresis(f, run, static_curve=CURVE) for f in initial_friction_laws(path, SLIP.force_along(path))]
     assert {name(f.friction) for f in fits} == {"Dahl", "LuGre", "BoucWen", "MaxwellSlip", "PrandtlIshlinskii"}
     assert all(f.rmse < 0.35 * f.rmse_without_friction for f in fits)
     best = min(fits, key=lambda f: f.rmse)
@@ -197,9 +197,9 @@ def test_candidates_are_sized_by_the_data_and_all_of_them_fit():
 def test_runs_that_cannot_tell_are_refused():
     run = isobaric(SLIP)
     with pytest.raises(IdentificationError, match="4 chosen rows along a path of"):
-        fit_hysteresis(SLIP, run, static=CURVE, chosen=np.arange(len(run)) < 4)
+        fit_hysteresis(SLIP, run, static_curve=CURVE, fitted_rows=np.arange(len(run)) < 4)
     with pytest.raises(IdentificationError, match="friction against shortening needs the resting length"):
-        fit_hysteresis(SLIP, Recording(run.columns, "loop"), static=CURVE)
+        fit_hysteresis(SLIP, Recording(run.columns, "loop"), static_curve=CURVE)
     with pytest.raises(IdentificationError, match="the path does not move"):
         initial_friction_laws(np.ones(9), np.ones(9))
 
@@ -244,7 +244,7 @@ def test_figures_show_units_and_what_was_fitted():
     assert (path.max(), path.min(), path[-1]) == pytest.approx(
         (2 * SLIP.presliding_distance, -2 * SLIP.presliding_distance, path.max())
     )
-    fit = fit_hysteresis(start_of(SLIP), isobaric(SLIP), static=CURVE)
+    fit = fit_hysteresis(start_of(SLIP), isobaric(SLIP), static_curve=CURVE)
     upper, lower = fit.plot().axes
     assert (upper.get_ylabel(), lower.get_ylabel()) == ("force [N]", "measured less modelled [N]")
     assert "MaxwellSlip fitted to loop" in str(fit)

@@ -120,7 +120,7 @@ def test_the_force_is_zero_where_the_muscle_hangs_free(tmp_path):
     [
         ((*SURFACE, "--free-contraction", "2 bar=18 %"), 2, "--free-contraction requires --shape"),
         ((*SURFACE, "--shape", "--free-contraction", "2 bar"), 2, "such as '3 bar=18 %'"),
-        ((*SURFACE, "--shape", "--free-contraction", "2 N=18 %"), 1, "--free-contraction: unit 'N' cannot become 'Pa'"),
+        ((*SURFACE, "--shape", "--free-contraction", "2 N=18 %"), 1, "--free-contraction: unit 'N' cannot be converted to 'Pa'"),
         ((*SURFACE, "--shape", "--free-contraction", "2 bar=1800 %"), 2, "must be from 0 to 100 %, not '1800 %'"),
         ((*SURFACE, "--shape", "--free-contraction", "2 bar=-18 %"), 2, "must be from 0 to 100 %, not '-18 %'"),
         (("--compare", "--shape"), 2, "it excludes --compare"),
@@ -129,7 +129,7 @@ def test_the_force_is_zero_where_the_muscle_hangs_free(tmp_path):
         ((*SURFACE, "--bootstrap", "50", "--leave-out", "run"), 1, "use --leave-out contraction"),
         ((*SURFACE, "--bootstrap", "3"), 2, "greater than or equal to 20"),
         ((*SURFACE, "--profile", "coefficients[0]", "--robust", "5 N"), 1, "a robust loss is no likelihood"),
-        ((*SURFACE, "--leave-out", "row"), 2, "allowed are run, specimen, contraction, pressure, block"),
+        ((*SURFACE, "--leave-out", "row"), 2, "allowed range: run, specimen, contraction, pressure, block"),
         (("--characteristic", "ContractileSurface", "--degree", "9"), 1, "--fix 'coefficients"),
     ],
 )

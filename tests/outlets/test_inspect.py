@@ -163,7 +163,7 @@ def test_options_and_mapping_are_equivalent(tmp_path: Path):
         (("none.csv",), 1, "cannot be read"),
         (("run.csv", "--column", "p"), 2, "--column must be NAME=TEXT"),
         (("run.csv", "--column", "x=pressure [bar]"), 1, "the mapping names column 'x', but there are t [s]"),
-        (("run.csv", "--unit", "pressure=mm"), 1, "cannot become 'Pa'"),
+        (("run.csv", "--unit", "pressure=mm"), 1, "cannot be converted to 'Pa'"),
         ((), 2, "Missing argument"),
     ],
 )

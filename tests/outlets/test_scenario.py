@@ -234,7 +234,7 @@ lag = {{ model = "SecondOrderLag", frequency = "20 Hz", damping_ratio = 0.7 }}
     scenario = load_scenario(written(tmp_path, text=text))
     assert scenario.command == Schedule({"setpoint": ((0.1, 2e5), (0.2, 1e5))})
     assert "setpoint\n[Pa]" in [axis.get_ylabel() for axis in _input_plot(scenario, scenario.simulate()).figure.axes]
-    with pytest.raises(UnitError, match=r"\[command\], setpoint: unit 'mm' cannot become 'Pa'"):
+    with pytest.raises(UnitError, match=r"\[command\], setpoint: unit 'mm' cannot be converted to 'Pa'"):
         load_scenario(written(tmp_path, ('"2 bar"', '"2 mm"'), text=text))
 
 

@@ -640,7 +640,7 @@ BAD = [
     ('low = "2 %"', 'low = "20 %"', "low is 0.2 and high is 0.1; low must be less than high"),
     ('low = "2 %"', 'low = "-95 %"', "allowed are"),
     ('low = "2 %", ', "", "Uniform needs 'low' (lower bound)"),
-    ('low = "2 %"', 'lo = "2 %"', "Uniform has no parameter 'lo'; there are low, high. Did you mean 'low'?"),
+    ('low = "2 %"', 'lo = "2 %"', "Uniform has no parameter 'lo'; its parameters are low, high. Did you mean 'low'?"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[]", "the list is empty"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[0.02, nan]", "it must be finite"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', "0.02", "write a list of values, or a distribution"),

@@ -156,7 +156,7 @@ def parse_split(name: str | None) -> GroupSplit | None:
         "block": BlockSplit(),
     }
     if name is not None and name not in splits:
-        raise typer.BadParameter(f"--leave-out is '{name}'; allowed are {', '.join(splits)}")
+        raise typer.BadParameter(f"--leave-out is '{name}'; allowed range: {', '.join(splits)}")
     return None if name is None else splits[name]
 
 

@@ -31,7 +31,7 @@ def fitted_entry(result: Fit, initial: Entry, files: list[Path]) -> Entry:
     """The initial entry with the fitted characteristic and a new provenance, without its checks."""
     summary = dict(result.summary())
     names = ", ".join(f.name for f in files)
-    note = f"Fitted to {names}: rms error {summary['rms error']}, maximum error {summary['greatest error']}."
+    note = f"Fitted to {names}: rms error {summary['rms error']}, maximum error {summary['maximum error']}."
     title = f"{type(result.model).__name__} fitted to {', '.join(f.stem for f in files)}"
     return dataclasses.replace(
         initial, name="muscle", title=title, provenance="fitted", note=note, warning="", characteristic=result.model,

@@ -261,7 +261,7 @@ def _check_command_range(name: str, signal: PiecewiseLinear, start: float) -> No
         if beyond.any():
             row = int(np.argmax(beyond))
             raise ParameterError(
-                f"the driver of '{name}' is told {values[row]:g} before {signal.ends[row]:g} s; allowed are 0 to 1."
+                f"the driver of '{name}' is told {values[row]:g} before {signal.ends[row]:g} s; allowed range: 0 to 1."
             )
 
 

@@ -169,8 +169,8 @@ def force_residuals(model: Characteristic, runs: Sequence[Recording], max_force:
         rows = run.rows((run["force"] > 0) & np.isfinite(run["pressure"] + run["contraction"] + run["force"]))
         law: Any = model
         length = run.constants.get("resting_length")
-        if length is not None and hasattr(law, "of_length"):
-            law = law.of_length(float(length))
+        if length is not None and hasattr(law, "with_resting_length"):
+            law = law.with_resting_length(float(length))
         residuals.append(evaluate_force(law, rows["pressure"], rows["contraction"], max_force) - rows["force"])
     return np.concatenate(residuals)
 

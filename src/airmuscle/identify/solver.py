@@ -67,7 +67,7 @@ def is_linear(problem: FitProblem) -> bool:
 def design_matrix(problem: FitProblem) -> tuple[Array, Array]:
     """Design matrix (N, P) and constant part (N,) of a law that is linear in its free parameters."""
     basis = getattr(problem.law, "basis", None)
-    if basis is not None and len(problem.free) == len(problem.law.terms):
+    if basis is not None and len(problem.free) == len(problem.law.term_labels):
         return np.array(basis(*problem.arguments)).T, np.zeros(len(problem.data))
     matrix = problem.jacobian(problem.initial_values)
     return matrix, problem.predict(problem.initial_values) - matrix @ problem.initial_values

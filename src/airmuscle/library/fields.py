@@ -23,13 +23,15 @@ def check_required(cls: type[Any], given: Mapping[str, Any], hints: Mapping[str,
         optional = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
         if not field.init or optional or field.name in given:
             continue
-        facts = field.metadata
-        what = (
-            f"[{facts['unit']}] ({facts['symbol']}, {facts['meaning']})"
-            if facts
-            else f"({describe_type(hints[field.name])})"
-        )
+        what = _describe_field(field, hints[field.name])
         raise ParameterError(f"{location}: {cls.__name__} needs '{field.name}' {what}; it is missing.")
+
+
+def _describe_field(field: dataclasses.Field[Any], hint: Any) -> str:
+    facts = field.metadata
+    if "unit" in facts:
+        return f"[{facts['unit']}] ({facts['symbol']}, {facts['meaning']})"
+    return f"({facts['meaning'] if facts else describe_type(hint)})"
 
 
 def read_parameter(value: Any, declared: Parameter, hint: Any, location: Location) -> Any:

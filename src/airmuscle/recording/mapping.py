@@ -85,7 +85,7 @@ def read_mapping(path: str | Path) -> ColumnMapping:
     for key, value in content.items():
         if key not in known:
             raise ParameterError(
-                f"{path.name}: unknown key '{key}'; allowed are {', '.join(known)}.{suggestion(key, known)}"
+                f"{path.name}: unknown key '{key}'; allowed range: {', '.join(known)}.{suggestion(key, known)}"
             )
         if key not in ("columns", *CONSTANT_NAMES) and not isinstance(value, str):
             raise ParameterError(f"{path.name}: {key} = {value!r}; it must be a quoted text.")

@@ -71,7 +71,7 @@ def detect_encoding(content: bytes) -> str:
 
 def is_comment(line: str) -> bool:
     """Whether a line with content is a comment."""
-    return line.lstrip()[0] in "#%"
+    return line.lstrip().startswith(("#", "%"))
 
 
 def has_content(line: str) -> bool:

@@ -221,7 +221,7 @@ def _read_bounds(table: Mapping[str, Any], plant: Plant, location: Location) -> 
         low, high = (read_finite_number(end, declared[path].unit, where) for end in value)
         lower, upper = declared[path].bounds
         if low < lower or high > upper:
-            raise ParameterError(f"{where} is {value!r}; allowed are {lower:g} to {upper:g}.")
+            raise ParameterError(f"{where} is {value!r}; allowed range: {lower:g} to {upper:g}.")
         if not low < high:
             raise ParameterError(f"{where} is {value!r}; the minimum must be less than the maximum.")
         bounds[path] = low, high

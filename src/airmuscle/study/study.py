@@ -181,7 +181,7 @@ def _read_variation(value: Any, parameter: ScenarioParameter, location: Location
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
     outside = [v for v in variation.support if np.isfinite(v) and not low <= v <= high]
     if outside:
-        raise ParameterError(f"{entry} includes {outside[0]:g}{unit}; allowed are {low:g} to {high:g}{unit}.")
+        raise ParameterError(f"{entry} includes {outside[0]:g}{unit}; allowed range: {low:g} to {high:g}{unit}.")
     return variation
 
 

@@ -109,7 +109,7 @@ def given_inputs(plant: Plant, inputs: Mapping[str, float] | None) -> dict[str, 
         if not command.minimum <= value <= command.maximum:
             unit = "" if command.unit == "1" else f" {command.unit}"
             raise ParameterError(
-                f"the input '{command.name}' is {value:g}{unit}; allowed are {command.minimum:g} to "
+                f"the input '{command.name}' is {value:g}{unit}; allowed range: {command.minimum:g} to "
                 f"{command.maximum:g}{unit} ({command.meaning})."
             )
     return {name: float(given.get(name, 0.0)) for name in plant.inputs}
