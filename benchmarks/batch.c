@@ -1,6 +1,6 @@
-/* Many plants of three states at once, every parameter of each its own: the equations of fill_discharge.c, LANES plants
-   side by side, RK4 of fixed step. Parameters, times of the valves and states are arrays of (number, plant). Written for
-   speed: whatever depends on parameters alone comes in computed, no branch, a block of lanes stays in the cache. */
+/* Batch of plants with three states and different parameters: the equations of fill_discharge.c for LANES plants in
+   parallel, RK4 with fixed step. Parameters, switching times and states are arrays (number, plant). Optimised for speed:
+   everything that depends only on parameters is precomputed, there are no branches, a block of lanes fits the cache. */
 #include <math.h>
 
 #define COUNT 46
@@ -74,8 +74,8 @@ static void steps(const Block *b, double *air, double *position, double *speed, 
   }
 }
 
-/* `plants` is a multiple of LANES; `state` (3, plants) is carried from its start to the end. Blocks `first` to `last`
-   alone, so that a caller can run several of these on threads. */
+/* Integrates `state` (3, plants) in place; `plants` is a multiple of LANES. Only blocks `first` to `last` are integrated, so
+   that the caller can use several threads. */
 void batch(const double *parameters, const double *at, double *state, long plants, long first, long last, long count,
            double h) {
   for (long block = first; block < last; block++) {

@@ -1,4 +1,4 @@
-"""The equations of batch.c as a NumPy user would write them for many plants: a row of every array is one quantity."""
+"""Vectorised NumPy code of the equations of batch.c; each row of an array is one quantity of all plants."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from filling import Array
 
 
 def rk4(p: Array, start: Array, switched: tuple[float, float, float, float], step: float, count: int) -> Array:
-    """The states (3, N) after `count` steps; `p` (46, N) as in batch.c, the same instants for all."""
+    """The states (3, N) after `count` steps; parameters `p` (46, N) as in batch.c, the same switching times for all."""
     state = start
     for i in range(count):
         now = (i + 0.5) * step
@@ -22,23 +22,23 @@ def rk4(p: Array, start: Array, switched: tuple[float, float, float, float], ste
 
 
 def rates(p: Array, state: Array, fill: Array | float, discharge: Array | float) -> Array:
-    """Rates (3, N) of air, position and speed."""
+    """Rates (3, N) of air mass, position and speed."""
     inverse_mass, gravity, inverse_length, volume_factor, cc, rt, ambient, supply = p[:8]
-    low_x, scale_x, low_q, scale_q, least, greatest, stiffness, damping, growth = p[16:25]
+    low_x, scale_x, low_q, scale_q, min_force, max_force, stiffness, damping, growth = p[16:25]
     air, position, speed = state
     contraction = position * inverse_length
     s = 1.0 - contraction
     pressure = air * rt / (volume_factor * s * (1.0 - cc * s * s))
     gauge = pressure - ambient
     x, q = (contraction - low_x) * scale_x - 1.0, (gauge - low_q) * scale_q - 1.0
-    force = np.clip(surface(p[25:], x, q), least, greatest)
+    force = np.clip(surface(p[25:], x, q), min_force, max_force)
     tension = np.maximum(force - stiffness * position - (damping + growth * gauge) * speed, 0.0)
     air_rate = fill * flow(p[9:12], supply, pressure) - discharge * flow(p[13:16], pressure, ambient)
     return np.array([air_rate, speed, tension * inverse_mass - gravity])
 
 
 def flow(valve: Array, up: Array, down: Array) -> Array:
-    """Flow between two pressures, by the ellipse and its laminar chord."""
+    """Mass flow between two pressures: the ISO 6358 ellipse with a laminar chord."""
     critical, subsonic, laminar = valve
     high, low = np.maximum(up, down), np.minimum(up, down)
     beyond = np.maximum(low - critical * high, 0.0) * subsonic
@@ -47,7 +47,7 @@ def flow(valve: Array, up: Array, down: Array) -> Array:
 
 
 def surface(a: Array, x: Array, q: Array) -> Array:
-    """The polynomial of degree five, continued by its tangent beyond its validity range."""
+    """The polynomial of degree five, extrapolated by its tangent beyond the validity range."""
     xi, qi = np.clip(x, -1.0, 1.0), np.clip(q, -1.0, 1.0)
     r0 = a[0] + xi * (a[1] + xi * (a[2] + xi * (a[3] + xi * (a[4] + xi * a[5]))))
     r1 = a[6] + xi * (a[7] + xi * (a[8] + xi * (a[9] + xi * a[10])))

@@ -1,4 +1,4 @@
-"""One evaluation of the derivative of a plant, with as many muscles as an arm has; called from compiled code."""
+"""Time of one evaluation of the derivative of a plant with many muscles, called from compiled code."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numba
 import numpy as np
 from filling import BRAID, Array
-from measure import Bar, Section, interleaved, of_time, show
+from measure import Section, Target, format_time, print_section, time_variants
 from new_plant import MUSCLES, many_muscles
 
 from airmuscle.analysis.equilibrium import find_equilibrium
@@ -18,14 +18,14 @@ from airmuscle.compile.kernels.calls import invoke, pointer
 from airmuscle.compile.program import CompiledSystem, compile_system
 from airmuscle.plant.plant import Plant
 
-HEADING = ("what", "median", "least", "a muscle")
+HEADER = ("plant", "median", "minimum", "per muscle")
 CALLS = 10_000
 TEXT = (
-    f"{MUSCLES} muscles on one mass, 26 states: for each the flow through two valves, volume, pressure, "
-    f"characteristic, spring and damper; half open. {CALLS} calls in a compiled loop, each at a state that depends on "
-    "the call before."
+    f"{MUSCLES} muscles on one mass, 26 states: for each muscle the flow through two valves, volume, pressure, "
+    f"characteristic, spring and damper; half-open valves. {CALLS} calls in a compiled loop, each at a state that "
+    "depends on the previous call."
 )
-WHY = "half open, both valves and the surface with its clamp are computed in every evaluation"
+REASON = "with half-open valves, both valves and the surface with its force limits are computed in every evaluation"
 
 
 @numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
@@ -37,8 +37,8 @@ def _calls(function: Any, x: Any, u: Any, c: Any, f: Any, count: Any) -> None:
             x[i] += 1e-30 * f[i]
 
 
-def calls(ready: CompiledSystem, start: Mapping[str, float], count: int = CALLS) -> Callable[[], Array]:
-    """So many evaluations of the derivative, one after the other; what the last one gave."""
+def make_calls(ready: CompiledSystem, start: Mapping[str, float], count: int = CALLS) -> Callable[[], Array]:
+    """A function that evaluates the derivative `count` times in sequence and returns the last result."""
     x = np.array([start[s.name] for s in ready.system.states])
     u, f = np.full(max(ready.sizes.inputs, 1), 0.5), np.empty(x.size)
 
@@ -49,30 +49,34 @@ def calls(ready: CompiledSystem, start: Mapping[str, float], count: int = CALLS)
     return call
 
 
-def plain_muscles() -> Plant:
-    """The same arm with muscles after Chou and Hannaford, the simplest characteristic there is."""
+def chou_hannaford_muscles() -> Plant:
+    """The same plant with the characteristic of Chou and Hannaford (1996), the simplest one."""
     plant = many_muscles()
     law = ChouHannaford1996(BRAID)
     return dataclasses.replace(plant, muscle=tuple(dataclasses.replace(m, contractile=law) for m in plant.muscles))
 
 
 def section(rounds: int = 15) -> Section:
-    """Both arms."""
-    plants = {"with a surface of 21 coefficients": many_muscles(), "after Chou and Hannaford": plain_muscles()}
+    """The complete benchmark."""
+    plants = {
+        "with a surface of 21 coefficients": many_muscles(),
+        "of Chou and Hannaford (1996)": chou_hannaford_muscles(),
+    }
     variants = {
-        f"{MUSCLES} muscles {name}": calls(compile_system(plant), dict(find_equilibrium(plant, pressure=1e5)))
+        f"{MUSCLES} muscles {name}": make_calls(compile_system(plant), dict(find_equilibrium(plant, pressure=1e5)))
         for name, plant in plants.items()
     }
-    times = interleaved(variants, rounds)
+    times = time_variants(variants, rounds)
     rows = tuple(
-        (name, *(of_time(t / CALLS) for t in (time.median, time.least, time.median / MUSCLES)))
+        (name, *(format_time(t / CALLS) for t in (time.median, time.minimum, time.median / MUSCLES)))
         for name, time in times.items()
     )
-    bars = tuple(
-        Bar(f"derivative of {name}", time.least / CALLS * 1e6, 0.6, "us", why=WHY) for name, time in times.items()
+    targets = tuple(
+        Target(f"derivative of {name}", time.minimum / CALLS * 1e6, 0.6, "us", reason=REASON)
+        for name, time in times.items()
     )
-    return Section(f"Derivative of an arm of {MUSCLES} muscles", TEXT, HEADING, rows, bars)
+    return Section(f"Derivative of a plant with {MUSCLES} muscles", TEXT, HEADER, rows, targets)
 
 
 if __name__ == "__main__":
-    show(section())
+    print_section(section())

@@ -1,7 +1,7 @@
-/* The hanging plants of filling.py, written for speed: everything inlined, no branch, the whole step one function.
-   MUSCLES is how many pull at the mass; a state is the air in each, then position and speed. The benchmark defines
-   EXPLICIT_STAGES from the tableau, a RATES(i, terms) for each stage after the first, and WEIGHTED, the sum of slopes.
-   SKIP leaves out shut valves and the tangent beyond the box, which costs branches but less work. */
+/* The hanging plants of filling.py, optimised for speed: everything inlined, no branches, a step is one function.
+   MUSCLES is the number of muscles on the mass; the states are their air masses, then position and speed. The benchmark
+   defines EXPLICIT_STAGES from the tableau, a RATES(i, terms) for each stage after the first, and WEIGHTED, the sum of
+   slopes. SKIP skips closed valves and the extrapolation beyond the validity range, with branches but less work. */
 #include <math.h>
 
 #ifndef MUSCLES
@@ -59,7 +59,7 @@ INLINE double surface(const Muscle *p, double x, double q) {
   return f + by_x * (x - xi) + by_q * (q - qi);
 }
 
-/* Tension of one muscle; the mass flow into it goes to `air_rate`. */
+/* Returns the tension of one muscle; `air_rate` is the mass flow into it. */
 INLINE double muscle(const Muscle *p, double air, double position, double speed, double fill, double discharge,
                      double *air_rate) {
   double contraction = position * p->inverse_length, s = 1.0 - contraction;
@@ -77,7 +77,7 @@ INLINE double muscle(const Muscle *p, double air, double position, double speed,
   return larger(force - p->stiffness * position - (p->damping + p->growth * gauge) * speed, 0.0);
 }
 
-/* k = rates at y under the openings u: fill and discharge of every muscle. */
+/* k = rates at y for the valve openings u: fill and discharge of every muscle. */
 INLINE void rates(const Plant *p, const double *y, const double *u, double *k) {
   double total = 0.0;
   for (int i = 0; i < MUSCLES; i++)
@@ -99,7 +99,7 @@ INLINE void step(const Plant *p, double *y, const double *u, double h) {
   for (int j = 0; j < STATES; j++) y[j] += h * (WEIGHTED);
 }
 
-/* Rows every `every` steps; `steps` of each segment are a multiple of it. */
+/* Writes a row every `every` steps; the steps of each segment must be a multiple of it. */
 void run(const Plant *plant, const double *start, int segments, const int *steps, const double *inputs, double h, int every,
          double *rows) {
   Plant local = *plant;

@@ -1,9 +1,9 @@
-"""The runs that the benchmarks time: 25 s on plants of three, six, eight and ten states.
+"""Runs of the benchmarks: 25 s on plants with three, six, eight and ten states.
 
-Three states: a muscle after Hill with a surface of 21 coefficients, two MATRIX valves and a hanging mass, filled and
-discharged as in the third paper. Conductance and critical ratio of the valve, supply, gas and schedule are the paper's
-(Hosovsky et al.); surface, spring, damper and mass are chosen. Eight states: six such muscles side by
-side. Six and ten: `joints.py`.
+Three states: a Hill-type muscle with a surface of 21 coefficients, two MATRIX valves and a hanging mass, with filling
+and discharge as in the third paper. Conductance and critical ratio of the valve, supply, gas and schedule are those of
+the paper (Hošovský et al.); surface, spring, damper and mass are chosen. Eight states: six such muscles in parallel.
+Six and ten states: `joints.py`.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ DURATION = 25.0
 SPACING = 0.01
 BRAID = Braid(0.01, 0.4363, 0.3)
 BOX = ((-1e4, 6e5), (-0.05, 0.35))
-"""Gauge pressure and contraction over which the surface is fitted. It begins below ambient, so that a muscle at rest is
-inside and the opponents are spared its tangent there."""
+"""Validity range of the surface: gauge pressure [Pa] and contraction [1]. It starts below ambient pressure, so that a
+muscle at rest is inside and the compared codes need no extrapolation there."""
 FILL_DISCHARGE = Schedule({"fill": ((5.0, 1.0), (15.0, 0.0)), "discharge": ((19.0, 1.0),)})
 JOINT_PULSES = Schedule(
     {
@@ -47,7 +47,7 @@ JOINT_PULSES = Schedule(
 
 
 def measured_force(pressure: Array, contraction: Array) -> Array:
-    """What stands for a measured muscle: Tondu and Lopez (2000), its end correction falling with pressure; chosen.
+    """Force [N] of a synthetic muscle: Tondu and Lopez (2000), end correction decreasing with pressure (chosen).
 
     F = pi r_0^2 p (a (1 - k(p) eps)^2 - b),   a = 3/tan^2(theta_0),   b = 1/sin^2(theta_0)
     """
@@ -58,18 +58,18 @@ def measured_force(pressure: Array, contraction: Array) -> Array:
 
 @functools.cache
 def surface() -> ContractileSurface:
-    """The polynomial of degree five nearest to `measured_force` on a grid over its validity range."""
+    """The polynomial of degree five fitted to `measured_force` on a grid over its validity range."""
     blank = ContractileSurface.blank().with_validity_range(*BOX)
     p, eps = (grid.ravel() for grid in np.meshgrid(*(np.linspace(*ends, 41) for ends in BOX)))
     columns = np.column_stack([np.asarray(c) for c in blank.basis(p, eps)])
-    found = np.linalg.lstsq(columns, measured_force(p, eps))[0]
-    return dataclasses.replace(blank, coefficients=tuple(found.tolist()))
+    coefficients = np.linalg.lstsq(columns, measured_force(p, eps))[0]
+    return dataclasses.replace(blank, coefficients=tuple(coefficients.tolist()))
 
 
 def hanging(muscles: int = 1) -> Plant:
-    """Muscles side by side on one mass, each with its own valves and a stiffness of its own: states one each, and two.
+    """Muscles in parallel on one mass, each with two valves and a different stiffness: one state per muscle, and two.
 
-    With one, the plant of three states.
+    One muscle gives the plant with three states.
     """
     matrix, supply = Valve(2.6167e-9, 0.433), Supply(650e3 - Ambient().pressure)
     each = [
@@ -82,8 +82,8 @@ def hanging(muscles: int = 1) -> Plant:
     return Plant(tuple(each), circuits, HangingMass(5.0 * muscles), Isothermal())
 
 
-def filled_in_turn(plant: Plant) -> Schedule:
-    """The schedule of the third paper for the first muscle, and for each further one a fifth of a second later."""
+def staggered_schedule(plant: Plant) -> Schedule:
+    """The schedule of the third paper for the first muscle, delayed by 0.2 s for each further muscle."""
     changes = {}
     for i, prefix in enumerate(plant.prefixes):
         for name, instants in FILL_DISCHARGE.changes.items():
@@ -93,7 +93,7 @@ def filled_in_turn(plant: Plant) -> Schedule:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Run:
-    """A system, where it starts, its command, and the factor that makes a displacement [m] of its first coordinate."""
+    """A system with initial state and input signal; `lever` converts its coordinate to a displacement [m]."""
 
     system: System
     start: dict[str, float]
@@ -115,35 +115,35 @@ class Run:
 
     @property
     def times(self) -> Array:
-        """Every 10 ms; all instants of the schedule are among them."""
+        """Output times [s], every 10 ms; they contain all switching times."""
         return np.linspace(0.0, DURATION, round(DURATION / SPACING) + 1)
 
     def error(self, rows: Array, reference: Array) -> float:
-        """Greatest error of displacement [m] over the run; rows are (N, n)."""
+        """Maximum error of the displacement [m] over the run; rows are (N, n)."""
         index = [s.name for s in self.system.states].index(self.coordinate)
         return float(self.lever * np.abs(rows[:, index] - reference[:, index]).max())
 
 
 @functools.cache
-def lifts(muscles: int) -> Run:
-    """The run of so many muscles on one mass."""
+def lifting_run(muscles: int) -> Run:
+    """The run of the plant with several muscles on one mass."""
     plant = hanging(muscles)
-    return Run(plant, dict(find_equilibrium(plant, pressure=0.0)), filled_in_turn(plant), "position", 1.0)
+    return Run(plant, dict(find_equilibrium(plant, pressure=0.0)), staggered_schedule(plant), "position", 1.0)
 
 
 @functools.cache
 def runs() -> dict[int, Run]:
-    """Four runs by their number of states: one muscle, two muscles on a joint, twice, and six muscles on one mass."""
+    """The runs by number of states: 3, one muscle; 6 and 10, a joint with two muscles; 8, six muscles on one mass."""
     six, ten = joint(), joint(heat=True)
     return {
-        3: lifts(1),
+        3: lifting_run(1),
         6: Run(six, joint_start(six), JOINT_PULSES, "angle", six.radius),
-        8: lifts(6),
+        8: lifting_run(6),
         10: Run(ten, joint_start(ten), JOINT_PULSES, "angle", ten.radius),
     }
 
 
 def stretch_factor(braid: Braid) -> tuple[float, float]:
-    """k and c of V = k s (1 - (c s)^2) with s = 1 - eps, for those who write the equations out by hand."""
+    """k and c of the volume V = k s (1 - (c s)^2), s = 1 - eps, for hand-written equations."""
     k = ops.pi * braid.radius**2 * braid.resting_length / ops.sin(braid.braid_angle) ** 2
     return float(k), float(ops.cos(braid.braid_angle))

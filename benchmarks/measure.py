@@ -1,6 +1,7 @@
-"""How the benchmarks measure: variants in turn in one process, medians, ratios within a round, and what is printed.
+"""Timing of benchmark variants, targets, and Markdown output.
 
-A machine that is busy slows neighbours in time alike, so a ratio is the median of the ratios of each round.
+All variants are timed in turn in one process. A ratio is the median of the ratios of each round, because a change of
+the machine load affects all variants of a round alike.
 """
 
 from __future__ import annotations
@@ -19,24 +20,24 @@ PACKAGES = (
     *("numpy", "scipy", "numba", "llvmlite", "casadi", "lmfit"),
     *("scikit-sundae", "diffrax", "jax", "control", "mujoco"),
 )
-LEAST = 0.004
-"""A variant quicker than this [s] is called several times in a round, so that it is timed warm and beyond the clock."""
+MIN_DURATION = 0.004
+"""Minimum duration [s] of a timing: faster variants are called several times per round, because of clock resolution."""
 
-PEAK = """
+PRINT_PEAK_MEMORY = """
 import pathlib, sys
 status = pathlib.Path("/proc/self/status")
-if status.exists():  # getrusage would count the process that this one was forked from
+if status.exists():  # getrusage also counts the parent process before the fork
     print(next(int(line.split()[1]) for line in status.read_text().splitlines() if line.startswith("VmHWM")) / 1e3)
 else:
     import resource
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3))
 """
-"""Python that prints the greatest memory of its own process so far [MB]."""
+"""Python code that prints the peak memory of its own process [MB]."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Times:
-    """Seconds a call of one variant, one number a round."""
+    """Duration of one call of a variant [s], one value per round."""
 
     rounds: tuple[float, ...]
 
@@ -45,22 +46,22 @@ class Times:
         return statistics.median(self.rounds)
 
     @property
-    def least(self) -> float:
+    def minimum(self) -> float:
         return min(self.rounds)
 
     def ratio_to(self, other: Times) -> float:
-        """How many times longer than the other, round by round."""
+        """Median over the rounds of the ratio to the duration of the other variant."""
         return statistics.median(a / b for a, b in zip(self.rounds, other.rounds, strict=True))
 
 
-def interleaved(variants: Mapping[str, Callable[[], Any]], rounds: int) -> dict[str, Times]:
-    """Time the variants in turn; a call before the first round warms each."""
-    calls = {name: max(1, round(LEAST / _seconds(run, 1, warm=True))) for name, run in variants.items()}
-    found: dict[str, list[float]] = {name: [] for name in variants}
+def time_variants(variants: Mapping[str, Callable[[], Any]], rounds: int) -> dict[str, Times]:
+    """Time the variants in turn, after one warm-up call each."""
+    calls = {name: max(1, round(MIN_DURATION / _seconds(run, 1, warm=True))) for name, run in variants.items()}
+    durations: dict[str, list[float]] = {name: [] for name in variants}
     for _ in range(rounds):
         for name, run in variants.items():
-            found[name].append(_seconds(run, calls[name]))
-    return {name: Times(tuple(times)) for name, times in found.items()}
+            durations[name].append(_seconds(run, calls[name]))
+    return {name: Times(tuple(times)) for name, times in durations.items()}
 
 
 def _seconds(run: Callable[[], Any], calls: int, warm: bool = False) -> float:
@@ -73,76 +74,77 @@ def _seconds(run: Callable[[], Any], calls: int, warm: bool = False) -> float:
 
 
 @dataclasses.dataclass(frozen=True)
-class Bar:
-    """What was wanted: a number that must not be more (or, `at_least`, not less) than a limit."""
+class Target:
+    """Target of a benchmark: a measured value with an upper limit or, if `at_least`, a lower limit."""
 
-    what: str
+    name: str
     measured: float
     limit: float
     unit: str
     at_least: bool = False
-    why: str = ""
-    """What is known of the reason, printed where the bar is missed."""
+    reason: str = ""
+    """Known reason, printed if the target is missed."""
 
     @property
-    def held(self) -> bool:
+    def met(self) -> bool:
         return self.measured >= self.limit if self.at_least else self.measured <= self.limit
 
     @property
     def cells(self) -> tuple[str, ...]:
-        wanted = f"{'>=' if self.at_least else '<='} {self.limit:g} {self.unit}"
-        return (self.what, f"{self.measured:.3g} {self.unit}", wanted, "held" if self.held else "**missed**")
+        target = f"{'>=' if self.at_least else '<='} {self.limit:g} {self.unit}"
+        return (self.name, f"{self.measured:.3g} {self.unit}", target, "met" if self.met else "**missed**")
 
 
 @dataclasses.dataclass(frozen=True)
 class Section:
-    """One benchmark: what it compares, its rows, and the bars it is held to."""
+    """Section of the results: title, description, table and targets of one benchmark."""
 
     title: str
     text: str
-    heading: tuple[str, ...]
+    header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
-    bars: tuple[Bar, ...] = ()
+    targets: tuple[Target, ...] = ()
 
     def markdown(self) -> str:
-        return f"## {self.title}\n\n{self.text}\n\n{table(self.heading, self.rows)}\n"
+        return f"## {self.title}\n\n{self.text}\n\n{table(self.header, self.rows)}\n"
 
 
-def table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = ["| " + " | ".join(row) + " |" for row in (heading, *rows)]
-    return "\n".join([lines[0], "|" + "---|" * len(heading), *lines[1:]])
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = ["| " + " | ".join(row) + " |" for row in (header, *rows)]
+    return "\n".join([lines[0], "|" + "---|" * len(header), *lines[1:]])
 
 
-def show(section: Section) -> None:
-    """Print a section and its bars."""
+def print_section(section: Section) -> None:
+    """Print a section and its targets."""
     print(section.markdown())
-    for bar in section.bars:
-        print("  ".join(bar.cells))
+    for target in section.targets:
+        print("  ".join(target.cells))
 
 
-def of_time(seconds: float) -> str:
-    """A time for people: 0.136 ms, 1.24 s."""
+def format_time(seconds: float) -> str:
+    """A time with three significant digits and a suitable unit: 0.136 ms, 1.24 s."""
     for scale, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
         if seconds >= scale:
             return f"{seconds / scale:.3g} {unit}"
     return f"{seconds / 1e-9:.3g} ns"
 
 
-def versions() -> str:
-    found = []
+def package_versions() -> str:
+    """Versions of Python and of the packages that are compared."""
+    texts = []
     for name in PACKAGES:
         try:
-            found.append(f"{name} {metadata.version(name)}")
+            texts.append(f"{name} {metadata.version(name)}")
         except metadata.PackageNotFoundError:
-            found.append(f"{name} absent")
-    return f"Python {platform.python_version()}, " + ", ".join(found)
+            texts.append(f"{name} not installed")
+    return f"Python {platform.python_version()}, " + ", ".join(texts)
 
 
-def machine() -> str:
-    """Processor, cores, system, and how busy it was."""
+def describe_machine() -> str:
+    """Processor, number of cores, operating system and load."""
     load, cores = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan"), os.cpu_count() or 1
-    busy = "; others used it too, so that seconds are too long and only ratios hold" if load > cores / 2 + 1 else ""
-    return f"{_processor()}, {cores} cores, {platform.system()}, load average {load:.1f} at the end{busy}"
+    busy = "; under other load, so that times are too long and only ratios are valid" if load > cores / 2 + 1 else ""
+    return f"{_processor()}, {cores} cores, {platform.system()}, load average at the end {load:.1f}{busy}"
 
 
 def _processor() -> str:

@@ -1,16 +1,16 @@
-"""Memory: what a process holds at its peak after each of a few tasks, one after the other."""
+"""Peak memory of a process after each of several tasks."""
 
 from __future__ import annotations
 
 import importlib.util
 
-from measure import PEAK, Section, show
-from new_plant import MUSCLES, process
+from measure import PRINT_PEAK_MEMORY, Section, print_section
+from new_plant import MUSCLES, run_python
 
-HEADING = ("after", "peak so far [MB]")
+HEADER = ("after", "peak memory [MB]")
 TEXT = (
-    "Resident memory of one process at its peak, as the system tells it. A run keeps its rows, eight bytes a state, "
-    "and makes from them the columns of its Recording: time, states, outputs and inputs."
+    "Peak resident memory of one process, as reported by the operating system. A run stores its rows, eight bytes per "
+    "state, and computes from them the columns of its Recording: time, states, outputs and inputs."
 )
 TASKS = {
     "Python and NumPy": "import numpy",
@@ -21,20 +21,22 @@ from airmuscle import simulate
 run = lambda output: simulate(hanging(), FILL_DISCHARGE, duration=25.0, output=output)
 run(0.01)""",
     "the same with 1 000 000 rows": "long = run(25e-6)",
-    f"a new plant of {MUSCLES} muscles": "from new_plant import fresh, many_muscles\nplant = fresh(many_muscles())",
+    f"a new plant of {MUSCLES} muscles": """
+from new_plant import compile_anew, many_muscles
+plant = compile_anew(many_muscles())""",
 }
 
 
 def section(rounds: int = 1) -> Section:
-    """All tasks, in one process."""
+    """The complete benchmark: all tasks in one process."""
     title = "Memory"
     if importlib.util.find_spec("resource") is None:
-        return Section(title, "This system does not tell a process what it holds.", HEADING, ())
-    code = "".join(f"{task}\n{PEAK}" for task in TASKS.values())
-    peaks = [float(line) for line in process(["-c", code]).split()]
+        return Section(title, "The operating system does not report the memory of a process.", HEADER, ())
+    code = "".join(f"{task}\n{PRINT_PEAK_MEMORY}" for task in TASKS.values())
+    peaks = [float(line) for line in run_python(["-c", code]).split()]
     rows = tuple((name, f"{peak:.0f}") for name, peak in zip(TASKS, peaks, strict=True))
-    return Section(title, TEXT, HEADING, rows)
+    return Section(title, TEXT, HEADER, rows)
 
 
 if __name__ == "__main__":
-    show(section())
+    print_section(section())

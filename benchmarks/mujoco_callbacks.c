@@ -1,4 +1,4 @@
-/* The muscles of fill_discharge.c as MuJoCo actuators: the activation is the air in a muscle, the force its tension. */
+/* The muscles of fill_discharge.c as MuJoCo actuators: the activation is the air mass, the force is the tension. */
 #include <mujoco/mujoco.h>
 
 #include "fill_discharge.c"
@@ -11,7 +11,7 @@ void open_valves(const double *given) {
   for (int i = 0; i < 2 * MUSCLES; i++) openings[i] = given[i];
 }
 
-/* MuJoCo asks for the rates of all activations before it asks for forces, at the same state: computed once. */
+/* MuJoCo evaluates the rates of all activations before the forces, at the same state: tensions are computed once. */
 static mjtNum air_rate(const mjModel *m, const mjData *d, int i) {
   double rate;
   tensions[i] = muscle(&plant.muscles[i], d->act[i], d->qpos[0], d->qvel[0], openings[2 * i], openings[2 * i + 1], &rate);

@@ -1,4 +1,4 @@
-"""ode8 at 1e-4 s over 25 s against MuJoCo's RK4 with the same muscles as C callbacks, compiled here."""
+"""ode8 at 1e-4 s over 25 s compared with RK4 of MuJoCo, with the same muscles as compiled C callbacks."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from filling import SPACING, Array, Run, lifts
-from measure import Bar, Section, interleaved, of_time, show
-from ode8 import FLAGS, SOURCE, STEP, build, compilers, constants
+from filling import SPACING, Array, Run, lifting_run
+from measure import Section, Target, format_time, print_section, time_variants
+from ode8 import FLAGS, SOURCE, STEP, compile_source, compilers, constants
 from rodas4 import kernel
 
 from airmuscle.compile.program import compile_system
@@ -21,17 +21,17 @@ from airmuscle.plant.plant import Plant
 from airmuscle.simulation.integrators import DormandPrince8, Integrator, Rodas4, RungeKutta4
 
 CALLBACKS = pathlib.Path(__file__).with_name("mujoco_callbacks.c")
-HEADING = ("muscles", "variant", "median", "least", "times ode8", "greatest error [m]")
+HEADER = ("muscles", "variant", "median", "minimum", "ratio to ode8", "maximum error [m]")
 TEXT = (
-    "A mass on a vertical slide without collisions; a muscle is an actuator whose activation is its air. `mj_step` is "
-    "told to take all steps between two rows in one call. Its callbacks are C that skips shut valves and the tangent "
-    "beyond the validity range. RungeKutta4 is the method that MuJoCo has, too; Rodas4 is what the library takes unless told "
-    "otherwise."
+    "A mass on a vertical slide joint without contacts; a muscle is an actuator whose activation is its air mass. One "
+    "call of `mj_step` takes all steps between two output times. The callbacks are C code that skips closed valves "
+    "and the extrapolation beyond the validity range. RungeKutta4 is the method of MuJoCo; Rodas4 is the default of "
+    "the library."
 )
-WHY = (
-    "ode8 has 13 stages, RK4 has 4; MuJoCo's own work, most of its time with one muscle, hardly grows with the "
-    "muscles, so that with more of them the stages decide. Its error at this step is as small as that of ode8; "
-    "RungeKutta4, which is MuJoCo's method, and Rodas4 stand beside"
+REASON = (
+    "ode8 has 13 stages, RK4 has 4; MuJoCo's overhead, most of its time with one muscle, hardly increases with the "
+    "number of muscles, so that with more muscles the number of stages decides. Its error at this step is as small as "
+    "that of ode8; the table also contains RungeKutta4, the method of MuJoCo, and Rodas4"
 )
 BODY = """<mujoco><option timestep="{step!r}" integrator="RK4" gravity="0 0 {gravity!r}"><flag contact="disable"
 constraint="disable"/></option><worldbody><body><joint name="lift" type="slide" axis="0 0 1"/>
@@ -39,23 +39,23 @@ constraint="disable"/></option><worldbody><body><joint name="lift" type="slide" 
 ACTUATOR = '<general joint="lift" dyntype="user" gaintype="user" biastype="user"/>'
 
 
-def absent() -> str:
-    """Why this cannot be measured here; empty where it can."""
+def missing_note() -> str:
+    """The reason why this benchmark cannot be run; empty if it can."""
     if importlib.util.find_spec("mujoco") is None:
-        return "mujoco is not installed and left out: pip install mujoco."
-    return "" if compilers() else "No C compiler is on the path, so that MuJoCo's callbacks are left out."
+        return "Omitted, because mujoco is not installed: pip install mujoco."
+    return "" if compilers() else "Omitted, because there is no C compiler for the callbacks of MuJoCo."
 
 
-def body(plant: Plant, step: float) -> str:
-    """The plant for MuJoCo, in its own language; position is upwards, as ours."""
+def model_xml(plant: Plant, step: float) -> str:
+    """The plant as a MuJoCo model (MJCF); the position is positive upwards, as in the library."""
     load = plant.mechanism
     return BODY.format(
         step=step, gravity=-load.gravity, mass=load.mass, actuators=ACTUATOR * len(plant.muscles)
     )  # fmt: skip
 
 
-def callbacks(folder: pathlib.Path, muscles: int) -> ctypes.CDLL:
-    """The compiled callbacks, linked with the MuJoCo that Python has."""
+def compile_callbacks(folder: pathlib.Path, muscles: int) -> ctypes.CDLL:
+    """The compiled callbacks, linked with the MuJoCo library of the Python package."""
     import mujoco
 
     home = pathlib.Path(mujoco.__file__).parent
@@ -63,18 +63,20 @@ def callbacks(folder: pathlib.Path, muscles: int) -> ctypes.CDLL:
     for source in (SOURCE, CALLBACKS):
         shutil.copy(source, folder)
     compiler, target = compilers()[0], folder / f"callbacks{muscles}.so"
-    chosen = [f"-I{home / 'include'}", f"-DMUSCLES={muscles}", "-DSKIP"]
+    options = [f"-I{home / 'include'}", f"-DMUSCLES={muscles}", "-DSKIP"]
     linked = (str(library), f"-Wl,-rpath,{home}", "-lm")
-    build([compiler, *FLAGS, "-ffast-math", *chosen], folder / CALLBACKS.name, target, linked)
+    compile_source([compiler, *FLAGS, "-ffast-math", *options], folder / CALLBACKS.name, target, linked)
     return ctypes.CDLL(str(target))
 
 
-def in_mujoco(run: Run, library: ctypes.CDLL, step: float = STEP) -> Callable[[], Array]:
-    """The run by MuJoCo's RK4."""
+def make_mujoco_run(run: Run, library: ctypes.CDLL, step: float = STEP) -> Callable[[], Array]:
+    """A function that computes the run with RK4 of MuJoCo."""
     import mujoco
 
     plant, inputs = constants(run.system), np.ascontiguousarray(run.segments.values)
-    model = mujoco.MjModel.from_xml_string(body(run.system, step))  # before the callbacks: it calls them, too
+    model = mujoco.MjModel.from_xml_string(
+        model_xml(run.system, step)
+    )  # before the callbacks are installed, because this calls them too
     counts = np.rint(np.diff([0.0, *run.segments.ends]) / SPACING).astype(int)
     rows, every = np.empty((counts.sum() + 1, run.vector.size)), round(SPACING / step)
     library.hold.argtypes = library.open_valves.argtypes = [ctypes.c_void_p]
@@ -97,49 +99,54 @@ def in_mujoco(run: Run, library: ctypes.CDLL, step: float = STEP) -> Callable[[]
     return call
 
 
-def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tuple[Bar, ...]]:
-    """Rows and the bar of so many muscles on one mass."""
-    run = lifts(muscles)
+def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tuple[Target, ...]]:
+    """Rows and target for a plant with several muscles on one mass."""
+    run = lifting_run(muscles)
     ready = compile_system(run.system)
     reference = kernel(run, ready, Rodas4(1e-11))()
     segments, times, state = run.segments, run.times, run.vector
-    ours, theirs = "DormandPrince8(1e-4), kernel", "MuJoCo RK4(1e-4), C callbacks"
+    library_name, mujoco_name = "DormandPrince8(1e-4), kernel", "MuJoCo RK4(1e-4), C callbacks"
 
-    def by(method: Integrator) -> Callable[[], Array]:
+    def kernel_call(method: Integrator) -> Callable[[], Array]:
         return lambda: method.run(ready, segments, 0.0, state, times).rows
 
-    variants = {ours: by(DormandPrince8(STEP))}
-    variants |= {"RungeKutta4(1e-4), kernel": by(RungeKutta4(STEP)), "Rodas4(1e-6), kernel": by(Rodas4(1e-6))}
+    variants = {library_name: kernel_call(DormandPrince8(STEP))}
+    variants |= {
+        "RungeKutta4(1e-4), kernel": kernel_call(RungeKutta4(STEP)),
+        "Rodas4(1e-6), kernel": kernel_call(Rodas4(1e-6)),
+    }
     with tempfile.TemporaryDirectory() as folder:
-        library = callbacks(pathlib.Path(folder), muscles)
-        variants[theirs] = in_mujoco(run, library)
-        variants["MuJoCo RK4(1e-3), C callbacks"] = in_mujoco(run, library, 1e-3)
-        taken = interleaved(variants, rounds)
+        library = compile_callbacks(pathlib.Path(folder), muscles)
+        variants[mujoco_name] = make_mujoco_run(run, library)
+        variants["MuJoCo RK4(1e-3), C callbacks"] = make_mujoco_run(run, library, 1e-3)
+        times_of = time_variants(variants, rounds)
         errors = {name: run.error(call(), reference) for name, call in variants.items()}
     rows = tuple(
         (
             str(muscles),
             name,
-            of_time(t.median),
-            of_time(t.least),
-            f"{t.ratio_to(taken[ours]):.3g}",
+            format_time(t.median),
+            format_time(t.minimum),
+            f"{t.ratio_to(times_of[library_name]):.3g}",
             f"{errors[name]:.1e}",
         )
-        for name, t in taken.items()
+        for name, t in times_of.items()
     )
-    what = f"muscles: {muscles}: MuJoCo RK4 with C callbacks / ode8, both 250 000 steps"
-    return rows, (Bar(what, taken[theirs].ratio_to(taken[ours]), 12.0, "x", at_least=True, why=WHY),)
+    name = f"muscles: {muscles}: MuJoCo RK4 with C callbacks / ode8, both 250 000 steps"
+    return rows, (
+        Target(name, times_of[mujoco_name].ratio_to(times_of[library_name]), 12.0, "x", at_least=True, reason=REASON),
+    )
 
 
 def section(rounds: int = 5) -> Section:
-    """The whole comparison."""
-    title = "ode8, 250 000 steps, against MuJoCo"
-    if absent():
-        return Section(title, absent(), HEADING, ())
+    """The complete benchmark."""
+    title = "ode8, 250 000 steps, compared with MuJoCo"
+    if missing_note():
+        return Section(title, missing_note(), HEADER, ())
     parts = [measure(muscles, max(1, rounds // muscles)) for muscles in (1, 2, 6)]
-    rows, bars = (tuple(x for part in column for x in part) for column in zip(*parts, strict=True))
-    return Section(title, TEXT, HEADING, rows, bars)
+    rows, targets = (tuple(x for part in column for x in part) for column in zip(*parts, strict=True))
+    return Section(title, TEXT, HEADER, rows, targets)
 
 
 if __name__ == "__main__":
-    show(section())
+    print_section(section())

@@ -1,4 +1,4 @@
-"""What a plant that was never seen costs: trace, derivatives, print, compile; another parameter set; the cache."""
+"""Preparation of a new plant: trace, derivatives, code generation, compilation; new parameters; the cache."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from filling import hanging, runs
-from measure import Bar, Section, interleaved, of_time, show
+from measure import Section, Target, format_time, print_section, time_variants
 
 from airmuscle.compile.program import Program, compile_system
 from airmuscle.core import autodiff
@@ -21,39 +21,39 @@ from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.simulation.integrators import DormandPrince8
 
-HEADING = ("what", "median", "least")
+HEADER = ("task", "median", "minimum")
 TEXT = (
-    "In a process that has compiled a plant before; what is kept of earlier traces is thrown away each time. The first "
-    "plant of a process also starts CasADi and LLVM, which `Process start` below counts."
+    "In a process that has already compiled a plant; the cache of traced functions is cleared each time. The first "
+    "plant of a process also loads CasADi and LLVM, which is part of `Process start` below."
 )
 MUSCLES = 24
-WHY = (
-    "each of these muscles has a surface with its tangent, so that the plant is printed as more than 40 000 "
-    "lines; LLVM's optimisation and code generation of functions so long take most of the time"
+REASON = (
+    "each of these muscles has a surface with its extrapolation, so that the generated code has more than 40 000 "
+    "lines; most of the time is LLVM's optimisation and code generation of such long functions"
 )
 ONE_RUN = """
 import sys
 from filling import runs
-from airmuscle.simulate import simulate
+from airmuscle import simulate
 run = runs()[int(sys.argv[1])]
 simulate(run.system, run.command, duration=0.1, start=run.start)
 """
 
 
-def fresh(system: System) -> Program:
-    """The program of a system as if its laws had never been traced."""
-    autodiff._functions.clear()
+def compile_anew(system: System) -> Program:
+    """The program of a system, without the cache of traced laws."""
+    autodiff._traced_functions.clear()
     return Program(system)
 
 
-def with_step(system: System) -> Any:
-    """A fresh program and its printed step of ode8, 13 stages in one function."""
-    program = fresh(system)
+def compile_with_step(system: System) -> Any:
+    """A new program and its compiled step of ode8, 13 stages in one function."""
+    program = compile_anew(system)
     return program.step(*DormandPrince8(1e-4).tableau(), compile_system(system).parameters)
 
 
 def many_muscles() -> Plant:
-    """As many muscles as an arm has, each with its valves, on one mass."""
+    """24 muscles, each with two valves, on one mass."""
     plant = hanging()
     muscles = tuple(dataclasses.replace(plant.muscles[0], name=f"muscle{i}") for i in range(MUSCLES))
     return dataclasses.replace(
@@ -62,21 +62,21 @@ def many_muscles() -> Plant:
 
 
 def cache_counts() -> tuple[int, ...]:
-    """Files in the kernels' cache after each of three processes, with a plant of another size each."""
+    """Number of files in the kernel cache after each of three processes, with plants of different size."""
     counts = []
     with tempfile.TemporaryDirectory() as folder:
         for size in (3, 6, 10):
-            process(["-c", ONE_RUN, str(size)], folder)
+            run_python(["-c", ONE_RUN, str(size)], folder)
             counts.append(sum(path.is_file() for path in pathlib.Path(folder).rglob("*")))
     return tuple(counts)
 
 
-def process(arguments: list[str], cache: str | None = None) -> str:
-    """What Python prints in a process of its own, with this folder as the kernels' cache; it may keep bytecode."""
+def run_python(arguments: list[str], cache: str | None = None) -> str:
+    """The output of a Python process, with `cache` as folder of the kernel cache; bytecode is written as usual."""
     here = pathlib.Path(__file__).parent
     path = os.pathsep.join([str(here), str(here.parent / "src"), os.environ.get("PYTHONPATH", "")])
-    kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-    environment = {**kept, "PYTHONPATH": path} | ({"NUMBA_CACHE_DIR": cache} if cache else {})
+    inherited = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    environment = {**inherited, "PYTHONPATH": path} | ({"NUMBA_CACHE_DIR": cache} if cache else {})
     done = subprocess.run(
         [sys.executable, *arguments], env=environment, check=True, capture_output=True, cwd=here, text=True
     )
@@ -84,27 +84,27 @@ def process(arguments: list[str], cache: str | None = None) -> str:
 
 
 def section(rounds: int = 5) -> Section:
-    """All of it."""
+    """The complete benchmark."""
     systems = {size: run.system for size, run in runs().items()}
     heavier, big = dataclasses.replace(hanging(), mechanism=HangingMass(6.0)), many_muscles()
     compile_system(systems[3])
     variants: dict[str, Callable[[], Any]] = {
-        f"new plant, {n} states": lambda s=s: fresh(s) for n, s in systems.items()
+        f"new plant, {n} states": lambda s=s: compile_anew(s) for n, s in systems.items()
     }
-    variants["new plant, 3 states, and its step of ode8"] = lambda: with_step(systems[3])
-    variants["another parameter set of a known plant"] = lambda: compile_system(heavier)
-    times = interleaved(variants, rounds)
-    times |= interleaved({f"new plant, {MUSCLES} muscles on one mass, 26 states": lambda: fresh(big)}, 2)
+    variants["new plant, 3 states, with compiled step of ode8"] = lambda: compile_with_step(systems[3])
+    variants["new parameter values of a known plant"] = lambda: compile_system(heavier)
+    times = time_variants(variants, rounds)
+    times |= time_variants({f"new plant, {MUSCLES} muscles on one mass, 26 states": lambda: compile_anew(big)}, 2)
     counts = cache_counts()
-    rows = [(name, of_time(t.median), of_time(t.least)) for name, t in times.items()]
+    rows = [(name, format_time(t.median), format_time(t.minimum)) for name, t in times.items()]
     rows.append(("files in the cache after each of three processes", ", ".join(map(str, counts)), ""))
-    bars = (
-        Bar("new plant, 10 states", times["new plant, 10 states"].least, 0.3, "s"),
-        Bar(f"new plant, {MUSCLES} muscles", list(times.values())[-1].least, 4.0, "s", why=WHY),
-        Bar("files added to the cache by a second and third process", counts[-1] - counts[0], 0, "files"),
+    targets = (
+        Target("new plant, 10 states", times["new plant, 10 states"].minimum, 0.3, "s"),
+        Target(f"new plant, {MUSCLES} muscles", list(times.values())[-1].minimum, 4.0, "s", reason=REASON),
+        Target("files added to the cache by the second and third process", counts[-1] - counts[0], 0, "files"),
     )
-    return Section("A new plant", TEXT, HEADING, tuple(rows), bars)
+    return Section("A new plant", TEXT, HEADER, tuple(rows), targets)
 
 
 if __name__ == "__main__":
-    show(section())
+    print_section(section())

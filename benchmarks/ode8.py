@@ -1,4 +1,4 @@
-"""ode8 at 1e-4 s over 25 s (250 000 steps) against C of the same equations, compiled here."""
+"""ode8 at 1e-4 s over 25 s (250 000 steps) compared with C code of the same equations."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from filling import SPACING, Array, Run, lifts, stretch_factor
-from measure import Bar, Section, Times, interleaved, of_time, show
+from filling import SPACING, Array, Run, lifting_run, stretch_factor
+from measure import Section, Target, Times, format_time, print_section, time_variants
 from rodas4 import kernel
 
 from airmuscle.compile.program import compile_system
@@ -20,24 +20,24 @@ from airmuscle.control.piecewise_linear import PiecewiseLinear
 from airmuscle.muscle import Muscle
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge
-from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Ambient, absolute
+from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Ambient, absolute_pressure
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4
 
 STEP = 1e-4
 SOURCE = pathlib.Path(__file__).with_name("fill_discharge.c")
 FLAGS = ("-O3", "-march=native")
 FAST = "-ffast-math"
-HEADING = ("muscles", "variant", "median", "least", "times the best branch-free C", "greatest error [m]")
+HEADER = ("muscles", "variant", "median", "minimum", "ratio to the fastest branch-free C", "maximum error [m]")
 TEXT = (
-    "One, two and six muscles on one mass, 2501 rows. The C computes both valves and the surface with its tangent "
-    "in every stage, without a branch, and inlines a whole step; the best of its compilers and flags counts. The "
-    "library branches around shut valves and the tangent of a validity range not left; the C that does so too stands beside "
-    "it. The reference is Rodas4 at rtol 1e-11."
+    "One, two and six muscles on one mass, 2501 rows. The C code computes both valves and the surface with its "
+    "extrapolation in every stage, without branches, and inlines a whole step; its fastest compiler and flags count. "
+    "The library skips closed valves and the extrapolation beyond the validity range; a C variant with these branches "
+    "is also listed. The reference is Rodas4 at rtol 1e-11."
 )
 
 
 def stages() -> str:
-    """The stages after the first, and the weighted sum, as C macros; zeros are left out."""
+    """The stages after the first and the weighted sum of slopes as C macros, without zero coefficients."""
     rows, weights = DormandPrince8(STEP).tableau()
 
     def total(row: tuple[float, ...]) -> str:
@@ -48,7 +48,7 @@ def stages() -> str:
 
 
 def constants(plant: Plant) -> Array:
-    """The struct `Plant` of the C source, in its order; the valves of a muscle are alike but in conductance."""
+    """The fields of the C struct `Plant`, in its order; the valves of a muscle differ only in conductance."""
     load = plant.mechanism
     muscles = [_constants(*pair, plant.ambient) for pair in zip(plant.muscles, plant.circuits, strict=True)]
     return np.array([1 / load.mass, load.gravity, *(x for one in muscles for x in one)])
@@ -62,21 +62,21 @@ def _constants(muscle: Muscle, circuit: FillDischarge, ambient: Ambient) -> list
     scaling = [x for low, high in validity_range for x in (low, 2 / (high - low))]
     return [
         *(1 / muscle.geometry.resting_length, k, c * c, GAS_CONSTANT * ambient.temperature),
-        *(ambient.pressure, absolute(circuit.supply.pressure, ambient)),
+        *(ambient.pressure, absolute_pressure(circuit.supply.pressure, ambient)),
         *(scale * v.conductance for v in (circuit.fill, circuit.discharge)),
         *(valve.critical_ratio, 1 / (1 - valve.critical_ratio), float(valve.laminar_slope())),
         *(*scaling, law.min_force, law.max_force),
-        *(muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth, *law.coefficients),
+        *(muscle.spring.stiffness, muscle.damper.damping, muscle.damper.damping_slope, *law.coefficients),
     ]
 
 
-def in_c(run: Run, library: ctypes.CDLL, segments: PiecewiseLinear | None = None) -> Callable[[], Array]:
-    """The run, or other segments of it, by a compiled C library."""
+def make_c_run(run: Run, library: ctypes.CDLL, segments: PiecewiseLinear | None = None) -> Callable[[], Array]:
+    """A function that computes the run, or given segments of it, with a compiled C library."""
     segments = segments or run.segments
     plant, start, inputs = constants(run.system), run.vector, np.ascontiguousarray(segments.values)
     steps = np.rint(np.diff([0.0, *segments.ends]) / STEP).astype(np.intc)
     if (steps % round(SPACING / STEP)).any():
-        raise ValueError("the C writes rows every 10 ms, and every instant must be on one of them")
+        raise ValueError("the C code writes rows every 10 ms; every switching time must be a multiple of 10 ms")
     rows = np.empty((int(steps.sum()) * round(STEP * 1e6) // round(SPACING * 1e6) + 1, start.size))
     arguments = [plant.ctypes.data, start.ctypes.data, len(steps), steps.ctypes.data, inputs.ctypes.data]
     at = ctypes.c_void_p
@@ -90,53 +90,67 @@ def in_c(run: Run, library: ctypes.CDLL, segments: PiecewiseLinear | None = None
 
 
 def compilers() -> list[str]:
-    """The C compilers on the path."""
+    """The available C compilers."""
     return [name for name in ("gcc", "clang") if shutil.which(name)]
 
 
-def compiled(folder: pathlib.Path, muscles: int = 1) -> dict[str, ctypes.CDLL]:
-    """The C source by each compiler, plain and fast, without and with branches."""
+def compile_libraries(folder: pathlib.Path, muscles: int = 1) -> dict[str, ctypes.CDLL]:
+    """The C code compiled by each compiler, with and without -ffast-math, without and with branches."""
     source = folder / SOURCE.name
     source.write_text(stages() + SOURCE.read_text(encoding="utf-8"), encoding="utf-8")
-    found = {}
+    libraries = {}
     for compiler in compilers():
         for skip in ((), ("-DSKIP",)):
             for fast in ((), (FAST,)):
-                name = " ".join(["C,", compiler, *FLAGS, *fast, *(["skipping"] if skip else [])])
-                target = folder / f"{muscles}-{len(found)}.so"
-                build([compiler, *FLAGS, *fast, *skip, f"-DMUSCLES={muscles}"], source, target)
-                found[name] = ctypes.CDLL(str(target))
-    return found
+                name = " ".join(["C,", compiler, *FLAGS, *fast, *(["with branches"] if skip else [])])
+                target = folder / f"{muscles}-{len(libraries)}.so"
+                compile_source([compiler, *FLAGS, *fast, *skip, f"-DMUSCLES={muscles}"], source, target)
+                libraries[name] = ctypes.CDLL(str(target))
+    return libraries
 
 
-def build(flags: list[str], source: pathlib.Path, target: pathlib.Path, linked: tuple[str, ...] = ("-lm",)) -> None:
-    """Linked without -ffast-math: gcc would add code that flushes subnormals to zero in the whole process."""
+def compile_source(
+    flags: list[str], source: pathlib.Path, target: pathlib.Path, linked: tuple[str, ...] = ("-lm",)
+) -> None:
+    """Compile and link a shared library.
+
+    It is linked without -ffast-math, because gcc would add code that sets subnormals to zero in the whole process.
+    """
     code, (compiler, *rest) = target.with_suffix(".o"), flags
     subprocess.run([compiler, *rest, "-fPIC", "-c", str(source), "-o", str(code)], check=True)
     subprocess.run([compiler, *FLAGS, "-shared", str(code), "-o", str(target), *linked], check=True)
 
 
-def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tuple[Bar, ...]]:
-    """Rows and the bar of so many muscles in one plant."""
-    run = lifts(muscles)
+def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tuple[Target, ...]]:
+    """Rows and target for a plant with several muscles."""
+    run = lifting_run(muscles)
     ready = compile_system(run.system)
     reference = kernel(run, ready, Rodas4(1e-11))()
     method, segments, times, state = DormandPrince8(STEP), run.segments, run.times, run.vector
-    ours = "DormandPrince8(1e-4), kernel"
-    variants: dict[str, Callable[[], Array]] = {ours: lambda: method.run(ready, segments, 0.0, state, times).rows}
+    library_name = "DormandPrince8(1e-4), kernel"
+    variants: dict[str, Callable[[], Array]] = {
+        library_name: lambda: method.run(ready, segments, 0.0, state, times).rows
+    }
     with tempfile.TemporaryDirectory() as folder:
-        libraries = compiled(pathlib.Path(folder), muscles)
-        variants |= {name: in_c(run, library) for name, library in libraries.items()}
-        taken = interleaved(variants, rounds)
+        libraries = compile_libraries(pathlib.Path(folder), muscles)
+        variants |= {name: make_c_run(run, library) for name, library in libraries.items()}
+        times_of = time_variants(variants, rounds)
         errors = {name: run.error(call(), reference) for name, call in variants.items()}
-    branch_free = [name for name in variants if name != ours and "skipping" not in name]
-    best = min(branch_free, key=lambda name: taken[name].median, default=ours)
+    branch_free = [name for name in variants if name != library_name and "with branches" not in name]
+    best = min(branch_free, key=lambda name: times_of[name].median, default=library_name)
     rows = tuple(
-        (str(muscles), name, of_time(t.median), of_time(t.least), _times(t, taken[best]), f"{errors[name]:.1e}")
-        for name, t in taken.items()
+        (
+            str(muscles),
+            name,
+            format_time(t.median),
+            format_time(t.minimum),
+            _times(t, times_of[best]),
+            f"{errors[name]:.1e}",
+        )
+        for name, t in times_of.items()
     )
-    title = f"ode8, muscles: {muscles}: / {best}"
-    return rows, (Bar(title, taken[ours].ratio_to(taken[best]), 1.15, "x"),) if branch_free else ()
+    title = f"muscles: {muscles}: ode8 / {best}"
+    return rows, (Target(title, times_of[library_name].ratio_to(times_of[best]), 1.15, "x"),) if branch_free else ()
 
 
 def _times(time: Times, other: Times) -> str:
@@ -144,11 +158,11 @@ def _times(time: Times, other: Times) -> str:
 
 
 def section(rounds: int = 9) -> Section:
-    """The whole comparison."""
+    """The complete benchmark."""
     parts = [measure(muscles, max(2, rounds // muscles)) for muscles in (1, 2, 6)]
-    rows, bars = (tuple(x for part in column for x in part) for column in zip(*parts, strict=True))
-    return Section("ode8, 250 000 steps, against C", TEXT, HEADING, rows, bars)
+    rows, targets = (tuple(x for part in column for x in part) for column in zip(*parts, strict=True))
+    return Section("ode8, 250 000 steps, compared with C", TEXT, HEADER, rows, targets)
 
 
 if __name__ == "__main__":
-    show(section())
+    print_section(section())

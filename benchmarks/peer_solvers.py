@@ -1,8 +1,8 @@
-"""The runs of `filling.py` through other packages, each as a user would have it at its quickest.
+"""Solvers of other packages for the runs of `filling.py`, each in its fastest configuration.
 
-A solver is made once for a run; asked for an rtol it gives a call that returns the rows (N, n), everything that can be
-done beforehand being done. The absolute tolerance is everywhere rtol times each state's nominal size, and every solver
-starts anew, or is told to expect a jump, at each instant of the schedule.
+A solver is created once per run. For an rtol it returns a function that computes the rows (N, n); all preparation is
+done before. The absolute tolerance is always rtol times the nominal value of each state, and every solver restarts at
+each switching time of the schedule.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from typing import Any
 import numba
 import numpy as np
 from filling import SPACING, Array, Run
-from rodas4 import by_hand
+from rodas4 import hand_written_rates
 
 from airmuscle.compile.kernels.calls import invoke, pointer
 from airmuscle.compile.program import CompiledSystem
 
 Solver = Callable[[float], Callable[[], Array]]
-MOST_STEPS = 1_000_000
+MAX_STEPS = 1_000_000
 PADDED, NEWTON = (512, 2048), 1e-2
 
 
-def pieces(run: Run) -> Iterator[tuple[Array, Array]]:
-    """The rows' times of each segment, its beginning among them, and its openings."""
+def segments_of(run: Run) -> Iterator[tuple[Array, Array]]:
+    """The output times of each segment, including its start, and its valve openings."""
     begin = 0.0
     for end, openings in zip(run.segments.ends.tolist(), run.segments.values, strict=True):
         yield np.linspace(begin, end, round((end - begin) / SPACING) + 1), openings
@@ -36,13 +36,13 @@ def pieces(run: Run) -> Iterator[tuple[Array, Array]]:
 
 @numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def rates_into(y: Any, u: Any, c: Any, function: Any, f: Any) -> None:
-    """The printed rates, written where the caller says."""
+    """The compiled rates, written to the array `f`."""
     invoke(function, (pointer(y), pointer(u), pointer(c), pointer(f)))
 
 
 def sundae_by_hand(run: Run, ready: CompiledSystem) -> Solver:
-    """scikit-sundae's CVODE (BDF, dense) with the rates written by hand in scalar Python."""
-    under = by_hand(run)
+    """CVODE of scikit-sundae (BDF, dense) with hand-written rates in scalar Python."""
+    under = hand_written_rates(run)
 
     def function(openings: Array) -> Callable[[float, Array, Array], None]:
         rates = under(openings)[0]
@@ -56,12 +56,12 @@ def sundae_by_hand(run: Run, ready: CompiledSystem) -> Solver:
 
 
 def sundae_compiled(run: Run, ready: CompiledSystem) -> Solver:
-    """scikit-sundae's CVODE with compiled rates: it calls them from Python all the same, there is no other way in."""
-    address, held = ready.address["rhs"], ready.precomputed
+    """CVODE of scikit-sundae with compiled rates, which it can only call from Python."""
+    address, precomputed = ready.address["rhs"], ready.precomputed
 
     def function(openings: Array) -> Callable[[float, Array, Array], None]:
         def into(t: float, y: Array, yp: Array) -> None:
-            rates_into(y, openings, held, address, yp)
+            rates_into(y, openings, precomputed, address, yp)
 
         return into
 
@@ -74,8 +74,8 @@ def _sundae(run: Run, function: Callable[[Array], Callable[[float, Array, Array]
     def at(rtol: float) -> Callable[[], Array]:
         atol = rtol * run.nominal
         solvers = [
-            (CVODE(function(openings), rtol=rtol, atol=atol, max_num_steps=MOST_STEPS), times)
-            for times, openings in pieces(run)
+            (CVODE(function(openings), rtol=rtol, atol=atol, max_num_steps=MAX_STEPS), times)
+            for times, openings in segments_of(run)
         ]
 
         def call() -> Array:
@@ -90,8 +90,8 @@ def _sundae(run: Run, function: Callable[[Array], Callable[[float, Array, Array]
 
 
 def casadi_cvodes(run: Run, ready: CompiledSystem, **options: Any) -> Solver:
-    """CasADi's CVODES on the expressions that our machine code is printed from, constants folded, states scaled by
-    their nominal sizes, with its own exact Jacobian."""
+    """CVODES of CasADi on the expressions from which the library generates machine code, with parameters substituted,
+    states scaled by their nominal values, and an exact Jacobian."""
     import casadi
 
     traced, size = ready.program.traced, run.nominal
@@ -100,13 +100,13 @@ def casadi_cvodes(run: Run, ready: CompiledSystem, **options: Any) -> Solver:
     equations = {"x": z, "u": traced.u, "ode": rates / size}
 
     def at(rtol: float) -> Callable[[], Array]:
-        settings = {"reltol": rtol, "abstol": rtol, "max_num_steps": MOST_STEPS, **options}
-        made: dict[int, Any] = {}
-        for times, _ in pieces(run):
-            if times.size not in made:
+        settings = {"reltol": rtol, "abstol": rtol, "max_num_steps": MAX_STEPS, **options}
+        integrators: dict[int, Any] = {}
+        for times, _ in segments_of(run):
+            if times.size not in integrators:
                 grid = (SPACING * np.arange(1, times.size)).tolist()
-                made[times.size] = casadi.integrator("run", "cvodes", equations, 0.0, grid, settings)
-        parts = [(made[times.size], openings) for times, openings in pieces(run)]
+                integrators[times.size] = casadi.integrator("run", "cvodes", equations, 0.0, grid, settings)
+        parts = [(integrators[times.size], openings) for times, openings in segments_of(run)]
 
         def call() -> Array:
             rows = [(run.vector / size)[None]]
@@ -120,7 +120,7 @@ def casadi_cvodes(run: Run, ready: CompiledSystem, **options: Any) -> Solver:
 
 
 def casadi_cvodes_jit(run: Run, ready: CompiledSystem) -> Solver:
-    """The same with its functions compiled by gcc, which CasADi does in the folder that the process is in."""
+    """The same with functions compiled by gcc, which CasADi does in the working directory."""
     flags = {"flags": ["-O3", "-march=native"], "compiler": "gcc", "verbose": False}
     solver = casadi_cvodes(run, ready, jit=True, compiler="shell", jit_options=flags)
 
@@ -132,11 +132,12 @@ def casadi_cvodes_jit(run: Run, ready: CompiledSystem) -> Solver:
 
 
 def diffrax_kvaerno5(run: Run, ready: CompiledSystem) -> Solver:
-    """diffrax' Kvaerno5 on the library's laws with JAX arrays, jitted, forward only.
+    """Kvaerno5 of diffrax on the library's laws with JAX arrays, compiled by jit, forward mode only.
 
-    A solve for each segment: with `jump_ts` the step of a long rest meets the opening of a valve, and the solver is
-    left with states that are infinite. Times are padded to two lengths, so that no more is compiled. Newton's
-    iterations to a hundredth instead of to rtol, and XLA on one thread, each make it two to five times quicker.
+    One solve per segment: with `jump_ts`, the long steps of a state of rest reach the opening of a valve, and the
+    states become infinite. Output times are padded to two lengths, so that only two functions are compiled. A tolerance
+    of 0.01 of the Newton iterations instead of rtol, and XLA with one thread, each reduce the time by a factor of two
+    to five.
     """
     os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")
     import diffrax
@@ -147,8 +148,8 @@ def diffrax_kvaerno5(run: Run, ready: CompiledSystem) -> Solver:
     system, names, nominal = run.system, [s.name for s in run.system.states], jnp.asarray(run.nominal)
 
     def rates(t: Any, y: Any, u: Any) -> Any:
-        found = system.rates(dict(zip(names, y, strict=True)), dict(zip(system.inputs, u, strict=True)))
-        return jnp.stack([jnp.asarray(found[name], dtype=float) for name in names])
+        values = system.rates(dict(zip(names, y, strict=True)), dict(zip(system.inputs, u, strict=True)))
+        return jnp.stack([jnp.asarray(values[name], dtype=float) for name in names])
 
     method = diffrax.Kvaerno5(root_finder=diffrax.VeryChord(rtol=NEWTON, atol=NEWTON * nominal))
 
@@ -156,7 +157,7 @@ def diffrax_kvaerno5(run: Run, ready: CompiledSystem) -> Solver:
     def segment(y: Any, u: Any, times: Any, rtol: Any) -> Any:
         return diffrax.diffeqsolve(
             diffrax.ODETerm(rates), method, times[0], times[-1], 1e-5, y, args=u,
-            stepsize_controller=diffrax.PIDController(rtol=rtol, atol=rtol * nominal), max_steps=MOST_STEPS,
+            stepsize_controller=diffrax.PIDController(rtol=rtol, atol=rtol * nominal), max_steps=MAX_STEPS,
             saveat=diffrax.SaveAt(ts=times), adjoint=diffrax.ForwardMode(), throw=False,
         ).ys  # fmt: skip
 
@@ -164,15 +165,15 @@ def diffrax_kvaerno5(run: Run, ready: CompiledSystem) -> Solver:
         length = next(n for n in PADDED if n >= times.size)
         return jnp.asarray(np.append(times, np.full(length - times.size, times[-1])))
 
-    parts = [(padded(times), times.size, jnp.asarray(openings)) for times, openings in pieces(run)]
+    parts = [(padded(times), times.size, jnp.asarray(openings)) for times, openings in segments_of(run)]
 
     def at(rtol: float) -> Callable[[], Array]:
         def call() -> Array:
             y, rows = jnp.asarray(run.vector), [run.vector[None]]
             for times, size, openings in parts:
-                found = segment(y, openings, times, rtol)
-                y = found[-1]
-                rows.append(np.asarray(found)[1:size])
+                states = segment(y, openings, times, rtol)
+                y = states[-1]
+                rows.append(np.asarray(states)[1:size])
             return np.concatenate(rows)
 
         return call
@@ -181,11 +182,11 @@ def diffrax_kvaerno5(run: Run, ready: CompiledSystem) -> Solver:
 
 
 def control_response(run: Run, ready: CompiledSystem) -> Solver:
-    """python-control's input_output_response, which is solve_ivp's LSODA behind an interpolation of the inputs; the
-    rates written by hand, a system for each set of openings so that they need not look at their inputs."""
+    """input_output_response of python-control: LSODA of solve_ivp with interpolated inputs; hand-written rates, with
+    one system for each set of valve openings, so that the rates do not depend on inputs."""
     import control
 
-    under = by_hand(run)
+    under = hand_written_rates(run)
 
     def system(openings: Array) -> Any:
         rates = under(openings)[0]
@@ -193,16 +194,16 @@ def control_response(run: Run, ready: CompiledSystem) -> Solver:
 
     def at(rtol: float) -> Callable[[], Array]:
         settings = {"rtol": rtol, "atol": rtol * run.nominal}
-        parts = [(system(openings), times) for times, openings in pieces(run)]
+        parts = [(system(openings), times) for times, openings in segments_of(run)]
 
         def call() -> Array:
             rows = [run.vector[None]]
             for part, times in parts:
-                found = control.input_output_response(
+                response = control.input_output_response(
                     part, times[[0, -1]], 0.0, rows[-1][-1], solve_ivp_method="LSODA", solve_ivp_kwargs=settings,
                     evaluation_times=times, return_states=True,
                 )  # fmt: skip
-                rows.append(found.states.T[1:])
+                rows.append(response.states.T[1:])
             return np.concatenate(rows)
 
         return call

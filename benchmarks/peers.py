@@ -1,6 +1,6 @@
-"""25 s of fill and discharge, Rodas4 against the solvers of other packages, each at its loosest tolerance that serves.
+"""25 s of filling and discharge: Rodas4 compared with solvers of other packages at equal accuracy.
 
-A package that is not installed is left out, and a line says how to install it.
+A package that is not installed is omitted; a note states how to install it.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import importlib.util
 from collections.abc import Callable
 
 from filling import Array, Run, runs
-from measure import Bar, Section, Times, interleaved, of_time, show
+from measure import Section, Target, Times, format_time, print_section, time_variants
 from peer_solvers import (
     Solver,
     casadi_cvodes,
@@ -20,107 +20,109 @@ from peer_solvers import (
     sundae_by_hand,
     sundae_compiled,
 )
-from rodas4 import WANTED, kernel, loosest
+from rodas4 import MAX_ERROR, kernel, loosest_tolerance
 
 from airmuscle.compile.program import CompiledSystem, compile_system
 from airmuscle.simulation.integrators import Rodas4
 
-HEADING = ("states", "variant", "rtol", "median", "least", "times Rodas4", "greatest error [m]")
+HEADER = ("states", "variant", "rtol", "median", "minimum", "ratio to Rodas4", "maximum error [m]")
 TEXT = (
-    "2501 rows, 10 ms apart. Each has the loosest rtol of a series at which, and at the next tighter one, the error is "
-    f"at most {WANTED:g} m, with atol rtol times each state's nominal size; each begins anew at every instant of the "
-    "schedule. What can be done beforehand (solvers made, functions compiled) is not timed. Eight states are six "
-    "muscles on one mass, six and ten two muscles on a joint. scikit-sundae calls Python for every evaluation, also of "
-    "compiled rates; CasADi has the expressions that our machine code is printed from, constants folded, and an exact "
-    "Jacobian; diffrax has the library's laws with JAX arrays, and is left out of the eight states, which XLA had not "
-    "compiled after two minutes; python-control is SciPy's LSODA with an "
-    "interpolation of its inputs at every evaluation. The reference is Rodas4 at rtol 1e-11."
+    "2501 rows, 10 ms apart. Each solver has the loosest rtol of a series at which, and at the next tighter one, the "
+    f"error is at most {MAX_ERROR:g} m; atol is rtol times the nominal value of each state. Each restarts at every "
+    "switching time of the schedule. Preparation (creation of solvers, compilation of functions) is not timed. Eight "
+    "states are six muscles on one mass, six and ten states two muscles on a joint. scikit-sundae calls Python for "
+    "every evaluation, also of compiled rates. CasADi uses the expressions from which the library generates machine "
+    "code, with parameters substituted, and an exact Jacobian. diffrax uses the library's laws with JAX arrays; it is "
+    "omitted for eight states, which XLA had not compiled after two minutes. python-control is LSODA of SciPy with "
+    "interpolated inputs. The reference is Rodas4 at rtol 1e-11."
 )
 
 
 @dataclasses.dataclass(frozen=True)
 class Peer:
-    """A solver of another package: what it is called, what must be importable, and what pip calls that."""
+    """A solver of another package: its name, the required module, and the name of the package for pip."""
 
     name: str
     module: str
     package: str
     solver: Callable[[Run, CompiledSystem], Solver]
-    least: float | None = None
-    """How many times longer it is wanted to take, at least."""
-    why: str = ""
-    but: int = 0
-    """The states of a plant that it is spared."""
-    series_of: Callable[[Run, CompiledSystem], Solver] | None = None
-    """What finds its tolerance, where it would take long to make it for each of the series."""
+    min_ratio: float | None = None
+    """Target: minimum ratio of its time to that of Rodas4."""
+    reason: str = ""
+    excluded_states: int = 0
+    """Number of states of the plant for which it is omitted."""
+    trial_solver: Callable[[Run, CompiledSystem], Solver] | None = None
+    """Solver used to find the tolerance, if the creation of `solver` takes long."""
 
     @property
-    def there(self) -> bool:
+    def installed(self) -> bool:
         return importlib.util.find_spec(self.module) is not None
 
     @property
-    def absent(self) -> str:
-        return f"{self.package} is not installed and left out: pip install {self.package}."
+    def missing_note(self) -> str:
+        return f"{self.package} is not installed and is omitted: pip install {self.package}."
 
 
-COMPILED = (
-    "with compiled rates most of CVODE's time is its own and that of the call of Python around each evaluation, which "
-    "hardly grow with the plant, while a step of Rodas4 does: 0.4 us with 3 states, 0.8 us with 10, 1.4 us with the "
-    "surfaces of six muscles"
+REASON = (
+    "with compiled rates most of the time is spent in CVODE and in the Python call of each evaluation, which hardly "
+    "increases with the size of the plant, unlike the time of a step of Rodas4: 0.4 us with 3 states, 0.8 us with 10, "
+    "1.4 us with the surfaces of six muscles"
 )
 PEERS = (
-    Peer("scikit-sundae CVODE, rates by hand", "sksundae", "scikit-sundae", sundae_by_hand, 45.0),
-    Peer("scikit-sundae CVODE, rates compiled", "sksundae", "scikit-sundae", sundae_compiled, 45.0, COMPILED),
-    Peer("diffrax Kvaerno5, jitted", "diffrax", "diffrax", diffrax_kvaerno5, 80.0, but=8),
+    Peer("scikit-sundae CVODE, hand-written rates", "sksundae", "scikit-sundae", sundae_by_hand, 45.0),
+    Peer("scikit-sundae CVODE, compiled rates", "sksundae", "scikit-sundae", sundae_compiled, 45.0, REASON),
+    Peer("diffrax Kvaerno5, jitted", "diffrax", "diffrax", diffrax_kvaerno5, 80.0, excluded_states=8),
     Peer("CasADi CVODES", "casadi", "casadi", casadi_cvodes),
-    Peer("CasADi CVODES, compiled by gcc", "casadi", "casadi", casadi_cvodes_jit, series_of=casadi_cvodes),
+    Peer("CasADi CVODES, compiled by gcc", "casadi", "casadi", casadi_cvodes_jit, trial_solver=casadi_cvodes),
     Peer("python-control input_output_response", "control", "control", control_response),
 )
 
 
-def fitting(peer: Peer, run: Run, ready: CompiledSystem, reference: Array) -> tuple[float, Callable[[], Array]]:
-    """Its loosest rtol that serves, and the call at this rtol."""
+def at_loosest_tolerance(
+    peer: Peer, run: Run, ready: CompiledSystem, reference: Array
+) -> tuple[float, Callable[[], Array]]:
+    """The loosest sufficient rtol of a peer, and its call at this rtol."""
     solver = peer.solver(run, ready)
-    trial = peer.series_of(run, ready) if peer.series_of else solver
-    rtol = loosest(run, lambda rtol: trial(rtol)(), reference)
+    trial = peer.trial_solver(run, ready) if peer.trial_solver else solver
+    rtol = loosest_tolerance(run, lambda rtol: trial(rtol)(), reference)
     return rtol, solver(rtol)
 
 
-def measure(states: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tuple[Bar, ...]]:
-    """Rows and bars of one plant."""
+def measure(states: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tuple[Target, ...]]:
+    """Rows and targets for one plant."""
     run = runs()[states]
     ready = compile_system(run.system)
     reference = kernel(run, ready, Rodas4(1e-11))()
-    ours = loosest(run, lambda rtol: kernel(run, ready, Rodas4(rtol))(), reference)
+    ours = loosest_tolerance(run, lambda rtol: kernel(run, ready, Rodas4(rtol))(), reference)
     tolerances, calls = {"Rodas4, kernel": ours}, {"Rodas4, kernel": kernel(run, ready, Rodas4(ours))}
-    there = [peer for peer in PEERS if peer.there and peer.but != states]
-    for peer in there:
-        tolerances[peer.name], calls[peer.name] = fitting(peer, run, ready, reference)
-    times = interleaved(calls, rounds)
+    installed = [peer for peer in PEERS if peer.installed and peer.excluded_states != states]
+    for peer in installed:
+        tolerances[peer.name], calls[peer.name] = at_loosest_tolerance(peer, run, ready, reference)
+    times = time_variants(calls, rounds)
     first = times["Rodas4, kernel"]
     rows = tuple(_row(states, name, tolerances[name], times[name], first, run.error(calls[name](), reference))
                  for name in calls)  # fmt: skip
-    bars = [
-        Bar(f"{states} states: {p.name} / Rodas4, each at its loosest rtol with an error <= 1e-7 m",
-            times[p.name].ratio_to(first), p.least, "x", at_least=True, why=p.why)
-        for p in there if p.least is not None
+    targets = [
+        Target(f"{states} states: {p.name} / Rodas4, each at its loosest rtol with an error <= 1e-7 m",
+            times[p.name].ratio_to(first), p.min_ratio, "x", at_least=True, reason=p.reason)
+        for p in installed if p.min_ratio is not None
     ]  # fmt: skip
-    return rows, tuple(bars)
+    return rows, tuple(targets)
 
 
 def _row(states: int, name: str, rtol: float, time: Times, first: Times, error: float) -> tuple[str, ...]:
-    taken = of_time(time.median), of_time(time.least)
-    return (str(states), name, f"{rtol:.0e}", *taken, f"{time.ratio_to(first):.3g}", f"{error:.1e}")
+    durations = format_time(time.median), format_time(time.minimum)
+    return (str(states), name, f"{rtol:.0e}", *durations, f"{time.ratio_to(first):.3g}", f"{error:.1e}")
 
 
 def section(rounds: int = 9) -> Section:
-    """The whole comparison."""
+    """The complete benchmark."""
     parts = [measure(states, rounds) for states in runs()]
-    rows, bars = (tuple(x for part in column for x in part) for column in zip(*parts, strict=True))
-    absent = dict.fromkeys(peer.absent for peer in PEERS if not peer.there)
-    text = " ".join([TEXT, *absent])
-    return Section("25 s of fill and discharge, Rodas4 against other packages", text, HEADING, rows, bars)
+    rows, targets = (tuple(x for part in column for x in part) for column in zip(*parts, strict=True))
+    missing = dict.fromkeys(peer.missing_note for peer in PEERS if not peer.installed)
+    text = " ".join([TEXT, *missing])
+    return Section("25 s of filling and discharge, Rodas4 and other packages", text, HEADER, rows, targets)
 
 
 if __name__ == "__main__":
-    show(section())
+    print_section(section())

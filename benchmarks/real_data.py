@@ -1,11 +1,11 @@
-"""Measured muscles of several lengths: static fits of one repeat judged on the next.
+"""Static fits to measured muscles of several lengths, validated on a repeated measurement.
 
     python benchmarks/real_data.py FOLDER
 
 FOLDER holds CSV files named `..._cut<cm>cm_held<cm>cm_test<n>.csv` with the columns time, pressure, force, length and
-rest_length, units in the headings. Rows above 2 N of repeat 8 are fitted, those of repeat 9 judge. Beside every
-figure stands what the two repeats differ by themselves: a fit below that has learnt one of them by heart. Which law to
-take is asked of repeat 8 alone, for each purpose, before repeat 9 is looked at.
+rest_length, units in the headers. Rows of repeat 8 above 2 N are fitted, those of repeat 9 are used for validation.
+Each error is compared with the repeatability, the difference of the two repeats: a fit below it is overfitted. The
+model is selected with repeat 8 alone, for each purpose, before repeat 9 is used.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ import pandas as pd
 
 from airmuscle.core.errors import IdentificationError
 from airmuscle.identify import BlockSplit, SpecimenSplit, compare, fit
-from airmuscle.identify.candidates import Candidate, standard_candidates, surface
-from airmuscle.identify.model_selection import errors_in_force
+from airmuscle.identify.candidates import Candidate, standard_candidates
+from airmuscle.identify.model_selection import force_residuals
 from airmuscle.recording import Recording
 
 NAME = re.compile(r"_cut(\d+)cm_held([\d.]+)cm_test(\d+)\.csv$")
-LEAST_FORCE = 2.0
+MIN_FORCE = 2.0
 CEILING = 5000.0
 
 
 def read(path: Path) -> Recording:
-    """One run in SI units, its resting length a constant."""
+    """One run in SI units, with its resting length as constant."""
     table = pd.read_csv(path)
-    table.columns = [heading.split(" [")[0] for heading in table.columns]
-    table = table[table["force"] > LEAST_FORCE]
+    table.columns = [header.split(" [")[0] for header in table.columns]
+    table = table[table["force"] > MIN_FORCE]
     rest = float(table["rest_length"].iloc[0]) / 100
     columns = {
         "pressure": table["pressure"].to_numpy() * 1e3,
@@ -50,7 +50,7 @@ def repeats(folder: Path) -> tuple[list[Recording], list[Recording]]:
     """The runs of repeat 8 and of repeat 9, in the same order."""
     runs = [read(path) for path in sorted(folder.glob("*.csv")) if NAME.search(path.name)]
     if not runs:
-        raise SystemExit(f"{folder}: no file is named like ..._cut10cm_held8.3cm_test8.csv")
+        raise SystemExit(f"{folder}: no file with a name such as ..._cut10cm_held8.3cm_test8.csv")
     return tuple([run for run in runs if run.constants["repeat"] == n] for n in ("8", "9"))  # type: ignore[return-value]
 
 
@@ -59,9 +59,9 @@ def rms(errors: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.asarray(errors) ** 2)))
 
 
-def floor(first: Sequence[Recording], second: Sequence[Recording]) -> float:
-    """What the repeats differ by: the median of repeat 8 near each pressure and branch against rows of repeat 9."""
-    found = []
+def repeatability(first: Sequence[Recording], second: Sequence[Recording]) -> float:
+    """The rms difference of the repeats [N]: medians of repeat 8 at the pressure and branch of each row of repeat 9."""
+    differences = []
     for a, b in zip(first, second, strict=True):
         for branch in (1, 2):
             x, y = (run.rows(run["branch"] == branch) for run in (a, b))
@@ -69,37 +69,39 @@ def floor(first: Sequence[Recording], second: Sequence[Recording]) -> float:
                 continue
             near = np.abs(x["pressure"][None, :] - y["pressure"][:, None]) < 5e3
             usable = near.sum(axis=1) >= 3
-            middles = np.array([np.median(x["force"][row]) for row in near[usable]])
-            found.append(middles - y["force"][usable])
-    return rms(np.concatenate(found))
+            medians = np.array([np.median(x["force"][row]) for row in near[usable]])
+            differences.append(medians - y["force"][usable])
+    return rms(np.concatenate(differences))
 
 
-def of_specimen(runs: Sequence[Recording], specimen: str, *, others: bool = False) -> list[Recording]:
+def select_specimen(runs: Sequence[Recording], specimen: str, *, others: bool = False) -> list[Recording]:
     """The runs of one specimen, or of all others."""
     return [run for run in runs if (run.constants["specimen"] == specimen) != others]
 
 
-def line(name: str, parameters: int, errors: Sequence[float], least: float) -> str:
+def format_row(name: str, parameters: int, errors: Sequence[float], floor: float) -> str:
     """One row of the table."""
-    return f"{name:<46}{parameters:>5}" + "".join(f"{e:>9.1f}" for e in errors) + f"{least:>9.1f}"
+    return f"{name:<46}{parameters:>5}" + "".join(f"{e:>9.1f}" for e in errors) + f"{floor:>9.1f}"
 
 
-def judged(candidate: Candidate, train: list[Recording], test: list[Recording], specimens: list[str]) -> list[float]:
-    """Error on the next repeat, and on each specimen that was left out; NaN where the others do not determine it."""
+def validation_errors(
+    candidate: Candidate, train: list[Recording], test: list[Recording], specimens: list[str]
+) -> list[float]:
+    """Error on repeat 9, then on each specimen left out of the fit; NaN if the others do not determine the law."""
     law, fixed = candidate.law, candidate.fixed
-    errors = [rms(errors_in_force(fit(law, train, fixed=fixed).model, test, CEILING))]
+    errors = [rms(force_residuals(fit(law, train, fixed=fixed).model, test, CEILING))]
     for name in specimens:
         try:
-            model = fit(law, of_specimen(train, name, others=True), fixed=fixed).model
-        except IdentificationError:  # two lengths do not determine it
+            model = fit(law, select_specimen(train, name, others=True), fixed=fixed).model
+        except IdentificationError:  # not determined by two lengths
             errors.append(np.nan)
             continue
-        errors.append(rms(errors_in_force(model, of_specimen(test, name), CEILING)))
+        errors.append(rms(force_residuals(model, select_specimen(test, name), CEILING)))
     return errors
 
 
-def best_rank(train: list[Recording], test: list[Recording]) -> np.ndarray:
-    """A surface of 21 coefficients of one specimen, judged; four lengths leave some open: the smallest are taken."""
+def single_surface_errors(train: list[Recording], test: list[Recording]) -> np.ndarray:
+    """Errors on repeat 9 of a surface with 21 coefficients for one specimen (minimum-norm solution)."""
     matrices = []
     for runs in (train, test):
         p, c = (np.concatenate([run[n] for run in runs]) for n in ("pressure", "contraction"))
@@ -107,8 +109,8 @@ def best_rank(train: list[Recording], test: list[Recording]) -> np.ndarray:
         matrices.append(np.column_stack([x**i * q**j for j in range(6) for i in range(6 - j)]))
     goal, truth = (np.concatenate([run["force"] for run in runs]) for runs in (train, test))
     norms = np.linalg.norm(matrices[0], axis=0)
-    found = np.linalg.lstsq(matrices[0] / norms, goal, rcond=1e-10)[0] / norms
-    return np.asarray(matrices[1] @ found - truth)
+    coefficients = np.linalg.lstsq(matrices[0] / norms, goal, rcond=1e-10)[0] / norms
+    return np.asarray(matrices[1] @ coefficients - truth)
 
 
 def main() -> None:
@@ -117,21 +119,24 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     train, test = repeats(parser.parse_args().folder)
     specimens = sorted({str(run.constants["specimen"]) for run in train})
-    for how in (BlockSplit(), SpecimenSplit()):
-        print(compare(train, leave_out=how).reason, flush=True)
-    least = floor(train, test)
-    print(f"\nrms error in force [N]; fitted to repeat 8 ({sum(map(len, train))} rows), judged on repeat 9")
+    for split in (BlockSplit(), SpecimenSplit()):
+        print(compare(train, leave_out=split).reason, flush=True)
+    floor = repeatability(train, test)
+    print(f"\nrms error of the force [N]; fitted to repeat 8 ({sum(map(len, train))} rows), validated on repeat 9")
     columns = "".join(f"{'no ' + name:>9}" for name in specimens)
-    print(f"{'law':<46}{'P':>5}{'next':>9}{columns}{'floor':>9}")
-    each = [best_rank(of_specimen(train, name), of_specimen(test, name)) for name in specimens]
-    print(line("a surface of 21 for each length", 63, [rms(np.concatenate(each))], least))
-    print(line("  by length", 21, [rms(e) for e in each], least))
-    candidates = [Candidate("one surface of degree 5 for all", surface(5)), *standard_candidates(train)]
+    print(f"{'law':<46}{'P':>5}{'rep. 9':>9}{columns}{'repeat.':>9}")
+    each = [single_surface_errors(select_specimen(train, name), select_specimen(test, name)) for name in specimens]
+    print(format_row("one surface of degree 5 per length", 63, [rms(np.concatenate(each))], floor))
+    print(format_row("  each length", 21, [rms(e) for e in each], floor))
+    candidates = [Candidate("one surface of degree 5 for all lengths", blank_surface(5)), *standard_candidates(train)]
     for candidate in candidates:
-        if hasattr(candidate.law, "of_length") or candidate is candidates[0]:
+        if hasattr(candidate.law, "with_resting_length") or candidate is candidates[0]:
             try:
                 size = len(fit(candidate.law, train, fixed=candidate.fixed).estimates)
-                print(line(candidate.name, size, judged(candidate, train, test, specimens), least), flush=True)
+                print(
+                    format_row(candidate.name, size, validation_errors(candidate, train, test, specimens), floor),
+                    flush=True,
+                )
             except IdentificationError as error:
                 print(f"{candidate.name:<46} excluded: {error}", flush=True)
 

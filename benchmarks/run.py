@@ -1,4 +1,4 @@
-"""Run all benchmarks and write RESULTS.md beside this file; some minutes.
+"""Run of all benchmarks, which takes some minutes; writes RESULTS.md to this folder.
 
 ./run python benchmarks/run.py [--rounds-factor 1.0] [--print-only]
 """
@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 
 os.environ.setdefault(
     "OPENBLAS_NUM_THREADS", "1"
-)  # before NumPy: a second thread that waits for a core slows both sides
+)  # must precede the import of NumPy; a second thread that waits for a core slows all variants
 
 import batch
 import bootstrap
@@ -30,7 +30,7 @@ import rodas4
 import sensitivities
 import startup
 import static_fit
-from measure import Bar, Section, machine, show, table, today, versions
+from measure import Section, Target, describe_machine, package_versions, print_section, table, today
 
 RESULTS = pathlib.Path(__file__).with_name("RESULTS.md")
 SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
@@ -50,48 +50,52 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (new_plant.section, 7),
     (startup.section, 7),
 )
-HEAD = """# Measured
+HEAD = """# Benchmark results
 
 Written by `benchmarks/run.py` on {date}. {machine}. {versions}.
 
-Variants are timed in turn in one process, quick ones several times in a round. Times are medians of the rounds, beside
-them the least; ratios are medians of the ratios within a round; bars in seconds are held to the least, because
-neighbours can only add. Errors stand beside speed. Linear algebra runs on one thread on all sides.
-{seconds:.0f} s in all.
+All variants are timed in turn in one process, fast ones several times per round. The tables state the median and the
+minimum of the rounds; ratios are medians of the ratios within a round. Targets in seconds apply to the minimum, because
+other load can only increase a time. Each table also states the errors. Linear algebra uses one thread in all variants.
+Total time {seconds:.0f} s.
 """
 
 
-def missed(bars: Sequence[Bar]) -> str:
-    """One paragraph a reason, with the bars that it explains."""
+def describe_missed(targets: Sequence[Target]) -> str:
+    """The missed targets, one paragraph per reason."""
     reasons: dict[str, list[str]] = {}
-    for bar in bars:
-        if not bar.held:
-            reasons.setdefault(bar.why or "the reason is not known", []).append(bar.what)
+    for target in targets:
+        if not target.met:
+            reasons.setdefault(target.reason or "not known", []).append(target.name)
     if not reasons:
-        return "No bar was missed.\n"
-    return "\n".join(f"Missed: {'; '.join(what)}. Why: {why}.\n" for why, what in reasons.items())
+        return "No target was missed.\n"
+    return "\n".join(f"Missed: {'; '.join(names)}. Reason: {reason}.\n" for reason, names in reasons.items())
 
 
 def report(sections: Sequence[Section], seconds: float) -> str:
-    """RESULTS.md."""
-    bars = [bar for section in sections for bar in section.bars]
-    head = HEAD.format(date=today(), machine=machine(), versions=versions(), seconds=seconds)
-    summary = table(("what", "measured", "bar", ""), [bar.cells for bar in bars])
-    return "\n".join([head, "## Bars\n", summary, "", missed(bars), *(section.markdown() for section in sections)])
+    """The text of RESULTS.md."""
+    targets = [target for section in sections for target in section.targets]
+    head = HEAD.format(date=today(), machine=describe_machine(), versions=package_versions(), seconds=seconds)
+    summary = table(("quantity", "measured", "target", ""), [target.cells for target in targets])
+    return "\n".join(
+        [head, "## Targets\n", summary, "", describe_missed(targets), *(section.markdown() for section in sections)]
+    )
 
 
 def main() -> None:
-    """Measure, print as it goes, write."""
+    """Run and print each benchmark, then write RESULTS.md."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rounds-factor", type=float, default=1.0, help="more rounds where the machine is busy")
-    parser.add_argument("--print-only", action="store_true", help="leave RESULTS.md as it is")
+    parser.add_argument(
+        "--rounds-factor", type=float, default=1.0, help="factor of the number of rounds, for a busy machine"
+    )
+    parser.add_argument("--print-only", action="store_true", help="do not write RESULTS.md")
     options = parser.parse_args()
-    begun, sections = time.perf_counter(), []
+    start, sections = time.perf_counter(), []
     for section, rounds in SECTIONS:
         sections.append(section(max(1, round(rounds * options.rounds_factor))))
-        show(sections[-1])
+        print_section(sections[-1])
     if not options.print_only:
-        RESULTS.write_text(report(sections, time.perf_counter() - begun), encoding="utf-8")
+        RESULTS.write_text(report(sections, time.perf_counter() - start), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""The same equations written out by hand in scalar Python, as a user would for SciPy: the opponent of the kernels.
+"""Hand-written rates of the benchmark plants in scalar Python, as a user would write them for SciPy.
 
-Everything constant is computed beforehand and bound as a local; shut valves, the tangent outside the validity range and the
-root of a choked valve are skipped. Nothing of the library is called while a run goes on.
+All constants are precomputed as local variables; closed valves, the extrapolation outside the validity range and the
+root of choked flow are skipped. The library is not called during a run.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from joints import HEAT_CAPACITY, Joint, JointWithHeat
 from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import Valve
-from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, absolute
+from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, absolute_pressure
 
 Rates = Callable[[float, Any], list[float]]
 Scalar = Callable[[float, float], float]
@@ -41,8 +41,8 @@ def valve_flow(valve: Valve, temperature: float) -> Scalar:
     return flow
 
 
-def beyond_box(law: ContractileSurface) -> Scalar:
-    """The surface beyond its validity range, in its scaled arguments: the value at the edge and the slopes there."""
+def extrapolate(law: ContractileSurface) -> Scalar:
+    """Extrapolation of the surface by its tangent beyond the validity range, in scaled arguments."""
     (a00, a10, a20, a30, a40, a50, a01, a11, a21, a31, a41, a02, a12, a22, a32, a03, a13, a23, a04, a14, a05) = (
         law.coefficients
     )
@@ -67,26 +67,26 @@ def beyond_box(law: ContractileSurface) -> Scalar:
 
 
 def hill(plant: Plant) -> Callable[[Sequence[float]], Rates]:
-    """Rates of the plant of three states under given openings."""
+    """A function from valve openings to the rates of the plant with three states."""
     muscle, load, circuit, ambient = plant.muscles[0], plant.mechanism, plant.circuits[0], plant.ambient
     law, length = muscle.contractile, muscle.geometry.resting_length
     k, c = stretch_factor(muscle.geometry)
     rt, outside, source = (
         GAS_CONSTANT * ambient.temperature,
         ambient.pressure,
-        absolute(circuit.supply.pressure, ambient),
+        absolute_pressure(circuit.supply.pressure, ambient),
     )
     fill_flow, discharge_flow = (valve_flow(v, ambient.temperature) for v in (circuit.fill, circuit.discharge))
-    stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth
+    stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.damping_slope
     inverse_mass, gravity, per_length, cc = 1.0 / load.mass, load.gravity, 1.0 / length, c * c
     low_x, scale_x = law.min_contraction, 2.0 / (law.max_contraction - law.min_contraction)
     low_q, scale_q = law.min_pressure, 2.0 / (law.max_pressure - law.min_pressure)
-    least, greatest, tangent = law.min_force, law.max_force, beyond_box(law)
+    min_force, max_force, tangent = law.min_force, law.max_force, extrapolate(law)
     (a00, a10, a20, a30, a40, a50, a01, a11, a21, a31, a41, a02, a12, a22, a32, a03, a13, a23, a04, a14, a05) = (
         law.coefficients
     )
 
-    def under(openings: Sequence[float]) -> Rates:
+    def rates_at(openings: Sequence[float]) -> Rates:
         fill, discharge = openings
 
         def rates(t: float, y: Any) -> list[float]:
@@ -103,7 +103,7 @@ def hill(plant: Plant) -> Callable[[Sequence[float]], Rates]:
                 force = r0 + q * (r1 + q * (r2 + q * (a03 + x * (a13 + x * a23) + q * (a04 + x * a14 + q * a05))))
             else:
                 force = tangent(x, q)
-            force = least if force < least else greatest if force > greatest else force
+            force = min_force if force < min_force else max_force if force > max_force else force
             tension = force - stiffness * position - (damping + growth * gauge) * speed
             if tension < 0.0:
                 tension = 0.0
@@ -116,21 +116,21 @@ def hill(plant: Plant) -> Callable[[Sequence[float]], Rates]:
 
         return rates
 
-    return under
+    return rates_at
 
 
 def _force(system: Joint) -> Callable[[float, float, float], float]:
-    """Tension [N] of a muscle of the joint by gauge pressure [Pa], contraction [1] and shortening speed [m/s]."""
+    """A function from gauge pressure [Pa], contraction [1] and shortening speed [m/s] to the tension [N]."""
     muscle = system.muscle
     length, clamp = muscle.geometry.resting_length, muscle.contractile
     k, c = stretch_factor(muscle.geometry)
     area, ccc, stiffness = -k / length, 3.0 * c * c, muscle.spring.stiffness * length
-    damping, least, greatest = muscle.damper.damping, clamp.min_force, clamp.max_force
+    damping, min_force, max_force = muscle.damper.damping, clamp.min_force, clamp.max_force
 
     def force(gauge: float, contraction: float, speed: float) -> float:
         s = 1.0 - contraction
         pull = gauge * area * (1.0 - ccc * s * s)
-        pull = least if pull < least else greatest if pull > greatest else pull
+        pull = min_force if pull < min_force else max_force if pull > max_force else pull
         tension = pull - stiffness * contraction - damping * speed
         return tension if tension > 0.0 else 0.0
 
@@ -138,16 +138,16 @@ def _force(system: Joint) -> Callable[[float, float, float], float]:
 
 
 def six_states(system: Joint) -> Callable[[Sequence[float]], Rates]:
-    """Rates of the joint of six states under given openings."""
+    """A function from valve openings to the rates of the joint with six states."""
     ambient, length = system.ambient, system.muscle.geometry.resting_length
     k, c = stretch_factor(system.muscle.geometry)
     rt, outside, cc = GAS_CONSTANT * ambient.temperature, ambient.pressure, c * c
-    in_tube, source, radius = rt / system.tube_volume, absolute(system.supply.pressure, ambient), system.radius
+    in_tube, source, radius = rt / system.tube_volume, absolute_pressure(system.supply.pressure, ambient), system.radius
     lever, offset, inverse_inertia = radius / length, system.offset, 1.0 / system.inertia
     friction, load, force = system.friction, system.load, _force(system)
     valve, tube = (valve_flow(v, ambient.temperature) for v in (system.valve, system.tube))
 
-    def under(openings: Sequence[float]) -> Rates:
+    def rates_at(openings: Sequence[float]) -> Rates:
         left_fill, left_discharge, right_fill, right_discharge = openings
 
         def rates(t: float, y: Any) -> list[float]:
@@ -172,15 +172,15 @@ def six_states(system: Joint) -> Callable[[Sequence[float]], Rates]:
 
         return rates
 
-    return under
+    return rates_at
 
 
 def ten_states(system: JointWithHeat) -> Callable[[Sequence[float]], Rates]:
-    """Rates of the joint of ten states, with heat and spools, under given openings."""
+    """A function from valve openings to the rates of the joint with ten states: heat transfer and spools."""
     ambient, length = system.ambient, system.muscle.geometry.resting_length
     k, c = stretch_factor(system.muscle.geometry)
     wall, outside, cc = ambient.temperature, ambient.pressure, c * c
-    in_tube, source = GAS_CONSTANT * wall / system.tube_volume, absolute(system.supply.pressure, ambient)
+    in_tube, source = GAS_CONSTANT * wall / system.tube_volume, absolute_pressure(system.supply.pressure, ambient)
     radius, offset, inverse_inertia = system.radius, system.offset, 1.0 / system.inertia
     lever, friction, load, force = radius / length, system.friction, system.load, _force(system)
     valve, tube = (valve_flow(v, wall) for v in (system.valve, system.tube))
@@ -200,13 +200,13 @@ def ten_states(system: JointWithHeat) -> Callable[[Sequence[float]], Rates]:
         elif spool < 0.0:
             incoming = spool * valve(t, outside)
         through = tube(t, p)
-        carried = cp * through * (wall if through >= 0.0 else temperature)
+        energy_flow = cp * through * (wall if through >= 0.0 else temperature)
         work = p * k * (3.0 * css - 1.0) * speed * per_length
-        heating = carried - work + transfer * (wall - temperature)
+        heating = energy_flow - work + transfer * (wall - temperature)
         tension = force(p - outside, contraction, speed)
         return tension, through, incoming - through, heating, (goal - spool) * inverse_lag
 
-    def under(openings: Sequence[float]) -> Rates:
+    def rates_at(openings: Sequence[float]) -> Rates:
         goal_l, goal_r = openings[0] - openings[1], openings[2] - openings[3]
 
         def rates(t: float, y: Any) -> list[float]:
@@ -219,4 +219,4 @@ def ten_states(system: JointWithHeat) -> Callable[[Sequence[float]], Rates]:
 
         return rates
 
-    return under
+    return rates_at

@@ -1,4 +1,4 @@
-"""Several muscles on one mass, written out by hand in scalar Python: what `scalar_rates.hill` is for one of them."""
+"""Hand-written rates of several muscles on one mass in scalar Python; `scalar_rates.hill` is that of one muscle."""
 
 from __future__ import annotations
 
@@ -6,27 +6,27 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from filling import stretch_factor
-from scalar_rates import Rates, beyond_box, valve_flow
+from scalar_rates import Rates, extrapolate, valve_flow
 
 from airmuscle.muscle import Muscle
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge
-from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, absolute
+from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, absolute_pressure
 
 OneMuscle = Callable[[float, float, float, float, float], tuple[float, float]]
 
 
 def one_muscle(muscle: Muscle, circuit: FillDischarge, ambient: Ambient) -> OneMuscle:
-    """Air, position, speed, openings -> tension [N] and mass flow into it [kg/s]."""
+    """A function from air mass, position, speed and valve openings to tension [N] and mass flow [kg/s]."""
     law, per_length = muscle.contractile, 1.0 / muscle.geometry.resting_length
     k, c = stretch_factor(muscle.geometry)
     rt, outside, cc = GAS_CONSTANT * ambient.temperature, ambient.pressure, c * c
-    source = absolute(circuit.supply.pressure, ambient)
+    source = absolute_pressure(circuit.supply.pressure, ambient)
     fill_flow, discharge_flow = (valve_flow(v, ambient.temperature) for v in (circuit.fill, circuit.discharge))
-    stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.growth
+    stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.damping_slope
     low_x, scale_x = law.min_contraction, 2.0 / (law.max_contraction - law.min_contraction)
     low_q, scale_q = law.min_pressure, 2.0 / (law.max_pressure - law.min_pressure)
-    least, greatest, tangent = law.min_force, law.max_force, beyond_box(law)
+    min_force, max_force, tangent = law.min_force, law.max_force, extrapolate(law)
     (a00, a10, a20, a30, a40, a50, a01, a11, a21, a31, a41, a02, a12, a22, a32, a03, a13, a23, a04, a14, a05) = (
         law.coefficients
     )
@@ -44,7 +44,7 @@ def one_muscle(muscle: Muscle, circuit: FillDischarge, ambient: Ambient) -> OneM
             force = r0 + q * (r1 + q * (r2 + q * (a03 + x * (a13 + x * a23) + q * (a04 + x * a14 + q * a05))))
         else:
             force = tangent(x, q)
-        force = least if force < least else greatest if force > greatest else force
+        force = min_force if force < min_force else max_force if force > max_force else force
         tension = force - stiffness * position - (damping + growth * gauge) * speed
         flow = 0.0
         if fill:
@@ -56,25 +56,25 @@ def one_muscle(muscle: Muscle, circuit: FillDischarge, ambient: Ambient) -> OneM
     return one
 
 
-def several(plant: Plant) -> Callable[[Sequence[float]], Rates]:
-    """Rates of the hanging plants with more than one muscle, under given openings."""
+def hanging_rates(plant: Plant) -> Callable[[Sequence[float]], Rates]:
+    """A function from valve openings to the rates of a hanging plant with several muscles."""
     load = plant.mechanism
     inverse_mass, gravity = 1.0 / load.mass, load.gravity
     muscles = [one_muscle(m, c, plant.ambient) for m, c in zip(plant.muscles, plant.circuits, strict=True)]
 
-    def under(openings: Sequence[float]) -> Rates:
+    def rates_at(openings: Sequence[float]) -> Rates:
         parts = list(zip(muscles, openings[::2], openings[1::2], strict=True))
 
         def rates(t: float, y: Any) -> list[float]:
             *airs, position, speed = y.tolist()
-            pull, found = 0.0, []
+            pull, rates_of_states = 0.0, []
             for air, (one, fill, discharge) in zip(airs, parts):  # noqa: B905 - checked above, and this is timed
                 tension, flow = one(air, position, speed, fill, discharge)
                 pull += tension
-                found.append(flow)
-            found += (speed, pull * inverse_mass - gravity)
-            return found
+                rates_of_states.append(flow)
+            rates_of_states += (speed, pull * inverse_mass - gravity)
+            return rates_of_states
 
         return rates
 
-    return under
+    return rates_at

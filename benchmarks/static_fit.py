@@ -1,10 +1,10 @@
-"""The 21 coefficients of a contractile surface, fitted by the library and by lmfit from the same points."""
+"""Fit of a contractile surface with 21 coefficients: the library and lmfit."""
 
 from __future__ import annotations
 
 import numpy as np
 from filling import BOX, Array, measured_force
-from measure import Bar, Section, interleaved, of_time, show
+from measure import Section, Target, format_time, print_section, time_variants
 
 from airmuscle.characteristic.contractile_surface import ContractileSurface, exponents
 from airmuscle.identify.censoring import UNCENSORED
@@ -13,39 +13,38 @@ from airmuscle.recording import Recording
 
 POINTS = 1000
 NOISE = 2.0
-HEADING = ("variant", "median", "least", "times the library", "greatest difference of a coefficient")
+HEADER = ("variant", "median", "minimum", "ratio to library", "maximum difference of a coefficient")
 TEXT = (
-    f"{POINTS} points of a chosen muscle (see `filling.py`) with Gaussian noise of {NOISE:g} N; both scale contraction "
-    "and pressure alike. Both give standard deviations and correlations, the library also rank and condition. lmfit is "
-    "given the residual as a matrix product, the quickest form a user could write, "
-    "and once also that matrix as its derivative. Differences are from the library's answer, relative to its greatest "
-    "coefficient."
+    f"{POINTS} points of a synthetic muscle (see `filling.py`) with Gaussian noise of {NOISE:g} N; both scale "
+    "contraction and pressure in the same way. Both compute standard errors and correlations, the library also rank "
+    "and condition number. The residual for lmfit is a matrix product, the fastest form; one variant also gives this "
+    "matrix as its derivative. Differences are relative to the largest coefficient of the library."
 )
 
 
-def points() -> Recording:
-    """Noisy forces at random points of the validity range."""
+def make_points() -> Recording:
+    """Forces with noise at random points of the validity range."""
     rng = np.random.default_rng(5)
     p, eps = (rng.uniform(*ends, POINTS) for ends in BOX)
     force = measured_force(p, eps) + NOISE * rng.standard_normal(POINTS)
     return Recording({"pressure": p, "contraction": eps, "force": force}, "benchmark")
 
 
-def matrix(data: Recording) -> Array:
-    """The powers of contraction and pressure, scaled to -1..1, as a user of lmfit writes them once."""
+def design_matrix(data: Recording) -> Array:
+    """The powers of contraction and pressure, scaled to -1 to 1."""
     x, q = (2 * (v - v.min()) / np.ptp(v) - 1 for v in (data["contraction"], data["pressure"]))
     return np.column_stack([x**i * q**j for i, j in exponents(5)])
 
 
-def by_library(data: Recording) -> Array:
-    """The coefficients that `fit` finds; every row counts."""
+def fit_library(data: Recording) -> Array:
+    """The coefficients fitted by the library, without censoring."""
     model = fit(ContractileSurface.blank(), data, censoring=UNCENSORED).model
     assert isinstance(model, ContractileSurface)
     return np.array(model.coefficients)
 
 
-def by_lmfit(data: Recording, columns: Array, derivative: bool) -> Array:
-    """The coefficients that lmfit finds by Levenberg and Marquardt from zero."""
+def fit_lmfit(data: Recording, columns: Array, derivative: bool) -> Array:
+    """The coefficients fitted by lmfit (Levenberg-Marquardt from zero)."""
     import lmfit
 
     names = [f"a{i}" for i in range(columns.shape[1])]
@@ -57,30 +56,38 @@ def by_lmfit(data: Recording, columns: Array, derivative: bool) -> Array:
         return np.asarray(columns @ [values[name].value for name in names] - force)
 
     settings = {"Dfun": lambda values: columns} if derivative else {}
-    found = lmfit.minimize(residual, parameters, **settings)
-    return np.array([found.params[name].value for name in names])
+    result = lmfit.minimize(residual, parameters, **settings)
+    return np.array([result.params[name].value for name in names])
 
 
 def section(rounds: int = 9) -> Section:
-    """The whole comparison."""
-    data = points()
-    columns = matrix(data)
+    """The complete benchmark."""
+    data = make_points()
+    columns = design_matrix(data)
     variants = {
-        "`fit`": lambda: by_library(data),
-        "lmfit": lambda: by_lmfit(data, columns, False),
-        "lmfit with the derivative": lambda: by_lmfit(data, columns, True),
+        "`fit`": lambda: fit_library(data),
+        "lmfit": lambda: fit_lmfit(data, columns, False),
+        "lmfit with the derivative": lambda: fit_lmfit(data, columns, True),
     }
-    times = interleaved(variants, rounds)
-    answers = {name: call() for name, call in variants.items()}
-    ours = answers["`fit`"]
-    apart = {name: float(np.abs(found - ours).max() / np.abs(ours).max()) for name, found in answers.items()}
+    times = time_variants(variants, rounds)
+    coefficients = {name: call() for name, call in variants.items()}
+    expected = coefficients["`fit`"]
+    differences = {n: float(np.abs(c - expected).max() / np.abs(expected).max()) for n, c in coefficients.items()}
     rows = tuple(
-        (name, of_time(t.median), of_time(t.least), f"{t.ratio_to(times['`fit`']):.3g}", f"{apart[name]:.0e}")
+        (
+            name,
+            format_time(t.median),
+            format_time(t.minimum),
+            f"{t.ratio_to(times['`fit`']):.3g}",
+            f"{differences[name]:.0e}",
+        )
         for name, t in times.items()
     )
-    bar = Bar("21 coefficients: library and lmfit agree", max(apart.values()), 1e-8, "of the greatest")
-    return Section("Static fit of 21 coefficients against lmfit", TEXT, HEADING, rows, (bar,))
+    target = Target(
+        "21 coefficients: difference between library and lmfit", max(differences.values()), 1e-8, "relative"
+    )
+    return Section("Static fit of 21 coefficients, library and lmfit", TEXT, HEADER, rows, (target,))
 
 
 if __name__ == "__main__":
-    show(section())
+    print_section(section())

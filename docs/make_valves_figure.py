@@ -1,4 +1,4 @@
-"""Draws docs/images/valves.png, flow laws and the rule for valves in series: python docs/make_valves_figure.py"""
+"""Figure docs/images/valves.png: flow laws and equivalent valves in series. Run python docs/make_valves_figure.py"""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from airmuscle.core.plotting import DASHES, LINES, new_figure, save
-from airmuscle.pneumatics import CheckValve, IndexedValve, Orifice, Valve, in_series
+from airmuscle.pneumatics import CheckValve, Orifice, SubsonicIndexValve, Valve, in_series
 from airmuscle.pneumatics.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
 
 PICTURE = Path(__file__).with_name("images") / "valves.png"
@@ -18,51 +18,53 @@ RATIO = np.linspace(0.0, 1.2, 1201)
 
 
 def flow(law: Orifice, upstream: Any, downstream: Any) -> Any:
-    """Mass flow [kg/s] of the open valve."""
+    """Mass flow of the open valve [kg/s]."""
     return law.mass_flow(upstream, downstream, 1.0, REFERENCE_TEMPERATURE)
 
 
-def between(first: Valve, second: Valve, downstream: float) -> float:
-    """Flow through two valves, the pressure between them found by root search [kg/s]."""
+def exact_series_flow(first: Valve, second: Valve, downstream: float) -> float:
+    """Mass flow through two valves in series [kg/s], with the pressure between them from a root finder."""
     middle = brentq(lambda p: flow(first, UPSTREAM, p) - flow(second, p, downstream), downstream, UPSTREAM)
     return float(flow(first, UPSTREAM, middle))
 
 
 def draw_laws(axes: Any) -> None:
-    """Share of the choked flow over the pressure ratio, beyond 1 reversed."""
+    """Plot the fraction of the choked flow over the pressure ratio; the flow is reversed above 1."""
     laws: dict[str, Orifice] = {
         "b = 0": Valve(1e-8, 0.0),
         "b = 0.3": Valve(1e-8, 0.3),
-        "b = 0.3, m = 0.7": IndexedValve(1e-8, 0.3, 0.7),
-        "b = 0.3, cracking at 0.7 bar": IndexedValve(1e-8, 0.3, cracking_pressure=70e3),
-        "the same, check valve": CheckValve(IndexedValve(1e-8, 0.3, cracking_pressure=70e3)),
+        "b = 0.3, m = 0.7": SubsonicIndexValve(1e-8, 0.3, 0.7),
+        "b = 0.3, cracking pressure 0.7 bar": SubsonicIndexValve(1e-8, 0.3, cracking_pressure=70e3),
+        "the same with check valve": CheckValve(SubsonicIndexValve(1e-8, 0.3, cracking_pressure=70e3)),
     }
     choked = 1e-8 * REFERENCE_DENSITY * UPSTREAM
     for i, (label, law) in enumerate(laws.items()):
-        share = flow(law, UPSTREAM, RATIO * UPSTREAM) / choked
-        axes.plot(RATIO, share, color=LINES[i], linestyle=DASHES[i], label=label)
-    axes.set(xlabel="downstream over upstream pressure", ylabel="share of the choked flow", title="flow laws, 7 bar")
+        fraction = flow(law, UPSTREAM, RATIO * UPSTREAM) / choked
+        axes.plot(RATIO, fraction, color=LINES[i], linestyle=DASHES[i], label=label)
+    axes.set(
+        xlabel="pressure ratio downstream/upstream", ylabel="fraction of the choked flow", title="flow laws, 7 bar"
+    )
     axes.legend(loc="lower left")
 
 
 def draw_series(axes: Any) -> None:
-    """Two valves in both orders: the rule, and points with the pressure between them found."""
+    """Plot the flow through two valves in both orders: equivalent valve (lines) and exact flow (markers)."""
     wide, narrow = Valve(2e-8, 0.2), Valve(1e-8, 0.5)
     ratios = np.linspace(0.02, 0.995, 26)
     for i, (label, pair) in enumerate({"narrow first": (narrow, wide), "wide first": (wide, narrow)}.items()):
-        rule = in_series(*pair)
-        line = flow(rule, UPSTREAM, RATIO[RATIO <= 1] * UPSTREAM)
-        axes.plot(RATIO[RATIO <= 1], line * 1e3, color=LINES[i], linestyle=DASHES[i], label=f"{label}, rule")
-        found = [between(*pair, r * UPSTREAM) * 1e3 for r in ratios]
-        axes.plot(ratios, found, "o", color=LINES[i], markersize=3, label=f"{label}, found")
-    axes.set(xlabel="downstream over upstream pressure", ylabel="mass flow [g/s]")
+        equivalent = in_series(*pair)
+        line = flow(equivalent, UPSTREAM, RATIO[RATIO <= 1] * UPSTREAM)
+        axes.plot(RATIO[RATIO <= 1], line * 1e3, color=LINES[i], linestyle=DASHES[i], label=f"{label}, equivalent")
+        exact = [exact_series_flow(*pair, r * UPSTREAM) * 1e3 for r in ratios]
+        axes.plot(ratios, exact, "o", color=LINES[i], markersize=3, label=f"{label}, exact")
+    axes.set(xlabel="pressure ratio downstream/upstream", ylabel="mass flow [g/s]")
     axes.set_title("in series: C = 1 dm3/(s bar), b = 0.5 and C = 2, b = 0.2")
     axes.set_ylim(0.0, None)
     axes.legend(loc="lower left")
 
 
 def main() -> None:
-    """Both pictures in one file."""
+    """Save both plots in one file."""
     figure, (left, right) = new_figure(1, 2, width=9.0, height=3.4)
     draw_laws(left)
     draw_series(right)

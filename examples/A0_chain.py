@@ -1,6 +1,6 @@
-"""The chain on one page: from measured points to a fitted muscle, to a plant with valves and load, to a run.
+"""Workflow on one page: measured points, fitted muscle, plant with valves and load, simulation.
 
-python examples/A0_chain.py        writes chain.png where it is run
+python examples/A0_chain.py        writes chain.png to the working directory
 """
 
 import numpy as np
@@ -10,32 +10,32 @@ from airmuscle.core.plotting import LINES, new_figure, save
 from airmuscle.units import bar, kPa
 
 bench = am.load_data("dmsp-20-300")
-found = am.fit(am.characteristic.ContractileSurface.blank(5, max_force=1e5), bench)
-print(found)
+result = am.fit(am.characteristic.ContractileSurface.blank(5, max_force=1e5), bench)
+print(result)
 
 braid = am.geometry.Braid(radius=0.010, braid_angle=0.426, resting_length=0.300)
-muscle = am.Muscle(found.model, braid, damper=am.LinearDamper(200.0))
+muscle = am.Muscle(result.model, braid, damper=am.LinearDamper(200.0))
 valve = am.Valve(conductance=2.6167e-9, critical_ratio=0.433)
 plant = am.Plant(muscle, am.FillDischarge(am.Supply(5.5 * bar), valve, valve), am.HangingMass(10.0))
 run = am.simulate(plant, am.Schedule({"fill": ((1, 1), (4, 0)), "discharge": ((5, 1),)}), duration=8.0)
-print(f"lifts 10 kg by {run['position'].max() * 1e3:.1f} mm")
+print(f"stroke with 10 kg: {run['position'].max() * 1e3:.1f} mm")
 print(*run.notes, sep="\n")
 print(*am.cite(plant), sep="\n")
 
 figure, (left, right) = new_figure(1, 2, width=9.0, height=3.2)
 contraction = np.linspace(0.0, 0.26, 200)
 for i, pressure in enumerate((600, 450, 312.5, 180)):
-    here = np.isclose(bench["pressure"], pressure * kPa)
-    left.plot(contraction * 100, found.model.force(pressure * kPa, contraction), color=LINES[i], label=f"{pressure:g}")
-    left.plot(bench["contraction"][here] * 100, bench["force"][here], "o", color=LINES[i])
-left.set(xlabel="contraction [%]", ylabel="force [N]", title="measured (points) and fitted (lines)")
+    level = np.isclose(bench["pressure"], pressure * kPa)
+    left.plot(contraction * 100, result.model.force(pressure * kPa, contraction), color=LINES[i], label=f"{pressure:g}")
+    left.plot(bench["contraction"][level] * 100, bench["force"][level], "o", color=LINES[i])
+left.set(xlabel="contraction [%]", ylabel="force [N]", title="measured points and fitted surface")
 left.legend(title="kPa gauge")
 right.plot(run["time"], run["pressure"] / kPa, color=LINES[0])
-right.set(xlabel="time [s]", ylabel="pressure [kPa gauge]", title="simulated fill and discharge, 10 kg")
+right.set(xlabel="time [s]", ylabel="pressure [kPa gauge]", title="simulated filling and discharge, 10 kg")
 right.yaxis.label.set_color(LINES[0])
-lift = right.twinx()
-lift.plot(run["time"], run["position"] * 1e3, color=LINES[1], linestyle="--")
-lift.set_ylabel("displacement [mm]", color=LINES[1])
-lift.grid(False)
+position = right.twinx()
+position.plot(run["time"], run["position"] * 1e3, color=LINES[1], linestyle="--")
+position.set_ylabel("position [mm]", color=LINES[1])
+position.grid(False)
 save(figure, "chain.png")
 print("wrote chain.png")

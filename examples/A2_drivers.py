@@ -1,30 +1,29 @@
-"""What a valve makes of pulses: the command, the coil's current, the opening; and the mean opening over the duty ratio.
+"""Solenoid valve with pulse-width modulation: command, coil current and opening; mean opening over the duty ratio.
 
-python examples/A2_drivers.py        writes drivers.png where it is run
+python examples/A2_drivers.py        writes drivers.png to the working directory
 """
 
 import numpy as np
 
 import airmuscle as am
-from airmuscle.control.driver import PWM, SolenoidDriver
-from airmuscle.control.with_drivers import WithDrivers
+from airmuscle.control import PWM, SolenoidDriver, WithDrivers
 from airmuscle.core.plotting import BLACK, LINES, legend_outside, new_figure, save
 from airmuscle.units import ms
 
 VALVE = SolenoidDriver(opening_delay=5 * ms, closing_delay=2 * ms, opening_ramp=10 * ms, closing_ramp=4 * ms)  # chosen
 
 
-def course(command, duration, rows=4000):
-    """Times [s] and the fill input there."""
+def sample_input(command, duration, rows=4000):
+    """Sample times [s] and values of the input `fill`."""
     times = np.linspace(0.0, duration, rows, endpoint=False)
     return times, command.segments(("fill",), 0.0, duration).inputs_at(times, 0.0)[:, 0]
 
 
-def mean(duty, carrier):
-    """The mean opening over the last of 20 periods."""
-    command = WithDrivers(am.Schedule({"fill": ((0, duty),)}), {"fill": (carrier, VALVE)})
+def mean_opening(duty, pwm):
+    """Mean opening over the last of 20 periods."""
+    command = WithDrivers(am.Schedule({"fill": ((0, duty),)}), {"fill": (pwm, VALVE)})
     memory = command.init(0.0)
-    period = 1 / carrier.frequency
+    period = 1 / pwm.frequency
     _, memory = command.step(memory, ("fill",), 0.0, 19 * period)
     last, _ = command.step(memory, ("fill",), 19 * period, period)
     lengths = np.diff(last.ends, prepend=19 * period)
@@ -33,22 +32,22 @@ def mean(duty, carrier):
 
 figure, (left, right) = new_figure(1, 2, width=9.0, height=3.4, width_ratios=(1.5, 1))
 signal = am.SampledSignal({"fill": ((0.0, 0.05), (0.4, 0.6))})
-carrier = PWM(frequency=25.0, smallest_pulse=3 * ms)
+pwm = PWM(frequency=25.0, smallest_pulse=3 * ms)
 for command, style in (
     (signal, {"color": BLACK, "linestyle": "--", "label": "command"}),
-    (WithDrivers(signal, {"fill": carrier}), {"color": LINES[4], "linewidth": 0.9, "label": "coil"}),
-    (WithDrivers(signal, {"fill": (carrier, VALVE)}), {"color": LINES[0], "label": "opening"}),
+    (WithDrivers(signal, {"fill": pwm}), {"color": LINES[4], "linewidth": 0.9, "label": "coil current"}),
+    (WithDrivers(signal, {"fill": (pwm, VALVE)}), {"color": LINES[0], "label": "opening"}),
 ):
-    times, values = course(command, 0.4)
+    times, values = sample_input(command, 0.4)
     left.plot(times / ms, values, **style)
-left.set(xlabel="time [ms]", ylabel="duty ratio, current, opening", title="PWM of 25 Hz, pulses of 3 ms at least")
+left.set(xlabel="time [ms]", ylabel="command, current, opening", title="PWM at 25 Hz, minimum pulse 3 ms")
 left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3)
 
 duties = np.linspace(0.0, 1.0, 201)
 for i, frequency in enumerate((5.0, 25.0, 50.0, 100.0)):
-    right.plot(duties, [mean(d, PWM(frequency)) for d in duties], color=LINES[i], label=f"{frequency:g} Hz")
+    right.plot(duties, [mean_opening(d, PWM(frequency)) for d in duties], color=LINES[i], label=f"{frequency:g} Hz")
 right.plot((0, 1), (0, 1), color=BLACK, linewidth=0.6)
-right.set(xlabel="duty ratio", ylabel="mean opening", title="what the muscle gets")
-legend_outside(right, title="carrier")
+right.set(xlabel="duty ratio", ylabel="mean opening", title="mean opening over duty ratio")
+legend_outside(right, title="PWM frequency")
 save(figure, "drivers.png")
 print("wrote drivers.png")

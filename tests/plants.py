@@ -27,7 +27,6 @@ from airmuscle.library import catalogue
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
-    Held,
     Isometric,
     Isotonic,
     JointWithEndStops,
@@ -37,6 +36,7 @@ from airmuscle.mechanism import (
     Pulley,
     SpringLoad,
     WithEndStops,
+    WithLatch,
     WithOffsets,
 )
 from airmuscle.mechanism.contact import HuntCrossley
@@ -45,7 +45,6 @@ from airmuscle.muscle import (
     CubicSpring,
     DirectionalDamper,
     EndStop,
-    LaggingWall,
     LinearDamper,
     LinearSpring,
     Muscle,
@@ -56,6 +55,7 @@ from airmuscle.muscle import (
     Serres2009Damper,
     Serres2009Spring,
     SwellingWall,
+    ViscoelasticWall,
 )
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
@@ -109,7 +109,7 @@ EXAMPLES = {
         type(m).__name__: of(SURFACE, geometry.StraightFibre(0.2, 0.02, meridian=m))
         for m in (Catenary(), Parabola(), TrueArcParabola())
     },
-    "vessel": of(SURFACE, Vessel(2e-4), wall=LaggingWall(2e-11, 0.05)),
+    "vessel": of(SURFACE, Vessel(2e-4), wall=ViscoelasticWall(2e-11, 0.05)),
     "polynomial volume": of(SURFACE, as_polynomial(BRAID, 8, (-0.05, 0.3))),
     # elements of a muscle
     "hardening spring, lopsided damper": of(
@@ -118,7 +118,7 @@ EXAMPLES = {
     "pressure damper, creep": of(damper=PressureDamper(50.0, 1e-3), creep=CreepElements((2e4, 1e4), (0.1, 2.0))),
     "Reynolds": of(spring=Reynolds2003Spring(), damper=Reynolds2003Damper()),
     "Serres": of(spring=Serres2009Spring(), damper=Serres2009Damper()),
-    "stop, lagging wall": of(stop=STOP, wall=LaggingWall(2e-11, 0.05)),
+    "stop, lagging wall": of(stop=STOP, wall=ViscoelasticWall(2e-11, 0.05)),
     "series spring with a stop": of(
         series=SeriesSpring(1e5), stop=STOP, damper=DirectionalDamper(300.0, 150.0, 1e-3, 0.0)
     ),
@@ -133,14 +133,14 @@ EXAMPLES = {
     "polytropic": fed(TWO_VALVES, gas=Polytropic(1.3)),
     "heat": fed(TWO_VALVES),
     "closed": fed(pneumatics.ClosedChamber()),
-    "held and let go": Plant(chosen_muscle(), TWO_VALVES, Held(HangingMass(10.0))),
+    "held and let go": Plant(chosen_muscle(), TWO_VALVES, WithLatch(HangingMass(10.0))),
     "held for good": Plant(chosen_muscle(), TWO_VALVES, Isometric(0.05), EnergyBalance(0.5)),
     "check valve and cracking pressure": fed(
         FillDischarge(
-            Supply(5e5), pneumatics.CheckValve(pneumatics.IndexedValve(1e-8, 0.3, 0.6, 3e4)), pneumatics.IndexedValve(1e-8, 0.5, 0.4)
+            Supply(5e5), pneumatics.CheckValve(pneumatics.SubsonicIndexValve(1e-8, 0.3, 0.6, 3e4)), pneumatics.SubsonicIndexValve(1e-8, 0.5, 0.4)
         )
     ),
-    "three positions through a tube": fed(pneumatics.WithTubes(pneumatics.ThreePosition(Supply(5e5), VALVE, OTHER),
+    "three positions through a tube": fed(pneumatics.WithTubes(pneumatics.ThreePositionValve(Supply(5e5), VALVE, OTHER),
                                                        pneumatics.Tube(pneumatics.TubeOrifice(1.0, 3e-3), 1e-5, 2))),
     "tube with inertia": fed(pneumatics.WithTubes(TWO_VALVES, pneumatics.DistributedTube(1.0, 2e-3, 2, EnergyBalance(0.1)))),
     "overlap": fed(pneumatics.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, 0.2, 2), 2),
@@ -149,7 +149,7 @@ EXAMPLES = {
     "manifold on tank and regulator": fed(
         pneumatics.Manifold(
             pneumatics.RegulatedSupply(pneumatics.Tank(Supply(7e5), OTHER, 1e-3, EnergyBalance(0.1)), VALVE, 4e5),
-            (FillDischarge(pneumatics.SharedSupply(), VALVE, OTHER), pneumatics.ThreePosition(pneumatics.SharedSupply(), VALVE, OTHER)),
+            (FillDischarge(pneumatics.SharedSupply(), VALVE, OTHER), pneumatics.ThreePositionValve(pneumatics.SharedSupply(), VALVE, OTHER)),
             ("one", "two"),
         ),
         2,

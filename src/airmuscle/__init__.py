@@ -17,7 +17,9 @@ from .core.errors import AirmuscleError
 from .core.reference import Reference, cite
 from .core.status import Status
 from .core.system import System
-from .library.catalogue import list_library, load, load_data, save
+from .library.catalogue import load, load_data
+from .library.files import list_library
+from .library.write import save
 from .mechanism import HangingMass, Isometric, Mechanism
 from .muscle import LinearDamper, LinearSpring, Muscle
 from .plant.plant import Plant
@@ -63,6 +65,7 @@ __all__ = [
     "Supply",
     "System",
     "Valve",
+    "WithLatch",
     "advance",
     "characteristic",
     "cite",

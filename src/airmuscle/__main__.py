@@ -1,4 +1,4 @@
-"""`python -m airmuscle` is the command `airmuscle`."""
+"""Entry point of `python -m airmuscle`."""
 
 from .cli import main
 

@@ -1,6 +1,6 @@
-"""The benchmarks compare like with like: the opponents compute the same equations, and every script runs.
+"""Benchmarks: all variants solve the same equations, and every script runs.
 
-No time is asserted here; times depend on the machine and stand in benchmarks/RESULTS.md.
+No times are asserted, because they depend on the machine; benchmarks/RESULTS.md contains them.
 """
 
 from __future__ import annotations
@@ -26,97 +26,97 @@ from airmuscle.simulation.integrators import DormandPrince8, Rodas4
 
 
 @pytest.mark.parametrize("states", [3, 6, 8, 10])
-def test_the_rates_written_by_hand_are_those_of_the_plant(states):
+def test_the_hand_written_rates_are_those_of_the_plant(states):
     case = runs()[states]
     assert len(case.system.states) == states
-    assert rodas4.refuse_other_equations(case, compile_system(case.system)) < 1e-12
+    assert rodas4.check_rates(case, compile_system(case.system)) < 1e-12
 
 
 @pytest.mark.parametrize(("pressure", "position"), [(7e5, 0.06), (5e4, -0.02)])
-def test_so_are_they_beyond_the_box_of_the_surface(pressure, position):
-    """Where the force is also within its clamp, so that the tangent counts."""
+def test_the_hand_written_rates_are_equal_beyond_the_validity_range(pressure, position):
+    """At points where the force is within its limits, so that the extrapolation is used."""
     case = runs()[3]
     y = np.array(list(case.system.state_at(pressure=pressure, position=position, speed=0.1).values()))
-    found = rodas4.by_hand(case)(np.array([1.0, 0.5]))[0](0.0, y)
-    np.testing.assert_allclose(found, compile_system(case.system).rates(y, [1.0, 0.5]), rtol=1e-12)
+    rates = rodas4.hand_written_rates(case)(np.array([1.0, 0.5]))[0](0.0, y)
+    np.testing.assert_allclose(rates, compile_system(case.system).rates(y, [1.0, 0.5]), rtol=1e-12)
 
 
-def test_other_equations_are_refused():
+def test_different_equations_are_detected():
     case = runs()[3]
     heavier = dataclasses.replace(case.system, mechanism=dataclasses.replace(case.system.mechanism, mass=5.001))
     with pytest.raises(AssertionError, match="differ by"):
-        rodas4.refuse_other_equations(case, compile_system(heavier))
+        rodas4.check_rates(case, compile_system(heavier))
 
 
-def test_lsoda_with_rates_by_hand_finds_the_same_course():
+def test_lsoda_computes_the_same_solution():
     case = runs()[3]
     ready = compile_system(case.system)
     reference = rodas4.kernel(case, ready, Rodas4(1e-11))()
     for solve in (rodas4.lsoda, rodas4.odeint_lsoda):
-        for rates in (rodas4.by_hand(case), rodas4.by_machine(ready)):
-            found = solve(case, rates, 1e-8)
-            assert found.shape == reference.shape
-            assert case.error(found, reference) < 1e-8
+        for rates in (rodas4.hand_written_rates(case), rodas4.machine_code_rates(ready)):
+            solution = solve(case, rates, 1e-8)
+            assert solution.shape == reference.shape
+            assert case.error(solution, reference) < 1e-8
 
 
 @pytest.mark.skipif(not ode8.compilers(), reason="no C compiler on the path")
-def test_the_c_computes_the_same_steps(tmp_path):
-    """Over 0.2 s from beyond the validity range of the surface, within which valves open; equal to rounding."""
+def test_the_c_code_computes_the_same_steps(tmp_path):
+    """Over 0.2 s from a state beyond the validity range of the surface, with valve openings; equal to rounding."""
     case = runs()[3]
     start = case.system.state_at(pressure=6.5e5, position=0.05)
     short = dataclasses.replace(case, start=start, command=Schedule({"discharge": ((0.05, 1.0), (0.15, 0.0))}))
     ready, segments = compile_system(case.system), short.command.segments(case.system.inputs, 0.0, 0.2)
     times = np.linspace(0.0, 0.2, 21)
     expected = DormandPrince8(ode8.STEP).run(ready, segments, 0.0, short.vector, times).rows
-    for library in ode8.compiled(tmp_path).values():
-        found = ode8.in_c(short, library, segments)()[:21]
-        np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-12)
+    for library in ode8.compile_libraries(tmp_path).values():
+        rows = ode8.make_c_run(short, library, segments)()[:21]
+        np.testing.assert_allclose(rows, expected, rtol=1e-11, atol=1e-12)
 
 
 def test_c_numpy_and_lanes_compute_the_same_batch(tmp_path):
-    """Over 0.7 s, within which a valve opens: 37 plants, whose number is no multiple of any block."""
-    timed = batch.variants(tmp_path, 37, 0.7)
+    """Over 0.7 s with the opening of a valve: 37 plants, a number that is not a multiple of any block size."""
+    timed = batch.make_variants(tmp_path, 37, 0.7)
     assert any("C, gcc" in name for name in timed) or not ode8.compilers()
-    ends = {name: call() for name, (_, call) in timed.items()}
-    parameters = batch.varied(batch.hanging(), 37)
-    table = batch.constants(tree.unflatten(batch.hanging(), list(parameters.values())), 37)
-    ends["NumPy"] = batch.in_numpy(table, runs()[3].vector, 0.7)
-    batch.refuse_other_ends(ends, "simulate_batch", runs()[3].nominal)
+    final_states = {name: call() for name, (_, call) in timed.items()}
+    parameters = batch.random_parameters(batch.hanging(), 37)
+    table = batch.c_parameters(tree.unflatten(batch.hanging(), list(parameters.values())), 37)
+    final_states["NumPy"] = batch.run_numpy(table, runs()[3].vector, 0.7)
+    batch.check_final_states(final_states, "simulate_batch", runs()[3].nominal)
     table[0, 3] *= 1.0001
-    ends["NumPy"] = batch.in_numpy(table, runs()[3].vector, 0.7)
-    with pytest.raises(AssertionError, match="NumPy ends"):
-        batch.refuse_other_ends(ends, "simulate_batch", runs()[3].nominal)
+    final_states["NumPy"] = batch.run_numpy(table, runs()[3].vector, 0.7)
+    with pytest.raises(AssertionError, match="the final states of NumPy and simulate_batch differ"):
+        batch.check_final_states(final_states, "simulate_batch", runs()[3].nominal)
 
 
-def test_the_section_of_the_batch_holds_its_rows_and_bars():
+def test_the_section_of_the_batch_has_its_rows_and_targets():
     section = batch.section(rounds=1, count=16, seconds=0.02)
     assert section.rows[0][:3] == ("simulate_batch (0.02 s simulated)", "16", "1")
-    assert any("NumPy" in bar.what for bar in section.bars)
+    assert any("NumPy" in target.name for target in section.targets)
 
 
-def test_lmfit_finds_the_same_coefficients():
+def test_lmfit_computes_the_same_coefficients():
     pytest.importorskip("lmfit")
     section = static_fit.section(rounds=1)
-    assert all(bar.held for bar in section.bars)
+    assert all(target.met for target in section.targets)
 
 
-def test_a_section_and_its_bars_are_printed():
+def test_a_section_and_its_targets_are_printed():
     case = runs()[3]
-    times = measure.interleaved({"kernel": rodas4.kernel(case, compile_system(case.system))}, rounds=2)
-    bar = measure.Bar("speed", 3.0, 4.0, "x", at_least=True, why="a reason")
+    times = measure.time_variants({"kernel": rodas4.kernel(case, compile_system(case.system))}, rounds=2)
+    target = measure.Target("speed", 3.0, 4.0, "x", at_least=True, reason="a reason")
     section = measure.Section(
-        "title", "text", ("what", "time"), (("kernel", measure.of_time(times["kernel"].median)),), (bar,)
+        "title", "text", ("what", "time"), (("kernel", measure.format_time(times["kernel"].median)),), (target,)
     )
     text = run.report([section], 1.0)
     assert "| speed | 3 x | >= 4 x | **missed** |" in text
-    assert "Missed: speed. Why: a reason." in text
+    assert "Missed: speed. Reason: a reason." in text
     assert "## title" in text
 
 
-def test_a_new_plant_is_traced_and_compiled_anew():
+def test_a_new_plant_is_traced_and_compiled_again():
     system = runs()[3].system
-    assert new_plant.fresh(system).address != compile_system(system).program.address
+    assert new_plant.compile_anew(system).address != compile_system(system).program.address
 
 
-def test_a_process_of_its_own_runs_the_program():
-    startup.process([*startup.command(), "list"])
+def test_a_separate_process_runs_the_program():
+    startup.run_python([*startup.program(), "list"])

@@ -1,4 +1,4 @@
-"""One meaning per name: the nomenclature page is what the code declares, and no public argument is missing from it."""
+"""Nomenclature: the page is generated from the declarations, and contains every public argument."""
 
 from __future__ import annotations
 
@@ -15,19 +15,21 @@ from airmuscle.recording import QUANTITIES
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-def maker():
+def load_generator():
     spec = importlib.util.spec_from_file_location("make_nomenclature", DOCS / "make_nomenclature.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
-def test_the_page_is_what_the_code_declares():
-    assert (DOCS / "nomenclature.md").read_text(encoding="utf-8") == maker().page(), "run docs/make_nomenclature.py"
+def test_the_page_is_up_to_date():
+    assert (DOCS / "nomenclature.md").read_text(encoding="utf-8") == load_generator().page(), (
+        "run docs/make_nomenclature.py"
+    )
 
 
 def public_arguments():
-    """(where, argument) of every public function and method of what the package exports, and of every model."""
+    """(owner, argument) of every public function and method in the face of the package, and of every model."""
     classes = [model_class(name, "test") for name in model_names()]
     exported = [getattr(airmuscle, name) for name in airmuscle.__all__]
     for thing in [*exported, *classes]:
@@ -48,12 +50,12 @@ def test_no_public_argument_is_missing_from_the_nomenclature():
         if dataclasses.is_dataclass(model_class(name, ""))
         for p in parameters(model_class(name, ""))
     }
-    known = declared | set(QUANTITIES) | set(maker().ARGUMENTS) | {"self", "cls"}
+    known = declared | set(QUANTITIES) | set(load_generator().ARGUMENTS) | {"self", "cls"}
     missing = sorted({f"{argument} ({where})" for where, argument in public_arguments() if argument not in known})
     assert not missing, f"add to docs/make_nomenclature.py, or use a name that is there: {missing}"
 
 
-def test_every_declared_parameter_says_what_it_is():
+def test_every_parameter_has_unit_symbol_meaning_and_bounds():
     for name in model_names():
         cls = model_class(name, "test")
         for p in parameters(cls) if dataclasses.is_dataclass(cls) else ():

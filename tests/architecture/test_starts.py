@@ -1,6 +1,6 @@
-"""A process starts with what it needs and no more: heavy modules are imported where they are used.
+"""Start of a process: heavy modules are imported only where they are used.
 
-A first result must come within 0.7 s (benchmarks/startup.py); what is counted here does not depend on the machine.
+The target for the first result is 0.7 s (benchmarks/startup.py); the modules checked here do not depend on the machine.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ STARTS = {
 
 
 @pytest.mark.parametrize("start", STARTS)
-def test_a_process_starts_without_what_it_does_not_need(start):
+def test_a_process_does_not_import_modules_that_it_does_not_need(start):
     code, absent = STARTS[start]
-    for _ in range(2):  # by the second the kernels are kept
+    for _ in range(2):  # the second run uses the kernel cache
         done = subprocess.run(
             [sys.executable, "-c", f"{code}\nimport sys; print(*sys.modules)"],
             capture_output=True,
@@ -48,7 +48,7 @@ def test_a_process_starts_without_what_it_does_not_need(start):
     assert absent & set(done.stdout.splitlines()[-1].split()) == set()
 
 
-def test_what_is_imported_late_is_there_for_who_asks():
+def test_names_that_are_imported_on_use_are_available():
     assert am.fit is sys.modules["airmuscle.identify"].fit
     assert am.Fit is sys.modules["airmuscle.identify"].Fit
     assert am.identify is sys.modules["airmuscle.identify"]

@@ -23,7 +23,7 @@ from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.pneumatics.gas import Isothermal
-from airmuscle.reproduce.hosovsky_plant import Numbers, hanging
+from airmuscle.reproduce.hosovsky_plant import UnpublishedParameters, hanging_load
 from airmuscle.reproduce.hosovsky_plant import plant as third_paper
 from airmuscle.simulation import simulate
 from airmuscle.simulation.batch import BatchSolution, Single, simulate_batch, thread_pool, variations
@@ -36,7 +36,7 @@ FAST = RungeKutta4(1e-3)
 
 
 def paper():
-    return third_paper(Numbers(), hanging(Numbers()))
+    return third_paper(UnpublishedParameters(), hanging_load(UnpublishedParameters()))
 
 
 def plain():
@@ -311,7 +311,10 @@ def test_plants_that_differ_in_their_circuit_alone_share_the_search_for_rest(mon
     ("varied", "message"),
     [
         ({"mechanism.mas": [1.0]}, r"Plant has no parameter 'mechanism.mas'. Did you mean 'mechanism.mass'\?"),
-        ({"mechanism.mass": [5.0, np.nan]}, r"row 1: 'mechanism.mass' \(m, .*\) is nan kg; allowed are finite values"),
+        (
+            {"mechanism.mass": [5.0, np.nan]},
+            r"row 1: 'mechanism.mass' \(m, .*\) is nan kg; allowed range: finite values",
+        ),
         ({"mechanism.mass": [5.0, 5.0, -2.0, -3.0]}, r"row 2: .* is -2 kg; .*from 0.* \(1 further rows too\)"),
         ({"mechanism.mass": []}, "there are no plants; give at least one row"),
         ({"mechanism.mass": [[1.0]]}, r"must be a column \(N,\), one value a plant; its shape is \(1, 1\)"),
@@ -416,14 +419,21 @@ def test_everything_else_that_cannot_be_is_refused(tmp_path):
     refused("duration is -1 s", duration=-1)
     refused(r"1e\+06 s in steps of 0.001 s are 1e\+09 steps .* more steps than allowed, 5e\+07", duration=1e6)
     refused(
-        "start, row 0: Braid cannot take a contraction of", GeometryLimitError, start={**start, "position": [1.0, 0.0]}
+        "start, row 0: Braid: a contraction of .* is outside its range",
+        GeometryLimitError,
+        start={**start, "position": [1.0, 0.0]},
     )
     refused(
-        "start, row 1: Braid cannot take a contraction of", GeometryLimitError, start={**start, "position": [0.0, -1.0]}
+        "start, row 1: Braid: a contraction of .* is outside its range",
+        GeometryLimitError,
+        start={**start, "position": [0.0, -1.0]},
     )
     lengths = {"mechanism.mass": [9.0, 10.0], "muscle.geometry.resting_length": [0.3, 0.02]}
     refused(
-        "start, row 1: Braid cannot take", GeometryLimitError, variations=lengths, start={**start, "position": -0.02}
+        "start, row 1: Braid: a contraction of",
+        GeometryLimitError,
+        variations=lengths,
+        start={**start, "position": -0.02},
     )
     refused("start: it is 'rest'; give for each state a number", start="rest")
     refused("keep: it is 3; name columns", keep=3)

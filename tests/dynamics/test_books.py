@@ -14,7 +14,7 @@ from airmuscle.control.inputs import Schedule
 from airmuscle.core import autodiff
 from airmuscle.core.errors import EquilibriumError, ParameterError
 from airmuscle.library.catalogue import load
-from airmuscle.mechanism import HangingMass, Held, Isometric
+from airmuscle.mechanism import HangingMass, Isometric, WithLatch
 from airmuscle.muscle import LinearDamper
 from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
@@ -25,12 +25,12 @@ from airmuscle.simulation.integrators import DormandPrince8, Rodas4
 
 VALVE = Valve(2.6167e-9, 0.433)
 CIRCUIT = FillDischarge(Supply(548675.0), VALVE, VALVE)
-RELEASE = Schedule({"held": ((0.0, 1.0), (0.5, 0.0))})
+RELEASE = Schedule({"latched": ((0.0, 1.0), (0.5, 0.0))})
 GASES = [Isothermal(), Polytropic(1.2)]
 
 
 def release_plant(gas):
-    return Plant(chosen_muscle(), CIRCUIT, Held(HangingMass(30.0)), gas)
+    return Plant(chosen_muscle(), CIRCUIT, WithLatch(HangingMass(30.0)), gas)
 
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-10])
@@ -123,7 +123,7 @@ def test_a_muscle_never_pushes():
 
 @pytest.mark.parametrize(
     ("pressure", "position", "message"),
-    [(-2e5, 0.0, "below absolute zero"), (1e5, 0.25, "cannot take a contraction of 125")],
+    [(-2e5, 0.0, "below absolute zero"), (1e5, 0.25, "a contraction of 125 % is outside its range")],
 )
 def test_a_state_that_cannot_be_is_refused(pressure, position, message):
     plant = Plant(chosen_muscle(), CIRCUIT, HangingMass(1.0))

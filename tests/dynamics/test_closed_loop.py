@@ -31,7 +31,7 @@ from airmuscle.core.reference import cite
 from airmuscle.core.status import Status
 from airmuscle.core.system import System
 from airmuscle.core.variables import StateVariable
-from airmuscle.mechanism import HangingMass, Held, Isometric
+from airmuscle.mechanism import HangingMass, Isometric, WithLatch
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, ProportionalRegulator, ProportionalValve, SecondOrderLag, Supply, Valve
 from airmuscle.pneumatics.gas import Isothermal
@@ -292,18 +292,18 @@ def test_pid_follows_with_every_kind_of_valve():
 
 
 def test_position_is_followed_and_what_is_beside_goes_on():
-    plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), Held(HangingMass(10.0)))
+    plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), WithLatch(HangingMass(10.0)))
     pid = PID("position", SplitRange("fill", "discharge"), 15.0, 0.5, 0.08)
     loop = ControlLoop(
         pid,
         5e-3,
         SampledSignal({"position": ((0.0, 0.0), (2.0, 0.02))}),
-        other_inputs=Schedule({"held": ((0, 1), (0.5, 0))}),
+        other_inputs=Schedule({"latched": ((0, 1), (0.5, 0))}),
     )
     run = simulate(plant, loop, duration=5.0, initial_state=plant.state_at(pressure=1e5))
     early = run["time"] < 0.5
     assert np.ptp(run["position"][early]) == 0.0
-    assert np.array_equal(run["held"], early.astype(float))
+    assert np.array_equal(run["latched"], early.astype(float))
     assert run["position"][-1] == pytest.approx(0.02, abs=1e-3)
     assert run["setpoint.position"] == pytest.approx(np.minimum(run["time"] / 100, 0.02))
 
@@ -351,8 +351,8 @@ def test_a_run_cut_between_two_samples_goes_on_with_what_was_commanded(cut):
 
 def test_what_was_commanded_gives_the_same_run_without_a_controller():
     drivers = {"fill": (PWM(30.0), SolenoidDriver(9e-3, 7e-3, 4e-3, 2e-3))}
-    plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), Held(HangingMass(10.0)))
-    loop = ControlLoop(VALVES, TICK, PRESSURE, Schedule({"held": ((0, 1), (0.1, 0))}), drivers)
+    plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), WithLatch(HangingMass(10.0)))
+    loop = ControlLoop(VALVES, TICK, PRESSURE, Schedule({"latched": ((0, 1), (0.1, 0))}), drivers)
     start = plant.state_at(pressure=1e5)
     run = simulate(plant, loop, duration=1.0, initial_state=start, integrator=FINE)
     again = simulate(
@@ -360,7 +360,7 @@ def test_what_was_commanded_gives_the_same_run_without_a_controller():
     )
     at = np.isin(again["time"], run["time"])
     assert at.sum() == len(run)
-    for name in ("pressure", "position", "fill", "held"):
+    for name in ("pressure", "position", "fill", "latched"):
         assert again[name][at] == pytest.approx(run[name], rel=1e-6, abs=1e-8), name
 
 
@@ -511,7 +511,10 @@ def test_a_period_that_cannot_be_is_refused(period):
     [
         ({"controller": 3}, "ControlLoop.controller is 3; give a PID"),
         ({"setpoint": {"pressure": 1e5}}, "the input is {'pressure'"),
-        ({"setpoint": Schedule({"presure": ()})}, "ControlLoop.setpoint names presure; the set points of PID are pressure"),
+        (
+            {"setpoint": Schedule({"presure": ()})},
+            "ControlLoop.setpoint names presure; the set points of PID are pressure",
+        ),
         ({"setpoint": Schedule({})}, "ControlLoop.setpoint names nothing; the set points of PID are pressure"),
         ({"setpoint": Periodic(Schedule({"force": ()}), 1.0)}, "ControlLoop.setpoint names force"),
         ({"other_inputs": Schedule({"fill": ((0, 1),)})}, "'fill' is commanded by the controller and by other_inputs"),
@@ -565,9 +568,7 @@ def test_a_batch_and_an_experiment_refuse_a_loop():
 
     loop, plant = ControlLoop(VALVES, 0.1, PRESSURE), lifting()
     for given in (loop, [loop, loop]):
-        with pytest.raises(
-            ParameterError, match=r"simulate_batch: the input must be known beforehand.*ControlLoop"
-        ):
+        with pytest.raises(ParameterError, match=r"simulate_batch: the input must be known beforehand.*ControlLoop"):
             simulate_batch(plant, {"mechanism.mass": [9.0, 10.0]}, given, duration=1.0)
     run = simulate(plant, loop, duration=0.2)
     with pytest.raises(ParameterError, match="the command is ControlLoop"):

@@ -43,7 +43,7 @@ def test_a_measured_column_is_a_command(tmp_path):
     signal = SampledSignal.recorded(recording, {"fill": "fill"})
     assert signal == SampledSignal({"fill": ((0.0, 0.0), (0.1, 0.4), (0.3, 0.8))})
     assert course(signal, 0.0, 0.4, np.array([0.05, 0.2, 0.35])) == pytest.approx([0.2, 0.6, 0.8])
-    with pytest.raises(ColumnError, match=r"bench.csv: no column 'discharge'; there are time, fill, pressure"):
+    with pytest.raises(ColumnError, match=r"bench.csv: no column 'discharge'; the columns are time, fill, pressure"):
         SampledSignal.recorded(recording, {"fill": "discharge"})
     with pytest.raises(ColumnError, match="no column 'time'"):
         SampledSignal.recorded(Recording({"fill": np.zeros(2)}, "a list"), {"fill": "fill"})

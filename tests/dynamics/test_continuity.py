@@ -33,8 +33,8 @@ NOT_IN_A_PLANT = {
         "Schedule", "SampledSignal", "SolenoidDriver", "PWM", "Rodas4", "DormandPrince8", "RungeKutta4"),
     "controllers, which look at a plant from outside": ("PID", "OnOffController", "SplitRange"),
     "laws solved for pressure or contraction, where as_force_law stands in, and their readings": (
-        "BorzikovaDirect", "BorzikovaExponential", "Hunt2017", "Saga2007", "AlongArc", "AlongAxis",
-        "EvenSpread", "GivenSum", "SumOverHalf", "SumPastHalf",
+        "BorzikovaDirect", "BorzikovaExponential", "Hunt2017", "Saga2007", "ArcIntegral", "AxialIntegral",
+        "UniformFibreSum", "UserDefinedFibreSum", "HalfShellFibreSum", "PrintedFibreSum",
     ),
     "not closed-form, refused by Plant": ("ExactMeridian", "Tabulated", "PleatedTube", "TabulatedGeometry"),
 }  # fmt: skip

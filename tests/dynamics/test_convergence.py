@@ -15,7 +15,7 @@ from airmuscle.characteristic import VirtualWork
 from airmuscle.control.inputs import ZERO_INPUT, SampledSignal, Schedule
 from airmuscle.geometry import Braid
 from airmuscle.mechanism import HangingMass
-from airmuscle.muscle import CreepElements, CubicSpring, LaggingWall, LinearDamper, Muscle
+from airmuscle.muscle import CreepElements, CubicSpring, LinearDamper, Muscle, ViscoelasticWall
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, DistributedTube, FillDischarge, Supply, Valve, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Polytropic
@@ -26,7 +26,7 @@ BRAID = Braid(0.01, 0.4363, 0.2)
 HEAT = EnergyBalance(0.5)
 MUSCLE = Muscle(
     VirtualWork(BRAID), BRAID, CubicSpring(3000.0, 20.0), LinearDamper(150.0),
-    wall=LaggingWall(2e-11, 0.05), creep=CreepElements((5e3,), (0.1,)),
+    wall=ViscoelasticWall(2e-11, 0.05), creep=CreepElements((5e3,), (0.1,)),
 )  # fmt: skip
 WAVES = Polytropic(1.3)
 SMOOTH = {

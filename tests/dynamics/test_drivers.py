@@ -290,10 +290,10 @@ def test_rows_too_near_an_instant_give_way_to_it():
     [
         (
             lambda: SolenoidDriver(opening_delay=-1e-3),
-            r"SolenoidDriver.opening_delay .* is -0.001 s; allowed are 0 to 10 s",
+            r"SolenoidDriver.opening_delay .* is -0.001 s; allowed range: 0 to 10 s",
         ),
         (lambda: SolenoidDriver(closing_ramp=float("nan")), r"SolenoidDriver.closing_ramp .* must be finite"),
-        (lambda: PWM(0.0), r"PWM.frequency .* is 0 1/s; allowed are 0.001 to"),
+        (lambda: PWM(0.0), r"PWM.frequency .* is 0 1/s; allowed range: 0.001 to"),
         (lambda: PWM(100.0, 6e-3), r"PWM.smallest_pulse is 0.006 s, more than half of the carrier's period of 0.01 s"),
         (
             lambda: WithDrivers(Schedule({}), {"fill": 3}),
@@ -313,7 +313,7 @@ def test_an_impossible_driver_is_refused(make, message: str):
 def test_a_driver_refuses_names_and_commands_it_cannot_follow():
     told = SampledSignal({"fill": ((0.0, 0.5), (1.0, 1.5))})
     command = WithDrivers(told, {"fill": PWM(10.0)})
-    with pytest.raises(ParameterError, match=r"the driver of 'fill' is told 1.5 before 1 s; allowed are 0 to 1"):
+    with pytest.raises(ParameterError, match=r"the driver of 'fill' is told 1.5 before 1 s; allowed range: 0 to 1"):
         command.segments(INPUTS, 0.0, 1.0)
     assert command.segments(INPUTS, 0.0, 0.5).ends.size > 1, "what is not reached is not refused"
     with pytest.raises(ParameterError, match=r"no input 'fil'; there are other, fill. Did you mean 'fill'\?"):

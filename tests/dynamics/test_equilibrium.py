@@ -22,17 +22,17 @@ from airmuscle.friction import Dahl
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
-    Held,
     Isometric,
     JointWithEndStops,
     Lever,
     MusclesInSeries,
     PrescribedMotion,
     SpringLoad,
+    WithLatch,
     WithOffsets,
 )
 from airmuscle.mechanism.contact import HuntCrossley
-from airmuscle.muscle import CreepElements, LaggingWall, SeriesSpring
+from airmuscle.muscle import CreepElements, SeriesSpring, ViscoelasticWall
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, FillDischarge, ProportionalValve, SecondOrderLag, Supply, Valve
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
@@ -42,7 +42,7 @@ LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right")
 VALVE = Valve(2.6e-8, 0.433)
 CIRCUIT = FillDischarge(Supply(6e5), VALVE, VALVE)
 JOINT = AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12)
-COMPLIANT = replace(chosen_muscle(), series=SeriesSpring(5e4), wall=LaggingWall(1e-12, 0.05))
+COMPLIANT = replace(chosen_muscle(), series=SeriesSpring(5e4), wall=ViscoelasticWall(1e-12, 0.05))
 GASES = [Isothermal(), Polytropic(1.2), EnergyBalance(1.0)]
 
 
@@ -242,9 +242,9 @@ def test_the_failure_names_the_muscles_and_what_they_pull():
 
 
 def test_what_rests_anywhere_is_said_to():
-    for mechanism in (PrescribedMotion(), Held(HangingMass(5.0))):
+    for mechanism in (PrescribedMotion(), WithLatch(HangingMass(5.0))):
         plant = Plant(chosen_muscle(), ClosedChamber(), mechanism)
-        inputs = {"held": 1.0} if plant.inputs == ("held",) else None
+        inputs = {"latched": 1.0} if plant.inputs == ("latched",) else None
         with pytest.raises(
             EquilibriumError, match=r"rests wherever it is.*plant.state_at\(pressure=..., position=...\)"
         ):
@@ -285,6 +285,6 @@ def test_a_state_at_three_pressures_of_two_muscles_is_refused():
 
 
 def test_an_input_beyond_its_range_is_refused():
-    valve = ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(80.0), muscles=2)
-    with pytest.raises(ParameterError, match=r"the input 'command' is 2; allowed are -1 to 1"):
+    valve = ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(80.0), muscle_count=2)
+    with pytest.raises(ParameterError, match=r"the input 'command' is 2; allowed range: -1 to 1"):
         find_equilibrium(Plant((LEFT, RIGHT), valve, JOINT), pressure=1e5, inputs={"command": 2.0})

@@ -32,7 +32,7 @@ from airmuscle.mechanism import (
     SpringLoad,
 )
 from airmuscle.mechanism.contact import HuntCrossley
-from airmuscle.muscle import LaggingWall, LinearSpring, SeriesSpring
+from airmuscle.muscle import LinearSpring, SeriesSpring, ViscoelasticWall
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, FillDischarge, ProportionalRegulator, Supply, Tube, Valve, WithTubes
 from airmuscle.pneumatics.gas import Ambient, Polytropic
@@ -52,7 +52,7 @@ OTHERS = {
         (TWO_VALVES, TWO_VALVES), JOINT.mechanism, Polytropic(1.2),
     ),
     "series spring and wall, held": Plant(
-        replace(chosen_muscle(), series=SeriesSpring(5e4), wall=LaggingWall(1e-12, 0.05)), TWO_VALVES, Isometric(0.1)
+        replace(chosen_muscle(), series=SeriesSpring(5e4), wall=ViscoelasticWall(1e-12, 0.05)), TWO_VALVES, Isometric(0.1)
     ),
     "no load on a spring": pulled(SpringLoad(5.0, 2000.0)),
 }  # fmt: skip

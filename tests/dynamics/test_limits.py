@@ -131,7 +131,7 @@ def test_at_no_flow_and_shut_valves_the_air_stays_but_for_rounding():
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9])
 def test_a_joint_between_equal_pressures_stays_where_it_is(rtol):
     muscles = tuple(replace(MUSCLE, name=name, friction=Dahl(1e5, 5.0)) for name in ("left", "right"))
-    valve = ProportionalValve(Supply(3e5), VALVE, VALVE, SecondOrderLag(50.0), 0.05, muscles=2)
+    valve = ProportionalValve(Supply(3e5), VALVE, VALVE, SecondOrderLag(50.0), 0.05, muscle_count=2)
     plant = Plant(muscles, valve, AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12))
     run = simulate(
         plant, ZERO_INPUT, duration=600.0, initial_state=find_equilibrium(plant, pressure=3e5), integrator=Rodas4(rtol)

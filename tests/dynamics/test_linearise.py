@@ -36,7 +36,7 @@ from airmuscle.simulation.integrators import Rodas4
 VALVE = Valve(2.6e-9, 0.433)
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))
 JOINT = AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12)
-PROPORTIONAL = ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(50.0), muscles=2)
+PROPORTIONAL = ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(50.0), muscle_count=2)
 HANGING = Plant(chosen_muscle(), FillDischarge(Supply(6e5), VALVE, VALVE), HangingMass(20.0))
 REGULATED = Plant(
     replace(chosen_muscle(), series=SeriesSpring(5e4)),
@@ -57,7 +57,14 @@ CASES = {
 def moving(plant, pressure=3e5):
     """A state away from rest and from kinks."""
     state = find_equilibrium(plant, pressure=pressure)
-    push = {"speed": 0.02, "angular_speed": 0.2, "spool": 0.1, "regulated": 8e3, "tube.air_mass": 1e-6, "bristle": 1e-6}
+    push = {
+        "speed": 0.02,
+        "angular_speed": 0.2,
+        "spool": 0.1,
+        "lagged_setpoint": 8e3,
+        "tube.air_mass": 1e-6,
+        "bristle": 1e-6,
+    }
     return {n: v + push.get(n, 0.0) for n, v in state.items()}
 
 
@@ -171,7 +178,7 @@ def test_an_own_system_is_linearised_like_a_plant():
         (lambda s: linearise(HANGING, {"position": 0.0}), "the start lacks air_mass, speed"),
         (lambda s: linearise(HANGING, {**s, "speed": float("nan")}), "must be finite"),
         (lambda s: linearise(HANGING, s, {"fil": 1.0}), "no input 'fil'"),
-        (lambda s: linearise(HANGING, s, {"fill": 1.5}), "the input 'fill' is 1.5; allowed are 0 to 1"),
+        (lambda s: linearise(HANGING, s, {"fill": 1.5}), "the input 'fill' is 1.5; allowed range: 0 to 1"),
         (lambda s: linearise(HANGING, s).select(outputs=("presure",)), "no output 'presure'.*Did you mean 'pressure'"),
         (lambda s: linearise(HANGING, s).frequency_response([-1.0]), "must be finite and not negative"),
         (lambda s: linearise(joint(), joint_start(joint()), {"fill": 1.0}), "no input 'fill'; there are left.fill"),

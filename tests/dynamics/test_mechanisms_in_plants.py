@@ -40,7 +40,7 @@ from airmuscle.pneumatics import (
     SecondOrderLag,
     SharedSupply,
     Supply,
-    ThreePosition,
+    ThreePositionValve,
     Tube,
     Valve,
     WithTubes,
@@ -70,7 +70,7 @@ MECHANISMS = {
 
 
 def pair(mechanism, gas=Polytropic(1.2), circuit=CIRCUIT):
-    muscles = (LEFT, RIGHT)[: mechanism.muscles or 2]
+    muscles = (LEFT, RIGHT)[: mechanism.muscle_count or 2]
     return Plant(muscles, (circuit,) * len(muscles), mechanism, gas)
 
 
@@ -218,7 +218,7 @@ def test_with_heat_it_is_too_but_that_air_that_leaves_a_muscle_flows_at_its_own_
     time constant; here its place is given.
     """
     system = joint(heat=True)
-    valve = ThreePosition(Supply(6e5), VALVE, VALVE)
+    valve = ThreePositionValve(Supply(6e5), VALVE, VALVE)
     plant = pair(JOINT, EnergyBalance(1.0), WithTubes(valve, TUBE))
     rng, directions = np.random.default_rng(2), set()
     for _ in range(50):
@@ -245,7 +245,7 @@ def test_with_heat_it_is_too_but_that_air_that_leaves_a_muscle_flows_at_its_own_
 
 def test_the_tubes_of_one_circuit_for_all_are_called_by_their_muscles():
     """Each tube belongs to a muscle, whose name it carries as it does where every muscle has a circuit of its own."""
-    valve = ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(80.0), muscles=2)
+    valve = ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(80.0), muscle_count=2)
     plant = Plant((LEFT, RIGHT), WithTubes(valve, Tube(VALVE, 1e-5, 2)), JOINT, Isothermal())
     of_tubes = [s.name for s in plant.states if "tube" in s.name]
     assert of_tubes == [f"{side}.tube{i}.air_mass" for side in ("left", "right") for i in (1, 2)]
@@ -283,13 +283,13 @@ def test_a_run_says_where_air_ran_too_fast_for_a_distributed_tube(nested):
 
 def test_two_tubes_of_one_name_are_refused():
     with pytest.raises(ParameterError, match=r"two of its parts use the name 'left.tube.air_mass'"):
-        pair(JOINT, Isothermal(), WithTubes(WithTubes(ThreePosition(Supply(6e5), VALVE, VALVE), TUBE), TUBE))
+        pair(JOINT, Isothermal(), WithTubes(WithTubes(ThreePositionValve(Supply(6e5), VALVE, VALVE), TUBE), TUBE))
 
 
 def test_one_five_port_valve_turns_a_joint_to_either_side():
     """Its command fills one muscle and discharges the other; changed over, the joint mirrors its motion."""
     valve = ProportionalValve(
-        Supply(6e5), Valve(2.6e-9, 0.433), Valve(2.6e-9, 0.433), SecondOrderLag(80.0), 0.05, muscles=2
+        Supply(6e5), Valve(2.6e-9, 0.433), Valve(2.6e-9, 0.433), SecondOrderLag(80.0), 0.05, muscle_count=2
     )
     plant = Plant((LEFT, RIGHT), valve, JOINT, EnergyBalance(0.5))
     start = find_equilibrium(plant, pressure=2.5e5)

@@ -121,7 +121,10 @@ class Forgetful(Silent):
 
 
 def test_a_constant_that_is_not_finite_names_the_law():
-    with pytest.raises(TraceError, match=r"Silent traced to a constant that is not finite. Use airmuscle.core.ops"):
+    with pytest.raises(
+        TraceError,
+        match=r"Silent: the traced expression contains a constant that is not finite. Use airmuscle.core.ops",
+    ):
         compile_system(Silent())
     with pytest.raises(TraceError, match=r"states are \['x'\], but rates are given for \[\]"):
         compile_system(Forgetful())
@@ -156,7 +159,7 @@ def test_where_two_numbers_are_equal_one_is_the_larger_and_the_other_the_smaller
 
 @pytest.mark.parametrize(
     ("value", "message"),
-    [(math.nan, "must be finite"), ("2", "must be a number"), (True, "must be a number"), (1e9, "allowed are")],
+    [(math.nan, "must be finite"), ("2", "must be a number"), (True, "must be a number"), (1e9, "allowed range: ")],
 )
 def test_a_parameter_is_checked_when_a_model_is_made(value, message):
     @model

@@ -33,11 +33,11 @@ from airmuscle.muscle import (
     CubicSpring,
     DirectionalDamper,
     EndStop,
-    LaggingWall,
     LinearDamper,
     PressureDamper,
-    RigidSeries,
+    RigidSeriesElement,
     SeriesSpring,
+    ViscoelasticWall,
 )
 from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
@@ -46,16 +46,16 @@ from airmuscle.pneumatics import (
     ClosedChamber,
     DistributedTube,
     FillDischarge,
-    IndexedValve,
     Manifold,
     ProportionalRegulator,
     ProportionalValve,
     RegulatedSupply,
     SecondOrderLag,
     SharedSupply,
+    SubsonicIndexValve,
     Supply,
     Tank,
-    ThreePosition,
+    ThreePositionValve,
     Tube,
     Valve,
     WithLeak,
@@ -84,9 +84,9 @@ class Drawer:
 
     def muscle(self, name):
         about, sometimes = self.about, lambda: self.rng.random() < 0.3
-        series = self.one_of(RigidSeries(), RigidSeries(), SeriesSpring(about(3e4)))
+        series = self.one_of(RigidSeriesElement(), RigidSeriesElement(), SeriesSpring(about(3e4)))
         frictions = [NoFriction(), Dahl(about(3e4), about(15.0)), MaxwellSlip((about(2e4), about(2e4)), (2e-4, 1e-3))]
-        if isinstance(series, RigidSeries):
+        if isinstance(series, RigidSeriesElement):
             frictions.append(LuGre(about(4e4), about(15.0), 5.0, 0.01, 50.0, 20.0))
         dampers = (
             LinearDamper(about(150.0)), PressureDamper(about(150.0), 2e-4),
@@ -96,7 +96,7 @@ class Drawer:
         for field, part in (
             ("stop", EndStop(self.rng.uniform(0.05, 0.15), HuntCrossley(about(3e8)))),
             ("creep", CreepElements((about(3e3),), (about(0.3),))),
-            ("wall", LaggingWall(about(1e-11), about(0.03))),
+            ("wall", ViscoelasticWall(about(1e-11), about(0.03))),
             ("spring", CubicSpring(about(1e3), 20.0)),
         ):
             if sometimes():
@@ -107,7 +107,7 @@ class Drawer:
         conductance = self.about(5e-9, 10.0)
         return self.one_of(
             Valve(conductance, self.rng.uniform(0.0, 0.6)),
-            IndexedValve(conductance, 0.3, self.rng.uniform(0.4, 0.7), self.one_of(0.0, 2e4)),
+            SubsonicIndexValve(conductance, 0.3, self.rng.uniform(0.4, 0.7), self.one_of(0.0, 2e4)),
             CheckValve(Valve(conductance, 0.3)),
         )
 
@@ -123,7 +123,7 @@ class Drawer:
         return self.around(
             self.one_of(
                 FillDischarge(supply, first, second),
-                ThreePosition(supply, first, second),
+                ThreePositionValve(supply, first, second),
                 ProportionalValve(supply, first, second, spool, self.rng.uniform(-0.1, 0.1)),
                 ProportionalRegulator(supply, first, second, spool),
                 FillDischarge(supply, first, second) if isinstance(supply, SharedSupply) else ClosedChamber(),

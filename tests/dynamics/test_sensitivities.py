@@ -29,7 +29,7 @@ PATHS = (
     "circuit.supply.pressure",
     "muscle.spring.stiffness",
     "muscle.damper.damping",
-    "muscle.damper.growth",
+    "muscle.damper.damping_slope",
     "mechanism.mass",
 )
 COMMAND = Schedule({"fill": ((0.5, 1.0), (2.0, 0.0)), "discharge": ((3.0, 1.0),)})

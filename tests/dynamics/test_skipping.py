@@ -26,7 +26,7 @@ from airmuscle.core.declaration import model, parameter
 from airmuscle.core.system import System
 from airmuscle.core.variables import StateVariable
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, ThreePosition, Valve
+from airmuscle.pneumatics import FillDischarge, Supply, ThreePositionValve, Valve
 from airmuscle.simulation.batch import simulate_batch
 from airmuscle.simulation.integrators import RungeKutta4
 
@@ -167,7 +167,7 @@ def test_a_shut_valve_and_a_box_not_left_are_skipped() -> None:
     assert {len(item.gates) for item in items if isinstance(item, Branch)} == {1}
 
 
-@pytest.mark.parametrize("circuit", [FillDischarge, ThreePosition])
+@pytest.mark.parametrize("circuit", [FillDischarge, ThreePositionValve])
 def test_plant_has_the_rates_and_slopes_that_it_has_without_branches(circuit: Any) -> None:
     """At shut and open valves, within the validity range of the surface, on its edges and beyond them."""
     system = plant(circuit)

@@ -22,7 +22,7 @@ from airmuscle.mechanism import AntagonisticJoint, HangingMass, Isometric, Lever
 from airmuscle.muscle import LinearSpring, Muscle, SeriesSpring
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber
-from airmuscle.pneumatics.gas import HEAT_CAPACITY_RATIO, EnergyBalance, Isothermal, Polytropic, absolute
+from airmuscle.pneumatics.gas import HEAT_CAPACITY_RATIO, EnergyBalance, Isothermal, Polytropic, absolute_pressure
 from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
 
@@ -67,12 +67,12 @@ def test_both_are_their_formulas(gas, exponent, pressure, contraction):
     plant = Plant(MUSCLE, ClosedChamber(), Isometric(contraction), gas)
     found = stiffness(plant, plant.state_at(pressure=pressure))
     area, growth, volume = (
-        VirtualWork(BRAID).area(contraction),
-        BRAID.volume_growth(contraction),
+        VirtualWork(BRAID).effective_area(contraction),
+        BRAID.volume_derivative(contraction),
         BRAID.volume(contraction),
     )
     at_pressure = MUSCLE.stiffness(pressure, contraction)
-    following = area * exponent * absolute(pressure, plant.ambient) / volume * growth
+    following = area * exponent * absolute_pressure(pressure, plant.ambient) / volume * growth
     assert found.muscles["muscle"].constant_pressure == pytest.approx(at_pressure, rel=1e-9)
     assert found.muscles["muscle"].shut_valves == pytest.approx(at_pressure + following, rel=1e-9)
     assert found.per_metre["muscle"] == pytest.approx([k / 0.2 for k in found.muscles["muscle"]])

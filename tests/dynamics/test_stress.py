@@ -17,7 +17,7 @@ from airmuscle.control.with_drivers import WithDrivers
 from airmuscle.friction import LuGre, MaxwellSlip
 from airmuscle.mechanism import HangingMass
 from airmuscle.mechanism.contact import HuntCrossley
-from airmuscle.muscle import CreepElements, DirectionalDamper, EndStop, LaggingWall, SeriesSpring
+from airmuscle.muscle import CreepElements, DirectionalDamper, EndStop, SeriesSpring, ViscoelasticWall
 from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import DistributedTube, FillDischarge, RegulatedSupply, Supply, Tank, Tube, Valve, WithTubes
@@ -45,12 +45,12 @@ def drawn(seed):
         friction=friction[seed % 2],
         stop=EndStop(rng.uniform(0.1, 0.14), HuntCrossley(about(3e8))),
         creep=CreepElements((about(3e3),), (about(0.3),)),
-        wall=LaggingWall(about(1e-11), about(0.03)),
+        wall=ViscoelasticWall(about(1e-11), about(0.03)),
     )
     heat = EnergyBalance(about(0.5))
     supply = RegulatedSupply(Tank(Supply(about(7e5, 1.1)), Valve(5e-9, 0.3), 2e-3, heat), Valve(4e-8, 0.3), 5e5)
     valves = FillDischarge(supply, Valve(about(1.5e-8, 1.3), 0.4), Valve(about(3e-8, 1.3), 0.3))
-    tube = Tube.of_size(about(0.5), about(5e-3, 1.3), 2, heat)
+    tube = Tube.from_dimensions(about(0.5), about(5e-3, 1.3), 2, heat)
     plant = Plant(muscle, WithTubes(valves, tube), HangingMass(about(20.0, 1.3)), heat)
     return plant, switched(rng)
 

@@ -21,7 +21,7 @@ from airmuscle.geometry.braid import Braid
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import CheckValve, FillDischarge, IndexedValve, Orifice, Supply, Valve
+from airmuscle.pneumatics import CheckValve, FillDischarge, Orifice, SubsonicIndexValve, Supply, Valve
 from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, Ambient, Isothermal
 from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
@@ -67,12 +67,14 @@ def test_the_vessel_fills_as_the_closed_form_says(b: float, start: float):
 
 
 def test_the_general_law_fills_it_alike():
-    plain, general = (filled(law, 1e5, 2.0)[1] for law in (Valve(CONDUCTANCE, 0.3), IndexedValve(CONDUCTANCE, 0.3)))
+    plain, general = (
+        filled(law, 1e5, 2.0)[1] for law in (Valve(CONDUCTANCE, 0.3), SubsonicIndexValve(CONDUCTANCE, 0.3))
+    )
     assert general == pytest.approx(plain, rel=1e-6)
 
 
 def test_through_a_cracking_check_valve_it_stops_short_of_the_supply_and_does_not_empty():
-    check = CheckValve(IndexedValve(CONDUCTANCE, 0.3, 0.55, 30e3))
+    check = CheckValve(SubsonicIndexValve(CONDUCTANCE, 0.3, 0.55, 30e3))
     _, filling = filled(check, 1e5, 60.0)
     assert filling[-1] == pytest.approx(SOURCE - 30e3, rel=1e-4)
     assert filling.max() <= SOURCE - 30e3 + 1.0

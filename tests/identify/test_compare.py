@@ -18,13 +18,13 @@ from typer.testing import CliRunner
 import airmuscle as am
 from airmuscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.cli.app import app
-from airmuscle.cli.fit_options import part_of
+from airmuscle.cli.fit_options import parse_split
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify import BlockSplit, Candidate, LevelSplit, RunSplit, SpecimenSplit, compare
-from airmuscle.identify.candidates import surface
-from airmuscle.identify.cross_validation import KEPT, natural
-from airmuscle.identify.force_of import force_of
+from airmuscle.identify.candidates import blank_surface
+from airmuscle.identify.cross_validation import ALWAYS_FITTED, default_split
+from airmuscle.identify.force_evaluation import evaluate_force
 from airmuscle.recording import Recording, write_csv
 
 TRUTH = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
@@ -48,29 +48,29 @@ def bench() -> list[Recording]:
 
 CANDIDATES = (
     Candidate("braid", START),
-    Candidate("surface of degree 2", surface(2)),
-    Candidate("surface of degree 5", surface(5)),
-    Candidate("surface of degree 6", surface(6)),
+    Candidate("surface of degree 2", blank_surface(2)),
+    Candidate("surface of degree 5", blank_surface(5)),
+    Candidate("surface of degree 6", blank_surface(6)),
 )
 
 
 def test_the_order_in_sample_is_not_the_order_on_what_was_left_out():
     found = compare(bench(), CANDIDATES, leave_out=RunSplit())
-    in_sample = min(found.contenders, key=lambda c: c.in_sample)
+    in_sample = min(found.ranking, key=lambda c: c.in_sample_rmse)
     assert in_sample.candidate.name == "surface of degree 5"
-    assert found["surface of degree 5"].in_sample < 0.8 * found["braid"].in_sample
-    assert found["surface of degree 5"].cross_validated > 2 * found["braid"].cross_validated
+    assert found["surface of degree 5"].in_sample_rmse < 0.8 * found["braid"].in_sample_rmse
+    assert found["surface of degree 5"].cross_validated_rmse > 2 * found["braid"].cross_validated_rmse
     assert found.recommended.candidate.name == "braid"
     assert "3 parameters" in found.reason
-    assert [c.cross_validated for c in found.contenders] == sorted(c.cross_validated for c in found.contenders)
+    assert [c.cross_validated_rmse for c in found.ranking] == sorted(c.cross_validated_rmse for c in found.ranking)
 
 
 def test_what_is_not_determined_is_excluded_with_its_reason():
     found = compare(bench(), CANDIDATES, leave_out=RunSplit())
     assert [e.name for e in found.excluded] == ["surface of degree 6"]
-    assert "run 0.000" in found.excluded[0].why
-    assert "levels" in found.excluded[0].why
-    assert "degree" in found.excluded[0].why
+    assert "run 0.000" in found.excluded[0].reason
+    assert "levels" in found.excluded[0].reason
+    assert "degree" in found.excluded[0].reason
 
 
 def test_a_part_left_out_is_not_among_the_points_of_its_fit():
@@ -78,7 +78,7 @@ def test_a_part_left_out_is_not_among_the_points_of_its_fit():
     runs = bench()
     ruined = runs[3].with_columns(force=runs[3]["force"] + 500.0)
     found = compare([*runs[:3], ruined, *runs[4:]], CANDIDATES[:1], leave_out=RunSplit())
-    errors = {part.part: part.rms for part in found.recommended.left_out}
+    errors = {part.fold: part.rmse for part in found.recommended.fold_scores}
     clean = fit_without(runs, 3)
     assert errors["run 0.100"] == pytest.approx(clean, rel=1e-6)
 
@@ -103,18 +103,18 @@ def test_aicc_is_hurvich_and_tsais():
     n, k = 210, 4
     pulls = sum(int((run["force"] > 0).sum()) for run in bench())
     assert pulls == n
-    expected = n * np.log(contender.in_sample**2) + 2 * k + 2 * k * (k + 1) / (n - k - 1)
+    expected = n * np.log(contender.in_sample_rmse**2) + 2 * k + 2 * k * (k + 1) / (n - k - 1)
     assert contender.aicc == pytest.approx(expected, rel=1e-12)
 
 
 def test_what_is_left_out_by_itself_is_the_widest_that_there_are_three_of():
     runs = bench()
-    assert natural(runs) == RunSplit()
-    assert natural([run.with_constants(specimen=run.origin) for run in runs]) == SpecimenSplit()
+    assert default_split(runs) == RunSplit()
+    assert default_split([run.with_constants(specimen=run.origin) for run in runs]) == SpecimenSplit()
     whole = Recording({n: np.concatenate([r[n] for r in runs]) for n in ("pressure", "contraction", "force")}, "whole")
-    assert natural([whole]) == LevelSplit("contraction")
+    assert default_split([whole]) == LevelSplit("contraction")
     with pytest.raises(IdentificationError, match="more levels"):
-        natural([runs[0].rows(slice(0, 2))])
+        default_split([runs[0].rows(slice(0, 2))])
 
 
 def test_levels_are_what_was_held():
@@ -130,9 +130,9 @@ def test_laws_of_every_direction_are_judged_in_force():
     law = Hunt2017(0.2)
     pressure, force = np.meshgrid(np.linspace(2e5, 6e5, 9), np.linspace(5.0, 300.0, 9))
     contraction = law.contraction(pressure.ravel(), force.ravel())
-    found = force_of(law, pressure.ravel(), contraction, 1000.0)
+    found = evaluate_force(law, pressure.ravel(), contraction, 1000.0)
     assert found == pytest.approx(force.ravel(), abs=0.02)
-    assert force_of(law, np.array([1e5]), np.array([0.2]), 1000.0) == 0.0
+    assert evaluate_force(law, np.array([1e5]), np.array([0.2]), 1000.0) == 0.0
 
 
 def labelled(run: Recording, how) -> list[str]:
@@ -141,19 +141,19 @@ def labelled(run: Recording, how) -> list[str]:
 
 def test_blocks_leave_stretches_of_every_run_out_and_keep_its_ends():
     run = isometric(0.1, seed=1, rows=100)
-    labels = labelled(run, BlockSplit(count=4))
+    labels = labelled(run, BlockSplit(folds=4))
     shares = (run["pressure"] - run["pressure"].min()) / np.ptp(run["pressure"])
     inside = (shares >= 1 / 8) & (shares < 7 / 8)
-    assert [label == KEPT for label in labels] == (~inside).tolist()
+    assert [label == ALWAYS_FITTED for label in labels] == (~inside).tolist()
     stretch = (8 * shares[inside]).astype(int)
-    assert [label for label in labels if label != KEPT] == [f"block {s % 4 + 1}" for s in stretch]
-    two = BlockSplit(count=4).labels([run, run])
-    assert all(a == KEPT or a != b for a, b in zip(*two, strict=True))
+    assert [label for label in labels if label != ALWAYS_FITTED] == [f"block {s % 4 + 1}" for s in stretch]
+    two = BlockSplit(folds=4).labels([run, run])
+    assert all(a == ALWAYS_FITTED or a != b for a, b in zip(*two, strict=True))
     found = compare(bench(), CANDIDATES[:1], leave_out=BlockSplit())
-    rows = sum(part.rows for part in found.recommended.left_out)
-    assert rows == int((np.concatenate(BlockSplit().labels(bench())) != KEPT).sum())
+    rows = sum(part.rows for part in found.recommended.fold_scores)
+    assert rows == int((np.concatenate(BlockSplit().labels(bench())) != ALWAYS_FITTED).sum())
     with pytest.raises(ParameterError, match="2 or more"):
-        BlockSplit(count=1)
+        BlockSplit(folds=1)
 
 
 def test_what_is_left_out_decides_what_the_law_is_for():
@@ -168,7 +168,10 @@ def test_what_is_left_out_decides_what_the_law_is_for():
             force = inner.polynomial(pressure, held) + bend * np.sin(45 * held) + 1.0 * random.standard_normal(25)
             columns = {"pressure": pressure, "contraction": held, "force": force}
             runs.append(Recording(columns, f"run {len(runs)}", {"resting_length": length, "specimen": f"{length} m"}))
-    candidates = [Candidate("plain", surface(1)), Candidate("rich", InverseLength(surface(5), surface(3), 0.4, 0.4))]
+    candidates = [
+        Candidate("plain", blank_surface(1)),
+        Candidate("rich", InverseLength(blank_surface(5), blank_surface(3), 0.4, 0.4)),
+    ]
     within, beyond = (compare(runs, candidates, leave_out=how) for how in (BlockSplit(), SpecimenSplit()))
     assert (within.recommended.candidate.name, beyond.recommended.candidate.name) == ("rich", "plain")
     assert within.purpose in within.reason
@@ -182,7 +185,7 @@ def test_what_is_left_out_decides_what_the_law_is_for():
     [("run", RunSplit()), ("specimen", SpecimenSplit()), ("block", BlockSplit()), ("pressure", LevelSplit("pressure"))],
 )
 def test_the_command_knows_each_way_by_a_word(word: str, how):
-    assert part_of(word) == how
+    assert parse_split(word) == how
 
 
 def test_each_way_of_leaving_out_has_a_purpose_of_its_own():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from airmuscle.identify.dynamic.levenberg_marquardt import descended, step_within
+from airmuscle.identify.dynamic.levenberg_marquardt import bounded_step, minimise
 
 FREE = np.full(2, -np.inf), np.full(2, np.inf)
 
@@ -33,7 +33,7 @@ def valley(x):
 
 @pytest.mark.parametrize("begin", [(-1.2, 1.0), (3.0, -2.0), (0.1, 0.1)])
 def test_a_curved_valley_is_followed_to_its_end(begin):
-    found, cost, _ = descended(rosenbrock, np.array(begin), *FREE, 200)
+    found, cost, _ = minimise(rosenbrock, np.array(begin), *FREE, 200)
     np.testing.assert_allclose(found, [1.0, 1.0], atol=1e-8)
     assert cost < 1e-16
 
@@ -50,7 +50,7 @@ def test_the_optimum_is_that_of_trf(low, high):
         asked.append(x)
         return decay(x)
 
-    found, cost, ended = descended(counted, begin, *ends, 200)
+    found, cost, ended = minimise(counted, begin, *ends, 200)
     assert ended
     assert len(asked) <= 12
     expected = least_squares(
@@ -61,7 +61,7 @@ def test_the_optimum_is_that_of_trf(low, high):
 
 
 def test_what_is_not_determined_does_not_hinder():
-    found, cost, _ = descended(valley, np.array([5.0, -1.0]), *FREE, 100)
+    found, cost, _ = minimise(valley, np.array([5.0, -1.0]), *FREE, 100)
     assert found.sum() == pytest.approx(3.2)
     assert cost == pytest.approx(0.05)
 
@@ -74,11 +74,11 @@ def test_a_place_that_cannot_be_run_is_gone_round():
         asked.append(float(x[0]))
         return (np.exp(x) - 1, np.exp(x)[:, None]) if x[0] < 0.01 else None
 
-    found, cost, _ = descended(residuals, np.array([-2.0]), np.array([-9.0]), np.array([9.0]), 200)
+    found, cost, _ = minimise(residuals, np.array([-2.0]), np.array([-9.0]), np.array([9.0]), 200)
     assert found[0] == pytest.approx(0.0, abs=1e-8)
     assert cost < 1e-16
     assert max(asked) > 0.01
-    assert descended(residuals, np.array([2.0]), np.array([-9.0]), np.array([9.0]), 200)[1] == np.inf
+    assert minimise(residuals, np.array([2.0]), np.array([-9.0]), np.array([9.0]), 200)[1] == np.inf
 
 
 def test_no_more_is_asked_than_allowed():
@@ -88,7 +88,7 @@ def test_no_more_is_asked_than_allowed():
         asked.append(x)
         return rosenbrock(x)
 
-    assert not descended(counted, np.array([-1.2, 1.0]), *FREE, 5).ended
+    assert not minimise(counted, np.array([-1.2, 1.0]), *FREE, 5).finished
     assert len(asked) == 5
 
 
@@ -101,7 +101,7 @@ def test_what_hardly_matters_does_not_keep_the_others_from_going():
         asked.append(x)
         return columns @ (x - np.array([1.5, 0.5, 100.0])), columns
 
-    found, _, ended = descended(residuals, np.ones(3), np.zeros(3), np.full(3, np.inf), 60)
+    found, _, ended = minimise(residuals, np.ones(3), np.zeros(3), np.full(3, np.inf), 60)
     assert ended
     np.testing.assert_allclose(asked[1][:2], [1.5, 0.5], atol=0.02)
     assert asked[1][2] <= 1.71
@@ -123,10 +123,10 @@ def test_jumps_of_the_sum_do_not_hinder_its_end(seed):
         asked.append(x)
         return errors * (1 + 1e-6 * _place(x, seed).uniform(-1, 1)), slopes
 
-    found, _, ended = descended(jumping, np.array([0.8, 3.0]), *FREE, 200)
+    found, _, ended = minimise(jumping, np.array([0.8, 3.0]), *FREE, 200)
     assert ended
     assert len(asked) <= 6
-    np.testing.assert_allclose(found, descended(decay, np.array([0.8, 3.0]), *FREE, 200).x, atol=1e-8)
+    np.testing.assert_allclose(found, minimise(decay, np.array([0.8, 3.0]), *FREE, 200).x, atol=1e-8)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -139,7 +139,7 @@ def test_nor_do_jumps_of_the_place_where_it_is_least(seed):
         asked.append(x)
         return errors + slopes @ (3e-6 * _place(x, seed).uniform(-1, 1, 2)), slopes
 
-    assert descended(jumping, np.array([0.8, 3.0]), *FREE, 200).ended
+    assert minimise(jumping, np.array([0.8, 3.0]), *FREE, 200).finished
     assert len(asked) <= 15
 
 
@@ -152,7 +152,7 @@ def test_a_place_much_worse_than_promised_is_not_taken_for_a_jump():
         errors, slopes = decay(x)
         return errors * (2 if len(asked) == 5 else 1), slopes
 
-    found, cost, ended = descended(residuals, np.array([0.8, 3.0]), *FREE, 200)
+    found, cost, ended = minimise(residuals, np.array([0.8, 3.0]), *FREE, 200)
     assert ended
     assert len(asked) > 5
     assert cost == pytest.approx(float(decay(found)[0] @ decay(found)[0]), rel=1e-9)
@@ -160,7 +160,7 @@ def test_a_place_much_worse_than_promised_is_not_taken_for_a_jump():
 
 def test_slopes_too_steep_to_be_squared_end_the_search():
     with np.errstate(all="ignore"):
-        assert descended(lambda x: (np.ones(2), np.full((2, 2), 1e200)), np.ones(2), *FREE, 50).ended
+        assert minimise(lambda x: (np.ones(2), np.full((2, 2), 1e200)), np.ones(2), *FREE, 50).finished
 
 
 def test_what_was_refused_is_not_asked_again():
@@ -171,7 +171,7 @@ def test_what_was_refused_is_not_asked_again():
         asked.append(tuple(x))
         return (x - 50.0, np.eye(2)) if (x < 1.6).all() else None
 
-    assert not descended(residuals, np.ones(2), *FREE, 12).ended
+    assert not minimise(residuals, np.ones(2), *FREE, 12).finished
     assert len(set(asked)) == len(asked) == 12
 
 
@@ -184,7 +184,7 @@ def test_a_step_onto_a_bound_is_the_best_within_it():
     low, high = np.full(3, -9.0), np.full(3, 9.0)
     high[np.argmax(np.abs(whole))] = low[np.argmax(np.abs(whole))] = 0.3 * whole[np.argmax(np.abs(whole))]
     low, high = np.where(whole < 0, low, -9.0), np.where(whole < 0, 9.0, high)
-    found = step_within(normal, gradient, np.zeros(3), x, low, high)
+    found = bounded_step(normal, gradient, np.zeros(3), x, low, high)
     held = np.argmax(np.abs(whole))
     assert found[held] == pytest.approx(0.3 * whole[held])
     np.testing.assert_allclose(np.delete(gradient + normal @ found, held), 0.0, atol=1e-12)

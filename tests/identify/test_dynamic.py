@@ -20,11 +20,11 @@ from airmuscle.geometry import Vessel
 from airmuscle.identify.dynamic import (
     Experiment,
     InitialConditions,
+    InitialValue,
     StartTime,
-    StartValue,
+    analyse_identifiability,
     fit_dynamic,
-    identifiable,
-    where_sensed,
+    locate_pressure_sensor,
 )
 from airmuscle.mechanism import HangingMass, Isometric
 from airmuscle.muscle import Muscle, SwellingWall
@@ -83,7 +83,7 @@ def rigid_plant():
 
 def rigid_fill(plant, seed=3):
     command = Schedule({"fill": ((0.0, 1.0),)})
-    start = InitialConditions.held(plant, 0.0)
+    start = InitialConditions.at_coordinates(plant, 0.0)
     run = simulate(plant, command, duration=1.0, initial_state=plant.state_at(pressure=0.0), output_times=0.005)
     return Experiment(noisy(run, seed, pressure=300.0), command, start)
 
@@ -101,7 +101,12 @@ def test_what_the_simulation_used_is_found_within_the_stated_bands():
         muscle__spring__stiffness=0.8,
     )  # fmt: skip
     fit = fit_dynamic(
-        start, experiments, free=FREE, own=("circuit.supply.pressure", StartTime(0.05)), observed=SENSORS, starts=4
+        start,
+        experiments,
+        free=FREE,
+        per_record=("circuit.supply.pressure", StartTime(0.05)),
+        observed=SENSORS,
+        starts=4,
     )
     expected = [truth(plants[0], e.name) for e in fit.estimates[:7]]
     expected += [
@@ -115,7 +120,7 @@ def test_what_the_simulation_used_is_found_within_the_stated_bands():
     squared = distance @ np.linalg.solve(fit.correlations, distance)
     assert 1.83 < squared < 31.3  # 0.1 % and 99.9 % of chi squared with eleven degrees of freedom
     assert fit.residual_std == pytest.approx(1.0, abs=0.06)
-    assert fit.reached >= 2
+    assert fit.starts_at_optimum >= 2
     assert fit.rms("pressure", 1) == pytest.approx(500.0, rel=0.1)
     assert all(e.stderr < 0.05 * e.value for e in fit.estimates[:7])
 
@@ -140,7 +145,7 @@ def test_conductance_against_volume_is_named_with_the_experiment_that_separates_
     (found,) = fit.identifiability.undetermined
     assert {name for name, _ in found.shares} == set(free)
     assert [share for _, share in found.shares] == pytest.approx([1.0, 1.0], abs=1e-3)
-    assert "rigid vessel of known volume" in found.experiment
+    assert "rigid vessel of known volume" in found.remedy
     assert "cannot tell apart" in str(fit)
     assert fit.identifiability.rank == 1
     assert all(np.isnan(e.stderr) for e in fit.estimates)
@@ -168,9 +173,9 @@ def test_a_parameter_that_nothing_depends_on_is_named():
 
 def test_singular_values_of_a_known_design():
     """Columns (1, 0) and (1, 1e-3): singular values sqrt(2) and about 1e-3/sqrt(2), direction (1, -1)."""
-    found = identifiable(np.array([[1.0, 1.0], [0.0, 1e-3]]), ["a", "b"], np.ones(2))
-    assert found.singular == pytest.approx([np.sqrt(2), 1e-3 / np.sqrt(2)], rel=1e-5)
-    assert found.undetermined[0].deviation == pytest.approx(1e3 * np.sqrt(2), rel=1e-5)
+    found = analyse_identifiability(np.array([[1.0, 1.0], [0.0, 1e-3]]), ["a", "b"], np.ones(2))
+    assert found.singular_values == pytest.approx([np.sqrt(2), 1e-3 / np.sqrt(2)], rel=1e-5)
+    assert found.undetermined[0].relative_stderr == pytest.approx(1e3 * np.sqrt(2), rel=1e-5)
     assert dict(found.undetermined[0].shares)["a"] == pytest.approx(-dict(found.undetermined[0].shares)["b"], rel=1e-3)
 
 
@@ -184,7 +189,7 @@ def test_a_profile_agrees_with_the_standard_deviation_where_the_problem_is_nearl
     found, estimate = fit.profile("circuit.fill.critical_ratio", 6), fit["circuit.fill.critical_ratio"]
     low, high = found.interval
     assert high - low == pytest.approx(2 * 1.96 * estimate.stderr, rel=0.1)
-    assert found.growth.min() == 0.0
+    assert found.cost_increase.min() == 0.0
 
 
 def test_a_profile_of_what_is_not_determined_is_open():
@@ -193,16 +198,16 @@ def test_a_profile_of_what_is_not_determined_is_open():
     fit = fit_dynamic(plant, [rigid_fill(plant)], free=free, observed={"pressure": 300.0})
     found = fit.profile("circuit.fill.conductance", 3)
     assert np.isnan(found.interval).all()
-    assert found.growth.max() < 0.1
+    assert found.cost_increase.max() < 0.1
 
 
 def test_the_start_pressure_is_a_nuisance():
     plant = rigid_plant()
     command = Schedule({"fill": ((0.0, 1.0),)})
     run = simulate(plant, command, duration=0.5, initial_state=plant.state_at(pressure=40e3), output_times=0.005)
-    wrong = Experiment(noisy(run, 1, pressure=300.0), command, InitialConditions.held(plant, 36e3))
+    wrong = Experiment(noisy(run, 1, pressure=300.0), command, InitialConditions.at_coordinates(plant, 36e3))
     fit = fit_dynamic(
-        plant, [wrong], free=("circuit.fill.conductance",), own=(StartValue("pressure", 8e3),),
+        plant, [wrong], free=("circuit.fill.conductance",), per_record=(InitialValue("pressure", 8e3),),
         observed={"pressure": 300.0},
     )  # fmt: skip
     found = fit["start pressure of record 1"]
@@ -214,8 +219,8 @@ def test_the_derivative_of_a_start_at_rest_is_that_of_the_equilibrium():
     plant = moving()
     start, path = InitialConditions.at_rest(plant, 2e5), "muscle.spring.stiffness"
     experiment = Experiment(simulate(plant, FILL, duration=0.1), FILL, start)
-    fit = fit_dynamic(plant, [experiment], free=(path,), own=(StartValue("pressure", 1e4),), observed=SENSORS)
-    state, slopes = fit.problem.courses[0].start(np.array([4000.0, 2e5]))
+    fit = fit_dynamic(plant, [experiment], free=(path,), per_record=(InitialValue("pressure", 1e4),), observed=SENSORS)
+    state, slopes = fit.problem.record_models[0].initial_state(np.array([4000.0, 2e5]))
     up, down = (find_equilibrium(changed(plant, muscle__spring__stiffness=f), pressure=2e5) for f in (1.001, 0.999))
     higher, lower = (find_equilibrium(plant, pressure=p) for p in (2e5 + 100, 2e5 - 100))
     for i, name in enumerate(s.name for s in plant.states):
@@ -236,16 +241,16 @@ def free_muscle(lag=0.2, tube=3e-5):
 
 def free_fill(plant, sensed, seed=2, first=1e4):
     run = simulate(plant, OPEN, duration=2.0, initial_state=plant.state_at(pressure=first), output_times=0.005)
-    return Experiment(noisy(run, seed, **{sensed: 500.0}), OPEN, InitialConditions.held(plant, first))
+    return Experiment(noisy(run, seed, **{sensed: 500.0}), OPEN, InitialConditions.at_coordinates(plant, first))
 
 
 def test_line_and_muscle_are_told_from_a_sensor_in_the_line():
     plant = free_muscle()
     valve, line, wall = "circuit.circuit.fill", "circuit.tube", "muscle.wall"
     free = (f"{valve}.conductance", f"{valve}.critical_ratio", f"{line}.volume", f"{line}.orifice.conductance",
-            f"{wall}.growth_volume", f"{wall}.lag")  # fmt: skip
+            f"{wall}.growth_volume", f"{wall}.time_constant")  # fmt: skip
     guess = changed(plant, circuit__tube__volume=1.5, circuit__tube__orifice__conductance=0.8,
-                    muscle__wall__lag=0.6, muscle__wall__growth_volume=1.4)  # fmt: skip
+                    muscle__wall__time_constant=0.6, muscle__wall__growth_volume=1.4)  # fmt: skip
     fit = fit_dynamic(
         guess, [free_fill(plant, "tube.pressure")], free=free, observed={"tube.pressure": 500.0}, starts=3
     )
@@ -268,29 +273,29 @@ def test_a_fill_tells_whether_it_was_sensed_before_the_muscle(sensed):
     lone = dataclasses.replace(free_muscle(lag=0.005), circuit=plant.circuit.circuit)
     valve, wall = "circuit.fill", "muscle.wall"
     inside = fit_dynamic(
-        lone, [Experiment(recording, OPEN, InitialConditions.held(lone, 1e4))], observed={"pressure": 500.0}, starts=3,
-        free=(f"{valve}.conductance", f"{valve}.critical_ratio", f"{wall}.growth_volume", f"{wall}.middle"),
+        lone, [Experiment(recording, OPEN, InitialConditions.at_coordinates(lone, 1e4))], observed={"pressure": 500.0}, starts=3,
+        free=(f"{valve}.conductance", f"{valve}.critical_ratio", f"{wall}.growth_volume", f"{wall}.midpoint_pressure"),
         bounds={f"{valve}.critical_ratio": (0.1, 0.6), f"{wall}.growth_volume": (0.0, 2e-4)},
     )  # fmt: skip
     line = ("circuit.circuit.fill.conductance", "circuit.tube.volume", "circuit.tube.orifice.conductance")
     before = fit_dynamic(
-        plant, [Experiment(recording, OPEN, record.start)], free=line, observed={"tube.pressure": 500.0}
+        plant, [Experiment(recording, OPEN, record.initial_conditions)], free=line, observed={"tube.pressure": 500.0}
     )
-    found = where_sensed(inside=inside, before=before)
-    assert found.before_muscle == (sensed == "tube.pressure")
-    assert str(found).startswith("looks sensed before the muscle") == (sensed == "tube.pressure")
-    assert inside.rms("pressure") == found.inside
-    assert found.rise == np.ptp(values)
+    found = locate_pressure_sensor(in_muscle=inside, in_line=before)
+    assert found.is_upstream == (sensed == "tube.pressure")
+    assert str(found).startswith("the sensor is probably upstream of the muscle") == (sensed == "tube.pressure")
+    assert inside.rms("pressure") == found.rms_in_muscle
+    assert found.pressure_rise == np.ptp(values)
     other = dataclasses.replace(record, recording=noisy(record.recording, 3, **{sensed: 1.0}))
     elsewhere = fit_dynamic(plant, [other], free=line, observed={sensed: 500.0})
     with pytest.raises(IdentificationError, match="different rows"):
-        where_sensed(inside=inside, before=elsewhere)
+        locate_pressure_sensor(in_muscle=inside, in_line=elsewhere)
 
 
 def test_the_heat_through_the_wall_is_found_from_the_pressure_of_a_fill_and_a_hold():
     """After the valve shuts the warm air cools, and its pressure falls with a time constant m c_v/(hA)."""
     plant = dataclasses.replace(rigid_plant(), gas=EnergyBalance(0.5))
-    command, start = Schedule({"fill": ((0.0, 1.0), (0.4, 0.0))}), InitialConditions.held(plant, 0.0)
+    command, start = Schedule({"fill": ((0.0, 1.0), (0.4, 0.0))}), InitialConditions.at_coordinates(plant, 0.0)
     run = simulate(plant, command, duration=1.5, initial_state=plant.state_at(pressure=0.0), output_times=0.005)
     record = Experiment(noisy(run, 4, pressure=300.0), command, start)
     free = ("gas.heat_transfer", "circuit.fill.conductance")
@@ -304,12 +309,12 @@ def test_the_heat_through_the_wall_is_found_from_the_pressure_of_a_fill_and_a_ho
 def test_a_leak_is_found_from_a_hold_with_shut_valves():
     plant = rigid_plant()
     plant = dataclasses.replace(plant, circuit=WithLeak(plant.circuit, Valve(2e-11, 0.3)))
-    rest, start = Schedule({}), InitialConditions.held(plant, 3e5)
+    rest, start = Schedule({}), InitialConditions.at_coordinates(plant, 3e5)
     run = simulate(plant, rest, duration=10.0, initial_state=plant.state_at(pressure=3e5), output_times=0.05)
     record = Experiment(noisy(run, 8, pressure=300.0), rest, start)
     guess = changed(plant, circuit__leak__conductance=4.0)
     fit = fit_dynamic(guess, [record], free=("circuit.leak.conductance",), observed={"pressure": 300.0},
-                      own=(StartValue("pressure", 2e4),))  # fmt: skip
+                      per_record=(InitialValue("pressure", 2e4),))  # fmt: skip
     leak = fit["circuit.leak.conductance"]
     assert abs(leak.value - 2e-11) < 3.5 * leak.stderr
     assert leak.stderr < 0.02 * leak.value
@@ -346,7 +351,7 @@ def test_model_error_is_called_so():
         ({"bounds": {"gas.exponent": (1.0, 2.0)}}, "bounds of 'gas.exponent', which is not free"),
         ({"bounds": {"circuit.fill.conductance": (1e-8, 1e-7)}}, "its bounds are 1e-08 to 1e-07"),
         ({"free": ()}, "nothing is free"),
-        ({"own": (StartValue("presure", 1.0),)}, "does not take 'presure' as known"),
+        ({"per_record": (InitialValue("presure", 1.0),)}, "does not take 'presure' as known"),
         ({"starts": 0}, "one start"),
         ({"observed": {"pressure": 0.0}}, "must be positive"),
     ],
@@ -370,7 +375,11 @@ def test_records_that_cannot_be_used_are_refused():
     with pytest.raises(IdentificationError, match="1 readings cannot determine 1 unknowns"):
         fit_dynamic(plant, [short], **question)
     with pytest.raises(ParameterError, match="as many conditions as there are states"):
-        fit_dynamic(plant, [dataclasses.replace(record, start=InitialConditions({}, {"air_mass": 1e-4}))], **question)
+        fit_dynamic(
+            plant,
+            [dataclasses.replace(record, initial_conditions=InitialConditions({}, {"air_mass": 1e-4}))],
+            **question,
+        )
 
 
 @pytest.mark.parametrize(
@@ -385,7 +394,7 @@ def test_a_start_that_does_not_exist_is_refused(known, still, message):
     """Conditions that say one thing twice; a pressure below absolute zero; rest under a load that nothing bears."""
     plant = dataclasses.replace(moving(), mechanism=HangingMass(1e5))
     record = dataclasses.replace(
-        recorded(moving(), 1), start=InitialConditions(known, moving().state_at(pressure=0.0), still)
+        recorded(moving(), 1), initial_conditions=InitialConditions(known, moving().state_at(pressure=0.0), still)
     )
     with pytest.raises(IdentificationError, match=message):
         fit_dynamic(plant, [record], free=("muscle.damper.damping",), observed=SENSORS)
@@ -405,10 +414,10 @@ def test_a_start_left_after_a_first_look_goes_on_as_if_it_had_not_been(monkeypat
     plant, free = rigid_plant(), ("circuit.fill.conductance", "circuit.supply.pressure")
     question = {"free": free, "observed": {"pressure": 300.0}, "starts": 5}
     whole = fit_dynamic(plant, [rigid_fill(plant)], **question)
-    monkeypatch.setattr("airmuscle.identify.dynamic.fit.FIRST_LOOK", 3)
-    monkeypatch.setattr("airmuscle.identify.dynamic.fit.HOPELESS", np.inf)
+    monkeypatch.setattr("airmuscle.identify.dynamic.fit.SCREENING_RUNS", 3)
+    monkeypatch.setattr("airmuscle.identify.dynamic.fit.SCREENING_RATIO", np.inf)
     np.testing.assert_array_equal(fit_dynamic(plant, [rigid_fill(plant)], **question).costs, whole.costs)
-    monkeypatch.setattr("airmuscle.identify.dynamic.fit.HOPELESS", 1.0)
+    monkeypatch.setattr("airmuscle.identify.dynamic.fit.SCREENING_RATIO", 1.0)
     left = fit_dynamic(plant, [rigid_fill(plant)], **question)
     assert left.costs[-1] > 10 * whole.costs[-1]
     assert left.costs[0] == pytest.approx(whole.costs[0], rel=1e-6)
@@ -427,8 +436,8 @@ def test_a_run_of_far_more_steps_than_the_best_is_not_waited_for(monkeypatch):
     found = fit_dynamic(guess, [record], free=(path,), observed={"pressure": 300.0})
     assert found[path].value == pytest.approx(truth(plant, path), rel=0.01)
     assert allowed == [1_000_000, *[10_000] * (len(allowed) - 2), 1_000_000]  # the last is that of the result
-    monkeypatch.setattr("airmuscle.identify.dynamic.problem.FEW_STEPS", 10)
-    monkeypatch.setattr("airmuscle.identify.dynamic.problem.MANY", 0.5)
+    monkeypatch.setattr("airmuscle.identify.dynamic.problem.MIN_STEP_BUDGET", 10)
+    monkeypatch.setattr("airmuscle.identify.dynamic.problem.STEP_BUDGET_FACTOR", 0.5)
     stays = fit_dynamic(guess, [record], free=(path,), observed={"pressure": 300.0})
     assert stays[path].value == truth(guess, path)
 
@@ -445,7 +454,7 @@ def test_an_interrupted_run_ends_the_fit(monkeypatch):
 def test_a_heavier_load_is_another_plant_of_the_same_structure():
     light, heavy = moving(), dataclasses.replace(moving(), mechanism=HangingMass(8.0))
     records = [recorded(light, 1), dataclasses.replace(recorded(heavy, 2), plant=heavy)]
-    fit = fit_dynamic(light, records, free=("muscle.damper.damping",), own=("mechanism.mass",), observed=SENSORS)
+    fit = fit_dynamic(light, records, free=("muscle.damper.damping",), per_record=("mechanism.mass",), observed=SENSORS)
     for found, expected in zip(fit.estimates[1:], (5.0, 8.0), strict=True):
         assert abs(found.value - expected) < 3.5 * found.stderr
     assert fit.plant(1).mechanism.mass == fit.estimates[2].value

@@ -14,19 +14,19 @@ from airmuscle.core import autodiff
 from airmuscle.core.errors import IdentificationError
 from airmuscle.identify.correlation_index import correlation_index
 from airmuscle.identify.surface.basis import Chebyshev, LoadRange, Monomials, conditioning
-from airmuscle.identify.surface.exponential import SurfaceProblem, linearised, nonlinear
+from airmuscle.identify.surface.exponential import SurfaceProblem, fit_linearised, fit_nonlinear
 from airmuscle.identify.surface.monotone import (
     FALLS_WITH_PRESSURE,
     RISES_WITH_FORCE,
-    monotone,
-    monotonicity_breaks,
+    find_monotonicity_violations,
+    fit_monotone,
     slope_constraints,
 )
 from airmuscle.recording import Recording
 
 CURVES = SAM_30X290.sample()
-EXACT = SAM_30X290.interpolated()
-FITS = [linearised, nonlinear]
+EXACT = SAM_30X290.interpolate()
+FITS = [fit_linearised, fit_nonlinear]
 
 
 def other_muscle(points: int = 400, seed: int = 1) -> Recording:
@@ -43,7 +43,7 @@ def test_undisturbed_curves_give_back_the_exact_surface(procedure):
     found = procedure(CURVES, 0.40)
     assert found.model.coefficients == pytest.approx(EXACT.coefficients, rel=1e-9)
     assert found.max_error < 1e-13
-    assert (found.points, found.dropped, found.conditioning.rank) == (45, 0, 15)
+    assert (found.points, found.points_dropped, found.conditioning.rank) == (45, 0, 15)
     assert found.model.pressure_range == (0.0, 3.5e5)
     assert found.model.force_range == (45.0, 260.0)
 
@@ -56,28 +56,28 @@ def test_disturbed_curves_tell_the_procedures_apart(disturbance, by_log, by_k):
     noise = 0.005 * np.random.default_rng(0).standard_normal(45)
     data = CURVES.with_columns(contraction=np.round(k * 200) / 200 if disturbance == "rounded" else k + noise)
     digits = 0.00005 if disturbance == "rounded" else 0.0005
-    assert 100 * linearised(data, 0.40).rms == pytest.approx(by_log, abs=digits)
-    assert 100 * nonlinear(data, 0.40).rms == pytest.approx(by_k, abs=digits)
+    assert 100 * fit_linearised(data, 0.40).rmse == pytest.approx(by_log, abs=digits)
+    assert 100 * fit_nonlinear(data, 0.40).rmse == pytest.approx(by_k, abs=digits)
 
 
 def test_least_squares_on_k_has_no_slope_left_in_any_coefficient():
     data = other_muscle()
-    found = nonlinear(data, 0.3)
+    found = fit_nonlinear(data, 0.3)
     errors = found.model.contraction(data["pressure"], data["force"]) - data["contraction"]
     _, by_parameters = autodiff.jacobian(found.model, "contraction", data["pressure"], data["force"])
     by_coefficients = by_parameters[:, :15]
     cosines = errors @ by_coefficients / (np.linalg.norm(errors) * np.linalg.norm(by_coefficients, axis=0))
     assert np.abs(cosines).max() < 1e-7
-    assert found.rms < linearised(data, 0.3).rms
+    assert found.rmse < fit_linearised(data, 0.3).rmse
 
 
 def test_the_derivatives_by_the_coefficients_are_exact():
-    problem = SurfaceProblem.of(CURVES, 0.40, 4, 2)
+    problem = SurfaceProblem.from_recording(CURVES, 0.40, 4, 2)
     start, step = np.linspace(-0.5, 0.5, 15), 1e-6
     differences = [
-        (problem.modelled(start + step * e) - problem.modelled(start - step * e)) / (2 * step) for e in np.eye(15)
+        (problem.predict(start + step * e) - problem.predict(start - step * e)) / (2 * step) for e in np.eye(15)
     ]
-    assert problem.slopes(start) == pytest.approx(np.column_stack(differences), rel=1e-7, abs=1e-8)
+    assert problem.jacobian(start) == pytest.approx(np.column_stack(differences), rel=1e-7, abs=1e-8)
 
 
 @pytest.mark.parametrize("procedure", FITS)
@@ -86,7 +86,7 @@ def test_any_degrees_and_any_saturation_are_returned(procedure):
     validity_range = LoadRange(0.5e5, 6e5, 100.0, 900.0)
     chebyshev = 0.1 * rng.standard_normal(24)
     chebyshev[0] -= 1.0
-    plain = Chebyshev(validity_range).in_bar_and_newton(chebyshev, 5, 3)
+    plain = Chebyshev(validity_range).to_bar_and_newton(chebyshev, 5, 3)
     law = BorzikovaExponential(tuple(plain), *validity_range, 5, 3, saturation=0.28)
     pressure, force = (v.ravel() for v in validity_range.grid(12, 7))
     data = Recording(
@@ -103,26 +103,26 @@ def test_points_without_a_logarithm_are_left_out_and_counted():
     k = CURVES["contraction"].copy()
     k[[13, 14]] = 0.40, 0.41
     data = CURVES.with_columns(contraction=k)
-    found = linearised(data, 0.40)
-    assert found.dropped == 2
+    found = fit_linearised(data, 0.40)
+    assert found.points_dropped == 2
     assert found.model.coefficients == pytest.approx(EXACT.coefficients, rel=1e-8)
     assert found.max_error == pytest.approx(0.41 - EXACT.contraction(3.5e5, 45.0), abs=1e-10)
     assert "45 points, 2 of them not used (k >= k_max)" in str(found)
-    assert nonlinear(data, 0.40).dropped == 0
+    assert fit_nonlinear(data, 0.40).points_dropped == 0
 
 
 def test_two_loads_determine_ten_of_fifteen_coefficients():
     two = CURVES.rows(CURVES["force"] < 200)
-    assert conditioning(two, Chebyshev(LoadRange.of_recording(two))).rank == 10
-    for procedure in (*FITS, monotone):
+    assert conditioning(two, Chebyshev(LoadRange.from_recording(two))).rank == 10
+    for procedure in (*FITS, fit_monotone):
         with pytest.raises(IdentificationError, match=r"under 45, 130 N determine 10 of the 15 .* Measure at 3 loads"):
             procedure(two, 0.40)
-    assert linearised(two, 0.40, force_degree=1).max_error < 1e-13
+    assert fit_linearised(two, 0.40, force_degree=1).max_error < 1e-13
 
 
 def test_too_few_points_below_saturation_are_refused():
     with pytest.raises(IdentificationError, match="9 points under 45, 130, 260 N determine 9 of the 15"):
-        linearised(CURVES, 0.02)
+        fit_linearised(CURVES, 0.02)
 
 
 @pytest.mark.parametrize(
@@ -135,7 +135,7 @@ def test_too_few_points_below_saturation_are_refused():
 )
 def test_unusable_recordings_are_refused(change, message):
     with pytest.raises(IdentificationError, match=message):
-        nonlinear(change(CURVES), 0.40)
+        fit_nonlinear(change(CURVES), 0.40)
 
 
 # Condition numbers of the 15 coefficients on 15 even pressures and three loads, to the digits given; that in
@@ -157,21 +157,21 @@ def test_conditioning_of_the_plane_curves(basis, condition, digit):
 
 # Places of the surface through the curves, read off its slopes on a grid of 201 x 201.
 def test_breaks_are_named_with_their_places():
-    rises, falls, falls_at_the_end, rises_at_the_start = monotonicity_breaks(EXACT)
+    rises, falls, falls_at_the_end, rises_at_the_start = find_monotonicity_violations(EXACT)
     assert (rises.rule, rises_at_the_start.rule) == (RISES_WITH_FORCE,) * 2
     assert (falls.rule, falls_at_the_end.rule) == (FALLS_WITH_PRESSURE,) * 2
-    assert rises.across == pytest.approx((202, 260), abs=1)
+    assert rises.second_argument == pytest.approx((202, 260), abs=1)
     assert rises.pressure == pytest.approx((0.09e5, 3.5e5), abs=0.02e5)
-    assert rises.share + rises_at_the_start.share == pytest.approx(0.17, abs=0.01)
+    assert rises.area_fraction + rises_at_the_start.area_fraction == pytest.approx(0.17, abs=0.01)
     assert falls.pressure == pytest.approx((0.0, 0.61e5), abs=0.02e5)
-    assert falls_at_the_end.across == pytest.approx((94, 249), abs=1.5)
+    assert falls_at_the_end.second_argument == pytest.approx((94, 249), abs=1.5)
     assert falls_at_the_end.pressure == pytest.approx((3.22e5, 3.5e5), abs=0.02e5)
     assert rises.worst_slope > 0 > falls.worst_slope
     assert "rises with force between 8.75 and 350 kPa, 202 N and 260 N (16.1% of the validity range)" in str(rises)
 
 
 def test_a_box_without_a_break_has_none():
-    assert monotonicity_breaks(EXACT, LoadRange(1e5, 3e5, 45.0, 180.0)) == ()
+    assert find_monotonicity_violations(EXACT, LoadRange(1e5, 3e5, 45.0, 180.0)) == ()
 
 
 @pytest.mark.parametrize("degrees", [(4, 2), (6, 3)])
@@ -179,22 +179,22 @@ def test_the_monotone_fit_holds_between_its_cells(degrees):
     data = CURVES if degrees == (4, 2) else other_muscle()
     saturation = 0.40 if degrees == (4, 2) else 0.3
     settings = {"pressure_degree": degrees[0], "force_degree": degrees[1]}
-    free = nonlinear(data, saturation, **settings)
-    found = monotone(data, saturation, cells=(8, 6), **settings)
-    assert monotonicity_breaks(free.model) != ()
+    free = fit_nonlinear(data, saturation, **settings)
+    found = fit_monotone(data, saturation, cells=(8, 6), **settings)
+    assert find_monotonicity_violations(free.model) != ()
     # ten times finer than the 8 x 6 cells, each with the degree + 1 points that enclose it
-    assert monotonicity_breaks(found.model, points=(401, 301)) == ()
-    assert found.rms >= free.rms
+    assert find_monotonicity_violations(found.model, points=(401, 301)) == ()
+    assert found.rmse >= free.rmse
 
 
 def test_the_monotone_fit_is_the_best_of_the_monotone():
     """Nothing gains that a general solver finds with the slopes on a grid, where it is freer than on all the validity range."""
     from scipy.optimize import minimize
 
-    found = monotone(CURVES, 0.40, cells=(32, 24))
-    assert 100 * found.rms == pytest.approx(1.472, abs=0.0005)
-    validity_range = LoadRange.of_recording(CURVES)
-    columns = Chebyshev(validity_range).columns(CURVES["pressure"], CURVES["force"], 4, 2)
+    found = fit_monotone(CURVES, 0.40, cells=(32, 24))
+    assert 100 * found.rmse == pytest.approx(1.472, abs=0.0005)
+    validity_range = LoadRange.from_recording(CURVES)
+    columns = Chebyshev(validity_range).design_matrix(CURVES["pressure"], CURVES["force"], 4, 2)
     rows = slope_constraints(4, 2, (20, 15))
     start = np.linalg.lstsq(columns, -CURVES["pressure"] / 2e5, rcond=None)[0]
 
@@ -211,7 +211,7 @@ def test_the_monotone_fit_is_the_best_of_the_monotone():
         method="SLSQP",
         options={"ftol": 1e-12, "maxiter": 300},
     )
-    assert math.sqrt(peer.fun) == pytest.approx(100 * found.rms, abs=1e-3)
+    assert math.sqrt(peer.fun) == pytest.approx(100 * found.rmse, abs=1e-3)
 
 
 def test_data_that_are_monotone_are_fitted_as_if_free():
@@ -219,7 +219,7 @@ def test_data_that_are_monotone_are_fitted_as_if_free():
     exponent = -1e-5 * pressure * (1 - force / 500)
     data = Recording({"pressure": pressure, "force": force, "contraction": 0.3 * (1 - np.exp(exponent))}, origin="law")
     # level at zero pressure, so the margin of the monotone fit costs its 1e-9
-    assert monotone(data, 0.3).max_error < 1e-8
+    assert fit_monotone(data, 0.3).max_error < 1e-8
 
 
 def test_the_index_is_the_root_of_the_explained_part():
@@ -230,14 +230,14 @@ def test_the_index_is_the_root_of_the_explained_part():
 
 
 def test_the_mean_is_that_of_the_measured_values():
-    assert correlation_index([0.0, 2.0], [5.0, 7.0]).explained == pytest.approx(1 - 50 / 2)
+    assert correlation_index([0.0, 2.0], [5.0, 7.0]).r_squared == pytest.approx(1 - 50 / 2)
 
 
 def test_where_there_is_no_index_it_is_said():
     found = correlation_index([0.0, 1.0, 2.0], [10.0, 10.0, 10.0])
-    assert (found.exists, found.value) == (False, None)
-    assert found.explained == pytest.approx(1 - 245 / 2)
-    assert str(found) == "no index: 1 - SSE/SST = -121.5 is negative"
+    assert (found.is_defined, found.value) == (False, None)
+    assert found.r_squared == pytest.approx(1 - 245 / 2)
+    assert str(found) == "undefined, because 1 - SSE/SST = -121.5 is negative"
 
 
 @pytest.mark.parametrize(

@@ -75,7 +75,7 @@ def test_a_surface_gives_its_forces_back(degree: int):
     recording = points(truth.force)
     found = fit(ContractileSurface.blank(degree, **WIDE), recording)
     assert found.rank == len(exponents(degree))
-    assert np.abs(found.errors).max() < 1e-9
+    assert np.abs(found.residuals).max() < 1e-9
     boxed = truth.with_validity_range(found.validity_range.pressure, found.validity_range.contraction)
     refitted = fit(boxed, points(boxed.force))
     assert refitted.values == pytest.approx(boxed.coefficients, abs=1e-8)
@@ -141,7 +141,7 @@ def hung(law: HungLoad, noise: float = 0.0) -> Recording:
 def test_a_law_in_contraction_is_fitted_in_contraction(kind: type[HungLoad]):
     truth = HungLoad(0.25, 1.4e5, 3e-4)
     found = fit(kind(0.1, 5e4, 1e-4), hung(truth))
-    assert found.direction.quantity == "contraction"
+    assert found.fitted_quantity.name == "contraction"
     assert found.values == pytest.approx([0.25, 1.4e5, 3e-4], rel=1e-8)
 
 
@@ -149,7 +149,7 @@ def test_exact_derivatives_and_differences_agree_on_the_uncertainty():
     recording = hung(HungLoad(0.25, 1.4e5, 3e-4), noise=2e-3)
     exact, differences = (fit(kind(0.1, 5e4, 1e-4), recording) for kind in (HungLoad, Untraced))
     assert differences.values == pytest.approx(exact.values, rel=1e-6)
-    assert differences.standard_deviations == pytest.approx(exact.standard_deviations, rel=1e-6)
+    assert differences.standard_errors == pytest.approx(exact.standard_errors, rel=1e-6)
 
 
 def test_a_law_in_pressure_is_fitted_in_pressure():
@@ -159,7 +159,7 @@ def test_a_law_in_pressure_is_fitted_in_pressure():
     pressure = truth.pressure(contraction, force)
     recording = Recording({"pressure": pressure, "contraction": contraction, "force": force}, "bench")
     found = fit(NeededPressure(0.0, 1e6, 1.0), recording)
-    assert found.direction.quantity == "pressure"
+    assert found.fitted_quantity.name == "pressure"
     assert found.values == pytest.approx([6e4, 5e6, 700.0], rel=1e-9)
 
 
@@ -167,7 +167,7 @@ def test_several_recordings_are_fitted_together():
     runs = tuple(points(surface(2).force, n=5, seed=seed) for seed in (1, 2, 3))
     found = fit(ContractileSurface.blank(2, **WIDE), runs)
     assert found.rows_used == 15
-    assert np.abs(found.errors).max() < 1e-9
+    assert np.abs(found.residuals).max() < 1e-9
 
 
 # How sure
@@ -184,7 +184,7 @@ def repeats(count: int, noise: float) -> list[Fit]:
 def test_standard_deviations_are_those_of_repeated_experiments():
     fits = repeats(800, noise=4.0)
     values = np.array([found.values for found in fits])
-    stated = np.sqrt(np.mean([found.standard_deviations**2 for found in fits], axis=0))
+    stated = np.sqrt(np.mean([found.standard_errors**2 for found in fits], axis=0))
     # 800 repeats leave 2.5 % of a deviation open: four times that is allowed
     assert values.std(axis=0, ddof=1) / stated == pytest.approx(np.ones(6), abs=0.1)
     assert np.sqrt(np.mean([found.sigma**2 for found in fits])) == pytest.approx(4.0, rel=0.02)
@@ -201,7 +201,7 @@ def test_robust_standard_deviations_are_those_of_repeated_experiments():
         rows = clean.with_columns(force=clean["force"] + noise)
         fits.append(fit(ContractileSurface.blank(1, **WIDE), rows, loss=Huber(6.0)))
     scatter = np.std([found.values for found in fits], axis=0, ddof=1)
-    stated = np.sqrt(np.mean([found.standard_deviations**2 for found in fits], axis=0))
+    stated = np.sqrt(np.mean([found.standard_errors**2 for found in fits], axis=0))
     assert scatter / stated == pytest.approx(np.ones(3), abs=0.15)
 
 
@@ -216,7 +216,7 @@ def test_a_fit_equals_lmfit():
         start.add(name, value=0.0)
     peer = lmfit.minimize(lambda p: matrix @ [p[name].value for name in names] - measured, start)
     assert found.values == pytest.approx([peer.params[name].value for name in names], rel=1e-6)
-    assert found.standard_deviations == pytest.approx([peer.params[name].stderr for name in names], rel=1e-5)
+    assert found.standard_errors == pytest.approx([peer.params[name].stderr for name in names], rel=1e-5)
     assert found.correlations[0, 9] == pytest.approx(peer.params["a0"].correl["a9"], abs=1e-6)
     assert found.sigma == pytest.approx(np.sqrt(peer.redchi), rel=1e-9)
 
@@ -236,7 +236,7 @@ def test_a_weighted_fit_equals_curve_fit():
     )
     found = fit(Sarosi2012(*start), recording, sigma=sigma, censoring=UNCENSORED)
     assert found.values == pytest.approx(peer * scale, rel=1e-5)
-    assert found.standard_deviations == pytest.approx(np.sqrt(np.diag(covariance)) * scale, rel=1e-4)
+    assert found.standard_errors == pytest.approx(np.sqrt(np.diag(covariance)) * scale, rel=1e-4)
 
 
 def test_figures_of_quality_are_their_formulas():
@@ -247,7 +247,7 @@ def test_figures_of_quality_are_their_formulas():
     assert found.rmse == pytest.approx(np.sqrt(np.mean(errors**2)))
     assert found.sigma == pytest.approx(np.sqrt(np.sum(errors**2) / 37))
     assert found.r2 == pytest.approx(1 - np.sum(errors**2) / np.sum((measured - measured.mean()) ** 2))
-    assert found.correlation_index == pytest.approx(np.sqrt(found.r2))
+    assert found.ik == pytest.approx(np.sqrt(found.r2))
     worst = int(np.argmax(np.abs(errors)))
     extreme = found.max_error
     assert extreme.error == pytest.approx(errors[worst])
@@ -258,7 +258,7 @@ def test_a_law_worse_than_the_mean_has_no_correlation_index():
     recording = points(lambda p, c: 100.0 + 0.0 * p + np.sin(1e4 * c), n=60)
     found = fit(TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.0), recording, fixed=("geometry.radius",))
     assert found.r2 < 0
-    assert found.correlation_index is None
+    assert found.ik is None
     assert f"1 - SSE/SST = {found.r2:.4g}" in str(found)
 
 
@@ -279,8 +279,8 @@ def test_points_at_zero_force_do_not_bend_the_surface():
     found, as_zeros = fit(start, recording), fit(start, recording, censoring=UNCENSORED)
     assert 50 < found.rows_censored < 100
     taut = recording["force"] > 0
-    assert np.abs(found.errors).max() < 1e-8
-    assert np.abs(as_zeros.errors[taut]).max() > 10.0
+    assert np.abs(found.residuals).max() < 1e-8
+    assert np.abs(as_zeros.residuals[taut]).max() > 10.0
     assert as_zeros.rows_censored == 0
 
 
@@ -343,7 +343,7 @@ def test_slack_points_bound_laws_in_contraction_and_pressure_too():
         assert fit(start, recording, censoring=Censoring()).values == pytest.approx(truth, rel=1e-8)
         unbound = fit(start, recording)
         assert unbound.values != pytest.approx(truth, rel=1e-3)
-        assert any("20 rows at zero force or below are fitted as they stand" in note for note in unbound.notes)
+        assert any("20 rows at zero force or below are treated as measured values" in note for note in unbound.notes)
 
 
 @settings(max_examples=60, deadline=None)
@@ -355,7 +355,7 @@ def test_no_other_coefficients_are_better(seed: int, degree: int, loss: Loss):
     force = np.maximum(random.normal(0, 1, 40), 0)
     found = fit(ContractileSurface.blank(degree), Recording({**columns, "force": force}, "noise"), loss=loss)
     errors = found.model.polynomial(columns["pressure"], columns["contraction"]) - force
-    errors = np.where(found.sides * errors < 0, 0.0, errors)
+    errors = np.where(found.censoring * errors < 0, 0.0, errors)
     influence = errors * loss.rho((errors / loss.scale) ** 2)[1]
     assert np.abs(sheet(degree, found.recording).T @ influence).max() < 1e-6
 
@@ -368,7 +368,7 @@ def test_both_solvers_find_the_same_robust_and_censored_fit(loss):
     start = dataclasses.replace(direct.model, coefficients=(50.0,) * 6, **WIDE)
     iterated = fit(Clamped(start), recording, loss=loss)
     assert iterated.values == pytest.approx(direct.values, rel=1e-6)
-    assert iterated.standard_deviations == pytest.approx(direct.standard_deviations, rel=1e-5)
+    assert iterated.standard_errors == pytest.approx(direct.standard_errors, rel=1e-5)
     assert iterated.names[0] == "inner.coefficients[0]"
 
 
@@ -397,7 +397,7 @@ def test_a_robust_loss_of_any_scale_settles_where_no_change_helps(name: str, deg
     assert found.rank == len(exponents(degree))
 
     def total(values: np.ndarray) -> float:
-        return float(np.sum(loss.rho((found.problem.errors(found.problem.modelled(values)) / scale) ** 2)[0]))
+        return float(np.sum(loss.rho((found.problem.residuals(found.problem.predict(values)) / scale) ** 2)[0]))
 
     random, least = np.random.default_rng(3), total(found.values)
     for size in (1e-3, 1e-2, 0.1, 1.0):
@@ -415,7 +415,7 @@ def test_a_wide_robust_loss_is_least_squares_for_slack_rows_too():
 def test_a_loss_narrower_than_the_noise_is_noted():
     recording = points(surface(2).force, noise=5.0)
     start = ContractileSurface.blank(2, **WIDE)
-    assert any("standard deviations come out too small" in n for n in fit(start, recording, loss=Huber(0.5)).notes)
+    assert any("standard errors are too small" in n for n in fit(start, recording, loss=Huber(0.5)).notes)
     assert not any("too small" in n for n in fit(start, recording, loss=Huber(15.0)).notes)
 
 
@@ -437,7 +437,7 @@ def test_units_and_scales_change_nothing(force_scale: float, pressure_scale: flo
         ),
     )
     assert other.values == pytest.approx(force_scale * found.values, rel=1e-6, abs=1e-7 * force_scale)
-    assert other.standard_deviations == pytest.approx(force_scale * found.standard_deviations, rel=1e-6)
+    assert other.standard_errors == pytest.approx(force_scale * found.standard_errors, rel=1e-6)
     assert (other.r2, other.condition) == pytest.approx((found.r2, found.condition), rel=1e-6)
 
 
@@ -470,7 +470,7 @@ def grid(contractions: int, pressures: int) -> Recording:
 def test_too_few_levels_are_named_with_the_powers_they_leave_open():
     """(x + 1)(x + 1/2) x (x - 1/2)(x - 1), which vanishes at five even levels, holds odd powers only."""
     said = refused(ContractileSurface.blank(5), grid(5, 12))
-    assert "map.csv: the points cannot tell apart a(x), a(x^3), a(x^5) of ContractileSurface" in said
+    assert "map.csv: the data cannot separate a(x), a(x^3), a(x^5) of ContractileSurface" in said
     assert "rank 20 of 21" in said
     assert "12 of pressure, 5 of contraction" in said
     assert "lower degree" in said
@@ -484,7 +484,7 @@ def test_parameters_that_only_act_together_are_named_and_may_be_held():
     columns = {"contraction": contraction, "force": force, "pressure": law.pressure(contraction, force)}
     recording = Recording(columns, "bench")
     said = refused(law, recording)
-    assert "cannot tell apart" in said
+    assert "cannot separate" in said
     assert all(symbol in said for symbol in ("t", "alpha", "beta", "rank 2 of 3"))
     assert "fixed=(" in said
     assert fit(law, recording, fixed=("wall_thickness",)).rank == 2
@@ -499,12 +499,12 @@ def test_a_library_muscle_is_refitted_to_its_own_map_without_a_word_more():
 def test_a_parameter_without_any_effect_is_named():
     recording = hung(HungLoad(0.25, 1.4e5, 3e-4)).with_columns(force=np.zeros(80))
     said = refused(HungLoad(0.2, 1e5, 1e-4), recording)
-    assert "do not act on c of HungLoad" in said
+    assert "do not depend on c of HungLoad" in said
 
 
 def test_fewer_points_than_parameters():
     said = refused(ContractileSurface.blank(5, **WIDE), points(surface(2).force, n=20))
-    assert "21 parameters to be found, but only 20 points were measured" in said
+    assert "21 free parameters, but only 20 rows are measured values" in said
     assert "lower degree" in said
 
 
@@ -512,9 +512,9 @@ def test_slack_points_do_not_count_as_measured():
     recording = points(surface(2).force, n=30)
     cut = recording.with_columns(force=np.where(np.arange(30) < 10, recording["force"], 0.0))
     said = refused(ContractileSurface.blank(4), cut)
-    assert "only 10 points were measured (20 more are cut off" in said
+    assert "only 10 rows are measured values (20 further rows are censored" in said
     said = refused(ContractileSurface.blank(2), cut.with_columns(force=np.zeros(30)))
-    assert "all 30 rows are cut off" in said
+    assert "all 30 rows are censored" in said
     assert "censoring=" in said
 
 
@@ -532,7 +532,7 @@ def test_an_infinite_value_is_refused_and_a_missing_one_left_out():
     force[7] = np.nan
     found = fit(ContractileSurface.blank(2, **WIDE), recording.with_columns(force=force))
     assert (found.rows_used, found.rows_dropped) == (49, 1)
-    assert "1 rows with a missing value (NaN) were left out." in found.notes
+    assert "1 rows with a missing value (NaN) were dropped." in found.notes
     force = np.where(np.isnan(force), np.inf, force)
     said = refused(ContractileSurface.blank(2), recording.with_columns(force=force))
     assert "bench, row 8: force is inf" in said
@@ -550,7 +550,9 @@ def test_points_beyond_the_reach_of_a_law_are_named():
 
 
 def test_an_unknown_name_to_hold():
-    with pytest.raises(ParameterError, match=r"no parameter 'end_corection' to hold.*Did you mean 'end_correction'"):
+    with pytest.raises(
+        ParameterError, match=r"no parameter 'end_corection' to be fixed.*Did you mean 'end_correction'"
+    ):
         fit(TonduLopez2000(Braid(0.01, 0.45, 0.3)), points(surface(2).force), fixed=("end_corection",))
 
 
@@ -563,13 +565,13 @@ def test_a_parameter_on_its_bound_is_flagged_and_has_no_deviation():
     assert estimate.value == pytest.approx(1.0, abs=1e-6)
     assert np.isnan(estimate.stderr)
     assert np.isfinite(found["geometry.braid_angle"].stderr)
-    assert "end_correction stopped at its bound; the value is not a measured one." in found.notes
+    assert "end_correction is on its bound; its value is not determined by the data." in found.notes
 
 
 def test_as_many_points_as_parameters_leave_the_deviations_unknown():
     found = fit(ContractileSurface.blank(1, **WIDE), points(surface(1).force, n=3))
-    assert np.isnan(found.standard_deviations).all()
-    assert "As many points as parameters: the standard deviations are unknown." in found.notes
+    assert np.isnan(found.standard_errors).all()
+    assert "There are as many rows as parameters, so the standard errors are unknown." in found.notes
 
 
 def test_a_recording_of_another_specimen_is_noted():
@@ -577,7 +579,10 @@ def test_a_recording_of_another_specimen_is_noted():
         resting_length=0.25
     )
     found = fit(TonduLopez2000(Braid(0.0095, 0.5, 0.3), 1.1), recording, fixed=("geometry.radius",))
-    assert "The recording is of a muscle of 0.25 m, geometry.resting_length is 0.3 m." in found.notes
+    assert (
+        "The muscle in the recording has a resting length of 0.25 m, but geometry.resting_length is 0.3 m."
+        in found.notes
+    )
 
 
 # Measured muscles
@@ -603,7 +608,7 @@ def test_what_only_bounds_determine_stays_near_to_them_and_is_noted():
     assert recording["force"][recording["length"] == 0.222].max() == 0
     start = ContractileSurface.blank(5, max_force=2000.0)
     found = fit(start, recording)
-    assert "The measured rows determine 20 of 21 parameters" in " ".join(found.notes)
+    assert "The uncensored rows determine 20 of 21 parameters" in " ".join(found.notes)
     at_shortest = found.recording["contraction"] == found.recording["contraction"].max()
     bare = found.model.polynomial(found.recording["pressure"], found.recording["contraction"])[at_shortest]
     assert bare.max() == pytest.approx(0.0, abs=1e-3)
@@ -633,7 +638,16 @@ def test_a_fit_prints_its_parameters_and_figures():
     assert f"{found['end_correction'].value:.6g}" in text
     assert f"{twice:.3g}" in text
     assert "how much more the middle contracts than the whole muscle" in text
-    for said in ("rms error", " N at ", " kPa, ", "sigma", "R2", "correlation index", "rank, condition", "valid for"):
+    for said in (
+        "rms error",
+        " N at ",
+        " kPa, ",
+        "residual std",
+        "R2",
+        "correlation index",
+        "rank, condition",
+        "data range",
+    ):
         assert said in text
     assert "<table>" in found._repr_html_()
 
@@ -643,5 +657,5 @@ def test_a_fit_draws_parity_and_errors_with_units():
     figure = fit(ContractileSurface.blank(2), recording).plot()
     parity, errors = figure.axes
     assert parity.get_xlabel() == "measured force [N]"
-    assert errors.get_ylabel() == "model less measured [N]"
-    assert [text.get_text() for text in figure.legends[0].get_texts()][-1] == "cut off, a bound only"
+    assert errors.get_ylabel() == "residual (model - measured) [N]"
+    assert [text.get_text() for text in figure.legends[0].get_texts()][-1] == "censored (bound)"

@@ -15,11 +15,18 @@ from airmuscle.characteristic.virtual_work import VirtualWork
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, PrandtlIshlinskii
 from airmuscle.geometry.braid import Braid
-from airmuscle.identify.hysteresis import Given, OnContraction, OnPressure, PolynomialCurve, candidates, fit_hysteresis
-from airmuscle.identify.hysteresis.branches import gap, repeat_difference
+from airmuscle.identify.hysteresis import (
+    ContractionPath,
+    FixedCharacteristic,
+    PolynomialCurve,
+    PressurePath,
+    fit_hysteresis,
+    initial_friction_laws,
+)
+from airmuscle.identify.hysteresis.branches import branch_gap, repeat_difference
 from airmuscle.identify.hysteresis.creep import Creep, fit_creep
-from airmuscle.identify.hysteresis.evidence import aicc, effective_rows, f_test
-from airmuscle.identify.hysteresis.plot import plot_loops, winding
+from airmuscle.identify.hysteresis.plot import loop_path, plot_loops
+from airmuscle.identify.model_evidence import aicc, effective_sample_size, f_test_p_value
 from airmuscle.recording import Recording
 from airmuscle.recording.segment import motion_direction
 
@@ -71,20 +78,20 @@ CURVE = PolynomialCurve("contraction", 2)
 @pytest.mark.parametrize("law", TRUE, ids=name)
 def test_the_friction_that_made_a_loop_is_found_again(law):
     run = isobaric(law)
-    fit = fit_hysteresis(start_of(law), run, static=CURVE, slide=OnContraction())
-    made, found = (x.force_along(fit.course.path) for x in (law, fit.friction))
+    fit = fit_hysteresis(start_of(law), run, static_curve=CURVE, friction_path=ContractionPath())
+    made, found = (x.force_along(fit.series.path) for x in (law, fit.friction))
     assert np.abs(made - found - np.mean(made - found)).max() < 0.25
     assert fit.rmse == pytest.approx(0.2, rel=0.1)
-    assert fit.plain_rmse > 5.0
-    assert fit.gap_left < 0.02 * fit.gap
+    assert fit.rmse_without_friction > 5.0
+    assert fit.residual_gap < 0.02 * fit.gap
     assert fit.justified
     assert fit.verdict.endswith("The data justify this friction.")
 
 
 def test_the_parameters_of_dahl_and_of_the_slips_come_back():
-    dahl = fit_hysteresis(start_of(TRUE[0]), isobaric(TRUE[0]), static=CURVE).friction
+    dahl = fit_hysteresis(start_of(TRUE[0]), isobaric(TRUE[0]), static_curve=CURVE).friction
     assert (dahl.stiffness, dahl.coulomb_force) == pytest.approx((3e4, 20.0), rel=0.02)
-    slips = fit_hysteresis(start_of(SLIP), isobaric(SLIP), static=CURVE).friction
+    slips = fit_hysteresis(start_of(SLIP), isobaric(SLIP), static_curve=CURVE).friction
     assert slips.stiffnesses == pytest.approx(SLIP.stiffnesses, rel=0.03)
 
 
@@ -92,19 +99,19 @@ def test_a_given_characteristic_takes_the_place_of_the_curve():
     law = VirtualWork(Braid(0.01, 0.4363, LENGTH))
     run = isobaric(SLIP)
     force = law.force(run["pressure"], run["contraction"]) + 3.0 - SLIP.force_along(run["contraction"] * LENGTH)
-    fit = fit_hysteresis(start_of(SLIP), run.with_columns(force=force), static=Given(law))
+    fit = fit_hysteresis(start_of(SLIP), run.with_columns(force=force), static_curve=FixedCharacteristic(law))
     assert fit.coefficients == pytest.approx([3.0], abs=1e-6)
     assert fit.friction.stiffnesses == pytest.approx(SLIP.stiffnesses, rel=1e-6)
 
 
 def test_an_isometric_ramp_shows_friction_on_the_pressure():
     pressure = np.concatenate([np.linspace(0, 6e5, 150), np.linspace(6e5, 0, 150)])
-    slide = OnPressure()
+    slide = PressurePath()
     friction = MaxwellSlip((3e3, 1e3), (4e-4, 2e-3))
-    force = 5e-4 * pressure - friction.force_along(slide.travel_per_pressure * pressure)
+    force = 5e-4 * pressure - friction.force_along(slide.displacement_per_pressure * pressure)
     run = Recording({"pressure": pressure, "force": force}, "ramp")
-    fit = fit_hysteresis(MaxwellSlip((1.0, 1.0), friction.limits), run, static=PolynomialCurve("pressure", 1),
-                         slide=slide)  # fmt: skip
+    fit = fit_hysteresis(MaxwellSlip((1.0, 1.0), friction.limits), run, static_curve=PolynomialCurve("pressure", 1),
+                         friction_path=slide)  # fmt: skip
     assert fit.friction.stiffnesses == pytest.approx(friction.stiffnesses, rel=1e-3)
 
 
@@ -114,10 +121,10 @@ def test_lugre_uses_the_time_of_the_rows():
     path, time = run["contraction"] * LENGTH, np.cumsum(np.repeat([0.02, 0.1, 1.0, 0.05, 0.1, 0.5], 60))
     rng = np.random.default_rng(2)
     force = run["force"] - law.force_along(path, time) + 0.1 * rng.standard_normal(time.size)
-    fit = fit_hysteresis(LuGre(1e4, 20.0, 3.0, 0.01), run.with_columns(time=time, force=force), static=CURVE)
+    fit = fit_hysteresis(LuGre(1e4, 20.0, 3.0, 0.01), run.with_columns(time=time, force=force), static_curve=CURVE)
     assert fit.rmse < 0.15
     assert fit.friction.coulomb_force == pytest.approx(10.0, rel=0.1)
-    slow = fit_hysteresis(Dahl(1e4, 20.0), run.with_columns(time=time, force=force), static=CURVE)
+    slow = fit_hysteresis(Dahl(1e4, 20.0), run.with_columns(time=time, force=force), static_curve=CURVE)
     assert slow.rmse > 3 * fit.rmse
 
 
@@ -126,9 +133,9 @@ def test_without_friction_none_is_claimed():
     claims = 0
     for seed in range(60):
         run = isobaric(None, noise=1.0, seed=seed)
-        claims += fit_hysteresis(start_of(SLIP), run, static=CURVE).justified
+        claims += fit_hysteresis(start_of(SLIP), run, static_curve=CURVE).justified
     assert claims <= 1
-    assert "do not justify" in fit_hysteresis(start_of(SLIP), isobaric(None, 1.0), static=CURVE).verdict
+    assert "do not justify" in fit_hysteresis(start_of(SLIP), isobaric(None, 1.0), static_curve=CURVE).verdict
 
 
 def test_drifting_errors_count_as_few_rows():
@@ -137,18 +144,18 @@ def test_drifting_errors_count_as_few_rows():
     drifting = np.zeros(4000)
     for i in range(1, 4000):
         drifting[i] = 0.8 * drifting[i - 1] + steps[i]
-    assert effective_rows(white) == pytest.approx(4000, rel=0.08)
-    assert effective_rows(drifting) == pytest.approx(4000 * 0.2 / 1.8, rel=0.15)
+    assert effective_sample_size(white) == pytest.approx(4000, rel=0.08)
+    assert effective_sample_size(drifting) == pytest.approx(4000 * 0.2 / 1.8, rel=0.15)
 
 
 def test_a_friction_that_does_not_carry_over_to_the_second_run_is_not_justified():
     first, same, without = isobaric(SLIP, seed=1), isobaric(SLIP, seed=2), isobaric(None, seed=3)
-    good = fit_hysteresis(start_of(SLIP), first, static=CURVE, repeat=(same, None))
+    good = fit_hysteresis(start_of(SLIP), first, static_curve=CURVE, repeat=(same, None))
     assert good.justified
     assert good.repeat_rmse == pytest.approx(0.2, rel=0.15)
     assert good.repeatability < 0.3
-    bad = fit_hysteresis(start_of(SLIP), first, static=CURVE, repeat=(without, None))
-    assert bad.repeat_rmse > 3 > bad.plain_repeat_rmse
+    bad = fit_hysteresis(start_of(SLIP), first, static_curve=CURVE, repeat=(without, None))
+    assert bad.repeat_rmse > 3 > bad.repeat_rmse_without_friction
     assert not bad.justified
 
 
@@ -156,7 +163,7 @@ def test_the_gap_between_branches_and_between_runs_is_measured_place_by_place():
     path = np.concatenate([np.linspace(0, 1, 200), np.linspace(1, 0, 200)])
     loop = np.where(np.arange(400) < 200, -2.0, 3.0)
     way = motion_direction(path)
-    assert gap(path, loop, way) == pytest.approx(5.0 * np.ones(24), abs=0.2)
+    assert branch_gap(path, loop, way) == pytest.approx(5.0 * np.ones(24), abs=0.2)
     assert repeat_difference(path, loop, way, path, loop + 1.5, way) == pytest.approx(1.5 * np.ones(48))
 
 
@@ -165,7 +172,7 @@ def test_an_inner_loop_belongs_to_both_branches():
     path = np.concatenate([np.linspace(a, b, 100) for a, b in ((0, 1), (1, 0.5), (0.5, 1), (1, 0))])
     way = motion_direction(path)
     assert [int(s) for s in way[[50, 150, 250, 350]]] == [1, -1, 1, -1]
-    assert gap(path, np.where(way > 0, -2.0, 3.0), way) == pytest.approx(5.0 * np.ones(24))
+    assert branch_gap(path, np.where(way > 0, -2.0, 3.0), way) == pytest.approx(5.0 * np.ones(24))
     assert not motion_direction(np.ones(20)).any()
 
 
@@ -173,16 +180,16 @@ def test_the_criteria_meet_their_definitions():
     assert aicc(2.0, 50.0, 3) == pytest.approx(50 * np.log(2.0) + 8 + 40 / 45)
     assert aicc(2.0, 5.0, 3) == np.inf
     # F = (100/80 - 1)/2 / (1/(40 - 5)) = 4.375 with 2 and 35 degrees: 0.020 (tables: 3.27 is 5 %, 5.27 is 1 %)
-    assert f_test(100.0, 80.0, 40.0, 5, 2) == pytest.approx(0.0201, abs=3e-4)
-    assert f_test(80.0, 80.0, 40.0, 5, 2) == 1.0
+    assert f_test_p_value(100.0, 80.0, 40.0, 5, 2) == pytest.approx(0.0201, abs=3e-4)
+    assert f_test_p_value(80.0, 80.0, 40.0, 5, 2) == 1.0
 
 
 def test_candidates_are_sized_by_the_data_and_all_of_them_fit():
     run = isobaric(SLIP)
     path = run["contraction"] * LENGTH
-    fits = [fit_hysteresis(f, run, static=CURVE) for f in candidates(path, SLIP.force_along(path))]
+    fits = [fit_hysteresis(f, run, static_curve=CURVE) for f in initial_friction_laws(path, SLIP.force_along(path))]
     assert {name(f.friction) for f in fits} == {"Dahl", "LuGre", "BoucWen", "MaxwellSlip", "PrandtlIshlinskii"}
-    assert all(f.rmse < 0.35 * f.plain_rmse for f in fits)
+    assert all(f.rmse < 0.35 * f.rmse_without_friction for f in fits)
     best = min(fits, key=lambda f: f.rmse)
     assert name(best.friction) in ("MaxwellSlip", "PrandtlIshlinskii")
 
@@ -190,11 +197,11 @@ def test_candidates_are_sized_by_the_data_and_all_of_them_fit():
 def test_runs_that_cannot_tell_are_refused():
     run = isobaric(SLIP)
     with pytest.raises(IdentificationError, match="4 chosen rows along a path of"):
-        fit_hysteresis(SLIP, run, static=CURVE, chosen=np.arange(len(run)) < 4)
+        fit_hysteresis(SLIP, run, static_curve=CURVE, fitted_rows=np.arange(len(run)) < 4)
     with pytest.raises(IdentificationError, match="friction against shortening needs the resting length"):
-        fit_hysteresis(SLIP, Recording(run.columns, "loop"), static=CURVE)
+        fit_hysteresis(SLIP, Recording(run.columns, "loop"), static_curve=CURVE)
     with pytest.raises(IdentificationError, match="the path does not move"):
-        candidates(np.ones(9), np.ones(9))
+        initial_friction_laws(np.ones(9), np.ones(9))
 
 
 @pytest.mark.parametrize("parts", [((), ()), ((0.02,), (3.0,)), ((0.01, 0.02), (1.0, 15.0))], ids=len)
@@ -202,7 +209,7 @@ def test_creep_with_none_one_or_two_time_constants_is_told_apart(parts):
     creep = Creep(0.1, *parts)
     time = np.arange(0.0, 60.0, 0.1)
     rng = np.random.default_rng(4)
-    values = creep.at(time) + 2e-4 * rng.standard_normal(time.size)
+    values = creep.value_at(time) + 2e-4 * rng.standard_normal(time.size)
     fit = fit_creep(Recording({"time": time + 7.0, "contraction": values}, "hold"), "contraction")
     assert fit.creep.time_constants == pytest.approx(parts[1], rel=0.1)
     assert fit.creep.amplitudes == pytest.approx(parts[0], rel=0.1)
@@ -221,7 +228,7 @@ def test_creep_is_not_claimed_of_noise():
 def test_a_hold_too_short_for_its_creep_is_said_to_be_so():
     time = np.arange(0.0, 5.0, 0.02)
     rng = np.random.default_rng(4)
-    force = Creep(100.0, (10.0,), (4.0,)).at(time) + 0.01 * rng.standard_normal(time.size)
+    force = Creep(100.0, (10.0,), (4.0,)).value_at(time) + 0.01 * rng.standard_normal(time.size)
     fit = fit_creep(Recording({"time": time, "force": force}, "hold"), "force")
     assert "too short for the longest" in fit.verdict
     with pytest.raises(IdentificationError, match="12 rows of a hold at least, in rising time; there are 5"):
@@ -233,11 +240,11 @@ def test_a_hold_too_short_for_its_creep_is_said_to_be_so():
 def test_figures_show_units_and_what_was_fitted():
     figure = plot_loops(SLIP)
     assert figure.axes[0].get_xlabel() == "displacement [mm]"
-    path = winding(SLIP.presliding_distance)
+    path = loop_path(SLIP.presliding_distance)
     assert (path.max(), path.min(), path[-1]) == pytest.approx(
         (2 * SLIP.presliding_distance, -2 * SLIP.presliding_distance, path.max())
     )
-    fit = fit_hysteresis(start_of(SLIP), isobaric(SLIP), static=CURVE)
+    fit = fit_hysteresis(start_of(SLIP), isobaric(SLIP), static_curve=CURVE)
     upper, lower = fit.plot().axes
     assert (upper.get_ylabel(), lower.get_ylabel()) == ("force [N]", "measured less modelled [N]")
     assert "MaxwellSlip fitted to loop" in str(fit)

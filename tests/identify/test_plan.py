@@ -18,11 +18,11 @@ from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify.experiment_design import (
     BenchLimits,
-    _exchanged,
-    _greedy,
-    _logarithm,
+    _exchange,
+    _log_determinant,
+    _select_greedily,
+    candidate_runs,
     optimal_design,
-    possible_runs,
 )
 from airmuscle.identify.static_fit import fit
 from airmuscle.recording import Recording, read_csv
@@ -37,7 +37,7 @@ def law():
 def test_a_line_is_measured_at_its_ends():
     x = np.linspace(-1.0, 1.0, 9)
     information = np.array([np.outer(row, row) for row in np.column_stack([np.ones(9), x])])
-    chosen = _exchanged(information, _greedy(information, 4))
+    chosen = _exchange(information, _select_greedily(information, 4))
     assert sorted(chosen) == [0, 0, 8, 8]
 
 
@@ -45,13 +45,15 @@ def test_the_exchange_finds_the_best_of_all_designs():
     rng = np.random.default_rng(4)
     designs = rng.standard_normal((8, 3, 3))
     information = np.einsum("rij,rik->rjk", designs, designs)
-    best = max(_logarithm(information, c) for c in itertools.combinations_with_replacement(range(8), 3))
-    assert _logarithm(information, _exchanged(information, _greedy(information, 3))) == pytest.approx(best, abs=1e-6)
+    best = max(_log_determinant(information, c) for c in itertools.combinations_with_replacement(range(8), 3))
+    assert _log_determinant(information, _exchange(information, _select_greedily(information, 3))) == pytest.approx(
+        best, abs=1e-6
+    )
 
 
 def test_every_candidate_stays_within_the_bench():
-    found = possible_runs(law(), BENCH, 12)
-    assert {run.held for run in found} == {"pressure", "contraction"}
+    found = candidate_runs(law(), BENCH, 12)
+    assert {run.constant for run in found} == {"pressure", "contraction"}
     for run in found:
         assert run.pressure.min() >= 50e3 - 1e-6
         assert run.pressure.max() <= 500e3 + 1e-6
@@ -71,11 +73,11 @@ def test_the_deviations_are_those_that_a_fit_then_has():
     columns["force"] = points["force"] + 2.0 * rng.standard_normal(len(points))
     found = fit(law(), Recording(columns, "bench"), fixed=("geometry.radius",))
     assert found.names == free.names
-    np.testing.assert_allclose(found.standard_deviations, free.deviations, rtol=0.15)
+    np.testing.assert_allclose(found.standard_errors, free.standard_errors, rtol=0.15)
 
 
 def test_the_plan_tells_more_than_runs_spread_evenly():
-    assert optimal_design(law(), BENCH, runs=4, fixed=("geometry.radius",)).gain > 1.1
+    assert optimal_design(law(), BENCH, runs=4, fixed=("geometry.radius",)).relative_d_efficiency > 1.1
 
 
 def test_what_the_runs_cannot_tell_is_named():
@@ -87,9 +89,9 @@ def test_what_the_runs_cannot_tell_is_named():
 
 
 def test_a_bench_that_can_do_nothing_is_refused():
-    with pytest.raises(IdentificationError, match="pulls nowhere between 0 and 1e-06 N"):
+    with pytest.raises(IdentificationError, match="gives no force between 0 and 1e-06 N"):
         optimal_design(law(), BenchLimits(ValidityRange(50e3, 500e3, 0.0, 0.25), 1e-6))
-    with pytest.raises(ParameterError, match="plan needs one run or more"):
+    with pytest.raises(ParameterError, match="optimal_design needs runs >= 1"):
         optimal_design(law(), BENCH, runs=0)
     with pytest.raises(ParameterError, match="min_pressure"):
         BenchLimits(ValidityRange(5e5, 5e4, 0.0, 0.25), 100.0)
@@ -101,7 +103,7 @@ ARGUMENTS = ["plan", "tondu-lopez", "--max-pressure", "5 bar", "--max-force", "4
 def test_the_command_prints_a_table_and_writes_points_to_follow(tmp_path):
     done = CliRunner().invoke(app, [*ARGUMENTS, "--out", str(tmp_path / "bench")])
     assert done.exit_code == 0, done.output
-    assert "force to expect" in done.output
+    assert "expected force" in done.output
     points = read_csv(tmp_path / "bench" / "plan.csv")
     assert set(points["run"]) == {1.0, 2.0, 3.0, 4.0}
     assert points["force"].max() <= 400.0
@@ -112,10 +114,10 @@ def test_the_command_prints_json():
     done = CliRunner().invoke(app, [*ARGUMENTS, "--json"])
     found = json.loads(done.output)
     assert len(found["runs"]) == 4
-    assert found["gain"] > 1.0
+    assert found["relative_efficiency"] > 1.0
 
 
 def test_a_limit_without_its_unit_is_one_line():
     done = CliRunner().invoke(app, ["plan", "tondu-lopez", "--max-pressure", "5", "--max-force", "400 N"])
     assert done.exit_code == 1
-    assert "carries no unit" in done.output
+    assert "has no unit" in done.output

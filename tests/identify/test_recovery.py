@@ -19,9 +19,9 @@ from airmuscle.characteristic.tabulated import Tabulated
 from airmuscle.core import tree
 from airmuscle.core.errors import AirmuscleWarning, IdentificationError
 from airmuscle.identify import UNCENSORED, confidence_band, fit
-from airmuscle.identify.problem import direction_of
+from airmuscle.identify.problem import fitted_quantity_of
 from airmuscle.identify.profile_likelihood import weakly_determined
-from airmuscle.library import catalogue
+from airmuscle.library import catalogue, files
 from airmuscle.recording import Recording
 
 HELD = {
@@ -41,7 +41,7 @@ def law_of(name: str):
 
 
 def recoverable() -> list[str]:
-    return [n for n in catalogue.list_library() if any(leaf.declared.fitted for leaf in tree.leaves(law_of(n)[0]))]
+    return [n for n in files.list_laws() if any(leaf.declared.fitted for leaf in tree.leaves(law_of(n)[0]))]
 
 
 def simulated(
@@ -51,10 +51,14 @@ def simulated(
     random = np.random.default_rng(seed)
     low, high = max(validity_range.contraction[0], least), validity_range.contraction[1]
     pressure = random.uniform(*validity_range.pressure, 400)
-    direction = direction_of(law)
+    direction = fitted_quantity_of(law)
     if isinstance(law, ForceLaw):
         contraction = random.uniform(low, high, 400)
-        columns = {"pressure": pressure, "contraction": contraction, "force": law.unclamped(pressure, contraction)}
+        columns = {
+            "pressure": pressure,
+            "contraction": contraction,
+            "force": law.unclamped_force(pressure, contraction),
+        }
     elif isinstance(law, ContractionLaw):
         force = random.uniform(*law.force_range, 400)
         columns = {"pressure": pressure, "force": force, "contraction": law.contraction(pressure, force)}
@@ -64,10 +68,10 @@ def simulated(
         inside = (columns["pressure"] > 0) & (columns["pressure"] < 8e5)
         columns = {key: values[inside] for key, values in columns.items()}
     exact = Recording(columns, "simulated")
-    truth = exact[direction.quantity]
+    truth = exact[direction.name]
     noise = 0.005 * float(np.ptp(truth))
     noisy = truth + noise * random.standard_normal(len(exact))
-    return exact.with_columns(**{direction.quantity: noisy}), exact, noise
+    return exact.with_columns(**{direction.name: noisy}), exact, noise
 
 
 def disturbed(law, fixed: tuple[str, ...]):
@@ -89,7 +93,7 @@ def test_a_law_is_recovered_within_its_bands(name: str):
     found = fit(disturbed(inner, fixed), noisy, censoring=UNCENSORED, fixed=fixed)
     assert found.sigma == pytest.approx(noise, rel=0.15)
     stated = confidence_band(found, exact, level=0.999)
-    truth = exact[found.direction.quantity]
+    truth = exact[found.fitted_quantity.name]
     held = (stated.low <= truth) & (truth <= stated.high)
     assert held.mean() > 0.97
     assert np.sqrt(np.mean((stated.value - truth) ** 2)) < 0.5 * noise
@@ -101,8 +105,8 @@ def test_a_law_is_recovered_within_its_bands(name: str):
 
 
 def test_every_law_of_the_library_is_tried_and_a_table_has_nothing_to_find():
-    tables = {name for name in catalogue.list_library() if isinstance(law_of(name)[0], Tabulated)}
-    assert set(recoverable()) | tables == set(catalogue.list_library())
+    tables = {name for name in files.list_laws() if isinstance(law_of(name)[0], Tabulated)}
+    assert set(recoverable()) | tables == set(files.list_laws())
     assert tables == {"festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40"}
     for name in tables:
         law, validity_range = law_of(name)

@@ -17,12 +17,12 @@ from airmuscle import read_csv
 from airmuscle.characteristic import ContractileSurface, EffectiveLength, Hunt2017, Sarosi2012
 from airmuscle.core.errors import IdentificationError
 from airmuscle.identify import UNCENSORED, Candidate, LevelSplit, compare, fit
-from airmuscle.identify.candidates import standard_candidates, surface
-from airmuscle.identify.censored_least_squares import least_squares_of
+from airmuscle.identify.candidates import blank_surface, standard_candidates
+from airmuscle.identify.censored_least_squares import solve_censored_least_squares
 from airmuscle.identify.censoring import Censoring
-from airmuscle.identify.cross_validation import parts
+from airmuscle.identify.cross_validation import label_folds
 from airmuscle.identify.problem import make_problem
-from airmuscle.identify.variable_projection import linear_leaves, projected_start
+from airmuscle.identify.variable_projection import find_initial_values, is_linear_parameter
 from airmuscle.recording import Recording
 
 DATA = Path(airmuscle.__file__).parent / "library" / "data"
@@ -64,7 +64,7 @@ def test_with_any_level_left_out_a_fit_settles_or_names_what_nothing_tells_apart
     recording = read_csv(DATA / f"{name}.csv")
     candidates = [c for c in standard_candidates([recording]) if isinstance(c.law, Sarosi2012 | Hunt2017)]
     assert len(candidates) == 2
-    (labels,), names = parts([recording], LevelSplit("contraction"))
+    (labels,), names = label_folds([recording], LevelSplit("contraction"))
     reasons = []
     for candidate in candidates:
         for left_out in names:
@@ -72,7 +72,7 @@ def test_with_any_level_left_out_a_fit_settles_or_names_what_nothing_tells_apart
                 assert np.isfinite(fit(candidate.law, recording.rows(labels != left_out)).values).all()
             except IdentificationError as error:
                 reasons.append(str(error))
-    assert [r for r in reasons if "cannot tell apart" not in r and "do not act on" not in r] == []
+    assert [r for r in reasons if "cannot separate" not in r and "do not depend on" not in r] == []
 
 
 def test_the_better_of_two_optima_is_found():
@@ -87,7 +87,7 @@ def lengths(inner: ContractileSurface, dead_length: float, noise: float = 0.0) -
     for i, length in enumerate((0.08, 0.12, 0.2, 0.4)):
         random = np.random.default_rng(i)
         pressure, contraction = random.uniform(3e5, 6e5, 150), random.uniform(0.0, 0.12, 150)
-        force = EffectiveLength(inner, length, dead_length, 1e-3).unclamped(pressure, contraction)
+        force = EffectiveLength(inner, length, dead_length, 1e-3).unclamped_force(pressure, contraction)
         columns = {
             "pressure": pressure,
             "contraction": contraction,
@@ -103,7 +103,7 @@ def test_the_ends_of_a_family_of_degree_five_are_found_from_any_start(start: tup
     coefficients = random.normal(0, 20, 21)
     coefficients[:2], coefficients[6] = (300.0, -250.0), 200.0
     inner = ContractileSurface(tuple(coefficients), 3e5, 6e5, -0.06, 0.18, -1e6, 1e6, 5)
-    found = fit(EffectiveLength(surface(5), 0.4, *start), lengths(inner, 0.02))
+    found = fit(EffectiveLength(blank_surface(5), 0.4, *start), lengths(inner, 0.02))
     assert found["dead_length"].value == pytest.approx(0.02, abs=1e-5)
     assert found["end_shift"].value == pytest.approx(1e-3, abs=1e-5)
 
@@ -113,15 +113,17 @@ def test_slack_rows_take_part_in_the_projection():
     recording = pulled(SAROSI)
     slack = recording.with_columns(force=np.maximum(recording["force"], 0.0))
     problem = make_problem(Sarosi2012(0.0, 1.0, -10.0, 0.0, 0.0, 0.0), slack, Censoring(), np.ones(120), ())
-    assert problem.sides.any()
-    start = projected_start(problem)
+    assert problem.censoring.any()
+    start = find_initial_values(problem)
     assert start[2] == pytest.approx(-40.0, rel=1e-4)
-    linear = linear_leaves(problem)
+    linear = is_linear_parameter(problem)
     assert linear.tolist() == [True, True, False, True, True, True]
     again = start.copy()
     again[linear] = 0.0
-    slopes = problem.slopes(again)[:, linear]
-    assert least_squares_of(problem, slopes, problem.modelled(again)) == pytest.approx(start[linear], rel=1e-6)
+    slopes = problem.jacobian(again)[:, linear]
+    assert solve_censored_least_squares(problem, slopes, problem.predict(again)) == pytest.approx(
+        start[linear], rel=1e-6
+    )
 
 
 def test_what_is_linear_alone_is_solved_at_once():
@@ -133,6 +135,8 @@ def test_a_fold_that_leaves_the_exponential_open_is_excluded_by_name():
     """On this map one level alone lies where the exponential acts."""
     recording = read_csv(DATA / "dmsp-20-300.csv")
     (candidate,) = (c for c in standard_candidates([recording]) if isinstance(c.law, Sarosi2012))
-    found = compare(recording, [candidate, Candidate("plane", surface(1, 4e3))], leave_out=LevelSplit("contraction"))
+    found = compare(
+        recording, [candidate, Candidate("plane", blank_surface(1, 4e3))], leave_out=LevelSplit("contraction")
+    )
     (excluded,) = found.excluded
-    assert "cannot tell apart a_1, a_2, a_3" in excluded.why
+    assert "cannot separate a_1, a_2, a_3" in excluded.reason

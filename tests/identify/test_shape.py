@@ -12,8 +12,8 @@ import pytest
 from airmuscle.characteristic import ContractileSurface, Sarosi2012, TonduLopez2000, ValidityRange
 from airmuscle.core.errors import IdentificationError, SolveError
 from airmuscle.geometry.braid import Braid
-from airmuscle.identify import convert, fit, fit_shaped, shape_breaks
-from airmuscle.identify.candidates import surface
+from airmuscle.identify import convert, find_shape_violations, fit, fit_shape_constrained
+from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.surface.shape import FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION, shape_constraints
 from airmuscle.recording import Recording
 
@@ -30,10 +30,10 @@ def points(n: int, noise: float, seed: int = 2) -> Recording:
 
 def test_few_and_noisy_points_bend_a_free_surface_and_not_a_shaped_one():
     data = points(40, 60.0)
-    found = fit_shaped(surface(4), data)
-    assert {b.rule for b in found.broken} == {FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION}
-    assert shape_breaks(found.model, found.model.validity_range, points=201) == ()
-    assert found.rmse > found.unconstrained
+    found = fit_shape_constrained(blank_surface(4), data)
+    assert {b.rule for b in found.unconstrained_violations} == {FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION}
+    assert find_shape_violations(found.model, found.model.validity_range, points=201) == ()
+    assert found.rmse > found.unconstrained_rmse
     grid = np.meshgrid(
         np.linspace(*found.model.validity_range.pressure, 60), np.linspace(*found.model.validity_range.contraction, 60)
     )
@@ -41,16 +41,16 @@ def test_few_and_noisy_points_bend_a_free_surface_and_not_a_shaped_one():
     def distance(law):
         return float(np.sqrt(np.mean((law.force(*grid) - MUSCLE.force(*grid)) ** 2)))
 
-    assert distance(found.model) < distance(fit(surface(4), data).model)
+    assert distance(found.model) < distance(fit(blank_surface(4), data).model)
 
 
 def test_conditions_that_hold_anyway_change_nothing():
     data = points(200, 0.5)
-    found = fit_shaped(surface(2), data)
-    free = fit(surface(2), data).model
-    assert found.broken == ()
+    found = fit_shape_constrained(blank_surface(2), data)
+    free = fit(blank_surface(2), data).model
+    assert found.unconstrained_violations == ()
     assert found.model.coefficients == pytest.approx(free.coefficients, abs=1e-6)
-    assert found.rmse == pytest.approx(found.unconstrained, rel=1e-9)
+    assert found.rmse == pytest.approx(found.unconstrained_rmse, rel=1e-9)
 
 
 def test_the_conditions_are_those_of_the_slopes():
@@ -76,42 +76,42 @@ def test_at_points_of_free_contraction_the_force_is_zero():
     data = points(150, 5.0)
     pressure = np.array([2e5, 4e5, 6e5])
     free = Recording({"pressure": pressure, "contraction": np.full(3, 0.2)}, "hung free")
-    found = fit_shaped(surface(4), data, free=free)
-    assert found.model.unclamped(pressure, free["contraction"]) == pytest.approx(np.zeros(3), abs=1e-8)
-    assert shape_breaks(found.model, found.model.validity_range) == ()
+    found = fit_shape_constrained(blank_surface(4), data, free=free)
+    assert found.model.unclamped_force(pressure, free["contraction"]) == pytest.approx(np.zeros(3), abs=1e-8)
+    assert find_shape_violations(found.model, found.model.validity_range) == ()
     many = Recording({"pressure": np.linspace(1e5, 6e5, 9), "contraction": np.linspace(0.05, 0.2, 9) ** 2}, "too many")
     with pytest.raises(IdentificationError, match="leave none"):
-        fit_shaped(surface(1), data, free=many)
+        fit_shape_constrained(blank_surface(1), data, free=many)
 
 
 def test_the_place_of_a_break_is_named():
     law = Sarosi2012(0.0, 0.0, -1.0, 4e-3, 1e-3, 50.0)  # gains force with contraction everywhere
-    (found,) = shape_breaks(law, BOX)
+    (found,) = find_shape_violations(law, BOX)
     assert found.rule is RISES_WITH_CONTRACTION
-    assert found.share == 1.0
-    assert found.worst[0] == 6e5
+    assert found.area_fraction == 1.0
+    assert found.worst_point[0] == 6e5
     assert found.worst_slope == pytest.approx(4e-3 * 6e5)
     assert "600 kPa" in str(found)
 
 
 def test_a_conversion_finds_the_same_law_in_another_form():
     """F = p (A eps^2 + B eps + C) is a surface of degree three, exactly."""
-    found = convert(MUSCLE, surface(3), BOX)
-    assert found.rms < 1e-9
-    assert convert(found.model, TonduLopez2000(Braid(0.012, 0.4, 0.3), 1.0), BOX).rms < 1e-6
+    found = convert(MUSCLE, blank_surface(3), BOX)
+    assert found.rmse < 1e-9
+    assert convert(found.model, TonduLopez2000(Braid(0.012, 0.4, 0.3), 1.0), BOX).rmse < 1e-6
 
 
 def test_a_conversion_says_how_far_it_is_off():
-    found = convert(MUSCLE, surface(1), BOX)
+    found = convert(MUSCLE, blank_surface(1), BOX)
     grid = np.meshgrid(np.linspace(*BOX.pressure, 300), np.linspace(*BOX.contraction, 300))
     difference = found.model.force(*grid) - MUSCLE.force(*grid)
     assert np.abs(found.max_error) == pytest.approx(np.abs(difference).max(), rel=0.02)
     denser = (1 - np.cos(np.pi * np.linspace(0, 1, 300))) / 2  # as the conversion judges: denser towards the edges
     grid = np.meshgrid(1e5 + 5e5 * denser, 0.2 * denser)
     difference = found.model.force(*grid) - MUSCLE.force(*grid)
-    assert found.rms == pytest.approx(np.sqrt(np.mean(difference**2)), rel=0.1)
-    at = (found.pressure, found.contraction)
+    assert found.rmse == pytest.approx(np.sqrt(np.mean(difference**2)), rel=0.1)
+    at = (found.max_error_pressure, found.max_error_contraction)
     assert found.model.force(*at) - MUSCLE.force(*at) == pytest.approx(found.max_error, rel=1e-9)
     assert f"{found.max_error:.4g} N" in str(found)
     with pytest.raises(SolveError, match="pulls nowhere"):
-        convert(MUSCLE, surface(1), ValidityRange(1e5, 6e5, 0.5, 0.55))
+        convert(MUSCLE, blank_surface(1), ValidityRange(1e5, 6e5, 0.5, 0.55))

@@ -15,7 +15,7 @@ from airmuscle.characteristic import ContractileSurface, TonduLopez2000
 from airmuscle.cli.app import app
 from airmuscle.geometry.braid import Braid
 from airmuscle.identify import fit
-from airmuscle.identify.weights import deviations
+from airmuscle.identify.weights import sensor_deviations
 from airmuscle.recording import Recording
 from airmuscle.recording.csv_writer import write_csv
 
@@ -40,7 +40,7 @@ def rigs(seed: int) -> list[Recording]:
 
 
 def test_the_deviations_are_those_of_noise_and_rounding():
-    found = deviations(rigs(1), "force")
+    found = sensor_deviations(rigs(1), "force")
     fine, coarse = np.hypot(0.3, 0.2 / 12**0.5), np.hypot(15.0, 12.0 / 12**0.5)
     assert found == pytest.approx([fine] * 4 + [coarse] * 4, rel=0.25)
     assert len(set(found.tolist())) == 2, "recordings of one rig share its sensor"
@@ -49,23 +49,23 @@ def test_the_deviations_are_those_of_noise_and_rounding():
 def test_without_time_the_resolution_decides():
     runs = [ramp(1e5, step, 0.5, 1, count=1500) for step in (0.2, 0.2, 6.0)]
     shuffled = [Recording({n: run[n] for n in ("pressure", "contraction", "force")}, run.origin) for run in runs]
-    assert deviations(shuffled, "force") == pytest.approx(np.array([0.2, 0.2, 6.0]) / 12**0.5, rel=0.02)
-    assert deviations(shuffled[:2], "force") is None
+    assert sensor_deviations(shuffled, "force") == pytest.approx(np.array([0.2, 0.2, 6.0]) / 12**0.5, rel=0.02)
+    assert sensor_deviations(shuffled[:2], "force") is None
 
 
 def test_one_rig_and_sensors_that_show_nothing_weigh_all_alike():
     runs = rigs(1)
-    assert deviations(runs[:4], "force") is None
-    assert deviations(runs[:1], "force") is None
+    assert sensor_deviations(runs[:4], "force") is None
+    assert sensor_deviations(runs[:1], "force") is None
     still = runs[0].with_columns(force=np.full(400, 5.0))
-    assert deviations([still, runs[5]], "force") is None, "a sensor without noise or resolution tells nothing"
-    assert deviations([runs[0].rows(slice(0, 0)), runs[5]], "force") is None
-    assert deviations(runs, "temperature") is None
+    assert sensor_deviations([still, runs[5]], "force") is None, "a sensor without noise or resolution tells nothing"
+    assert sensor_deviations([runs[0].rows(slice(0, 0)), runs[5]], "force") is None
+    assert sensor_deviations(runs, "temperature") is None
 
 
 def test_the_default_of_a_fit_is_the_sigma_of_the_sensors():
     runs = rigs(2)
-    sigma = np.repeat(deviations(runs, "force"), [len(run) for run in runs])
+    sigma = np.repeat(sensor_deviations(runs, "force"), [len(run) for run in runs])
     default, stated = fit(SURFACE, runs), fit(SURFACE, runs, sigma=sigma)
     assert default.values == pytest.approx(stated.values, rel=1e-9)
     assert any("weigh by standard deviations of 0." in note for note in default.notes)
@@ -100,6 +100,6 @@ def test_the_command_line_weighs_by_sensor_unless_told(tmp_path):
         json.loads(CliRunner().invoke(app, ["fit", *files, *law, *more]).stdout)["notes"]
         for more in ((), ("--equal-weights",))
     ]
-    assert [any("rigs whose sensors differ" in note for note in each) for each in notes] == [True, False]
+    assert [any("test rigs with different sensors" in note for note in each) for each in notes] == [True, False]
     page = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
     assert "sigma=1.0" not in page

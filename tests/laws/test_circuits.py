@@ -24,16 +24,16 @@ from airmuscle.pneumatics import (
     ClosedChamber,
     DistributedTube,
     FillDischarge,
-    IndexedValve,
     Manifold,
     ProportionalRegulator,
     ProportionalValve,
     RegulatedSupply,
     SecondOrderLag,
     SharedSupply,
+    SubsonicIndexValve,
     Supply,
     Tank,
-    ThreePosition,
+    ThreePositionValve,
     Tube,
     Valve,
     WithLeak,
@@ -65,8 +65,8 @@ def plant(circuit, gas=ADIABATIC, count=1, mechanism=HELD):
 
 CIRCUITS = {
     "two valves": plant(FillDischarge(Supply(5e5), VALVE, NARROW)),
-    "check and index": plant(FillDischarge(Supply(5e5), CheckValve(VALVE), IndexedValve(1e-8, 0.3, 0.6, 2e4))),
-    "three positions on a tank": plant(ThreePosition(tank(), VALVE, NARROW)),
+    "check and index": plant(FillDischarge(Supply(5e5), CheckValve(VALVE), SubsonicIndexValve(1e-8, 0.3, 0.6, 2e4))),
+    "three positions on a tank": plant(ThreePositionValve(tank(), VALVE, NARROW)),
     "regulated supply on a tank": plant(
         FillDischarge(RegulatedSupply(tank(), WIDE, 4e5, gas=ADIABATIC), VALVE, NARROW)
     ),
@@ -214,7 +214,7 @@ def test_a_regulator_with_a_leak_stays_below_its_set_point_within_its_band():
 
 def test_a_set_point_beyond_the_range_is_refused():
     system = plant(ProportionalRegulator(Supply(7e5), VALVE, VALVE, SecondOrderLag(50.0)))
-    with pytest.raises(ParameterError, match=r"setpoint.*allowed are 0 to 1e\+06 Pa"):
+    with pytest.raises(ParameterError, match=r"setpoint.*allowed range: 0 to 1e\+06 Pa"):
         simulate(system, Schedule({"setpoint": ((0.0, 2e6),)}), duration=1.0)
 
 
@@ -297,19 +297,19 @@ def test_a_manifold_books_what_its_branches_draw():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: plant(FillDischarge(SharedSupply(), VALVE, VALVE)), r"Plant: its FillDischarge: SharedSupply\(\) is the supply of"),
+        (lambda: plant(FillDischarge(SharedSupply(), VALVE, VALVE)), r"Plant: its FillDischarge: SharedSupply\(\) is allowed only as the supply of"),
         (lambda: plant(WithTubes(FillDischarge(SharedSupply(), VALVE, VALVE), tube())), r"Plant: its WithTubes: SharedSupply\(\)"),
-        (lambda: Tank(SharedSupply(), VALVE, 1e-3), r"Tank: SharedSupply\(\) .* here give a Supply, a Tank or a Reg"),
+        (lambda: Tank(SharedSupply(), VALVE, 1e-3), r"Tank: SharedSupply\(\) is allowed only .* give a Supply, a Tank or a Reg"),
         (lambda: RegulatedSupply(SharedSupply(), VALVE, 4e5), r"RegulatedSupply: SharedSupply\(\)"),
-        (lambda: Manifold(Supply(6e5), (FillDischarge(Supply(6e5), VALVE, VALVE),), ("a",)), "branch 'a' has a supply of"),
-        (lambda: Manifold(Supply(6e5), (ClosedChamber(SharedSupply()),), ("a", "b")), "1 branches need as many different"),
+        (lambda: Manifold(Supply(6e5), (FillDischarge(Supply(6e5), VALVE, VALVE),), ("a",)), "the supply of branch 'a' is Supply; it must be"),
+        (lambda: Manifold(Supply(6e5), (ClosedChamber(SharedSupply()),), ("a", "b")), "give a distinct name for each of the 1 branches"),
         (lambda: Manifold(Supply(6e5), (ClosedChamber(SharedSupply()),), ("supply",)), "cannot be named 'supply'"),
-        (lambda: Manifold(Supply(6e5), (ClosedChamber(SharedSupply()),), ("a.b",)), "a word without a dot"),
-        (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 0.0, 3), "one muscle or two, not 3"),
-        (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 0.0, True), "one muscle or two, not True"),
-        (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 1.0), r"overlap .* allowed are -0.5 to 0.9"),
-        (lambda: Tube(VALVE, 1e-5, 0), "Tube: pieces is 0; give a whole number from 1 to 200"),
-        (lambda: DistributedTube(1.0, 4e-3, 2.5), "DistributedTube: pieces is 2.5"),
+        (lambda: Manifold(Supply(6e5), (ClosedChamber(SharedSupply()),), ("a.b",)), "give a name without a dot"),
+        (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 0.0, 3), "muscle_count is 3; it must be 1 or 2"),
+        (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 0.0, True), "muscle_count is True; it must be 1 or 2"),
+        (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 1.0), r"overlap .* allowed range: -0.5 to 0.9"),
+        (lambda: Tube(VALVE, 1e-5, 0), "Tube: segment_count is 0; give an integer from 1 to 200"),
+        (lambda: DistributedTube(1.0, 4e-3, 2.5), "DistributedTube: segment_count is 2.5"),
         (lambda: plant(FillDischarge(Supply(5e5), VALVE, VALVE), count=2), "circuits feed 1 muscles; 2 are given"),
     ],
 )  # fmt: skip

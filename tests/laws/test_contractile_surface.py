@@ -1,4 +1,4 @@
-"""The contractile surface: its powers, its clamp, its plain coefficients, and how it goes on where there was no data."""
+"""Contractile surface: powers, force limits, monomial coefficients, and extrapolation outside the validity range."""
 
 from __future__ import annotations
 
@@ -30,19 +30,21 @@ def test_a_polynomial_of_total_degree_n_has_its_powers_and_no_others(degree):
 
 @settings(max_examples=50)
 @given(st.integers(0, 99), st.floats(*BOX[0]), st.floats(*BOX[1]))
-def test_inside_the_box_it_is_the_sum_of_its_powers(seed, pressure, contraction):
+def test_inside_the_validity_range_it_is_the_sum_of_its_powers(seed, pressure, contraction):
     law = surface(seed)
     x, q = 2 * contraction / 0.25 - 1, 2 * (pressure - 50e3) / 600e3 - 1
     expected = sum(a * x**i * q**j for a, (i, j) in zip(law.coefficients, exponents(5), strict=True))
     assert law.force(pressure, contraction) == pytest.approx(expected, abs=1e-8)
-    plain = law.plain_coefficients(1e5)
+    plain = law.monomial_coefficients(1e5)
     exported = sum(a * contraction**i * (pressure / 1e5) ** j for (i, j), a in plain.items())
     assert exported == pytest.approx(expected, abs=1e-6)
 
 
 @settings(max_examples=60)
 @given(st.integers(0, 99), st.floats(-1e5, 9e5), st.floats(-0.05, 0.4))
-def test_outside_the_box_it_never_rises_with_contraction_nor_falls_with_pressure(seed, pressure, contraction):
+def test_outside_the_validity_range_it_neither_increases_with_contraction_nor_decreases_with_pressure(
+    seed, pressure, contraction
+):
     law = surface(seed)
     if contraction > 0.25 or contraction < 0.0:
         out = contraction + 0.01 * np.sign(contraction)
@@ -55,20 +57,20 @@ def test_outside_the_box_it_never_rises_with_contraction_nor_falls_with_pressure
 
 @settings(max_examples=30)
 @given(st.integers(0, 99), st.floats(*BOX[0]))
-def test_it_is_continuous_at_the_edge_of_the_box(seed, pressure):
+def test_it_is_continuous_at_the_edge_of_the_validity_range(seed, pressure):
     law = surface(seed)
     for edge in BOX[1]:
         assert law.force(pressure, edge - 1e-9) == pytest.approx(law.force(pressure, edge + 1e-9), abs=1e-3)
 
 
-def test_where_the_tangent_is_physical_it_goes_on_by_it():
+def test_a_physical_slope_is_extrapolated_linearly():
     falling = ContractileSurface((300.0, -100.0, 200.0), *BOX[0], *BOX[1], degree=1)
     slopes = falling.slopes(300e3, 0.1)
     expected = falling.force(650e3, 0.25) + slopes.by_pressure * 100e3 + slopes.by_contraction * 0.02
     assert falling.force(750e3, 0.27) == pytest.approx(expected)
 
 
-def test_it_stays_within_its_clamp():
+def test_it_stays_within_its_force_limits():
     law = surface(3, min_force=0.0, max_force=1200.0)
     force = law.force(np.linspace(-1e5, 1e6, 50)[:, None], np.linspace(-0.05, 0.4, 50)[None, :])
     assert force.min() == 0.0
@@ -78,12 +80,12 @@ def test_it_stays_within_its_clamp():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"coefficients": (1.0, 2.0)}, "degree 5 needs 21 coefficients, not 2"),
-        ({"max_pressure": 1e3}, "min_pressure 50000 must lie below max_pressure 1000"),
-        ({"max_contraction": -0.1}, "min_contraction 0 must lie below max_contraction -0.1"),
-        ({"min_force": 1e10}, "min_force 1e\\+10 must lie below max_force"),
+        ({"coefficients": (1.0, 2.0)}, "degree 5 requires 21 coefficients, not 2"),
+        ({"max_pressure": 1e3}, "min_pressure 50000 must be less than max_pressure 1000"),
+        ({"max_contraction": -0.1}, "min_contraction 0 must be less than max_contraction -0.1"),
+        ({"min_force": 1e10}, "min_force 1e\\+10 must be less than max_force"),
     ],
 )
-def test_what_is_no_surface_is_refused(change, message):
+def test_invalid_surfaces_are_errors(change, message):
     with pytest.raises(ParameterError, match=message):
         dataclasses.replace(surface(0), **change)

@@ -135,9 +135,9 @@ def test_a_controller_keeps_nothing_outside_its_memory():
         ({"gain": math.nan}, r"PID.gain \(K, proportional gain\) is nan; it must be finite"),
         ({"gain": math.inf}, "it must be finite"),
         ({"gain": "2"}, "must be a number in u/y"),
-        ({"integral_time": -1.0}, r"PID.integral_time .* is -1 s; allowed are 0 to"),
-        ({"derivative_filter": 0.0}, r"PID.derivative_filter .* allowed are 1 to 1000"),
-        ({"setpoint_weight": 2.0}, r"PID.setpoint_weight .* allowed are 0 to 1"),
+        ({"integral_time": -1.0}, r"PID.integral_time .* is -1 s; allowed range: 0 to"),
+        ({"derivative_filter": 0.0}, r"PID.derivative_filter .* allowed range: 1 to 1000"),
+        ({"setpoint_weight": 2.0}, r"PID.setpoint_weight .* allowed range: 0 to 1"),
     ],
 )
 def test_what_a_controller_cannot_be_is_said(changed, message):

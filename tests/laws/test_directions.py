@@ -1,8 +1,7 @@
-"""Every library entry is one surface, whatever it is asked for.
+"""Force, contraction and pressure of every library entry describe one surface F = f(p, eps).
 
-With F = f(p, eps): force, contraction and pressure answer points of the same surface; a direction that a law has in
-closed form equals the root search that stands in for it elsewhere; slopes are the derivatives of the force; an array
-gives what its elements give; a traced law gives what NumPy gives, and so does JAX.
+A direction in closed form agrees with the root search of the base class; slopes are the derivatives of the force; an
+array gives the values of its elements; traced models and JAX give the values of NumPy.
 """
 
 from __future__ import annotations
@@ -18,7 +17,8 @@ from airmuscle.characteristic.base import Characteristic, ContractionLaw, ForceL
 from airmuscle.characteristic.validity_range import ValidityRange
 from airmuscle.core import autodiff
 from airmuscle.core.errors import AirmuscleWarning, ParameterError, SolveError
-from airmuscle.library import catalogue
+from airmuscle.library import catalogue, files
+from airmuscle.library.entry import Entry
 
 ARGUMENTS = {
     "force": ("pressure", "contraction"),
@@ -31,7 +31,7 @@ PLACES = np.array([0.0871, 0.2913, 0.4931, 0.7127, 0.9083])
 
 
 class Points(NamedTuple):
-    """Points of a surface where the tension rises with pressure and falls with contraction."""
+    """Points of a surface at which tension increases with pressure and decreases with contraction."""
 
     pressure: np.ndarray
     contraction: np.ndarray
@@ -42,14 +42,14 @@ class Points(NamedTuple):
 
 
 @functools.cache
-def entry(name: str) -> catalogue.Entry:
+def entry(name: str) -> Entry:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
         return catalogue.load(name)
 
 
 def own_direction(law: Characteristic) -> str:
-    """The quantity that the law is given for."""
+    """The quantity for which the characteristic is solved."""
     return next((direction for base, direction in SEARCHES.items() if isinstance(law, base)), "force")
 
 
@@ -91,17 +91,17 @@ def reached_from_rest(law: Characteristic, pressure: float, contraction: float, 
     return bool(slopes.by_pressure > 0 and slopes.by_contraction < 0)
 
 
-every_entry = pytest.mark.parametrize("name", catalogue.list_library())
+every_entry = pytest.mark.parametrize("name", files.list_laws())
 
 
 @every_entry
-def test_a_box_holds_points_to_test(name: str):
+def test_every_validity_range_has_test_points(name: str):
     assert points(name).force.size >= 8
 
 
 @every_entry
 @pytest.mark.parametrize("direction", ARGUMENTS)
-def test_each_direction_answers_a_point_of_the_surface(name: str, direction: str):
+def test_each_direction_returns_a_point_of_the_surface(name: str, direction: str):
     law, there = entry(name).characteristic, points(name)
     answers = there._replace(**{direction: getattr(law, direction)(*there.given(direction))})
     own = own_direction(law)
@@ -124,14 +124,14 @@ def test_a_closed_form_equals_the_root_search(name: str):
 
 
 @every_entry
-def test_a_force_that_no_muscle_has_is_refused(name: str):
+def test_an_impossible_force_is_an_error(name: str):
     law, there = entry(name).characteristic, points(name)
     if own_direction(law) != "force":
         pytest.skip("solved for another quantity, the law answers any force")
     if law.force(there.pressure[0], law.contraction_range[0]) < 1e7:  # straight fibres pull without limit at rest
-        with pytest.raises(SolveError, match=r"no contraction between .* balances 1e\+07 N"):
+        with pytest.raises(SolveError, match=r"no contraction in the range .* is in equilibrium with 1e\+07 N"):
             law.contraction(there.pressure[0], 1e7)
-    with pytest.raises(SolveError, match=r"no gauge pressure between .* gives 1e\+07 N"):
+    with pytest.raises(SolveError, match=r"no gauge pressure in the range .* gives 1e\+07 N"):
         law.pressure(there.contraction, 1e7)
 
 
@@ -148,7 +148,7 @@ def test_slopes_are_the_derivatives_of_the_force(name: str):
 
 @every_entry
 @pytest.mark.parametrize("direction", ARGUMENTS)
-def test_an_array_gives_what_its_elements_give(name: str, direction: str):
+def test_an_array_gives_the_values_of_its_elements(name: str, direction: str):
     law, there = entry(name).characteristic, points(name)
     given = there.given(direction)
     singly = [getattr(law, direction)(float(a), float(b)) for a, b in zip(*given, strict=True)]
@@ -157,7 +157,7 @@ def test_an_array_gives_what_its_elements_give(name: str, direction: str):
 
 
 @every_entry
-def test_a_traced_law_gives_what_numpy_gives(name: str):
+def test_a_traced_model_gives_the_values_of_numpy(name: str):
     law, there = entry(name).characteristic, points(name)
     if not law.traceable:
         pytest.skip("the law says that it is not closed-form")
@@ -167,7 +167,7 @@ def test_a_traced_law_gives_what_numpy_gives(name: str):
 
 
 @every_entry
-def test_jax_gives_what_numpy_gives(name: str):
+def test_jax_gives_the_values_of_numpy(name: str):
     jax: Any = pytest.importorskip("jax")
     law, there = entry(name).characteristic, points(name)
     if not law.traceable:
@@ -178,6 +178,6 @@ def test_jax_gives_what_numpy_gives(name: str):
     np.testing.assert_allclose(np.asarray(found), getattr(law, own)(*there.given(own)), rtol=1e-12)
 
 
-def test_a_box_refuses_ends_that_do_not_rise():
-    with pytest.raises(ParameterError, match="min_pressure 2 must lie below max_pressure 1"):
+def test_a_validity_range_needs_increasing_limits():
+    with pytest.raises(ParameterError, match="min_pressure 2 must be less than max_pressure 1"):
         ValidityRange(2.0, 1.0, 0.0, 0.1)

@@ -1,8 +1,8 @@
-"""Friction: force with memory, against the motion, that never drives.
+"""Friction models: hysteretic, opposed to the motion, and passive.
 
-Each law's rates and its replay along a path are one law; Dahl and Bouc-Wen meet their closed forms, LuGre its
-Stribeck curve; stops meet their definition, and with it Masing's rules, closed inner loops and wiping out. Whatever
-the path, the work done against friction from rest is never negative. All but LuGre are independent of the rate.
+The rates of each model and its force along a path agree; Dahl and Bouc-Wen agree with their closed forms, LuGre with
+its Stribeck curve; stop operators satisfy their definition, Masing's rules, closure of inner loops and wiping out. For
+every path, the work done against friction from the relaxed state is not negative. All but LuGre are rate-independent.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from scipy.integrate import solve_ivp
 from airmuscle.core.errors import ParameterError
 from airmuscle.core.tree import leaves
 from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
-from airmuscle.friction.path import stops
+from airmuscle.friction.path import stop_operators
 
 STIFFNESSES, LIMITS = (4e4, 2e4, 1e4), (1e-4, 4e-4, 1e-3)
 SLIP = MaxwellSlip(STIFFNESSES, LIMITS)
@@ -38,13 +38,13 @@ def name(law):
 
 
 def path_through(ends, rows=40):
-    """A path from 0 through turning points, straight between them."""
+    """A path from 0 through turning points, linear between them."""
     legs = [np.linspace(a, b, rows, endpoint=False) for a, b in itertools.pairwise((0.0, *ends))]
     return np.concatenate([*legs, [ends[-1]]])
 
 
 def integrated(law, ends, speed=1e-3):
-    """Force and bristles at the end of a path run at a constant speed, by the rates of the law."""
+    """Force and bristles at the end of a path at constant speed, by integration of the rates."""
     values, names = np.zeros(len(law.states)), [s.name for s in law.states]
     v = 0.0
     for a, b in itertools.pairwise((0.0, *ends)):
@@ -62,7 +62,7 @@ def integrated(law, ends, speed=1e-3):
 
 
 def yielded(law, ends):
-    """Bristles at the end of a path, by the rates of the law, in steps within the transition of its least limit."""
+    """Bristles at the end of a path, by integration of the rates, with steps within the smallest transition."""
     names, longest = [s.name for s in law.states], 0.5 * law.transition * min(law.limits)
     z = np.zeros(len(names))
     for a, b in itertools.pairwise((0.0, *ends)):
@@ -79,7 +79,7 @@ def yielded(law, ends):
 
 
 @pytest.mark.parametrize("law", [DAHL, BOUC_WEN, replace(BOUC_WEN, sharpness=6.0, unloading=3.0)], ids=repr)
-def test_the_replay_is_the_integral_of_the_rates(law):
+def test_the_force_along_a_path_is_the_integral_of_the_rates(law):
     ends = (1e-3, -2e-4, 3e-4, 2e-4, 9e-4, -3e-3)
     for count in range(1, len(ends) + 1):
         assert law.force_along(path_through(ends[:count]))[-1] == pytest.approx(
@@ -87,7 +87,7 @@ def test_the_replay_is_the_integral_of_the_rates(law):
         )
 
 
-def test_the_replay_of_lugre_in_time_is_the_integral_of_its_rates():
+def test_the_force_of_lugre_over_time_is_the_integral_of_its_rates():
     ends = (1e-3, -2e-4, 3e-4)
     path = path_through(ends)
     time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(path)))]) / 5e-3
@@ -100,20 +100,20 @@ def test_the_replay_of_lugre_in_time_is_the_integral_of_its_rates():
 @pytest.mark.parametrize("law", EXACT_STOPS, ids=name)
 @settings(max_examples=8, deadline=None)
 @given(ends=st.lists(st.floats(-2e-3, 2e-3), min_size=2, max_size=5))
-def test_a_yielding_stop_stays_within_its_transition_of_the_exact_one(law, transition, ends):
-    """|delta - exact| <= eta Delta: the plant's form tends to the exact one with eta."""
+def test_a_gradual_stop_differs_from_the_exact_one_by_its_transition_at_most(law, transition, ends):
+    """|delta - exact| <= eta Delta: the form used in a plant converges to the exact one with eta."""
     bends = yielded(replace(law, transition=transition), ends)
-    exact = stops(np.array([0.0, *ends]), law.limits)[-1]
+    exact = stop_operators(np.array([0.0, *ends]), law.limits)[-1]
     assert (np.abs(bends - exact) <= transition * np.array(law.limits) + 1e-9).all()
 
 
-def test_dahl_meets_its_closed_form():
+def test_dahl_agrees_with_its_closed_form():
     x = np.linspace(0.0, 2e-3, 50)
     np.testing.assert_allclose(DAHL.force_along(x), 20.0 * (1.0 - np.exp(-5e4 * x / 20.0)), rtol=1e-12)
 
 
-def test_bouc_wen_meets_its_closed_forms():
-    """n = 2, sigma = 1/2 is a tangens hyperbolicus from rest; n = sigma = 1 is Dahl's law; sharp n is one stop."""
+def test_bouc_wen_agrees_with_its_closed_forms():
+    """n = 2, sigma = 1/2 is a hyperbolic tangent from rest; n = sigma = 1 is the Dahl model; large n is one stop."""
     x = np.linspace(0.0, 2e-3, 50)
     np.testing.assert_allclose(BoucWen(5e4, 20.0, 2.0, 0.5).force_along(x), 20.0 * np.tanh(5e4 * x / 20.0), atol=1e-6)
     ends = (1e-3, -2e-4, 3e-4, -1e-3)
@@ -126,14 +126,14 @@ def test_bouc_wen_meets_its_closed_forms():
 
 @pytest.mark.parametrize("bend", [-3e-4, -1e-4, 0.0, 2e-4, 3.9e-4])
 @pytest.mark.parametrize("speed", [-0.02, 0.02])
-def test_a_stop_that_yields_from_rest_is_bouc_wen_with_n_1_and_sigma_a_half(bend, speed):
+def test_a_stop_with_full_transition_is_bouc_wen_with_n_1_and_sigma_a_half(bend, speed):
     smooth, one = BoucWen(5e4, 20.0, 1.0, 0.5), MaxwellSlip((5e4,), (4e-4,), 1.0)
     (expected,) = smooth.rates({"bristle": bend}, speed).values()
     assert one.rates({"bristle1": bend}, speed)["bristle1"] == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("speed", [-0.1, -0.005, 0.002, 0.01, 0.3])
-def test_lugre_slides_along_stribecks_curve(speed):
+def test_lugre_slides_along_the_stribeck_curve(speed):
     law = LUGRE
     steady = np.sign(speed) * (15.0 + 5.0 * np.exp(-((speed / 0.01) ** 2))) + 20.0 * speed
     force, bristles = integrated(law, (np.sign(speed) * 0.05,), abs(speed))
@@ -144,8 +144,8 @@ def test_lugre_slides_along_stribecks_curve(speed):
 @pytest.mark.parametrize("law", ALL, ids=name)
 @settings(max_examples=60, deadline=None)
 @given(ends=turns)
-def test_friction_never_drives(law, ends):
-    """The work done against it from rest is never negative; on a closed path all of it but the bristles' is heat."""
+def test_friction_is_passive(law, ends):
+    """The work done against friction from rest is not negative; on a closed path it is dissipated or stored in bristles."""
     path = path_through((*ends, 0.0), 400)
     time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(path)))]) / 0.02
     force = law.force_along(path, time)
@@ -154,7 +154,7 @@ def test_friction_never_drives(law, ends):
 
 
 @pytest.mark.parametrize("law", ALL, ids=name)
-def test_a_loop_run_again_and_again_closes_and_costs_work(law):
+def test_a_repeated_loop_closes_and_dissipates_work(law):
     ends = (2e-3, -2e-3) * 6
     path = path_through(ends, 400)
     force = law.force_along(path)
@@ -166,20 +166,20 @@ def test_a_loop_run_again_and_again_closes_and_costs_work(law):
 @pytest.mark.parametrize("law", RATE_INDEPENDENT, ids=name)
 @settings(max_examples=30, deadline=None)
 @given(bend=st.floats(-1.0, 1.0), speed=st.floats(-1.0, 1.0), factor=st.floats(0.01, 100.0))
-def test_the_rates_grow_with_speed_so_that_the_path_alone_counts(law, bend, speed, factor):
+def test_the_rates_are_proportional_to_speed(law, bend, speed, factor):
     bristles = {s.name: bend * s.nominal for s in law.states}
     slow, fast = law.rates(bristles, speed), law.rates(bristles, factor * speed)
     assert list(fast.values()) == pytest.approx([factor * r for r in slow.values()], abs=1e-13 * factor)
     assert law.force(bristles, speed) == law.force(bristles, 0.0)
 
 
-def test_lugre_depends_on_the_rate_and_says_so():
+def test_lugre_is_rate_dependent_and_declares_it():
     assert not LUGRE.rate_independent
     assert abs(integrated(LUGRE, (0.01,), 0.1)[0] - integrated(LUGRE, (0.01,), 0.001)[0]) > 1.0
 
 
 @pytest.mark.parametrize("law", RATE_INDEPENDENT, ids=name)
-def test_rows_between_two_turning_points_change_nothing(law):
+def test_rows_between_two_turning_points_have_no_effect(law):
     ends = (1e-3, -2e-4, 3e-4, -1e-3)
     assert law.force_along(path_through(ends, 300))[-1] == pytest.approx(
         law.force_along(np.array([0.0, *ends]))[-1], abs=1e-6
@@ -188,10 +188,10 @@ def test_rows_between_two_turning_points_change_nothing(law):
 
 @settings(max_examples=100, deadline=None)
 @given(ends=turns)
-def test_a_stop_is_what_defines_it(ends):
-    """|z| <= r and (dx - dz)(z - phi) >= 0 for every |phi| <= r; with the play operator beside it, x = E + P."""
+def test_a_stop_operator_satisfies_its_definition(ends):
+    """|z| <= r and (dx - dz)(z - phi) >= 0 for every |phi| <= r; with the play operator P, x = E + P."""
     path = np.array([0.0, *ends])
-    bends = stops(path, LIMITS)
+    bends = stop_operators(path, LIMITS)
     play = np.zeros(3)
     for i, (x, bend) in enumerate(zip(path, bends, strict=True)):
         assert (np.abs(bend) <= LIMITS).all()
@@ -203,7 +203,7 @@ def test_a_stop_is_what_defines_it(ends):
                 assert (slid * (bend - phi) >= -1e-18).all()
 
 
-def test_masing_unloading_is_the_first_loading_drawn_twice_as_large():
+def test_masing_unloading_is_the_first_loading_scaled_by_two():
     first = SLIP.force_along(np.linspace(0.0, 1.5e-3, 301))
     path = path_through((1.5e-3, -1.5e-3), 600)
     unloading = SLIP.force_along(path)[600:]
@@ -212,8 +212,8 @@ def test_masing_unloading_is_the_first_loading_drawn_twice_as_large():
 
 
 @pytest.mark.parametrize("law", EXACT_STOPS, ids=name)
-def test_an_inner_loop_closes_and_is_forgotten(law):
-    """Back at the point where it began the force is what it was, and goes on as if there had been no inner loop."""
+def test_an_inner_loop_closes_and_leaves_no_memory(law):
+    """At the end of an inner loop the force is that at its beginning, and continues as without the loop."""
     outer, inner = (1.5e-3, -1e-3, 4e-4), (0.0, 2e-4, 1e-4, 4e-4)
     assert law.force_along(np.array([0.0, *outer, *inner]))[-1] == law.force_along(np.array([0.0, *outer]))[-1]
     going_on = (9e-4, -1.4e-3)
@@ -230,13 +230,13 @@ def test_a_single_bristle_does_not_close_inner_loops():
 
 @settings(max_examples=60, deadline=None)
 @given(ends=st.lists(st.floats(-3e-3, 3e-3), min_size=1, max_size=6), reach=st.floats(3e-3, 6e-3))
-def test_a_greater_extremum_wipes_out_what_was_before(ends, reach):
+def test_a_larger_extremum_wipes_out_the_memory(ends, reach):
     for law in EXACT_STOPS:
         after = law.force_along(np.array([0.0, *ends, reach, 1e-3]))[-1]
         assert after == pytest.approx(law.force_along(np.array([0.0, reach, 1e-3]))[-1], abs=1e-9)
 
 
-def test_without_dead_zones_prandtl_ishlinskii_is_maxwell_slip_and_with_them_lopsided():
+def test_prandtl_ishlinskii_without_dead_zones_is_maxwell_slip_and_with_them_asymmetric():
     path = path_through((1.5e-3, -1.5e-3, 1.5e-3))
     plain = PrandtlIshlinskii(STIFFNESSES, LIMITS)
     np.testing.assert_allclose(plain.force_along(path), SLIP.force_along(path), rtol=1e-12)
@@ -247,7 +247,7 @@ def test_without_dead_zones_prandtl_ishlinskii_is_maxwell_slip_and_with_them_lop
 
 
 @pytest.mark.parametrize("law", ALL, ids=name)
-def test_a_traced_law_gives_the_numbers_of_the_plain_one(law):
+def test_a_traced_model_gives_the_numbers_of_the_numeric_one(law):
     symbols = {s.name: casadi.SX.sym(s.name) for s in law.states}
     v = casadi.SX.sym("v")
     outputs = [*law.rates(symbols, v).values(), law.force(symbols, v)]
@@ -265,17 +265,19 @@ def test_the_rates_are_continuous_in_the_speed_and_vanish_at_rest(law):
         assert list(law.rates(bristles, speed).values()) == pytest.approx([0.0] * len(bristles), abs=1e-11)
 
 
-def test_no_friction_is_no_force_and_no_state():
+def test_no_friction_has_no_force_and_no_state():
     assert NoFriction().states == ()
     assert not list(leaves(NoFriction()))
     assert NoFriction().force_along(np.ones(3)).tolist() == [0.0, 0.0, 0.0]
 
 
-def test_elements_that_do_not_pair_and_dead_zones_that_would_drive_are_refused():
-    with pytest.raises(ParameterError, match="MaxwellSlip: 2 stiffnesses and 1 limits; give one of each"):
+def test_unequal_lengths_and_active_dead_zones_are_errors():
+    with pytest.raises(
+        ParameterError, match="MaxwellSlip: 2 stiffnesses and 1 limits; give one stiffness and one limit per element"
+    ):
         MaxwellSlip((1.0, 2.0), (1e-3,))
     with pytest.raises(ParameterError, match="PrandtlIshlinskii: 1 thresholds and 0 weights"):
         PrandtlIshlinskii((1.0,), (1e-3,), (5.0,))
-    with pytest.raises(ParameterError, match=r"weight -0.9 at 12 N the force would fall.*must exceed -1"):
+    with pytest.raises(ParameterError, match=r"weight -0.9 at 12 N the force would decrease.*must not be less than -1"):
         PrandtlIshlinskii((1.0,), (1e-3,), (5.0, 12.0), (-0.2, -0.9))
     PrandtlIshlinskii((1.0,), (1e-3,), (5.0, -12.0), (-0.2, -0.9))

@@ -19,8 +19,8 @@ from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.pneumatics.gas import (
     GAS_CONSTANT,
-    HEAT_AT_CONSTANT_PRESSURE,
-    HEAT_AT_CONSTANT_VOLUME,
+    SPECIFIC_HEAT_CONSTANT_PRESSURE,
+    SPECIFIC_HEAT_CONSTANT_VOLUME,
     Air,
     Ambient,
     EnergyBalance,
@@ -124,7 +124,7 @@ def test_pressure_rises_by_the_first_law(p, T, inflow, growth, heat_transfer):
     air = gas.air(content, V, AMBIENT)
     assert air.pressure == pytest.approx(p)
     assert air.temperature == pytest.approx(T)
-    flow = Flow(inflow, HEAT_AT_CONSTANT_PRESSURE * 300.0 * inflow)
+    flow = Flow(inflow, SPECIFIC_HEAT_CONSTANT_PRESSURE * 300.0 * inflow)
     rates = gas.rates(content, air, flow, growth, AMBIENT)
     expected = 0.4 / V * (1004.675 * 300.0 * inflow - p * growth + heat_transfer * (WARM - T)) - p * growth / V
     found = 0.4 * rates["internal_energy"] / V - 0.4 * energy * growth / V**2
@@ -133,8 +133,8 @@ def test_pressure_rises_by_the_first_law(p, T, inflow, growth, heat_transfer):
 
 
 def test_the_specific_heats_are_those_of_dry_air():
-    assert pytest.approx(1005, abs=1.0) == HEAT_AT_CONSTANT_PRESSURE
-    assert pytest.approx(GAS_CONSTANT) == HEAT_AT_CONSTANT_PRESSURE - HEAT_AT_CONSTANT_VOLUME
+    assert pytest.approx(1005, abs=1.0) == SPECIFIC_HEAT_CONSTANT_PRESSURE
+    assert pytest.approx(GAS_CONSTANT) == SPECIFIC_HEAT_CONSTANT_PRESSURE - SPECIFIC_HEAT_CONSTANT_VOLUME
 
 
 @pytest.mark.parametrize("gas", PROCESSES, ids=repr)

@@ -19,7 +19,6 @@ from airmuscle.core.errors import ParameterError
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
-    Held,
     Isometric,
     Isotonic,
     JointWithEndStops,
@@ -30,6 +29,7 @@ from airmuscle.mechanism import (
     Pulley,
     SpringLoad,
     WithEndStops,
+    WithLatch,
     WithOffsets,
 )
 from airmuscle.mechanism.contact import HuntCrossley
@@ -59,7 +59,7 @@ MECHANISMS: dict[str, tuple[Mechanism, int]] = {
         2,
     ),
     "stopped joint": (JointWithEndStops(JOINT, -0.3, 0.4, 0.05, CONTACT), 2),
-    "held": (Held(JOINT), 2),
+    "latched": (WithLatch(JOINT), 2),
 }
 LENGTHS = (0.2, 0.25, 0.3)
 each = pytest.mark.parametrize(("mechanism", "count"), MECHANISMS.values(), ids=MECHANISMS)
@@ -114,7 +114,7 @@ def test_the_power_of_the_pulls_goes_into_energy_or_is_lost(mechanism, count, dr
     """d(T + V)/dt along the motion, exactly, against what the muscles give and what is lost."""
     lengths = LENGTHS[:count]
     q, v = placed(mechanism, draw)
-    inputs = {i.name: 0.0 if i.name == "held" else given_input for i in mechanism.inputs}
+    inputs = {i.name: 0.0 if i.name == "latched" else given_input for i in mechanism.inputs}
     pulls = mechanism.generalised_forces(q, tensions[:count], lengths)
     acceleration = mechanism.acceleration(q, v, pulls, inputs)
     names, speeds = list(q), list(v)
@@ -187,12 +187,12 @@ def test_the_first_muscle_turns_the_joint_forward_and_the_second_back():
 @given(st.floats(-0.4, 0.6), st.floats(-3.0, 3.0))
 def test_stops_act_beyond_the_ends_alone_and_push_back(angle, speed):
     stops = JointWithEndStops(JOINT, -0.3, 0.4, 0.05, CONTACT)
-    push = stops.push({"angle": angle}, {"angular_speed": speed})
+    push = stops.stop_force({"angle": angle}, {"angular_speed": speed})
     if -0.3 <= angle <= 0.4:
         assert push == 0.0
     else:
         assert push * angle <= 0.0
-    still = stops.push({"angle": angle}, {"angular_speed": 0.0})
+    still = stops.stop_force({"angle": angle}, {"angular_speed": 0.0})
     depth = 0.05 * (max(-0.3 - angle, 0.0) - max(angle - 0.4, 0.0))
     assert still == pytest.approx(0.05 * 1e7 * np.sign(depth) * abs(depth) ** 1.5, abs=1e-9)
 
@@ -208,7 +208,7 @@ def test_a_stop_begins_without_a_jump(speed):
         )
         assert outside == pytest.approx(inside, abs=1e-4)
     leaving = -1 / (0.4 * 0.05)
-    push = [stops.push({"angle": 0.45}, {"angular_speed": leaving + h}) for h in (-1e-9, 0.0, 1e-9)]
+    push = [stops.stop_force({"angle": 0.45}, {"angular_speed": leaving + h}) for h in (-1e-9, 0.0, 1e-9)]
     assert push == pytest.approx([0.0, 0.0, 0.0], abs=1e-4)
 
 
@@ -218,22 +218,28 @@ def test_a_stop_begins_without_a_jump(speed):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Lever((), 1.0, 0.1), "give an arm for every muscle"),
-        (lambda: Lever((0.1, 0.1), 1.0, 0.1, offsets=(0.1,)), "2 arms and 1 offsets"),
-        (lambda: Lever((0.1,), 1.0, 0.0), "without inertia"),
+        (lambda: Lever((), 1.0, 0.1), "give one arm for each muscle"),
+        (lambda: Lever((0.1, 0.1), 1.0, 0.1, offsets=(0.1,)), "2 arms and 1 offsets are given"),
+        (lambda: Lever((0.1,), 1.0, 0.0), "the total inertia is zero"),
         (lambda: WithOffsets(JOINT, (0.1,)), "AntagonisticJoint takes 2 muscles; 1 offsets are given"),
         (lambda: MusclesInSeries(HangingMass(1.0), ()), "give the mass of each node"),
         (lambda: MusclesInSeries(JOINT, (0.1,)), "AntagonisticJoint takes 2"),
-        (lambda: WithEndStops(JOINT, 0.0, 0.1, CONTACT), "AntagonisticJoint has 0 coordinates in m"),
+        (
+            lambda: WithEndStops(JOINT, 0.0, 0.1, CONTACT),
+            "AntagonisticJoint has no coordinate in m; use another mechanism",
+        ),
         (
             lambda: WithEndStops(MusclesInSeries(HangingMass(1.0), (0.1,)), 0.0, 0.1, CONTACT),
             "node1.position or position",
         ),
         (lambda: WithEndStops(HangingMass(1.0), 0.0, 0.1, CONTACT, "angle"), "no coordinate 'angle' in m"),
-        (lambda: WithEndStops(HangingMass(1.0), 0.1, 0.1, CONTACT), "must lie below"),
+        (
+            lambda: WithEndStops(HangingMass(1.0), 0.1, 0.1, CONTACT),
+            "lower_stop is 0.1; it must be less than upper_stop, 0.1",
+        ),
         (lambda: SpringLoad(float("nan"), 1.0), "must be finite"),
-        (lambda: Isotonic(-5.0, 1.0), "allowed are 0 to"),
-        (lambda: Pulley(0.0, 1.0), "allowed are 0.0001"),
+        (lambda: Isotonic(-5.0, 1.0), "allowed range: 0 to"),
+        (lambda: Pulley(0.0, 1.0), "allowed range: 0.0001"),
     ],
 )
 def test_what_cannot_be_is_refused(make, message):
@@ -248,10 +254,10 @@ def test_a_plant_refuses_another_number_of_muscles_than_its_mechanism_takes():
 
 def test_wrapping_hands_on_everything():
     """A wrapper's interface is the inner mechanism's; none of it falls back to the base's."""
-    stopped = WithEndStops(Held(SpringLoad(3.0, 2000.0, 20.0)), -1.0, 1.0, CONTACT)
-    assert [i.name for i in stopped.inputs] == ["held"]
+    stopped = WithEndStops(WithLatch(SpringLoad(3.0, 2000.0, 20.0)), -1.0, 1.0, CONTACT)
+    assert [i.name for i in stopped.inputs] == ["latched"]
     q, v = {"position": 0.1}, {"speed": 0.2}
     assert stopped.potential_energy(q) == 10.0
     assert stopped.kinetic_energy(q, v) == pytest.approx(0.06)
-    assert stopped.dissipated_power(q, v, {"position": 0.0}, {"held": 0.0}) == pytest.approx(0.8)
-    assert dataclasses.replace(stopped, lower_stop=-2.0).ends == (-2.0, 1.0)
+    assert stopped.dissipated_power(q, v, {"position": 0.0}, {"latched": 0.0}) == pytest.approx(0.8)
+    assert dataclasses.replace(stopped, lower_stop=-2.0).stop_positions == (-2.0, 1.0)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from airmuscle.characteristic import ChouHannaford1996
 from airmuscle.geometry import Braid
 from airmuscle.muscle import CubicSpring, LinearDamper, LinearSpring, Muscle, PressureDamper
-from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, Isothermal, Polytropic, absolute, gauge
+from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, Isothermal, Polytropic, absolute_pressure, gauge_pressure
 
 BRAID = Braid(0.01, 0.44, 0.3)
 AMBIENT = Ambient()
@@ -60,8 +60,8 @@ def test_the_braid_is_chou_and_hannafords_volume(eps):
 
 @given(st.floats(-5e4, 1e6), st.floats(1e-6, 1e-3), st.sampled_from([Isothermal(), Polytropic(1.2), Polytropic(1.4)]))
 def test_air_mass_and_pressure_are_each_others_inverse(p, volume, gas):
-    mass = gas.air_mass(absolute(p, AMBIENT), volume, AMBIENT)
-    assert gauge(gas.pressure(mass, volume, AMBIENT), AMBIENT) == pytest.approx(p, abs=1e-6)
+    mass = gas.air_mass(absolute_pressure(p, AMBIENT), volume, AMBIENT)
+    assert gauge_pressure(gas.pressure(mass, volume, AMBIENT), AMBIENT) == pytest.approx(p, abs=1e-6)
 
 
 def test_isothermal_air_obeys_boyle_and_polytropic_air_its_exponent():

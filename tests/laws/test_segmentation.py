@@ -1,8 +1,8 @@
-"""What a recording consists of is found from the recording itself: synthetic truth comes back.
+"""Segmentation of recordings, compared with synthetic recordings of known structure.
 
-Branches follow from the pressure's history alone; a rest belongs to the branch that led to it. A sensor's resolution
-is the step of its readings, its end the reading at which they stop flickering. Glitches are listed, never removed;
-the overshoot of a step is none.
+Branches are identified from the pressure history alone; a dwell belongs to the branch before it. The resolution of a
+sensor is the step of its readings, its limit the reading at which they stay constant. Outliers are listed and never
+removed; the overshoot of a step is not an outlier.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from airmuscle.recording.segment import (
     ISOMETRIC,
     ISOTONIC,
     analyse_sampling,
+    branch_directions,
     check_swept,
-    directions,
     estimate_sensors,
     find_branches,
     find_outliers,
@@ -35,15 +35,15 @@ from airmuscle.recording.segment import (
     plateau_points,
     quasi_static_rows,
 )
-from airmuscle.recording.segment.branches import agreement
-from airmuscle.recording.segment.sensor import noise_of, resolution_of
+from airmuscle.recording.segment.branches import branch_column_agreement
+from airmuscle.recording.segment.sensor import estimate_noise, estimate_resolution
 
 STEP = 0.05
 RANDOM = np.random.default_rng
 
 
 def staircase(levels: list[float], rows: int = 10, overshoot: float = 0.0) -> np.ndarray:
-    """Plateaus of `rows` rows; the first row of each shoots over by a part of the step."""
+    """Plateaus of `rows` rows; the first row of each overshoots by a fraction of the step."""
     pressure = np.repeat(np.asarray(levels, dtype=float), rows)
     for i in range(1, len(levels)):
         pressure[i * rows] += overshoot * (levels[i] - levels[i - 1])
@@ -55,7 +55,7 @@ def timed(pressure: np.ndarray, **columns: np.ndarray) -> Recording:
 
 
 def bench(seed: int = 1, noise: float = 400.0) -> tuple[Recording, int]:
-    """A stepped isometric run up and down with noise, rounding and a cut-off; and the row at which it turns."""
+    """A stepped isometric run up and down with noise, rounding and saturation; and the row of the reversal."""
     up, down = np.linspace(0, 6e5, 25), np.linspace(5.4e5, 5e4, 20)
     pressure = staircase([*up, *down], 10, overshoot=0.6)
     random = RANDOM(seed)
@@ -68,11 +68,11 @@ def bench(seed: int = 1, noise: float = 400.0) -> tuple[Recording, int]:
 # Branches
 
 
-def test_a_stepped_ramp_with_overshoots_has_one_turn_at_the_last_row_of_the_top():
+def test_a_stepped_ramp_with_overshoots_has_one_reversal_at_the_last_row_of_the_top():
     recording, turn = bench()
     up, down = find_branches(recording)
-    assert (up.direction, up.name, up.stretch.start, up.stretch.stop) == (1, "inflating", 0, turn)
-    assert (down.direction, down.name, down.stretch.stop) == (-1, "deflating", len(recording))
+    assert (up.direction, up.name, up.interval.start, up.interval.stop) == (1, "inflating", 0, turn)
+    assert (down.direction, down.name, down.interval.stop) == (-1, "deflating", len(recording))
 
 
 @settings(max_examples=60, deadline=None)
@@ -83,7 +83,7 @@ def test_a_stepped_ramp_with_overshoots_has_one_turn_at_the_last_row_of_the_top(
     first=st.sampled_from([1, -1]),
     seed=st.integers(0, 99),
 )
-def test_every_turn_of_a_random_history_is_found(turns, rows, rest, first, seed):
+def test_every_reversal_of_a_random_history_is_found(turns, rows, rest, first, seed):
     corners = np.cumsum([0.0, *(first * (-1) ** i * part * 5e5 for i, part in enumerate(turns))])
     corners += 1e5 - corners.min()
     parts, truth = [], []
@@ -95,7 +95,7 @@ def test_every_turn_of_a_random_history_is_found(turns, rows, rest, first, seed)
     found = find_branches(timed(measured))
     assert [b.direction for b in found] == [first * (-1) ** i for i in range(len(turns))]
     slack = 0.6 * 0.05 * np.ptp(pressure) / (0.2 * 5e5 / rows) + 2  # rows that half a swing takes at the least slope
-    differing = np.count_nonzero(directions(timed(measured), found) != truth)
+    differing = np.count_nonzero(branch_directions(timed(measured), found) != truth)
     assert differing <= len(turns) * slack
 
 
@@ -104,15 +104,15 @@ def test_every_turn_of_a_random_history_is_found(turns, rows, rest, first, seed)
 def test_branches_do_not_depend_on_unit_or_zero_of_the_pressure(scale: float, shift: float, stretch: float):
     recording, _ = bench()
     other = recording.with_columns(pressure=recording["pressure"] * scale + shift)
-    cut = [(b.direction, b.stretch) for b in find_branches(recording)]
-    assert [(b.direction, b.stretch) for b in find_branches(other)] == cut
+    cut = [(b.direction, b.interval) for b in find_branches(recording)]
+    assert [(b.direction, b.interval) for b in find_branches(other)] == cut
 
 
-def test_turning_the_pressure_over_turns_the_branches_over():
+def test_negating_the_pressure_negates_the_directions():
     recording, turn = bench()
     found = find_branches(recording.with_columns(pressure=6e5 - recording["pressure"]))
     assert [b.direction for b in found] == [-1, 1]
-    assert found[0].stretch.stop == turn
+    assert found[0].interval.stop == turn
 
 
 def test_a_minor_loop_is_found_and_a_ripple_is_not():
@@ -120,14 +120,14 @@ def test_a_minor_loop_is_found_and_a_ripple_is_not():
     assert [b.direction for b in find_branches(timed(loop))] == [1, -1, 1]
     ripple = np.linspace(0, 6e5, 300) + 1.2e4 * np.sin(np.arange(300) * 0.5)
     assert [b.direction for b in find_branches(timed(ripple))] == [1]
-    assert len(find_branches(timed(loop), swing=0.3)) == 1
+    assert len(find_branches(timed(loop), reversal=0.3)) == 1
 
 
-def test_a_saw_tooth_has_a_deflating_branch_of_a_row_or_two_at_each_fall():
+def test_a_sawtooth_has_a_deflating_branch_of_one_or_two_rows_at_each_fall():
     tooth = np.tile(np.linspace(0, 6e5, 200), 4)
     found = find_branches(timed(tooth))
     assert [b.direction for b in found] == [1, -1, 1, -1, 1, -1, 1]
-    assert all(len(b.stretch) < 10 for b in found[1::2])
+    assert all(len(b.interval) < 10 for b in found[1::2])
 
 
 def test_constant_pressure_and_no_pressure_have_no_branch():
@@ -141,13 +141,13 @@ def test_constant_pressure_and_no_pressure_have_no_branch():
     assert find_branches(Recording({"force": np.arange(9.0)}, "x")) == ()
 
 
-def test_a_branch_column_judges_and_decides_nothing():
+def test_a_branch_column_is_compared_but_not_used():
     recording, turn = bench()
     stated = np.where(np.arange(len(recording)) < turn - 9, 1.0, 2.0)
     judged = recording.with_columns(branch=stated)
     assert find_branches(judged) == find_branches(recording)
-    assert agreement(judged, find_branches(judged)) == pytest.approx(1.0 - 9 / len(recording))
-    assert agreement(recording, find_branches(recording)) is None
+    assert branch_column_agreement(judged, find_branches(judged)) == pytest.approx(1.0 - 9 / len(recording))
+    assert branch_column_agreement(recording, find_branches(recording)) is None
 
 
 # Sensors
@@ -161,38 +161,38 @@ def test_a_branch_column_judges_and_decides_nothing():
     twins=st.booleans(),
     seed=st.integers(0, 99),
 )
-def test_the_step_of_readings_is_found_and_a_changing_last_digit_does_not_hide_it(step, noise, offset, twins, seed):
+def test_the_resolution_is_found_in_spite_of_a_varying_last_digit(step, noise, offset, twins, seed):
     course = 60.0 * np.sin(np.linspace(0, 9, 800)) + RANDOM(seed).normal(0, noise, 800)
     counts = np.round(course)
     values = step * (counts + offset)
     if twins:
         values = values + 0.01 * step * RANDOM(seed).integers(0, 2, 800)
-    assert resolution_of(values) == pytest.approx(step, rel=0.01)
+    assert estimate_resolution(values) == pytest.approx(step, rel=0.01)
 
 
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 999), size=st.integers(30, 2000))
-def test_continuous_readings_have_no_step(seed: int, size: int):
+def test_continuous_readings_have_no_resolution(seed: int, size: int):
     values = RANDOM(seed).normal(0, 1, size).cumsum()
-    found = resolution_of(values)
+    found = estimate_resolution(values)
     assert found < 0.02 * np.ptp(values) / np.sqrt(size), "chance leaves at most a step far below the noise"
 
 
-def test_a_few_settings_of_a_test_are_no_resolution():
-    assert resolution_of(np.repeat(np.arange(0, 7e5, 1e5), 30)) == 0.0
-    assert resolution_of(np.full(50, 3.0)) == 0.0
+def test_a_few_set_points_of_a_test_are_not_a_resolution():
+    assert estimate_resolution(np.repeat(np.arange(0, 7e5, 1e5), 30)) == 0.0
+    assert estimate_resolution(np.full(50, 3.0)) == 0.0
 
 
 @settings(max_examples=30, deadline=None)
 @given(sigma=st.floats(1e-3, 1e3), seed=st.integers(0, 99))
-def test_noise_is_told_from_the_course(sigma: float, seed: int):
+def test_the_noise_is_separated_from_the_signal(sigma: float, seed: int):
     course = 1e3 * sigma * np.sin(np.linspace(0, 6, 2000))
     noise = RANDOM(seed).normal(0, sigma, 2000)
     noise[::100] += 50.0 * sigma
-    assert noise_of(course + noise) == pytest.approx(sigma, rel=0.15)
+    assert estimate_noise(course + noise) == pytest.approx(sigma, rel=0.15)
 
 
-def test_resolution_and_cut_off_of_a_bench_are_found():
+def test_resolution_and_saturation_of_a_test_bench_are_found():
     recording, _ = bench()
     found = estimate_sensors(recording)
     assert found["pressure"].resolution == pytest.approx(765.0, rel=1e-3)
@@ -201,13 +201,13 @@ def test_resolution_and_cut_off_of_a_bench_are_found():
     assert np.isinf(found["force"].upper_limit)
     assert np.isinf(found["pressure"].lower_limit)
     assert "time" not in found
-    sides = found["force"].sides(recording["force"])
+    sides = found["force"].censoring(recording["force"])
     assert np.array_equal(sides == 1, recording["force"] < -8.7)
     assert not (sides == -1).any()
-    assert found["force"].deviation == pytest.approx(np.hypot(found["force"].noise, 0.68 / np.sqrt(12)), rel=1e-3)
+    assert found["force"].std == pytest.approx(np.hypot(found["force"].noise, 0.68 / np.sqrt(12)), rel=1e-3)
 
 
-def test_a_saturated_sensor_is_found_at_its_upper_end():
+def test_saturation_at_the_upper_limit_is_found():
     recording, _ = bench()
     full = np.minimum(recording["force"], recording["force"][180])
     found = estimate_sensors(recording.with_columns(force=full))["force"]
@@ -218,19 +218,19 @@ def test_a_saturated_sensor_is_found_at_its_upper_end():
     assert found.at_upper_limit == np.count_nonzero(full == full.max())
     few, many = (np.minimum(recording["force"], recording["force"][row]) for row in (180, 80))
     for values, serious in ((few, False), (many, True)):
-        said = [f for f in inspect(recording.with_columns(force=values)).findings if "highest reading" in f.text]
+        said = [f for f in inspect(recording.with_columns(force=values)).findings if "upper limit" in f.text]
         assert [f.serious for f in said] == [serious]
-        assert "Such rows are bounds, not values." in said[0].text
+        assert "These rows are bounds (censored), not values." in said[0].text
 
 
-def test_what_rests_without_flicker_or_with_it_on_both_sides_is_not_cut_off():
+def test_a_constant_signal_without_noise_or_with_noise_on_both_sides_is_not_saturated():
     vented = timed(np.maximum(np.concatenate([np.zeros(200), np.linspace(0, 5e5, 300)]), 0.0))
     assert np.isinf(estimate_sensors(vented)["pressure"].lower_limit), "a sensor without noise does not show its end"
     noisy = timed(765.0 * np.round((vented["pressure"] + RANDOM(4).normal(0, 600, 500)) / 765.0))
     assert np.isinf(estimate_sensors(noisy)["pressure"].lower_limit)
 
 
-def test_several_runs_of_a_rig_show_an_end_that_one_hardly_reaches():
+def test_several_runs_of_a_rig_show_a_limit_that_one_run_hardly_reaches():
     reaching, _ = bench(1)
     rows = np.concatenate([np.flatnonzero(reaching["force"] <= reaching["force"].min())[:2], np.arange(150, 380)])
     hardly = reaching.rows(np.sort(rows))
@@ -245,18 +245,18 @@ def test_several_runs_of_a_rig_show_an_end_that_one_hardly_reaches():
 def test_the_plateaus_of_a_staircase_are_its_steps():
     recording, _ = bench()
     found = find_plateaus(recording)
-    steps = {p.stretch.start // 10 for p in found}
+    steps = {p.interval.start // 10 for p in found}
     assert len(found) == len(steps) == 45
     levels = [*np.linspace(0, 6e5, 25), *np.linspace(5.4e5, 5e4, 20)]
     for plateau in found:
-        assert plateau.values["pressure"] == pytest.approx(levels[plateau.stretch.start // 10], abs=900.0)
-        assert plateau.stretch.stop <= 10 * (plateau.stretch.start // 10 + 1)
+        assert plateau.values["pressure"] == pytest.approx(levels[plateau.interval.start // 10], abs=900.0)
+        assert plateau.interval.stop <= 10 * (plateau.interval.start // 10 + 1)
     points = plateau_points(recording, found)
     assert len(points) == 45
-    assert "45 plateaus stand for" in points.notes[-1]
+    assert "45 plateaus replace" in points.notes[-1]
 
 
-def test_a_slow_ramp_is_quasi_static_and_no_plateau_a_fast_one_is_neither():
+def test_a_slow_ramp_is_quasi_static_but_not_a_plateau_and_a_fast_one_neither():
     slow = timed(np.linspace(0, 6e5, 600))
     assert quasi_static_rows(slow).all()
     assert find_plateaus(slow) == ()
@@ -268,7 +268,7 @@ def test_a_slow_ramp_is_quasi_static_and_no_plateau_a_fast_one_is_neither():
     assert [p.values["pressure"] for p in find_plateaus(fast)] == pytest.approx([0.0, 6e5], abs=1.0)
 
 
-def test_points_without_time_are_all_settled():
+def test_points_without_time_are_steady_states():
     table = Recording({"pressure": np.array([0.0, 3e5, 1e5]), "force": np.zeros(3)}, "table")
     assert quasi_static_rows(table).all()
     assert find_plateaus(table) == ()
@@ -281,7 +281,7 @@ def test_points_without_time_are_all_settled():
 
 @settings(max_examples=60, deadline=None)
 @given(rows=st.sets(st.integers(1, 44), min_size=1, max_size=5), sign=st.sampled_from([1, -1]), seed=st.integers(0, 9))
-def test_planted_glitches_are_listed_and_stay_in_the_recording(rows: set[int], sign: int, seed: int):
+def test_synthetic_outliers_are_listed_and_not_removed(rows: set[int], sign: int, seed: int):
     recording, _ = bench(seed)
     force = recording["force"].copy()
     planted = {10 * step + 5 for step in rows if force[10 * step + 1] > -7.0}
@@ -297,7 +297,7 @@ def test_planted_glitches_are_listed_and_stay_in_the_recording(rows: set[int], s
             assert outlier.expected == pytest.approx(recording["force"][outlier.row], abs=4.0)
 
 
-def test_a_glitch_of_two_rows_is_found_and_the_overshoot_of_a_step_is_not():
+def test_an_outlier_of_two_rows_is_found_and_the_overshoot_of_a_step_is_not():
     noise = RANDOM(3).normal(0, 300.0, 200)
     step = np.where(np.arange(200) < 100, 1e5, 3e5) + noise
     step[100:102] += 5e4
@@ -316,22 +316,22 @@ def test_each_kind_of_run_is_recognised():
     for kind, name in ((ISOBARIC, "pressure"), (ISOMETRIC, "contraction"), (ISOTONIC, "force")):
         recording = Recording({**swept, name: held[name]}, "run")
         (run,) = find_runs(recording)
-        assert (run.kind, run.column) == (kind, name)
-        assert run.value == pytest.approx(np.median(held[name]))
-        assert set(run.swept) == set(swept) - {name}
+        assert (run.kind, run.constant_column) == (kind, name)
+        assert run.constant_value == pytest.approx(np.median(held[name]))
+        assert set(run.swept_columns) == set(swept) - {name}
     assert [r.kind for r in find_runs(Recording(swept, "free"))] == [FREE]
     assert [r.kind for r in find_runs(Recording(held, "rest"))] == [AT_REST]
     by_length = {"pressure": swept["pressure"], "length": np.full(200, 0.3), "force": swept["force"]}
     assert find_runs(Recording(by_length, "length"))[0].kind is ISOMETRIC
 
 
-def test_a_relaxation_at_held_pressure_and_length_is_named_by_its_pressure():
+def test_a_relaxation_at_constant_pressure_and_length_is_isobaric():
     force = 500.0 + 80.0 * np.exp(-np.linspace(0, 4, 200))
     (run,) = find_runs(timed(np.full(200, 3e5), length=np.full(200, 0.28), force=force))
-    assert (run.kind, run.swept) == (ISOBARIC, ("force",))
+    assert (run.kind, run.swept_columns) == (ISOBARIC, ("force",))
 
 
-def test_a_table_of_isobars_is_as_many_runs():
+def test_a_table_of_isobars_has_one_run_per_isobar():
     pressures, contractions = (
         g.ravel() for g in np.meshgrid(np.linspace(1e5, 6e5, 6), np.linspace(0, 0.25, 11), indexing="ij")
     )
@@ -340,19 +340,21 @@ def test_a_table_of_isobars_is_as_many_runs():
     )
     found = find_runs(table)
     assert [run.kind for run in found] == [ISOBARIC] * 6
-    assert [run.value for run in found] == pytest.approx(np.linspace(1e5, 6e5, 6))
-    assert [(r.stretch.start, r.stretch.stop) for r in found] == [(11 * i, 11 * i + 11) for i in range(6)]
+    assert [run.constant_value for run in found] == pytest.approx(np.linspace(1e5, 6e5, 6))
+    assert [(r.interval.start, r.interval.stop) for r in found] == [(11 * i, 11 * i + 11) for i in range(6)]
 
 
-def test_constant_pressure_given_as_an_isometric_sweep_is_refused():
+def test_constant_pressure_stated_to_be_an_isometric_sweep_is_rejected():
     noise = RANDOM(0).normal(0, 1, 200)
     resting = timed(3e5 + 100 * noise, force=200 + 0.5 * noise, length=np.full(200, 0.28))
-    with pytest.raises(ColumnError, match=r"synthetic: nothing that was measured changes .*299\.\d to 300\.\d kPa"):
+    with pytest.raises(
+        ColumnError, match=r"synthetic: no measured quantity varies \(pressure 299\.\d to 300(\.\d)? kPa"
+    ):
         check_swept(resting, find_runs(resting))
     isobaric = timed(3e5 + 100 * noise, force=np.linspace(0, 900, 200), length=np.linspace(0.25, 0.3, 200))
     check_swept(isobaric, find_runs(isobaric))
     said = isobaric.with_constants(run="isometric")
-    with pytest.raises(ColumnError, match="said to be isometric, but what was measured is isobaric"):
+    with pytest.raises(ColumnError, match="stated to be isometric, but the data are isobaric"):
         check_swept(said, find_runs(said))
     assert inspect(said).findings[0].serious
 
@@ -360,7 +362,7 @@ def test_constant_pressure_given_as_an_isometric_sweep_is_refused():
 # Time
 
 
-def test_rate_jitter_gaps_repeats_and_steps_back():
+def test_rate_jitter_gaps_repeated_and_decreasing_times():
     steps = STEP * (1 + 0.02 * RANDOM(0).normal(0, 1, 400))
     steps[100] = 2.0
     time = np.concatenate([[0.0], np.cumsum(steps)])
@@ -369,21 +371,21 @@ def test_rate_jitter_gaps_repeats_and_steps_back():
     seen = analyse_sampling(Recording({"time": time}, "clock"))
     assert seen.rate == pytest.approx(20.0, rel=0.01)
     assert seen.jitter == pytest.approx(0.02, rel=0.25)
-    assert [(g.row, round(g.length, 6)) for g in seen.gaps] == [(100, 2.0)]
-    assert (seen.repeats, seen.backward) == ((200,), (301,))
+    assert [(g.row, round(g.duration, 6)) for g in seen.gaps] == [(100, 2.0)]
+    assert (seen.repeated_rows, seen.backward_rows) == ((200,), (301,))
     texts = [f.text for f in inspect(timed(np.linspace(0, 6e5, 401)).with_columns(time=time)).findings]
-    assert texts[0].startswith("time repeats in 1 rows, first in row 201")
-    assert texts[1].startswith("time runs backwards in 1 rows, first in row 302")
-    assert texts[2].startswith("1 gaps in time, the longest of 2 s behind row 101")
+    assert texts[0].startswith("time repeats in 1 row, first in row 201")
+    assert texts[1].startswith("time decreases in 1 row, first in row 302")
+    assert texts[2].startswith("1 gap in time, the longest of 2 s after row 101")
 
 
-def test_a_record_shorter_than_its_dynamics_is_said_to_be():
+def test_a_record_shorter_than_its_dynamics_is_reported():
     rise = 6e5 * (1 - np.exp(-np.arange(200) * STEP / 1.0))
     assert not any("may be shorter" in f.text for f in inspect(timed(rise)).findings)
     short = inspect(timed(rise[:15])).findings
     assert any("may be shorter than the dynamics" in f.text and f.serious for f in short)
     sudden = inspect(timed(np.repeat([0.0, 6e5], 30))).findings
-    assert any("faster than 20 rows per second can show" in f.text for f in sudden)
+    assert any("undersampled at 20 rows per second" in f.text for f in sudden)
     slow_sweep = inspect(timed(np.linspace(0, 6e5, 900))).findings
     assert not any("may be shorter" in f.text for f in slow_sweep)
 
@@ -395,5 +397,5 @@ def test_any_recording_can_be_inspected(values: list[float], with_time: bool):
     if with_time:
         columns["time"] = STEP * np.arange(len(values))
     seen = inspect(Recording(columns, "any"))
-    assert sum(len(b.stretch) for b in seen.branches) in (0, len(values))
-    assert all(0 <= r.stretch.start < r.stretch.stop <= len(values) for r in seen.runs)
+    assert sum(len(b.interval) for b in seen.branches) in (0, len(values))
+    assert all(0 <= r.interval.start < r.interval.stop <= len(values) for r in seen.runs)

@@ -13,7 +13,7 @@ from airmuscle.characteristic import VirtualWork
 from airmuscle.core import autodiff, tree
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CubicSpring, EndStop, LinearSpring, SeriesSpring
-from airmuscle.muscle.series_equilibrium import last_pulling
+from airmuscle.muscle.series_equilibrium import find_largest_nonnegative
 
 STOP = EndStop(0.1, HuntCrossley(1e9, 0.5))
 
@@ -50,9 +50,9 @@ def test_newtons_method_inside_finds_what_bisection_does(muscle, p):
     """Also where what is out of balance is zero on a stretch, of which the far end is meant: no pressure, no spring."""
     contractions = np.array([-0.09, -0.02, 0.0, 0.05, 0.1, 0.11, 0.25, 0.6])
     expected = [bisected(muscle, p, c) for c in contractions]
-    together = muscle.settled(p, contractions)["inner_contraction"]
+    together = muscle.steady_state(p, contractions)["inner_contraction"]
     np.testing.assert_allclose(together, expected, rtol=0.0, atol=1e-13)
-    alone = [muscle.settled(p, float(c))["inner_contraction"] for c in contractions]
+    alone = [muscle.steady_state(p, float(c))["inner_contraction"] for c in contractions]
     assert all(isinstance(inner, float) for inner in alone)
     np.testing.assert_allclose(alone, expected, rtol=0.0, atol=1e-13)
 
@@ -65,8 +65,8 @@ def test_a_law_that_is_not_closed_form_settles_too():
     opaque = replace(muscle, contractile=Opaque(muscle.geometry))
     usual = replace(muscle, contractile=VirtualWork(muscle.geometry))
     for contraction in (-0.05, 0.1, 0.5):
-        assert opaque.settled(2e5, contraction)["inner_contraction"] == pytest.approx(
-            usual.settled(2e5, contraction)["inner_contraction"], abs=1e-14
+        assert opaque.steady_state(2e5, contraction)["inner_contraction"] == pytest.approx(
+            usual.steady_state(2e5, contraction)["inner_contraction"], abs=1e-14
         )
 
 
@@ -78,12 +78,12 @@ def test_inside_it_settles_in_a_few_looks(monkeypatch):
         function = traced(*given, **named)
         return lambda *arguments: looks.append(1) or function(*arguments)
 
-    monkeypatch.setattr("airmuscle.muscle.series_equilibrium.autodiff.value_and_derivative", counted)
+    monkeypatch.setattr("airmuscle.muscle.muscle.autodiff.value_and_derivative", counted)
     for muscle in INSIDE.values():
         for p in (0.0, 2e5):
             for contraction in (-0.02, 0.0, 0.05, 0.2):
                 looks.clear()
-                muscle.settled(p, contraction)
+                muscle.steady_state(p, contraction)
                 flat = muscle.spring == LinearSpring(0.0) and p == 0.0  # no slope leads to the end of a stretch at zero
                 assert len(looks) <= (70 if flat else 20)
 
@@ -97,7 +97,7 @@ def test_a_search_that_newtons_method_only_creeps_to_is_halved():
         return -((x - 0.3) ** 9), -9.0 * (x - 0.3) ** 8
 
     zero = np.array([0.0, -0.2])
-    found = last_pulling(function, zero, zero + 1.0, zero)
+    found = find_largest_nonnegative(function, zero, zero + 1.0, zero)
     np.testing.assert_allclose(found, 0.3, rtol=0.0, atol=1e-13)
     assert len(looks) < 120
 
@@ -107,7 +107,7 @@ def test_of_a_stretch_at_zero_the_far_end_is_meant():
         return np.maximum(0.1 - x, 0.0) - np.maximum(x - 0.2, 0.0), -1.0 * ((x < 0.1) | (x > 0.2))
 
     for start in (0.0, 0.15, 0.5):
-        found = last_pulling(function, np.array([0.0]), np.array([0.5]), np.array([start]))
+        found = find_largest_nonnegative(function, np.array([0.0]), np.array([0.5]), np.array([start]))
         np.testing.assert_allclose(found, 0.2, rtol=0.0, atol=1e-14)
 
 
@@ -118,10 +118,10 @@ def test_a_table_of_muscles_settles_as_each_of_them():
     table = values * (1.0 + 0.03 * np.random.default_rng(2).uniform(-1, 1, (4, values.size)))
     columns = tree.unflatten(muscle, [column[:, None] for column in table.T])
     contractions = np.array([[0.0, 0.05, 0.2]])
-    together = columns.settled(2e5, contractions + np.zeros((4, 1)))["inner_contraction"]
+    together = columns.steady_state(2e5, contractions + np.zeros((4, 1)))["inner_contraction"]
     for row, inner in zip(table, together, strict=True):
         one = tree.with_parameters(muscle, row.tolist())
-        expected = [one.settled(2e5, c)["inner_contraction"] for c in contractions[0]]
+        expected = [one.steady_state(2e5, c)["inner_contraction"] for c in contractions[0]]
         np.testing.assert_allclose(inner, expected, rtol=0.0, atol=1e-14)
 
 
@@ -129,14 +129,14 @@ def test_a_value_comes_with_its_exact_slope_for_numbers_arrays_and_tables_of_par
     braid = chosen_muscle().geometry
     both, x = autodiff.value_and_derivative(braid, "volume", 1), np.linspace(0.0, 0.3, 7)
     value, slope = both(0.1)
-    assert (value, slope) == pytest.approx((braid.volume(0.1), braid.volume_growth(0.1)), rel=1e-14)
+    assert (value, slope) == pytest.approx((braid.volume(0.1), braid.volume_derivative(0.1)), rel=1e-14)
     values, slopes = both(x.reshape(7, 1))
     assert values.shape == slopes.shape == (7, 1)
     np.testing.assert_allclose(values[:, 0], braid.volume(x), rtol=1e-14)
-    np.testing.assert_allclose(slopes[:, 0], [braid.volume_growth(float(c)) for c in x], rtol=1e-14)
+    np.testing.assert_allclose(slopes[:, 0], [braid.volume_derivative(float(c)) for c in x], rtol=1e-14)
     radii = np.array([[0.01], [0.02]])
     table = tree.unflatten(braid, [radii, *tree.flatten(braid)[1:].tolist()])
     values, slopes = autodiff.value_and_derivative(table, "volume", 1)(x)
     np.testing.assert_allclose(values, (radii / 0.01) ** 2 * braid.volume(x), rtol=1e-14)
-    np.testing.assert_allclose(slopes, (radii / 0.01) ** 2 * braid.volume_growth(x), rtol=1e-14)
-    np.testing.assert_allclose(table.volume_growth(x), slopes, rtol=1e-14)
+    np.testing.assert_allclose(slopes, (radii / 0.01) ** 2 * braid.volume_derivative(x), rtol=1e-14)
+    np.testing.assert_allclose(table.volume_derivative(x), slopes, rtol=1e-14)

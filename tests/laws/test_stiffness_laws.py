@@ -1,4 +1,4 @@
-"""Laws of one specimen: Reynolds' and Serres' springs in N/mm, Hunt's pressure with the direction it moves in."""
+"""Models of one specimen: springs of Reynolds and Serres in N/mm, pressure of Hunt with the direction of motion."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from airmuscle.core.errors import ParameterError
 from airmuscle.library import catalogue
 
 
-def test_a_stiffness_law_asks_for_its_specimens_length():
+def test_a_stiffness_model_requires_the_length_of_its_specimen():
     for law in (Reynolds2003, Serres2009):
         with pytest.raises(TypeError, match="resting_length"):
             law()
 
 
 @pytest.mark.parametrize("law", [Reynolds2003(0.15), Reynolds2003(0.4)])
-def test_the_spring_of_reynolds_is_the_printed_one_whatever_the_length(law):
+def test_the_spring_of_reynolds_is_the_printed_one_for_every_length(law):
     """K = 5.71 + 0.0307 P in N/mm, P in kPa."""
     for kilopascal in (207.0, 620.0):
         stiffness = law.stiffness(kilopascal * 1e3, 0.05) / law.resting_length
         assert stiffness == pytest.approx((5.71 + 0.0307 * kilopascal) * 1e3, rel=1e-12)
 
 
-def test_the_two_lines_of_serres_meet_where_the_paper_changes_them():
+def test_the_two_lines_of_serres_intersect_at_the_printed_pressure():
     """32.7 - 0.0321 P up to 314 kPa, 17 + 0.0179 P beyond, in N/mm."""
     law = Serres2009(0.2)
     for kilopascal, expected in ((150, 32.7 - 0.0321 * 150), (313, 32.7 - 0.0321 * 313), (315, 17 + 0.0179 * 315)):
@@ -44,14 +44,14 @@ def test_the_branches_of_hunt_are_31_kilopascal_apart():
         Hunt2017(0.17, direction=2)
 
 
-def test_hunt_turns_back_nowhere_up_to_its_pole_and_beyond():
+def test_the_pressure_of_hunt_is_monotone_up_to_its_pole_and_beyond():
     pressure = Hunt2017(0.17).pressure(np.linspace(-0.05, 0.4, 2000), 0.0)
     assert (np.diff(pressure) >= 0).all()
     assert np.isfinite(Hunt2017(0.17).pressure(0.1, np.linspace(0.0, 2000.0, 500))).all()
 
 
-def test_the_library_says_what_is_second_hand_or_chosen():
+def test_the_library_marks_secondary_sources_and_chosen_numbers():
     for name in ("hunt2017-festo-10", "reynolds2003", "serres2009"):
         entry = catalogue.load(name)
-        assert entry.provenance == "second hand"
+        assert entry.provenance == "secondary source"
         assert "chosen" in entry.note

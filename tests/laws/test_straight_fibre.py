@@ -1,7 +1,7 @@
-"""Straight fibres: every outline has the integrals that its own curve has, and the arc that the fibre has.
+"""Straight fibres: the integrals of every meridian are those of its curve, and its arc is the fibre length.
 
 Reference values are of the muscle of Table 1 of Saga et al. 2007 (l0 = 72 mm, r0 = 6 mm), computed from the closed
-forms apart from this code. A volume's slope by contraction is exact, and the ideal muscle's tension is p dV/deps / L0.
+forms independently of this code. dV/deps is exact, and the tension of the ideal muscle is (p dV/deps)/L0.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from airmuscle.core import autodiff
 from airmuscle.core.errors import GeometryLimitError, ParameterError
 from airmuscle.geometry.catenary import Catenary
 from airmuscle.geometry.circular_arc import CircularArc
-from airmuscle.geometry.fibre_sum import EvenSpread, GivenSum, SumOverHalf, SumPastHalf
+from airmuscle.geometry.fibre_sum import HalfShellFibreSum, PrintedFibreSum, UniformFibreSum, UserDefinedFibreSum
 from airmuscle.geometry.parabola import Parabola, TrueArcParabola
 from airmuscle.geometry.pleated import PleatedTube
 from airmuscle.geometry.straight_fibre import StraightFibre
@@ -84,7 +84,7 @@ RINGS = {
 
 
 def printed(text, value):
-    """Agreement to the last digit that a table gives."""
+    """Agreement to the last printed digit of a table."""
     digits = text.partition(".")[2]
     return abs(float(text) - value) <= 0.51 * 10.0 ** -len(digits)
 
@@ -105,7 +105,7 @@ def test_outlines_agree_with_the_reference_table(row):
         "parabola": lambda: segment.end_slope,
     }[name]()
     assert printed(shape, found)
-    assert printed(radius, 1e3 * segment.largest_radius)
+    assert printed(radius, 1e3 * segment.max_radius)
     assert printed(slope, segment.end_slope)
     assert printed(volume, 1e9 * segment.volume)
     assert printed(section, 1e6 * segment.half_section)
@@ -114,7 +114,7 @@ def test_outlines_agree_with_the_reference_table(row):
 
 @pytest.mark.parametrize("meridian", MERIDIANS, ids=lambda m: type(m).__name__)
 @pytest.mark.parametrize("contraction", [1e-6, 0.1, 0.35, 0.45])
-def test_integrals_are_those_of_the_drawn_curve(meridian, contraction):
+def test_integrals_are_those_of_the_profile(meridian, contraction):
     segment = tube(meridian).segment(contraction)
     points = 20001
     x, r = meridian.profile(contraction, L0, D0 / 2, np.linspace(-1, 1, points))
@@ -123,7 +123,7 @@ def test_integrals_are_those_of_the_drawn_curve(meridian, contraction):
     rise = middle - D0 / 2
     assert segment.length == pytest.approx(dx.sum(), rel=1e-12)
     assert segment.arc == pytest.approx(ds.sum(), rel=1e-7)
-    assert segment.largest_radius == pytest.approx(r.max(), rel=1e-9)
+    assert segment.max_radius == pytest.approx(r.max(), rel=1e-9)
     assert segment.half_section == pytest.approx((middle * dx).sum(), rel=1e-7)
     assert segment.arc_excess == pytest.approx((rise * ds).sum(), rel=1e-6)
     assert segment.arc_excess_squared == pytest.approx((rise**2 * ds).sum(), rel=1e-6)
@@ -132,7 +132,7 @@ def test_integrals_are_those_of_the_drawn_curve(meridian, contraction):
 
 
 @pytest.mark.parametrize("meridian", KEEP_THEIR_ARC, ids=lambda m: type(m).__name__)
-def test_newton_solves_the_shape_equation_to_rounding_over_all_its_reach(meridian):
+def test_newton_solves_the_shape_equation_to_rounding_over_its_whole_range(meridian):
     contraction = np.concatenate([np.geomspace(1e-12, 0.01, 40), np.linspace(0.011, 0.5, 200)])
     if meridian is CIRCLE:
         z = meridian.angle_squared(contraction)
@@ -159,19 +159,19 @@ def _true_arc(u, contraction):
 @pytest.mark.parametrize("meridian", MERIDIANS, ids=lambda m: type(m).__name__)
 @UNHURRIED
 @given(contraction=st.floats(1e-4, 0.44))
-def test_volume_growth_is_exact_though_newton_is_unrolled(meridian, contraction):
+def test_the_volume_derivative_is_exact_with_unrolled_newton_steps(meridian, contraction):
     shape = tube(meridian)
     step = 2e-3 * contraction
     ends = [shape.volume(contraction + n * step) for n in (-2, -1, 1, 2)]
     by_difference = (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / (12 * step)
-    assert shape.volume_growth(contraction) == pytest.approx(by_difference, rel=2e-8, abs=1e-12)
+    assert shape.volume_derivative(contraction) == pytest.approx(by_difference, rel=2e-8, abs=1e-12)
 
 
-def test_the_circles_growth_in_closed_form_is_the_derivative_of_its_integrals():
+def test_the_closed_form_derivatives_of_the_circle_are_those_of_its_integrals():
     contraction = np.array([1e-9, 1e-4, 0.03, 0.2, 0.4, 0.49])
     shape = tube(CIRCLE)
     z = CIRCLE.angle_squared(contraction)
-    growth = CIRCLE.growth_times_angle(z, L0, D0 / 2)
+    growth = CIRCLE.derivatives_times_angle(z, L0, D0 / 2)
     assert growth.volume / np.sqrt(z) == pytest.approx(autodiff.derivative(shape, "volume", contraction), rel=1e-12)
     step = 1e-3 * contraction
     for name in ("arc_excess", "arc_excess_squared"):
@@ -181,7 +181,7 @@ def test_the_circles_growth_in_closed_form_is_the_derivative_of_its_integrals():
 
 
 @pytest.mark.parametrize("meridian", MERIDIANS, ids=lambda m: type(m).__name__)
-def test_small_contractions_lose_no_digits(meridian):
+def test_small_contractions_are_accurate(meridian):
     """To first order in sqrt(eps): tan(phi0) = sqrt(6 eps), G = l0^2 sqrt(6 eps)/6, Q = l0^3 6 eps/30."""
     for contraction in (1e-14, 1e-10, 1e-8):
         u = np.sqrt(6 * contraction)
@@ -214,8 +214,8 @@ def test_the_parabola_3_is_too_short_by_what_the_reference_says():
         (tube(PARABOLA), 29.47),
     ],
 )
-def test_largest_volumes_lie_where_the_reference_says(shape, percent):
-    found = 100 * brentq(lambda c: float(shape.volume_growth(c)), 0.2, 0.49, xtol=1e-9)
+def test_contractions_of_maximum_volume_agree_with_the_reference(shape, percent):
+    found = 100 * brentq(lambda c: float(shape.volume_derivative(c)), 0.2, 0.49, xtol=1e-9)
     assert round(found, 2) == percent
 
 
@@ -223,13 +223,13 @@ def test_largest_volumes_lie_where_the_reference_says(shape, percent):
 def test_the_exact_outline_agrees_with_its_reference_table(row):
     contraction = row[0] / 100
     shape = PleatedTube(L0, D0)
-    ellipse, segment = shape.ellipse(contraction), shape.segment(contraction)
+    ellipse, segment = shape.elliptic_outline(contraction), shape.segment(contraction)
     found = (
         ellipse.parameter,
         ellipse.angle,
-        1e3 * segment.largest_radius,
+        1e3 * segment.max_radius,
         np.degrees(np.arctan2(segment.end_sine, segment.end_cosine)),
-        1e6 * shape.area(contraction),
+        1e6 * shape.effective_area(contraction),
         1e9 * segment.volume,
         1e6 * segment.half_section,
         1e6 * segment.arc_excess,
@@ -242,8 +242,8 @@ def test_the_exact_outline_agrees_with_its_reference_table(row):
 def test_rings_divide_the_exact_muscle(rings):
     areas, radii, volumes = RINGS[rings]
     shape = PleatedTube(L0, D0, rings)
-    assert 1e6 * shape.area(CONTRACTIONS) == pytest.approx(areas, rel=1e-5, abs=1e-4)
-    assert 1e3 * shape.segment(CONTRACTIONS).largest_radius == pytest.approx(radii, abs=6e-6)
+    assert 1e6 * shape.effective_area(CONTRACTIONS) == pytest.approx(areas, rel=1e-5, abs=1e-4)
+    assert 1e3 * shape.segment(CONTRACTIONS).max_radius == pytest.approx(radii, abs=6e-6)
     assert 1e9 * shape.volume(CONTRACTIONS) == pytest.approx(volumes, abs=6e-3)
 
 
@@ -251,9 +251,7 @@ def test_free_contraction_with_rings_and_of_a_slender_muscle():
     assert [round(100 * PleatedTube(L0, D0, n).free_contraction, 4) for n in (0, 1, 2)] == [46.8835, 40.2520, 34.5741]
     slender = PleatedTube(20.0, 2e-4)
     assert 100 * slender.free_contraction == pytest.approx(54.3053, abs=2e-3)
-    ends = [
-        1e3 * PleatedTube(L0, D0, n).segment(PleatedTube(L0, D0, n).free_contraction).largest_radius for n in (0, 1, 2)
-    ]
+    ends = [1e3 * PleatedTube(L0, D0, n).segment(PleatedTube(L0, D0, n).free_contraction).max_radius for n in (0, 1, 2)]
     assert np.round(ends, 4).tolist() == [32.0365, 18.3115, 13.7465]
 
 
@@ -267,19 +265,19 @@ def test_virtual_work_gives_the_tension_of_the_exact_outline(contraction, rings)
     weights = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
     growth = ends @ weights / step
     scale = np.pi * shape.end_radius**2
-    assert shape.area(contraction) == pytest.approx(growth / L0, rel=1e-9, abs=1e-8 * scale)
-    assert shape.volume_growth(contraction) == pytest.approx(growth, rel=1e-9, abs=1e-8 * scale * L0)
+    assert shape.effective_area(contraction) == pytest.approx(growth / L0, rel=1e-9, abs=1e-8 * scale)
+    assert shape.volume_derivative(contraction) == pytest.approx(growth, rel=1e-9, abs=1e-8 * scale * L0)
 
 
 @UNHURRIED
 @given(contraction=st.floats(1e-6, 0.49))
 def test_the_exact_half_shell_balances(contraction):
-    """N sin(phi0) = pi p Int r dx with N/(pi p) = R^2/(2 mu): the pressure on a half shell pulls at its ends."""
+    """N sin(phi0) = pi p Int r dx with N/(pi p) = R^2/(2 mu): the pressure on a half shell is balanced at its ends."""
     shape = PleatedTube(L0, D0)
-    segment, mu = shape.segment(contraction), shape.ellipse(contraction).parameter
-    fibre = segment.largest_radius**2 / (2 * mu)
+    segment, mu = shape.segment(contraction), shape.elliptic_outline(contraction).parameter
+    fibre = segment.max_radius**2 / (2 * mu)
     assert fibre * segment.end_sine == pytest.approx(segment.half_section, rel=1e-12)
-    axial = shape.area(contraction) / np.pi + shape.end_radius**2
+    axial = shape.effective_area(contraction) / np.pi + shape.end_radius**2
     assert fibre * segment.end_cosine == pytest.approx(axial, rel=1e-10, abs=1e-9 * fibre)
 
 
@@ -287,8 +285,8 @@ def test_the_exact_half_shell_balances(contraction):
 def test_the_exact_outline_solves_its_differential_equation(contraction):
     """N dphi/ds = -2 pi r p with N constant, integrated from the end: middle, chord and volume."""
     shape = PleatedTube(L0, D0)
-    segment, mu = shape.segment(contraction), shape.ellipse(contraction).parameter
-    curvature = 4 * mu / segment.largest_radius**2
+    segment, mu = shape.segment(contraction), shape.elliptic_outline(contraction).parameter
+    curvature = 4 * mu / segment.max_radius**2
     start = (D0 / 2, np.arctan2(segment.end_sine, segment.end_cosine), 0.0, 0.0)
 
     def along(s, state):
@@ -297,11 +295,11 @@ def test_the_exact_outline_solves_its_differential_equation(contraction):
 
     end = solve_ivp(along, (0, L0 / 2), start, rtol=1e-12, atol=1e-15, method="DOP853").y[:, -1]
     assert end[1] == pytest.approx(0, abs=1e-9)
-    assert end[0] == pytest.approx(segment.largest_radius, rel=1e-10)
+    assert end[0] == pytest.approx(segment.max_radius, rel=1e-10)
     assert 2 * end[2] == pytest.approx(segment.length, rel=1e-10)
     assert 2 * end[3] == pytest.approx(segment.volume, rel=1e-10)
     x, r = shape.outline(contraction, 4001)
-    assert np.interp(0.0, x, r) == pytest.approx(segment.largest_radius, rel=1e-6)
+    assert np.interp(0.0, x, r) == pytest.approx(segment.max_radius, rel=1e-6)
     assert np.hypot(np.diff(x), np.diff(r)).sum() == pytest.approx(L0, rel=1e-5)
 
 
@@ -310,7 +308,7 @@ def test_small_contraction_of_the_exact_outline_follows_its_limit():
     contraction = np.array([1e-4, 1e-3, 1e-2])
     r0 = D0 / 2
     limit = np.pi * r0 * L0 / np.sqrt(6 * contraction) + np.pi * (L0**2 / 5 - r0**2)
-    surplus = 1 - PleatedTube(L0, D0).area(contraction) / limit
+    surplus = 1 - PleatedTube(L0, D0).effective_area(contraction) / limit
     assert [f"{s:.1e}" for s in surplus] == ["2.6e-04", "2.6e-03", "2.7e-02"]
 
 
@@ -321,31 +319,31 @@ def test_rings_are_segments_in_series(contraction, rings):
     assert whole.volume(contraction) == pytest.approx((rings + 1) * part.volume(contraction), rel=1e-14)
     x, r = whole.outline(contraction, 601)
     assert x[-1] - x[0] == pytest.approx(L0 * (1 - contraction), rel=1e-12)
-    assert r.max() <= part.segment(contraction).largest_radius * (1 + 1e-12)
+    assert r.max() <= part.segment(contraction).max_radius * (1 + 1e-12)
     assert x == pytest.approx(-x[::-1], abs=1e-12)
     assert r == pytest.approx(r[::-1], abs=1e-12)
 
 
 def test_fibre_sums():
-    assert [round(s.of(16), 5) for s in (SumPastHalf(), SumOverHalf())] == [4.93074, 5.12583]
-    assert EvenSpread().of(16) == pytest.approx(5.092958, abs=5e-7)
-    assert GivenSum(5.0).of(16) == 5.0
+    assert [round(s.sum_of_sines(16), 5) for s in (PrintedFibreSum(), HalfShellFibreSum())] == [4.93074, 5.12583]
+    assert UniformFibreSum().sum_of_sines(16) == pytest.approx(5.092958, abs=5e-7)
+    assert UserDefinedFibreSum(5.0).sum_of_sines(16) == 5.0
     angles = np.pi / 16 * (2 * np.arange(9) + 1)
-    assert SumPastHalf().of(16) == pytest.approx(np.sin(angles).sum(), rel=1e-14)
-    assert SumOverHalf().of(16) == pytest.approx(np.sin(angles[:-1]).sum(), rel=1e-14)
-    assert SumOverHalf().of(4000) == pytest.approx(EvenSpread().of(4000), rel=1e-6)
+    assert PrintedFibreSum().sum_of_sines(16) == pytest.approx(np.sin(angles).sum(), rel=1e-14)
+    assert HalfShellFibreSum().sum_of_sines(16) == pytest.approx(np.sin(angles[:-1]).sum(), rel=1e-14)
+    assert HalfShellFibreSum().sum_of_sines(4000) == pytest.approx(UniformFibreSum().sum_of_sines(4000), rel=1e-6)
 
 
-def test_what_cannot_be_is_refused():
+def test_impossible_values_are_errors():
     with pytest.raises(
-        GeometryLimitError, match=r"StraightFibre cannot take a contraction of 60\.00%; it reaches from 0\.00% to 50"
+        GeometryLimitError, match=r"StraightFibre: a contraction of 60 % is outside its range, 0 to 50 %"
     ):
         tube(CIRCLE).volume(0.6)
-    with pytest.raises(GeometryLimitError, match=r"contraction of -1\.00%"):
+    with pytest.raises(GeometryLimitError, match=r"contraction of -1 % is outside its range"):
         tube(PARABOLA).volume(np.array([0.1, -0.01]))
-    with pytest.raises(GeometryLimitError, match="PleatedTube cannot take"):
+    with pytest.raises(GeometryLimitError, match="PleatedTube: a contraction of 51 % is outside its range"):
         PleatedTube(L0, D0).volume(0.51)
-    with pytest.raises(ParameterError, match=r"StraightFibre\.rings is -1; it must be a whole number"):
+    with pytest.raises(ParameterError, match=r"StraightFibre\.rings is -1; it must be an integer"):
         tube(CIRCLE, -1)
     with pytest.raises(ParameterError, match=r"end_diameter \(d_0, diameter at the ends and rings\) is 12 m"):
         StraightFibre(L0, 12.0)

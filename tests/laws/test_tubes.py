@@ -24,8 +24,8 @@ from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import DistributedTube, FillDischarge, Supply, Tube, TubeOrifice, Valve, WithTubes
 from airmuscle.pneumatics.gas import (
     GAS_CONSTANT,
-    HEAT_AT_CONSTANT_PRESSURE,
     NO_FLOW,
+    SPECIFIC_HEAT_CONSTANT_PRESSURE,
     Air,
     Ambient,
     EnergyBalance,
@@ -56,7 +56,7 @@ def steady(p1, p2, length, diameter, end_loss=1.5):
 def at_rest(tube, pressure, tilt=0.0):
     """States of a tube and its airs; `tilt` makes the pressures fall towards the muscle."""
     state = tube.steady_state(Air(pressure, WARM), AMBIENT)
-    n = tube.pieces
+    n = tube.segment_count
     for i in range(n):
         prefix = "tube." if n == 1 else f"tube{i + 1}."
         for name in ("air_mass", "internal_energy"):
@@ -77,25 +77,25 @@ def test_a_steady_flow_obeys_darcys_law_however_few_the_pieces(p1, p2, length, d
     ends = GAS_CONSTANT * WARM * end_loss * (q / area) ** 2
     squares = p1**2 - (p1**2 - p2**2 - ends) * np.arange(pieces) / pieces
     state = {}
-    for name, p in zip(tube.names, np.sqrt(squares), strict=True):
-        state |= {f"{name}air_mass": p * tube.piece_volume / (GAS_CONSTANT * WARM), f"{name}flow": q}
+    for name, p in zip(tube.prefixes, np.sqrt(squares), strict=True):
+        state |= {f"{name}air_mass": p * tube.segment_volume / (GAS_CONSTANT * WARM), f"{name}flow": q}
     rates, onward = tube.rates(state, tube.air_states(state, AMBIENT), NO_FLOW, Air(p2, WARM), AMBIENT)
     driving = tube.area * (p1 - p2) / length
     assert onward.mass == q
-    for name in tube.names:
+    for name in tube.prefixes:
         assert rates[f"{name}flow"] == pytest.approx(0.0, abs=1e-9 * driving)
-    for name in tube.names[1:]:
+    for name in tube.prefixes[1:]:
         assert rates[f"{name}air_mass"] == pytest.approx(0.0, abs=1e-15)
 
 
 @given(st.floats(-1e-2, 1e-2), st.floats(0.5, 10))
 def test_friction_holds_back_in_both_directions_and_is_continuous_at_its_transition(q, density):
     tube = DistributedTube(2.0, 4e-3)
-    assert tube.friction(q, density) == tube.friction(-q, density) > 0
+    assert tube.friction_coefficient(q, density) == tube.friction_coefficient(-q, density) > 0
     critical = (64 / 0.3164) ** (4 / 3) * tube.area * MU / tube.diameter
-    one, other = (tube.friction(critical * (1 + s), density) for s in (-1e-9, 1e-9))
+    one, other = (tube.friction_coefficient(critical * (1 + s), density) for s in (-1e-9, 1e-9))
     assert one == pytest.approx(other, rel=1e-8)
-    assert tube.friction(critical, density) == pytest.approx(32 * MU / (density * tube.diameter**2))
+    assert tube.friction_coefficient(critical, density) == pytest.approx(32 * MU / (density * tube.diameter**2))
 
 
 @pytest.mark.parametrize(("length", "diameter"), [(1.0, 4e-3), (2.0, 4e-3), (5.0, 6e-3), (2.0, 2.5e-3)])
@@ -115,11 +115,11 @@ def test_the_air_that_flows_on_is_as_warm_as_where_it_comes_from(mass_flow):
     airs, muscle = tube.air_states(state, AMBIENT), Air(3e5, 350.0)
     _, onward = tube.rates(state, airs, NO_FLOW, muscle, AMBIENT)
     origin = airs[1] if mass_flow > 0 else muscle
-    assert onward.enthalpy == pytest.approx(HEAT_AT_CONSTANT_PRESSURE * origin.temperature * mass_flow)
+    assert onward.enthalpy == pytest.approx(SPECIFIC_HEAT_CONSTANT_PRESSURE * origin.temperature * mass_flow)
 
 
 def test_a_tube_of_a_size_has_its_volume_and_its_flow():
-    tube = Tube.of_size(2.0, 4e-3)
+    tube = Tube.from_dimensions(2.0, 4e-3)
     assert tube.volume == pytest.approx(np.pi * 4e-6 * 2.0)
     assert tube.orifice.conductance == pytest.approx(0.029 * 1.6e-5 / np.sqrt(2.0 / 4e-3**1.25 + 510))
     as_valve = Valve(tube.orifice.conductance, tube.orifice.critical_ratio)
@@ -164,7 +164,7 @@ def linearised(tube, pressure):
     # along the gas's own process mass changes by dp/(p n), and an energy, where there is one, by dp/p
     imposed = {first[0]: state[first[0]] / exponent} | {n: state[n] for n in first[1:]}
     b = by({n: 1e-6 * size for n, size in imposed.items()}) / 1e-6 / pressure
-    return a, b, inner.index(f"tube{tube.pieces}.flow"), muscle
+    return a, b, inner.index(f"tube{tube.segment_count}.flow"), muscle
 
 
 @pytest.mark.parametrize("gas", GASES, ids=repr)
@@ -215,7 +215,7 @@ def test_the_front_fades_with_the_way_that_it_runs(diameter):
     length, gas = 2.0, Isothermal()
     tube, c = DistributedTube(length, diameter, 60, gas), gas.sound_speed(Air(3e5, WARM))
     run = shock_tube(tube, gas, 1.2 * length / c)
-    friction = tube.friction(0.0, 3.05e5 / (GAS_CONSTANT * WARM))
+    friction = tube.friction_coefficient(0.0, 3.05e5 / (GAS_CONSTANT * WARM))
     at = np.argmax(run["time"] >= 1.08 * length / c)  # behind the smeared front, before what comes back
     sent = tube.area / c * 1e4
     assert run["tube54.flow"][at] / sent == pytest.approx(np.exp(-friction * 0.9 * length / (2 * c)), rel=0.1)
@@ -224,7 +224,7 @@ def test_the_front_fades_with_the_way_that_it_runs(diameter):
 def test_a_lumped_tube_knows_no_delay_and_both_agree_once_the_waves_are_gone():
     length, diameter = 2.0, 4e-3
     valve, courses = Valve(2.6167e-9, 0.433), {}
-    for tube in (DistributedTube(length, diameter, 30), Tube.of_size(length, diameter)):
+    for tube in (DistributedTube(length, diameter, 30), Tube.from_dimensions(length, diameter)):
         circuit = WithTubes(FillDischarge(Supply(5.5e5), valve, valve), tube)
         plant = Plant(chosen_muscle(), circuit, Isometric(0.1), Isothermal())
         start = plant.state_at(pressure=0.0)
@@ -247,6 +247,6 @@ def test_the_page_states_the_error_of_lumped_tubes(length, conductance, per_cent
     spec = importlib.util.spec_from_file_location("make_tubes_figure", script)
     drawing = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(drawing)
-    assert 100 * drawing.error(length, 1, conductance) == pytest.approx(per_cent, abs=0.07)
+    assert 100 * drawing.max_error(length, 1, conductance) == pytest.approx(per_cent, abs=0.07)
     page = script.with_name("components.md").read_text(encoding="utf-8")
     assert f"{per_cent} %" in page

@@ -1,4 +1,4 @@
-"""Units at the border: the table of common ones is pint's, gauge and absolute differ by the surroundings."""
+"""Unit conversion: common units agree with pint; gauge and absolute pressure differ by the ambient pressure."""
 
 from __future__ import annotations
 
@@ -13,21 +13,23 @@ COMMON = {name: entry for name, entry in units._FACTORS.items() if name not in (
 
 
 @pytest.mark.parametrize("unit", COMMON)
-def test_a_common_unit_is_what_pint_says(unit):
+def test_a_common_unit_agrees_with_pint(unit):
     factor, target = COMMON[unit]
-    by_pint = units._by_pint("dimensionless" if unit == "1" else unit, "dimensionless" if target == "1" else target, "")
+    by_pint = units._convert_with_pint(
+        "dimensionless" if unit == "1" else unit, "dimensionless" if target == "1" else target, ""
+    )
     assert by_pint.factor == pytest.approx(factor, rel=1e-12)
     assert by_pint.offset == 0.0
 
 
-def test_the_factors_of_the_notebook_are_those_of_the_text():
+def test_the_unit_factors_are_those_of_text():
     assert units.quantity("6 bar", "Pa") == 6 * units.bar
     assert units.quantity("300 mm", "m") == pytest.approx(300 * units.mm)
     assert units.quantity("25 deg", "rad") == 25 * units.degree
 
 
 @given(st.floats(-1e5, 1e7), st.floats(9e4, 1.1e5))
-def test_absolute_pressure_is_gauge_plus_the_surroundings(gauge, ambient):
+def test_absolute_pressure_is_gauge_plus_ambient(gauge, ambient):
     absolute = units.conversion("kPa(a)", "Pa", ambient=ambient)
     assert absolute((gauge + ambient) / 1e3) == pytest.approx(gauge, abs=1e-8 * 1e7)
     assert units.conversion("barg", "Pa", ambient=ambient)(gauge / 1e5) == pytest.approx(gauge)
@@ -43,12 +45,12 @@ def test_every_spelling_of_gauge_is_understood(text):
     assert units.quantity(text, "Pa") == pytest.approx(7e5)
 
 
-def test_a_bare_pressure_is_taken_as_gauge_and_says_so():
+def test_a_plain_pressure_unit_is_assumed_to_be_gauge_and_marked():
     assert units.conversion("bar", "Pa").assumed_gauge
     assert not units.conversion("barg", "Pa").assumed_gauge
 
 
 @pytest.mark.parametrize(("text", "target"), [("3 N", "m"), ("3 bara", "N"), ("3 zorkmid", "m"), ("3", "m"), ("", "m")])
-def test_what_is_no_such_quantity_is_refused(text, target):
+def test_a_unit_of_another_quantity_is_an_error(text, target):
     with pytest.raises(UnitError):
         units.quantity(text, target)

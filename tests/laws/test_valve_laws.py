@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from airmuscle.core import autodiff, ops
 from airmuscle.core.errors import ParameterError
 from airmuscle.core.reference import cite
-from airmuscle.pneumatics import CheckValve, IndexedValve, Orifice, Valve
+from airmuscle.pneumatics import CheckValve, Orifice, SubsonicIndexValve, Valve
 from airmuscle.pneumatics.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
 
 T0 = REFERENCE_TEMPERATURE
@@ -24,19 +24,19 @@ ratios = st.floats(0.0, 0.6)
 indices = st.floats(0.3, 1.0)
 crackings = st.one_of(st.just(0.0), st.floats(1e3, 3e5))
 valves = st.builds(Valve, conductances, ratios)
-indexed = st.builds(IndexedValve, conductances, ratios, indices, crackings)
+indexed = st.builds(SubsonicIndexValve, conductances, ratios, indices, crackings)
 reversible = st.one_of(valves, indexed)
 orifices = st.one_of(reversible, st.builds(CheckValve, reversible))
 
 EXAMPLES = {
     "valve": Valve(1e-8, 0.3),
-    "elliptic": IndexedValve(1e-8, 0.3),
-    "indexed": IndexedValve(1e-8, 0.25, 0.6),
-    "parabolic": IndexedValve(1e-8, 0.0, 1.0),
-    "cracking": IndexedValve(1e-8, 0.3, 0.55, 3e4),
-    "all range cracking": IndexedValve(1e-8, 0.6, 0.5, 3e5),
+    "elliptic": SubsonicIndexValve(1e-8, 0.3),
+    "indexed": SubsonicIndexValve(1e-8, 0.25, 0.6),
+    "parabolic": SubsonicIndexValve(1e-8, 0.0, 1.0),
+    "cracking": SubsonicIndexValve(1e-8, 0.3, 0.55, 3e4),
+    "all range cracking": SubsonicIndexValve(1e-8, 0.6, 0.5, 3e5),
     "check": CheckValve(Valve(1e-8, 0.3)),
-    "check, cracking": CheckValve(IndexedValve(5e-8, 0.25, cracking_pressure=2e4)),
+    "check, cracking": CheckValve(SubsonicIndexValve(5e-8, 0.25, cracking_pressure=2e4)),
 }
 every_orifice = pytest.mark.parametrize("law", EXAMPLES.values(), ids=EXAMPLES)
 
@@ -45,7 +45,7 @@ def flow(law: Orifice, upstream, downstream):
     return law.mass_flow(upstream, downstream, 1.0, T0)
 
 
-def printed(valve: IndexedValve, p1: float, p2: float) -> float:
+def printed(valve: SubsonicIndexValve, p1: float, p2: float) -> float:
     """Mass flow as ISO 6358-1:2013 has it, p1 > p2."""
     r, b, crack = p2 / p1, valve.critical_ratio, valve.cracking_pressure / p1
     choked = valve.conductance * REFERENCE_DENSITY * p1
@@ -65,14 +65,14 @@ def test_away_from_the_laminar_chord_it_is_the_printed_formula(valve, p1, r):
 
 @given(conductances, ratios, st.floats(0.97, 0.9999), pressures, pressures)
 def test_with_index_one_half_and_no_cracking_pressure_it_is_the_valve(c, b, laminar, one, other):
-    simple, general = Valve(c, b, laminar), IndexedValve(c, b, 0.5, 0.0, laminar)
+    simple, general = Valve(c, b, laminar), SubsonicIndexValve(c, b, 0.5, 0.0, laminar)
     scale = c * REFERENCE_DENSITY * max(one, other)
     assert flow(general, one, other) == pytest.approx(flow(simple, one, other), abs=1e-9 * scale)
 
 
 def test_a_number_worked_out_by_hand():
     """C = 1e-8, b = 0.2, m = 0.6, dp_c = 30 kPa, 500 to 400 kPa: x = 0.6/0.74, phi = 0.342586^0.6 = 0.525850."""
-    valve = IndexedValve(1e-8, 0.2, 0.6, 30e3)
+    valve = SubsonicIndexValve(1e-8, 0.2, 0.6, 30e3)
     assert flow(valve, 5e5, 4e5) == pytest.approx(1e-8 * 1.185 * 5e5 * 0.525850, rel=2e-6)
 
 
@@ -118,14 +118,14 @@ def test_a_check_valve_is_its_orifice_one_way_and_shut_the_other(law, one, other
 
 
 def test_below_its_cracking_pressure_it_is_shut_and_above_it_opens():
-    valve = IndexedValve(5e-8, 0.25, cracking_pressure=20e3)
+    valve = SubsonicIndexValve(5e-8, 0.25, cracking_pressure=20e3)
     assert flow(valve, 320e3, 301e3) == 0.0
     assert 0.0 < flow(valve, 320e3, 299.9e3) < flow(valve, 320e3, 299e3)
 
 
 def test_where_cracking_takes_up_all_of_the_subsonic_range_it_opens_over_the_laminar_one():
     """b = 0.6 and dp_c = 3 bar at 4 bar: 1 - b - dp_c/p1 < 0, where the printed formula has no meaning."""
-    valve, p1 = IndexedValve(1e-8, 0.6, 0.5, 3e5), 4e5
+    valve, p1 = SubsonicIndexValve(1e-8, 0.6, 0.5, 3e5), 4e5
     choked = 1e-8 * REFERENCE_DENSITY * p1
     shares = [flow(valve, p1, p1 - 3e5 - part * 0.001 * p1) / choked for part in (0.0, 0.25, 0.5, 1.0, 50.0)]
     assert shares == pytest.approx([0.0, 0.25, 0.5, 1.0, 1.0])
@@ -187,11 +187,11 @@ def test_arrays_floats_and_symbols_agree(law):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: IndexedValve(1e-8, 0.3, 1.5), "subsonic_index .* allowed are 0.25 to 1"),
-        (lambda: IndexedValve(1e-8, 0.3, 0.5, -1.0), "cracking_pressure .* allowed are 0 to 500000 Pa"),
-        (lambda: IndexedValve(1e-8, 1.0), "critical_ratio .* allowed are 0 to 0.95"),
-        (lambda: IndexedValve(float("nan"), 0.3), "conductance .* must be finite"),
-        (lambda: IndexedValve(1.1, 0.3), "conductance .* Values are SI: check the unit"),
+        (lambda: SubsonicIndexValve(1e-8, 0.3, 1.5), "subsonic_index .* allowed range: 0.25 to 1"),
+        (lambda: SubsonicIndexValve(1e-8, 0.3, 0.5, -1.0), "cracking_pressure .* allowed range: 0 to 500000 Pa"),
+        (lambda: SubsonicIndexValve(1e-8, 1.0), "critical_ratio .* allowed range: 0 to 0.95"),
+        (lambda: SubsonicIndexValve(float("nan"), 0.3), "conductance .* must be finite"),
+        (lambda: SubsonicIndexValve(1.1, 0.3), "conductance .* Values are in SI units; check the unit"),
     ],
 )
 def test_an_impossible_valve_is_refused(make, message):
@@ -200,4 +200,4 @@ def test_an_impossible_valve_is_refused(make, message):
 
 
 def test_the_sources_are_named():
-    assert {r.key for r in cite(CheckValve(IndexedValve(1e-8, 0.3)))} == {"iso-6358-1-2013"}
+    assert {r.key for r in cite(CheckValve(SubsonicIndexValve(1e-8, 0.3)))} == {"iso-6358-1-2013"}

@@ -1,8 +1,8 @@
-"""The tension of an ideal muscle is what its volume gives: F = -p dV/dL.
+"""The tension of an ideal muscle follows from its volume by virtual work: F = -p dV/dL.
 
-It holds to 1e-9 for Chou and Hannaford, and for Tondu and Lopez with end correction 1, on the braid they contain.
-With corrected ends, or with a wall, it does not: the tests say by how much. A law that adds a wall to the braid
-still keeps energy, dF/dp = -dV/dL; corrected ends do not.
+This is exact to 1e-9 for Chou and Hannaford, and for Tondu and Lopez with end correction 1, on their braid. With an end
+correction or a wall it is not; the tests quantify the difference. A model that adds a wall to the braid still conserves
+energy, dF/dp = -dV/dL; a model with an end correction does not.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def test_without_end_correction_the_force_of_tondu_and_lopez_is_the_same():
     assert virtual_work_defect(ChouHannaford1996(BRAID), BRAID, BOX).relative < 1e-9
 
 
-def test_corrected_ends_leave_virtual_work_by_a_sixth_at_the_end_of_the_stroke():
+def test_an_end_correction_differs_from_virtual_work_by_a_sixth_at_the_end_of_the_stroke():
     law = TonduLopez2000(BRAID, 1.25)
     work, maxwell = virtual_work_defect(law, BRAID, BOX), maxwell_defect(law, BRAID, BOX)
     assert work.contraction == maxwell.contraction == 0.28
@@ -55,7 +55,7 @@ def test_corrected_ends_leave_virtual_work_by_a_sixth_at_the_end_of_the_stroke()
 
 
 @pytest.mark.parametrize(("name", "newtons"), [("dmsp-20-300", 418.4), ("dmsp-10-250", 199.5)])
-def test_a_rubber_wall_takes_hundreds_of_newtons_and_keeps_energy(name: str, newtons: float):
+def test_a_rubber_wall_takes_hundreds_of_newtons_and_conserves_energy(name: str, newtons: float):
     muscle = catalogue.load(name)
     assert virtual_work_defect(muscle.characteristic, muscle.geometry, muscle.validity_range).worst == pytest.approx(
         newtons, abs=0.05
@@ -63,13 +63,13 @@ def test_a_rubber_wall_takes_hundreds_of_newtons_and_keeps_energy(name: str, new
     assert maxwell_defect(muscle.characteristic, muscle.geometry, muscle.validity_range).relative < 1e-9
 
 
-def test_a_volume_that_is_not_the_laws_shows_as_a_maxwell_defect_of_its_size():
+def test_another_volume_gives_a_maxwell_defect_of_its_size():
     thicker = replace(BRAID, radius=BRAID.radius * 1.1)
     defect = maxwell_defect(ChouHannaford1996(BRAID), thicker, BOX)
     assert defect.relative == pytest.approx(1 - 1 / 1.21, rel=1e-9)
 
 
-def test_a_muscle_that_pulls_nowhere_has_no_defect_to_tell():
+def test_a_muscle_without_tension_has_no_defect():
     with pytest.raises(SolveError, match="pulls nowhere"):
         maxwell_defect(ChouHannaford1996(BRAID), BRAID, ValidityRange(1e5, 2e5, 0.5, 0.6))
 
@@ -80,23 +80,23 @@ def test_a_tabulated_volume_gives_its_force_but_no_second_derivative():
     inside = np.linspace(0.0125, 0.3375, 9)
     ideal = VirtualWork(BRAID).force(4e5, inside)
     np.testing.assert_allclose(VirtualWork(table).force(4e5, inside), ideal, atol=0.01 * ideal.max())
-    with pytest.raises(TraceError, match=r"TabulatedGeometry is not closed-form.*as_polynomial"):
+    with pytest.raises(TraceError, match=r"TabulatedGeometry is not in closed form.*as_polynomial"):
         VirtualWork(table).slopes(4e5, 0.1)
 
 
-def test_the_polynomial_of_a_geometry_states_errors_that_bound_it():
-    replaced = as_polynomial(BRAID, degree=3, reach=(0.0, 0.35))
+def test_the_stated_errors_of_a_polynomial_geometry_are_bounds():
+    replaced = as_polynomial(BRAID, degree=3, contraction_range=(0.0, 0.35))
     assert replaced.volume_error < 1e-18  # the volume of a braid is a cubic
     contraction = np.linspace(0.0, 0.35, 201)
     table = TabulatedGeometry(tuple(contraction[::10]), tuple(BRAID.volume(contraction[::10])), 0.3)
     coarse = as_polynomial(table, degree=6)
     error = np.abs(coarse.volume(contraction) - table.volume(contraction)).max()
     assert 0.5 * error <= coarse.volume_error <= 1.05 * error
-    slope_error = np.abs(coarse.volume_growth(contraction) - table.volume_growth(contraction)).max()
-    assert coarse.growth_error == pytest.approx(slope_error, rel=0.1)
+    slope_error = np.abs(coarse.volume_derivative(contraction) - table.volume_derivative(contraction)).max()
+    assert coarse.derivative_error == pytest.approx(slope_error, rel=0.1)
 
 
-def test_outside_its_box_a_polynomial_geometry_goes_on_by_its_tangent():
-    replaced = as_polynomial(BRAID, degree=5, reach=(0.0, 0.3))
-    beyond = replaced.volume(0.3) + 0.1 * BRAID.volume_growth(0.3)
+def test_outside_its_range_a_polynomial_geometry_is_extrapolated_linearly():
+    replaced = as_polynomial(BRAID, degree=5, contraction_range=(0.0, 0.3))
+    beyond = replaced.volume(0.3) + 0.1 * BRAID.volume_derivative(0.3)
     assert replaced.volume(0.4) == pytest.approx(beyond, rel=1e-9)

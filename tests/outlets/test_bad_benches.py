@@ -1,7 +1,7 @@
-"""Recordings that a bench spoils, through the command line: each is refused in one line, or used for what it tells.
+"""Defective recordings on the command line: each is rejected with one line, or used as far as possible.
 
-Units that contradict each other, a run that is not what it is said to be, a sensor cut off, a record shorter than the
-dynamics, time that repeats, steps back or jumps, a mapping that names no column.
+Contradictory units, a run of another kind than stated, a saturated sensor, a record shorter than the dynamics, times that
+repeat, decrease or have gaps, a mapping with an unknown column.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def airmuscle(*arguments):
 
 
 def ramp(path: Path, pressure: float, *, ceiling: float = np.inf, seed: int = 1, count: int = 400) -> Path:
-    """An isobaric ramp of contraction up and down, its force cut off at a ceiling."""
+    """An isobaric ramp of contraction up and down, its force saturated at a ceiling."""
     rng = np.random.default_rng(seed)
     contraction = np.concatenate([np.linspace(0.0, 0.2, count // 2), np.linspace(0.2, 0.0, count // 2)])
     force = MUSCLE.force(pressure, contraction) + 0.8 * rng.standard_normal(count)
@@ -69,20 +69,17 @@ def test_two_files_that_contradict_each_others_units(tmp_path, command):
     assert "--unit 'pressure=...'" in line
 
 
-# A run that is not what it is said to be
+# A run of another kind than stated
 
 
-def test_constant_pressure_given_as_an_isometric_sweep(tmp_path):
+def test_constant_pressure_stated_to_be_an_isometric_sweep(tmp_path):
     file = ramp(tmp_path / "run.csv", 3e5)
     (tmp_path / "rig.toml").write_text('run = "isometric"\n', encoding="utf-8")
     for command in COMMANDS[:2]:
         line = refused(tmp_path, *command, file, "--mapping", tmp_path / "rig.toml")
-        assert (
-            "run.csv: it is said to be isometric, but what was measured is isobaric (pressure from 300 to 300 kPa)"
-            in line
-        )
+        assert "run.csv: the run is stated to be isometric, but the data are isobaric (pressure 300 to 300 kPa)" in line
     seen = airmuscle("inspect", file, "--mapping", tmp_path / "rig.toml")
-    assert "PROBLEM: it is said to be isometric" in seen.stdout
+    assert "PROBLEM: the run is stated to be isometric" in seen.stdout
 
 
 def at_rest(path: Path, pressure: float, contraction: float, seed: int) -> Path:
@@ -93,12 +90,10 @@ def at_rest(path: Path, pressure: float, contraction: float, seed: int) -> Path:
     return path
 
 
-def test_a_run_in_which_nothing_changes_tells_nothing_by_itself_and_a_point_among_others(tmp_path):
+def test_a_run_without_variation_is_rejected_alone_and_a_point_among_others(tmp_path):
     lone = at_rest(tmp_path / "rest.csv", 3e5, 0.1, 1)
     for command in COMMANDS[:2]:
-        assert "rest.csv: nothing that was measured changes (pressure from 300 to 300 kPa)" in refused(
-            tmp_path, *command, lone
-        )
+        assert "rest.csv: no measured quantity varies (pressure 300 to 300 kPa)" in refused(tmp_path, *command, lone)
     points = [(p, c) for p in (1e5, 3e5, 5e5) for c in (0.0, 0.08, 0.16)]
     files = [at_rest(tmp_path / f"point{i}.csv", p, c, i) for i, (p, c) in enumerate(points)]
     result = airmuscle("fit", *files, "--characteristic", "TonduLopez2000", "--resting-length", "300 mm",
@@ -106,16 +101,16 @@ def test_a_run_in_which_nothing_changes_tells_nothing_by_itself_and_a_point_amon
     assert result.exit_code == 0, result.stderr
 
 
-def test_the_noise_of_a_constant_pressure_is_no_step(tmp_path):
+def test_the_noise_of_a_constant_pressure_is_not_a_step(tmp_path):
     said = airmuscle("inspect", ramp(tmp_path / "run.csv", 3e5)).stdout
     assert "isobaric at pressure 300 kPa" in said
-    assert "faster than" not in said
+    assert "undersampled" not in said
 
 
-# A sensor that is cut off
+# A saturated sensor
 
 
-def test_a_force_sensor_at_its_upper_end_gives_bounds_not_values(tmp_path):
+def test_a_saturated_force_sensor_gives_bounds_not_values(tmp_path):
     """A surface linear in the truth's powers meets the truth beyond the sensor's end; taken as they stand, rows bend it."""
     files = [ramp(tmp_path / f"run{i}.csv", p, ceiling=500.0, seed=i) for i, p in enumerate((1e5, 2e5, 3e5, 4e5, 5e5))]
     out = tmp_path / "out"
@@ -124,30 +119,30 @@ def test_a_force_sensor_at_its_upper_end_gives_bounds_not_values(tmp_path):
     law = load(out / "muscle.toml").characteristic
     true = float(MUSCLE.force(4e5, 0.02))
     assert true > 850.0
-    assert law.unclamped(4e5, 0.02) == pytest.approx(true, rel=0.01)
+    assert law.unclamped_force(4e5, 0.02) == pytest.approx(true, rel=0.01)
     runs = read(files, resting_length=0.3)
     found = fit(ContractileSurface.blank(3, max_force=1e5), runs)
     high = np.concatenate([run["force"] for run in runs]) >= 500.0
     assert high.sum() > 100
-    assert (found.sides[high] == -1).all()
+    assert (found.censoring[high] == -1).all()
     assert found.rmse < 1.0
     as_it_stands = fit(ContractileSurface.blank(3, max_force=1e5), runs, censoring=UNCENSORED)
     assert as_it_stands.rmse > 10.0
-    assert float(as_it_stands.model.unclamped(4e5, 0.02)) < 0.65 * true
+    assert float(as_it_stands.model.unclamped_force(4e5, 0.02)) < 0.65 * true
 
 
-def test_a_sensor_without_an_end_changes_nothing(tmp_path):
+def test_a_sensor_without_limits_changes_nothing(tmp_path):
     runs = read([ramp(tmp_path / f"run{i}.csv", p, seed=i) for i, p in enumerate((2e5, 3e5))], resting_length=0.3)
-    assert (fit(ContractileSurface.blank(1, max_force=1e5), runs).sides <= 0).sum() == sum(
+    assert (fit(ContractileSurface.blank(1, max_force=1e5), runs).censoring <= 0).sum() == sum(
         (run["force"] > 0).sum() for run in runs
     )
 
 
-def test_a_sensor_that_is_cut_off_most_of_the_time_is_a_problem_to_see(tmp_path):
+def test_a_sensor_that_is_mostly_saturated_is_reported_as_a_problem(tmp_path):
     file = ramp(tmp_path / "run.csv", 5e5, ceiling=600.0)
     said = airmuscle("inspect", file).stdout
-    assert "PROBLEM: the force stands still at its highest reading, 600 N" in said
-    assert "Such rows are bounds, not values." in said
+    assert "PROBLEM: the force sensor saturates at its upper limit, 600 N" in said
+    assert "These rows are bounds (censored), not values." in said
 
 
 # Time
@@ -187,11 +182,11 @@ file = "record.csv"
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"rows": 20}, "record.csv: the record ends while the pressure still changes"),
-        ({"jump": True}, "record.csv: 1 gaps in time, the longest of 3.05 s behind row 100"),
+        ({"rows": 20}, "record.csv: the record ends before the pressure has settled"),
+        ({"jump": True}, "record.csv: 1 gap in time, the longest of 3.05 s after row 100"),
     ],
 )
-def test_a_record_too_short_or_with_a_gap_is_said_to_be_so_before_and_after_the_fit(tmp_path, options, message):
+def test_a_record_that_is_too_short_or_has_a_gap_is_reported_before_and_after_the_fit(tmp_path, options, message):
     filling(tmp_path / "record.csv", **options)
     assert message.partition(": ")[2] in airmuscle("inspect", tmp_path / "record.csv").stdout
     (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
@@ -201,9 +196,9 @@ def test_a_record_too_short_or_with_a_gap_is_said_to_be_so_before_and_after_the_
     assert message.partition(": ")[2] in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(("row", "message"), [(20, "repeats the time of"), (15, "goes back behind")])
+@pytest.mark.parametrize(("row", "message"), [(20, "repeats the time"), (15, "is less than the time")])
 @pytest.mark.parametrize("command", [*COMMANDS[:2], ("fit-dynamic",)], ids=lambda words: words[0])
-def test_time_that_repeats_or_steps_back_is_refused_with_its_line(tmp_path, command, row, message):
+def test_time_that_repeats_or_decreases_is_rejected_with_its_line(tmp_path, command, row, message):
     lines = ramp(tmp_path / "record.csv", 3e5).read_text(encoding="utf-8").splitlines()
     first = next(i for i, line in enumerate(lines) if line[0].isdigit())
     lines.insert(first + 21, lines[first + row])
@@ -211,7 +206,7 @@ def test_time_that_repeats_or_steps_back_is_refused_with_its_line(tmp_path, comm
     (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
     source = tmp_path / ("study.toml" if command[0] == "fit-dynamic" else "record.csv")
     line = refused(tmp_path, *command, source)
-    assert f"record.csv, line {first + 22}: time {0.1 * row:g} s {message} the row before (2 s)" in line
+    assert f"record.csv, line {first + 22}: time {0.1 * row:g} s {message} of the previous row (2 s)" in line
     if command[0] != "fit-dynamic":
         assert "PROBLEM: time" in airmuscle("inspect", tmp_path / "record.csv").stdout
 
@@ -224,5 +219,5 @@ def test_a_mapping_that_names_a_missing_column(tmp_path, command):
     file = ramp(tmp_path / "run.csv", 3e5)
     (tmp_path / "rig.toml").write_text('[columns]\n"presure" = "pressure [Pa]"\n', encoding="utf-8")
     line = refused(tmp_path, *command, file, "--mapping", tmp_path / "rig.toml")
-    assert "run.csv: the mapping names column 'presure', but there are time [s], pressure [Pa]" in line
+    assert "run.csv: the mapping names column 'presure', but the columns are time [s], pressure [Pa]" in line
     assert "Did you mean 'pressure [Pa]'?" in line

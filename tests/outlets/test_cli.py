@@ -1,14 +1,17 @@
-"""The command line does what its help says, and ends as it promises.
+"""The command line: help, exit codes, output that agrees with the library, messages without raw bytes.
 
-Exit code 0 is well, 1 the work failed (one line on stderr, no traceback, nothing half written), 2 wrong usage,
-130 interrupted. What it prints and writes agrees with the library. `list` starts at once.
+Exit code 0: success. 1: failure (one line on stderr, no traceback, no partial files). 2: wrong usage. 130: interrupted,
+also while modules are imported. `list` and `--help` import no more than they need.
 """
 
 from __future__ import annotations
 
 import csv
+import importlib
 import json
+import os
 import re
+import signal
 import subprocess
 import sys
 import tomllib
@@ -20,12 +23,13 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from airmuscle.characteristic.contractile_surface import ContractileSurface
-from airmuscle.cli.app import app
+from airmuscle.cli.app import COMMANDS, app
 from airmuscle.cli.cite import as_bibtex
+from airmuscle.cli.terminal import print_json, print_table, printable
 from airmuscle.core.errors import UnknownNameError
 from airmuscle.core.reference import Reference
-from airmuscle.library.catalogue import list_library, load
-from airmuscle.library.valve_catalogue import valve_names
+from airmuscle.library.catalogue import load
+from airmuscle.library.files import list_laws, list_valves
 from airmuscle.recording import read_csv
 from airmuscle.report.chapter import Chapter, Claim, Equal
 from airmuscle.reproduce import run
@@ -60,7 +64,7 @@ def airmuscle(*arguments: object) -> Result:
 
 
 def shell(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
-    """The true command, in a process of its own."""
+    """The command in a process of its own."""
     command = [sys.executable, "-m", "airmuscle", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, **options)  # type: ignore[call-overload, no-any-return]
 
@@ -75,22 +79,41 @@ def assert_failed(result: Result, message: str) -> None:
 
 # Help and usage
 
-COMMANDS = (
+NAMES = (
     "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "plan",
     "simulate", "sweep", "schema",
 )  # fmt: skip
 
 
-def test_the_commands_stand_in_the_order_of_use():
-    listed = re.findall(r"^  ([\w-]+)  ", airmuscle("--help").output.partition("Commands:")[2], re.MULTILINE)
-    assert listed == list(COMMANDS)
+def test_the_help_lists_the_commands_in_the_order_of_use():
+    listed = re.findall(r"^  ([\w-]+)  +(.*)$", airmuscle("--help").output.partition("Commands:")[2], re.MULTILINE)
+    assert listed == [(row.name, row.summary) for row in COMMANDS]
+    assert tuple(row.name for row in COMMANDS) == NAMES
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_help_has_examples(command: str):
-    result = airmuscle(command, "--help")
+@pytest.mark.parametrize("row", COMMANDS, ids=NAMES)
+def test_every_command_has_its_summary_and_examples_in_its_help(row):
+    function = getattr(importlib.import_module(f"airmuscle.cli.{row.module}"), row.function)
+    assert function.__doc__.splitlines()[0] == row.summary
+    result = airmuscle(row.name, "--help")
     assert result.exit_code == 0
-    assert re.search(rf"^ +airmuscle {command}", result.output, re.MULTILINE)
+    assert row.summary in " ".join(result.output.split())
+    assert re.search(rf"^ +airmuscle {row.name}", result.output, re.MULTILINE)
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["list"]])
+def test_a_command_module_is_imported_only_when_it_is_called(arguments: list[str]):
+    modules = [row.module for row in COMMANDS if row.name not in arguments]
+    code = (
+        f"from airmuscle.cli.app import app; app({arguments!r}, standalone_mode=False); import sys; print(*sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert not {f"airmuscle.cli.{name}" for name in modules} & set(done.stdout.splitlines()[-1].split())
+
+
+def test_an_unknown_command_names_the_nearest_one():
+    assert "No such command 'sovle'. Did you mean 'solve'?" in airmuscle("sovle").stderr
 
 
 @pytest.mark.parametrize(
@@ -120,7 +143,7 @@ def test_wrong_usage_is_exit_code_2(arguments: tuple[str, ...]):
 def test_list_names_every_entry_with_title_kind_and_trust():
     found = json.loads(airmuscle("list", "--json").output)
     listed = {entry["name"]: entry for entry in found if entry["kind"] != "data set"}
-    assert tuple(listed) == (*list_library(), *valve_names())
+    assert tuple(listed) == (*list_laws(), *list_valves())
     entry = load(MUSCLE)
     assert listed[MUSCLE] == {
         "name": MUSCLE,
@@ -129,7 +152,7 @@ def test_list_names_every_entry_with_title_kind_and_trust():
         "provenance": entry.provenance,
     }
     table = airmuscle("list").output
-    assert all(name in table for name in list_library())
+    assert all(name in table for name in list_laws())
 
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
@@ -146,7 +169,7 @@ def test_list_names_the_data_sets_that_fit_takes():
     found = json.loads(airmuscle("list", "--json").output)
     data = {entry["name"]: entry["provenance"] for entry in found if entry["kind"] == "data set"}
     assert data[MUSCLE] == "measured"
-    assert data["festo-tool-dmsp-20"] == "second hand"
+    assert data["festo-tool-dmsp-20"] == "secondary source"
 
 
 def test_show_gives_parameters_sources_and_checks():
@@ -161,7 +184,7 @@ def test_show_gives_parameters_sources_and_checks():
 
 
 def test_show_leaves_out_the_middle_of_long_lists():
-    long = next(n for n in list_library() if len(json.loads(airmuscle("show", n, "--json").stdout)["parameters"]) > 60)
+    long = next(n for n in list_laws() if len(json.loads(airmuscle("show", n, "--json").stdout)["parameters"]) > 60)
     text = airmuscle("show", long).output
     assert re.search(r"\.\.\. \d+ more", text)
     assert len(text.splitlines()) < 60
@@ -169,7 +192,7 @@ def test_show_leaves_out_the_middle_of_long_lists():
 
 def test_a_unique_beginning_of_a_name_is_enough_and_others_are_refused():
     assert airmuscle("show", "dmsp-20").output == airmuscle("show", MUSCLE).output
-    assert_failed(airmuscle("show", "dmsp"), "'dmsp' is the beginning of several: dmsp-10-250, dmsp-20-300")
+    assert_failed(airmuscle("show", "dmsp"), "'dmsp' is ambiguous: dmsp-10-250, dmsp-20-300")
     assert_failed(airmuscle("show", "dmps-20-300"), r".*Did you mean 'dmsp-20-300'\?")
     assert_failed(airmuscle("show", "no/such.toml"), "no/such.toml: there is no such file")
 
@@ -205,7 +228,7 @@ def test_any_two_give_the_third(wanted: str):
     solved = json.loads(airmuscle("solve", MUSCLE, *given, "--json").output)
     assert solved["solved"] == wanted
     assert {name: solved[name] for name in point} == pytest.approx(point, rel=1e-9)
-    assert solved["inside_data"] is True
+    assert solved["inside_validity_range"] is True
     assert solved["stiffness"] == pytest.approx(float(law.stiffness(3e5, 0.12)), rel=1e-6)
 
 
@@ -234,7 +257,7 @@ def test_the_chart_and_its_data_stand_in_the_folder(tmp_path: Path):
 
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
-@pytest.mark.parametrize("name", list_library())
+@pytest.mark.parametrize("name", list_laws())
 def test_every_entry_has_a_chart(tmp_path: Path, name: str):
     entry = load(name)
     low, high = entry.validity_range.pressure if entry.validity_range else entry.characteristic.pressure_range
@@ -260,15 +283,15 @@ def test_a_point_outside_the_data_is_a_warning():
         airmuscle("solve", MUSCLE, f"--pressure={p} kPa", "--contraction=0.1", "--json") for p in (300, 750)
     )
     assert inside.stderr == ""
-    assert re.match(r"warning: the working point lies outside the range .*35 to 675 kPa", outside.stderr)
-    assert json.loads(outside.stdout)["inside_data"] is False
+    assert re.match(r"warning: the operating point is outside the validity range .*35 to 675 kPa", outside.stderr)
+    assert json.loads(outside.stdout)["inside_validity_range"] is False
 
 
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (("--pressure=3 kg", "--force=1 N"), "--pressure: unit 'kg' cannot become 'Pa'"),
-        (("--pressure=3", "--force=1 N"), "--pressure: '3' carries no unit; write it like '3 Pa'"),
+        (("--pressure=3 kg", "--force=1 N"), "--pressure: unit 'kg' cannot be converted to 'Pa'"),
+        (("--pressure=3", "--force=1 N"), "--pressure: '3' has no unit; write it like '3 Pa'"),
         (("--pressure=-2 bar", "--contraction=0.1"), "a gauge pressure of -200 kPa lies below absolute zero"),
         (("--pressure=3 bar", "--force=9 kN"), "no contraction between .* balances 9000 N at 300 kPa"),
     ],
@@ -325,10 +348,14 @@ def test_fit_starts_from_a_library_entry_and_keeps_what_is_fixed(tmp_path: Path)
 @pytest.mark.parametrize(
     ("rows", "options", "message"),
     [
-        (36, ("--characteristic", "Saga2007"), "--characteristic: Saga2007 needs values to start from"),
+        (36, ("--characteristic", "Saga2007"), "--characteristic: Saga2007 needs initial values"),
         (36, ("--characteristic", "ContractileSurfac"), "no library entry 'ContractileSurfac'"),
         (20, ("--characteristic", "ContractileSurface"), ".*has 21 parameters to be found, but only 19 points"),
-        (36, ("--characteristic", "ContractileSurface", "--robust", "5 mm"), "--robust: unit 'mm' cannot become 'N'"),
+        (
+            36,
+            ("--characteristic", "ContractileSurface", "--robust", "5 mm"),
+            "--robust: unit 'mm' cannot be converted to 'N'",
+        ),
         (36, ("--characteristic", "ContractileSurface", "--resting-length", "3 N"), ".*resting_length.*'N'"),
     ],
 )
@@ -381,7 +408,7 @@ def test_a_run_that_fails_keeps_what_it_has_and_says_why(scenario: Path, tmp_pat
     result = airmuscle("simulate", scenario, "--out", tmp_path / "run")
     assert result.exit_code == 1
     kept, error = result.stderr.splitlines()[-2:]
-    assert kept == f"what was computed until then stands in {tmp_path / 'run'}"
+    assert kept == f"partial results were written to {tmp_path / 'run'}"
     found = re.fullmatch(
         r"error: the run ended at (\S+) of 25 s because .* steps, at air_mass .* kg, .*\. \S+ .*\.", error
     )
@@ -390,8 +417,8 @@ def test_a_run_that_fails_keeps_what_it_has_and_says_why(scenario: Path, tmp_pat
     rows = np.array([[float(cell) for cell in line.split(",")] for line in lines if line[0].isdigit()])
     assert 5.0 < rows[-1, 0] <= float(found[1])
     assert np.isfinite(rows).all()
-    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
-    assert "A run of 25 s that ended early, at " in page
+    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
+    assert "Simulation of 25 s, ended early at " in page
     assert f"<p>{error.removeprefix('error: ').capitalize()[:30]}" in page, "the last note says why"
 
 
@@ -404,12 +431,12 @@ def test_the_report_of_a_run_shows_inputs_parameters_sources_and_notes(scenario:
     scenario.write_text(f"{named}\n{driver}\n[output]\ncolumns = ['force']", encoding="utf-8")
     result = airmuscle("simulate", scenario, "--out", tmp_path / "run")
     assert result.exit_code == 0, result.output
-    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
     for text in (
-        "A run of 0.5 s. The recording is recording.csv.",
+        "Simulation of 0.5 s. All columns are in recording.csv.",
         "was outside the validity range of its characteristic in pressure",
-        "Inputs of the plant; dashed, what the drivers were told.",
-        "fill 1 from 0.1 s, 0 from 0.3 s; driven: fill by PWM(frequency=50.0, smallest_pulse=0.0), SolenoidDriver(opening_delay=",
+        "Inputs applied to the plant; dashed: commands to the drivers.",
+        "fill 1 from 0.1 s, 0 from 0.3 s; drivers: fill: PWM(frequency=50.0, smallest_pulse=0.0), SolenoidDriver(opening_delay=",
         "<td>muscle.contractile.wall_thickness</td>",
         "Rodas4(rtol=1e-06)",
         "Martens",
@@ -435,7 +462,7 @@ def test_simulate_prints_json(scenario: Path, tmp_path: Path):
     [
         ('duration = "0.5 s"', "", ".*duration"),
         ("critical_ratio", "critical_ration", ".*critical_ration"),
-        ('mass = "5 kg"', 'mass = "5 N"', ".*unit 'N' cannot become 'kg'"),
+        ('mass = "5 kg"', 'mass = "5 N"', ".*unit 'N' cannot be converted to 'kg'"),
         ("fill = [[", "fil = [[", r".*no input 'fil'.*Did you mean 'fill'\?"),
         ('mass = "5 kg"', 'mass = "5000 kg"', ".*"),
     ],
@@ -489,14 +516,14 @@ def test_an_interrupted_reproduction_is_polite(tmp_path: Path, one_paper: types.
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path):
     (tmp_path / "taken").write_text("a file")
     result = airmuscle("reproduce", "--out", tmp_path / "taken")
-    assert_failed(result, ".*taken: cannot be written to: .*Name a folder that you may write to")
+    assert_failed(result, ".*taken: cannot be written to: .*Specify a folder with write permission")
     assert (tmp_path / "taken").read_text() == "a file"
 
 
-# The true command
+# The command in a process of its own
 
 
-def test_the_true_command_ends_with_the_promised_codes():
+def test_a_process_ends_with_the_documented_exit_codes():
     well = shell("solve", MUSCLE, "--pressure", "3 bar", "--force", "100 N", "--json")
     assert (well.returncode, well.stderr) == (0, "")
     assert json.loads(well.stdout)["solved"] == "contraction"
@@ -525,3 +552,104 @@ def test_every_example_of_the_help_is_valid_toml_where_it_names_a_file():
     assert named
     for name in named:
         assert "plant" in tomllib.loads((root / name).read_text(encoding="utf-8"))
+
+
+# Interruptions
+
+SLOW_IMPORT = """
+import importlib.abc, signal, sys, time
+from airmuscle.cli import main
+
+class SlowFinder(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == MODULE:
+            print("importing", flush=True)
+            try:
+                time.sleep(60)
+            except KeyboardInterrupt:
+                if KIND == "extension":
+                    raise ImportError("initialization failed") from None
+                if KIND == "module":
+                    raise
+
+MODULE, KIND = sys.argv[1:]
+sys.meta_path.insert(0, SlowFinder())
+signal.signal(signal.SIGINT, signal.default_int_handler)  # it is ignored where the tests run in the background
+sys.argv[1:] = ["solve", "dmsp-20", "--pressure", "3 bar", "--force", "100 N"]
+main()
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="SIGINT cannot be sent to one process")
+@pytest.mark.parametrize("kind", ["module", "extension", "exception discarded"])
+@pytest.mark.parametrize("module", ["typer", "airmuscle.cli.app", "airmuscle.cli.solve", "rich.table"])
+def test_an_interrupted_import_is_one_line_and_exit_code_130(module: str, kind: str):
+    command = [sys.executable, "-c", SLOW_IMPORT, module, kind]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert "importing\n" in iter(process.stdout.readline, "")
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+    assert (process.returncode, errors) == (130, "interrupted\n")
+
+
+# Messages without raw bytes
+
+
+def assert_printable(text: str) -> None:
+    assert [c for c in text if not c.isprintable() and c != "\n"] == []
+
+
+@pytest.mark.parametrize(
+    ("command", "suffix"),
+    [("fit --characteristic ContractileSurface", "csv"), ("inspect", "csv"), ("inspect", "txt"), ("hysteresis", "tdms"),
+     ("show", "toml"), ("simulate", "toml"), ("sweep", "toml"), ("fit-dynamic", "toml")],
+)  # fmt: skip
+@pytest.mark.parametrize(
+    "content", [bytes(range(256)) * 8, b"\x1b[2J\x07 = \x1b]0;title\x07\n" * 20], ids=["all", "escapes"]
+)
+def test_binary_input_is_not_printed_raw(tmp_path: Path, command: str, suffix: str, content: bytes):
+    file = tmp_path / f"input\x1b[31m.{suffix}"
+    file.write_bytes(content)
+    result = airmuscle(*command.split(), file)
+    assert result.exit_code == 1, result.output
+    assert result.stderr.startswith("error: ")
+    assert_printable(result.output)
+
+
+def test_control_characters_of_a_file_that_can_be_read_are_escaped_in_tables_json_and_progress(tmp_path: Path):
+    rows = [f"{t},{t}" for t in range(10)]
+    (tmp_path / "x.csv").write_text("\n".join(["time [s],my\x1b[2J\x9b [kPa]", *rows]), encoding="utf-8")
+    options = ("--column", "2=pressure [kPa]")
+    for arguments in ((), options, (*options, "--json")):
+        assert_printable(airmuscle("inspect", tmp_path / "x.csv", *arguments).output)
+
+
+@pytest.mark.parametrize(
+    "arguments", [["\x1b[31mlist"], ["list", "\x1b[31m"], ["list", "--\x1b[31m"], ["show", "\x1b[31m"], ["plan", "x", "--max-pressure", "\x1b"]]
+)  # fmt: skip
+def test_control_characters_of_arguments_are_escaped(arguments: list[str]):
+    result = airmuscle(*arguments)
+    assert result.exit_code in (1, 2)
+    assert_printable(result.output)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="arguments are bytes on POSIX only")
+@pytest.mark.parametrize("command", [[b"show"], [b"simulate"], [b"list"]])
+def test_an_argument_that_cannot_be_decoded_is_shown_with_its_bytes(command: list[bytes]):
+    done = subprocess.run([sys.executable, "-m", "airmuscle", *command, b"no\xffname"], capture_output=True, timeout=60)
+    assert done.returncode in (1, 2)
+    assert b"no\\xffname" in done.stderr
+    assert b"Traceback" not in done.stderr
+
+
+def test_printable_keeps_text_and_escapes_the_rest(capsys: pytest.CaptureFixture[str]):
+    assert printable("Hošovský, 5 °C\u202f\t½\n") == "Hošovský, 5 °C\u202f\t½\n"
+    assert printable("a\x1b[0m\r\x7f\x9b\udcff\u202e") == "a\\x1b[0m\\r\\x7f\\x9b\\xff\\u202e"
+    print_json({"a": "\x1b\x9b\udcff\u202e", "b": float("nan")})
+    printed = capsys.readouterr().out
+    assert_printable(printed)
+    assert json.loads(printed) == {"a": "\x1b\x9b\udcff\u202e", "b": None}
+    print_table(("p [kPa]", ":smile:"), [("\x1b[2J", "[red]x[/red]")])
+    printed = capsys.readouterr().out
+    assert_printable(printed)
+    assert all(text in printed for text in ("p [kPa]", ":smile:", "\\x1b[2J", "[red]x[/red]"))

@@ -20,7 +20,7 @@ from airmuscle.scenario.scenario import load_scenario
 def text_of(plant):
     places = "".join(f', "{c.name}" = "0.005 {c.unit}"' for c in plant.mechanism.coordinates)
     start = f'start = {{ pressure = "2 bar"{places} }}' if places else ""
-    tables = "\n".join(write._table("plant", write._described(plant)))
+    tables = write.part_toml("plant", plant)
     return f'{tables}\n[run]\nduration = "20 ms"\noutput = "5 ms"\n{start}\n'
 
 
@@ -41,9 +41,9 @@ muscle = { library = "dmsp-20-300", series = { model = "SeriesSpring", stiffness
 gas = { model = "EnergyBalance", heat_transfer = "0.5 W/K" }
 [plant.circuit]
 model = "WithTubes"
-tube = { model = "DistributedTube", length = "1.5 m", diameter = "4 mm", pieces = 5 }
+tube = { model = "DistributedTube", length = "1.5 m", diameter = "4 mm", segment_count = 5 }
 [plant.circuit.circuit]
-model = "ThreePosition"
+model = "ThreePositionValve"
 supply = { model = "Tank", volume = "5 l", feed = { model = "TubeOrifice", length = "3 m", diameter = "6 mm" }, supply = { model = "Supply", pressure = "7 bar" } }
 fill = { library = "matrix-821" }
 discharge = { library = "matrix-821" }
@@ -63,7 +63,7 @@ def test_components_nest_in_a_file_with_units_as_text(tmp_path):
     file.write_text(TUBE, encoding="utf-8")
     scenario = load_scenario(file)
     tube, muscle = scenario.plant.circuit.tube, scenario.plant.muscle
-    assert (tube.length, tube.diameter, tube.pieces) == (1.5, 0.004, 5)
+    assert (tube.length, tube.diameter, tube.segment_count) == (1.5, 0.004, 5)
     assert muscle.series.stiffness == 2e5
     assert muscle.damper.shortening == 2900.0
     assert muscle.stop.contraction == 0.2
@@ -75,12 +75,12 @@ def test_components_nest_in_a_file_with_units_as_text(tmp_path):
 @pytest.mark.parametrize(
     ("right", "wrong", "message"),
     [
-        ('pieces = 5', 'pieces = 0', r"DistributedTube: pieces is 0; give a whole number from 1 to 200"),
+        ('segment_count = 5', 'segment_count = 0', r"DistributedTube: segment_count is 0; give an integer from 1 to 200"),
         ('diameter = "4 mm"', 'diameter = "4 m"', r"diameter \(D, inner diameter of the tube\) is 4 m; allowed are"),
-        ('tube = { model = "DistributedTube"', 'tube = { model = "Supply", pressure = "1 bar" } #', r"tube is Supply; a TubeModel is wanted"),
+        ('tube = { model = "DistributedTube"', 'tube = { model = "Supply", pressure = "1 bar" } #', r"tube is Supply; it must be a TubeModel"),
         ('damper = "Serres2009Damper"', 'damper = "LinearSpring"', r"needs 'stiffness'"),
-        ('valve = [["10 ms", 1]', 'valve = [["10 ms", 2]', r"the input 'valve' is 2 .* allowed are -1 to 1"),
-        ('supply = { model = "Tank"', 'supply = "SharedSupply" #', r"SharedSupply\(\) is the supply of a branch in a Manifold"),
+        ('valve = [["10 ms", 1]', 'valve = [["10 ms", 2]', r"the input 'valve' is 2 .* allowed range: -1 to 1"),
+        ('supply = { model = "Tank"', 'supply = "SharedSupply" #', r"SharedSupply\(\) is allowed only as the supply of a branch in a Manifold"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_a_component_is_said_with_its_place(right, wrong, message, tmp_path):

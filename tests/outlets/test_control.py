@@ -25,7 +25,7 @@ from airmuscle.control.driver import PWM, SolenoidDriver
 from airmuscle.control.inputs import ZERO_INPUT, Periodic, SampledSignal, Schedule
 from airmuscle.control.with_drivers import WithDrivers
 from airmuscle.core.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownNameError
-from airmuscle.report.run_chapter import in_words, run_chapter
+from airmuscle.report.run_chapter import describe_input, run_chapter
 from airmuscle.scenario.scenario import load_scenario
 from airmuscle.scenario.schema import scenario_schema
 from airmuscle.study.study import load_study
@@ -88,11 +88,11 @@ def test_the_code_of_the_page_runs():
 
 def test_the_table_of_the_page_is_a_loop(tmp_path: Path):
     held = PLANT.replace(
-        'model = "HangingMass"\nmass = "5 kg"', 'model = "Held"\ninner = { model = "HangingMass", mass = 5 }'
+        'model = "HangingMass"\nmass = "5 kg"', 'model = "WithLatch"\ninner = { model = "HangingMass", mass = 5 }'
     )
     scenario = load_scenario(written(tmp_path, text=f"{held}{TABLE}"))
     pid = PID("position", SplitRange("fill", "discharge"), 40.0, 1.0, 0.05)
-    wanted, beside = Schedule({"position": ((0.0, 0.0), (0.2, 0.02))}), Schedule({"held": ((0.0, 1.0), (0.1, 0.0))})
+    wanted, beside = Schedule({"position": ((0.0, 0.0), (0.2, 0.02))}), Schedule({"latched": ((0.0, 1.0), (0.1, 0.0))})
     assert scenario.command == ControlLoop(pid, 5e-3, wanted, beside, {"fill": PWM(200.0), "discharge": PWM(200.0)})
     run = scenario.simulate()
     assert np.ptp(run["position"][run["time"] <= 0.1]) < 1e-12
@@ -156,7 +156,7 @@ def test_drivers_and_inputs_beside_stand_where_they_always_do(tmp_path: Path):
 def test_the_columns_of_a_loop_may_be_asked_for(tmp_path: Path):
     asked = ("[run]", '[output]\ncolumns = ["setpoint.pressure", "command.fill"]\n[run]')
     scenario = load_scenario(written(tmp_path, asked))
-    assert list(scenario.chosen(scenario.simulate())) == ["time", "setpoint.pressure", "command.fill"]
+    assert list(scenario.select_columns(scenario.simulate())) == ["time", "setpoint.pressure", "command.fill"]
 
 
 # What is wrong
@@ -170,38 +170,38 @@ PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "SplitRange", positiv
     [
         ('measured = "pressure"', 'measured = "presure"', ParameterError, r"toml, \[command.controller\]: PID measures 'presure', which .*Did you mean 'pressure'\?"),
         ('measured = "pressure"', 'measured = "fill"', ParameterError, r"PID measures 'fill', which the plant does not have; there are"),
-        ('measured = "pressure"', "measured = 3", ParameterError, r"\[command.controller\]: measured is 3; text is wanted"),
-        ('measured = "pressure"\n', "", ParameterError, r"\[command.controller\]: PID needs 'measured' \(text\); it is missing"),
+        ('measured = "pressure"', "measured = 3", ParameterError, r"\[command.controller\]: measured is 3; it must be a text"),
+        ('measured = "pressure"\n', "", ParameterError, r"\[command.controller\]: PID needs 'measured' \(a text\); it is missing"),
         ('commanded = "fill"', 'commanded = "fil"', ParameterError, r"\[command.controller\]: the plant has no input 'fil'; there are fill, discharge. Did you mean 'fill'\?"),
-        ('commanded = "fill"', "commanded = 3", ParameterError, r"commanded is 3; text or a SplitRange is wanted"),
+        ('commanded = "fill"', "commanded = 3", ParameterError, r"commanded is 3; it must be a text or a SplitRange"),
         ('commanded = "fill"', PID_TABLE[1].format("fill", "vent"), ParameterError, r"\[command.controller\]: the plant has no input 'vent'"),
         ('commanded = "fill"', PID_TABLE[1].format("fill", "fill"), ParameterError, r"SplitRange: both sides are 'fill'"),
-        ('"1.5 1/bar"', '"1.5 1/mm"', UnitError, r"\[command.controller\], gain: unit '1/mm' cannot become '1/Pa'"),
-        ('"1.5 1/bar"', '"1.5"', UnitError, r"gain: '1.5' carries no unit; write it like '1.5 1/Pa'"),
+        ('"1.5 1/bar"', '"1.5 1/mm"', UnitError, r"\[command.controller\], gain: unit '1/mm' cannot be converted to '1/Pa'"),
+        ('"1.5 1/bar"', '"1.5"', UnitError, r"gain: '1.5' has no unit; write it like '1.5 1/Pa'"),
         ('"1.5 1/bar"', "nan", ParameterError, r"\[command.controller\]: PID.gain .* is nan; it must be finite"),
         ('"1.5 1/bar"', "inf", ParameterError, r"PID.gain .* is inf; it must be finite"),
         ('"1.5 1/bar"', "true", ParameterError, r"gain is True; it must be a number in 1/Pa"),
         ("integral_time", "integral_tim", ParameterError, r"PID has no parameter 'integral_tim'; .*mean 'integral_time'\?"),
-        ('"300 ms"\nperiod', '"-3 ms"\nperiod', ParameterError, r"PID.integral_time .* is -0.003 s; allowed are 0 to"),
+        ('"300 ms"\nperiod', '"-3 ms"\nperiod', ParameterError, r"PID.integral_time .* is -0.003 s; allowed range: 0 to"),
         ('period = "5 ms"', 'period = "0 ms"', ParameterError, r"\[command.controller\]: ControlLoop.period is 0.0 s; it must be positive"),
         ('period = "5 ms"', "period = -1", ParameterError, r"ControlLoop.period is -1.0 s"),
         ('period = "5 ms"', "period = nan", ParameterError, r"\[command.controller\], period is nan; it must be finite"),
-        ('period = "5 ms"', 'period = "5 bar"', UnitError, r"period: unit 'bar' cannot become 's'"),
+        ('period = "5 ms"', 'period = "5 bar"', UnitError, r"period: unit 'bar' cannot be converted to 's'"),
         ('period = "5 ms"', 'period = "1 s"', ParameterError, r"\[command.controller\]: the controller looks every 1 s, and the run lasts 0.3 s"),
         ('period = "5 ms"\n', "", ParameterError, r"\[command.controller\]: 'period' is missing; write period = \"10 ms\""),
         ("[command.controller.setpoint]", "[plant.setpoint]", ParameterError, r"Plant has no parameter 'setpoint'"),
         (f"[command.controller.setpoint]\n{SETPOINT}", "", ParameterError, r"'setpoint' is missing; write \[command.controller.setpoint\]"),
         (SETPOINT, "", ParameterError, r"ControlLoop.setpoint names nothing; PID follows pressure"),
         (SETPOINT, 'presure = [[0, 1]]', ParameterError, r"\[command.controller.setpoint\]: the controller has no set point 'presure'; there are pressure.*Did you mean"),
-        (SETPOINT, 'pressure = [[0, "1 mm"]]', UnitError, r"setpoint\], pressure: unit 'mm' cannot become 'Pa'"),
+        (SETPOINT, 'pressure = [[0, "1 mm"]]', UnitError, r"setpoint\], pressure: unit 'mm' cannot be converted to 'Pa'"),
         (SETPOINT, 'pressure = [[0, nan]]', ParameterError, r"setpoint\], pressure is nan; it must be finite"),
-        (SETPOINT, 'pressure = 3', ParameterError, r"setpoint\], pressure is 3; write instants and values"),
+        (SETPOINT, 'pressure = 3', ParameterError, r"setpoint\], pressure is 3; it must be a list of instants and values"),
         (SETPOINT, f'{SETPOINT}\ndrivers = {{ pressure = "SolenoidDriver" }}', ParameterError, r"a set point has no drivers; write \[command.drivers\]"),
-        (SETPOINT, f'{SETPOINT}\ncontroller = 3', ParameterError, r"a controller stands in a scenario only"),
+        (SETPOINT, f'{SETPOINT}\ncontroller = 3', ParameterError, r"a controller is allowed only in a scenario"),
         (SETPOINT, 'file = "none.csv"', AirmuscleError, r"none.csv"),
-        ('model = "PID"', 'model = "Valve"', ParameterError, r"\[command.controller\]: Valve is no controller; there are OnOffController, PID"),
+        ('model = "PID"', 'model = "Valve"', ParameterError, r"\[command.controller\]: Valve is not a controller; there are OnOffController, PID"),
         ('model = "PID"', 'model = "PDI"', UnknownNameError, r"no model 'PDI'"),
-        ('model = "PID"\n', "", ParameterError, r"\[command.controller\]: no model is named"),
+        ('model = "PID"\n', "", ParameterError, r"\[command.controller\]: the model is not named"),
         ("[command]\n", '[command]\nfill = [["0.1 s", 1]]\n', ParameterError, r"'fill' is commanded by the controller, and beside it too"),
         ("[command]\n", '[command]\ndischarge = [["0.1 s", 2]]\n', ParameterError, r"\[command\]: the input 'discharge' is 2 before"),
         ("[command]\n", '[command]\ndrivers = { vent = "SolenoidDriver" }\n', ParameterError, r"\[command.drivers\]: the plant has no input 'vent'"),
@@ -215,7 +215,10 @@ def test_a_loop_that_cannot_be_is_refused(tmp_path: Path, was: str, becomes: str
 def test_what_is_no_table_of_a_controller_is_refused(tmp_path: Path):
     i = GOOD.index("[command.controller]")
     for given in ("3", '"PID"'):
-        with pytest.raises(ParameterError, match=r'\[command.controller\] is .*; write model = "PID", its parameters'):
+        with pytest.raises(
+            ParameterError,
+            match=r'\[command.controller\] is .*; it must be a table. Write model = "PID", its parameters',
+        ):
             load_scenario(written(tmp_path, text=f"{GOOD[:i]}controller = {given}"))
     flat = f'{GOOD[:i]}controller = {{ model = "PID", measured = "pressure", commanded = "fill", gain = 1, period = 1e-3, setpoint = 3 }}'
     with pytest.raises(ParameterError, match=r'\[command.controller.setpoint\] is 3; write pressure = \[\["0 s"'):
@@ -223,28 +226,31 @@ def test_what_is_no_table_of_a_controller_is_refused(tmp_path: Path):
 
 
 def test_two_inputs_of_one_command_are_of_one_kind(tmp_path: Path):
-    text = regulated('{ model = "SplitRange", positive = "setpoint", negative = "held" }')
+    text = regulated('{ model = "SplitRange", positive = "setpoint", negative = "latched" }')
     text = text.replace(
-        'model = "HangingMass"\nmass = "5 kg"', 'model = "Held"\ninner = { model = "HangingMass", mass = 5 }'
+        'model = "HangingMass"\nmass = "5 kg"', 'model = "WithLatch"\ninner = { model = "HangingMass", mass = 5 }'
     )
-    with pytest.raises(ParameterError, match="setpoint and held have different units; name inputs of one kind"):
+    with pytest.raises(
+        ParameterError, match="setpoint and latched have different units; choose inputs of the same unit"
+    ):
         load_scenario(written(tmp_path, text=text))
 
 
 def test_a_column_that_a_set_point_follows_is_there(tmp_path: Path):
     (tmp_path / "wanted.csv").write_text("time [s],valve\n0,1\n1,2\n", encoding="utf-8")
-    with pytest.raises(ColumnError, match=r"wanted.csv has no column called like an input \(pressure\)"):
+    with pytest.raises(ColumnError, match=r"wanted.csv has no column with the name of an input \(pressure\)"):
         load_scenario(written(tmp_path, (SETPOINT, 'file = "wanted.csv"')))
 
 
 def test_a_record_has_no_controller(tmp_path: Path):
     from airmuscle.library.location import Location
-    from airmuscle.scenario.inputs import command_from
+    from airmuscle.scenario.inputs import build_input_signal
 
     with pytest.raises(
-        ParameterError, match=r"record, \[command\]: a controller stands in a scenario only; give what was"
+        ParameterError,
+        match=r"record, \[command\]: a controller is allowed only in a scenario; give the commanded inputs",
     ):
-        command_from({"controller": {}}, (), Location("record", "command", tmp_path))
+        build_input_signal({"controller": {}}, (), Location("record", "command", tmp_path))
 
 
 # Schema, report, program, study
@@ -300,16 +306,16 @@ def test_the_report_shows_set_point_and_measurement_with_units():
     assert np.array_equal(lines["measured"][:, 1], run["pressure"] * 1e-3)
     assert loop.figure.axes[0].get_ylabel() == "pressure\n[kPa]"
     assert all("setpoint" not in axis.get_ylabel() for axis in whole.figure.axes)
-    had = {line.get_label(): line.get_xydata() for line in inputs.figure.axes[0].lines}
-    assert set(had) == {"command", "what the plant had"}
-    assert inputs.caption.endswith("dashed, what the drivers were told.")
+    applied = {line.get_label(): line.get_xydata() for line in inputs.figure.axes[0].lines}
+    assert set(applied) == {"command", "applied input"}
+    assert inputs.caption.endswith("; dashed: commands to the drivers.")
     table = chapter.tables[1]
     assert table.title == "Parameters of the controller, PID"
     assert dict(zip(table.columns["parameter"], table.columns["unit"], strict=True))["gain"] == "1/Pa"
     assert "astrom-hagglund-1995" in [r.key for r in chapter.references]
     settings = {name: value for name, value, _ in chapter.chosen}
-    assert settings["command"].startswith(
-        "every 0.02 s PID commands fill, discharge; set point: pressure 100000 from 0 s,"
+    assert settings["inputs"].startswith(
+        "PID, sample time 0.02 s, manipulated inputs fill, discharge; set point: pressure 100000 from 0 s,"
     )
 
 
@@ -317,10 +323,10 @@ def test_a_loop_without_drivers_is_drawn_to_its_end(tmp_path: Path):
     scenario = load_scenario(written(tmp_path, ('period = "5 ms"', 'period = "0.5 ms"')))
     run = scenario.simulate()
     plot = run_chapter(scenario, run).plots[-1]
-    (had,) = [line.get_xydata() for line in plot.figure.axes[0].lines]
-    assert plot.caption == "Inputs of the plant."
-    assert had[-1, 0] == 0.3
-    assert in_words(scenario.command).endswith("; beside: none")
+    (applied,) = [line.get_xydata() for line in plot.figure.axes[0].lines]
+    assert plot.caption == "Inputs applied to the plant."
+    assert applied[-1, 0] == 0.3
+    assert describe_input(scenario.command).endswith("; other inputs: none")
     assert not isinstance(scenario.command.as_open_loop(run), WithDrivers)
 
 
@@ -383,6 +389,6 @@ def test_a_study_varies_the_numbers_of_a_controller(tmp_path: Path):
 
 
 def test_a_study_depends_on_the_controllers_program():
-    from airmuscle.study.fingerprint import NOT_COMPUTING
+    from airmuscle.study.fingerprint import EXCLUDED_PACKAGES
 
-    assert "control" not in NOT_COMPUTING
+    assert "control" not in EXCLUDED_PACKAGES

@@ -65,8 +65,9 @@ def test_a_stated_end_takes_the_place_of_the_muscles(tmp_path):
 
 def test_the_table_is_printed(tmp_path):
     said = airmuscle("convert", MUSCLE, "ContractileSurface", "--degree", 2, "--out", tmp_path / "m.toml").stdout
-    assert "MartensBoblan2017, over 35 to 675 kPa and 1.33% to 26.00%" in said
-    assert "greatest error [N]" in said
+    assert "MartensBoblan2017, over 35 to 675 kPa and 1.333 % to 26 %" in said
+    assert "pressure [kPa]" in said
+    assert "maximum error [N]" in said
     assert said.splitlines()[-1] == f"muscle: {tmp_path / 'm.toml'}"
 
 
@@ -75,17 +76,20 @@ def test_the_table_is_printed(tmp_path):
     [
         (
             ("borzikova-exponential", "ContractileSurface"),
-            "states no validity range to convert it on; give --min-pressure, ",
+            "has no validity range for the conversion; give --min-pressure, ",
         ),
         ((MUSCLE, "ContractileSurfac"), "no library entry 'ContractileSurfac'"),
-        ((MUSCLE, "Saga2007"), "MODEL: Saga2007 needs values to start from"),
+        ((MUSCLE, "Saga2007"), "MODEL: Saga2007 needs initial values"),
         ((MUSCLE, "hunt"), "has no force at"),
-        ((MUSCLE, "ContractileSurface", "--min-pressure", "7 bar"), "must lie below max_pressure"),
+        ((MUSCLE, "ContractileSurface", "--min-pressure", "7 bar"), "must be less than max_pressure"),
         (
             (MUSCLE, "ContractileSurface", "--min-contraction", "25.9 %", "--max-pressure", "1 bar"),
             "nothing to c",
         ),
-        ((MUSCLE, "ContractileSurface", "--min-pressure", "7 mm"), "--min-pressure: unit 'mm' cannot become 'Pa'"),
+        (
+            (MUSCLE, "ContractileSurface", "--min-pressure", "7 mm"),
+            "--min-pressure: unit 'mm' cannot be converted to 'Pa'",
+        ),
     ],
 )
 def test_what_cannot_be_converted_is_refused(arguments, message, tmp_path):

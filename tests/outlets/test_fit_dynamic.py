@@ -15,11 +15,11 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.core.tree import leaves
-from airmuscle.identify.dynamic import StartTime, StartValue
+from airmuscle.identify.dynamic import InitialValue, StartTime
 from airmuscle.mechanism import HangingMass
 from airmuscle.recording import Recording, read_csv
 from airmuscle.recording.csv_writer import write_csv
-from airmuscle.scenario.identification import load_study
+from airmuscle.scenario.identification import load_dynamic_fit
 from airmuscle.scenario.scenario import load_scenario
 
 PLANT = """
@@ -148,16 +148,16 @@ def test_a_study_says_what_it_was_told(folder):
               '[[record]]\nfile = "run2.csv"\nfirst = "0.3 s"\nlast = "1 s"\n[record.command]\nfill = [[0, 1]]\n'
               '[record.plant.mechanism]\nmodel = "HangingMass"\nmass = "12 kg"\n'),
     )  # fmt: skip
-    study = load_study(path)
+    study = load_dynamic_fit(path)
     first, second = study.experiments
-    assert study.own == ("circuit.supply.pressure", StartTime(0.05), StartValue("pressure", 2e3))
+    assert study.own == ("circuit.supply.pressure", StartTime(0.05), InitialValue("pressure", 2e3))
     assert (study.seed, study.starts, study.bounds) == (3, 2, {"gas.exponent": (1.01, 1.4)})
     assert study.method.rtol == 1e-7
     assert study.observed == pytest.approx({"pressure": 500.0, "position": 5e-5})
     assert (first.plant.mechanism, second.plant.mechanism) == (HangingMass(10.0), HangingMass(12.0))
     assert (second.recording["time"].min(), second.recording["time"].max()) == pytest.approx((0.3, 1.0), abs=0.011)
-    assert second.start.known["pressure"] == pytest.approx(np.median(second.recording["pressure"][:3]))
-    assert first.start.known["pressure"] == 6e4
+    assert second.initial_conditions.known["pressure"] == pytest.approx(np.median(second.recording["pressure"][:3]))
+    assert first.initial_conditions.known["pressure"] == 6e4
     assert second.command.segments(("fill", "discharge"), 0.0, 1.0).values.tolist() == [[1.0, 0.0]]
 
 
@@ -168,7 +168,7 @@ model = "VirtualWork"
 geometry = { model = "Vessel", enclosed_volume = "100 mL" }
 [plant.muscle]
 geometry = { model = "Vessel", enclosed_volume = "100 mL" }
-wall = { model = "SwellingWall", growth_volume = 1e-4, middle = "150 kPa", breadth = "50 kPa", lag = "0.2 s" }
+wall = { model = "SwellingWall", growth_volume = 1e-4, midpoint_pressure = "150 kPa", pressure_width = "50 kPa", time_constant = "0.2 s" }
 [plant.circuit]
 model = "WithTubes"
 [plant.circuit.circuit]
@@ -196,9 +196,11 @@ file = "run1.csv"
 
 def test_an_unloaded_muscle_behind_a_tube_is_fitted_and_written_too(folder, tmp_path):
     (folder / "fill.toml").write_text(UNLOADED, encoding="utf-8")
-    study = load_study(folder / "fill.toml")
+    study = load_dynamic_fit(folder / "fill.toml")
     (experiment,) = study.experiments
-    assert experiment.start.known["pressure"] == pytest.approx(np.median(experiment.recording["pressure"][:3]))
+    assert experiment.initial_conditions.known["pressure"] == pytest.approx(
+        np.median(experiment.recording["pressure"][:3])
+    )
     result = airmuscle("fit-dynamic", folder / "fill.toml", "--out", tmp_path / "out", "--json")
     assert result.exit_code == 0, result.stderr
     (found,) = json.loads(result.stdout)["parameters"]
@@ -222,30 +224,42 @@ def test_a_command_may_stand_in_a_file_and_is_found_from_the_written_scenario(fo
 
 
 REFUSED = {
-    "no record": ('[[record]]\nfile = "run1.csv"', "[[recor]]", "'recor' is not known here"),
+    "no record": ('[[record]]\nfile = "run1.csv"', "[[recor]]", "unknown key 'recor'"),
     "a file that is not there": ('"run1.csv"', '"run3.csv"', "run3.csv"),
     "an unknown path": ('"gas.exponent", "m', '"gas.exponen", "m', "no parameter 'gas.exponen'"),
     "an unknown path in bounds": ('"gas.exponent" =', '"gas.exponen" =', "Did you mean 'gas.exponent'"),
-    "bounds upside down": ("[1.01, 1.4]", "[1.4, 1.01]", "the least value must lie below the greatest"),
-    "bounds beyond what can be": ("[1.01, 1.4]", "[1.0, 1.4]", "allowed are 1.001 to 1.667"),
-    "one bound": ("[1.01, 1.4]", "1.4", "write the least and the greatest value"),
-    "bounds of another kind": ("[1.01, 1.4]", '["1 m", 1.4]', "unit 'm' cannot become"),
+    "bounds upside down": ("[1.01, 1.4]", "[1.4, 1.01]", "the minimum must be less than the maximum"),
+    "bounds beyond what can be": ("[1.01, 1.4]", "[1.0, 1.4]", "allowed range: 1.001 to 1.667"),
+    "one bound": ("[1.01, 1.4]", "1.4", "it must be a list of minimum and maximum"),
+    "bounds of another kind": ("[1.01, 1.4]", '["1 m", 1.4]', "unit 'm' cannot be converted to"),
     "a start beyond its bounds": ("[1.01, 1.4]", "[1.2, 1.4]", "gas.exponent starts at 1.1; its bounds are 1.2 to 1.4"),
-    "a deviation of zero": ('"500 Pa"', '"0 Pa"', "a sensor's standard deviation is above zero"),
-    "a deviation of another kind": ('"500 Pa"', '"500 mm"', "[observed], pressure: unit 'mm' cannot become 'Pa'"),
-    "a column that is not there": ('"height"', '"heigth"', "no column 'heigth'; there are time, pressure, height"),
+    "a deviation of zero": ('"500 Pa"', '"0 Pa"', "the standard deviation of a sensor must be greater than zero"),
+    "a deviation of another kind": (
+        '"500 Pa"',
+        '"500 mm"',
+        "[observed], pressure: unit 'mm' cannot be converted to 'Pa'",
+    ),
+    "a column that is not there": (
+        '"height"',
+        '"heigth"',
+        "no column 'heigth'; the columns are time, pressure, height",
+    ),
     "no such output": (
         'position = { deviation = "50 um"',
         "heading = { deviation = 5e-5",
         "Plant has no state or output 'heading'",
     ),
     "a margin of zero": ('"50 ms"', '"0 ms"', "start_time is '0 ms'; it must be greater than zero"),
-    "no whole number": ("starts = 2", "starts = 2.5", "starts is 2.5; it must be a whole number, 1 or more"),
+    "no whole number": ("starts = 2", "starts = 2.5", "starts is 2.5; it must be an integer of at least 1"),
     "a command of no input": ("discharge = [[", "exhaust = [[", "no input 'exhaust'"),
-    "no list": ('own = ["circuit.supply.pressure"]', 'own = "circuit.supply.pressure"', "write a list of paths"),
+    "no list": ('own = ["circuit.supply.pressure"]', 'own = "circuit.supply.pressure"', "it must be a list of paths"),
     "nothing observed": ('pressure = "500 Pa"\nposition = { deviation = "50 um", column = "height" }', "", "observed"),
-    "an empty stretch": ('start_time = "0.2 s"', 'start_time = "0.2 s"\nfirst = "9 s"', "no row lies between"),
-    "a key without meaning": ('start_time = "0.2 s"', 'star = "0.2 s"', "'star' is not known here"),
+    "an empty stretch": (
+        'start_time = "0.2 s"',
+        'start_time = "0.2 s"\nfirst = "9 s"',
+        "there is no row between first, 9 s, and last",
+    ),
+    "a key without meaning": ('start_time = "0.2 s"', 'star = "0.2 s"', "unknown key 'star'"),
     "nothing free": (
         f'free = [{VALVES}, "gas.exponent", "muscle.damper.damping"]\nown = ["circuit.supply.pressure"]\n'
         'start_time = "50 ms"\n',
@@ -280,7 +294,7 @@ def test_the_page_on_dynamic_identification_holds_a_study_that_loads(folder):
     page = (Path(__file__).parents[2] / "docs" / "dynamic-identification.md").read_text(encoding="utf-8")
     (text,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
     (folder / "page.toml").write_text(text, encoding="utf-8")
-    study = load_study(folder / "page.toml")
+    study = load_dynamic_fit(folder / "page.toml")
     assert [e.plant.mechanism.mass for e in study.experiments] == [10.0, 12.0]
     assert study.free[0] == ("circuit.fill.conductance", "circuit.discharge.conductance")
 

@@ -16,13 +16,13 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.friction import MaxwellSlip
-from airmuscle.identify.hysteresis import OnPressure, find_holds, find_loops
+from airmuscle.identify.hysteresis import PressurePath, find_holds, find_loops
 from airmuscle.identify.hysteresis.plot import plot_loops
 from airmuscle.library.catalogue import load
 from airmuscle.library.location import Location
 from airmuscle.recording import Recording, read
 from airmuscle.recording.csv_writer import write_csv
-from airmuscle.scenario.scenario import muscle_from
+from airmuscle.scenario.scenario import build_muscle
 
 SLIP = MaxwellSlip((2e4, 1e4, 3e3), (3e-4, 1.2e-3, 5e-3))
 TURNS = (0.02, 0.14, 0.08, 0.12, 0.05, 0.14, 0.02)
@@ -81,19 +81,21 @@ def test_without_a_muscle_the_friction_stands_in_a_table_that_a_plant_takes(two,
     data = json.loads(result.stdout)
     assert data["written"] == str(tmp_path / "friction.toml")
     (found,) = data["loops"]
-    assert found["recommended"] == found["laws"][0]["law"]
-    assert found["laws"][0]["repeat_rmse"] is None, "one run has no second"
+    assert found["recommended"] == found["models"][0]["model"]
+    assert found["models"][0]["repeat_rmse"] is None, "one run has no second"
     table = tomllib.loads((tmp_path / "friction.toml").read_text(encoding="utf-8"))
-    muscle = muscle_from({"library": MUSCLE, **table}, Location("scenario.toml", "plant.muscle", tmp_path))
+    muscle = build_muscle({"library": MUSCLE, **table}, Location("scenario.toml", "plant.muscle", tmp_path))
     assert type(muscle.friction).__name__ == found["recommended"]
 
 
 def test_a_loop_without_friction_writes_none(tmp_path):
     file = loop(tmp_path / "loop.csv", 3, friction=None, turns=TURNS[-3:])
     again = loop(tmp_path / "again.csv", 4, friction=None, turns=TURNS[-3:])
-    result = airmuscle("hysteresis", file, again, *LENGTH, "--muscle", MUSCLE, "--given", "--out", tmp_path / "out")
-    assert "The data justify no friction in this loop." in result.stdout
-    assert "no friction to write" in result.stdout
+    result = airmuscle(
+        "hysteresis", file, again, *LENGTH, "--muscle", MUSCLE, "--use-characteristic", "--out", tmp_path / "out"
+    )
+    assert "The data justify no friction model for this loop." in result.stdout
+    assert "no friction file: no model that a plant can use is justified" in result.stdout
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"report.html", "figures", "data"}
 
 
@@ -105,12 +107,12 @@ def test_friction_on_the_pressure_is_reported_and_not_written(tmp_path):
     write_csv(Recording(columns, "ramp"), tmp_path / "ramp.csv")
     result = airmuscle("hysteresis", tmp_path / "ramp.csv", *LENGTH, "--degree", 1, "--out", tmp_path / "out")
     assert "isometric at 5.00%" in result.stdout
-    assert "does not enter a plant" in result.stdout
+    assert "a plant cannot use it" in result.stdout
     assert not list((tmp_path / "out").glob("*.toml"))
 
 
 def test_figures_of_it_stand_over_the_pressure():
-    axes = plot_loops(SLIP, OnPressure().axis).axes[0]
+    axes = plot_loops(SLIP, PressurePath().axis).axes[0]
     assert axes.get_xlabel() == "gauge pressure [kPa]"
     drawn = np.concatenate([line.get_xdata() for line in axes.lines])
     assert drawn.max() == pytest.approx(2.0 * SLIP.presliding_distance * 1e5, rel=1e-6), "1 mm stands for 100 kPa"
@@ -128,7 +130,7 @@ def test_a_second_run_at_another_level_is_a_loop_of_its_own(two):
     [
         ((0.02, 0.14), LENGTH, "loop.csv: no branch along which the path falls: a loop goes up and down."),
         (TURNS, (), "loop.csv: friction against shortening needs the resting length"),
-        (TURNS, (*LENGTH, "--muscle", "none-such"), "no library entry 'none-such'"),
+        (TURNS, (*LENGTH, "--muscle", "none-such"), "no muscle or law 'none-such'"),
     ],
 )
 def test_what_is_no_loop_is_refused(turns, options, message, tmp_path):
@@ -150,7 +152,7 @@ def test_quick_rows_do_not_count_unless_told_to(tmp_path):
 def test_a_hold_begins_where_the_length_has_arrived(two):
     (recording,) = read(two[0], resting_length=0.3)
     (found,) = find_holds(recording)
-    assert (found.stretch.start, found.stretch.stop, found.quantity) == (899, 940, "force")
+    assert (found.interval.start, found.interval.stop, found.quantity) == (899, 940, "force")
     weight = recording.with_columns(force=np.full(len(recording), 200.0))
     assert {hold.quantity for hold in find_holds(weight)} == {"contraction"}
 
@@ -160,5 +162,5 @@ def test_rows_on_the_way_to_a_hold_are_none_of_it():
     contraction = np.concatenate([np.linspace(0.0897, 0.1, 103, endpoint=False), np.full(40, 0.1)])
     rows = {"time": 0.5 * np.arange(143), "pressure": np.full(143, 3e5), "contraction": contraction}
     force = np.linspace(100.0, 300.0, 143)
-    found = max(find_holds(Recording({**rows, "force": force}, "hold")), key=lambda hold: len(hold.stretch))
-    assert (found.stretch.start, found.stretch.stop) == (103, 143)
+    found = max(find_holds(Recording({**rows, "force": force}, "hold")), key=lambda hold: len(hold.interval))
+    assert (found.interval.start, found.interval.stop) == (103, 143)

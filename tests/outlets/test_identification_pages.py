@@ -17,7 +17,7 @@ from airmuscle.identify.dynamic import Experiment, InitialConditions
 from airmuscle.library.catalogue import load
 from airmuscle.pneumatics.gas import Polytropic
 from airmuscle.recording import Recording, write_csv
-from airmuscle.reproduce.hosovsky_plant import Numbers, hanging
+from airmuscle.reproduce.hosovsky_plant import UnpublishedParameters, hanging_load
 from airmuscle.reproduce.hosovsky_plant import plant as third_paper
 from airmuscle.simulation import simulate
 
@@ -50,7 +50,7 @@ def test_the_code_on_static_identification_runs(tmp_path, monkeypatch, capsys):
 
 
 def test_the_code_on_dynamic_identification_runs(capsys):
-    plant = replace(third_paper(Numbers(), hanging(Numbers())), gas=Polytropic(1.2))
+    plant = replace(third_paper(UnpublishedParameters(), hanging_load(UnpublishedParameters())), gas=Polytropic(1.2))
     command = Schedule({"fill": ((0.1, 1.0), (0.8, 0.0)), "discharge": ((1.0, 1.0),)})
     exact = simulate(plant, command, duration=1.5, output_times=0.01)
     rng = np.random.default_rng(4)

@@ -1,7 +1,7 @@
-"""`airmuscle inspect` shows what was understood of a file before anything is fitted, and changes nothing.
+"""`airmuscle inspect` prints the inspection of recordings and changes nothing.
 
-What it prints is what the library says: columns with the units they were written in, sampling, runs, branches,
-plateaus, glitches, cut-offs. It looks at files that a fit would refuse, and says why.
+The output equals that of the library: columns with their original units, sampling, runs, branches, plateaus, outliers,
+saturation. Files that a fit would reject are inspected, with the reason.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def seen(*arguments: object) -> list[dict]:
 
 
 def bench(path: Path, *, glitch: int | None = 95, swap: bool = False) -> Path:
-    """Twenty steps up and twenty down, the force rounded to 0.5 N and cut off at -5 N, a glitch of one row."""
+    """Twenty steps up and twenty down, the force rounded to 0.5 N and saturated at -5 N, an outlier of one row."""
     random = np.random.default_rng(5)
     levels = [*np.linspace(0, 570, 20), *np.linspace(540, 0, 20)]
     pressure = np.repeat(levels, 10) + random.normal(0, 0.4, ROWS)
@@ -47,7 +47,7 @@ def bench(path: Path, *, glitch: int | None = 95, swap: bool = False) -> Path:
     return path
 
 
-def test_json_holds_what_the_library_says(tmp_path: Path):
+def test_json_contains_the_results_of_the_library(tmp_path: Path):
     path = bench(tmp_path / "run.csv")
     (found,) = seen(path)
     (recording,) = read(path)
@@ -66,7 +66,7 @@ def test_json_holds_what_the_library_says(tmp_path: Path):
     force = next(sensor for sensor in found["sensors"] if sensor["name"] == "force")
     assert (force["resolution"], force["lower_limit"], force["upper_limit"]) == (pytest.approx(0.5), -5.0, None)
     assert found["runs"] == [
-        {"kind": "isometric", "first_row": 1, "last_row": ROWS, "held": "contraction",
+        {"kind": "isometric", "first_row": 1, "last_row": ROWS, "constant": "contraction",
          "value": pytest.approx(0.1), "swept": ["pressure", "force"]}
     ]  # fmt: skip
     assert [(b["branch"], b["first_row"], b["last_row"]) for b in found["branches"]] == [
@@ -74,13 +74,13 @@ def test_json_holds_what_the_library_says(tmp_path: Path):
         ("deflating", 201, ROWS),
     ]
     assert len(found["plateaus"]) == len(expected.plateaus) == 40
-    assert [(o["column"], o["row"]) for o in found["suspected_glitches"]] == [("force", 96)]
+    assert [(o["column"], o["row"]) for o in found["suspected_outliers"]] == [("force", 96)]
     assert found["quasi_static"] == expected.quasi_static
-    assert any("the sensor is cut off there" in finding["text"] for finding in found["findings"])
-    assert any("taken as gauge" in note for note in found["notes"])
+    assert any("sensor saturates at its lower limit" in finding["text"] for finding in found["findings"])
+    assert any("read as gauge" in note for note in found["notes"])
 
 
-def test_the_text_says_it_in_words(tmp_path: Path):
+def test_the_text_output(tmp_path: Path):
     text = airmuscle("inspect", bench(tmp_path / "run.csv")).stdout
     for said in (
         "run.csv: 400 rows",
@@ -89,25 +89,25 @@ def test_the_text_says_it_in_words(tmp_path: Path):
         "runs: isometric at contraction 10 %, rows 1 to 400",
         "branches: inflating, rows 1 to 200; deflating, rows 201 to 400",
         "plateaus: 40 with",
-        "suspected glitches: 1, kept: force in row 96",
+        "suspected outliers: 1, not removed: force in row 96",
         "note: the force stands still at its lowest reading, -5 N",
     ):
         assert said in text
     assert "PROBLEM" not in text
 
 
-def test_a_long_list_is_cut_and_says_by_how_much(tmp_path: Path):
+def test_a_long_list_is_truncated_with_a_count(tmp_path: Path):
     rows = [(p, c, 1e3 * p - 9 * c) for p in range(1, 14) for c in range(0, 24, 2)]
     path = tmp_path / "table.csv"
     path.write_text("\n".join(["p [barg],k [%],F [N]", *(",".join(map(str, row)) for row in rows)]))
     text = airmuscle("inspect", path).stdout
     assert "isobaric at pressure 800 kPa" in text
     assert "... 5 more" in text
-    assert "note: there is no time" in text
+    assert "note: no time column" in text
     assert "sampling:" not in text
 
 
-def test_the_figures_stand_in_the_folder_and_are_the_same_each_time(tmp_path: Path):
+def test_the_figures_are_written_to_the_folder_and_reproducible(tmp_path: Path):
     bench(tmp_path / "a.csv")
     bench(tmp_path / "b.csv", glitch=None)
     for folder in ("one", "two"):
@@ -120,29 +120,29 @@ def test_the_figures_stand_in_the_folder_and_are_the_same_each_time(tmp_path: Pa
     assert (tmp_path / "one" / names[0]).read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_figure_draws_branches_plateaus_glitches_and_the_cut_off(tmp_path: Path):
+def test_the_figure_shows_branches_plateaus_outliers_and_limits(tmp_path: Path):
     (recording,) = read(bench(tmp_path / "run.csv"))
     figure = inspect(recording).plot()
     pressure, force, contraction = figure.axes
     labels = pressure.get_legend_handles_labels()[1]
-    assert labels == ["inflating", "deflating", "plateau", "suspected glitch"]
+    assert labels == ["inflating", "deflating", "plateau", "suspected outlier"]
     assert force.get_ylabel() == "force\n[N]"
     assert contraction.get_ylabel() == "contraction\n[%]"
-    glitches = next(line for line in force.lines if line.get_label() == "suspected glitch")
+    glitches = next(line for line in force.lines if line.get_label() == "suspected outlier")
     assert list(glitches.get_xdata()) == [pytest.approx(0.05 * 95)]
     assert any(list(line.get_ydata()) == [-5.0, -5.0] and line.get_linestyle() == "--" for line in force.lines)
 
 
-def test_a_file_that_a_fit_refuses_is_still_looked_at(tmp_path: Path):
+def test_a_file_that_a_fit_rejects_is_inspected(tmp_path: Path):
     path = bench(tmp_path / "run.csv", swap=True)
     text = airmuscle("inspect", path).stdout
-    assert "PROBLEM: time runs backwards in 1 rows, first in row 22" in text
+    assert "PROBLEM: time decreases in 1 row, first in row 22" in text
     fitted = airmuscle("fit", path, "--characteristic", "ContractileSurface", "--out", tmp_path / "fit")
     assert fitted.exit_code == 1
-    assert "goes back behind" in fitted.stderr
+    assert "is less than the time of the previous row" in fitted.stderr
 
 
-def test_flags_and_mapping_say_what_the_file_does_not(tmp_path: Path):
+def test_options_and_mapping_are_equivalent(tmp_path: Path):
     path = tmp_path / "run.txt"
     np.savetxt(path, np.column_stack([np.arange(9.0), np.linspace(2, 6, 9), np.linspace(290, 250, 9)]), delimiter="\t")
     flags = ("--column", "1=time [s]", "--column", "2=pressure [bara]", "--column", "3=length [mm]")
@@ -161,13 +161,13 @@ def test_flags_and_mapping_say_what_the_file_does_not(tmp_path: Path):
     ("arguments", "code", "expected"),
     [
         (("none.csv",), 1, "cannot be read"),
-        (("run.csv", "--column", "p"), 2, "--column wants NAME=TEXT"),
+        (("run.csv", "--column", "p"), 2, "--column must be NAME=TEXT"),
         (("run.csv", "--column", "x=pressure [bar]"), 1, "the mapping names column 'x', but there are t [s]"),
-        (("run.csv", "--unit", "pressure=mm"), 1, "cannot become 'Pa'"),
+        (("run.csv", "--unit", "pressure=mm"), 1, "cannot be converted to 'Pa'"),
         ((), 2, "Missing argument"),
     ],
 )
-def test_what_cannot_be_read_is_one_line(tmp_path: Path, monkeypatch, arguments, code: int, expected: str):
+def test_an_unreadable_file_is_an_error_on_one_line(tmp_path: Path, monkeypatch, arguments, code: int, expected: str):
     bench(tmp_path / "run.csv")
     monkeypatch.chdir(tmp_path)
     result = airmuscle("inspect", *arguments)

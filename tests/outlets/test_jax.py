@@ -16,7 +16,7 @@ from airmuscle.core import tree
 from airmuscle.friction import MaxwellSlip
 from airmuscle.mechanism import HangingMass
 from airmuscle.mechanism.contact import HuntCrossley
-from airmuscle.muscle import CreepElements, EndStop, LaggingWall, SeriesSpring
+from airmuscle.muscle import CreepElements, EndStop, SeriesSpring, ViscoelasticWall
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Tank, Tube, Valve, WithLeak, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
@@ -34,7 +34,7 @@ def plant_of_everything(gas):
     muscle = replace(
         chosen_muscle(),
         friction=MaxwellSlip((4e4, 2e4), (2e-4, 1e-3)),
-        wall=LaggingWall(2e-11, 0.2),
+        wall=ViscoelasticWall(2e-11, 0.2),
         series=SeriesSpring(2e4),
         stop=EndStop(0.12, HuntCrossley(1e8)),
         creep=CreepElements((500.0,), (2.0,)),

@@ -1,7 +1,7 @@
-"""A report is whole, honest and repeatable.
+"""A report is complete, self-contained and reproducible.
 
-It appears whole or not at all. Its page needs nothing but itself. Every verdict stands there in words, and is
-computed. The same chapters give the same bytes, and what is not finite never becomes NaN in JSON.
+It appears completely or not at all. Its page loads nothing from elsewhere, and formulas are MathML. Every verdict is
+computed and stated in words. The same chapters give the same bytes, and JSON contains neither NaN nor infinity.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ from airmuscle.core import plotting
 from airmuscle.core.errors import FileError, SolveError, UnknownNameError
 from airmuscle.core.reference import Reference
 from airmuscle.report.chapter import AtLeast, AtMost, Chapter, Claim, Equal, Plot, Table
-from airmuscle.report.html import GREATEST_VECTOR
+from airmuscle.report.formatting import format_number, format_published
+from airmuscle.report.formula import to_mathtext, to_plain
+from airmuscle.report.html import MAX_SVG_BYTES, render_cell, render_header
 from airmuscle.report.output_folder import atomic_folder, check_writable
-from airmuscle.report.wording import number, published
 from airmuscle.report.write import as_json, write_report
 from airmuscle.reproduce import run
 
@@ -175,12 +176,12 @@ def test_a_dense_figure_enters_the_page_as_pixels(tmp_path: Path):
     axes.plot(*scatter, ".")
     chapter = Chapter("p", "t", "s", plots=(Plot("dense", "Dense", figure),))
     page = write_report([chapter], tmp_path, date=DATE)
-    assert (tmp_path / "figures" / "dense.svg").stat().st_size > GREATEST_VECTOR
+    assert (tmp_path / "figures" / "dense.svg").stat().st_size > MAX_SVG_BYTES
     assert Links(page.read_text(encoding="utf-8")).loaded[0].startswith("data:image/png;base64,")
 
 
 def test_two_figures_of_one_name_are_refused(tmp_path: Path):
-    with pytest.raises(ValueError, match=r"plots need names that are file names and differ; look at Saga 2007 iso"):
+    with pytest.raises(ValueError, match=r"plots: names must be unique and valid file names; check Saga 2007 iso"):
         write_report([a_chapter(), a_chapter()], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -188,7 +189,7 @@ def test_two_figures_of_one_name_are_refused(tmp_path: Path):
 def test_a_report_without_claims_writes_none(tmp_path: Path):
     write_report([dataclasses.replace(a_chapter(), claims=())], tmp_path, date=DATE)
     assert not (tmp_path / "claims.json").exists()
-    assert "at a glance" not in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Overview of the claims" not in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_other_files_in_the_folder_stay(tmp_path: Path):
@@ -227,7 +228,7 @@ def test_a_folder_that_cannot_be_written_is_named_and_left_alone(tmp_path: Path,
     with pytest.raises(FileError) as caught:
         write_report([a_chapter()], folder)
     assert str(caught.value).startswith(f"{folder}: cannot be written to: ")
-    assert str(caught.value).endswith("Name a folder that you may write to.")
+    assert str(caught.value).endswith("Specify a folder with write permission.")
     assert sorted(tmp_path.rglob("*")) == before
 
 
@@ -254,22 +255,100 @@ def test_asking_whether_a_folder_is_writable_leaves_nothing(tmp_path: Path):
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (1234567.0, "1.23457e+06"),
+        (1234567.0, "1.235e+06"),
+        (2.6167e-9, "2.617e-09"),
+        (101325.0, "101300"),
+        (281.4976, "281.5"),
+        (-0.0, "0"),
+        (-1e-9 * 0, "0"),
+        (250_000, "250000"),
         (3, "3"),
         (np.float64(0.5), "0.5"),
         (None, "–"),
         (math.nan, "–"),
+        (-math.inf, "-∞"),
         ("circle", "circle"),
         (True, "True"),
     ],
 )
-def test_numbers_read_to_six_digits(value: object, text: str):
-    assert number(value) == text
+def test_numbers_have_four_significant_digits(value: object, text: str):
+    assert format_number(value) == text
+
+
+@pytest.mark.parametrize(
+    ("header", "value", "text"),
+    [
+        ("a_ij", "1.6846648427e-01", "0.1685"),
+        ("a_ij", "-7.6323055877e-05", "−7.632 × 10⁻⁵"),
+        ("rms [%]", "0.1118", "0.1118"),
+        ("v", "-1.18 to -0.00", "−1.18 to 0.00"),
+        ("force [N]", 1e-7, "10⁻⁷"),
+        ("p-value", 2.95575e-309, "&lt; 0.001"),
+        ("p-value", 0.04321, "0.043"),
+        ("p-value", math.nan, "–"),
+        ("unit", "kg m^2", "kg m²"),
+        ("unit", "1", ""),
+        ("method", "Rodas4(rtol=1e-06)", "Rodas4(rtol=1e-06)"),
+        ("length", "30 mm <a>", "30\u00a0mm &lt;a&gt;"),
+    ],
+)
+def test_a_cell_of_the_page(header: str, value: object, text: str):
+    assert render_cell(header, value) == text
+
+
+def test_a_header_shows_no_unit_1():
+    assert render_header("contraction [1]") == "contraction"
+    assert render_header("area [mm2]") == "area [mm²]"
+    assert render_header("N/A") == "N/A"
+
+
+def test_a_symbol_of_a_table_is_mathml():
+    assert "<msub><mi>&#x003B5;</mi><mrow><mn>0</mn></mrow></msub>" in render_cell("symbol", "eps_0")
+    assert "<msub><mi>p</mi><mtext>amb</mtext></msub>" in render_cell("symbol", "p_amb")
+    assert render_cell("symbol", "geometry.radius") == "geometry.radius", "a path is no formula"
+
+
+def test_formulas_are_mathml_on_the_page_and_plain_in_the_files(tmp_path: Path):
+    formula = r"\(k = k_\text{max}\,(1 - \text{e}^{v})\)"
+    plot = dataclasses.replace(a_plot("p"), caption=f"Curve {formula}.")
+    table = Table("t", f"Table {formula}", {r"\(k_\text{max}\) [%]": [40.0], "law": [r"\(w = 2\), line A"]})
+    claim = Claim("p", f"claim {formula} <b>", Equal(1.0), 1.0, "1", note=r"with \(k_\text{max}\)")
+    chapter = Chapter("p", "t", f"Summary {formula}.", claims=(claim,), tables=(table,), plots=(plot,))
+    page = write_report([chapter], tmp_path, date=DATE).read_text(encoding="utf-8")
+    assert page.count("<math") == 7
+    assert "\\(" not in page
+    assert 'alt="Curve k = k_max (1 - e^v)."' in page
+    assert "<msup><mtext>e</mtext><mrow><mi>v</mi></mrow></msup>" in page
+    assert "&lt;b&gt;" in page
+    assert not {"script", "link", "img:http"} & set(Links(page).tags)
+    stored = json.loads((tmp_path / "claims.json").read_text(encoding="utf-8"))[0]
+    assert (stored["claim"], stored["note"]) == ("claim k = k_max (1 - e^v) <b>", "with k_max")
+    with (tmp_path / "data" / "t.csv").open(encoding="utf-8", newline="") as file:
+        assert list(csv.reader(file)) == [["k_max [%]", "law"], ["40.0", "w = 2, line A"]]
+
+
+@pytest.mark.parametrize(
+    ("latex", "text"),
+    [
+        (r"-p\,\frac{\text{d}V}{\text{d}L}", "-p dV/dL"),
+        (r"1 - \text{SSE}/\text{SST}", "1 - SSE/SST"),
+        (r"x^{-2}", "x^(-2)"),
+        (r"\frac{a + b}{c}", "(a + b)/c"),
+        (r"\varepsilon_{0i}", "ε_0i"),
+        (r"k < k_\text{max}", "k < k_max"),
+    ],
+)
+def test_the_plain_form_of_a_formula(latex: str, text: str):
+    assert to_plain(rf"\({latex}\)") == text
+
+
+def test_a_formula_in_a_figure_is_mathtext():
+    assert to_mathtext(r"\(w = 2\), line A") == "$w = 2$, line A"
 
 
 def test_a_bound_reads_as_one():
-    assert published(Claim("p", "c", AtMost(2.0, 0.5), 1.0, "1")) == "≤ 2 ± 0.5"
-    assert published(Claim("p", "c", None, 1.0, "1")) == "–"
+    assert format_published(Claim("p", "c", AtMost(2.0, 0.5), 1.0, "1")) == "≤ 2 ± 0.5"
+    assert format_published(Claim("p", "c", None, 1.0, "1")) == "–"
 
 
 # Reproducing
@@ -343,4 +422,4 @@ def test_a_chosen_bound_is_never_given_out_as_published():
     assert claim.verdict == "holds"
     assert claim.as_dict()["published"] is None
     assert claim.as_dict()["tolerance"] == 0.04
-    assert published(claim) == "≤ 0.04 (chosen)"
+    assert format_published(claim) == "≤ 0.04 (chosen)"

@@ -1,4 +1,4 @@
-"""The chapter of a run says what was commanded in a line, however long it was, and draws inputs with their jumps."""
+"""The chapter of a run describes the inputs in one line, whatever their length, and plots them with their steps."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from airmuscle.control.driver import PWM
 from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
 from airmuscle.control.with_drivers import WithDrivers
-from airmuscle.report.run_chapter import MOST_PIECES, in_words, run_chapter
+from airmuscle.report.run_chapter import MAX_DRIVER_SEGMENTS, describe_input, run_chapter
 from airmuscle.scenario.scenario import load_scenario
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
@@ -23,13 +23,13 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
         (Schedule({}), "none"),
         (Schedule({"fill": ((5, 1), (15, 0)), "discharge": ((19, 1),)}), "fill 1 from 5 s, 0 from 15 s; discharge 1 from 19 s"),
         (SampledSignal({"fill": ((0, 0), (2, 0.5))}), "fill 0 at 0 s, 0.5 at 2 s"),
-        (Schedule({"fill": tuple((i, i % 2) for i in range(1000))}), "fill: 1000 values from 0 to 1, 0 to 999 s"),
-        (Periodic(Schedule({"fill": ((1, 1),)}), 2.0), "every 2 s: fill 1 from 1 s"),
-        (WithDrivers(Schedule({"fill": ((1, 0.5),)}), {"fill": PWM(50.0)}), "fill 0.5 from 1 s; driven: fill by PWM(frequency=50.0, smallest_pulse=0.0)"),
+        (Schedule({"fill": tuple((i, i % 2) for i in range(1000))}), "fill: 1000 values between 0 and 1, 0 to 999 s"),
+        (Periodic(Schedule({"fill": ((1, 1),)}), 2.0), "periodic, 2 s: fill 1 from 1 s"),
+        (WithDrivers(Schedule({"fill": ((1, 0.5),)}), {"fill": PWM(50.0)}), "fill 0.5 from 1 s; drivers: fill: PWM(frequency=50.0, smallest_pulse=0.0)"),
     ],
 )  # fmt: skip
-def test_a_command_in_words(command, words: str):
-    assert in_words(command) == words
+def test_an_input_is_described_in_one_sentence(command, words: str):
+    assert describe_input(command) == words
 
 
 def drawn(command, duration: float):
@@ -40,24 +40,24 @@ def drawn(command, duration: float):
 
 def test_a_jump_is_upright():
     plot, lines = drawn(Schedule({"fill": ((0.1, 1), (0.2, 0))}), 0.3)
-    assert plot.caption == "Inputs of the plant."
-    assert lines["what the plant had"].tolist() == [[0, 0], [0.1, 0], [0.1, 1], [0.2, 1], [0.2, 0], [0.3, 0]]
+    assert plot.caption == "Inputs applied to the plant."
+    assert lines["applied input"].tolist() == [[0, 0], [0.1, 0], [0.1, 1], [0.2, 1], [0.2, 0], [0.3, 0]]
 
 
-def test_of_a_long_command_the_beginning_is_drawn_beside_what_the_driver_was_told():
+def test_the_beginning_of_a_long_input_is_plotted_with_the_command_of_its_driver():
     command = WithDrivers(Schedule({"fill": ((0.0, 0.5),)}), {"fill": PWM(1000.0)})
     plot, lines = drawn(command, 0.5)
-    assert plot.caption == "Inputs of the plant; the first 300 pieces; dashed, what the drivers were told."
-    had, told = lines["what the plant had"], lines["command"]
-    assert had[-1, 0] == told[-1, 0] == pytest.approx(MOST_PIECES * 0.5e-3)
-    assert np.array_equal(told[:, 1], [0.5, 0.5])
+    assert plot.caption == "Inputs applied to the plant (first 300 segments); dashed: commands to the drivers."
+    applied, commanded = lines["applied input"], lines["command"]
+    assert applied[-1, 0] == commanded[-1, 0] == pytest.approx(MAX_DRIVER_SEGMENTS * 0.5e-3)
+    assert np.array_equal(commanded[:, 1], [0.5, 0.5])
 
 
 def test_a_run_that_ended_at_once_still_shows_what_was_commanded():
     scenario = load_scenario(EXAMPLE)
     run = scenario.simulate()
     chapter = run_chapter(scenario, run.rows(slice(0, 1)))
-    assert chapter.summary.startswith("A run of 25 s that ended early, at 0 s; the last note says why.")
+    assert chapter.summary.startswith("Simulation of 25 s, ended early at 0 s; the last note gives the reason.")
     assert chapter.plots[-1].figure.axes[0].lines[0].get_xdata()[-1] == 25.0
 
 

@@ -18,9 +18,11 @@ from typer.testing import CliRunner
 from airmuscle.cli.app import app
 from airmuscle.core.declaration import parameters
 from airmuscle.core.errors import AirmuscleError
-from airmuscle.library.catalogue import list_library, load, to_toml
+from airmuscle.library.catalogue import load
+from airmuscle.library.entry_file import build_entry
+from airmuscle.library.files import list_laws
 from airmuscle.library.models import model_class
-from airmuscle.library.read import entry_from
+from airmuscle.library.write import to_toml
 from airmuscle.scenario.scenario import load_scenario
 from airmuscle.scenario.schema import muscle_schema, scenario_schema
 
@@ -113,7 +115,7 @@ def test_every_file_of_the_library_passes(path: Path):
 
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
-@pytest.mark.parametrize("name", list_library())
+@pytest.mark.parametrize("name", list_laws())
 def test_every_entry_passes_in_the_form_that_fit_and_save_write(name: str):
     assert judged(tomllib.loads(to_toml(load(name))), MUSCLE) == []
 
@@ -193,7 +195,7 @@ def test_a_broken_scenario_is_found_by_the_schema_and_refused_by_the_program(
         ('wall_thickness = "1.8 mm"\n', "", ".characteristic: none of"),
         ('quantity = "force"', 'quantity = "stiffness"', ".check[0].quantity: none of"),
         ('equals = "328.0 N"', "", ".check[0]: lacks equals"),
-        ("max_contraction", "max_contractoin", ".validity_range: greatest_contractoin is not known"),
+        ("max_contraction", "max_contractoin", ".validity_range: max_contractoin is not known"),
     ],
 )
 def test_a_broken_muscle_is_found_by_the_schema_and_refused_by_the_program(was: str, becomes: str, fault: str):
@@ -202,7 +204,7 @@ def test_a_broken_muscle_is_found_by_the_schema_and_refused_by_the_program(was: 
     found = judged(tables, MUSCLE)
     assert any(f.startswith(fault) for f in found), found
     with pytest.raises(AirmuscleError):
-        entry_from(tables, "broken", Path("broken.toml"), ROOT)
+        build_entry(tables, "broken", Path("broken.toml"), ROOT)
 
 
 # It is generated
@@ -229,4 +231,4 @@ def test_the_command_prints_or_writes_what_editors_read(tmp_path: Path):
     assert "cannot be written to" in refused.stderr
     nameless = CliRunner().invoke(app, ["schema", "--out", ""])
     assert nameless.exit_code == 2
-    assert "wants the name of a file" in nameless.stderr
+    assert "--out must be a file name" in nameless.stderr

@@ -1,8 +1,9 @@
-"""A study gives the same results to the last bit however it was run.
+"""Parameter studies: the results are bit-identical for every kind of execution.
 
-Killed and resumed, in one process or several, in threads or on a Dask cluster: results.csv, the kept chunks and the
-figures are equal byte by byte. A chunk is computed anew exactly when something that it depends on has changed. A run
-that fails leaves its reason and stops no other. Every study that cannot be is refused in one line that says where.
+Killed and resumed, in one process or several, in threads or on a Dask cluster: results.csv, the chunk files and the
+figures are identical byte by byte. A chunk is computed again if and only if something that it depends on has changed. A
+failed run is recorded with its reason and stops no other run. An invalid study is rejected with one line that names the
+location.
 """
 
 from __future__ import annotations
@@ -26,15 +27,15 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.cli.interruption import check_interrupted, deferred_sigint
-from airmuscle.core.errors import AirmuscleError, FileError, InputError, SimulationError
+from airmuscle.core.errors import AirmuscleError, ColumnError, FileError, InputError, SimulationError
 from airmuscle.report.write import save_table
 from airmuscle.scenario.scenario import load_scenario
 from airmuscle.simulation import simulate
-from airmuscle.study import chunk, dask_cluster, fingerprint, load_study, processes, run_study
+from airmuscle.study import chunk, dask_cluster, fingerprint, load_study, process_pool, run_study
 from airmuscle.study.chapter import study_chapter, write_study
 from airmuscle.study.design import DESIGNS
-from airmuscle.study.distributions import DISTRIBUTIONS, Range
-from airmuscle.study.metrics import OUTCOMES
+from airmuscle.study.distributions import VARIATIONS
+from airmuscle.study.metrics import METRICS
 
 ROOT = Path(__file__).parents[2]
 MUSCLE = """
@@ -70,18 +71,18 @@ start = { pressure = "0.5 bar" }
 STUDY = """
 title = "Two valves"
 scenario = "scenario.toml"
-chunk = 4
+chunk_size = 4
 [vary]
-"circuit.fill.conductance" = { model = "Normal", mean = "3e-9 m3/(s Pa)", deviation = "0.2e-9 m3/(s Pa)" }
+"circuit.fill.conductance" = { model = "Normal", mean = "3e-9 m3/(s Pa)", std = "0.2e-9 m3/(s Pa)" }
 "mechanism.contraction" = { model = "Uniform", low = "2 %", high = "10 %" }
 [design]
 model = "MonteCarlo"
 count = 22
 seed = 3
-[outcome]
+[metrics]
 pressure = { model = "Final", column = "pressure" }
 reached = { model = "TimeToReach", column = "pressure", level = "2 bar", begin = "0.1 s" }
-course = { model = "TimeSeries", column = "force", every = "0.05 s" }
+course = { model = "TimeSeries", column = "force", sample_time = "0.05 s" }
 """
 
 
@@ -100,14 +101,14 @@ def edited(folder: Path, old: str, new: str, file: str = "study.toml") -> Path:
 
 
 def run(folder: Path, out: str = "out", executor=None):
-    """The study's result, and results.csv; figures take longer than all the rest."""
+    """The result of the study; writes results.csv without the report, whose figures take most of the time."""
     result = run_study(load_study(folder / "study.toml"), folder / out, executor)
     save_table(result.table(), folder / out / "results.csv")
     return result
 
 
 def contents(out: Path) -> dict[str, bytes]:
-    """Everything that a study writes, but the page, which carries the date."""
+    """All files of a study except for the page, which contains the date."""
     return {
         p.relative_to(out).as_posix(): p.read_bytes() for p in out.rglob("*") if p.is_file() and p.suffix != ".html"
     }
@@ -134,7 +135,7 @@ runpy.run_module("airmuscle", run_name="__main__", alter_sys=True)
 
 
 def started(folder: Path, chunks: int, *options: str) -> subprocess.Popen:
-    """A study that has kept as many chunks and is still running; Ctrl-C reaches it as it does from a terminal."""
+    """A running study that has saved at least `chunks` chunks; SIGINT reaches it as from a terminal."""
     process = subprocess.Popen(
         [sys.executable, "-c", HEARING, *command(folder, *options)[3:]],
         stdout=subprocess.PIPE,
@@ -150,10 +151,10 @@ def started(folder: Path, chunks: int, *options: str) -> subprocess.Popen:
     return process
 
 
-# The same to the last bit
+# Bit-identical results
 
 
-def test_a_study_that_was_killed_goes_on_and_ends_bit_equal(folder: Path):
+def test_a_killed_study_is_resumed_with_bit_identical_results(folder: Path):
     edited(folder, "count = 22", "count = 400")
     process = started(folder, 3, "--workers", "2")
     os.killpg(process.pid, signal.SIGKILL)
@@ -163,28 +164,71 @@ def test_a_study_that_was_killed_goes_on_and_ends_bit_equal(folder: Path):
     (folder / "out" / "chunks" / ".unfinished-1234").write_bytes(b"half a chunk")
     done = subprocess.run(command(folder), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert {p: p.stat().st_mtime_ns for p in before} == before, "what was kept was computed again"
+    assert f"resuming: {4 * len(before)} of 400 runs are already saved" in done.stderr
+    assert {p: p.stat().st_mtime_ns for p in before} == before, "saved runs were computed again"
     write_study(run(folder, "uninterrupted"), folder / "uninterrupted")
     assert contents(folder / "out") == contents(folder / "uninterrupted")
 
 
+def children_of(pid: int) -> list[int]:
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def is_alive(pid: int) -> bool:
+    """Whether a process exists and is not a zombie that waits for its parent."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def ignores_sigint(pid: int) -> bool:
+    """Whether a worker has been initialised."""
+    (mask,) = re.findall(r"SigIgn:\s*(\w+)", Path(f"/proc/{pid}/status").read_text())
+    return bool(int(mask, 16) & 1 << signal.SIGINT - 1)
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes are observed in /proc")
+def test_workers_exit_within_a_second_when_their_parent_is_killed(folder: Path):
+    edited(folder, "count = 22", "count = 2000")
+    process = started(folder, 3, "--workers", "2")
+    end = time.monotonic() + 60
+    while not (len(children := children_of(process.pid)) >= 3 and all(map(ignores_sigint, children))):
+        assert time.monotonic() < end, "two workers and the resource tracker of multiprocessing are expected"
+        time.sleep(0.01)
+    process.kill()
+    process.wait()
+    end = time.monotonic() + 1.0
+    while any(map(is_alive, children)):
+        assert time.monotonic() < end, "a worker survived its parent"
+        time.sleep(0.01)
+
+
+def test_only_a_resumed_study_is_reported_as_resumed(folder: Path):
+    arguments = ["sweep", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1"]
+    first, second = (CliRunner().invoke(app, arguments) for _ in range(2))
+    assert "resuming" not in first.stderr
+    assert "resuming: 22 of 22 runs are already saved" in second.stderr
+    assert second.stdout == first.stdout
+
+
 @pytest.mark.parametrize("workers", ["1", "2"])
-def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(folder: Path, workers: str):
+def test_ctrl_c_saves_completed_runs_and_says_how_to_resume(folder: Path, workers: str):
     edited(folder, "count = 22", "count = 2000")
     process = started(folder, 3, "--workers", workers)
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "of 2000 runs are kept in" in said
-    assert "the same command goes on from there" in said
+    assert "of 2000 runs are saved in" in said
+    assert "the same command resumes from there" in said
     assert "Traceback" not in said
-    (kept,) = re.findall(r"(\d+) of 2000 runs are kept", said)
+    (kept,) = re.findall(r"(\d+) of 2000 runs are saved", said)
     assert int(kept) == 4 * len(list((folder / "out" / "chunks").glob("*.npz")))
     assert not (folder / "out" / "results.csv").exists()
 
 
-def test_ctrl_c_while_workers_begin_is_no_traceback_of_theirs():
-    with processes(2) as executor:
+def test_ctrl_c_while_workers_start_gives_no_traceback():
+    with process_pool(2) as executor:
         tasks = [executor.submit(os.getpid) for _ in range(2)]
         for _ in range(40):
             for child in multiprocessing.active_children():
@@ -193,7 +237,7 @@ def test_ctrl_c_while_workers_begin_is_no_traceback_of_theirs():
         assert len({task.result() for task in tasks}) in {1, 2}
 
 
-def test_ctrl_c_that_python_loses_is_remembered(monkeypatch):
+def test_a_sigint_that_python_discards_is_not_lost(monkeypatch):
     lost = []
     monkeypatch.setattr(sys, "unraisablehook", lost.append)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -222,6 +266,8 @@ def test_ctrl_c_that_python_loses_is_remembered(monkeypatch):
         check_interrupted()  # forgotten once the block has raised it
         with pytest.raises(KeyboardInterrupt), deferred_sigint():
             interrupted_import()
+        with pytest.raises(KeyboardInterrupt), deferred_sigint(), deferred_sigint():  # blocks may be nested
+            interrupted_import()
         with pytest.raises(ImportError), deferred_sigint():
             raise ImportError
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -247,7 +293,7 @@ def local_dask():
         yield executor
 
 
-@pytest.mark.parametrize("place", [lambda: processes(3), threads, local_dask], ids=["processes", "threads", "dask"])
+@pytest.mark.parametrize("place", [lambda: process_pool(3), threads, local_dask], ids=["processes", "threads", "dask"])
 def test_results_do_not_depend_on_the_executor(folder: Path, place):
     run(folder, "alone")
     with place() as executor:
@@ -257,9 +303,9 @@ def test_results_do_not_depend_on_the_executor(folder: Path, place):
 
 def test_the_result_does_not_depend_on_the_size_of_a_chunk(folder: Path):
     first = run(folder, "first")
-    edited(folder, "chunk = 4", "chunk = 7")
+    edited(folder, "chunk_size = 4", "chunk_size = 7")
     second = run(folder, "second")
-    assert np.array_equal(first.numbers, second.numbers)
+    assert np.array_equal(first.scalars, second.scalars)
     assert np.array_equal(first["course"], second["course"])
 
 
@@ -273,15 +319,15 @@ def test_a_run_is_what_simulate_gives(folder: Path):
     assert scenario.plant.mechanism.contraction == result.study.values[5, 1]
 
 
-def test_where_the_runs_of_a_chunk_begin_is_found_at_once_and_is_what_each_finds_alone(folder: Path):
+def test_initial_states_computed_together_equal_those_computed_individually(folder: Path):
     study = load_study(folder / "study.toml")
-    rests = study.rests(range(22))
-    assert [rest == study.scenario(run).start for run, rest in enumerate(rests)] == [True] * 22
-    assert study.scenario(3, rests[3]).start == rests[3]
-    assert len({rest["air_mass"] for rest in rests}) == 22
+    states = study.initial_states(range(22))
+    assert [state == study.scenario(run).start for run, state in enumerate(states)] == [True] * 22
+    assert study.scenario(3, states[3]).start == states[3]
+    assert len({state["air_mass"] for state in states}) == 22
 
 
-def test_a_number_may_follow_any_that_varies(folder: Path):
+def test_a_parameter_may_follow_any_varied_parameter(folder: Path):
     content = (folder / "study.toml").read_text(encoding="utf-8")
     follow = '[follow]\n"circuit.fill.critical_ratio" = "mechanism.contraction"\n[design]'
     (folder / "study.toml").write_text(content.replace("[design]", follow), encoding="utf-8")
@@ -289,26 +335,26 @@ def test_a_number_may_follow_any_that_varies(folder: Path):
     assert study.scenario(5).plant.circuit.fill.critical_ratio == study.values[5, 1]
 
 
-def test_a_start_that_varies_or_is_no_rest_is_found_run_by_run(folder: Path):
+def test_a_varied_initial_state_is_computed_run_by_run(folder: Path):
     edited(
         folder, '"mechanism.contraction" =', '"run.start.pressure" = { model = "Uniform", low = 0, high = 1e5 }\n"x" ='
     )
     text = (folder / "study.toml").read_text(encoding="utf-8")
     (folder / "study.toml").write_text(re.sub(r'"x" = .*\n', "", text), encoding="utf-8")
     study = load_study(folder / "study.toml")
-    assert study.rests(range(4)) == [None] * 4
+    assert study.initial_states(range(4)) == [None] * 4
     assert len({study.scenario(run).start["air_mass"] for run in range(4)}) == 4
     assert not run(folder).failed.size
 
 
-# What is computed anew
+# Chunks that are computed again
 
 
 def computed_anew(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """The chunks that a further run of the study computes."""
+    """The chunks that another execution of the study computes."""
     found = []
-    original = chunk.computed
-    monkeypatch.setattr(chunk, "computed", lambda study, index: found.append(index) or original(study, index))
+    original = chunk.compute_chunk
+    monkeypatch.setattr(chunk, "compute_chunk", lambda study, index: found.append(index) or original(study, index))
     run(folder)
     monkeypatch.undo()
     return found
@@ -329,28 +375,28 @@ EVERYTHING = list(range(6))
         ('radius = "10 mm"', 'radius = "10.1 mm"', "muscle.toml", EVERYTHING),
     ],
 )
-def test_a_chunk_is_computed_anew_when_what_it_depends_on_changes(folder, monkeypatch, old, new, file, expected):
+def test_a_chunk_is_computed_again_if_something_it_depends_on_changes(folder, monkeypatch, old, new, file, expected):
     run(folder)
     assert computed_anew(folder, monkeypatch) == []
     edited(folder, old, new, file)
     assert computed_anew(folder, monkeypatch) == expected
 
 
-def test_another_program_computes_everything_anew(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_another_program_version_computes_all_chunks_again(folder: Path, monkeypatch: pytest.MonkeyPatch):
     run(folder)
     monkeypatch.setattr(fingerprint.metadata, "version", lambda name: "another")
-    fingerprint.program.cache_clear()
+    fingerprint.program_fingerprint.cache_clear()
     try:
         assert not {p.name for p in (folder / "out" / "chunks").glob("*.npz")} & {
-            chunk.name_of(load_study(folder / "study.toml"), i) for i in EVERYTHING
+            chunk.chunk_file_name(load_study(folder / "study.toml"), i) for i in EVERYTHING
         }
     finally:
-        fingerprint.program.cache_clear()
+        fingerprint.program_fingerprint.cache_clear()
 
 
-def test_a_chunk_that_is_damaged_is_computed_anew(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_damaged_chunk_is_computed_again(folder: Path, monkeypatch: pytest.MonkeyPatch):
     result = run(folder)
-    file = folder / "out" / "chunks" / chunk.name_of(result.study, 2)
+    file = folder / "out" / "chunks" / chunk.chunk_file_name(result.study, 2)
     whole = file.read_bytes()
     for damaged in (whole[:-40], b"", whole[:200] + bytes(8) + whole[208:]):
         file.write_bytes(damaged)
@@ -358,7 +404,7 @@ def test_a_chunk_that_is_damaged_is_computed_anew(folder: Path, monkeypatch: pyt
         assert file.read_bytes() == whole
 
 
-def test_a_chunk_appears_whole_or_not_at_all(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_chunk_is_written_atomically(folder: Path, monkeypatch: pytest.MonkeyPatch):
     study = load_study(folder / "study.toml")
 
     def refusing(*given):
@@ -366,12 +412,12 @@ def test_a_chunk_appears_whole_or_not_at_all(folder: Path, monkeypatch: pytest.M
 
     monkeypatch.setattr(chunk.os, "replace", refusing)
     with pytest.raises(OSError, match="no space left"):
-        chunk.write(chunk.computed(study, 0), folder / "chunk.npz")
+        chunk.write_chunk(chunk.compute_chunk(study, 0), folder / "chunk.npz")
     assert not {p.name for p in folder.iterdir()} - {"muscle.toml", "scenario.toml", "study.toml"}
 
 
-def test_the_way_in_which_a_start_is_given_is_an_input_too(folder: Path):
-    """At rest, or held where it happens to rest: equal for the scenario itself, but not for what varies."""
+def test_the_fingerprint_depends_on_how_the_initial_state_is_specified(folder: Path):
+    """In equilibrium, or at a fixed position of equal value: the same nominal scenario, but not the same varied runs."""
     edited(folder, 'model = "Isometric"\ncontraction = 0.05', 'model = "HangingMass"\nmass = "5 kg"', "scenario.toml")
     edited(
         folder,
@@ -379,74 +425,74 @@ def test_the_way_in_which_a_start_is_given_is_an_input_too(folder: Path):
         '"mechanism.mass" = [4, 6]',
     )
     at_rest = load_study(folder / "study.toml")
-    place = at_rest.source.scenario.start["position"]
+    place = at_rest.template.scenario.start["position"]
     edited(folder, 'pressure = "0.5 bar"', f'pressure = "0.5 bar", position = {place!r}', "scenario.toml")
     held = load_study(folder / "study.toml")
-    assert held.source.scenario.start == pytest.approx(at_rest.source.scenario.start)
+    assert held.template.scenario.start == pytest.approx(at_rest.template.scenario.start)
     assert held.scenario(0).start != pytest.approx(at_rest.scenario(0).start)
     assert held.fingerprint() != at_rest.fingerprint()
 
 
-def test_a_reason_is_the_same_from_wherever_the_study_was_read(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    """A worker knows the study by its whole path, and reasons are results."""
+def test_a_failure_reason_does_not_depend_on_the_path_of_the_study(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    """A worker reads the study by its absolute path, and failure reasons are part of the results."""
     edited(folder, "[design]", '"run.duration" = ["0 s"]\n[design]')
     monkeypatch.chdir(folder)
-    here, elsewhere = (chunk.computed(load_study(path), 0) for path in ("study.toml", folder / "study.toml"))
-    assert list(here.reasons) == list(elsewhere.reasons)
-    assert here.reasons[0].startswith("scenario.toml, [run], duration is 0.0; it must be greater than zero")
+    here, elsewhere = (chunk.compute_chunk(load_study(path), 0) for path in ("study.toml", folder / "study.toml"))
+    assert list(here.failure_reasons) == list(elsewhere.failure_reasons)
+    assert here.failure_reasons[0].startswith("scenario.toml, [run], duration is 0.0; it must be greater than zero")
 
 
-def test_a_worker_leaves_ctrl_c_to_the_process_that_it_works_for():
-    with processes(2) as executor:
+def test_a_worker_ignores_sigint():
+    with process_pool(2) as executor:
         assert executor.submit(signal.getsignal, signal.SIGINT).result() == signal.SIG_IGN
 
 
-def test_a_worker_that_reads_another_study_refuses(folder: Path):
+def test_a_worker_rejects_a_different_study(folder: Path):
     study = load_study(folder / "study.toml")
-    with pytest.raises(FileError, match="a worker reads another study than the one that was started"):
+    with pytest.raises(FileError, match="a worker process has read a different study"):
         chunk.run_chunk(str(study.path), "0" * 64, 0)
 
 
-def test_a_worker_that_dies_is_an_error_that_says_how_to_go_on(folder: Path):
+def test_a_dead_worker_is_an_error_that_says_how_to_resume(folder: Path):
     study = load_study(edited(folder, "count = 22", "count = 2000"))
-    with processes(2) as executor:
+    with process_pool(2) as executor:
 
         def killing(done: int, of: int) -> None:
             if done:
                 for process in executor._processes.values():
                     process.kill()
 
-        with pytest.raises(SimulationError, match="a worker died"):
+        with pytest.raises(SimulationError, match="a worker process died"):
             run_study(study, folder / "out", executor, killing)
     assert 1 <= len(list((folder / "out" / "chunks").glob("*.npz"))) < 500
 
 
-# Runs that fail
+# Failed runs
 
 
-def test_a_run_that_fails_leaves_its_reason_and_stops_no_other(folder: Path):
+def test_a_failed_run_is_recorded_with_its_reason_and_stops_no_other(folder: Path):
     edited(folder, "[design]", '"command.fill[0][1]" = [1, 2]\n[design]')
     result = run(folder)
     opened = result.study.values[:, 2] == 2
     assert 0 < opened.sum() < 22
     assert np.array_equal(result.failed, np.flatnonzero(opened))
-    assert np.isnan(result.numbers[opened]).all()
-    assert np.isfinite(result.numbers[~opened, 0]).all()
+    assert np.isnan(result.scalars[opened]).all()
+    assert np.isfinite(result.scalars[~opened, 0]).all()
     rows = list(csv.DictReader((folder / "out" / "results.csv").open(encoding="utf-8")))
     assert [row["status"] for row in rows] == ["failed" if o else "done" for o in opened]
     assert all("the input 'fill' is 2" in row["reason"] for row, o in zip(rows, opened, strict=True) if o)
     assert all(row["pressure [Pa]"] == "" for row, o in zip(rows, opened, strict=True) if o)
 
 
-def test_a_value_beyond_its_bounds_fails_its_run_alone(folder: Path):
-    edited(folder, 'deviation = "0.2e-9 m3/(s Pa)"', 'deviation = "3e-9 m3/(s Pa)"')
+def test_a_value_outside_its_bounds_fails_only_its_own_run(folder: Path):
+    edited(folder, 'std = "0.2e-9 m3/(s Pa)"', 'std = "3e-9 m3/(s Pa)"')
     result = run(folder)
     assert np.array_equal(result.failed, np.flatnonzero(result.study.values[:, 0] < 0))
     assert result.failed.size
-    assert "allowed are" in result.reasons[result.failed[0]]
+    assert "allowed are" in result.failure_reasons[result.failed[0]]
 
 
-def test_what_nobody_foresaw_fails_its_run_alone(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_an_unexpected_exception_fails_only_its_own_run(folder: Path, monkeypatch: pytest.MonkeyPatch):
     calls = []
 
     def failing(*given, **named):
@@ -455,25 +501,25 @@ def test_what_nobody_foresaw_fails_its_run_alone(folder: Path, monkeypatch: pyte
             raise ZeroDivisionError("by nothing")
         return simulate(*given, **named)
 
-    monkeypatch.setattr("airmuscle.study.runs.simulate", failing)
+    monkeypatch.setattr("airmuscle.study.scenario_runs.simulate", failing)
     result = run(folder)
-    assert [r for r in result.reasons if r] == ["ZeroDivisionError: by nothing"]
+    assert [r for r in result.failure_reasons if r] == ["ZeroDivisionError: by nothing"]
 
 
-def test_a_study_of_failures_alone_says_so(folder: Path):
+def test_a_study_in_which_all_runs_fail_is_an_error(folder: Path):
     edited(folder, "[design]", '"command.fill[0][1]" = [2]\n[design]')
     done = CliRunner().invoke(
         app, ["sweep", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1"]
     )
     assert done.exit_code == 1
-    assert "all 22 runs failed; the first because: " in done.stderr
+    assert "all 22 runs failed; reason of the first: " in done.stderr
     assert (folder / "out" / "results.csv").exists()
 
 
-# What varies
+# Varied parameters
 
 
-def test_numbers_of_command_and_run_vary_too(folder: Path):
+def test_parameters_of_command_and_run_may_vary(folder: Path):
     edited(
         folder,
         "[design]",
@@ -489,14 +535,14 @@ def test_numbers_of_command_and_run_vary_too(folder: Path):
     assert scenario.duration == duration == 0.5
 
 
-def test_a_number_follows_another(folder: Path):
+def test_a_parameter_follows_another(folder: Path):
     edited(folder, "[design]", '[follow]\n"circuit.discharge.conductance" = "circuit.fill.conductance"\n[design]')
     circuit = load_study(folder / "study.toml").scenario(7).plant.circuit
     assert circuit.discharge.conductance == circuit.fill.conductance != 3e-9
 
 
-def test_a_scenario_may_stand_in_the_study(folder: Path):
-    beside = run(folder, "beside")
+def test_the_scenario_may_be_part_of_the_study_file(folder: Path):
+    separate = run(folder, "separate")
     inside = (
         SCENARIO.replace("[plant", "[scenario.plant")
         .replace("[command", "[scenario.command")
@@ -504,7 +550,7 @@ def test_a_scenario_may_stand_in_the_study(folder: Path):
     )
     edited(folder, 'scenario = "scenario.toml"\n', "")
     edited(folder, "[vary]", f"{inside}\n[vary]")
-    assert np.array_equal(run(folder, "inside").numbers, beside.numbers)
+    assert np.array_equal(run(folder, "inside").scalars, separate.scalars)
 
 
 def test_the_example_runs(tmp_path: Path):
@@ -512,30 +558,30 @@ def test_the_example_runs(tmp_path: Path):
         shutil.copy(ROOT / "examples" / name, tmp_path)
     study = load_study(tmp_path / "valve_study.toml")
     assert len(study) == 384
-    assert study.source.scenario.plant == load_scenario(ROOT / "examples" / "fill_discharge.toml").plant
+    assert study.template.scenario.plant == load_scenario(ROOT / "examples" / "fill_discharge.toml").plant
     (tmp_path / "valve_study.toml").rename(tmp_path / "study.toml")
     edited(tmp_path, "count = 64", "count = 2")
     result = run(tmp_path)
     assert result.failed.size == 0
-    assert np.isfinite(result.numbers).all()
+    assert np.isfinite(result.scalars).all()
 
 
-def test_the_study_of_the_page_can_be_read(tmp_path: Path):
+def test_the_study_in_the_documentation_is_valid(tmp_path: Path):
     page = (ROOT / "docs" / "sweep.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
     shutil.copy(ROOT / "examples" / "fill_discharge.toml", tmp_path)
     (tmp_path / "study.toml").write_text(blocks[0], encoding="utf-8")
     study = load_study(tmp_path / "study.toml")
     shown = set(re.findall(r"`(\w+)`", page))
-    kinds = {cls.__name__ for cls in (*DESIGNS, *DISTRIBUTIONS, *OUTCOMES, Range)}
+    kinds = {*DESIGNS, *VARIATIONS, *METRICS}
     assert kinds <= shown, f"the page lacks {kinds - shown}"
     assert len(study) == 256
 
 
-# Outputs
+# Output files
 
 
-def test_the_table_has_one_row_a_run_with_units(folder: Path):
+def test_the_table_has_one_row_per_run_with_units(folder: Path):
     result = run(folder)
     rows = list(csv.DictReader((folder / "out" / "results.csv").open(encoding="utf-8")))
     assert list(rows[0]) == [
@@ -544,9 +590,17 @@ def test_the_table_has_one_row_a_run_with_units(folder: Path):
     ]  # fmt: skip
     assert [float(row["pressure [Pa]"]) for row in rows] == result["pressure"].tolist()
     write_study(result, folder / "out")
-    kept = np.load(folder / "out" / "courses.npz")
+    kept = np.load(folder / "out" / "time_series.npz")
     assert np.array_equal(kept["course"], result["course"])
     assert kept["course_time"] == pytest.approx(np.arange(11) * 0.05)
+
+
+def test_an_unknown_metric_is_an_error_with_the_nearest_name(folder: Path):
+    result = run(folder)
+    with pytest.raises(
+        ColumnError, match=r"no metric 'presure'; the metrics are pressure, reached, course.* 'pressure'"
+    ):
+        result["presure"]
 
 
 def test_the_report_shows_design_statistics_and_figures(folder: Path):
@@ -555,13 +609,13 @@ def test_the_report_shows_design_statistics_and_figures(folder: Path):
     chapter = study_chapter(result)
     assert [t.name for t in chapter.tables] == ["varied", "statistics", "sensitivities"]
     assert [p.name for p in chapter.plots] == [
-        "histograms", "scatter-pressure", "scatter-reached", "sensitivities", "course-course",
+        "histograms", "scatter-pressure", "scatter-reached", "sensitivities", "time-series-course",
     ]  # fmt: skip
     statistics = result.statistics().columns
     assert statistics["mean"][0] == pytest.approx(result["pressure"].mean())
     assert statistics["median"][1] == pytest.approx(np.median(result["reached"]))
-    own = load_study(folder / "study.toml").source.scenario.simulate()["pressure"][-1]
-    assert statistics["as it stands"][0] == pytest.approx(own, rel=1e-9)
+    own = load_study(folder / "study.toml").template.scenario.simulate()["pressure"][-1]
+    assert statistics["nominal"][0] == pytest.approx(own, rel=1e-9)
     write_study(result, folder / "out")
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
     assert "Saltelli(count=8, seed=3)" in page
@@ -575,84 +629,84 @@ def test_the_command_names_its_report_last(folder: Path):
     assert "Two valves: 22 runs, MonteCarlo(count=22, seed=3)" in done.stdout
 
 
-# Studies that cannot be
+# Invalid studies
 
 BAD = [
-    ("circuit.fill.conductance", "circuit.fil.conductance", "no number 'circuit.fil.conductance'. Did you mean 'circuit.fill.conductance'?"),
-    ("mechanism.contraction", "run.stop", "the scenario has no number 'run.stop'"),
+    ("circuit.fill.conductance", "circuit.fil.conductance", "no parameter 'circuit.fil.conductance'. Did you mean 'circuit.fill.conductance'?"),
+    ("mechanism.contraction", "run.stop", "the scenario has no parameter 'run.stop'"),
     ('low = "2 %"', "low = nan", "it must be finite"),
     ('low = "2 %"', "low = -inf", "it must be finite"),
-    ('low = "2 %"', 'low = "2 mm"', "cannot become a ratio"),
-    ('low = "2 %"', 'low = "20 %"', "low must be the smaller one"),
+    ('low = "2 %"', 'low = "2 mm"', "cannot be converted to a ratio"),
+    ('low = "2 %"', 'low = "20 %"', "low is 0.2 and high is 0.1; low must be less than high"),
     ('low = "2 %"', 'low = "-95 %"', "allowed are"),
-    ('low = "2 %", ', "", "Uniform needs 'low' (least value)"),
-    ('low = "2 %"', 'lo = "2 %"', "'lo' is not known here; there are low, high. Did you mean 'low'?"),
+    ('low = "2 %", ', "", "Uniform needs 'low' (lower bound)"),
+    ('low = "2 %"', 'lo = "2 %"', "Uniform has no parameter 'lo'; its parameters are low, high. Did you mean 'low'?"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[]", "the list is empty"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[0.02, nan]", "it must be finite"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', "0.02", "write a list of values, or a distribution"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[0.02, 0.99]", "goes to 0.99; allowed are"),
+    ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[0.02, 0.99]", "includes 0.99; allowed are"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Range", low = 0.0, high = 0.1, count = 0 }', "2 to 1000000 values"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Truncated", inner = { model = "Normal", mean = 0.05, deviation = 0.001 }, low = 0.1, high = 0.2 }', "at least 1e-06 must"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Truncated", inner = { model = "Truncated" }, low = 0.1, high = 0.2 }', "no model 'Truncated' here"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Triangular", low = 0.0, mode = 0.3, high = 0.2 }', "mode 0.3 must lie within 0 to 0.2"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "LogNormal", median = 0.0, log_deviation = 0.1 }', "it must be greater than zero"),
-    ('model = "Uniform"', 'model = "Unifrom"', "no model 'Unifrom' here; there are Range, Uniform, Normal, LogNormal, Triangular, Truncated. Did you mean 'Uniform'?"),
-    ('deviation = "0.2e-9 m3/(s Pa)"', "deviation = 0", "it must be greater than zero"),
-    ('deviation = "0.2e-9 m3/(s Pa)"', 'deviation = "1 kg"', "cannot become 'm3/(s Pa)'"),
-    ("count = 22", "count = 0", "at least one point is needed"),
-    ("count = 22", "count = -1", "must be a whole number"),
-    ("count = 22", "count = 2.5", "must be a whole number"),
-    ("count = 22", "count = true", "must be a whole number"),
-    ("count = 22", "count = 100_000_000", "a study has 10000000 at most"),
+    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Truncated", inner = { model = "Normal", mean = 0.05, std = 0.001 }, low = 0.1, high = 0.2 }', "it must be at least 1e-06"),
+    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Truncated", inner = { model = "Truncated" }, low = 0.1, high = 0.2 }', "no model 'Truncated'; there are Uniform, Normal, LogNormal, Triangular."),
+    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Triangular", low = 0.0, mode = 0.3, high = 0.2 }', "mode is 0.3; it must lie between low, 0, and high, 0.2"),
+    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "LogNormal", median = 0.0, log_std = 0.1 }', "median is 0; it must be positive"),
+    ('model = "Uniform"', 'model = "Unifrom"', "no model 'Unifrom'; there are Range, Uniform, Normal, LogNormal, Triangular, Truncated. Did you mean 'Uniform'?"),
+    ('std = "0.2e-9 m3/(s Pa)"', "std = 0", "std is 0; it must be positive"),
+    ('std = "0.2e-9 m3/(s Pa)"', 'std = "1 kg"', "cannot be converted to 'm3/(s Pa)'"),
+    ("count = 22", "count = 0", "count is 0; it must be at least 1"),
+    ("count = 22", "count = -1", "must be a non-negative integer"),
+    ("count = 22", "count = 2.5", "must be a non-negative integer"),
+    ("count = 22", "count = true", "must be a non-negative integer"),
+    ("count = 22", "count = 100_000_000", "the maximum is 10000000"),
     ("count = 22\n", "", "MonteCarlo needs 'count'"),
-    ("seed = 3", "seed = -3", "must be a whole number"),
-    ('model = "MonteCarlo"', 'model = "Sobol"', "count is 22; Sobol points keep their balance for powers of two only. Take 16 or 32."),
-    ('model = "MonteCarlo"', 'model = "Saltelli"', "Take 16 or 32."),
+    ("seed = 3", "seed = -3", "must be a non-negative integer"),
+    ('model = "MonteCarlo"', 'model = "Sobol"', "count is 22; Sobol points are balanced only if their number is a power of two. Use 16 or 32."),
+    ('model = "MonteCarlo"', 'model = "Saltelli"', "Use 16 or 32."),
     ('model = "MonteCarlo"\ncount = 22\nseed = 3', 'model = "Grid"', "has no levels; give a list or a Range"),
-    ('model = "MonteCarlo"', 'model = "Random"', "no model 'Random' here"),
-    ('[design]\nmodel = "MonteCarlo"\ncount = 22\nseed = 3', "", "[design] is None; write a table with a model"),
-    ('"2 bar"', '"2 mm"', "cannot become 'Pa'"),
+    ('model = "MonteCarlo"', 'model = "Random"', "no model 'Random'; there are Grid, LatinHypercube"),
+    ('[design]\nmodel = "MonteCarlo"\ncount = 22\nseed = 3', "", "[design] is missing"),
+    ('"2 bar"', '"2 mm"', "cannot be converted to 'Pa'"),
     ('"2 bar"', "inf", "it must be finite"),
     ('model = "Final", column = "pressure"', 'model = "Final", column = "presure"', "a run has no column 'presure'"),
-    ('model = "Final", column = "pressure"', 'model = "Last", column = "pressure"', "no model 'Last' here"),
+    ('model = "Final", column = "pressure"', 'model = "Last", column = "pressure"', "no model 'Last'; there are Final, Maximum"),
     ('begin = "0.1 s"', 'begin = "0.1 s", end = "0.1 s"', "its end must be later than its begin"),
-    ('begin = "0.1 s"', 'begin = "-9 s", end = "-8 s"', "from -9 to -8 s there is nothing of a run from 0 to"),
-    ('begin = "0.1 s"', 'begin = "9 s"', "there is nothing of a run"),
-    ('every = "0.05 s"', 'every = "0 s"', "it must be positive and finite"),
-    ('every = "0.05 s"', 'every = "1 ns"', "2 to 1000000 instants"),
-    ('every = "0.05 s"', 'every = "0.05 s", begin = "9 s"', "there is nothing of a run"),
-    ("chunk = 4", "chunk = 0", "at least one run is written at a time"),
+    ('begin = "0.1 s"', 'begin = "-9 s", end = "-8 s"', "the window -9 to -8 s does not overlap the run, 0 to"),
+    ('begin = "0.1 s"', 'begin = "9 s"', "does not overlap the run"),
+    ('sample_time = "0.05 s"', 'sample_time = "0 s"', "it must be positive and finite"),
+    ('sample_time = "0.05 s"', 'sample_time = "1 ns"', "2 to 1000000 samples"),
+    ('sample_time = "0.05 s"', 'sample_time = "0.05 s", begin = "9 s"', "does not overlap the run"),
+    ("chunk_size = 4", "chunk_size = 0", "chunk_size is 0; it must be at least 1"),
     ('scenario = "scenario.toml"', 'scenario = "senario.toml"', "there is no such file"),
     ('scenario = "scenario.toml"', "scenario = 5", "name a file"),
     ('scenario = "scenario.toml"', "", "scenario is None; name a file"),
-    ("title", "titel", "'titel' is not known here"),
+    ("title", "titel", "unknown key 'titel'"),
     ("[design]", '[follow]\n"circuit.discharge.conductance" = "mechanism.contraction"\n[design]', "cannot follow"),
     ("[design]", '[follow]\n"circuit.discharge.conductance" = "mechanism.contract"\n[design]', "is not under [vary]. Did you mean 'mechanism.contraction'?"),
-    ("[design]", '[follow]\n"mechanism.contraction" = "mechanism.contraction"\n[design]', "varies by itself"),
+    ("[design]", '[follow]\n"mechanism.contraction" = "mechanism.contraction"\n[design]', "is also under [vary]"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("old", "new", "message"), BAD)
-def test_a_study_that_cannot_be_is_refused(folder: Path, old: str, new: str, message: str):
+def test_an_invalid_study_is_rejected(folder: Path, old: str, new: str, message: str):
     with pytest.raises(AirmuscleError) as refused:
         load_study(edited(folder, old, new))
     assert message in str(refused.value)
     assert "toml" in str(refused.value)
 
 
-@pytest.mark.parametrize("table", ["vary", "outcome"])
-def test_an_empty_or_missing_table_is_refused(folder: Path, table: str):
+@pytest.mark.parametrize("table", ["vary", "metrics"])
+def test_an_empty_or_missing_table_is_rejected(folder: Path, table: str):
     whole = (folder / "study.toml").read_text(encoding="utf-8")
     start = whole.index(f"[{table}]")
     end = whole.find("[design]") if table == "vary" else len(whole)
     for instead in ("", f"[{table}]\n"):
         (folder / "study.toml").write_text(whole[:start] + instead + whole[end:], encoding="utf-8")
-        with pytest.raises(InputError, match=rf"the table \[{table}\] is (missing|empty)"):
+        with pytest.raises(InputError, match=rf"\[{table}\] is (missing|empty)"):
             load_study(folder / "study.toml")
 
 
-def test_places_that_cannot_be_are_refused(folder: Path):
-    with pytest.raises(InputError, match="at least one is needed"), processes(0):
+def test_invalid_executors_and_folders_are_rejected(folder: Path):
+    with pytest.raises(InputError, match="workers is 0; it must be at least 1"), process_pool(0):
         pass
     (folder / "file").write_text("", encoding="utf-8")
     with pytest.raises(FileError, match="cannot be written to"):
@@ -663,11 +717,14 @@ def test_places_that_cannot_be_are_refused(folder: Path):
     assert "--workers and --dask exclude each other" in both.stderr
 
 
-def test_a_cluster_that_does_not_answer_is_refused(monkeypatch: pytest.MonkeyPatch):
+def test_a_cluster_that_does_not_respond_is_rejected(monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("airmuscle.study.executors.ANSWER_WITHIN", 0.5)
+    monkeypatch.setattr("airmuscle.study.executors.CONNECT_TIMEOUT", 0.5)
     for address in ("tcp://127.0.0.1:1", "nonsense://here"):
-        with pytest.raises(InputError, match=f"no Dask scheduler answers at '{address}'"), dask_cluster(address):
+        with (
+            pytest.raises(InputError, match=f"no response from a Dask scheduler at '{address}'"),
+            dask_cluster(address),
+        ):
             pass
 
 

@@ -1,8 +1,8 @@
-"""Designs and distributions keep what their names promise.
+"""Designs of experiments and distributions have their defining properties.
 
-A distribution turns shares into values: rising, within its ends, half of all below the median. A grid holds every
-combination once; a Latin hypercube every part of every range once; a greater Monte Carlo or Sobol study begins with the
-points of the smaller one; Saltelli's runs exchange one variable at a time. The same seed gives the same points.
+The quantiles of a distribution are monotonic and within its support. A grid contains each combination once, a Latin
+hypercube each equiprobable interval once; a larger Monte Carlo or Sobol design begins with the points of the smaller one;
+Saltelli's design exchanges one parameter at a time. Equal seeds give equal points.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from airmuscle.study.distributions import (
     Truncated,
     Uniform,
     Variation,
-    variation_from,
+    read_variation,
 )
-from airmuscle.study.parse import difference
+from airmuscle.study.fields import read_difference
 
 numbers = st.floats(-1e6, 1e6)
 widths = st.floats(1e-3, 1e6)
@@ -47,15 +47,15 @@ def distributions(draw) -> Variation:
             ]
         )
     )
-    middle = inner.at(np.array([0.2, 0.9]))
+    middle = inner.ppf(np.array([0.2, 0.9]))
     return Truncated(inner, *middle.tolist()) if draw(st.booleans()) else inner
 
 
 @settings(deadline=None)
 @given(distributions(), st.lists(st.floats(1e-9, 1 - 1e-9), min_size=2, max_size=20))
-def test_values_rise_with_the_shares_and_stay_within_the_ends(variation, shares):
-    values = variation.at(np.sort(shares))
-    low, high = variation.ends
+def test_quantiles_are_monotonic_and_within_the_support(variation, probabilities):
+    values = variation.ppf(np.sort(probabilities))
+    low, high = variation.support
     assert (np.diff(values) >= 0).all()
     assert (values >= low - 1e-9 * abs(low)).all()
     assert (values <= high + 1e-9 * abs(high)).all()
@@ -65,9 +65,9 @@ def test_values_rise_with_the_shares_and_stay_within_the_ends(variation, shares)
 @given(distributions())
 def test_a_truncated_distribution_keeps_the_shape_of_its_middle(variation):
     if isinstance(variation, Truncated):
-        law = variation.inner.law()
-        share = law.cdf(variation.at(np.array([0.25, 0.5, 0.75])))
-        assert (share - 0.2) / 0.7 == pytest.approx([0.25, 0.5, 0.75], abs=1e-6)
+        inner = variation.inner.scipy_distribution()
+        probability = inner.cdf(variation.ppf(np.array([0.25, 0.5, 0.75])))
+        assert (probability - 0.2) / 0.7 == pytest.approx([0.25, 0.5, 0.75], abs=1e-6)
 
 
 EVEN = (np.arange(100_000) + 0.5) / 100_000
@@ -84,27 +84,27 @@ EVEN = (np.arange(100_000) + 0.5) / 100_000
         (LevelSet((1.0, 2.0, 6.0)), 3.0, np.sqrt(14 / 3)),
     ],
 )
-def test_mean_and_deviation_are_those_of_the_text_books(variation, mean, deviation):
-    values = variation.at(EVEN)
+def test_mean_and_standard_deviation_are_those_of_the_textbooks(variation, mean, deviation):
+    values = variation.ppf(EVEN)
     assert values.mean() == pytest.approx(mean, abs=2e-4)
     assert values.std() == pytest.approx(deviation, rel=2e-3)
 
 
-def test_a_file_gives_values_in_units_and_deviations_as_differences():
+def test_values_have_units_and_standard_deviations_are_differences():
     place = Location("study.toml", "", None)
-    found = variation_from({"model": "Normal", "mean": "6.5 bara", "deviation": "0.1 bara"}, "Pa", place)
+    found = read_variation({"model": "Normal", "mean": "6.5 bara", "std": "0.1 bara"}, "Pa", place)
     assert found.mean == pytest.approx(548675.0)
-    assert found.deviation == pytest.approx(1e4)
-    assert difference("5 degC", "K", "here") == pytest.approx(5.0)
-    assert variation_from(["1 mm", 2e-3], "m", place) == LevelSet((0.001, 0.002))
-    assert variation_from({"model": "Range", "low": "0 kg", "high": "1 kg", "count": 5}, "kg", place).values == (
+    assert found.std == pytest.approx(1e4)
+    assert read_difference("5 degC", "K", "here") == pytest.approx(5.0)
+    assert read_variation(["1 mm", 2e-3], "m", place) == LevelSet((0.001, 0.002))
+    assert read_variation({"model": "Range", "low": "0 kg", "high": "1 kg", "count": 5}, "kg", place).values == (
         0.0, 0.25, 0.5, 0.75, 1.0,
     )  # fmt: skip
 
 
 @settings(deadline=None)
 @given(st.lists(st.integers(1, 5), min_size=1, max_size=4), st.floats(0.1, 10))
-def test_a_grid_holds_every_combination_once_the_last_fastest(sizes, step):
+def test_a_grid_contains_each_combination_once_the_last_fastest(sizes, step):
     lists = [[step * (i + 7 * k) for i in range(size)] for k, size in enumerate(sizes)]
     values = Grid().values([LevelSet(tuple(each)) for each in lists])
     assert [tuple(row) for row in values] == list(itertools.product(*lists))
@@ -112,20 +112,20 @@ def test_a_grid_holds_every_combination_once_the_last_fastest(sizes, step):
 
 @settings(deadline=None)
 @given(st.integers(1, 40), st.integers(1, 5), st.integers(0, 1000))
-def test_a_latin_hypercube_has_every_part_of_every_range_once(count, variables, seed):
+def test_a_latin_hypercube_contains_each_interval_once(count, variables, seed):
     values = LatinHypercube(count, seed).values([Uniform(0.0, 1.0)] * variables)
     parts = np.sort(np.floor(values * count), axis=0)
     assert (parts == np.arange(count)[:, None]).all()
 
 
 @pytest.mark.parametrize("design", [MonteCarlo, Sobol])
-def test_a_greater_study_begins_with_the_points_of_the_smaller_one(design):
+def test_a_larger_design_begins_with_the_points_of_the_smaller_one(design):
     variations = [Normal(0.0, 1.0), Uniform(0.0, 1.0), LevelSet((1.0, 2.0))]
     assert np.array_equal(design(64, 5).values(variations)[:16], design(16, 5).values(variations))
 
 
 @pytest.mark.parametrize("design", [MonteCarlo, Sobol, LatinHypercube, Saltelli])
-def test_the_seed_decides(design):
+def test_equal_seeds_give_equal_points(design):
     variations = [Uniform(0.0, 1.0)] * 2
     assert np.array_equal(design(8, 5).values(variations), design(8, 5).values(variations))
     assert not np.array_equal(design(8, 5).values(variations), design(8, 6).values(variations))
@@ -141,7 +141,7 @@ def test_saltelli_exchanges_one_variable_at_a_time():
     variations = [Uniform(0.0, 1.0)] * 3
     design = Saltelli(8, 2)
     table = design.values(variations).reshape(8, 5, 3)
-    assert design.runs(variations) == 40
+    assert design.run_count(variations) == 40
     for a, *mixed, b in table:
         for i, row in enumerate(mixed):
             assert row[i] == b[i]
@@ -157,17 +157,17 @@ def test_no_value_of_a_normal_distribution_is_infinite():
     ("make", "message"),
     [
         (lambda: LevelSet(()), "the list is empty"),
-        (lambda: LevelSet((1.0, float("nan"))), "every number must be finite"),
-        (lambda: Normal(float("inf"), 1.0), "every number must be finite"),
-        (lambda: Normal(0.0, -1.0), "deviation is -1; it must be greater than zero"),
-        (lambda: Uniform(1.0, 1.0), "low must be the smaller one"),
-        (lambda: Truncated(LevelSet((1.0,)), 0.0, 1.0), "is no distribution that can be cut"),
+        (lambda: LevelSet((1.0, float("nan"))), "all values must be finite"),
+        (lambda: Normal(float("inf"), 1.0), "all values must be finite"),
+        (lambda: Normal(0.0, -1.0), "std is -1; it must be positive"),
+        (lambda: Uniform(1.0, 1.0), "low is 1 and high is 1; low must be less than high"),
+        (lambda: Truncated(LevelSet((1.0,)), 0.0, 1.0), "is not a continuous distribution"),
         (lambda: Range(0.0, 0.0, 3), "two different ends"),
-        (lambda: MonteCarlo(0), "at least one point is needed"),
-        (lambda: Sobol(100), "Take 64 or 128"),
-        (lambda: Grid().values([LevelSet(tuple(range(2, 5000)))] * 3), "a study has 10000000 at most"),
+        (lambda: MonteCarlo(0), "count is 0; it must be at least 1"),
+        (lambda: Sobol(100), "Use 64 or 128"),
+        (lambda: Grid().values([LevelSet(tuple(range(2, 5000)))] * 3), "the maximum is 10000000"),
     ],
 )
-def test_what_cannot_be_is_refused(make, message):
+def test_an_invalid_design_or_distribution_is_rejected(make, message):
     with pytest.raises(ParameterError, match=message):
         make()

@@ -1,4 +1,4 @@
-"""What is written is read back to the last digit, and a file appears whole or not at all."""
+"""Writer of recordings: reading a written file gives bit-identical numbers, and writing is atomic."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def run(rows: int = 50) -> Recording:
     )
 
 
-def test_what_is_written_is_read_back_to_the_last_digit(tmp_path: Path):
+def test_a_written_recording_is_read_back_bit_identical(tmp_path: Path):
     written = run()
     back = read_csv(write_csv(written, tmp_path / "run.csv"))
     assert list(back) == list(written)
@@ -46,7 +46,7 @@ def test_what_is_written_is_read_back_to_the_last_digit(tmp_path: Path):
     force=st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=5),
     rest=st.floats(1e-3, 20.0),
 )
-def test_any_number_survives(tmp_path_factory, force: list[float], rest: float):
+def test_any_number_is_read_back_bit_identical(tmp_path_factory, force: list[float], rest: float):
     path = tmp_path_factory.getbasetemp() / "any.csv"
     recording = Recording({"force": np.array(force)}, "any", {"resting_length": rest})
     back = read_csv(write_csv(recording, path))
@@ -77,11 +77,11 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path, place: str):
         write_csv(run(), tmp_path / place)
     assert str(tmp_path / place) in str(caught.value)
     assert "cannot be written" in str(caught.value)
-    assert "Choose a folder" in str(caught.value)
+    assert "Choose an existing folder" in str(caught.value)
     assert [path.name for path in tmp_path.iterdir()] == ["a file"]
 
 
-def test_a_write_that_fails_half_way_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_failed_write_leaves_the_existing_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     path = write_csv(run(3), tmp_path / "run.csv")
     before = path.read_bytes()
 
@@ -95,7 +95,7 @@ def test_a_write_that_fails_half_way_leaves_the_old_file(tmp_path: Path, monkeyp
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_recording_draws_its_columns_with_units():
+def test_the_plot_of_a_recording_has_units():
     figure = run().plot("left.pressure", "contraction")
     assert [axis.get_ylabel() for axis in figure.axes] == ["left.pressure\n[kPa]", "contraction\n[%]"]
     assert figure.axes[-1].get_xlabel() == "time [s]"

@@ -73,10 +73,10 @@ CASES = {
     "endless pressure": (lambda: PLANT.state_at(pressure=math.inf), "pressure of a state is inf; it must be finite"),
     "position as text": (lambda: PLANT.state_at(pressure=0.0, position="10 mm"), "the position of a state is '10 mm'"),
     "speed nan": (lambda: PLANT.state_at(pressure=0.0, speed=math.nan), "the speed of a state is nan; it must be finite"),
-    "name of a muscle": (lambda: replace(MUSCLE, name=5), "Muscle: its name is 5; it must be a word"),
-    "empty name": (lambda: replace(MUSCLE, name=""), "Muscle: its name is ''; it must be a word"),
-    "validity range of a muscle": (lambda: replace(MUSCLE, validity_range="all"), "Muscle: its validity range must be a Box, or None; it is 'all'"),
-    "geometry first": (lambda: Muscle(MUSCLE.geometry, MUSCLE.contractile), "Muscle: its contractile must be a Char"),
+    "name of a muscle": (lambda: replace(MUSCLE, name=5), "Muscle: name is 5; it must be a non-empty text"),
+    "empty name": (lambda: replace(MUSCLE, name=""), "Muscle: name is ''; it must be a non-empty text"),
+    "validity range of a muscle": (lambda: replace(MUSCLE, validity_range="all"), "Muscle: validity_range is 'all'; it must be a ValidityRange or None"),
+    "geometry first": (lambda: Muscle(MUSCLE.geometry, MUSCLE.contractile), "Muscle: contractile is .* it must be a Characteristic"),
     "list of muscles": (lambda: Plant([MUSCLE], CIRCUIT, MASS), "its muscle must be a Muscle; .*stand in a tuple"),
     "library entry": (lambda: Plant(ENTRY, CIRCUIT, MASS), "its muscle must be a Muscle; .* give its .muscle"),
     "no muscle": (lambda: Plant((), (), MASS), "Plant: it has no muscle; give one, or a tuple of them"),
@@ -84,11 +84,11 @@ CASES = {
     "a class": (lambda: Plant(MUSCLE, CIRCUIT, HangingMass), "its mechanism must be a Mechanism; it is <class"),
     "supply as number": (
         lambda: Plant(MUSCLE, FillDischarge(6e5, EDGE, EDGE), MASS),
-        "FillDischarge: its supply must be of AirSource; it is 600000",
+        "FillDischarge: supply must be an instance of AirSource; it is 600000",
     ),
     "one for several": (lambda: WithOffsets(MASS, 0.1), r"WithOffsets.offsets .* is 0.1; it must be several numbers, \(1.0"),
-    "valve as number": (lambda: in_series(EDGE, 2.0), "number 2 is float; the rule holds for Valve"),
-    "no valve": (in_parallel, "in_parallel needs one valve at least"),
+    "valve as number": (lambda: in_series(EDGE, 2.0), "argument 2 is float; it must be a Valve, with C and b"),
+    "no valve": (in_parallel, "in_parallel: no valve is given; give at least one"),
     "muscle simulated": (lambda: simulate(MUSCLE, FILL, duration=0.1), "simulate: Muscle.* is no plant; give Plant"),
     "class simulated": (lambda: simulate(Plant, FILL, duration=0.1), "simulate: <class .* is no plant"),
     "muscle advanced": (lambda: advance(MUSCLE, REST, {}, 0.1), "advance: Muscle.* is no plant; give Plant"),
@@ -99,8 +99,8 @@ CASES = {
     "sources of a name": (lambda: cite("dmsp-20-300"), r"cite: 'dmsp-20-300' is no model; .*cite\(load\("),
     "fit of a name": (lambda: fit("Sarosi2012", RUN), "fit: Sarosi2012 is no characteristic"),
     "fit to nothing": (lambda: fit(MUSCLE.contractile, None), "fit: None is no Recording, as read"),
-    "save a plant": (lambda: save(PLANT, "muscle.toml"), "save: Plant.* is no library entry"),
-    "write a plant": (lambda: write_csv(PLANT, "run.csv"), "write_csv: Plant.* is no Recording"),
+    "save a plant": (lambda: save(PLANT, "muscle.toml"), "save: Plant.* is not an Entry"),
+    "write a plant": (lambda: write_csv(PLANT, "run.csv"), "write_csv: Plant.* is not a Recording"),
 }  # fmt: skip
 
 
@@ -115,12 +115,12 @@ def test_a_wrong_type_is_refused_in_words(wrong, message, tmp_path: Path, monkey
 @pytest.mark.parametrize(
     ("wrong", "error", "message"),
     [
-        (lambda: read_csv(5), FileError, "read_csv: 5 is no path"),
-        (lambda: read(None), FileError, "read: None is no path; name a file, a folder"),
-        (lambda: write_csv(RUN, None), FileError, "write_csv: None is no path"),
-        (lambda: save(ENTRY, None), FileError, "save: None is no path"),
+        (lambda: read_csv(5), FileError, "read_csv: 5 is not a path"),
+        (lambda: read(None), FileError, "read: None is not a path. Pass a file, a folder"),
+        (lambda: write_csv(RUN, None), FileError, "write_csv: None is not a path"),
+        (lambda: save(ENTRY, None), FileError, "save: None is not a path"),
         (lambda: load_data(5), UnknownNameError, "no data set '5'; there are"),
-        (lambda: RUN[3], ColumnError, "a bench: no column '3'; there are time, fill"),
+        (lambda: RUN[3], ColumnError, "a bench: no column '3'; the columns are time, fill"),
         (lambda: SampledSignal.recorded(RUN, {"fill": 3}), ColumnError, "a bench: no column '3'"),
     ],
 )

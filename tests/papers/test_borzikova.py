@@ -1,6 +1,7 @@
-"""The chapter on Borzikova et al. judges the paper by computing: other coefficients give other verdicts.
+"""The verdicts on Borzíková et al. are computed: other coefficients give other verdicts.
 
-The printed matrix is neither the exponent of equation (1) nor, for a misprint, the direct surface; repaired it is.
+The printed matrix is neither the exponent of equation (1) nor, because of a misprint, the direct surface; corrected,
+it is the latter.
 """
 
 import dataclasses
@@ -14,14 +15,14 @@ from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_PRINTED
 from airmuscle.reproduce import borzikova
 from airmuscle.reproduce.borzikova_surfaces import (
     AS_EXPONENT,
+    CORRECTED,
+    CORRECTED_A02,
     EXPONENTIAL,
-    MENDED_A02,
-    MISPRINT_MENDED,
+    MISPRINT_CORRECTED,
     MONOTONE,
     PRINTED,
-    REPAIRED,
     index_on_curves,
-    rounded,
+    round_contraction,
     surfaces,
     with_a02,
 )
@@ -41,7 +42,7 @@ def verdict(name, law, curves=CURVES):
 def rms(law, force, least=0.25e5):
     """Per cent of contraction, over 27 even pressures from `least` to 3.5 bar."""
     pressures = np.linspace(least, 3.5e5, 27)
-    errors = law.contraction(pressures, force) - CURVES.at(force).contraction(pressures)
+    errors = law.contraction(pressures, force) - CURVES.curve_at(force).contraction(pressures)
     return 100 * np.sqrt(np.mean(np.asarray(errors) ** 2))
 
 
@@ -59,8 +60,8 @@ def test_the_printed_indices_cannot_be_confirmed():
     [
         (AS_EXPONENT, DIFFERS),
         (PRINTED, DIFFERS),
-        (MISPRINT_MENDED, DIFFERS),
-        (REPAIRED, HOLDS),
+        (MISPRINT_CORRECTED, DIFFERS),
+        (CORRECTED, HOLDS),
         (EXPONENTIAL, HOLDS),
     ],
 )
@@ -69,25 +70,25 @@ def test_verdicts_on_the_surfaces(laws, name, expected):
 
 
 def test_the_misprint_put_back_changes_the_verdict(laws):
-    assert verdict(REPAIRED, with_a02(laws[REPAIRED], -7.55e-3)) == DIFFERS
-    assert verdict(REPAIRED, with_a02(laws[REPAIRED], MENDED_A02)) == HOLDS
+    assert verdict(CORRECTED, with_a02(laws[CORRECTED], -7.55e-3)) == DIFFERS
+    assert verdict(CORRECTED, with_a02(laws[CORRECTED], CORRECTED_A02)) == HOLDS
 
 
 @pytest.mark.parametrize(
-    ("place", "repaired", "printed", "digit"), [(5, 0.002404, 0.0024, 5e-5), (8, -0.002259, -0.0023, 5e-5)]
+    ("place", "corrected", "printed", "digit"), [(5, 0.002404, 0.0024, 5e-5), (8, -0.002259, -0.0023, 5e-5)]
 )
-def test_the_repair_is_within_rounding_and_matters(laws, place, repaired, printed, digit):
-    coefficients = list(laws[REPAIRED].coefficients)
-    assert coefficients[place] == repaired
-    assert abs(repaired - printed) < digit
+def test_the_correction_is_within_rounding_and_matters(laws, place, corrected, printed, digit):
+    coefficients = list(laws[CORRECTED].coefficients)
+    assert coefficients[place] == corrected
+    assert abs(corrected - printed) < digit
     coefficients[place] = printed
-    assert rms(dataclasses.replace(laws[REPAIRED], coefficients=tuple(coefficients)), 260.0) > 0.5
+    assert rms(dataclasses.replace(laws[CORRECTED], coefficients=tuple(coefficients)), 260.0) > 0.5
 
 
 def test_the_second_coefficient_without_its_digits_changes_the_verdict(laws):
-    coefficients = list(laws[REPAIRED].coefficients)
+    coefficients = list(laws[CORRECTED].coefficients)
     coefficients[8] = -0.0023
-    assert verdict(REPAIRED, dataclasses.replace(laws[REPAIRED], coefficients=tuple(coefficients))) == DIFFERS
+    assert verdict(CORRECTED, dataclasses.replace(laws[CORRECTED], coefficients=tuple(coefficients))) == DIFFERS
 
 
 @pytest.mark.parametrize("saturation", [0.36, 0.44])
@@ -96,18 +97,18 @@ def test_another_saturation_changes_the_verdict(laws, saturation):
 
 
 def test_another_sign_of_a_plane_curve_changes_the_verdict(laws):
-    middle = CURVES.at(130.0)
+    middle = CURVES.curve_at(130.0)
     flipped = dataclasses.replace(middle, coefficients=(0.0082, -0.0872, *middle.coefficients[2:]))
     curves = dataclasses.replace(CURVES, curves=(CURVES.curves[0], flipped, CURVES.curves[2]))
-    assert verdict(REPAIRED, laws[REPAIRED], curves) == DIFFERS
-    assert verdict(EXPONENTIAL, curves.interpolated(), curves) == HOLDS
+    assert verdict(CORRECTED, laws[CORRECTED], curves) == DIFFERS
+    assert verdict(EXPONENTIAL, curves.interpolate(), curves) == HOLDS
 
 
 def test_where_no_index_exists_the_explained_part_stands_in_its_place(laws):
     found = borzikova.surface_claim(PRINTED, laws[PRINTED], CURVES)
     assert index_on_curves(laws[PRINTED], CURVES).value is None
     assert found.reproduced == pytest.approx(-576.65, abs=0.01)
-    assert "No index exists" in found.note
+    assert "The index does not exist" in found.note
 
 
 def test_the_printed_matrix_cannot_be_the_exponent(laws):
@@ -122,20 +123,20 @@ def test_the_printed_matrix_cannot_be_the_exponent(laws):
     assert ranges[260.0] == pytest.approx((-520.5, -504.9), abs=0.05)
 
 
-def test_the_repaired_surface_lies_within_037_per_cent_of_the_curves(laws):
-    errors = [rms(laws[REPAIRED], c.force) for c in CURVES.curves]
+def test_the_corrected_surface_lies_within_037_per_cent_of_the_curves(laws):
+    errors = [rms(laws[CORRECTED], c.force) for c in CURVES.curves]
     assert errors == pytest.approx([0.57, 0.21, 0.20], abs=0.006)
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(0.37, abs=0.005)
-    assert index_on_curves(laws[REPAIRED], CURVES).value == pytest.approx(0.99905, abs=5e-6)
+    assert index_on_curves(laws[CORRECTED], CURVES).value == pytest.approx(0.99905, abs=5e-6)
 
 
-def test_with_the_misprint_alone_mended_it_is_off_by_a_sixth_at_260_newton(laws):
-    assert 16.0 < rms(laws[MISPRINT_MENDED], 260.0, least=0.0) < rms(laws[MISPRINT_MENDED], 260.0) < 17.0
+def test_with_only_the_misprint_corrected_it_is_off_by_a_sixth_at_260_newton(laws):
+    assert 16.0 < rms(laws[MISPRINT_CORRECTED], 260.0, least=0.0) < rms(laws[MISPRINT_CORRECTED], 260.0) < 17.0
 
 
 def test_between_the_loads_both_surfaces_dip_below_zero(laws):
     pressure, force = LoadRange(0.0, 3.5e5, 130.0, 260.0).grid(351, 651)
-    for name, depth, bar, newton in ((REPAIRED, -1.96, 0.43, 203), (EXPONENTIAL, -3.41, 0.61, 206)):
+    for name, depth, bar, newton in ((CORRECTED, -1.96, 0.43, 203), (EXPONENTIAL, -3.41, 0.61, 206)):
         contraction = laws[name].contraction(pressure, force)
         at = np.unravel_index(contraction.argmin(), contraction.shape)
         assert 100 * contraction[at] == pytest.approx(depth, abs=0.005)
@@ -151,7 +152,7 @@ def test_two_loads_change_the_verdict_on_the_coefficients():
 
 
 def test_on_rounded_curves_the_linearised_fit_is_not_least_squares():
-    data = rounded(CURVES.sample())
+    data = round_contraction(CURVES.sample())
     claim = borzikova.procedure_claim(data, 0.40)
     assert claim.reproduced == pytest.approx(0.11175 / 0.10763, abs=1e-4)
     assert claim.verdict == DIFFERS
@@ -175,7 +176,7 @@ def test_the_library_holds_the_monotone_fit_of_the_chapter(laws):
     assert np.abs(difference).max() < 1e-7
 
 
-def test_the_chapter_is_whole():
+def test_the_chapter_is_complete():
     chapter = borzikova.chapter()
     assert chapter.paper == "borzikova"
     assert {c.verdict for c in chapter.claims} == {HOLDS, DIFFERS, NOT_PRINTED}
@@ -186,5 +187,5 @@ def test_the_chapter_is_whole():
         "borzikova_surface",
     }
     breaks = next(t for t in chapter.tables if t.name == "borzikova_breaks")
-    assert set(breaks.columns["surface"]) == {REPAIRED, EXPONENTIAL}
-    assert breaks.note == f"Nowhere: {MONOTONE}."
+    assert set(breaks.columns["surface"]) == {CORRECTED, EXPONENTIAL}
+    assert breaks.note == f"Without violations: {MONOTONE}."

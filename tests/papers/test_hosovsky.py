@@ -1,4 +1,4 @@
-"""The third paper: its runs are right by two methods, its verdicts are computed, and its surface comes back."""
+"""Hošovský et al.: two integrators agree, the verdicts are computed, and a refit reproduces the surface."""
 
 from __future__ import annotations
 
@@ -12,22 +12,30 @@ from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.control.inputs import ZERO_INPUT, SampledSignal
 from airmuscle.identify.static_fit import fit
 from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.muscle import CubicSpring, LaggingWall, LinearDamper, LinearSpring, Muscle
+from airmuscle.muscle import CubicSpring, LinearDamper, LinearSpring, Muscle, ViscoelasticWall
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import ClosedChamber, IndexedValve, Tube, Valve
+from airmuscle.pneumatics import ClosedChamber, SubsonicIndexValve, Tube, Valve
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.recording import Recording
 from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_PRINTED
 from airmuscle.reproduce import hosovsky
-from airmuscle.reproduce import hosovsky_causes as causing
+from airmuscle.reproduce import hosovsky_effects as causing
 from airmuscle.reproduce import hosovsky_fill as filling
 from airmuscle.reproduce import hosovsky_release as releasing
-from airmuscle.reproduce.hosovsky_plant import MATRIX, Numbers, hanging, latched, plant, surface, surface_fit
+from airmuscle.reproduce.hosovsky_plant import (
+    MATRIX,
+    UnpublishedParameters,
+    hanging_load,
+    latched_load,
+    plant,
+    surface,
+    surface_fit,
+)
 from airmuscle.reproduce.hosovsky_schedule import FILLING
 from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import DormandPrince8, RungeKutta4
 
-NUMBERS = Numbers()
+NUMBERS = UnpublishedParameters()
 
 
 @pytest.fixture(scope="module")
@@ -53,14 +61,14 @@ def test_the_muscle_fills_to_the_supply_and_empties_to_the_surroundings(fill):
 
 
 def test_a_higher_critical_ratio_changes_the_verdict_on_choking(fill):
-    claim = "filling is choked until P2/P1 = b: muscle pressure at which the flow begins to fall"
+    claim = r"the flow is choked until \(p_2/p_1 = b\): muscle pressure at which the mass flow begins to decrease"
     assert verdicts(filling.claims(fill))[claim] == HOLDS
     other = filling.run_fill(NUMBERS, dataclasses.replace(MATRIX, critical_ratio=0.5))
     assert verdicts(filling.claims(other))[claim] == DIFFERS
 
 
 def test_another_conductance_changes_the_verdict_on_its_usual_unit(fill):
-    claim = "sonic conductance of the MATRIX valve in usual units"
+    claim = "sonic conductance of the MATRIX valve in customary units"
     other = filling.run_fill(NUMBERS, dataclasses.replace(MATRIX, conductance=2.6167e-8))
     assert verdicts(filling.claims(fill))[claim] == HOLDS
     assert verdicts(filling.claims(other))[claim] == DIFFERS
@@ -70,14 +78,14 @@ def test_what_has_no_printed_number_is_never_said_to_hold(fill):
     assert [c.verdict for c in filling.claims(fill) if c.reproduced is None] == [NOT_PRINTED]
 
 
-def test_exchanged_pressures_turn_the_verdicts_of_the_release():
-    low, high = releasing.pair(NUMBERS)
-    ranges = releasing.over_ranges(NUMBERS)
+def test_interchanged_pressures_change_the_verdicts_of_the_release():
+    low, high = releasing.release_pair(NUMBERS)
+    ranges = releasing.range_table(NUMBERS)
     right = [c.verdict for c in releasing.claims(low, high, ranges)]
     wrong = [c.verdict for c in releasing.claims(high, low, ranges)]
     assert right[:2] == [HOLDS, HOLDS]
     assert wrong[:2] == [DIFFERS, DIFFERS]
-    assert all("over the range of every chosen number" in c.note for c in releasing.claims(low, high, ranges))
+    assert all("Over the ranges of all chosen values: " in c.note for c in releasing.claims(low, high, ranges))
 
 
 def test_the_release_starts_from_rest_with_the_latch_carrying_the_difference():
@@ -122,8 +130,8 @@ def test_refitting_the_surface_from_simulated_runs_returns_what_went_in():
 
 
 def ramp(law: ContractileSurface, contraction: float) -> Recording:
-    muscle = Muscle(law, plant(NUMBERS, latched()).muscles[0].geometry, LinearSpring(0.0), LinearDamper(300.0))
-    system = Plant(muscle, plant(NUMBERS, latched()).circuits[0], Isometric(contraction), Isothermal())
+    muscle = Muscle(law, plant(NUMBERS, latched_load()).muscles[0].geometry, LinearSpring(0.0), LinearDamper(300.0))
+    system = Plant(muscle, plant(NUMBERS, latched_load()).circuits[0], Isometric(contraction), Isothermal())
     opening = SampledSignal({"fill": ((0.0, 0.0), (4.0, 0.2))})
     return simulate(system, opening, duration=20.0, initial_state=system.state_at(pressure=40e3), output_times=0.2)
 
@@ -131,7 +139,7 @@ def ramp(law: ContractileSurface, contraction: float) -> Recording:
 @pytest.mark.parametrize(("method", "coarse", "order"), [(RungeKutta4, 4e-3, 4), (DormandPrince8, 5e-2, 8)])
 def test_a_taut_closed_muscle_without_kinks_is_solved_at_the_order_of_the_method(method, coarse, order):
     """No clamp, no valve, no slack: what the paper's own plant cannot show, since its kinks dominate the error."""
-    ideal = Muscle.ideal(plant(NUMBERS, latched()).muscles[0].geometry)
+    ideal = Muscle.ideal(plant(NUMBERS, latched_load()).muscles[0].geometry)
     system = Plant(ideal, ClosedChamber(), HangingMass(20.0), Isothermal())
     rest = find_equilibrium(system, pressure=300e3)
     start = rest | {"position": rest["position"] - 0.004}
@@ -149,11 +157,11 @@ def test_a_taut_closed_muscle_without_kinks_is_solved_at_the_order_of_the_method
 
 @pytest.fixture(scope="module")
 def effects():
-    return causing.effects(NUMBERS, causing.Suspected())
+    return causing.compute_effects(NUMBERS, causing.SuspectedCauses())
 
 
-def test_every_suspected_cause_is_exchanged_and_changes_the_courses(effects):
-    assert {e.exchanged.cause for e in effects} == {*causing.CAUSES, "one of each"}
+def test_every_suspected_cause_is_substituted_and_has_an_effect(effects):
+    assert {e.substitution.cause for e in effects} == {*causing.CAUSES, causing.COMBINED}
     for effect in effects:
         assert abs(effect.largest("pressure", FILLING)) > 1e3
         assert abs(effect.largest("contraction", FILLING)) > 1e-4
@@ -165,8 +173,8 @@ def test_every_suspected_cause_is_exchanged_and_changes_the_courses(effects):
     "nothing",
     [
         {"valve": dataclasses.replace(MATRIX, critical_ratio=0.433)},
-        {"valve": IndexedValve(MATRIX.conductance, MATRIX.critical_ratio, 0.5)},
-        {"wall": LaggingWall(0.0, 0.1)},
+        {"valve": SubsonicIndexValve(MATRIX.conductance, MATRIX.critical_ratio, 0.5)},
+        {"wall": ViscoelasticWall(0.0, 0.1)},
         {"gas": Polytropic(1.001)},
         {"gas": EnergyBalance(1e4)},
         {"spring": CubicSpring(1000.0, 0.0)},
@@ -175,18 +183,18 @@ def test_every_suspected_cause_is_exchanged_and_changes_the_courses(effects):
     ids=lambda part: repr(next(iter(part.values()))),
 )
 def test_a_component_in_the_limit_of_the_printed_one_changes_nothing(nothing):
-    """Each exchanged component contains the printed one; so what the table shows is the cause and nothing else."""
+    """Each substituted component contains the printed one as a limit, so the table shows the cause and nothing else."""
     base = causing._run(causing.PRINTED, NUMBERS)
-    effect = causing._effect(base, null := causing.Exchanged("none", "none", **nothing), causing._run(null, NUMBERS))
+    effect = causing._effect(base, null := causing.Substitution("none", "none", **nothing), causing._run(null, NUMBERS))
     assert np.abs(effect.pressure).max() < 1e3
     assert np.abs(effect.contraction).max() < 5e-4
 
 
 def test_the_effects_are_differences_of_two_runs(effects):
-    adiabatic = next(e for e in effects if e.exchanged.what == "first law, adiabatic")
+    adiabatic = next(e for e in effects if e.substitution.component == "first law, adiabatic")
     runs = [
         simulate(
-            plant(NUMBERS, hanging(NUMBERS), gas=gas), filling.SCHEDULE, duration=25.0, output_times=adiabatic.time
+            plant(NUMBERS, hanging_load(NUMBERS), gas=gas), filling.SCHEDULE, duration=25.0, output_times=adiabatic.time
         )
         for gas in (Isothermal(), EnergyBalance(0.0))
     ]
@@ -196,25 +204,32 @@ def test_the_effects_are_differences_of_two_runs(effects):
 
 def test_heat_is_what_changes_filling_most_and_more_than_discharging(effects):
     """Neither line, flow law nor spring comes near it, and it does what the paper saw; a volume would not."""
-    table = causing.table(effects).columns
-    filled = np.abs(table["pressure, filling: greatest change [kPa]"])
+    table = causing.effect_table(effects).columns
+    filled = np.abs(table["pressure, filling: largest change [kPa]"])
     causes = np.array(table["cause"])
-    heat = filled[(causes == "heat") & (np.array(table["exchanged"]) == "first law, hA = 0.5 W/K")][0]
+    heat = filled[
+        (causes == "heat transfer") & (np.array(table["substituted component"]) == r"first law, \(hA = 0.5\) W/K")
+    ][0]
     for cause in ("line", "flow law", "spring"):
         assert filled[causes == cause].max() < 0.6 * heat
-    shares = dict(zip(table["exchanged"], table["pressure, filling to discharging [1]"], strict=True))
-    assert shares["first law, hA = 0.5 W/K"] > 1.2
-    assert shares["b = 0.25"] > 1.2
+    shares = dict(
+        zip(table["substituted component"], table["pressure, ratio of filling to discharging [1]"], strict=True)
+    )
+    assert shares[r"first law, \(hA = 0.5\) W/K"] > 1.2
+    assert shares[r"\(b = 0.25\)"] > 1.2
     assert max(s for s, c in zip(shares.values(), causes, strict=True) if c == "volume") < 1.0
 
 
 def test_more_heat_transfer_turns_what_the_report_says(effects):
     """The words are computed: with a wall that takes all heat the cause drops behind the others."""
-    warm = dataclasses.replace(causing.Suspected().heat_transfer, value=2000.0)
-    suspected = dataclasses.replace(causing.Suspected(), heat_transfer=warm)
-    row = "heat (first law, hA = {:g} W/K)".format
-    assert row(0.5) in causing.in_words(effects)
-    chosen = [e for e in causing.exchanges(NUMBERS, suspected) if e.what in ("first law, hA = 2000 W/K", "none")]
+    warm = dataclasses.replace(causing.SuspectedCauses().heat_transfer, value=2000.0)
+    suspected = dataclasses.replace(causing.SuspectedCauses(), heat_transfer=warm)
+    assert r"heat transfer (first law, \(hA = 0.5\) W/K)" in causing.describe_effects(effects)
+    chosen = [
+        e
+        for e in causing.substitutions(NUMBERS, suspected)
+        if e.component in (r"first law, \(hA = 2000\) W/K", "no spring")
+    ]
     base = causing._run(causing.PRINTED, NUMBERS)
     heat, spring = (causing._effect(base, e, causing._run(e, NUMBERS)) for e in chosen)
     assert abs(heat.largest("pressure", FILLING)) < abs(spring.largest("pressure", FILLING))
@@ -222,12 +237,12 @@ def test_more_heat_transfer_turns_what_the_report_says(effects):
 
 def test_every_chosen_number_stands_in_the_chapter_with_its_range():
     chapter = hosovsky.chapter()
-    behind = (NUMBERS, causing.Suspected())
+    behind = (NUMBERS, causing.SuspectedCauses())
     assert {what for what, _, _ in chapter.chosen} == {
         getattr(numbers, f.name).meaning for numbers in behind for f in dataclasses.fields(numbers)
     }
     assert all("range" in value for _, value, _ in chapter.chosen)
     assert sum(c.verdict == HOLDS for c in chapter.claims) >= 10
-    (deviations,) = [c for c in chapter.claims if "larger deviations while filling" in c.claim]
-    assert "Filling suffers more than discharging" in deviations.note
+    (deviations,) = [c for c in chapter.claims if "larger deviations during filling" in c.claim]
+    assert "Filling is affected more than discharging" in deviations.note
     assert deviations.verdict == NOT_PRINTED

@@ -8,24 +8,25 @@ import warnings
 import pytest
 
 from airmuscle.core.errors import AirmuscleWarning
-from airmuscle.library import catalogue
-from airmuscle.library.verify import verify
+from airmuscle.library import catalogue, files
+from airmuscle.library.entry import Entry
+from airmuscle.library.verification import verify
 
 
-def quietly_loaded(name: str) -> catalogue.Entry:
+def quietly_loaded(name: str) -> Entry:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
         return catalogue.load(name)
 
 
-@pytest.mark.parametrize("name", catalogue.list_library())
+@pytest.mark.parametrize("name", files.list_laws())
 def test_the_checks_of_an_entry_hold(name: str):
     verdicts = verify(quietly_loaded(name))
     assert verdicts, "the file has no [[check]]"
-    assert [str(verdict) for verdict in verdicts if not verdict.holds] == []
+    assert [str(verdict) for verdict in verdicts if not verdict.passes] == []
 
 
-@pytest.mark.parametrize("name", catalogue.list_library())
+@pytest.mark.parametrize("name", files.list_laws())
 def test_an_entry_says_where_it_is_from(name: str):
     entry = quietly_loaded(name)
     assert entry.references or entry.characteristic.references or getattr(entry.characteristic, "inner", None)
@@ -35,4 +36,4 @@ def test_an_entry_says_where_it_is_from(name: str):
 def test_a_check_fails_when_the_model_changes():
     entry = catalogue.load("dmsp-20-300")
     stiffer = dataclasses.replace(entry.characteristic, c0=entry.characteristic.c0 * 1.1)
-    assert not all(verdict.holds for verdict in verify(dataclasses.replace(entry, characteristic=stiffer)))
+    assert not all(verdict.passes for verdict in verify(dataclasses.replace(entry, characteristic=stiffer)))

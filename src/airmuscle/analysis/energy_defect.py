@@ -47,7 +47,7 @@ def maxwell_defect(characteristic: Characteristic, geometry: Geometry, validity_
 
     def sides(pressure: Array, contraction: Array) -> tuple[Array, Array]:
         by_pressure = characteristic.slopes(pressure, contraction).by_pressure
-        return by_pressure, geometry.volume_growth(contraction) / geometry.resting_length
+        return by_pressure, geometry.volume_derivative(contraction) / geometry.resting_length
 
     return _largest(characteristic, sides, validity_range, "m2")
 
@@ -62,7 +62,7 @@ def virtual_work_defect(
     """
 
     def sides(pressure: Array, contraction: Array) -> tuple[Array, Array]:
-        ideal = pressure * geometry.volume_growth(contraction) / geometry.resting_length
+        ideal = pressure * geometry.volume_derivative(contraction) / geometry.resting_length
         return characteristic.force(pressure, contraction), ideal
 
     return _largest(characteristic, sides, validity_range, "N")

@@ -79,7 +79,9 @@ class LinearModel:
         found = []
         for f in np.atleast_1d(np.asarray(frequencies, dtype=float)):
             if not (np.isfinite(f) and f >= 0):
-                raise ParameterError(f"frequency_response: a frequency is {f!r} Hz; it must be finite and not negative.")
+                raise ParameterError(
+                    f"frequency_response: a frequency is {f!r} Hz; it must be finite and not negative."
+                )
             shifted = 2j * math.pi * f * np.eye(len(self.states)) - self.A
             try:
                 found.append(self.C @ np.linalg.solve(shifted, self.B) + self.D)

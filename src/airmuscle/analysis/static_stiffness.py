@@ -12,7 +12,7 @@ from ..muscle import Muscle, SeriesSpring
 from ..plant.muscle_state import MuscleState
 from ..plant.plant import Plant
 from ..plant.state import state_vector
-from ..pneumatics.gas import NO_FLOW, gauge
+from ..pneumatics.gas import NO_FLOW, gauge_pressure
 
 
 class StiffnessPair(NamedTuple):
@@ -91,12 +91,12 @@ def _pressure_slope(plant: Plant, muscle: Muscle, port: MuscleState) -> float:
     """dp/deps [Pa] of the air shut in: its pressure by volume and by what the gas law makes of its content."""
     content = {s.name: port.states[s.name] for s in plant.gas.states(port.volume, plant.ambient)}
     names = list(content)
-    growth = muscle.geometry.volume_growth(port.inner_contraction)
+    growth = muscle.geometry.volume_derivative(port.inner_contraction)
     moved, still = (plant.gas.rates(content, port.air, NO_FLOW, rate, plant.ambient) for rate in (growth, 0.0))
 
     def pressure(x: Sequence[Value]) -> list[Value]:
         air = plant.gas.air(dict(zip(names, x[1:], strict=True)), x[0], plant.ambient)
-        return [gauge(air.pressure, plant.ambient)]
+        return [gauge_pressure(air.pressure, plant.ambient)]
 
     at = [float(v) for v in (port.volume, *content.values())]
     along = [float(growth), *(float(moved[n] - still[n]) for n in names)]

@@ -1,4 +1,4 @@
-"""Static laws: what binds gauge pressure, contraction and tension. One paper, one file, one class."""
+"""Static characteristics: relations between gauge pressure, contraction and tension; one class per paper."""
 
 from .base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from .borzikova import BorzikovaDirect, BorzikovaExponential
@@ -13,7 +13,7 @@ from .length_family import InverseLength, LogarithmicLength
 from .martens_boblan2017 import MartensBoblan2017
 from .polynomial_surrogate import PolynomialSurrogate, as_force_law
 from .reynolds2003 import Reynolds2003
-from .rubber import AlongArc, AlongAxis, RubberLine
+from .rubber import ArcIntegral, AxialIntegral, RubberLine
 from .saga2007 import Saga2007
 from .sarosi2012 import Sarosi2012
 from .serres2009 import Serres2009
@@ -23,8 +23,8 @@ from .validity_range import ValidityRange
 from .virtual_work import VirtualWork
 
 __all__ = [
-    "AlongArc",
-    "AlongAxis",
+    "ArcIntegral",
+    "AxialIntegral",
     "BorzikovaDirect",
     "BorzikovaExponential",
     "Characteristic",

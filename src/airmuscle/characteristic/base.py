@@ -1,8 +1,8 @@
-"""The static surface that binds gauge pressure p [Pa], contraction eps [1] and tension F [N].
+"""Characteristic (interface): static relation between gauge pressure p [Pa], contraction eps [1] and tension F [N].
 
-A paper gives it solved for one of the three. A law implements its own direction; the classes here give the other
-two by a safeguarded root search, and exact slopes by the implicit function theorem. Where several answers exist
-it is the one reached from rest: the smallest contraction, pressure or force at which the muscle balances.
+A paper gives the relation solved for one of the three quantities. A model implements this direction; the classes here
+compute the other two by a bracketed root search, and exact slopes by the implicit function theorem. If there are
+several solutions, the one reached from rest is returned: the smallest contraction, pressure or force in equilibrium.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from typing import ClassVar, NamedTuple
 from ..core import autodiff
 from ..core.ops import Value
 from ..core.reference import Reference
-from .solve import first_crossing
+from .solve import describe_range, find_first_root
 
-NO_PRESSURE = 1e-300
-"""Stands for a pressure of zero [Pa] where a force is divided by it: no load then has an answer."""
+MIN_PRESSURE = 1e-300
+"""Replaces a pressure of zero [Pa] as a divisor; no load then has a solution."""
 
 
 class Slopes(NamedTuple):
-    """How the tension changes at a point of the surface."""
+    """Partial derivatives of the tension at a point of the surface."""
 
     by_pressure: Value
     """dF/dp at constant contraction [N/Pa]."""
@@ -29,93 +29,95 @@ class Slopes(NamedTuple):
 
 
 class Characteristic(abc.ABC):
-    """Gauge pressure [Pa], contraction [1] and tension [N] of a muscle at rest; pulling is positive."""
+    """Static relation between gauge pressure [Pa], contraction [1] and tension [N]; pulling is positive."""
 
     references: ClassVar[tuple[Reference, ...]] = ()
     traceable: ClassVar[bool] = True
-    """Whether the law is closed-form over `ops`; otherwise it enters a plant through `as_force_law`."""
+    """Whether the model is in closed form over `ops`; otherwise a plant uses it through `as_force_law`."""
 
     @property
     def pressure_range(self) -> tuple[float, float]:
-        """Gauge pressures [Pa] that an answer may have."""
+        """Minimum and maximum gauge pressure [Pa] of a solution."""
         return (0.0, 1.0e6)
 
     @property
     def force_range(self) -> tuple[float, float]:
-        """Tensions [N] that an answer may have."""
+        """Minimum and maximum tension [N] of a solution."""
         return (0.0, 1.0e4)
 
     @property
     def contraction_range(self) -> tuple[float, float]:
-        """Contractions [1] that an answer may have; a geometric law narrows it."""
+        """Minimum and maximum contraction [1] of a solution; geometric models restrict it."""
         return (-0.05, 0.6)
 
     @abc.abstractmethod
     def force(self, pressure: Value, contraction: Value) -> Value:
-        """Tension [N] at gauge pressure [Pa] and contraction [1]; arrays broadcast. Raises NoSolution."""
+        """Tension [N] at gauge pressure [Pa] and contraction [1]; arrays broadcast. Raises SolveError."""
 
     @abc.abstractmethod
     def contraction(self, pressure: Value, force: Value) -> Value:
-        """Contraction [1] at gauge pressure [Pa] under a tension [N]; arrays broadcast. Raises NoSolution."""
+        """Contraction [1] at gauge pressure [Pa] and tension [N]; arrays broadcast. Raises SolveError."""
 
     @abc.abstractmethod
     def pressure(self, contraction: Value, force: Value) -> Value:
-        """Gauge pressure [Pa] that holds a tension [N] at a contraction [1]; arrays broadcast. Raises NoSolution."""
+        """Gauge pressure [Pa] at contraction [1] and tension [N]; arrays broadcast. Raises SolveError."""
 
     @abc.abstractmethod
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
-        """Exact partial derivatives of the tension at gauge pressure [Pa] and contraction [1]."""
+        """Exact partial derivatives of the tension at gauge pressure [Pa] and contraction [1]; arrays broadcast."""
 
     def stiffness(self, pressure: Value, contraction: Value) -> Value:
-        """-dF/deps at constant pressure [N]; divide by the resting length for N/m."""
+        """Stiffness -dF/deps [N] at constant pressure; divide by the resting length for [N/m]."""
         return -self.slopes(pressure, contraction).by_contraction
 
-    def _no_contraction(self, pressure: float, force: float) -> str:
-        start, end = self.contraction_range
+    def _no_contraction_message(self, pressure: float, force: float) -> str:
+        low, high = self.contraction_range
+        limits = describe_range(100 * low, 100 * high, "%")
         return (
-            f"{type(self).__name__}: no contraction between {start:.1%} and {end:.1%} balances {force:.6g} N at "
-            f"{pressure / 1e3:.6g} kPa. "
+            f"{type(self).__name__}: no contraction in the range {limits} is in equilibrium with {force:.4g} N at "
+            f"{pressure / 1e3:.4g} kPa. "
         )
 
-    def _no_pressure(self, contraction: float, force: float) -> str:
-        start, end = (p / 1e3 for p in self.pressure_range)
+    def _no_pressure_message(self, contraction: float, force: float) -> str:
+        low, high = self.pressure_range
+        limits = describe_range(low / 1e3, high / 1e3, "kPa")
         return (
-            f"{type(self).__name__}: no gauge pressure between {start:.6g} and {end:.6g} kPa gives {force:.6g} N at "
-            f"a contraction of {contraction:.2%}. "
+            f"{type(self).__name__}: no gauge pressure in the range {limits} gives {force:.4g} N at a contraction of "
+            f"{100 * contraction:.4g} %. "
         )
 
-    def _no_force(self, pressure: float, contraction: float) -> str:
-        start, end = self.force_range
+    def _no_force_message(self, pressure: float, contraction: float) -> str:
+        limits = describe_range(*self.force_range, "N")
         return (
-            f"{type(self).__name__}: no force between {start:.6g} and {end:.6g} N holds a contraction of "
-            f"{contraction:.2%} at {pressure / 1e3:.6g} kPa. "
+            f"{type(self).__name__}: no force in the range {limits} gives a contraction of {100 * contraction:.4g} % at "
+            f"{pressure / 1e3:.4g} kPa. "
         )
 
 
 class ForceLaw(Characteristic):
-    """A law given as F(p, eps)."""
+    """Characteristic given as F(p, eps)."""
 
-    def unclamped(self, pressure: Value, contraction: Value) -> Value:
-        """The tension [N] before the law holds it within a range: what a fit determines from measured points."""
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
+        """Tension [N] before any limit is applied; fits evaluate the residuals with it."""
         return self.force(pressure, contraction)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
-        def unbalance(contraction: Value, p: Value, load: Value) -> Value:
+        def residual(contraction: Value, p: Value, load: Value) -> Value:
             return load - self.force(p, contraction)
 
         def message(p: float, load: float, low: float, high: float) -> str:
-            return self._no_contraction(p, load) + _pulls(load - high, load - low)
+            return self._no_contraction_message(p, load) + _describe_force_limits(load - high, load - low)
 
-        return first_crossing(unbalance, self.contraction_range, (pressure, force), message)
+        return find_first_root(residual, self.contraction_range, (pressure, force), message)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        def excess(pressure: Value, c: Value, load: Value) -> Value:
+        def residual(pressure: Value, c: Value, load: Value) -> Value:
             return self.force(pressure, c) - load
 
         def message(c: float, load: float, low: float, high: float) -> str:
-            return self._no_pressure(c, load) + _pulls(low + load, high + load)
+            return self._no_pressure_message(c, load) + _describe_force_limits(low + load, high + load)
 
-        return first_crossing(excess, self.pressure_range, (contraction, force), message)
+        return find_first_root(residual, self.pressure_range, (contraction, force), message)
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         return Slopes(
@@ -123,42 +125,43 @@ class ForceLaw(Characteristic):
             autodiff.derivative(self, "force", pressure, contraction, wrt=1),
         )
 
-    def _no_contraction_here(self, pressure: float, force: float) -> str:
-        """For a law solved in closed form, whose tension falls steadily from one end of its reach to the other."""
+    def _contraction_limits_message(self, pressure: float, force: float) -> str:
+        """Message for a closed-form model whose tension decreases monotonically over the contraction range."""
         ends = (float(self.force(pressure, end)) for end in self.contraction_range)
-        return self._no_contraction(pressure, force) + _pulls(*sorted(ends))
+        return self._no_contraction_message(pressure, force) + _describe_force_limits(*sorted(ends))
 
-    def _no_pressure_here(self, contraction: float, force: float) -> str:
+    def _pressure_limits_message(self, contraction: float, force: float) -> str:
+        """Message for a closed-form model whose tension is monotone over the pressure range."""
         ends = (float(self.force(end, contraction)) for end in self.pressure_range)
-        return self._no_pressure(contraction, force) + _pulls(*sorted(ends))
+        return self._no_pressure_message(contraction, force) + _describe_force_limits(*sorted(ends))
 
 
-def _pulls(low: float, high: float) -> str:
-    return f"Between these the muscle pulls {low:.6g} to {high:.6g} N there."
+def _describe_force_limits(low: float, high: float) -> str:
+    return f"Available force: {describe_range(low, high, 'N')}."
 
 
 class ContractionLaw(Characteristic):
-    """A law given as eps(p, F)."""
+    """Characteristic given as eps(p, F)."""
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        def shortfall(force: Value, p: Value, c: Value) -> Value:
+        def residual(force: Value, p: Value, c: Value) -> Value:
             return c - self.contraction(p, force)
 
         def message(p: float, c: float, low: float, high: float) -> str:
-            possible = f"Between these it contracts by {c - high:.2%} to {c - low:.2%} at this pressure."
-            return self._no_force(p, c) + possible
+            limits = describe_range(100 * (c - high), 100 * (c - low), "%")
+            return f"{self._no_force_message(p, c)}Available contraction at this pressure: {limits}."
 
-        return first_crossing(shortfall, self.force_range, (pressure, contraction), message)
+        return find_first_root(residual, self.force_range, (pressure, contraction), message)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        def excess(pressure: Value, c: Value, load: Value) -> Value:
+        def residual(pressure: Value, c: Value, load: Value) -> Value:
             return self.contraction(pressure, load) - c
 
         def message(c: float, load: float, low: float, high: float) -> str:
-            possible = f"Between these it contracts by {low + c:.2%} to {high + c:.2%} under this load."
-            return self._no_pressure(c, load) + possible
+            limits = describe_range(100 * (low + c), 100 * (high + c), "%")
+            return f"{self._no_pressure_message(c, load)}Available contraction at this load: {limits}."
 
-        return first_crossing(excess, self.pressure_range, (contraction, force), message)
+        return find_first_root(residual, self.pressure_range, (contraction, force), message)
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         force = self.force(pressure, contraction)
@@ -168,27 +171,27 @@ class ContractionLaw(Characteristic):
 
 
 class PressureLaw(Characteristic):
-    """A law given as p(eps, F)."""
+    """Characteristic given as p(eps, F)."""
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        def excess(force: Value, p: Value, c: Value) -> Value:
+        def residual(force: Value, p: Value, c: Value) -> Value:
             return self.pressure(c, force) - p
 
         def message(p: float, c: float, low: float, high: float) -> str:
-            possible = f"Between these it needs {(low + p) / 1e3:.6g} to {(high + p) / 1e3:.6g} kPa there."
-            return self._no_force(p, c) + possible
+            limits = describe_range((low + p) / 1e3, (high + p) / 1e3, "kPa")
+            return f"{self._no_force_message(p, c)}Required pressure at this contraction: {limits}."
 
-        return first_crossing(excess, self.force_range, (pressure, contraction), message)
+        return find_first_root(residual, self.force_range, (pressure, contraction), message)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
-        def excess(contraction: Value, p: Value, load: Value) -> Value:
+        def residual(contraction: Value, p: Value, load: Value) -> Value:
             return self.pressure(contraction, load) - p
 
         def message(p: float, load: float, low: float, high: float) -> str:
-            possible = f"Between these it needs {(low + p) / 1e3:.6g} to {(high + p) / 1e3:.6g} kPa under this load."
-            return self._no_contraction(p, load) + possible
+            limits = describe_range((low + p) / 1e3, (high + p) / 1e3, "kPa")
+            return f"{self._no_contraction_message(p, load)}Required pressure at this load: {limits}."
 
-        return first_crossing(excess, self.contraction_range, (pressure, force), message)
+        return find_first_root(residual, self.contraction_range, (pressure, force), message)
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         force = self.force(pressure, contraction)

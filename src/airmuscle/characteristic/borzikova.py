@@ -1,7 +1,7 @@
-"""Contraction of the Shadow Air Muscle SAM 30 x 290 against pressure and load: plane curves and two surfaces.
+"""Borzíková et al.: contraction of the Shadow Air Muscle SAM 30 x 290, three plane curves and two surfaces.
 
-The coefficients stand here as the paper has them, in per cent, bar and newton; they are converted where they
-are used and never refitted.
+The coefficients are given as printed in the paper, in per cent, bar and newton. They are converted when used and are
+not refitted.
 """
 
 from __future__ import annotations
@@ -22,29 +22,28 @@ from .base import ContractionLaw
 
 BORZIKOVA = Reference(
     "borzikova-sam",
-    "Borzikova, Balara, Pitel",
+    "Borzíková, Balara, Piteľ",
     "The Mathematical Model of Contraction Characteristic k = (F, p) of the Pneumatic Artificial Muscle",
-    "FVT TU Kosice, Presov",
-    note="undated, newest reference of 2006, grant 1/4077/07: 2007 or later; its text lost its minus signs",
+    "FVT TU Košice, Prešov",
+    note="undated; newest reference of 2006, grant 1/4077/07: 2007 or later; minus signs are missing in the text",
 )
 
 
 @model
 class PlaneCurve:
-    """Contraction under one constant load, as the paper fitted it: k = k_max (1 - exp(b_0 + b_1 p + ...)).
+    """Contraction at one constant load, as fitted in the paper: k = k_max (1 - exp(b_0 + b_1 p + ...)).
 
-    p gauge pressure in bar in the coefficients, k_max the contraction that the muscle saturates towards. The
-    index IK was computed by the authors against measurements that are lost.
-    Reference: Borzikova et al., the three plane characteristics.
+    p: gauge pressure in bar; k_max: saturation contraction. The authors computed the correlation index IK from
+    measurements that are lost. Reference: Borzíková et al., the three plane characteristics.
     """
 
-    force: float = parameter("N", "F", "load, constant along the curve", bounds=(0.0, 1e5), fitted=False)
+    force: float = parameter("N", "F", "constant load of the curve", bounds=(0.0, 1e5), fitted=False)
     coefficients: tuple[float, ...] = parameter("1/bar^i", "b_i", "coefficients of the exponent, by power of p in bar")
-    saturation: float = parameter("1", "k_max", "contraction that the muscle saturates towards", bounds=(1e-3, 1.0))
-    printed_index: float = parameter("1", "IK", "correlation index printed for the curve", bounds=(0, 1), fitted=False)
+    saturation: float = parameter("1", "k_max", "saturation contraction", bounds=(1e-3, 1.0))
+    printed_index: float = parameter("1", "IK", "printed correlation index of the curve", bounds=(0, 1), fitted=False)
 
     def exponent(self, pressure: Value) -> Value:
-        """The exponent [1] at a gauge pressure [Pa]."""
+        """Exponent [1] at a gauge pressure [Pa]."""
         return _horner(self.coefficients, pressure / bar)
 
     def contraction(self, pressure: Value) -> Value:
@@ -52,30 +51,32 @@ class PlaneCurve:
         return self.saturation * (1.0 - ops.exp(self.exponent(pressure)))
 
     def turning_pressures(self) -> tuple[float, ...]:
-        """The positive gauge pressures [Pa], ascending, at which the contraction turns over."""
+        """Positive gauge pressures [Pa] of the extrema of the contraction, in ascending order."""
         roots = [complex(r) for r in np.polynomial.Polynomial(self.coefficients).deriv().roots()]
         return tuple(sorted(r.real * bar for r in roots if abs(r.imag) < 1e-9 and r.real > 0))
 
 
 @model
 class PlaneCurves:
-    """The plane curves of one muscle: the only record left of its measurements, so they serve as data."""
+    """Plane curves of one muscle; they replace its measurements, which are lost, as data."""
 
     references: ClassVar[tuple[Reference, ...]] = (BORZIKOVA,)
 
     curves: tuple[PlaneCurve, ...]
-    max_pressure: float = parameter("Pa", "p_high", "upper end of the measured gauge pressures", fitted=False)
+    max_pressure: float = parameter("Pa", "p_high", "upper limit of the measured gauge pressure", fitted=False)
 
-    def at(self, force: float) -> PlaneCurve:
-        """The curve of one load [N]. Raises OutOfReach where the paper has no curve for it."""
+    def curve_at(self, force: float) -> PlaneCurve:
+        """Return the curve of one load [N]. Raises GeometryLimitError if the paper has no curve for it."""
         for curve in self.curves:
             if curve.force == force:
                 return curve
         loads = ", ".join(f"{c.force:g}" for c in self.curves)
-        raise GeometryLimitError(f"No plane curve under {force:g} N; there are {loads} N. Between them ask a surface.")
+        raise GeometryLimitError(
+            f"No plane curve at {force:g} N; curves exist at {loads} N. Use a surface between these loads."
+        )
 
     def sample(self, points: int = 15) -> Recording:
-        """A recording of `points` even pressures [Pa] from zero on every curve, curve after curve."""
+        """Return a recording of `points` equidistant pressures from zero on every curve, curve after curve."""
         pressures = np.linspace(0.0, self.max_pressure, points)
         return Recording(
             {
@@ -83,17 +84,17 @@ class PlaneCurves:
                 "force": np.repeat([c.force for c in self.curves], points),
                 "contraction": np.concatenate([c.contraction(pressures) for c in self.curves]),
             },
-            origin="plane curves of Borzikova et al., sampled",
+            origin="plane curves of Borzíková et al., sampled",
             constants={"specimen": "Shadow Air Muscle SAM 30 x 290", "resting_length": 0.29},
-            notes=("Curves fitted by the authors, not measured points: those are lost.",),
+            notes=("Curves fitted by the authors; the measured points are lost.",),
         )
 
-    def interpolated(self, force_degree: int = 2) -> BorzikovaExponential:
-        """The one exponential surface through all the curves, for one load more than its degree in force."""
+    def interpolate(self, force_degree: int = 2) -> BorzikovaExponential:
+        """Return the exponential surface through all curves, of which there must be `force_degree` + 1."""
         loads = np.array([c.force for c in self.curves])
         degree = max(len(c.coefficients) for c in self.curves) - 1
         rows = np.array([(*c.coefficients, *(0.0,) * (degree + 1 - len(c.coefficients))) for c in self.curves])
-        # in F / F_max, or the powers of the load would cost digits
+        # in F / F_max, because the powers of the load are badly conditioned
         scaled = np.linalg.solve(np.vander(loads / loads.max(), force_degree + 1, increasing=True), rows).T
         matrix = scaled / loads.max() ** np.arange(force_degree + 1)
         validity_range = (0.0, self.max_pressure, float(loads.min()), float(loads.max()))
@@ -109,71 +110,73 @@ SAM_30X290 = PlaneCurves(
     ),
     3.5 * bar,
 )
-"""Loads of 4.5, 13 and 26 kg, taken as 45, 130 and 260 N as in the paper.
+"""Plane curves at 4.5, 13 and 26 kg, converted to 45, 130 and 260 N as in the paper.
 
-Minus signs are restored: plus signs survived in the text, so a gap inside a sum is a minus; the leading signs
-are those with which the printed matrix agrees. The range of 3.5 bar is inferred (the catalogue pressure).
+The minus signs are restored: plus signs are present in the text, so that a gap inside a sum is a minus; the leading
+signs are those that agree with the printed matrix. The range of 3.5 bar is inferred (the catalogue pressure).
 """
 
 
 @model
-class _Surface(ContractionLaw):
-    """What the two surfaces share: Sum_ij a_ij p^i F^j in bar and newton, and the validity range it was fitted on."""
+class _PolynomialSurface(ContractionLaw):
+    """Common part of the two surfaces: Sum_ij a_ij p^i F^j in bar and newton, and its validity range."""
 
     references: ClassVar[tuple[Reference, ...]] = (BORZIKOVA,)
 
     coefficients: tuple[float, ...] = parameter(
-        "1/(bar^i N^j)", "a_ij", "coefficients by power of p in bar, then of F in N; in per cent if direct"
+        "1/(bar^i N^j)",
+        "a_ij",
+        "coefficients ordered by power of p [bar], then of F [N]; for the direct surface in per cent",
     )
-    min_pressure: float = parameter("Pa", "p_low", "lower end of the validity range in gauge pressure", fitted=False)
-    max_pressure: float = parameter("Pa", "p_high", "upper end of the validity range in gauge pressure", fitted=False)
-    min_force: float = parameter("N", "F_low", "lower end of the validity range in force", fitted=False)
-    max_force: float = parameter("N", "F_high", "upper end of the validity range in force", fitted=False)
+    min_pressure: float = parameter("Pa", "p_low", "lower limit of the validity range in gauge pressure", fitted=False)
+    max_pressure: float = parameter("Pa", "p_high", "upper limit of the validity range in gauge pressure", fitted=False)
+    min_force: float = parameter("N", "F_low", "lower limit of the validity range in force", fitted=False)
+    max_force: float = parameter("N", "F_high", "upper limit of the validity range in force", fitted=False)
     pressure_degree: int = 4
     force_degree: int = 2
 
     def check(self) -> None:
         name = type(self).__name__
-        wanted = (self.pressure_degree + 1) * (self.force_degree + 1)
-        if len(self.coefficients) != wanted:
+        expected = (self.pressure_degree + 1) * (self.force_degree + 1)
+        if len(self.coefficients) != expected:
             raise ParameterError(
                 f"{name} of degree {self.pressure_degree} in pressure and {self.force_degree} in force needs "
-                f"{wanted} coefficients; {len(self.coefficients)} given."
+                f"{expected} coefficients, not {len(self.coefficients)}."
             )
-        for what, low, high in (
+        for quantity, low, high in (
             ("pressure", self.min_pressure, self.max_pressure),
             ("force", self.min_force, self.max_force),
         ):
             if not low < high:
-                raise ParameterError(f"{name}: min_{what} {low:g} must lie below max_{what} {high:g}.")
+                raise ParameterError(f"{name}: min_{quantity} {low:g} must be less than max_{quantity} {high:g}.")
 
     @property
     def pressure_range(self) -> tuple[float, float]:
-        """The validity range in gauge pressure [Pa]: a search finds nothing outside it."""
+        """Validity range in gauge pressure [Pa]; solutions are searched within it."""
         return (self.min_pressure, self.max_pressure)
 
     @property
     def force_range(self) -> tuple[float, float]:
-        """The validity range in force [N]: a search finds nothing outside it."""
+        """Validity range in force [N]; solutions are searched within it."""
         return (self.min_force, self.max_force)
 
     @abc.abstractmethod
     def contraction(self, pressure: Value, force: Value) -> Value: ...
 
     def inside_validity_range(self, pressure: Value, force: Value) -> Value:
-        """Whether gauge pressure [Pa] and force [N] lie where the muscle was measured."""
+        """Return whether gauge pressure [Pa] and force [N] are within the validity range."""
         in_pressure = ops.both(pressure >= self.min_pressure, pressure <= self.max_pressure)
         return ops.both(in_pressure, ops.both(force >= self.min_force, force <= self.max_force))
 
     def polynomial(self, pressure: Value, force: Value) -> Value:
-        """Sum_ij a_ij p^i F^j at gauge pressure [Pa] and force [N]; outside the validity range by its tangent."""
+        """Sum_ij a_ij p^i F^j at gauge pressure [Pa] and force [N]; linear extrapolation outside the validity range."""
         inner_p = ops.clip(pressure, self.min_pressure, self.max_pressure)
         inner_f = ops.clip(force, self.min_force, self.max_force)
-        value, by_p, by_f = self._with_slopes(inner_p / bar, inner_f)
+        value, by_p, by_f = self._value_and_derivatives(inner_p / bar, inner_f)
         return value + by_p * (pressure - inner_p) / bar + by_f * (force - inner_f)
 
-    def _with_slopes(self, p: Value, f: Value) -> tuple[Value, Value, Value]:
-        """The polynomial and its slopes by p [bar] and F [N], by Horner's scheme in both."""
+    def _value_and_derivatives(self, p: Value, f: Value) -> tuple[Value, Value, Value]:
+        """Polynomial and its derivatives with respect to p [bar] and F [N], by Horner's method in both variables."""
         width = self.force_degree + 1
         value: Value = 0.0
         by_p: Value = 0.0
@@ -187,13 +190,13 @@ class _Surface(ContractionLaw):
 
 
 @model
-class BorzikovaDirect(_Surface):
-    """Contraction as a polynomial: k = Sum_{i=0..m} Sum_{j=0..n} a_ij p^i F^j.
+class BorzikovaDirect(_PolynomialSurface):
+    """Polynomial contraction surface: k = Sum_{i=0..m} Sum_{j=0..n} a_ij p^i F^j.
 
-    k contraction in per cent, p gauge pressure in bar, F load in N; m = 4 and n = 2 give the 15 coefficients
-    that the paper prints in a matrix. Outside its validity range, where nothing was measured, the surface goes on by its
-    tangent and `inside_validity_range` says so.
-    Reference: Borzikova et al., the printed matrix: it is this polynomial, not the exponent of equation (1).
+    k: contraction in per cent; p: gauge pressure in bar; F: load in N; m = 4 and n = 2 give the 15 coefficients of the
+    printed matrix. Outside the validity range the surface is extrapolated linearly; `inside_validity_range` tests for
+    it. Reference: Borzíková et al., the printed matrix, which belongs to this polynomial and not to the exponent of
+    equation (1).
     """
 
     def contraction(self, pressure: Value, force: Value) -> Value:
@@ -201,24 +204,22 @@ class BorzikovaDirect(_Surface):
 
 
 @model
-class BorzikovaExponential(_Surface):
-    """Contraction that saturates: k = k_max (1 - exp v), v = Sum_{i=0..m} Sum_{j=0..n} a_ij p^i F^j.
+class BorzikovaExponential(_PolynomialSurface):
+    """Exponential contraction surface: k = k_max (1 - exp v), v = Sum_{i=0..m} Sum_{j=0..n} a_ij p^i F^j.
 
-    p gauge pressure in bar, F load in N, k_max the contraction that the muscle saturates towards [1], 0.40
-    for the SAM 30 x 290. The coefficients depend on material and geometry: each muscle must be measured.
-    Outside its validity range v goes on by its tangent.
-    Reference: Borzikova et al., equation (1).
+    p: gauge pressure in bar; F: load in N; k_max: saturation contraction [1], 0.40 for the SAM 30 x 290. The
+    coefficients depend on material and geometry, so that each muscle must be measured. Outside the validity range v is
+    extrapolated linearly. Reference: Borzíková et al., equation (1).
     """
 
-    saturation: float = parameter(
-        "1", "k_max", "contraction that the muscle saturates towards", bounds=(1e-3, 1.0), kw_only=True
-    )
+    saturation: float = parameter("1", "k_max", "saturation contraction", bounds=(1e-3, 1.0), kw_only=True)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         return self.saturation * (1.0 - ops.exp(self.polynomial(pressure, force)))
 
 
 def _horner(coefficients: tuple[float, ...], x: Value) -> Value:
+    """Sum of coefficients[i] x^i."""
     value: Value = 0.0
     for a in reversed(coefficients):
         value = value * x + a

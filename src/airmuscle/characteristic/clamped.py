@@ -1,4 +1,4 @@
-"""A wrapper: any force law, held within a range of force."""
+"""Wrapper that limits the force of any force law."""
 
 from __future__ import annotations
 
@@ -11,16 +11,19 @@ from .base import ForceLaw
 
 @model
 class Clamped(ForceLaw):
-    """F = min(max(F_inner, F_min), F_max): a muscle pulls and never pushes, and a compensator limits its force."""
+    """Limited force: F = min(max(F_inner, F_min), F_max).
+
+    A muscle pulls and never pushes; the upper limit is that of the force compensator or of the catalogue.
+    """
 
     inner: ForceLaw
-    min_force: float = parameter("N", "F_min", "force that the clamp lets through at least", fitted=False, default=0.0)
-    max_force: float = parameter("N", "F_max", "force that the clamp lets through at most", fitted=False, default=1.0e5)
+    min_force: float = parameter("N", "F_min", "lower limit of the force", fitted=False, default=0.0)
+    max_force: float = parameter("N", "F_max", "upper limit of the force", fitted=False, default=1.0e5)
 
     def check(self) -> None:
         if not self.min_force < self.max_force:
             raise ParameterError(
-                f"Clamped: min_force {self.min_force:g} N must lie below max_force {self.max_force:g} N."
+                f"Clamped: min_force {self.min_force:g} N must be less than max_force {self.max_force:g} N."
             )
 
     @property
@@ -30,5 +33,5 @@ class Clamped(ForceLaw):
     def force(self, pressure: Value, contraction: Value) -> Value:
         return ops.clip(self.inner.force(pressure, contraction), self.min_force, self.max_force)
 
-    def unclamped(self, pressure: Value, contraction: Value) -> Value:
-        return self.inner.unclamped(pressure, contraction)
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
+        return self.inner.unclamped_force(pressure, contraction)

@@ -1,4 +1,4 @@
-"""Contractile surface of Hill's muscle model: a polynomial of total degree n in contraction and pressure."""
+"""Contractile surface of Hill's muscle model: polynomial of total degree n in contraction and pressure."""
 
 from __future__ import annotations
 
@@ -14,51 +14,55 @@ from .validity_range import ValidityRange
 
 HOSOVSKY_HILL = Reference(
     "hosovsky-hill",
-    "Hosovsky, A. et al.",
+    "Hošovský, A. et al.",
     "Pneumatic artificial muscle modelling based on modified Hill's muscle model",
-    "TU Kosice",
-    note="polynomial of total degree five in contraction and pressure, 21 coefficients, clamped to 0..1200 N; "
+    "TU Košice",
+    note="polynomial of total degree five in contraction and pressure, 21 coefficients, limited to 0..1200 N; "
     "the coefficients are not printed",
 )
 
 
 def exponents(degree: int) -> tuple[tuple[int, int], ...]:
-    """The powers (i, j) of contraction and pressure with i + j <= degree, in the order of the coefficients."""
+    """Return the powers (i, j) of contraction and pressure with i + j <= degree, in the order of the coefficients."""
     return tuple((i, j) for j in range(degree + 1) for i in range(degree + 1 - j))
 
 
 @model
 class ContractileSurface(ForceLaw):
-    """F = clamp( Sum_{i+j<=n} a_ij x^i q^j ), with x and q the contraction and pressure scaled to -1..1 on the validity range.
+    """Polynomial force surface: F = clamp(Sum_{i+j<=n} a_ij x^i q^j).
 
         x = (2 eps - eps_low - eps_high)/(eps_high - eps_low),   q likewise from p
 
-    eps contraction [1], p gauge pressure [Pa], a_ij scaled coefficients [N], n = 5 gives the 21 of the paper.
-    Scaling is what keeps the fit well conditioned. Outside the validity range, where there was no data, the surface goes on
-    by its tangent, but there it neither rises with contraction nor falls with pressure, which no muscle does.
-    Reference: Hosovsky et al., F_KE = f(k, P) under their equation (1).
+    eps: contraction [1]; p: gauge pressure [Pa]; x, q: contraction and pressure scaled to -1..1 on the validity range;
+    a_ij: coefficients [N] of the scaled polynomial; n = 5 gives the 21 coefficients of the paper. The scaling keeps the
+    fit well conditioned. Outside the validity range the surface is extrapolated linearly, with a slope that is limited
+    so that force neither increases with contraction nor decreases with pressure.
+    Reference: Hošovský et al., F_KE = f(k, P) below their equation (1).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (HOSOVSKY_HILL,)
     linear_in: ClassVar[str] = "coefficients"
-    """The parameters in which the law is linear, so that a fit solves for them directly."""
+    """The parameters in which the model is linear; a fit solves for them by linear least squares."""
 
-    coefficients: tuple[float, ...] = parameter("N", "a_ij", "coefficients of the scaled powers, by pressure's power")
-    min_pressure: float = parameter("Pa", "p_low", "lower end of the validity range in gauge pressure", fitted=False)
-    max_pressure: float = parameter("Pa", "p_high", "upper end of the validity range in gauge pressure", fitted=False)
-    min_contraction: float = parameter("1", "eps_low", "lower end of the validity range in contraction", fitted=False)
-    max_contraction: float = parameter("1", "eps_high", "upper end of the validity range in contraction", fitted=False)
-    min_force: float = parameter("N", "F_min", "force that the clamp lets through at least", fitted=False, default=0.0)
-    max_force: float = parameter(
-        "N", "F_max", "force that the clamp lets through at most", fitted=False, default=1200.0
+    coefficients: tuple[float, ...] = parameter(
+        "N", "a_ij", "coefficients of the polynomial in scaled contraction and pressure, ordered by power of pressure"
     )
+    min_pressure: float = parameter("Pa", "p_low", "lower limit of the validity range in gauge pressure", fitted=False)
+    max_pressure: float = parameter("Pa", "p_high", "upper limit of the validity range in gauge pressure", fitted=False)
+    min_contraction: float = parameter("1", "eps_low", "lower limit of the validity range in contraction", fitted=False)
+    max_contraction: float = parameter(
+        "1", "eps_high", "upper limit of the validity range in contraction", fitted=False
+    )
+    min_force: float = parameter("N", "F_min", "lower limit of the force", fitted=False, default=0.0)
+    max_force: float = parameter("N", "F_max", "upper limit of the force", fitted=False, default=1200.0)
     degree: int = 5
 
     def check(self) -> None:
-        wanted = len(exponents(self.degree))
-        if len(self.coefficients) != wanted:
+        expected = len(exponents(self.degree))
+        if len(self.coefficients) != expected:
             raise ParameterError(
-                f"ContractileSurface: degree {self.degree} needs {wanted} coefficients, not {len(self.coefficients)}."
+                f"ContractileSurface: degree {self.degree} requires {expected} coefficients, not "
+                f"{len(self.coefficients)}."
             )
         for name, low, high in (
             ("pressure", self.min_pressure, self.max_pressure),
@@ -66,36 +70,36 @@ class ContractileSurface(ForceLaw):
             ("force", self.min_force, self.max_force),
         ):
             if not low < high:
-                raise ParameterError(f"ContractileSurface: min_{name} {low:g} must lie below max_{name} {high:g}.")
+                raise ParameterError(f"ContractileSurface: min_{name} {low:g} must be less than max_{name} {high:g}.")
 
     @classmethod
     def blank(cls, degree: int = 5, *, min_force: float = 0.0, max_force: float = 1200.0) -> ContractileSurface:
-        """A surface without coefficients yet, for `fit`, which takes its validity range from the data."""
+        """Return a surface with zero coefficients as the initial model of `fit`, which sets the validity range."""
         size = len(exponents(degree))
         return cls((0.0,) * size, 0.0, 1.0, 0.0, 1.0, min_force, max_force, degree)
 
     def with_validity_range(
         self, pressure: tuple[float, float], contraction: tuple[float, float]
     ) -> ContractileSurface:
-        """The surface with the same coefficients on another validity range; `fit` calls it before it solves."""
+        """Return the surface with the same coefficients on another validity range; `fit` calls it before it solves."""
         return ContractileSurface(
             self.coefficients, *pressure, *contraction, self.min_force, self.max_force, self.degree
         )
 
     @property
     def validity_range(self) -> ValidityRange:
-        """Where the surface has data; outside it goes on by its tangent."""
+        """Range of the data; outside, the surface is extrapolated linearly."""
         return ValidityRange(self.min_pressure, self.max_pressure, self.min_contraction, self.max_contraction)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         return ops.clip(self.polynomial(pressure, contraction), self.min_force, self.max_force)
 
-    def unclamped(self, pressure: Value, contraction: Value) -> Value:
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
         return self.polynomial(pressure, contraction)
 
     def basis(self, pressure: Value, contraction: Value) -> list[Value]:
-        """What each coefficient multiplies at points inside the validity range: the columns of the matrix that a fit solves."""
-        x, q = self._scaled(pressure, contraction)
+        """Basis functions at points in the validity range, one per coefficient: the columns of the design matrix."""
+        x, q = self._scale(pressure, contraction)
         powers_x, powers_q = [x * 0.0 + 1.0], [q * 0.0 + 1.0]
         for _ in range(self.degree):
             powers_x.append(powers_x[-1] * x)
@@ -103,25 +107,25 @@ class ContractileSurface(ForceLaw):
         return [powers_x[i] * powers_q[j] for i, j in exponents(self.degree)]
 
     @property
-    def terms(self) -> tuple[str, ...]:
-        """What each coefficient multiplies, in words for tables and messages: `x^2 q`."""
-        return tuple(f"{_power('x', i)} {_power('q', j)}".strip() or "1" for i, j in exponents(self.degree))
+    def term_labels(self) -> tuple[str, ...]:
+        """Labels of the basis functions for tables and messages, such as `x^2 q`."""
+        return tuple(f"{_power_label('x', i)} {_power_label('q', j)}".strip() or "1" for i, j in exponents(self.degree))
 
     def polynomial(self, pressure: Value, contraction: Value) -> Value:
-        """The force [N] before the clamp, continued by its tangent outside the validity range."""
-        x, q = self._scaled(pressure, contraction)
+        """Force [N] before the limits are applied, extrapolated linearly outside the validity range."""
+        x, q = self._scale(pressure, contraction)
         inner_q, inner_x = ops.clip(q, -1.0, 1.0), ops.clip(x, -1.0, 1.0)
         value, by_x, by_q = self._horner(inner_x, inner_q)
         return value + ops.minimum(by_x, 0.0) * (x - inner_x) + ops.maximum(by_q, 0.0) * (q - inner_q)
 
-    def _scaled(self, pressure: Value, contraction: Value) -> tuple[Value, Value]:
-        """Contraction and pressure as x and q, from -1 to 1 on the validity range."""
+    def _scale(self, pressure: Value, contraction: Value) -> tuple[Value, Value]:
+        """Scaled contraction x and pressure q, from -1 to 1 on the validity range."""
         half_p = (self.max_pressure - self.min_pressure) / 2
         half_c = (self.max_contraction - self.min_contraction) / 2
         return (contraction - self.min_contraction) / half_c - 1, (pressure - self.min_pressure) / half_p - 1
 
     def _horner(self, x: Value, q: Value) -> tuple[Value, Value, Value]:
-        """The polynomial and its slopes by x and q, by Horner's scheme in both variables."""
+        """Polynomial and its derivatives with respect to x and q, by Horner's method in both variables."""
         value: Value = 0.0
         by_x: Value = 0.0
         by_q: Value = 0.0
@@ -138,29 +142,30 @@ class ContractileSurface(ForceLaw):
             by_x = by_x * q + slope
         return value, by_x, by_q
 
-    def plain_coefficients(self, pressure_unit: float = 1.0) -> dict[tuple[int, int], float]:
-        """Coefficients of eps^i p^j inside the validity range, p in multiples of `pressure_unit` [Pa] (1e5 for bar).
+    def monomial_coefficients(self, pressure_unit: float = 1.0) -> dict[tuple[int, int], float]:
+        """Return the coefficients of eps^i p^j in the validity range, p in units of `pressure_unit` [Pa] (1e5: bar).
 
-        Returns {(i, j): value in N per pressure_unit^j}. Plain powers are badly conditioned: for export, not for fits.
+        Returns {(i, j): value in N per pressure_unit^j}. Monomials are badly conditioned: for export, not for fits.
         """
         scale_c = 2 / (self.max_contraction - self.min_contraction)
         scale_p = 2 / (self.max_pressure - self.min_pressure)
-        powers_c = _powers(-1 - scale_c * self.min_contraction, scale_c, self.degree)
-        powers_p = _powers(-1 - scale_p * self.min_pressure, scale_p * pressure_unit, self.degree)
-        plain = dict.fromkeys(exponents(self.degree), 0.0)
+        powers_c = _powers_of_linear(-1 - scale_c * self.min_contraction, scale_c, self.degree)
+        powers_p = _powers_of_linear(-1 - scale_p * self.min_pressure, scale_p * pressure_unit, self.degree)
+        monomial = dict.fromkeys(exponents(self.degree), 0.0)
         for (i, j), a in zip(exponents(self.degree), self.coefficients, strict=True):
             for m, by_c in enumerate(powers_c[i]):
                 for n, by_p in enumerate(powers_p[j]):
-                    plain[m, n] += a * by_c * by_p
-        return plain
+                    monomial[m, n] += a * by_c * by_p
+        return monomial
 
 
-def _power(symbol: str, exponent: int) -> str:
+def _power_label(symbol: str, exponent: int) -> str:
+    """Return a power as text, empty for exponent 0."""
     return "" if exponent == 0 else symbol if exponent == 1 else f"{symbol}^{exponent}"
 
 
-def _powers(constant: float, factor: float, degree: int) -> list[list[float]]:
-    """The coefficients of (constant + factor t)^i in t, for i up to `degree`."""
+def _powers_of_linear(constant: float, factor: float, degree: int) -> list[list[float]]:
+    """Coefficients of (constant + factor t)^i in t, for i up to `degree`."""
     powers = [[1.0]]
     for _ in range(degree):
         last = powers[-1]

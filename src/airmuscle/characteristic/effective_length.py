@@ -1,4 +1,4 @@
-"""A wrapper: one force law for muscles of one type and different length, whose ends do not take part."""
+"""Wrapper for muscles of one type and different lengths: rigid ends of constant length."""
 
 from __future__ import annotations
 
@@ -10,31 +10,33 @@ from ..core.errors import ParameterError
 from ..core.ops import Value
 from .base import ForceLaw
 
-_ROOM = 2.0
-"""Widening of a surface's validity range: so much more than the whole muscle its middle may contract (chosen)."""
+_RANGE_FACTOR = 2.0
+"""Factor by which the contraction range of the inner surface exceeds that of the whole muscle (chosen)."""
 
 
 @model
 class EffectiveLength(ForceLaw):
-    """F = F_inner(p, (eps L_0 + d)/(L_0 - l_d)).
+    """Force law of the active length: F = F_inner(p, (eps L_0 + d)/(L_0 - l_d)).
 
-    eps contraction of the whole muscle, L_0 its length between the fittings. The ends take l_d of it that does not
-    contract; d is the length by which they give under pressure or the zero of a bench is off. Short muscles so
-    contract less. `of_length` gives the law of another muscle of the type. Made for this program; that a dead
-    length at the ends limits short muscles is Tondu and Lopez (2000), whose end correction is L_0/(L_0 - l_d).
+    eps: contraction of the whole muscle; L_0: length between the fittings; l_d: length of the ends, which do not
+    contract; d: elongation of the ends under pressure, or zero error of the length measurement. Short muscles therefore
+    contract less. `with_resting_length` returns the model of another muscle of the same type. Developed for airmuscle;
+    the effect of the ends is from Tondu and Lopez (2000), whose end correction is L_0/(L_0 - l_d).
     """
 
     inner: ForceLaw
     resting_length: float = parameter(
         "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
     )
-    dead_length: float = parameter("m", "l_d", "length of the ends that does not contract", bounds=(-1.0, 1.0))
-    end_shift: float = parameter("m", "d", "length by which the ends give", bounds=(-0.1, 0.1), default=0.0)
+    dead_length: float = parameter("m", "l_d", "length of the ends, which do not contract", bounds=(-1.0, 1.0))
+    end_shift: float = parameter(
+        "m", "d", "elongation of the ends, or zero error of the length", bounds=(-0.1, 0.1), default=0.0
+    )
 
     def check(self) -> None:
         if not self.dead_length < self.resting_length:
             raise ParameterError(
-                f"EffectiveLength: dead_length {self.dead_length:g} m must lie below resting_length "
+                f"EffectiveLength: dead_length {self.dead_length:g} m must be less than resting_length "
                 f"{self.resting_length:g} m."
             )
 
@@ -46,29 +48,30 @@ class EffectiveLength(ForceLaw):
 
     @property
     def linear_in(self) -> tuple[str, ...]:
-        """What the inner law is linear in; the lengths are not among it."""
-        named = getattr(self.inner, "linear_in", ())
-        return tuple(f"inner.{field}" for field in ((named,) if isinstance(named, str) else named))
+        """The parameters in which the inner model is linear; the lengths are not among them."""
+        fields = getattr(self.inner, "linear_in", ())
+        return tuple(f"inner.{field}" for field in ((fields,) if isinstance(fields, str) else fields))
 
-    def of_length(self, resting_length: float) -> EffectiveLength:
-        """The law of a muscle of the same type with this length [m] between the fittings."""
+    def with_resting_length(self, resting_length: float) -> EffectiveLength:
+        """Return the model of a muscle of the same type with this resting length [m]."""
         return dataclasses.replace(self, resting_length=resting_length)
 
     def with_validity_range(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> EffectiveLength:
-        """The law with its inner surface on a validity range that leaves room for the middle to contract more."""
+        """Return the model with another validity range; that of the inner surface is wider in contraction."""
         inner: Any = self.inner
         if not hasattr(inner, "with_validity_range"):
             return self
         low, high = contraction
-        room = (_ROOM - 1) * (high - low) / 2
-        return dataclasses.replace(self, inner=inner.with_validity_range(pressure, (low - room, high + room)))
+        margin = (_RANGE_FACTOR - 1) * (high - low) / 2
+        return dataclasses.replace(self, inner=inner.with_validity_range(pressure, (low - margin, high + margin)))
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        return self.inner.force(pressure, self._of_the_middle(contraction))
+        return self.inner.force(pressure, self._active_contraction(contraction))
 
-    def unclamped(self, pressure: Value, contraction: Value) -> Value:
-        return self.inner.unclamped(pressure, self._of_the_middle(contraction))
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
+        return self.inner.unclamped_force(pressure, self._active_contraction(contraction))
 
-    def _of_the_middle(self, contraction: Value) -> Value:
+    def _active_contraction(self, contraction: Value) -> Value:
+        """Contraction [1] of the active length."""
         shortening = contraction * self.resting_length + self.end_shift
         return shortening / (self.resting_length - self.dead_length)

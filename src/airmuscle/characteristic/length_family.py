@@ -1,4 +1,4 @@
-"""Wrappers: one force law for muscles of one type and different length, as a law plus a share of its change."""
+"""Wrappers for muscles of one type and different lengths: a force law plus a length-dependent correction."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from .base import ForceLaw
 
 @model
 class LengthFamily(ForceLaw):
-    """F = max(0, F_inner(p, eps) + s(L_0) F_change(p, eps)), with a share s that is zero at the reference length.
+    """Base class: F = max(0, F_inner(p, eps) + s(L_0) F_change(p, eps)), with s = 0 at the reference length.
 
-    L_0 length between the fittings. Each family says how its share depends on it; clamps inside do not act.
+    L_0: length between the fittings; s: length factor, defined by the subclass. Force limits of the inner models are
+    not applied.
     """
 
     inner: ForceLaw
@@ -25,7 +26,7 @@ class LengthFamily(ForceLaw):
         "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
     )
     reference_length: float = parameter(
-        "m", "L_ref", "length at which the inner law is the whole", bounds=(1e-3, 20.0), fitted=False
+        "m", "L_ref", "reference length, at which the correction is zero", bounds=(1e-3, 20.0), fitted=False
     )
 
     @property
@@ -34,59 +35,59 @@ class LengthFamily(ForceLaw):
 
     @property
     def linear_in(self) -> tuple[str, ...]:
-        """Where both parts are linear in their coefficients, the whole is."""
-        parts: tuple[tuple[str, Any], ...] = (("inner", self.inner), ("change", self.change))
-        fields = [f"{name}.{part.linear_in}" for name, part in parts if hasattr(part, "linear_in")]
-        return tuple(fields) if len(fields) == len(parts) else ()
+        """The coefficients of both models if both are linear in them, else none."""
+        models: tuple[tuple[str, Any], ...] = (("inner", self.inner), ("change", self.change))
+        fields = [f"{name}.{law.linear_in}" for name, law in models if hasattr(law, "linear_in")]
+        return tuple(fields) if len(fields) == len(models) else ()
 
-    def of_length(self, resting_length: float) -> Self:
-        """The law of a muscle of the same type with this length [m] between the fittings."""
+    def with_resting_length(self, resting_length: float) -> Self:
+        """Return the model of a muscle of the same type with this resting length [m]."""
         return dataclasses.replace(self, resting_length=resting_length)
 
     def with_validity_range(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> Self:
-        """The law with its surfaces on another validity range."""
-        parts: dict[str, Any] = {"inner": self.inner, "change": self.change}
-        boxed = {
-            n: p.with_validity_range(pressure, contraction)
-            for n, p in parts.items()
-            if hasattr(p, "with_validity_range")
+        """Return the model with its surfaces on another validity range."""
+        models: dict[str, Any] = {"inner": self.inner, "change": self.change}
+        surfaces = {
+            name: law.with_validity_range(pressure, contraction)
+            for name, law in models.items()
+            if hasattr(law, "with_validity_range")
         }
-        return dataclasses.replace(self, **boxed)
+        return dataclasses.replace(self, **surfaces)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        return ops.maximum(self.unclamped(pressure, contraction), 0.0)
+        return ops.maximum(self.unclamped_force(pressure, contraction), 0.0)
 
     @abc.abstractmethod
-    def share(self) -> Value:
-        """s [1] at this muscle's length."""
+    def length_factor(self) -> Value:
+        """Length factor s [1] of this muscle."""
 
-    def unclamped(self, pressure: Value, contraction: Value) -> Value:
-        whole = self.inner.unclamped(pressure, contraction)
-        return whole + self.share() * self.change.unclamped(pressure, contraction)
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
+        reference = self.inner.unclamped_force(pressure, contraction)
+        return reference + self.length_factor() * self.change.unclamped_force(pressure, contraction)
 
 
 @model
 class InverseLength(LengthFamily):
-    """F = max(0, F_inner(p, eps) + (L_ref/L_0 - 1) F_change(p, eps)).
+    """Length factor in 1/L_0: F = max(0, F_inner(p, eps) + (L_ref/L_0 - 1) F_change(p, eps)).
 
-    L_0 length between the fittings, L_ref the length at which F_inner is the whole law; clamps inside do not act.
-    If both are surfaces, every coefficient has a term in 1/L_0: what ends of a fixed size do. `of_length` gives
-    the law of another muscle of the type. Made for this program.
+    L_0: length between the fittings; L_ref: reference length. Force limits of the inner models are not applied. If both
+    models are surfaces, every coefficient has a term in 1/L_0, the effect of ends of constant size.
+    `with_resting_length` returns the model of another muscle of the same type. Developed for airmuscle.
     """
 
-    def share(self) -> Value:
+    def length_factor(self) -> Value:
         return self.reference_length / self.resting_length - 1.0
 
 
 @model
 class LogarithmicLength(LengthFamily):
-    """F = max(0, F_inner(p, eps) + ln(L_0/L_ref) F_change(p, eps)).
+    """Logarithmic length factor: F = max(0, F_inner(p, eps) + ln(L_0/L_ref) F_change(p, eps)).
 
-    L_0 length between the fittings, L_ref the length at which F_inner is the whole law; clamps inside do not act.
-    Between a term in 1/L_0, which is all but gone in long muscles, and one in L_0, which has no end. `of_length`
-    gives the law of another muscle of the type. Made for this program, after measured muscles of 83 to 382 mm whose
-    force grew about as much with the first doubling of their length as with the second.
+    L_0: length between the fittings; L_ref: reference length. Force limits of the inner models are not applied. The
+    logarithm lies between a term in 1/L_0, which is negligible for long muscles, and a term in L_0, which is unbounded.
+    `with_resting_length` returns the model of another muscle of the same type. Developed for airmuscle from measured
+    muscles of 83 to 382 mm, whose force increased about equally with the first and the second doubling of length.
     """
 
-    def share(self) -> Value:
+    def length_factor(self) -> Value:
         return ops.log(self.resting_length / self.reference_length)

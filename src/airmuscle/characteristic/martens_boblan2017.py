@@ -1,4 +1,4 @@
-"""Martens and Boblan 2017: braid, wall stiffness along and around, of Festo's DMSP muscles."""
+"""Martens and Boblan 2017: Festo DMSP muscles, braid with axial and circumferential wall stiffness."""
 
 from __future__ import annotations
 
@@ -19,49 +19,49 @@ MARTENS_BOBLAN_2017 = Reference(
     "Actuators 6(4):33",
     2017,
     "10.3390/act6040033",
-    "formula, parameters and the measured force maps of the appendix, CC BY 4.0; numbers read from a public copy",
+    "formula, parameters and measured force maps of the appendix, CC BY 4.0; numbers read from a public copy",
 )
 
 
 @model
 class MartensBoblan2017(ForceLaw):
-    """F = max(0, -p dV/dL + F_pe dD/dL - F_l), threads in a rubber wall of one modulus E(L).
+    """Braided muscle with a rubber wall of modulus E(L): F = max(0, -p dV/dL + F_pe dD/dL - F_l).
 
         L_f = L_0/cos(theta),   n = L_0 tan(theta)/(pi D_0),   D = sqrt(L_f^2 - L^2)/(n pi)
         dV/dL = (L_f^2 - 3 L^2)/(4 pi n^2),   dD/dL = -L/(n pi sqrt(L_f^2 - L^2))
         E = c_0 + c_1 L + c_2 L^2 + c_3 L^3
         F_l = E (L - L_0)/L_0 H_0 pi D,   F_pe = E (D - D_0)/D_0 H_0 L pi
 
-    p gauge pressure, L length, D diameter, L_f length and n turns of a thread, H_0 wall thickness, F_l force of
-    the wall along the axis, F_pe around it. The angle of the braid is theta = 28.6 deg + d_theta with the printed
-    d_theta in radians. Reference: Martens and Boblan (2017).
+    p: gauge pressure; L: length; D: diameter; L_f, n: length and number of turns of a thread; H_0: wall thickness;
+    F_l, F_pe: axial and circumferential force of the wall. The braid angle is theta = 28.6 deg + d_theta with the
+    printed d_theta in radians. Reference: Martens and Boblan (2017).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (MARTENS_BOBLAN_2017,)
 
     geometry: Braid
     wall_thickness: float = parameter(
-        "m", "H_0", "thickness of the wall at rest; only its product with E is felt", bounds=(1e-4, 1e-2), fitted=False
+        "m", "H_0", "wall thickness at rest; only its product with E has an effect", bounds=(1e-4, 1e-2), fitted=False
     )
     c0: float = parameter("Pa", "c_0", "modulus of the wall, constant term")
-    c1: float = parameter("Pa/m", "c_1", "modulus of the wall, by length")
-    c2: float = parameter("Pa/m^2", "c_2", "modulus of the wall, by length squared")
-    c3: float = parameter("Pa/m^3", "c_3", "modulus of the wall, by length cubed")
+    c1: float = parameter("Pa/m", "c_1", "modulus of the wall, linear term")
+    c2: float = parameter("Pa/m^2", "c_2", "modulus of the wall, quadratic term")
+    c3: float = parameter("Pa/m^3", "c_3", "modulus of the wall, cubic term")
 
     @property
     def contraction_range(self) -> tuple[float, float]:
-        """From 5 % of stretch, or straight threads where they come sooner, to 40 %: E(L) was fitted within."""
+        """From -5 %, or half the contraction of straight threads if greater, to 40 %, the validity range of E(L)."""
         straight, _ = self.geometry.contraction_range
         return (max(-0.05, straight / 2), 0.4)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        return ops.maximum(self.unclamped(pressure, contraction), 0.0)
+        return ops.maximum(self.unclamped_force(pressure, contraction), 0.0)
 
     def modulus(self, length: Value) -> Value:
-        """E [Pa] of the wall at a length [m] between the fittings."""
+        """Modulus E [Pa] of the wall at a length [m] between the fittings."""
         return self.c0 + length * (self.c1 + length * (self.c2 + length * self.c3))
 
-    def unclamped(self, pressure: Value, contraction: Value) -> Value:
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
         rest, angle = self.geometry.resting_length, self.geometry.braid_angle
         length = rest * (1.0 - contraction)
         turns = rest * ops.tan(angle) / (ops.pi * 2 * self.geometry.radius)
@@ -73,6 +73,7 @@ class MartensBoblan2017(ForceLaw):
         stress = self.modulus(length) * self.wall_thickness * ops.pi
         along = stress * (length - rest) / rest * diameter
         around = stress * (diameter / (2 * self.geometry.radius) - 1.0) * length
-        # Mechanics would add the axial force: a wall shorter than at rest pushes. The paper subtracts it and
-        # fitted c_0..c_3 so; with a plus its own maps are missed by 15 % and 10 % instead of 2.4 % and 7.4 %.
+        # Mechanically the axial force should be added: a wall shorter than at rest pushes. The paper subtracts it and
+        # fitted c_0..c_3 accordingly; with a plus sign the maximum errors on its maps are 15 % and 10 % instead of
+        # 2.4 % and 7.4 %.
         return -pressure * volume_by_length + around * diameter_by_length - along

@@ -1,4 +1,4 @@
-"""Reynolds 2003: contractile force and spring, both linear in pressure."""
+"""Reynolds 2003: contractile force and spring stiffness, both linear in pressure."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ REYNOLDS_2003 = Reference(
     "Annals of Biomedical Engineering 31(3):310-317",
     2003,
     "10.1114/1.1554921",
-    "coefficients second hand, as given in Lilly and Quesada, IEEE TNSRE 12(3):349 (2004); units of N/mm inferred",
+    "coefficients from a secondary source, Lilly and Quesada, IEEE TNSRE 12(3):349 (2004); units of N/mm inferred",
 )
 
 
 @model
 class Reynolds2003(ForceLaw):
-    """F = f_0 + f_1 p - (k_0 + k_1 p) L_0 eps.
+    """Contractile force and parallel spring: F = f_0 + f_1 p - (k_0 + k_1 p) L_0 eps.
 
-    p gauge pressure, eps contraction; f the contractile force, k the stiffness of the spring beside it, given in
-    N/mm of one specimen: so the law needs that specimen's resting length L_0. Reference: Reynolds et al. (2003).
+    p: gauge pressure; eps: contraction; f: contractile force; k: stiffness of the parallel spring, given in N/mm for
+    one specimen, so that its resting length L_0 is required. Reference: Reynolds et al. (2003).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (REYNOLDS_2003,)
@@ -33,10 +33,12 @@ class Reynolds2003(ForceLaw):
     resting_length: float = parameter(
         "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
     )
-    force_offset: float = parameter("N", "f_0", "contractile force without pressure", default=179.2)
-    force_by_pressure: float = parameter("N/Pa", "f_1", "growth of the contractile force", default=1.39e-3)
-    stiffness_offset: float = parameter("N/m", "k_0", "stiffness without pressure", default=5.71e3)
-    stiffness_by_pressure: float = parameter("N/m/Pa", "k_1", "growth of the stiffness with pressure", default=0.0307)
+    force_offset: float = parameter("N", "f_0", "contractile force at zero pressure", default=179.2)
+    force_by_pressure: float = parameter(
+        "N/Pa", "f_1", "increase of the contractile force with pressure", default=1.39e-3
+    )
+    stiffness_offset: float = parameter("N/m", "k_0", "stiffness at zero pressure", default=5.71e3)
+    stiffness_by_pressure: float = parameter("N/m/Pa", "k_1", "increase of the stiffness with pressure", default=0.0307)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         contractile = self.force_offset + self.force_by_pressure * pressure

@@ -1,4 +1,4 @@
-"""The rubber of a straight-fibre muscle's wall: a straight line of hoop stress over strain."""
+"""Rubber wall of a straight-fibre muscle: linear relation between hoop stress and strain."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from ..geometry.meridian import Segment
 
 @model
 class RubberLine:
-    """sigma = alpha eps + beta,   eps = (r - r_0)/r_0: nominal hoop stress, on the initial wall thickness.
+    """Linear rubber: sigma = alpha eps + beta,   eps = (r - r_0)/r_0.
 
-    Fibres that do not stretch leave the hoop force per arc as sigma t, so that the wall needs no correction for
-    thinning. A positive beta is a stress at rest, as of a balloon. Reference: Saga et al. 2007, (10), (11), Fig. 4.
+    sigma: nominal hoop stress, referred to the initial wall thickness. With inextensible fibres the hoop force per arc
+    length is sigma t, so that no correction for the decreasing thickness is required. A positive beta is a prestress,
+    as in a balloon. Reference: Saga et al. 2007, (10), (11), Fig. 4.
     """
 
-    slope: float = parameter("Pa", "alpha", "growth of the hoop stress with strain", bounds=(0.0, 1e8))
+    slope: float = parameter("Pa", "alpha", "increase of the hoop stress with strain", bounds=(0.0, 1e8))
     intercept: float = parameter("Pa", "beta", "hoop stress at rest", bounds=(-1e7, 1e7))
 
     def stress(self, strain: Value) -> Value:
@@ -25,32 +26,33 @@ class RubberLine:
         return self.slope * strain + self.intercept
 
     def energy(self, arc_excess: Value, arc_excess_squared: Value, end_radius: Value) -> Value:
-        """U/t = 2 pi (alpha Q/(2 r_0) + beta G) [N] per wall thickness; linear: it takes their growth as well."""
+        """Energy per wall thickness [N], U/t = 2 pi (alpha Q/(2 r_0) + beta G); linear, also valid for derivatives."""
         return 2 * pi * (self.slope * arc_excess_squared / (2 * end_radius) + self.intercept * arc_excess)
 
-    def _along(self, excess: Value, path: Value, end_radius: Value) -> Value:
-        return self.slope / end_radius * excess + self.intercept * path
+    def integrate_stress(self, excess: Value, length: Value, end_radius: Value) -> Value:
+        """Integral of the hoop stress [N/m] from the integral of r - r_0 [m2] over a path and its length [m]."""
+        return self.slope / end_radius * excess + self.intercept * length
 
 
 class RubberIntegral(abc.ABC):
-    """What the hoop stress is integrated along."""
+    """Path of integration of the hoop stress (interface)."""
 
     @abc.abstractmethod
     def hoop_stress(self, rubber: RubberLine, segment: Segment) -> Value:
-        """H = Int sigma over one segment [N/m]."""
+        """H = Int sigma [N/m] over one segment."""
 
 
 @model
-class AlongAxis(RubberIntegral):
-    """H = Int sigma dx, as Saga et al. 2007 print in (12)."""
+class AxialIntegral(RubberIntegral):
+    """Integration along the axis: H = Int sigma dx, as printed in (12) of Saga et al. 2007."""
 
     def hoop_stress(self, rubber: RubberLine, segment: Segment) -> Value:
-        return rubber._along(segment.excess, segment.length, segment.end_radius)
+        return rubber.integrate_stress(segment.excess, segment.length, segment.end_radius)
 
 
 @model
-class AlongArc(RubberIntegral):
-    """H = Int sigma ds: a hoop stress acts along the arc."""
+class ArcIntegral(RubberIntegral):
+    """Integration along the arc: H = Int sigma ds, as a hoop stress acts along the arc."""
 
     def hoop_stress(self, rubber: RubberLine, segment: Segment) -> Value:
-        return rubber._along(segment.arc_excess, segment.arc, segment.end_radius)
+        return rubber.integrate_stress(segment.arc_excess, segment.arc, segment.end_radius)

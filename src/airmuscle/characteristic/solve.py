@@ -1,4 +1,4 @@
-"""The root search behind the directions that a law does not give in closed form."""
+"""Root search for the directions of a characteristic that are not in closed form."""
 
 from __future__ import annotations
 
@@ -10,70 +10,79 @@ import numpy as np
 from ..core.errors import SolveError
 
 INTERVALS = 256
-"""Places looked at within a reach; a law that rises and falls again within 1/256 of it is not resolved."""
+"""Intervals of the search grid; a pair of roots within 1/256 of the search range is not resolved."""
 
 _TOLERANCES = {"xatol": 0.0, "xrtol": 4 * float(np.finfo(float).eps), "fatol": 0.0, "frtol": 0.0}
 
 
-def first_crossing(
+def describe_range(low: float, high: float, unit: str) -> str:
+    """Return a range as text with four significant digits; rounding residues become 0, missing limits a dash."""
+    if np.isnan(low) or np.isnan(high):
+        return "–"
+    size = max(abs(low), abs(high))
+    low, high = (0.0 if abs(limit) < 1e-9 * size else limit for limit in (low, high))
+    return f"{low:.4g} to {high:.4g} {unit}"
+
+
+def find_first_root(
     function: Callable[[Any, Any, Any], Any],
-    reach: tuple[float, float],
-    given: tuple[Any, Any],
+    bounds: tuple[float, float],
+    args: tuple[Any, Any],
     message: Callable[[float, float, float, float], str],
 ) -> Any:
-    """The smallest x in `reach` where `function(x, a, b)` passes from below zero to zero or more.
+    """Return the smallest x within `bounds` at which `function(x, a, b)` changes from negative to zero or positive.
 
-    That is the branch reached from rest as x grows. `given` are the two other quantities, scalars or arrays
-    that broadcast; the answer has their shape. `message(a, b, lowest, greatest)` words the NoSolution raised for
-    the first pair without a crossing, from the least and greatest value that `function` takes in `reach`.
+    This is the branch reached from rest as x increases. `args` are the two other quantities a and b, scalars or arrays
+    that broadcast; the result has their shape. Raises SolveError for the first pair without a root, with the text of
+    `message(a, b, minimum, maximum)`, where minimum and maximum are the extreme values of `function` within `bounds`.
     """
     from scipy.optimize import elementwise
 
-    first, second = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in given))
+    first, second = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in args))
     a, b = first.reshape(-1), second.reshape(-1)
-    grid = np.linspace(*reach, INTERVALS + 1)
-    with np.errstate(over="ignore", invalid="ignore"):  # far from any answer a law may overflow
+    grid = np.linspace(*bounds, INTERVALS + 1)
+    with np.errstate(over="ignore", invalid="ignore"):  # a model may overflow far from its solutions
         values = np.asarray(function(grid[:, None], a, b)) + np.zeros((grid.size, a.size))
     rises = (values[:-1] < 0) & (values[1:] >= 0)
     at_start = values[0] == 0
     unsolved = ~(rises.any(axis=0) | at_start)
     if unsolved.any():
-        worst = int(np.argmax(unsolved))
-        taken = values[~np.isnan(values[:, worst]), worst]
-        ends = (float(taken.min()), float(taken.max())) if taken.size else (np.nan, np.nan)
-        raise SolveError(message(float(a[worst]), float(b[worst]), *ends))
-    found = np.full(a.size, reach[0])
+        first_unsolved = int(np.argmax(unsolved))
+        finite = values[~np.isnan(values[:, first_unsolved]), first_unsolved]
+        extremes = (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)
+        raise SolveError(message(float(a[first_unsolved]), float(b[first_unsolved]), *extremes))
+    roots = np.full(a.size, bounds[0])
     index = rises.argmax(axis=0)
     plateau = np.take_along_axis(values, index[None, :] + 1, axis=0)[0] == 0
-    for chosen, searched in ((~plateau, function), (plateau, _by_sign(function))):
-        here = chosen & ~at_start
-        if here.any():
-            bracket = (grid[index[here]], grid[index[here] + 1])
+    for subset, target in ((~plateau, function), (plateau, _sign_function(function))):
+        selected = subset & ~at_start
+        if selected.any():
+            bracket = (grid[index[selected]], grid[index[selected] + 1])
             with np.errstate(over="ignore", invalid="ignore"):
                 root = elementwise.find_root(
-                    searched, bracket, args=(a[here], b[here]), tolerances=_TOLERANCES, maxiter=200
+                    target, bracket, args=(a[selected], b[selected]), tolerances=_TOLERANCES, maxiter=200
                 )
-            found[here] = root.x
-    return float(found[0]) if first.ndim == 0 else found.reshape(first.shape)
+            roots[selected] = root.x
+    return float(roots[0]) if first.ndim == 0 else roots.reshape(first.shape)
 
 
-def _by_sign(function: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Any, Any], Any]:
-    """The function reduced to its side of zero: a plateau at zero (a clamped force) is then searched for its edge."""
+def _sign_function(function: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Any, Any], Any]:
+    """Return the sign of a function, so that the search finds the edge of a plateau at zero (a clamped force)."""
     return lambda x, a, b: np.where(np.asarray(function(x, a, b)) >= 0, 1.0, -1.0)
 
 
-def within_reach(
-    found: Any, reach: tuple[float, float], given: tuple[Any, Any], message: Callable[[float, float], str]
+def check_solution(
+    solution: Any, bounds: tuple[float, float], args: tuple[Any, Any], message: Callable[[float, float], str]
 ) -> Any:
-    """`found`, the answer of a closed form, where it lies in `reach`; raises SolveError(message(a, b)) elsewhere.
+    """Return `solution`, the result of a closed form; raises SolveError(message(a, b)) if it is not within `bounds`.
 
-    `given` are the two other quantities. Symbols and JAX arrays pass, for they have no value to look at.
+    `args` are the two other quantities a and b. Symbols and JAX arrays have no values and are not checked.
     """
-    if type(found).__module__.partition(".")[0] in ("casadi", "jax", "jaxlib"):
-        return found
-    values = np.asarray(found, dtype=float)
-    outside = ~((values >= reach[0]) & (values <= reach[1]))
+    if type(solution).__module__.partition(".")[0] in ("casadi", "jax", "jaxlib"):
+        return solution
+    values = np.asarray(solution, dtype=float)
+    outside = ~((values >= bounds[0]) & (values <= bounds[1]))
     if outside.any():
-        first, second = (np.broadcast_to(np.asarray(v, dtype=float), values.shape)[outside].flat[0] for v in given)
+        first, second = (np.broadcast_to(np.asarray(v, dtype=float), values.shape)[outside].flat[0] for v in args)
         raise SolveError(message(float(first), float(second)))
-    return found
+    return solution

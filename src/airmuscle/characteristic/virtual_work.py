@@ -1,4 +1,4 @@
-"""The tension of any geometry by virtual work: a muscle without wall or friction, which keeps energy."""
+"""Ideal muscle of any geometry by the principle of virtual work, without wall stiffness or friction."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from ..core.reference import Reference
 from ..geometry.base import Geometry
 from ..geometry.braid import CHOU_HANNAFORD_1996
 from .base import ForceLaw, Slopes
-from .solve import within_reach
+from .solve import check_solution
 
 
 @model
 class VirtualWork(ForceLaw):
-    """F = -p dV/dL = p (dV/deps)/L_0.
+    """Virtual work: F = -p dV/dL = p (dV/deps)/L_0.
 
-    p gauge pressure, V enclosed volume, L = L_0 (1 - eps) length. The work of the air, p dV, is all given to
-    the load, so the Maxwell defect dF/dp + dV/dL is zero everywhere. Past the contraction of greatest volume
-    the muscle pushes; clamp it where it must not. Reference: Chou and Hannaford (1996), the derivation of
-    their force.
+    p: gauge pressure; V: enclosed volume; L = L_0 (1 - eps): length. The work p dV of the air is transferred to the
+    load without loss, so that the Maxwell defect dF/dp + dV/dL is zero everywhere. Above the contraction of maximum
+    volume the force is negative; limit it with `Clamped` if required.
+    Reference: Chou and Hannaford (1996), derivation of the force.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (CHOU_HANNAFORD_1996,)
@@ -33,20 +33,20 @@ class VirtualWork(ForceLaw):
         return self.geometry.contraction_range
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        return pressure * self.area(contraction)
+        return pressure * self.effective_area(contraction)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        found = force / self.area(contraction)
-        return within_reach(found, self.pressure_range, (contraction, force), self._no_pressure)
+        solution = force / self.effective_area(contraction)
+        return check_solution(solution, self.pressure_range, (contraction, force), self._no_pressure_message)
 
-    def area(self, contraction: Value) -> Value:
-        """F/p [m2]: the piston that the muscle is worth at a contraction [1]."""
-        return self.geometry.volume_growth(contraction) / self.geometry.resting_length
+    def effective_area(self, contraction: Value) -> Value:
+        """Effective area F/p [m2] at a contraction [1], the area of an equivalent piston."""
+        return self.geometry.volume_derivative(contraction) / self.geometry.resting_length
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         if not type(self.geometry).traceable:
             raise TraceError(
-                f"VirtualWork: {type(self.geometry).__name__} is not closed-form, so its second derivative is not "
-                "known exactly. Replace it by airmuscle.geometry.chebyshev.as_polynomial(geometry)."
+                f"VirtualWork: {type(self.geometry).__name__} is not in closed form, so that its second derivative "
+                "is not available. Replace it by airmuscle.geometry.chebyshev.as_polynomial(geometry)."
             )
         return super().slopes(pressure, contraction)

@@ -1,6 +1,6 @@
-"""The command line. Heavy modules are imported inside the commands, so that `airmuscle list` starts at once."""
+"""The command line `airmuscle`."""
 
-from .app import main
+from .entry_point import main
 
 __all__ = [
     "main",

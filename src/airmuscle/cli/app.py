@@ -1,112 +1,158 @@
-"""The command `airmuscle`: its commands, and how each of them ends.
+"""The command `airmuscle`: table of its commands, errors and exit codes.
 
-Exit code 0 is well, 1 the work failed (one line on stderr says why), 2 wrong usage, 130 interrupted.
+Exit code 0: success. 1: failure, with one line on stderr that gives the reason. 2: wrong usage. 130: interrupted.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import importlib
 import warnings
-from typing import Annotated, Any
+from collections.abc import Iterator
+from typing import Annotated, Any, NamedTuple
 
 import typer
 from typer.core import TyperGroup
 
-from ..core.errors import AirmuscleError, AirmuscleWarning
-from .cite import cite
-from .convert import convert
-from .fit import fit
-from .fit_dynamic import fit_dynamic
-from .hysteresis import hysteresis
-from .inspect import inspect
-from .interruption import deferred_sigint
-from .list import list_entries
-from .plan import plan
+from ..core.errors import AirmuscleError, AirmuscleWarning, suggestion
+from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
 from .remedies import in_options
-from .reproduce import reproduce
-from .schema import schema
-from .show import show
-from .simulate import simulate
-from .solve import solve
-from .sweep import sweep
+from .terminal import echo, printable
+
+SETTINGS: dict[str, Any] = {
+    "add_completion": False,
+    "pretty_exceptions_enable": False,
+    "rich_markup_mode": None,
+    "context_settings": {"help_option_names": ["-h", "--help"], "max_content_width": 110},
+}
 
 
-class Commands(TyperGroup):
-    """Lists the commands in the order of use, and turns errors and warnings into one line each."""
+class CommandRow(NamedTuple):
+    """A command: its module in this package and its function there, imported on use; its summary for --help."""
+
+    name: str
+    module: str
+    function: str
+    summary: str
+
+
+COMMANDS = (
+    CommandRow("reproduce", "reproduce", "reproduce", "Reproduce three papers and test each of their claims."),
+    CommandRow("list", "list", "list_entries", "List the muscles, laws, valves and data sets of the library."),
+    CommandRow("show", "show", "show", "Show parameters, sources and checks of a library entry."),
+    CommandRow("cite", "cite", "cite", "Print the references of a library entry."),
+    CommandRow("solve", "solve", "solve", "Solve for pressure, contraction or force, given the other two."),
+    CommandRow("inspect", "inspect", "inspect", "Inspect measurement files: columns, runs, sampling, outliers."),
+    CommandRow("fit", "fit", "fit", "Fit a characteristic to measured points, or compare several."),
+    CommandRow("convert", "convert", "convert", "Approximate one characteristic by another."),
+    CommandRow("hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."),
+    CommandRow("fit-dynamic", "fit_dynamic", "fit_dynamic", "Identify plant parameters from transient records."),
+    CommandRow("plan", "plan", "plan", "Design the most informative static experiments (D-optimal)."),
+    CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
+    CommandRow("sweep", "sweep", "sweep", "Run a parameter study of a scenario."),
+    CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
+)
+"""All commands, in the order of use."""
+_ROWS = {row.name: row for row in COMMANDS}
+_UsageError: Any = typer.BadParameter.__base__
+
+
+class LazyCommands(TyperGroup):
+    """The commands of the table; a command's module is imported when the command is called."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        return list(self.commands)
+        return list(_ROWS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        row = _ROWS.get(cmd_name)
+        if row is None:
+            return None
+        function = getattr(importlib.import_module(f".{row.module}", __package__), row.function)
+        check_interrupted()
+        command = typer.Typer(**SETTINGS)
+        command.command(row.name)(function)
+        return typer.main.get_command(command)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        if args[0] not in _ROWS:
+            ctx.fail(f"No such command '{args[0]}'.{suggestion(args[0], _ROWS)}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(row.name, row.summary) for row in COMMANDS])
+
+    def make_context(self, *args: Any, **settings: Any) -> Any:
+        with _printable_usage_errors():
+            return super().make_context(*args, **settings)
 
     def invoke(self, ctx: Any) -> Any:
         with warnings.catch_warnings():
             warnings.simplefilter("always", AirmuscleWarning)
             warnings.showwarning = functools.partial(_show_warning, warnings.showwarning)
-            try:
-                with deferred_sigint():
-                    return super().invoke(ctx)
-            except AirmuscleError as error:
-                typer.echo(f"error: {in_options(str(error))}", err=True)
-                raise typer.Exit(1) from None
-            except BrokenPipeError:
-                raise
-            except OSError as error:  # a full disk, a terminal that went away
-                typer.echo(f"error: {error.filename or 'output'}: {error.strerror or error}.", err=True)
-                raise typer.Exit(1) from None
-            except KeyboardInterrupt:
-                typer.echo("interrupted", err=True)
-                raise typer.Exit(130) from None
+            with _exit_codes(), _printable_usage_errors(), deferred_sigint():
+                return super().invoke(ctx)
 
 
-def _show_warning(others: Any, message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
-    """One line for a warning of ours; those of others say where they come from."""
+@contextlib.contextmanager
+def _exit_codes() -> Iterator[None]:
+    """Turn errors into one line on stderr and an exit code."""
+    try:
+        yield
+    except AirmuscleError as error:
+        echo(f"error: {in_options(str(error))}", err=True)
+        raise typer.Exit(1) from None
+    except BrokenPipeError:
+        raise
+    except OSError as error:  # a full disk, a closed terminal
+        echo(f"error: {error.filename or 'output'}: {error.strerror or error}.", err=True)
+        raise typer.Exit(1) from None
+    except KeyboardInterrupt:
+        echo("interrupted", err=True)
+        raise typer.Exit(INTERRUPTED) from None
+
+
+@contextlib.contextmanager
+def _printable_usage_errors() -> Iterator[None]:
+    """Escape control characters of arguments that a usage error quotes; typer prints the error itself."""
+    try:
+        yield
+    except _UsageError as error:
+        error.message = printable(error.message)
+        raise
+
+
+def _show_warning(
+    show_other: Any, message: Warning | str, category: type[Warning], *location: Any, **options: Any
+) -> None:
+    """Print one line for a warning of airmuscle; other warnings are shown with their location in the code."""
     if issubclass(category, AirmuscleWarning):
-        typer.echo(f"warning: {in_options(str(message))}", err=True)
+        echo(f"warning: {in_options(str(message))}", err=True)
     else:
-        others(message, category, *place, **more)
+        show_other(message, category, *location, **options)
 
 
-app = typer.Typer(
-    cls=Commands,
-    name="airmuscle",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-)
-app.command("reproduce", short_help="Reproduce the papers, and judge each of their claims.")(reproduce)
-app.command("list")(list_entries)
-app.command("show", short_help="Show parameters, sources and checks of an entry.")(show)
-app.command("cite")(cite)
-app.command("solve", short_help="From two of pressure, contraction and force get the third.")(solve)
-app.command("inspect", short_help="Show what was understood of bench files.")(inspect)
-app.command("fit")(fit)
-app.command("convert", short_help="Bring one model as near to another as it comes.")(convert)
-app.command("hysteresis", short_help="Fit friction to loops, and say whether the data justify it.")(hysteresis)
-app.command("fit-dynamic", short_help="Find a plant's numbers from records of its motion.")(fit_dynamic)
-app.command("plan", short_help="Say which runs tell most about a muscle on your bench.")(plan)
-app.command("simulate", short_help="Simulate a plant that a scenario file describes.")(simulate)
-app.command("sweep", short_help="Run a scenario many times, with numbers that vary.")(sweep)
-app.command("schema", short_help="Print what editors need to check scenario and muscle files.")(schema)
+app = typer.Typer(cls=LazyCommands, name="airmuscle", no_args_is_help=True, **SETTINGS)
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(requested: bool) -> None:
+    if requested:
         from importlib import metadata
 
-        typer.echo(f"airmuscle {metadata.version('airmuscle')}")
+        echo(f"airmuscle {metadata.version('airmuscle')}")
         raise typer.Exit
 
 
 @app.callback()
 def airmuscle(
     version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and leave.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """Models, identification and simulation of pneumatic artificial muscles.
 
-    Pressures are gauge unless their unit says absolute (bara, kPa(a), psia).
+    Pressures are gauge pressures unless the unit is an absolute one (bara, kPa(a), psia).
 
     \b
     Examples:
@@ -115,8 +161,3 @@ def airmuscle(
       airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out fit
       airmuscle simulate scenario.toml --out run
     """
-
-
-def main() -> None:
-    """Run the command line and leave with its exit code."""
-    app(prog_name="airmuscle")

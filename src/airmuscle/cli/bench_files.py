@@ -1,67 +1,71 @@
-"""BenchLimits files as arguments of a command: where they are, and what they do not say of themselves."""
+"""Measurement files as arguments of a command, with the options that complete them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..recording import Recording
+from ..core.errors import ParameterError
+from ..library.catalogue import load_data
+from ..recording import Recording, read
+from ..recording.segment import AT_REST, check_swept, estimate_sensors, find_runs
+from .progress import reading_progress
 
 Files = Annotated[
     list[Path],
-    typer.Argument(metavar="FILES", help="CSV, Excel, MAT, TDMS or MDF: pressure, contraction or length, force."),
+    typer.Argument(
+        metavar="FILES", help="CSV, Excel, MAT, TDMS or MDF files with pressure, contraction or length, and force."
+    ),
 ]
 Units = Annotated[
     list[str] | None,
-    typer.Option("--unit", metavar="COLUMN=UNIT", help="The unit of a column whose heading states none; repeat it."),
+    typer.Option("--unit", metavar="COLUMN=UNIT", help="Unit of a column whose header states none; repeatable."),
 ]
-Length = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Length unpressurised and unloaded: '300 mm'.")]
-Surroundings = Annotated[
-    str | None, typer.Option(metavar="QUANTITY", help="What absolute pressures are reduced by: '98 kPa'.")
+Length = Annotated[
+    str | None, typer.Option(metavar="QUANTITY", help="Length without pressure and load, such as '300 mm'.")
+]
+AmbientPressure = Annotated[
+    str | None,
+    typer.Option(metavar="QUANTITY", help="Ambient pressure, subtracted from absolute pressures, such as '98 kPa'."),
 ]
 
 
-def measured(files: list[Path], unit: list[str] | None, **options: Any) -> list[Recording]:
-    """The runs in files, read together so that contradictions show, then the data sets of the library."""
-    from ..core.errors import ParameterError
-    from ..library.catalogue import load_data as data_set
-    from ..recording import read
-    from .progress import reading_progress
+def read_recordings(files: list[Path], unit: list[str] | None, **options: Any) -> list[Recording]:
+    """The recordings of the files, read together so that their units can be compared, then library data sets.
 
-    options = {"units": pairs("--unit", unit), **options}
-    here = {entry.name for entry in Path().iterdir()}
-    names = [f for f in files if not f.suffix and len(f.parts) == 1 and f.name not in here]
-    own = [f for f in files if f not in names]
-    given = [name for name, value in options.items() if value]
-    if names and given:
+    A name without suffix and folder that is not in the working directory is a data set of the library. `options` are
+    those of `recording.read`. Raises ParameterError for options that a data set does not take.
+    """
+    options = {"units": parse_pairs("--unit", unit), **options}
+    local = {entry.name for entry in Path().iterdir()}
+    names = [f for f in files if not f.suffix and len(f.parts) == 1 and f.name not in local]
+    paths = [f for f in files if f not in names]
+    set_options = [name for name, value in options.items() if value]
+    if names and set_options:
         raise ParameterError(
-            f"{names[0]}: a data set of the library brings its units and constants along; leave out {', '.join(given)}."
+            f"{names[0]}: a data set of the library contains its units and constants; omit {', '.join(set_options)}."
         )
     with reading_progress() as progress:
-        runs = read(own, progress=progress, **options) if own else ()
-    _check_stated(runs)
-    return [*runs, *(data_set(str(name)) for name in names)]
+        recordings = read(paths, progress=progress, **options) if paths else ()
+    _check_content(recordings)
+    return [*recordings, *(load_data(str(name)) for name in names)]
 
 
-def _check_stated(recordings: Sequence[Recording]) -> None:
-    """Refuse a run that is not what its file says, or a lone one in which nothing changes."""
-    from ..recording.segment import AT_REST, check_swept, estimate_sensors, find_runs
-
-    together = estimate_sensors(recordings) if recordings else {}
+def _check_content(recordings: Sequence[Recording]) -> None:
+    """Raise where a recording contradicts its file, or where a single recording contains no variation."""
+    sensors = estimate_sensors(recordings) if recordings else {}
     for recording in recordings:
-        found = find_runs(recording, {name: s for name, s in together.items() if name in recording.columns})
-        if len(recordings) == 1 or all(run.kind is not AT_REST for run in found):
-            check_swept(recording, found)
+        runs = find_runs(recording, {name: s for name, s in sensors.items() if name in recording.columns})
+        if len(recordings) == 1 or all(run.kind is not AT_REST for run in runs):
+            check_swept(recording, runs)
 
 
-def pairs(option: str, texts: list[str] | None) -> dict[str, str]:
-    """What an option like --unit COLUMN=UNIT gives, by name."""
+def parse_pairs(option: str, texts: list[str] | None) -> dict[str, str]:
+    """The values of a repeatable option such as --unit COLUMN=UNIT, by name. Raises BadParameter."""
     parts = [text.partition("=") for text in texts or ()]
     if not all(name.strip() and sign for name, sign, _ in parts):
-        raise typer.BadParameter(f"{option} wants NAME=TEXT, not {', '.join(texts or ())}")
-    return {name.strip(): found.strip() for name, _, found in parts}
+        raise typer.BadParameter(f"{option} must be NAME=TEXT, not {', '.join(texts or ())}")
+    return {name.strip(): value.strip() for name, _, value in parts}

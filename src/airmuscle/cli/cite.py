@@ -1,18 +1,18 @@
-"""`airmuscle cite`: the sources behind a library entry."""
+"""`airmuscle cite`: references of a library entry."""
 
 from __future__ import annotations
 
 import dataclasses
 import re
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from ..core import reference
+from ..core.reference import Reference
+from ..library.catalogue import load
 from .options import Json, Name
-from .terminal import print_json
-
-if TYPE_CHECKING:
-    from ..core.reference import Reference
+from .terminal import echo, print_json
 
 
 def cite(
@@ -20,48 +20,47 @@ def cite(
     json: Json = False,
     bibtex: Annotated[bool, typer.Option("--bibtex", help="Print BibTeX entries.")] = False,
 ) -> None:
-    """Print every source of an entry's formulas and numbers.
+    """Print the references of a library entry.
+
+    The list covers the formulas and the parameter values.
 
     \b
     Examples:
       airmuscle cite dmsp-20-300
       airmuscle cite dmsp-20-300 --bibtex >> references.bib
     """
-    from ..core import reference
-    from ..library.find import find
-
     if json and bibtex:
         raise typer.BadParameter("--json and --bibtex exclude each other")
-    found = reference.cite(find(name))
+    references = reference.cite(load(name))
     if json:
-        print_json([dataclasses.asdict(source) for source in found])
+        print_json([dataclasses.asdict(source) for source in references])
         return
-    for source in found:
-        typer.echo(as_bibtex(source) if bibtex else str(source))
-    if not found:
-        typer.echo(f"{name}: no source is named; its numbers were chosen.")
+    for source in references:
+        echo(as_bibtex(source) if bibtex else str(source))
+    if not references:
+        echo(f"{name}: no reference is given; its parameter values are assumed.")
 
 
 def as_bibtex(source: Reference) -> str:
-    """A BibTeX entry that any style can set."""
+    """A BibTeX entry of type @misc, which every bibliography style supports."""
     fields = {
-        "author": _people(source.authors),
-        "title": "{" + _escaped(source.title) + "}",
-        "howpublished": _escaped(source.where),
+        "author": _authors(source.authors),
+        "title": "{" + _escape(source.title) + "}",
+        "howpublished": _escape(source.where),
         "year": str(source.year) if source.year else "",
         "doi": source.doi or "",
-        "note": _escaped(source.note),
+        "note": _escape(source.note),
     }
     lines = [f"  {key} = {{{value}}}," for key, value in fields.items() if value]
     key = re.sub(r"[^\w:.-]", "-", source.key)
     return "\n".join([f"@misc{{{key},", *lines, "}"])
 
 
-def _people(authors: str) -> str:
-    """`Chou, C.-P., Hannaford, B. et al.` in BibTeX's way: joined by `and`."""
-    joined = re.sub(r"(?:(?<=\.),|;) ", " and ", authors)
-    return _escaped(re.sub(r",? et al\.?", " and others", joined))
+def _authors(authors: str) -> str:
+    """`Chou, C.-P., Hannaford, B. et al.` in the syntax of BibTeX: names separated by `and`."""
+    separated = re.sub(r"(?:(?<=\.),|;) ", " and ", authors)
+    return _escape(re.sub(r",? et al\.?", " and others", separated))
 
 
-def _escaped(text: str) -> str:
+def _escape(text: str) -> str:
     return re.sub(r"([&%$#_{}])", r"\\\1", text)

@@ -1,33 +1,43 @@
-"""`airmuscle convert`: one model into another, with the error that stays."""
+"""`airmuscle convert`: approximation of one characteristic by another, with the remaining error."""
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
+import numpy as np
 import typer
 
-from .initial_law import start_of
+from ..characteristic import ValidityRange
+from ..core import leaves
+from ..core.errors import ParameterError
+from ..core.units import quantity
+from ..identify import ModelConversion
+from ..identify import convert as convert_model
+from ..identify.conversion import GRID_POINTS, sample_on_grid
+from ..library.catalogue import load_law
+from ..library.entry import Entry
+from ..library.write import save
+from ..report.isobar_plot import validity_range_of
+from .initial_law import find_initial_law
 from .options import Json, Name
-from .terminal import print_json, print_table
-
-if TYPE_CHECKING:
-    from ..characteristic.validity_range import ValidityRange
-    from ..identify.conversion import ModelConversion
-    from ..library.entry import Entry
+from .terminal import echo, percent, print_json, print_table
 
 BANDS = 6
-"""Parts of the validity range, by pressure, whose errors are printed."""
+"""Pressure intervals of the validity range for which errors are printed."""
+LIMIT_UNITS = {"min_pressure": "Pa", "max_pressure": "Pa", "min_contraction": "1", "max_contraction": "1"}
+
 Model = Annotated[
-    str, typer.Argument(metavar="MODEL", help="The other law: ContractileSurface, Sarosi2012, or an entry made of it.")
+    str,
+    typer.Argument(metavar="MODEL", help="The other model: ContractileSurface, Sarosi2012, or a library entry of it."),
 ]
-Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Muscle file for the other law.")]
-Pressure = Annotated[
-    str | None, typer.Option(metavar="QUANTITY", help="End of the validity range; else that of the muscle.")
+Out = Annotated[
+    Path | None, typer.Option("--out", metavar="FILE", help="Muscle file to write, with the other characteristic.")
 ]
-Contraction = Annotated[
-    str | None, typer.Option(metavar="QUANTITY", help="End of the validity range; else that of the muscle.")
+Limit = Annotated[
+    str | None, typer.Option(metavar="QUANTITY", help="Limit of the validity range; default: that of the muscle.")
 ]
 
 
@@ -35,122 +45,112 @@ def convert(
     name: Name,
     model: Model,
     out: Out = None,
-    min_pressure: Pressure = None,
-    max_pressure: Pressure = None,
-    min_contraction: Contraction = None,
-    max_contraction: Contraction = None,
-    degree: Annotated[int, typer.Option(min=1, max=9, help="Total degree of a ContractileSurface.")] = 5,
+    min_pressure: Limit = None,
+    max_pressure: Limit = None,
+    min_contraction: Limit = None,
+    max_contraction: Limit = None,
+    degree: Annotated[int, typer.Option(min=1, max=9, metavar="N", help="Total degree of a ContractileSurface.")] = 5,
     json: Json = False,
 ) -> None:
-    """Bring another model as near to a muscle's law as it comes, and say how near that is.
+    """Approximate one characteristic by another.
 
     \b
-    Compared in force, where the first law pulls, over the validity range of the muscle or the one that you state.
-    With --out, FILE is a muscle with the other law and all other parts as they were.
+    The error is the difference in force, where the original force is positive, over the validity range of the muscle
+    or the range given by the options. With --out, FILE is the muscle with the other characteristic; its other parts
+    are unchanged.
 
     \b
     Examples:
       airmuscle convert dmsp-20-300 ContractileSurface --degree 5 --out surface.toml
       airmuscle convert fit/muscle.toml Sarosi2012 --max-pressure "5 bar"
     """
-    from ..identify import convert as converted
-    from ..identify.conversion import POINTS, on_grid
-    from ..library.catalogue import load, save
-
-    entry = load(name)
-    validity_range = _validity_range(entry, (min_pressure, max_pressure, min_contraction, max_contraction))
-    grid = on_grid(entry.characteristic, validity_range, POINTS)
-    rest = getattr(entry.geometry, "resting_length", None)
-    start = start_of(model, [grid if rest is None else grid.with_constants(resting_length=rest)], degree, "MODEL")
-    found = converted(entry.characteristic, start.entry.characteristic, validity_range)
+    entry = load_law(name)
+    limits = (min_pressure, max_pressure, min_contraction, max_contraction)
+    validity_range = _validity_range(entry, dict(zip(LIMIT_UNITS, limits, strict=True)))
+    grid = sample_on_grid(entry.characteristic, validity_range, GRID_POINTS)
+    length = getattr(entry.geometry, "resting_length", None)
+    data = grid if length is None else grid.with_constants(resting_length=length)
+    initial = find_initial_law(model, [data], degree, "MODEL")
+    conversion = convert_model(entry.characteristic, initial.entry.characteristic, validity_range)
     if out is not None:
-        save(_changed(entry, found, validity_range), out)
+        save(_converted_entry(entry, conversion, validity_range), out)
     if json:
-        print_json(_as_data(found, validity_range))
+        print_json(_to_dict(conversion, validity_range))
         return
-    _print(entry, found, validity_range)
+    _print(entry, conversion, validity_range)
     if out is not None:
-        typer.echo(f"muscle: {out}")
+        echo(f"muscle: {out}")
 
 
-def _validity_range(entry: Entry, given: tuple[str | None, str | None, str | None, str | None]) -> ValidityRange:
-    """The muscle's validity range, with the ends that were given put in."""
-    from ..characteristic.validity_range import ValidityRange
-    from ..core.errors import ParameterError
-    from ..core.units import quantity
-    from ..report.chart import validity_range_of
-
-    names = ("min_pressure", "max_pressure", "min_contraction", "max_contraction")
-    own = validity_range_of(entry.characteristic, entry.validity_range)
-    ends: dict[str, float] = {} if own is None else {name: getattr(own, name) for name in names}
-    for name, text, unit in zip(names, given, ("Pa", "Pa", "1", "1"), strict=True):
+def _validity_range(entry: Entry, texts: dict[str, str | None]) -> ValidityRange:
+    """The validity range of the muscle, with limits replaced by those of the options."""
+    default = validity_range_of(entry.characteristic, entry.validity_range)
+    limits: dict[str, float] = {} if default is None else {name: getattr(default, name) for name in LIMIT_UNITS}
+    for name, text in texts.items():
         if text is not None:
-            ends[name] = quantity(text, unit, where=f"--{name.replace('_', '-')}")
-    lacking = [f"--{name.replace('_', '-')}" for name in names if name not in ends]
-    if lacking:
-        raise ParameterError(f"{entry.name} states no validity range to convert it on; give {', '.join(lacking)}.")
-    return ValidityRange(**ends)
+            limits[name] = quantity(text, LIMIT_UNITS[name], where=_option(name))
+    missing = [_option(name) for name in LIMIT_UNITS if name not in limits]
+    if missing:
+        raise ParameterError(f"{entry.name} has no validity range for the conversion; give {', '.join(missing)}.")
+    return ValidityRange(**limits)
 
 
-def _changed(entry: Entry, found: ModelConversion, validity_range: ValidityRange) -> Entry:
-    """The muscle with the other law; its checks were of the first."""
-    import dataclasses
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
-    title = f"{type(found.model).__name__} in place of {type(entry.characteristic).__name__}: {entry.title}"
-    note = f"Converted from {entry.name}: {found}. {entry.note}".strip()
+
+def _converted_entry(entry: Entry, conversion: ModelConversion, validity_range: ValidityRange) -> Entry:
+    """The muscle with the other characteristic, without the checks of the original one."""
+    title = f"{type(conversion.model).__name__} in place of {type(entry.characteristic).__name__}: {entry.title}"
+    note = f"Converted from {entry.name}: {conversion}. {entry.note}".strip()
     return dataclasses.replace(
         entry,
         name="muscle",
         title=title,
         provenance="fitted",
         note=note,
-        characteristic=found.model,
+        characteristic=conversion.model,
         validity_range=validity_range,
         checks=(),
     )
 
 
-def _by_pressure(found: ModelConversion, validity_range: ValidityRange) -> list[dict[str, float]]:
-    """Errors in parts of the validity range by pressure."""
-    import numpy as np
-
-    edges = np.linspace(*validity_range.pressure, BANDS + 1)
+def _errors_by_pressure(conversion: ModelConversion, validity_range: ValidityRange) -> list[dict[str, float]]:
+    """Errors [N] in intervals of pressure."""
+    points = conversion.check_points
     rows = []
-    for low, high in itertools.pairwise(edges):
-        here = (found.judged["pressure"] >= low) & (found.judged["pressure"] <= high)
-        if here.any():
-            error, force = found.judged["error"][here], found.judged["force"][here]
+    for low, high in itertools.pairwise(np.linspace(*validity_range.pressure, BANDS + 1)):
+        inside = (points["pressure"] >= low) & (points["pressure"] <= high)
+        if inside.any():
+            error, force = points["error"][inside], points["force"][inside]
             rows.append({"min_pressure": float(low), "max_pressure": float(high),
                          "rms": float(np.sqrt(np.mean(error**2))), "max": float(np.abs(error).max()),
                          "max_force": float(force.max())})  # fmt: skip
     return rows
 
 
-def _as_data(found: ModelConversion, validity_range: ValidityRange) -> dict[str, Any]:
-    import dataclasses
-
-    from ..core.tree import leaves
-
+def _to_dict(conversion: ModelConversion, validity_range: ValidityRange) -> dict[str, Any]:
+    """A conversion as plain data, all numbers SI."""
     return {
-        "model": type(found.model).__name__,
-        "parameters": {leaf.path: leaf.value for leaf in leaves(found.model)},
+        "model": type(conversion.model).__name__,
+        "parameters": {leaf.path: leaf.value for leaf in leaves(conversion.model)},
         "validity_range": dataclasses.asdict(validity_range),
-        "rms": found.rms,
-        "max": found.max_error,
-        "greatest_at": {"pressure": found.pressure, "contraction": found.contraction},
-        "by_pressure": _by_pressure(found, validity_range),
+        "rms": conversion.rmse,
+        "max": conversion.max_error,
+        "max_at": {"pressure": conversion.max_error_pressure, "contraction": conversion.max_error_contraction},
+        "by_pressure": _errors_by_pressure(conversion, validity_range),
     }
 
 
-def _print(entry: Entry, found: ModelConversion, validity_range: ValidityRange) -> None:
+def _print(entry: Entry, conversion: ModelConversion, validity_range: ValidityRange) -> None:
     (p0, p1), (c0, c1) = validity_range.pressure, validity_range.contraction
-    typer.echo(f"{entry.name}, {type(entry.characteristic).__name__}, over {p0 / 1e3:.4g} to {p1 / 1e3:.4g} kPa and "
-               f"{c0:.2%} to {c1:.2%}")  # fmt: skip
-    typer.echo(f"{found}\n")
+    echo(f"{entry.name}, {type(entry.characteristic).__name__}, over {p0 / 1e3:.4g} to {p1 / 1e3:.4g} kPa and "
+         f"{percent(c0)} to {percent(c1)}")  # fmt: skip
+    echo(f"{conversion}\n")
     rows = [
         (f"{row['min_pressure'] / 1e3:.4g} to {row['max_pressure'] / 1e3:.4g}",
          *(f"{row[key]:.4g}" for key in ("rms", "max", "max_force")))
-        for row in _by_pressure(found, validity_range)
+        for row in _errors_by_pressure(conversion, validity_range)
     ]  # fmt: skip
-    heads = ("pressure [kPa]", "rms error [N]", "greatest error [N]", "greatest force [N]")
-    print_table(heads, rows, right=heads[1:])
+    headers = ("pressure [kPa]", "rms error [N]", "maximum error [N]", "maximum force [N]")
+    print_table(headers, rows, right=headers[1:])

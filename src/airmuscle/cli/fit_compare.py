@@ -1,93 +1,87 @@
-"""The part of `airmuscle fit` that compares laws: --compare."""
+"""Model comparison of `airmuscle fit --compare`."""
 
 from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
+from ..identify import Candidate, Comparison, compare, standard_candidates
+from ..library.entry import Entry
+from ..recording import Recording
+from ..report.compare_chapter import compare_chapter
+from ..report.output_folder import check_writable
+from .fit_options import FitRequest
+from .fit_output import fit_to_dict, fitted_entry, print_results, write_results
+from .initial_law import find_initial_law
 from .remedies import in_options
-from .terminal import print_json
-
-if TYPE_CHECKING:
-    from ..identify.candidates import Candidate
-    from ..identify.model_selection import Comparison
-    from ..recording import Recording
-    from .fit_options import FitRequest
+from .terminal import echo, print_json
 
 
-def compared(files: list[Path], recordings: list[Recording], characteristic: str | None, asked: FitRequest) -> None:
-    """Compare, print the ranking, and write the recommended muscle with its report."""
-    from ..identify.model_selection import compare
-    from ..report.compare_chapter import compare_chapter
-    from ..report.output_folder import check_writable
-    from .fit_output import echo, fitted, write
-
-    if asked.uncensored or asked.robust is not None or asked.equal_weights:
+def compare_models(
+    files: list[Path], recordings: list[Recording], characteristic: str | None, request: FitRequest
+) -> None:
+    """Rank all candidates, print the ranking, and write the recommended muscle with its report."""
+    if request.uncensored or request.robust is not None or request.equal_weights:
         raise typer.BadParameter(
-            "--compare judges by squared errors of the rows that pull: no --robust, --uncensored, --equal-weights"
+            "--compare ranks by squared errors of rows with positive force: "
+            "--uncensored, --robust and --equal-weights do not apply"
         )
-    check_writable(asked.out)
-    candidates = _candidates(recordings, characteristic, asked)
-    said = None if asked.json else lambda name: typer.echo(f"  {name}", err=True)
-    found = _worded(compare(recordings, candidates, leave_out=asked.more.by, progress=said))
-    chosen = found.recommended
-    sure = asked.more.find(chosen.fit, recordings)
-    entry = fitted(chosen.fit, _bare(chosen.candidate), files)
-    write(chosen.fit, entry, recordings, asked.out, [compare_chapter(found), *sure.chapters()])
-    if asked.json:
-        print_json(_as_data(found) | sure.as_data())
+    check_writable(request.out)
+    candidates = _candidates(recordings, characteristic, request)
+    progress = None if request.json else lambda name: echo(f"  {name}", err=True)
+    comparison = compare(recordings, candidates, leave_out=request.options.split, progress=progress)
+    comparison = _with_option_names(comparison)
+    best = comparison.recommended
+    extras = request.options.evaluate(best.fit, recordings)
+    entry = fitted_entry(best.fit, _bare_entry(best.candidate), files)
+    write_results(best.fit, entry, recordings, request.out, [compare_chapter(comparison), *extras.chapters()])
+    if request.json:
+        print_json(_to_dict(comparison) | extras.to_dict())
         return
-    echo([str(found), *sure.lines()], asked.out)
+    print_results([str(comparison), *extras.lines()], request.out)
 
 
-def _worded(found: Comparison) -> Comparison:
-    """The reasons of exclusions with the remedies of the command line."""
-    excluded = tuple(dataclasses.replace(each, why=in_options(each.why)) for each in found.excluded)
-    return dataclasses.replace(found, excluded=excluded)
+def _with_option_names(comparison: Comparison) -> Comparison:
+    """The comparison whose reasons of exclusion name command-line options instead of Python arguments."""
+    excluded = tuple(dataclasses.replace(each, reason=in_options(each.reason)) for each in comparison.excluded)
+    return dataclasses.replace(comparison, excluded=excluded)
 
 
-def _candidates(recordings: list[Recording], characteristic: str | None, asked: FitRequest) -> list[Candidate]:
-    """All that start from data alone, and the one named beside them."""
-    from ..identify.candidates import Candidate, standard_candidates
-    from .initial_law import start_of
-
-    found = list(standard_candidates(recordings))
+def _candidates(recordings: list[Recording], characteristic: str | None, request: FitRequest) -> list[Candidate]:
+    """All models whose initial values can be estimated from data, and the one given with --characteristic."""
+    candidates = list(standard_candidates(recordings))
     if characteristic is not None:
-        start = start_of(characteristic, recordings, asked.degree)
-        law = start.entry.characteristic
-        found.append(Candidate(f"{characteristic} (named)", law, (*asked.fixed, *start.fixed)))
-    return found
+        initial = find_initial_law(characteristic, recordings, request.degree)
+        law = initial.entry.characteristic
+        candidates.append(Candidate(f"{characteristic} (named)", law, (*request.fixed, *initial.fixed)))
+    return candidates
 
 
-def _bare(candidate: Candidate) -> Any:
-    from ..library.entry import Entry
-
+def _bare_entry(candidate: Candidate) -> Entry:
     return Entry(candidate.name, candidate.name, "chosen", candidate.law)
 
 
-def _as_data(found: Comparison) -> dict[str, Any]:
+def _to_dict(comparison: Comparison) -> dict[str, Any]:
     """A comparison as plain data, all numbers SI."""
-    from .fit_output import as_data
-
     return {
-        "recommended": found.recommended.candidate.name,
-        "reason": found.reason,
-        "left_out": found.leave_out.word,
-        "purpose": found.purpose,
+        "recommended": comparison.recommended.candidate.name,
+        "reason": comparison.reason,
+        "left_out": comparison.leave_out.group_name,
+        "purpose": comparison.purpose,
         "ranking": [
             {
                 "law": c.candidate.name,
-                "parameters": c.parameters,
-                "in_sample": c.in_sample,
-                "cross_validated": c.cross_validated,
+                "parameters": c.parameter_count,
+                "in_sample": c.in_sample_rmse,
+                "cross_validated": c.cross_validated_rmse,
                 "aicc": c.aicc,
-                "parts": {part.part: part.rms for part in c.left_out},
+                "groups": {score.fold: score.rmse for score in c.fold_scores},
             }
-            for c in found.contenders
+            for c in comparison.ranking
         ],
-        "excluded": {e.name: e.why for e in found.excluded},
-        "fit": as_data(found.recommended.fit),
+        "excluded": {each.name: each.reason for each in comparison.excluded},
+        "fit": fit_to_dict(comparison.recommended.fit),
     }

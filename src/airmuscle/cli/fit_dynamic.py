@@ -1,25 +1,26 @@
-"""`airmuscle fit-dynamic`: parameters of a plant from records of its motion."""
+"""`airmuscle fit-dynamic`: identification of plant parameters from transient records."""
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from ..identify.dynamic import DynamicFit
+from ..identify.dynamic.profile import DynamicProfile
+from ..recording.segment import inspect
+from ..report.dynamic_chapter import dynamic_chapters
+from ..report.output_folder import atomic_folder, check_writable
+from ..report.write import write_into
+from ..scenario.identification import DynamicFitSetup, load_dynamic_fit
 from .options import Folder, Json
-from .terminal import print_json
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..identify.dynamic import DynamicFit
-    from ..identify.dynamic.profile import DynamicProfile
-    from ..scenario.identification import DynamicStudy
+from .terminal import echo, print_json
 
 WEAK = "weak"
-"""For --profile: all that take part in what the records do not determine."""
-
+"""Value of --profile that stands for all parameters of the undetermined combinations."""
 
 Study = Annotated[
     Path, typer.Argument(metavar="STUDY.toml", help="A file with [plant], [observed], [fit] and [[record]].")
@@ -28,11 +29,16 @@ Profiled = Annotated[
     list[str] | None,
     typer.Option(
         metavar="PARAMETER",
-        help="How the error grows as this one is held at other values; 'weak': all not determined. Repeat it.",
+        help="Profile likelihood of this parameter; 'weak': of all undetermined ones. Repeatable.",
     ),
 ]
-Points = Annotated[int, typer.Option(min=2, max=50, help="Values of a profile to either side.")]
-Starts = Annotated[int | None, typer.Option(min=1, max=10_000, help="Starts of the search, before the file's.")]
+Points = Annotated[
+    int, typer.Option(min=2, max=50, metavar="N", help="Values of a profile on either side of the estimate.")
+]
+Starts = Annotated[
+    int | None,
+    typer.Option(min=1, max=10_000, metavar="N", help="Number of initial guesses; default: that of the file."),
+]
 
 
 def fit_dynamic(
@@ -43,12 +49,13 @@ def fit_dynamic(
     out: Folder = Path("dynamic"),
     json: Json = False,
 ) -> None:
-    """Find valve, gas, volume, damping, friction or mass from records of fill, discharge and release.
+    """Identify plant parameters from transient records.
 
     \b
-    Says what the records cannot tell apart, and the experiment that would.
-    Writes DIR/report.html and DIR/scenario.toml with the numbers found, to simulate on; of several records
-    DIR/scenario-1.toml and so on.
+    Parameters of valves, gas, volume, damping, friction and mass are estimated from records of filling, discharge and
+    release. Reports parameter combinations that the records do not determine, and the experiment that would.
+    Writes DIR/report.html and the identified plant as a scenario, DIR/scenario.toml (DIR/scenario-1.toml and so on
+    for several records).
 
     \b
     Examples:
@@ -56,38 +63,31 @@ def fit_dynamic(
       airmuscle fit-dynamic study.toml --profile gas.exponent --starts 20
       airmuscle simulate dynamic/scenario.toml
     """
-    import dataclasses
-
-    from ..report.output_folder import check_writable
-    from ..scenario.identification import load_study
-
-    loaded = load_study(study)
+    loaded = load_dynamic_fit(study)
     if starts is not None:
         loaded = dataclasses.replace(loaded, starts=starts)
     check_writable(out)
-    remarks = _remarks(loaded)
+    findings = _findings(loaded)
     if not json:
-        typer.echo(f"  {len(loaded.experiments)} records, {loaded.starts} starts", err=True)
-    found = loaded.fit()
-    profiles = [found.profile(name, points) for name in _profiled(found, profile or [])]
-    written = _write(loaded, found, profiles, remarks, out)
+        echo(f"  {len(loaded.experiments)} records, {loaded.starts} starts", err=True)
+    fit = loaded.fit()
+    profiles = [fit.profile(name, points) for name in _profiled_names(fit, profile or [])]
+    scenarios = _write(loaded, fit, profiles, findings, out)
     if json:
-        print_json(_as_data(found, profiles, remarks))
+        print_json(_to_dict(fit, profiles, findings))
         return
-    typer.echo(str(found))
-    for remark in remarks:
-        typer.echo(f"note: {remark}")
+    echo(str(fit))
+    for finding in findings:
+        echo(f"note: {finding}")
     for each in profiles:
-        typer.echo(str(each))
-    for path in written:
-        typer.echo(f"{path.stem}: {path}")
-    typer.echo(f"report: {out / 'report.html'}")
+        echo(str(each))
+    for path in scenarios:
+        echo(f"{path.stem}: {path}")
+    echo(f"report: {out / 'report.html'}")
 
 
-def _remarks(study: DynamicStudy) -> list[str]:
-    """What is wrong, or may be, with the records."""
-    from ..recording.segment import inspect
-
+def _findings(study: DynamicFitSetup) -> list[str]:
+    """Data-quality problems of the records."""
     return [
         f"{experiment.recording.origin}: {finding.text}"
         for experiment in study.experiments
@@ -95,47 +95,44 @@ def _remarks(study: DynamicStudy) -> list[str]:
     ]
 
 
-def _profiled(found: DynamicFit, names: Sequence[str]) -> list[str]:
-    """The unknowns to profile; a value on its bound, or one that nothing determines, has a profile too."""
-    weak = [name for each in found.identifiability.undetermined for name, _ in each.shares]
-    wanted = [*(weak if WEAK in names else []), *(name for name in names if name != WEAK)]
-    return [found[name].name for name in dict.fromkeys(wanted)]
+def _profiled_names(fit: DynamicFit, names: Sequence[str]) -> list[str]:
+    """The parameters to profile; also allowed are estimates on a bound and undetermined ones."""
+    weak = [name for each in fit.identifiability.undetermined for name, _ in each.shares]
+    requested = [*(weak if WEAK in names else []), *(name for name in names if name != WEAK)]
+    return [fit[name].name for name in dict.fromkeys(requested)]
 
 
 def _write(
-    study: DynamicStudy, found: DynamicFit, profiles: Sequence[DynamicProfile], remarks: Sequence[str], out: Path
+    study: DynamicFitSetup, fit: DynamicFit, profiles: Sequence[DynamicProfile], findings: Sequence[str], out: Path
 ) -> list[Path]:
-    from ..report.dynamic_chapter import dynamic_chapters
-    from ..report.output_folder import atomic_folder
-    from ..report.write import fill
-
+    """Write the report and one scenario per record; returns the paths of the scenarios."""
     names = []
-    with atomic_folder(out) as place:
+    with atomic_folder(out) as folder:
         for i in range(len(study.experiments)):
             suffix = f"-{i + 1}" if len(study.experiments) > 1 else ""
             names.append(f"scenario{suffix}.toml")
-            (place / names[-1]).write_text(study.scenario(found, i), encoding="utf-8")
-        fill(place, dynamic_chapters(found, study.title, profiles, remarks), title="Dynamic fit")
+            (folder / names[-1]).write_text(study.scenario(fit, i), encoding="utf-8")
+        write_into(folder, dynamic_chapters(fit, study.title, profiles, findings), title="Dynamic fit")
     return [out / name for name in names]
 
 
-def _as_data(found: DynamicFit, profiles: Sequence[DynamicProfile], remarks: Sequence[str]) -> dict[str, Any]:
+def _to_dict(fit: DynamicFit, profiles: Sequence[DynamicProfile], findings: Sequence[str]) -> dict[str, Any]:
     """A dynamic fit as plain data, all numbers SI."""
-    import dataclasses
-
     return {
-        "parameters": [dataclasses.asdict(estimate) for estimate in found.estimates],
+        "parameters": [dataclasses.asdict(estimate) for estimate in fit.estimates],
         "records": [
-            {"origin": course.experiment.recording.origin, "rms": {n: found.rms(n, i) for n in course.names}}
-            for i, course in enumerate(found.problem.courses)
+            {"origin": record.experiment.recording.origin, "rms": {n: fit.rms(n, i) for n in record.names}}
+            for i, record in enumerate(fit.problem.record_models)
         ],
-        "scatter": found.residual_std,
-        "rank": found.identifiability.rank,
-        "starts_at_optimum": found.reached,
-        "not_determined": [
-            {"shares": dict(each.shares), "deviation": each.deviation, "experiment": each.experiment}
-            for each in found.identifiability.undetermined
+        "residual_std": fit.residual_std,
+        "rank": fit.identifiability.rank,
+        "starts_at_optimum": fit.starts_at_optimum,
+        "undetermined": [
+            {"shares": dict(each.shares), "deviation": each.relative_stderr, "experiment": each.remedy}
+            for each in fit.identifiability.undetermined
         ],
-        "profiles": {p.name: {"values": p.values, "growth": p.growth, "interval": list(p.interval)} for p in profiles},
-        "notes": [*found.notes, *remarks],
+        "profiles": {
+            p.name: {"values": p.values, "growth": p.cost_increase, "interval": list(p.interval)} for p in profiles
+        },
+        "notes": [*fit.notes, *findings],
     }

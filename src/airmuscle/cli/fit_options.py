@@ -1,33 +1,51 @@
-"""What `airmuscle fit` is asked beyond the fit: bootstrap, profiles, a physical shape."""
+"""Options of `airmuscle fit`: bootstrap, profile likelihood, cross-validation groups, shape constraints, loss."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
 import typer
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..identify.cross_validation import GroupSplit
-    from ..identify.result import Fit
-    from ..identify.surface.shape import ShapedFit
-    from ..library.entry import Entry
-    from ..recording import Recording
-    from ..report.chapter import Chapter
-    from ..report.uncertainty_chapter import Uncertainty
+from ..characteristic import Characteristic, ContractileSurface
+from ..core.errors import ParameterError
+from ..core.units import quantity
+from ..identify import (
+    BlockSplit,
+    Fit,
+    GroupSplit,
+    Huber,
+    LeastSquares,
+    LevelSplit,
+    Loss,
+    RunSplit,
+    ShapeConstrainedFit,
+    SpecimenSplit,
+    bootstrap,
+    profile,
+    weakly_determined,
+)
+from ..identify.problem import fitted_quantity_of
+from ..identify.surface.shape import fit_shape_constrained, shape_violations_of_fit
+from ..library.entry import Entry
+from ..recording import Recording
+from ..report.chapter import Chapter
+from ..report.shape_chapter import shape_chapter
+from ..report.uncertainty_chapter import Uncertainty, uncertainty_chapter
+from .progress import computation_progress
 
 WEAK = "weak"
-"""For --profile: all parameters whose standard deviation should not be trusted."""
+"""Value of --profile that stands for all weakly determined parameters."""
 
 
 @dataclasses.dataclass(frozen=True)
 class FitRequest:
-    """How to fit, and where the answers go."""
+    """Settings of the fit and of its output."""
 
-    more: FitOptions
+    options: FitOptions
     fixed: tuple[str, ...]
     degree: int
     robust: str | None
@@ -39,139 +57,141 @@ class FitRequest:
 
 @dataclasses.dataclass(frozen=True)
 class FitOptions:
-    """The options, checked before anything is read."""
+    """Computations beyond the fit; checked before any file is read."""
 
     refits: int | None
     profiled: tuple[str, ...]
-    by: GroupSplit | None
+    split: GroupSplit | None
     shape: bool
-    free: tuple[tuple[float, float], ...]
-    """Pressures [Pa] and contractions [1] at which the muscle hangs free."""
+    free_contractions: tuple[tuple[float, float], ...]
+    """Points of zero force: pressures [Pa] and contractions [1]."""
 
     @classmethod
-    def of(
+    def parse(
         cls, refits: int | None, profiled: list[str] | None, leave_out: str | None, shape: bool,
-        free: list[str] | None, compare: bool,
+        free_contraction: list[str] | None, compare: bool,
     ) -> FitOptions:  # fmt: skip
-        """From the options as typed."""
-        if free and not shape:
-            raise typer.BadParameter("--free states where the force of a surface with --shape is zero; give --shape")
+        """The options from their texts. Raises BadParameter or UnitError."""
+        if free_contraction and not shape:
+            raise typer.BadParameter("--free-contraction requires --shape")
         if shape and compare:
-            raise typer.BadParameter("--shape is for a ContractileSurface, named with --characteristic; no --compare")
-        return cls(refits, tuple(profiled or ()), part_of(leave_out), shape, tuple(_point(text) for text in free or ()))
+            raise typer.BadParameter(
+                "--shape is for a ContractileSurface, given with --characteristic; it excludes --compare"
+            )
+        points = tuple(_parse_point(text) for text in free_contraction or ())
+        return cls(refits, tuple(profiled or ()), parse_split(leave_out), shape, points)
 
-    def find(self, fit: Fit, recordings: Sequence[Recording]) -> FitExtras:
-        """All that was asked of a fit. Raises IdentificationError or ParameterError."""
-        from ..identify import bootstrap, profile, weakly_determined
-        from ..report.uncertainty_chapter import Uncertainty
-        from .progress import working_progress
-
+    def evaluate(self, fit: Fit, recordings: Sequence[Recording]) -> FitExtras:
+        """The requested results beyond the fit. Raises IdentificationError or ParameterError."""
         weak = weakly_determined(fit) if WEAK in self.profiled else ()
         names = dict.fromkeys((*weak, *(name for name in self.profiled if name != WEAK)))
-        drawn = None
+        sample = None
         if self.refits is not None:
-            with working_progress("refits") as progress:
-                drawn = bootstrap(fit, recordings, refits=self.refits, by=self.by, progress=progress)
+            with computation_progress("refits") as progress:
+                sample = bootstrap(fit, recordings, refits=self.refits, by=self.split, progress=progress)
         profiles = tuple(profile(fit, name) for name in names)
-        shaped = _shaped(fit, recordings, self.free) if self.shape else None
+        shaped = _fit_shaped(fit, recordings, self.free_contractions) if self.shape else None
         none_weak = WEAK in self.profiled and not weak
-        return FitExtras(Uncertainty(fit, drawn, profiles), shaped, len(self.free), none_weak)
+        return FitExtras(Uncertainty(fit, sample, profiles), shaped, len(self.free_contractions), none_weak)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class FitExtras:
-    """The answers, for report, terminal and file."""
+    """Results beyond the fit, for the report, the terminal and JSON."""
 
-    sure: Uncertainty
-    shaped: ShapedFit | None
-    free: int
+    uncertainty: Uncertainty
+    shaped: ShapeConstrainedFit | None
+    free_contractions: int
+    """Number of points at which the force is constrained to zero."""
     none_weak: bool
+    """Whether the weakly determined parameters were requested and there are none."""
 
     def chapters(self) -> list[Chapter]:
-        """Their chapters, before the fit's own."""
-        from ..report.shape_chapter import shape_chapter
-        from ..report.uncertainty_chapter import uncertainty_chapter
-
-        shape = [] if self.shaped is None else [shape_chapter(self.shaped, self.sure.fit, self.free)]
-        return [*shape, *([uncertainty_chapter(self.sure)] if self.sure.asked else [])]
+        """Chapters of the report, which precede that of the fit."""
+        fit = self.uncertainty.fit
+        shape = [] if self.shaped is None else [shape_chapter(self.shaped, fit, self.free_contractions)]
+        return [*shape, *([uncertainty_chapter(self.uncertainty)] if self.uncertainty.requested else [])]
 
     def lines(self) -> list[str]:
-        """The same for a terminal."""
-        from ..identify.surface.shape import broken_by
-
-        said = self.sure.lines()
+        """Lines for the terminal."""
+        lines = self.uncertainty.lines()
         if self.none_weak:
-            said.append("profile: no parameter is nearly undetermined; the standard deviations stand")
+            lines.append("profile: no parameter is weakly determined; the standard errors are valid")
         if self.shaped is None:
-            return [*said, *(f"note: {each}" for each in broken_by(self.sure.fit))]
-        cost = f"rms {self.shaped.rmse:.4g} N with it, {self.shaped.unconstrained:.4g} N without"
-        return [*said, f"shape: {cost}", *(f"without it {each}" for each in self.shaped.broken)]
+            return [*lines, *(f"note: {violation}" for violation in shape_violations_of_fit(self.uncertainty.fit))]
+        errors = f"rms error {self.shaped.rmse:.4g} N, unconstrained {self.shaped.unconstrained_rmse:.4g} N"
+        return [
+            *lines,
+            f"shape: {errors}",
+            *(f"unconstrained: {violation}" for violation in self.shaped.unconstrained_violations),
+        ]
 
-    def as_data(self) -> dict[str, Any]:
-        """The same as plain data, SI."""
-        from ..identify.surface.shape import broken_by
-
-        broken = broken_by(self.sure.fit) if self.shaped is None else self.shaped.broken
-        found = {**self.sure.as_data(), "shape_breaks": [_broken(each) for each in broken]}
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, all numbers SI."""
+        violations = (
+            shape_violations_of_fit(self.uncertainty.fit)
+            if self.shaped is None
+            else self.shaped.unconstrained_violations
+        )
+        data = {**self.uncertainty.as_data(), "shape_violations": [_violation_to_dict(each) for each in violations]}
         if self.shaped is not None:
-            found["shaped"] = {"rmse": self.shaped.rmse, "unconstrained": self.shaped.unconstrained}
-        return found
+            data["shaped"] = {"rmse": self.shaped.rmse, "unconstrained": self.shaped.unconstrained_rmse}
+        return data
 
-    def shaped_entry(self, entry: Entry) -> Entry:
-        """The muscle with the surface that keeps its shape, where one was asked for."""
+    def constrained_entry(self, entry: Entry) -> Entry:
+        """The entry with the shape-constrained surface if one was requested, else the entry itself."""
         if self.shaped is None:
             return entry
-        note = f"{entry.note} Here with the shape of a muscle: rms error {self.shaped.rmse:.4g} N."
+        note = f"{entry.note} With shape constraints: rms error {self.shaped.rmse:.4g} N."
         return dataclasses.replace(entry, characteristic=self.shaped.model, note=note)
 
 
-def part_of(word: str | None) -> GroupSplit | None:
-    """What --leave-out names."""
-    from ..identify.cross_validation import BlockSplit, LevelSplit, RunSplit, SpecimenSplit
-
-    parts: dict[str, GroupSplit] = {
+def parse_split(name: str | None) -> GroupSplit | None:
+    """The groups of rows that --leave-out names. Raises BadParameter."""
+    splits: dict[str, GroupSplit] = {
         "run": RunSplit(),
         "specimen": SpecimenSplit(),
         "contraction": LevelSplit("contraction"),
         "pressure": LevelSplit("pressure"),
         "block": BlockSplit(),
     }
-    if word is not None and word not in parts:
-        raise typer.BadParameter(f"--leave-out is '{word}'; it may be {', '.join(parts)}")
-    return None if word is None else parts[word]
+    if name is not None and name not in splits:
+        raise typer.BadParameter(f"--leave-out is '{name}'; allowed range: {', '.join(splits)}")
+    return None if name is None else splits[name]
 
 
-def _point(text: str) -> tuple[float, float]:
-    from ..core.units import quantity
+def loss_of(robust: str | None, law: Characteristic) -> Loss:
+    """The loss that --robust gives, with its threshold in the unit of the fitted quantity; squared loss without it."""
+    if robust is None:
+        return LeastSquares()
+    return Huber(quantity(robust, fitted_quantity_of(law).unit, where="--robust"))
 
+
+def _parse_point(text: str) -> tuple[float, float]:
+    """A point of zero force: pressure [Pa] and contraction [1]."""
     pressure, sign, contraction = text.partition("=")
     if not sign:
-        raise typer.BadParameter(f"--free wants PRESSURE=CONTRACTION, like '3 bar=18 %', not '{text}'")
-    found = quantity(contraction, "1", where="--free")
-    if not 0.0 <= found < 1.0:
-        raise typer.BadParameter(
-            f"--free: a muscle that hangs free is contracted by 0 to 100 %, not by '{contraction}'"
-        )
-    return quantity(pressure, "Pa", where="--free"), found
+        raise typer.BadParameter(f"--free-contraction must be PRESSURE=CONTRACTION, such as '3 bar=18 %', not '{text}'")
+    value = quantity(contraction, "1", where="--free-contraction")
+    if not 0.0 <= value < 1.0:
+        raise typer.BadParameter(f"--free-contraction: a contraction must be from 0 to 100 %, not '{contraction}'")
+    return quantity(pressure, "Pa", where="--free-contraction"), value
 
 
-def _shaped(fit: Fit, recordings: Sequence[Recording], free: tuple[tuple[float, float], ...]) -> ShapedFit:
-    from ..characteristic import ContractileSurface
-    from ..core.errors import ParameterError
-    from ..identify import fit_shaped
-    from ..recording import Recording
-
+def _fit_shaped(
+    fit: Fit, recordings: Sequence[Recording], points: tuple[tuple[float, float], ...]
+) -> ShapeConstrainedFit:
     if not isinstance(fit.model, ContractileSurface):
         raise ParameterError(
-            f"--shape: {type(fit.model).__name__} has the shape that its formula gives it; only a ContractileSurface "
-            "can be held to one. Give --characteristic ContractileSurface, or leave out --shape."
+            f"--shape: the shape of {type(fit.model).__name__} is given by its formula; only a ContractileSurface can "
+            "be constrained. Give --characteristic ContractileSurface, or omit --shape."
         )
-    points = None
-    if free:
-        pressure, contraction = zip(*free, strict=True)
-        points = Recording({"pressure": list(pressure), "contraction": list(contraction)}, "--free")  # type: ignore[dict-item]
-    return fit_shaped(fit.model, recordings, free=points)
+    free = None
+    if points:
+        pressure, contraction = np.array(points).T
+        free = Recording({"pressure": pressure, "contraction": contraction}, "--free-contraction")
+    return fit_shape_constrained(fit.model, recordings, free=free)
 
 
-def _broken(each: Any) -> dict[str, Any]:
-    return {**dataclasses.asdict(each), "rule": each.rule.words}
+def _violation_to_dict(violation: Any) -> dict[str, Any]:
+    return {**dataclasses.asdict(violation), "rule": violation.rule.description}

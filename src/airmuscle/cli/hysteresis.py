@@ -1,188 +1,188 @@
-"""`airmuscle hysteresis`: friction from loops."""
+"""`airmuscle hysteresis`: identification of friction models from hysteresis loops."""
 
 from __future__ import annotations
 
+import dataclasses
+import math
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from .bench_files import Files, Length, Surroundings, Units, measured
-from .options import Folder, Json, Map
-from .terminal import print_json, print_table
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..identify.hysteresis import HysteresisFit, LoopFit
-    from ..library.entry import Entry
-    from ..recording import Recording
+from ..core import leaves
+from ..identify.hysteresis import HysteresisFit, LoopFit, find_holds, find_loops, fit_creep, fit_loop
+from ..library.catalogue import load_law
+from ..library.entry import Entry
+from ..library.write import part_toml, save
+from ..recording import Recording
+from ..report.hysteresis_chapter import describe_row_counts, hysteresis_chapters
+from ..report.output_folder import atomic_folder, check_writable
+from ..report.write import write_into
+from .bench_files import AmbientPressure, Files, Length, Units, read_recordings
+from .options import Folder, Json, Mapping
+from .terminal import echo, print_json, print_table
 
 Muscle = Annotated[
-    str | None, typer.Option(metavar="NAME", help="The muscle that gets the friction: a library entry, a TOML file.")
+    str | None,
+    typer.Option(metavar="NAME", help="Muscle to which the friction is added: a library entry or a muscle file."),
 ]
-Given = Annotated[
-    bool, typer.Option("--given", help="The muscle's own law, with an offset, is the curve without friction.")
+UseCharacteristic = Annotated[
+    bool,
+    typer.Option(
+        "--use-characteristic",
+        help="Take the muscle's characteristic plus an offset as the friction-free curve; default: a polynomial.",
+    ),
 ]
-Degree = Annotated[int, typer.Option(min=0, max=9, help="Degree of the curve without friction in what is swept.")]
-AllRows = Annotated[bool, typer.Option("--all-rows", help="Rows in which pressure or length move quickly count too.")]
-Elements = Annotated[int, typer.Option(min=1, max=30, help="Elements of MaxwellSlip and PrandtlIshlinskii.")]
-Creep = Annotated[bool, typer.Option("--creep", help="Also fit creep to the longest hold of every file.")]
+Degree = Annotated[int, typer.Option(min=0, max=9, metavar="N", help="Degree of the polynomial friction-free curve.")]
+AllRows = Annotated[bool, typer.Option("--all-rows", help="Include rows in which pressure or length change quickly.")]
+Elements = Annotated[
+    int, typer.Option(min=1, max=30, metavar="N", help="Number of elements of MaxwellSlip and PrandtlIshlinskii.")
+]
+Creep = Annotated[bool, typer.Option("--creep", help="Also fit creep to the longest hold phase of every file.")]
 
 
 def hysteresis(
     files: Files,
     muscle: Muscle = None,
-    given: Given = False,
+    use_characteristic: UseCharacteristic = False,
     degree: Degree = 3,
     all_rows: AllRows = False,
     elements: Elements = 8,
     creep: Creep = False,
     out: Folder = Path("hysteresis"),
     resting_length: Length = None,
-    ambient: Surroundings = None,
+    ambient: AmbientPressure = None,
     unit: Units = None,
-    mapping: Map = None,
+    mapping: Mapping = None,
     json: Json = False,
 ) -> None:
-    """Fit friction laws to inflating and deflating branches, and say whether the data justify any.
+    """Fit friction models to hysteresis loops.
 
     \b
-    Runs are told by what they hold; a second run at the same level judges the first.
-    Writes DIR/report.html, and DIR/muscle.toml where --muscle names one, else DIR/friction.toml,
-    if the data justify a friction that a plant can take.
+    The type of a run (isobaric, isometric) is detected; a second run at the same level validates the first.
+    Statistical tests decide whether the data justify a friction model.
+    Writes DIR/report.html. If a model that a plant can use is justified, it is written to DIR/muscle.toml (with
+    --muscle) or to DIR/friction.toml.
 
     \b
     Examples:
       airmuscle hysteresis loop1.csv loop2.csv --resting-length "200 mm" --out friction
       airmuscle hysteresis loops/*.csv --muscle fit/muscle.toml --mapping rig.toml --creep
     """
-    from ..identify.hysteresis import find_loops, fit_loop
-    from ..library.catalogue import load
-    from ..report.output_folder import check_writable
-
-    if given and muscle is None:
-        raise typer.BadParameter("--given takes the law of the muscle that --muscle names")
-    recordings = measured(files, unit, mapping=mapping, resting_length=resting_length, ambient=ambient)
-    entry = None if muscle is None else load(muscle)
-    law = entry.characteristic if entry is not None and given else None
+    if use_characteristic and muscle is None:
+        raise typer.BadParameter("--use-characteristic requires --muscle")
+    recordings = read_recordings(files, unit, mapping=mapping, resting_length=resting_length, ambient=ambient)
+    entry = None if muscle is None else load_law(muscle)
+    law = entry.characteristic if entry is not None and use_characteristic else None
     loops = find_loops(recordings, characteristic=law, degree=degree, all_rows=all_rows)
     check_writable(out)
-    said = None if json else lambda name: typer.echo(f"  {name}", err=True)
-    found = [fit_loop(loop, elements=elements, progress=said) for loop in loops]
-    crept = _creep(recordings) if creep else []
-    chosen = _chosen(found)
-    written = _write(found, crept, chosen, entry, out)
+    progress = None if json else lambda name: echo(f"  {name}", err=True)
+    fits = [fit_loop(loop, elements=elements, progress=progress) for loop in loops]
+    creep_results = _fit_creep(recordings) if creep else []
+    path = _write(fits, creep_results, _select(fits), entry, out)
     if json:
-        print_json({"loops": [_as_data(each) for each in found], "creep": crept, "written": str(written or "")})
+        print_json({"loops": [_to_dict(fit) for fit in fits], "creep": creep_results, "written": str(path or "")})
         return
-    _print(found, crept)
-    typer.echo(
-        f"{written.stem}: {written}" if written else "no friction to write: none that a plant takes is justified"
-    )
-    typer.echo(f"report: {out / 'report.html'}")
+    _print(fits, creep_results)
+    echo(f"{path.stem}: {path}" if path else "no friction file: no model that a plant can use is justified")
+    echo(f"report: {out / 'report.html'}")
 
 
-def _chosen(found: Sequence[LoopFit]) -> HysteresisFit | None:
-    """The friction to write: that of the loop with most independent rows among those a plant can take."""
-    usable = [each.recommended for each in found if each.recommended is not None and each.enters_a_plant]
-    return max(usable, key=lambda fit: fit.effective_rows, default=None)
+def _select(fits: Sequence[LoopFit]) -> HysteresisFit | None:
+    """The friction to write: of the loop with the largest effective number of rows, among those a plant can use."""
+    usable = [fit.recommended for fit in fits if fit.recommended is not None and fit.usable_in_plant]
+    return max(usable, key=lambda fit: fit.effective_sample_size, default=None)
 
 
-def _creep(recordings: Sequence[Recording]) -> list[str]:
-    """What is to be said of creep in each recording's longest hold."""
-    from ..identify.hysteresis import find_holds, fit_creep
-
-    said = []
+def _fit_creep(recordings: Sequence[Recording]) -> list[str]:
+    """The result of a creep fit to the longest hold phase of each recording, in one sentence."""
+    results = []
     for recording in recordings:
-        found = max(find_holds(recording), key=lambda hold: len(hold.stretch), default=None)
-        if found is None:
-            said.append(f"{recording.origin}: pressure and load, or pressure and length, are never held for 12 rows.")
+        hold = max(find_holds(recording), key=lambda hold: len(hold.interval), default=None)
+        if hold is None:
+            results.append(
+                f"{recording.origin}: no hold phase of 12 rows or more, with constant pressure and constant force or "
+                "length."
+            )
             continue
-        rows = f"{found.stretch.start + 1} to {found.stretch.stop}"
-        verdict = fit_creep(recording.rows(found.stretch.rows), found.quantity).verdict
-        said.append(f"{recording.origin}, {found.quantity} in rows {rows}: {verdict}")
-    return said
+        rows = f"{hold.interval.start + 1} to {hold.interval.stop}"
+        verdict = fit_creep(recording.rows(hold.interval.rows), hold.quantity).verdict
+        results.append(f"{recording.origin}, {hold.quantity} in rows {rows}: {verdict}")
+    return results
 
 
 def _write(
-    found: Sequence[LoopFit], creep: Sequence[str], chosen: HysteresisFit | None, entry: Entry | None, out: Path
+    fits: Sequence[LoopFit], creep: Sequence[str], selected: HysteresisFit | None, entry: Entry | None, out: Path
 ) -> Path | None:
-    from ..library.catalogue import save
-    from ..library.write import part_lines
-    from ..report.hysteresis_chapter import hysteresis_chapters
-    from ..report.output_folder import atomic_folder
-    from ..report.write import fill
-
-    name = None if chosen is None else "friction.toml" if entry is None else "muscle.toml"
-    with atomic_folder(out) as place:
-        fill(place, hysteresis_chapters(found, creep), title="Friction")
-        if chosen is not None and entry is not None:
-            save(_with_friction(entry, chosen), place / "muscle.toml")
-        elif chosen is not None:
-            lines = [f"# {chosen.verdict}", *part_lines("friction", chosen.friction)]
-            (place / "friction.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    """Write the report and, for a selected friction, the muscle or friction file; returns the path of that file."""
+    name = None if selected is None else "friction.toml" if entry is None else "muscle.toml"
+    with atomic_folder(out) as folder:
+        write_into(folder, hysteresis_chapters(fits, creep), title="Friction")
+        if selected is not None and entry is not None:
+            save(_with_friction(entry, selected), folder / "muscle.toml")
+        elif selected is not None:
+            text = f"# {selected.verdict}\n{part_toml('friction', selected.friction)}"
+            (folder / "friction.toml").write_text(text, encoding="utf-8")
     return out / name if name else None
 
 
-def _with_friction(entry: Entry, chosen: HysteresisFit) -> Entry:
-    """The muscle with what was found; checks of the muscle without friction stay, being of its law."""
-    import dataclasses
-
-    note = f"{entry.note} Friction from {chosen.course.origin}: {chosen.verdict}".strip()
-    return dataclasses.replace(entry, name="muscle", friction=chosen.friction, note=note)
+def _with_friction(entry: Entry, fit: HysteresisFit) -> Entry:
+    """The muscle with the friction; its checks are kept, because they apply to the characteristic alone."""
+    note = f"{entry.note} Friction from {fit.series.origin}: {fit.verdict}".strip()
+    return dataclasses.replace(entry, name="muscle", friction=fit.friction, note=note)
 
 
-def _print(found: Sequence[LoopFit], creep: Sequence[str]) -> None:
-    from ..report.hysteresis_chapter import counted
-
-    for each in found:
-        typer.echo(f"{each.loop.recording.origin}: {each.loop.in_words}. {counted(each.loop)}")
+def _print(fits: Sequence[LoopFit], creep: Sequence[str]) -> None:
+    for fit in fits:
+        echo(f"{fit.loop.recording.origin}: {fit.loop.description}. {describe_row_counts(fit.loop)}")
         rows = [
-            (type(f.friction).__name__, f"{f.plain_rmse:.3g} to {f.rmse:.3g} N", _judge(f),
-             f"{f.aicc_gain:.4g}", "< 1e-300" if f.chance < 1e-300 else f"{f.chance:.2g}",
-             "yes" if f.justified else "no")
-            for f in each.fits
+            (type(f.friction).__name__, f"{f.rmse_without_friction:.3g} to {f.rmse:.3g} N", _second_run_errors(f),
+             f"{0.0 - f.aicc_reduction:.4g}", _p_value(f.p_value), "yes" if f.justified else "no")
+            for f in fit.fits
         ]  # fmt: skip
-        heads = ("law", "rms error", "on second run", "AICc falls by", "by chance", "justified")
-        print_table(heads, rows, right=heads[3:5])
-        best = each.recommended
-        typer.echo(str(best) if best is not None else "The data justify no friction in this loop.")
-        if best is not None and not each.enters_a_plant:
-            typer.echo("note: friction on the pressure describes isometric loops only; it does not enter a plant.")
-        for name, why in each.failed.items():
-            typer.echo(f"note: {name} was not fitted: {why}")
-        typer.echo("")
+        headers = ("model", "rms error", "on second run", "difference in AICc", "p-value (F test)", "justified")
+        print_table(headers, rows, right=headers[3:5])
+        best = fit.recommended
+        echo(str(best) if best is not None else "The data justify no friction model for this loop.")
+        if best is not None and not fit.usable_in_plant:
+            echo("note: friction driven by pressure describes isometric loops only; a plant cannot use it.")
+        for name, reason in fit.failed.items():
+            echo(f"note: {name} was not fitted: {reason}")
+        echo()
     for text in creep:
-        typer.echo(f"creep: {text}")
+        echo(f"creep: {text}")
 
 
-def _judge(fit: HysteresisFit) -> str:
-    import math
-
-    return f"{fit.plain_repeat_rmse:.3g} to {fit.repeat_rmse:.3g} N" if math.isfinite(fit.repeat_rmse) else ""
+def _p_value(probability: float) -> str:
+    return "< 0.001" if probability < 0.001 else f"{probability:.2g}"
 
 
-def _as_data(found: LoopFit) -> dict[str, Any]:
+def _second_run_errors(fit: HysteresisFit) -> str:
+    """The rms errors on the second run, without and with friction; empty without a second run."""
+    return (
+        f"{fit.repeat_rmse_without_friction:.3g} to {fit.repeat_rmse:.3g} N" if math.isfinite(fit.repeat_rmse) else ""
+    )
+
+
+def _to_dict(fit: LoopFit) -> dict[str, Any]:
     """A loop with its fits as plain data, all numbers SI."""
-    from ..core.tree import leaves
-
     return {
-        "origin": found.loop.recording.origin,
-        "run": found.loop.run.kind.name,
-        "held": found.loop.run.column,
-        "value": found.loop.run.value,
-        "recommended": type(found.recommended.friction).__name__ if found.recommended else None,
-        "enters_a_plant": found.enters_a_plant,
-        "laws": [
+        "origin": fit.loop.recording.origin,
+        "run": fit.loop.run.kind.name,
+        "constant": fit.loop.run.constant_column,
+        "value": fit.loop.run.constant_value,
+        "recommended": type(fit.recommended.friction).__name__ if fit.recommended else None,
+        "usable_in_plant": fit.usable_in_plant,
+        "models": [
             {
-                "law": type(f.friction).__name__, "parameters": {p.path: p.value for p in leaves(f.friction)},
-                "rmse": f.rmse, "plain_rmse": f.plain_rmse, "gap": f.gap, "gap_left": f.gap_left,
-                "repeat_rmse": f.repeat_rmse, "plain_repeat_rmse": f.plain_repeat_rmse,
-                "repeatability": f.repeatability, "aicc_gain": f.aicc_gain, "chance": f.chance,
-                "justified": f.justified, "not_determined": list(f.unsettled),
+                "model": type(f.friction).__name__, "parameters": {p.path: p.value for p in leaves(f.friction)},
+                "rmse": f.rmse, "rmse_without": f.rmse_without_friction, "gap": f.residual_gap, "gap_without": f.gap,
+                "repeat_rmse": f.repeat_rmse, "repeat_rmse_without": f.repeat_rmse_without_friction,
+                "repeatability": f.repeatability, "aicc_difference": 0.0 - f.aicc_reduction, "p_value": f.p_value,
+                "justified": f.justified, "undetermined": list(f.undetermined),
             }
-            for f in found.fits
+            for f in fit.fits
         ],
-        "failed": dict(found.failed),
+        "failed": dict(fit.failed),
     }  # fmt: skip

@@ -1,44 +1,45 @@
-"""What a fit starts from: a library entry, a muscle file, or a law that the data themselves can start."""
+"""Initial law of a fit: a library entry, a muscle file, or initial values estimated from the data."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..library.entry import Entry
-    from ..recording import Recording
+from ..core.errors import ParameterError
+from ..identify import standard_candidates
+from ..library.catalogue import load_law
+from ..library.entry import Entry
+from ..library.models import model_class, model_names
+from ..recording import Recording
 
 
 class InitialLaw(NamedTuple):
-    """An entry around the law, and the parameters that only multiply others and so stay."""
+    """An entry with the law, and the parameters to keep fixed because they only scale other parameters."""
 
     entry: Entry
     fixed: tuple[str, ...] = ()
 
 
-def start_of(name: str, recordings: Sequence[Recording], degree: int, option: str = "--characteristic") -> InitialLaw:
-    """The library entry to start from, or a bare one around a law that starts from data alone."""
-    from ..core.errors import ParameterError
-    from ..identify.candidates import standard_candidates
-    from ..library.catalogue import load
-    from ..library.entry import Entry
-    from ..library.models import model_class, model_names
+def find_initial_law(
+    name: str, recordings: Sequence[Recording], degree: int, option: str = "--characteristic"
+) -> InitialLaw:
+    """The library entry or muscle file of that name, or the named model with initial values estimated from the data.
 
+    Raises ParameterError for a model whose initial values cannot be estimated.
+    """
     if name not in model_names():
-        return InitialLaw(load(name))
+        return InitialLaw(load_law(name))
     cls = model_class(name, option)
     if hasattr(cls, "blank"):
-        # A clamp at twice what was measured cuts off no point, and still limits extrapolation.
-        greatest = 2.0 * max(1.0, *(float(run["force"].max()) for run in recordings))
-        return InitialLaw(Entry(name, name, "chosen", cls.blank(degree, max_force=greatest)))
+        # An upper limit of twice the measured force clamps no measured point, and still limits the extrapolation.
+        max_force = 2.0 * max(1.0, *(float(run["force"].max()) for run in recordings))
+        return InitialLaw(Entry(name, name, "chosen", cls.blank(degree, max_force=max_force)))
     for candidate in standard_candidates(recordings):
         if type(candidate.law) is cls:
             return InitialLaw(Entry(name, name, "chosen", candidate.law), candidate.fixed)
-    known = all("resting_length" in run.constants for run in recordings)
-    length = "" if known else " or give the resting length, from which some laws can start,"
+    has_length = all("resting_length" in run.constants for run in recordings)
+    length = "" if has_length else " Or give the resting length, which allows more models to be initialised from data."
     raise ParameterError(
-        f"{option}: {name} needs values to start from. Name a library entry made of it (airmuscle list shows which),"
-        f"{length} or write a muscle file with your own."
+        f"{option}: {name} needs initial values, which cannot be estimated from these data. Give a library entry of "
+        f"this model (see airmuscle list) or a muscle file with initial values.{length}"
     )

@@ -1,167 +1,169 @@
-"""`airmuscle inspect`: what was understood of bench files, before anything is fitted."""
+"""`airmuscle inspect`: inspection of measurement files before a fit."""
 
 from __future__ import annotations
 
+import dataclasses
+import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from .bench_files import Length, Surroundings, Units, pairs
-from .options import Json, Map, OptionalFolder
-from .terminal import print_json, print_table
-
-if TYPE_CHECKING:
-    from ..recording import ColumnMapping, Recording
-    from ..recording.segment import Inspection, Sampling
+from ..core.plotting import save
+from ..recording import ColumnMapping, Recording, read
+from ..recording.columns import quantity_of
+from ..recording.mapping import read_mapping
+from ..recording.segment import Inspection, Sampling, inspect_all
+from ..report.output_folder import atomic_folder
+from .bench_files import AmbientPressure, Length, Units, parse_pairs
+from .inspection_text import COLUMNS, column_rows, summary
+from .options import Json, Mapping, OptionalFolder
+from .progress import reading_progress
+from .terminal import echo, print_json, print_table
 
 Files = Annotated[
-    list[str], typer.Argument(metavar="FILE...", help="Files, globs or folders: CSV, Excel, MAT, TDMS, MDF.")
+    list[str],
+    typer.Argument(metavar="FILES", help="Files, folders or glob patterns: CSV, Excel, MAT, TDMS, MDF."),
 ]
 Columns = Annotated[
     list[str] | None,
-    typer.Option("--column", metavar="COLUMN=HEADING", help="'Channel 1=pressure [bara]', '3=length [mm]'; repeat it."),
+    typer.Option(
+        "--column",
+        metavar="COLUMN=HEADER",
+        help="Header of a column, by name or number: 'Channel 1=pressure [bara]', '3=length [mm]'. Repeatable.",
+    ),
 ]
-Text = Annotated[str | None, typer.Option(metavar="SIGN", help="Of text files, where it is not recognised.")]
-Sheet = Annotated[str | None, typer.Option(metavar="NAME", help="Worksheet of an Excel file; all without it.")]
-Group = Annotated[str | None, typer.Option(metavar="NAME", help="Group of a TDMS or MDF file, struct of a MAT file.")]
+Delimiter = Annotated[
+    str | None, typer.Option(metavar="CHARACTER", help="Column delimiter of text files; default: detected.")
+]
+Decimal = Annotated[
+    str | None, typer.Option(metavar="CHARACTER", help="Decimal mark of text files; default: detected.")
+]
+Sheet = Annotated[str | None, typer.Option(metavar="NAME", help="Worksheet of an Excel file; default: all.")]
+Group = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Group of a TDMS or MDF file, or struct of a MAT file.")
+]
 
 
 def inspect(
     files: Files,
-    mapping: Map = None,
+    mapping: Mapping = None,
     column: Columns = None,
     unit: Units = None,
     resting_length: Length = None,
-    ambient: Surroundings = None,
-    delimiter: Text = None,
-    decimal: Text = None,
+    ambient: AmbientPressure = None,
+    delimiter: Delimiter = None,
+    decimal: Decimal = None,
     sheet: Sheet = None,
     group: Group = None,
     json: Json = False,
     out: OptionalFolder = None,
 ) -> None:
-    """Show what was understood of bench files: columns, units, sampling, runs, branches, plateaus, glitches.
+    """Inspect measurement files: columns, runs, sampling, outliers.
 
     \b
-    Nothing is changed or left out. With --out, DIR gets a figure for each recording.
-    The sensors of several files are estimated together, as those of one rig.
+    Shows how the files are interpreted: columns and units, sampling, runs, branches, plateaus and suspected outliers.
+    The data are not changed. With --out, one figure per recording is written to DIR.
+    Sensor properties are estimated from all files together, as from one test rig.
 
     \b
     Examples:
       airmuscle inspect bench.csv
-      airmuscle inspect runs/ --resting-length "300 mm" --out seen
+      airmuscle inspect runs/ --resting-length "300 mm" --out inspection
       airmuscle inspect log.mat --column "data(:,1)=time [s]" --column "data(:,2)=pressure [bara]"
       airmuscle inspect runs/*.tdms --mapping rig.toml --json
     """
-    from ..recording.segment import inspect_all
-
-    told = _told(mapping, column=column, resting_length=resting_length, ambient=ambient, delimiter=delimiter,
-                 decimal=decimal, sheet=sheet, group=group)  # fmt: skip
-    seen = inspect_all(_recordings(files, told, pairs("--unit", unit)))
+    columns = _column_mapping(mapping, column=column, resting_length=resting_length, ambient=ambient,
+                              delimiter=delimiter, decimal=decimal, sheet=sheet, group=group)  # fmt: skip
+    inspections = inspect_all(_read(files, columns, parse_pairs("--unit", unit)))
     if out:
-        _draw(seen, out)
+        _save_figures(inspections, out)
     if json:
-        print_json([as_data(each) for each in seen])
+        print_json([_to_dict(each) for each in inspections])
         return
-    for each in seen:
+    for each in inspections:
         _print(each)
     if out:
-        typer.echo(f"figures: {out}")
+        echo(f"figures: {out}")
 
 
-def _told(path: Path | None, *, column: list[str] | None, **given: Any) -> ColumnMapping:
-    from ..recording import ColumnMapping
-    from ..recording.mapping import read_mapping
-
+def _column_mapping(path: Path | None, *, column: list[str] | None, **options: Any) -> ColumnMapping:
+    """The mapping of the file at `path`, if any, with the options taking precedence."""
     base = read_mapping(path) if path else ColumnMapping()
-    return base.with_given(columns=pairs("--column", column), **given)
+    return base.with_overrides(columns=parse_pairs("--column", column), **options)
 
 
-def _recordings(files: list[str], told: ColumnMapping, units: dict[str, str]) -> tuple[Recording, ...]:
-    from ..recording import read
-    from .progress import reading_progress
-
+def _read(files: list[str], mapping: ColumnMapping, units: dict[str, str]) -> tuple[Recording, ...]:
     with reading_progress() as progress:
-        return read(files, mapping=told, units=units, ordered=False, progress=progress)
+        return read(files, mapping=mapping, units=units, ordered=False, progress=progress)
 
 
-def _draw(seen: tuple[Inspection, ...], out: Path) -> None:
-    import re
-
-    from ..core.plotting import save
-    from ..report.output_folder import atomic_folder
-
-    with atomic_folder(out) as place:
-        for i, each in enumerate(seen, 1):
+def _save_figures(inspections: tuple[Inspection, ...], out: Path) -> None:
+    digits = len(str(len(inspections)))
+    with atomic_folder(out) as folder:
+        for i, each in enumerate(inspections, 1):
             stem = re.sub(r"[^\w.-]+", "-", each.recording.origin).strip("-")
-            name = f"{stem}.png" if len(seen) == 1 else f"{i:0{len(str(len(seen)))}}-{stem}.png"
-            save(each.plot(), place / name)
+            name = f"{stem}.png" if len(inspections) == 1 else f"{i:0{digits}}-{stem}.png"
+            save(each.plot(), folder / name)
 
 
-def as_data(seen: Inspection) -> dict[str, Any]:
+def _to_dict(inspection: Inspection) -> dict[str, Any]:
     """An inspection as plain data, all numbers SI, rows counted from 1."""
-    import dataclasses
-
-    recording = seen.recording
+    recording, sensors = inspection.recording, inspection.sensors.values()
     return {
         "origin": recording.origin,
         "rows": len(recording),
-        "columns": [_column(recording, name) for name in recording],
+        "columns": [_column_to_dict(recording, name) for name in recording],
         "constants": dict(recording.constants),
         "notes": list(recording.notes),
-        "sampling": _sampling(seen.sampling) if seen.sampling else None,
-        "sensors": [dataclasses.asdict(sensor) | {"deviation": sensor.deviation} for sensor in seen.sensors.values()],
+        "sampling": _sampling_to_dict(inspection.sampling) if inspection.sampling else None,
+        "sensors": [dataclasses.asdict(sensor) | {"deviation": sensor.std} for sensor in sensors],
         "runs": [
-            {"kind": run.kind.name, "first_row": run.stretch.start + 1, "last_row": run.stretch.stop,
-             "held": run.column, "value": run.value, "swept": run.swept} for run in seen.runs
+            {"kind": run.kind.name, "first_row": run.interval.start + 1, "last_row": run.interval.stop,
+             "constant": run.constant_column, "value": run.constant_value, "swept": run.swept_columns} for run in inspection.runs
         ],
         "branches": [
-            {"branch": b.name, "first_row": b.stretch.start + 1, "last_row": b.stretch.stop,
-             "start_pressure": b.start_pressure, "end_pressure": b.end_pressure} for b in seen.branches
+            {"branch": b.name, "first_row": b.interval.start + 1, "last_row": b.interval.stop,
+             "start_pressure": b.start_pressure, "end_pressure": b.end_pressure} for b in inspection.branches
         ],
-        "branch_agreement": seen.branch_agreement,
+        "branch_agreement": inspection.branch_agreement,
         "plateaus": [
-            {"first_row": p.stretch.start + 1, "last_row": p.stretch.stop, "values": dict(p.values),
-             "deviations": dict(p.deviations)} for p in seen.plateaus
+            {"first_row": p.interval.start + 1, "last_row": p.interval.stop, "values": dict(p.values),
+             "deviations": dict(p.standard_errors)} for p in inspection.plateaus
         ],
-        "quasi_static": seen.quasi_static,
-        "suspected_glitches": [dataclasses.asdict(o) | {"row": o.row + 1} for o in seen.outliers],
-        "findings": [dataclasses.asdict(finding) for finding in seen.findings],
+        "quasi_static": inspection.quasi_static,
+        "suspected_outliers": [dataclasses.asdict(o) | {"row": o.row + 1} for o in inspection.outliers],
+        "findings": [dataclasses.asdict(finding) for finding in inspection.findings],
     }  # fmt: skip
 
 
-def _sampling(timing: Sampling) -> dict[str, Any]:
+def _sampling_to_dict(sampling: Sampling) -> dict[str, Any]:
     return {
-        "rate": timing.rate,
-        "step": timing.step,
-        "jitter": timing.jitter,
-        "duration": timing.duration,
-        "gaps": [{"after_row": gap.row + 1, "start": gap.start, "length": gap.length} for gap in timing.gaps],
-        "repeating_rows": [row + 1 for row in timing.repeats],
-        "backward_rows": [row + 1 for row in timing.backward],
+        "rate": sampling.rate,
+        "step": sampling.sample_time,
+        "jitter": sampling.jitter,
+        "duration": sampling.duration,
+        "gaps": [{"after_row": gap.row + 1, "start": gap.start, "length": gap.duration} for gap in sampling.gaps],
+        "repeating_rows": [row + 1 for row in sampling.repeated_rows],
+        "backward_rows": [row + 1 for row in sampling.backward_rows],
     }
 
 
-def _column(recording: Recording, name: str) -> dict[str, Any]:
-    from ..recording.columns import quantity_of
-
-    quantity = quantity_of(name)
+def _column_to_dict(recording: Recording, name: str) -> dict[str, Any]:
+    column_quantity = quantity_of(name)
     values = recording[name]
     return {
         "name": name,
-        "unit": quantity.unit if quantity else None,
+        "unit": column_quantity.unit if column_quantity else None,
         "written_in": recording.units.get(name),
         "min": float(values.min()),
         "max": float(values.max()),
     }
 
 
-def _print(seen: Inspection) -> None:
-    from .inspection_text import COLUMNS, column_rows, summary
-
-    typer.echo(f"{seen.recording.origin}: {len(seen.recording)} rows")
-    print_table(COLUMNS, column_rows(seen), right=("min", "max", "resolution", "noise"))
-    for line in summary(seen):
-        typer.echo(line)
-    typer.echo("")
+def _print(inspection: Inspection) -> None:
+    echo(f"{inspection.recording.origin}: {len(inspection.recording)} rows")
+    print_table(COLUMNS, column_rows(inspection), right=("min", "max", "resolution", "noise"))
+    for line in summary(inspection):
+        echo(line)
+    echo()

@@ -1,4 +1,4 @@
-"""Ctrl-C that is never forgotten."""
+"""Deferred handling of SIGINT (Ctrl-C), so that no interruption is lost."""
 
 from __future__ import annotations
 
@@ -8,23 +8,29 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
-_pressed = threading.Event()
+INTERRUPTED = 130
+"""Exit code of an interrupted command: 128 + SIGINT."""
+
+_received = threading.Event()
 
 
 @contextlib.contextmanager
 def deferred_sigint() -> Iterator[None]:
-    """Within the block Ctrl-C raises KeyboardInterrupt as ever; if that is lost, `look` and the block's end raise it.
+    """Within the block SIGINT raises KeyboardInterrupt; if that exception is lost, the end of the block raises it.
 
-    Python throws away what is raised in a destructor or in the callback of a weak reference, of which imports have
-    many, and a compiled module whose import is interrupted fails as an ImportError. Where Ctrl-C is ignored, as by a
-    job that a shell runs in the background, or somebody else listens to it, it stays so.
+    Python discards exceptions raised in a destructor or in the callback of a weak reference, and imports run many of
+    these; an extension module whose import is interrupted raises ImportError instead. Blocks may be nested. Outside
+    the main thread, and where SIGINT is ignored (a background job of a shell) or has another handler, the block
+    changes nothing.
     """
-    ours = threading.current_thread() is threading.main_thread()
-    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+    handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
+    if handler not in (signal.default_int_handler, _receive):
         yield
         return
-    _pressed.clear()
-    signal.signal(signal.SIGINT, _hear)
+    outermost = handler is not _receive
+    if outermost:
+        _received.clear()
+        signal.signal(signal.SIGINT, _receive)
     try:
         yield
         check_interrupted()
@@ -32,16 +38,17 @@ def deferred_sigint() -> Iterator[None]:
         check_interrupted()
         raise
     finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        _pressed.clear()
+        if outermost:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+            _received.clear()
 
 
 def check_interrupted() -> None:
-    """Raise KeyboardInterrupt if Ctrl-C was pressed in a block; long work asks this now and then."""
-    if _pressed.is_set():
+    """Raise KeyboardInterrupt if SIGINT was received within a block; long computations call this repeatedly."""
+    if _received.is_set():
         raise KeyboardInterrupt
 
 
-def _hear(number: int, frame: Any) -> None:
-    _pressed.set()
+def _receive(number: int, frame: Any) -> None:
+    _received.set()
     signal.default_int_handler(number, frame)

@@ -1,18 +1,22 @@
-"""`airmuscle list`: what the library holds."""
+"""`airmuscle list`: contents of the library."""
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
+import tomllib
 from pathlib import Path
 
+from ..characteristic import ForceLaw
+from ..library.files import DATA, LAWS, VALVES, list_data, list_laws, list_valves
+from ..library.models import model_class
 from .options import Json
 from .terminal import print_json, print_table
 
 
 @dataclasses.dataclass(frozen=True)
 class ListRow:
-    """What a library file says of itself before anything is built from it."""
+    """Name, title, kind and provenance of a library file."""
 
     name: str
     title: str
@@ -23,60 +27,50 @@ class ListRow:
 def list_entries(json: Json = False) -> None:
     """List the muscles, laws, valves and data sets of the library.
 
-    A muscle can be simulated; a characteristic lacks a geometry for that, or is not solved for the force.
-    A valve stands in a scenario as { library = NAME }. A data set is a FILE that `airmuscle fit` knows by its
-    name. Trust says how the numbers came here: printed, measured, data sheet, second hand, fitted or chosen.
+    A muscle can be simulated; a characteristic cannot, because it has no geometry or is not solved for the force.
+    A valve is used in a scenario as { library = NAME }. A data set is used as FILES of `airmuscle fit`. The provenance
+    is the origin of the numbers: printed, measured, data sheet, secondary source, fitted or chosen.
 
     \b
     Examples:
       airmuscle list
       airmuscle list --json
     """
-    found = heads()
+    rows = library_rows()
     if json:
-        print_json([dataclasses.asdict(head) for head in found])
+        print_json([dataclasses.asdict(row) for row in rows])
         return
-    print_table(("name", "title", "kind", "provenance"), (dataclasses.astuple(head) for head in found))
+    print_table(("name", "title", "kind", "provenance"), (dataclasses.astuple(row) for row in rows))
 
 
-def heads() -> list[ListRow]:
-    """The heads of all library entries and data sets; nothing is built, so that listing stays quick."""
-    from ..library import valve_catalogue
-    from ..library.catalogue import DATA, FOLDER, list_library, measured_names
-
+def library_rows() -> list[ListRow]:
+    """All library entries, valves and data sets, read from the files without building any model."""
     return [
-        *(_entry_head(FOLDER / f"{name}.toml") for name in list_library()),
-        *(_valve_head(valve_catalogue.FOLDER / f"{name}.toml") for name in valve_catalogue.valve_names()),
-        *(_data_head(DATA / f"{name}.csv") for name in measured_names()),
+        *(_entry_row(LAWS / f"{name}.toml") for name in list_laws()),
+        *(_valve_row(VALVES / f"{name}.toml") for name in list_valves()),
+        *(_data_row(DATA / f"{name}.csv") for name in list_data()),
     ]
 
 
-def _entry_head(path: Path) -> ListRow:
-    import tomllib
-
-    from ..characteristic.base import ForceLaw
-    from ..library.models import model_class
-
+def _entry_row(path: Path) -> ListRow:
     tables = tomllib.loads(path.read_text(encoding="utf-8"))
     law = tables["characteristic"]
     muscle = issubclass(model_class(law["model"], str(path)), ForceLaw) and ("geometry" in tables or "geometry" in law)
-    return ListRow(
-        path.stem, tables["title"], f"{'muscle' if muscle else 'characteristic'}, {law['model']}", tables["provenance"]
-    )
+    kind = f"{'muscle' if muscle else 'characteristic'}, {law['model']}"
+    return ListRow(path.stem, tables["title"], kind, tables["provenance"])
 
 
-def _valve_head(path: Path) -> ListRow:
-    import tomllib
-
+def _valve_row(path: Path) -> ListRow:
     tables = tomllib.loads(path.read_text(encoding="utf-8"))
     return ListRow(path.stem, tables["title"], f"valve, {tables['valve']['model']}", tables["provenance"])
 
 
-def _data_head(path: Path) -> ListRow:
-    """Title and provenance from the comments that open a data file."""
+def _data_row(path: Path) -> ListRow:
+    """Title and provenance from the comments at the top of a data file."""
     with path.open(encoding="utf-8") as file:
         comments = list(itertools.takewhile(lambda line: line.startswith("#"), file))
     text = " ".join(line.lstrip("# ").strip() for line in comments)
     title = comments[0].lstrip("# ").strip() if comments else ""
-    provenance = "second hand" if "second hand" in text else "measured" if "measured" in text else ""
+    secondary = "secondary source" in text or "second hand" in text
+    provenance = "secondary source" if secondary else "measured" if "measured" in text else ""
     return ListRow(path.stem, title, "data set", provenance)

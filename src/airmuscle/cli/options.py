@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share."""
+"""Arguments and options shared by several commands."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ import typer
 
 Name = Annotated[
     str,
-    typer.Argument(metavar="NAME", help="A library entry, a unique beginning of its name, or a muscle's TOML file."),
+    typer.Argument(metavar="NAME", help="A library entry, a unique prefix of its name, or a muscle file (TOML)."),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units, instead of a table.")]
-Folder = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files; made where it is missing.")]
-"""A folder that the command cannot do without."""
+Json = Annotated[bool, typer.Option("--json", help="Print JSON in SI units instead of a table.")]
+Folder = Annotated[Path, typer.Option("--out", metavar="DIR", help="Output folder; created if it does not exist.")]
+"""An output folder that the command always writes."""
 OptionalFolder = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="Folder for chart and data; none are written without it.")
+    Path | None, typer.Option("--out", metavar="DIR", help="Output folder for figures and data; default: none.")
 ]
-Map = Annotated[Path | None, typer.Option("--mapping", metavar="FILE", help="TOML that says what the files do not.")]
-"""A mapping of columns, for files whose headings leave names or units open."""
+Mapping = Annotated[
+    Path | None,
+    typer.Option("--mapping", metavar="FILE", help="Column mapping (TOML) for headers without quantity or unit."),
+]

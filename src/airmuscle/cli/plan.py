@@ -1,108 +1,116 @@
-"""`airmuscle plan`: which static runs to measure."""
+"""`airmuscle plan`: D-optimal design of static experiments."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from ..characteristic import ValidityRange
+from ..core.units import quantity
+from ..identify.experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
+from ..library.catalogue import load_law
+from ..recording import write_csv
+from ..report.output_folder import atomic_folder, check_writable
 from .options import Json, Name, OptionalFolder
-from .terminal import print_json, print_table
-
-if TYPE_CHECKING:
-    from ..identify.experiment_design import Plan, PlannedRun
+from .terminal import echo, percent, print_json, print_table
 
 
 def plan(
     name: Name,
-    max_pressure: Annotated[str, typer.Option(metavar="QUANTITY", help="Of the bench: '6 bar'.")],
-    max_force: Annotated[str, typer.Option(metavar="QUANTITY", help="Of the load cell or frame: '1 kN'.")],
-    min_pressure: Annotated[str, typer.Option(metavar="QUANTITY", help="Where runs begin.")] = "50 kPa",
-    max_contraction: Annotated[str, typer.Option(metavar="QUANTITY", help="Of the frame.")] = "25 %",
-    min_contraction: Annotated[str, typer.Option(metavar="QUANTITY", help="Negative where it stretches.")] = "0 %",
-    runs: Annotated[int, typer.Option(min=1, max=100, help="How many runs to measure.")] = 6,
-    points: Annotated[int, typer.Option(min=3, max=1000, help="Points of a run.")] = 15,
+    max_pressure: Annotated[str, typer.Option(metavar="QUANTITY", help="Maximum pressure, such as '6 bar'.")],
+    max_force: Annotated[
+        str, typer.Option(metavar="QUANTITY", help="Maximum force of the load cell or frame, such as '1 kN'.")
+    ],
+    min_pressure: Annotated[str, typer.Option(metavar="QUANTITY", help="Minimum pressure.")] = "50 kPa",
+    max_contraction: Annotated[str, typer.Option(metavar="QUANTITY", help="Maximum contraction.")] = "25 %",
+    min_contraction: Annotated[
+        str, typer.Option(metavar="QUANTITY", help="Minimum contraction; negative if the bench stretches the muscle.")
+    ] = "0 %",
+    runs: Annotated[int, typer.Option(min=1, max=100, metavar="N", help="Number of runs.")] = 6,
+    points: Annotated[int, typer.Option(min=3, max=1000, metavar="N", help="Number of points per run.")] = 15,
     sigma: Annotated[
-        float, typer.Option(help="Standard deviation of a reading, SI unit of what the law gives (mostly N).")
+        float,
+        typer.Option(
+            metavar="NUMBER",
+            help="Standard deviation of a measured value, in the SI unit of the fitted quantity (mostly N).",
+        ),
     ] = 1.0,
     fix: Annotated[
-        list[str] | None, typer.Option("--fix", metavar="PARAMETER", help="The fit will not free it; repeat it.")
+        list[str] | None,
+        typer.Option("--fix", metavar="PARAMETER", help="Parameter that the fit will keep fixed; repeatable."),
     ] = None,
     out: OptionalFolder = None,
     json: Json = False,
 ) -> None:
-    """Say which isobaric and isometric runs tell most about a muscle, within the limits of a bench.
+    """Design the most informative static experiments (D-optimal).
 
     \b
-    The runs are D-optimal for fitting the muscle's characteristic, started from the values it has now.
-    With --out, DIR/plan.csv: the points in order, with the force to expect.
+    The runs are isobaric or isometric, within the limits of the test bench. They are D-optimal for fitting the
+    characteristic of the muscle, linearised at its present parameter values.
+    With --out, DIR/plan.csv contains the points in order, with the expected force.
 
     \b
     Examples:
       airmuscle plan dmsp-20-300 --max-pressure "6 bar" --max-force "1 kN"
       airmuscle plan my/muscle.toml --max-pressure "4 bar" --max-force "300 N" --runs 4 --out bench
     """
-    from ..characteristic.validity_range import ValidityRange
-    from ..core.units import quantity
-    from ..identify.experiment_design import BenchLimits
-    from ..identify.experiment_design import optimal_design as planned
-    from ..library.catalogue import load
-
-    pressures = [quantity(text, "Pa", where="limits of pressure") for text in (min_pressure, max_pressure)]
-    contractions = [quantity(text, "1", where="limits of contraction") for text in (min_contraction, max_contraction)]
-    bench = BenchLimits(ValidityRange(*pressures, *contractions), quantity(max_force, "N", where="--max-force"))
-    found = planned(load(name).characteristic, bench, runs=runs, points=points, sigma=sigma, fixed=fix or ())
+    pressures = [quantity(text, "Pa", where="pressure limits") for text in (min_pressure, max_pressure)]
+    contractions = [quantity(text, "1", where="contraction limits") for text in (min_contraction, max_contraction)]
+    limits = BenchLimits(ValidityRange(*pressures, *contractions), quantity(max_force, "N", where="--max-force"))
+    design = optimal_design(
+        load_law(name).characteristic, limits, runs=runs, points=points, sigma=sigma, fixed=fix or ()
+    )
     if out is not None:
-        _write(found, out)
+        _write(design, out)
     if json:
-        print_json(_as_data(found))
+        print_json(_to_dict(design))
         return
-    _print(found)
+    _print(design)
     if out is not None:
-        typer.echo(f"points to follow: {out / 'plan.csv'}")
+        echo(f"plan: {out / 'plan.csv'}")
 
 
-def _write(found: Plan, out: Path) -> None:
-    from ..recording.csv_writer import write_csv
-    from ..report.output_folder import atomic_folder, check_writable
-
+def _write(design: ExperimentPlan, out: Path) -> None:
     check_writable(out)
-    with atomic_folder(out) as place:
-        write_csv(found.recording(), place / "plan.csv")
+    with atomic_folder(out) as folder:
+        write_csv(design.recording(), folder / "plan.csv")
 
 
-def _words(quantity: str, value: float) -> str:
-    return f"{value / 1e3:.4g} kPa" if quantity == "pressure" else f"{value:.2%}"
+def _format(name: str, value: float) -> str:
+    return f"{value / 1e3:.4g} kPa" if name == "pressure" else percent(value)
 
 
 def _row(number: int, run: PlannedRun) -> tuple[str, ...]:
-    held = f"{run.held} {_words(run.held, run.level)}"
-    ends = " to ".join(_words(run.swept, end) for end in run.ends)
+    constant = f"{run.constant} {_format(run.constant, run.level)}"
+    ends = " to ".join(_format(run.swept, end) for end in run.sweep_limits)
     forces = f"{run.force.max():.4g} to {run.force.min():.4g} N"
-    return str(number), held, f"{run.swept} {ends}", str(run.force.size), forces
+    return str(number), constant, f"{run.swept} {ends}", str(run.force.size), forces
 
 
-def _print(found: Plan) -> None:
-    rows = [_row(i + 1, run) for i, run in enumerate(found.runs)]
-    print_table(("run", "hold", "sweep", "points", "force to expect"), rows, right=("run", "points"))
-    parameters = zip(found.names, found.values, found.deviations, strict=True)
-    rows = [(n, f"{v:.5g}", f"{2 * d:.2g}") for n, v, d in parameters]
-    print_table(("parameter", "value now", "2 sd to expect"), rows, right=("value now", "2 sd to expect"))
-    typer.echo(f"each run tells {found.gain:.2f} times as much as one of as many runs spread evenly")
-    for remark in found.undetermined:
-        typer.echo(f"note: {remark}")
+def _print(design: ExperimentPlan) -> None:
+    rows = [_row(i + 1, run) for i, run in enumerate(design.runs)]
+    print_table(("run", "constant", "sweep", "points", "expected force"), rows, right=("run", "points"))
+    parameters = zip(design.names, design.values, design.standard_errors, strict=True)
+    headers = ("parameter", "present value", "expected 2 stderr")
+    print_table(headers, [(n, f"{v:.5g}", f"{2 * d:.2g}") for n, v, d in parameters], right=headers[1:])
+    echo(
+        f"relative D-efficiency {design.relative_d_efficiency:.2f}, compared with the same number of evenly spaced runs"
+    )
+    for remark in design.undetermined:
+        echo(f"note: {remark}")
 
 
-def _as_data(found: Plan) -> dict[str, Any]:
+def _to_dict(design: ExperimentPlan) -> dict[str, Any]:
+    """A plan as plain data, all numbers SI."""
+    parameters = zip(design.names, design.values, design.standard_errors, strict=True)
     return {
         "runs": [
-            {"held": r.held, "level": r.level, "swept": r.swept, "ends": r.ends, "points": r.force.size}
-            for r in found.runs
+            {"constant": r.constant, "level": r.level, "swept": r.swept, "ends": r.sweep_limits, "points": r.force.size}
+            for r in design.runs
         ],
-        "parameters": {
-            n: {"value": v, "deviation": d} for n, v, d in zip(found.names, found.values, found.deviations, strict=True)
-        },
-        "gain": found.gain,
-        "notes": [str(remark) for remark in found.undetermined],
+        "parameters": {name: {"value": value, "stderr": stderr} for name, value, stderr in parameters},
+        "relative_efficiency": design.relative_d_efficiency,
+        "notes": [str(remark) for remark in design.undetermined],
     }

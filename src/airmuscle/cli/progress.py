@@ -1,32 +1,34 @@
-"""How far long work has come, on a terminal and there only."""
+"""Progress display on a terminal; nothing is shown where stderr is redirected."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
 
+from .terminal import without_markup
+
 
 @contextlib.contextmanager
-def reading_progress(word: str = "reading") -> Iterator[Callable[[str, float], None]]:
-    """A function for `read(progress=...)` that draws a bar on stderr while the block lasts."""
+def reading_progress(label: str = "reading") -> Iterator[Callable[[str, float], None]]:
+    """Yield a callback (name, fraction done), such as `read(progress=...)` takes, which draws one bar per name."""
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
     console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as display:
         tasks: dict[str, TaskID] = {}
 
-        def show(name: str, part: float) -> None:
+        def show(name: str, fraction: float) -> None:
             task = tasks.get(name)
             if task is None:
-                task = tasks[name] = bar.add_task(f"{word} {name}", total=1.0)
-            bar.update(task, completed=part)
+                task = tasks[name] = display.add_task(without_markup(f"{label} {name}"), total=1.0)
+            display.update(task, completed=fraction)
 
         yield show
 
 
 @contextlib.contextmanager
-def working_progress(word: str) -> Iterator[Callable[[float], None]]:
-    """A function that is told the part done, and draws a bar on stderr while the block lasts."""
-    with reading_progress(word) as show:
-        yield lambda part: show("", part)
+def computation_progress(label: str) -> Iterator[Callable[[float], None]]:
+    """Yield a callback (fraction done) that draws one bar."""
+    with reading_progress(label) as show:
+        yield lambda fraction: show("", fraction)

@@ -1,31 +1,32 @@
-"""Remedies that name a Python argument, in the words of the command line."""
+"""Remedies of the library's messages, with Python arguments replaced by command-line options."""
 
 from __future__ import annotations
 
 import re
 
+_LEVELS = r"Level(?:s|Split)\(['\"](\w+)['\"]\)"
 _OPTIONS: tuple[tuple[str, str], ...] = (
     (r"fixed=\('([^']+)',\)", r"--fix '\1'"),
-    (r"\bfixed=(?=[\s.,])", "--fix"),
-    (r"give the range with censoring=", "take the rows as they stand with --uncensored"),
-    (r"censoring=UNCENSORED fits", "--uncensored fits"),
-    (r"give censoring=Censoring\(\) if", "leave out --uncensored if"),
-    (r"sigma=1\.0 counts", "--equal-weights counts"),
+    (r"\bfixed=(?![\w('\"])", "--fix"),
+    (r"give the range with censoring=", "treat the rows as measured values with --uncensored"),
+    (r"\bcensoring=UNCENSORED\b", "--uncensored"),
+    (r"\b(?:give|set|use) censoring=Censoring\(\)", "omit --uncensored"),
+    (r"\bsigma=1(?:\.0)?\b", "--equal-weights"),
     (r"units=\{'([^']+)': \.\.\.\}", r"--unit '\1=...'"),
     (r"columns=(\{[^}]*\})", r"[columns] in a --mapping file: \1"),
     (r"decimal=','", "decimal = \",\" in a --mapping file"),
-    (r"leave out Levels\('contraction'\) or Levels\('pressure'\)", "choose --leave-out contraction or pressure"),
-    (r"draw by Levels\('(\w+)'\)", r"choose --leave-out \1"),
-    (r"; give resting_length\.", "; give --resting-length."),
-    (r"let all rows count", "use --all-rows"),
-    (r"Give its characteristic\.", "Name the muscle with --muscle, and give --given."),
+    (rf"\b(?:leave out|use|give) {_LEVELS} or {_LEVELS}", r"use --leave-out \1 or --leave-out \2"),
+    (rf"\b(?:draw by|resample by|use|give) {_LEVELS}", r"use --leave-out \1"),
+    (r"\b(give|set|state) resting_length\b(?!=)", r"\1 --resting-length"),
+    (r"\blet all rows count\b|\b(?:give|set|use) all_rows=True", "use --all-rows"),
+    (r"\bGive its characteristic\.", "Give the muscle with --muscle, and --use-characteristic."),
     (r"free=\('([^']+)',\)", r'free = ["\1"] under [fit]'),
 )  # fmt: skip
-"""What a message of the library says, and the option that does the same."""
+"""Pattern of a Python argument in a message, and the option or key that replaces it."""
 
 
 def in_options(text: str) -> str:
-    """A message of the library for someone who typed a command."""
-    for said, option in _OPTIONS:
-        text = re.sub(said, option, text)
+    """A message of the library in which remedies name command-line options."""
+    for pattern, option in _OPTIONS:
+        text = re.sub(pattern, option, text)
     return text

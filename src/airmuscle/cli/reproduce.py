@@ -1,62 +1,60 @@
-"""`airmuscle reproduce`: the papers, claim by claim."""
+"""`airmuscle reproduce`: reproduction of the three papers, claim by claim."""
 
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..core.errors import AirmuscleError
+from ..report.chapter import DIFFERS, HOLDS, NOT_PRINTED, Chapter, Claim
+from ..report.formatting import MARKS, count_verdicts, format_number, format_published
+from ..reproduce import reproduce as reproduce_papers
 from .options import Folder
-from .terminal import print_table
+from .terminal import echo, print_table
 
 if TYPE_CHECKING:
     from rich.text import Text
 
-    from ..report.chapter import Chapter, Claim
-
-COLOURS = {"holds": "green", "differs": "bold red", "not printed": "dim"}
+COLOURS = {HOLDS: "green", DIFFERS: "bold red", NOT_PRINTED: "dim"}
 
 
 def reproduce(
     papers: Annotated[
         list[str] | None,
-        typer.Argument(metavar="PAPER", help="saga2007, borzikova, hosovsky, or a beginning of one; all if none."),
+        typer.Argument(metavar="PAPER", help="saga2007, borzikova, hosovsky, or a prefix of one; default: all."),
     ] = None,
     out: Folder = Path("report"),
 ) -> None:
-    """Reproduce the papers: a report, the verdict on each claim, figures and data.
+    """Reproduce three papers and test each of their claims.
 
     \b
     Writes DIR/report.html, DIR/claims.json, DIR/figures/ and DIR/data/.
-    A claim that does not hold is a result, not a failure: the exit code is 0.
+    A claim that is not confirmed is a result, not a failure: the exit code is 0.
 
     \b
     Examples:
       airmuscle reproduce
       airmuscle reproduce saga hosovsky --out report
     """
-    from ..core.errors import AirmuscleError
-    from ..reproduce.run import reproduce as run
-
     chapters: list[Chapter] = []
     try:
-        page = run(papers, out, stage=_stage, finished=chapters.append)
+        page = reproduce_papers(papers, out, stage=_show_stage, finished=chapters.append)
     except (AirmuscleError, KeyboardInterrupt):
         if chapters:
-            typer.echo(f"\nthe chapters that were complete stand in {out}", err=True)
+            echo(f"\nthe completed chapters were written to {out}", err=True)
         raise
     _print_claims([claim for chapter in chapters for claim in chapter.claims])
-    typer.echo(f"report: {page}")
+    echo(f"report: {page}")
 
 
 @contextlib.contextmanager
-def _stage(paper: str) -> Iterator[None]:
-    """Shows on stderr that a paper is being computed, and then how long it took."""
-    import time
-
+def _show_stage(paper: str) -> Iterator[None]:
+    """Show on stderr which paper is being reproduced, and at the end the computation time."""
     from rich.console import Console
 
     console, start = Console(stderr=True, highlight=False), time.perf_counter()
@@ -66,13 +64,14 @@ def _stage(paper: str) -> Iterator[None]:
 
 
 def _print_claims(claims: list[Claim]) -> None:
-    from ..report.wording import number, published, tally
-
-    rows = [(c.paper, c.claim, published(c), number(c.reproduced), _unit(c), _verdict(c.verdict)) for c in claims]
+    rows = [
+        (c.paper, c.claim, format_published(c), format_number(c.reproduced), _unit(c), _verdict(c.verdict))
+        for c in claims
+    ]
     headers = ("paper", "claim", "published", "reproduced", "unit", "verdict")
     print_table(headers, rows, right=("published", "reproduced"))
-    counts = tally(tuple(claims))
-    typer.echo(f"{len(claims)} claims: " + ", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
+    counts = count_verdicts(tuple(claims))
+    echo(f"{len(claims)} claims: " + ", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
 
 
 def _unit(claim: Claim) -> str:
@@ -81,7 +80,5 @@ def _unit(claim: Claim) -> str:
 
 def _verdict(verdict: str) -> Text:
     from rich.text import Text
-
-    from ..report.wording import MARKS
 
     return Text(f"{MARKS[verdict]} {verdict}", style=COLOURS[verdict], no_wrap=True)

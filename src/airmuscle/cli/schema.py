@@ -1,4 +1,4 @@
-"""`airmuscle schema`: what an editor needs to check and complete the files that people write."""
+"""`airmuscle schema`: JSON schema of scenario and muscle files."""
 
 from __future__ import annotations
 
@@ -7,36 +7,38 @@ from typing import Annotated
 
 import typer
 
+from ..report.output_folder import atomic_folder
+from ..report.write import as_json
+from ..scenario.schema import muscle_schema, scenario_schema
+from .terminal import echo, print_json
+
 
 def schema(
     muscle: Annotated[
-        bool, typer.Option("--muscle", help="The schema of a muscle file instead of a scenario's.")
+        bool, typer.Option("--muscle", help="The schema of muscle files; default: of scenario files.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="File to write; it is printed without it.")
+        Path | None, typer.Option("--out", metavar="FILE", help="Output file; default: print to stdout.")
     ] = None,
 ) -> None:
-    """Print the JSON schema of a scenario file, for editors that check and complete TOML.
+    """Print the JSON schema of scenario or muscle files.
 
     \b
-    It is made from the program's own models: what it allows is what this version reads.
-    An editor is told by the first line of the file: #:schema scenario.schema.json
+    Editors use the schema to check and complete TOML files. It is generated from the models of this version, so it
+    allows exactly what this version reads.
+    The first line of a TOML file names its schema: #:schema scenario.schema.json
 
     \b
     Examples:
       airmuscle schema --out scenario.schema.json
       airmuscle schema --muscle --out muscle.schema.json
     """
-    from ..report.output_folder import atomic_folder
-    from ..report.write import as_json
-    from ..scenario.schema import muscle_schema, scenario_schema
-
-    text = as_json(muscle_schema() if muscle else scenario_schema())
+    content = muscle_schema() if muscle else scenario_schema()
     if out is None:
-        typer.echo(text, nl=False)
+        print_json(content)
         return
     if not out.name:
-        raise typer.BadParameter("--out wants the name of a file, like scenario.schema.json")
-    with atomic_folder(out.parent) as place:
-        (place / out.name).write_text(text, encoding="utf-8")
-    typer.echo(f"schema: {out}")
+        raise typer.BadParameter("--out must be a file name, such as scenario.schema.json")
+    with atomic_folder(out.parent) as folder:
+        (folder / out.name).write_text(as_json(content), encoding="utf-8")
+    echo(f"schema: {out}")

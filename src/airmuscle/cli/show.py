@@ -1,29 +1,30 @@
-"""`airmuscle show`: one library entry with its parameters, sources and checks."""
+"""`airmuscle show`: parameters, sources and checks of a library entry."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import typer
-
+from ..core import cite, leaves
+from ..library.catalogue import load
+from ..library.entry import Entry
+from ..library.valve_entry import ValveEntry
+from ..report.formatting import format_number
 from .options import Json, Name
-from .terminal import print_json, print_table
-
-if TYPE_CHECKING:
-    from ..library.entry import Entry
-    from ..library.valve_catalogue import ValveEntry
+from .terminal import echo, print_json, print_table
 
 PARTS = (
-    "characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "validity_range", "valve",
-    "exhaust", "response",
+    "characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "validity_range",
+    "valve", "exhaust", "switching_times",
 )  # fmt: skip
-MANY = 30
-"""Values of one list above which the table shows its ends only."""
+MAX_VALUES = 30
+"""Longest list of values that the table shows completely."""
 
 
 def show(name: Name, json: Json = False) -> None:
-    """Show an entry: parameters with symbol, value, unit, meaning and bounds, its sources and its checks.
+    """Show parameters, sources and checks of a library entry.
+
+    The table of parameters contains symbol, value, unit, meaning and bounds.
 
     \b
     Examples:
@@ -31,51 +32,46 @@ def show(name: Name, json: Json = False) -> None:
       airmuscle show matrix-821
       airmuscle show my/muscle.toml --json
     """
-    from ..library.find import find
-
-    entry = find(name)
+    data = entry_to_dict(load(name))
     if json:
-        print_json(described(entry))
-        return
-    _print(described(entry))
+        print_json(data)
+    else:
+        _print(data)
 
 
-def described(entry: Entry | ValveEntry) -> dict[str, Any]:
+def entry_to_dict(entry: Entry | ValveEntry) -> dict[str, Any]:
     """An entry as plain data, all numbers SI."""
-    from ..core.reference import cite
-
     parts = {part: getattr(entry, part) for part in PARTS if getattr(entry, part, None) is not None}
-    own_geometry = getattr(parts.get("characteristic"), "geometry", None)  # a geometric law has it among its parameters
+    # A geometric law contains the geometry among its own parameters; it is listed once.
+    law_geometry = getattr(parts.get("characteristic"), "geometry", None)
     return {
         "name": entry.name,
         "title": entry.title,
         "provenance": entry.provenance,
         "note": entry.note,
         "warning": entry.warning,
-        "models": {part: type(thing).__name__ for part, thing in parts.items()},
+        "models": {part: type(model).__name__ for part, model in parts.items()},
         "parameters": [
             row
-            for part, thing in parts.items()
-            if part != "geometry" or thing != own_geometry
-            for row in _parameters(part, thing)
+            for part, model in parts.items()
+            if part != "geometry" or model != law_geometry
+            for row in _parameter_rows(part, model)
         ],
         "checks": [
             {
-                "quantity": c.quantity,
-                "given": dict(c.given),
-                "equals": c.equals,
-                "tolerance": c.tolerance,
-                "source": c.source,
+                "quantity": check.quantity,
+                "given": dict(check.conditions),
+                "equals": check.equals,
+                "tolerance": check.tolerance,
+                "source": check.source,
             }
-            for c in entry.checks
+            for check in entry.checks
         ],
         "references": [str(reference) for reference in cite(entry)],
     }
 
 
-def _parameters(part: str, thing: Any) -> list[dict[str, Any]]:
-    from ..core.tree import leaves
-
+def _parameter_rows(part: str, model: Any) -> list[dict[str, Any]]:
     return [
         {
             "name": f"{part}.{leaf.path}",
@@ -86,48 +82,51 @@ def _parameters(part: str, thing: Any) -> list[dict[str, Any]]:
             "bounds": [bound if math.isfinite(bound) else None for bound in leaf.declared.bounds],
             "fitted": leaf.declared.fitted,
         }
-        for leaf in leaves(thing)
+        for leaf in leaves(model)
     ]
 
 
 def _print(entry: dict[str, Any]) -> None:
-    from ..report.wording import number
-
-    typer.echo(f"{entry['name']}: {entry['title']}")
-    typer.echo(f"provenance: {entry['provenance']}")
+    echo(f"{entry['name']}: {entry['title']}")
+    echo(f"provenance: {entry['provenance']}")
     for key in ("note", "warning"):
         if entry[key]:
-            typer.echo(f"{key}: {entry[key]}")
-    typer.echo("made of: " + ", ".join(f"{part} {model}" for part, model in entry["models"].items()) + "\n")
+            echo(f"{key}: {entry[key]}")
+    echo("components: " + ", ".join(f"{part} {model}" for part, model in entry["models"].items()) + "\n")
     rows = [
-        (p["name"], p["symbol"], number(p["value"]), _unit(p["unit"]), p["meaning"], _bounds(p["bounds"]))
-        for p in _shortened(entry["parameters"])
+        (p["name"], p["symbol"], format_number(p["value"]), _unit(p["unit"]), p["meaning"], _bounds(p["bounds"]))
+        for p in _shorten(entry["parameters"])
     ]
     print_table(("parameter", "symbol", "value", "unit", "meaning", "bounds"), rows, right=("value",))
     if entry["checks"]:
         checks = [
-            (c["quantity"], _given(c["given"]), f"{number(c['equals'])} ± {number(c['tolerance'])}", c["source"])
+            (
+                c["quantity"],
+                _point(c["given"]),
+                f"{format_number(c['equals'])} ± {format_number(c['tolerance'])}",
+                c["source"],
+            )
             for c in entry["checks"]
         ]
-        typer.echo()
-        print_table(("checked", "at (SI)", "equals (SI)", "source"), checks)
-    typer.echo()
+        echo()
+        print_table(("checked quantity", "at (SI)", "published value (SI)", "source"), checks)
+    echo()
     for reference in entry["references"]:
-        typer.echo(f"- {reference}")
+        echo(f"- {reference}")
 
 
-def _shortened(parameters: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _shorten(parameters: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The parameters without the middle of long lists."""
     stems = [p["name"].partition("[")[0] for p in parameters]
-    kept = []
+    rows = []
     for i, (stem, parameter) in enumerate(zip(stems, parameters, strict=True)):
-        place = i - stems.index(stem)
+        position = i - stems.index(stem)
         count = stems.count(stem)
-        if count <= MANY or place in (0, 1, count - 1):
-            kept.append(parameter)
-        elif place == 2:
-            kept.append({**parameter, "name": f"... {count - 3} more", "value": "", "meaning": ""})
-    return kept
+        if count <= MAX_VALUES or position in (0, 1, count - 1):
+            rows.append(parameter)
+        elif position == 2:
+            rows.append({**parameter, "name": f"... {count - 3} more", "value": "", "meaning": ""})
+    return rows
 
 
 def _unit(unit: str) -> str:
@@ -139,5 +138,5 @@ def _bounds(bounds: list[float | None]) -> str:
     return f"{low or '-inf'} to {high or 'inf'}" if low or high else ""
 
 
-def _given(given: dict[str, float]) -> str:
-    return ", ".join(f"{quantity} {value:.6g}" for quantity, value in given.items())
+def _point(values: dict[str, float]) -> str:
+    return ", ".join(f"{quantity} {value:.6g}" for quantity, value in values.items())

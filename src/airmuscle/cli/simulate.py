@@ -1,18 +1,22 @@
-"""`airmuscle simulate`: a scenario file carried through time."""
+"""`airmuscle simulate`: simulation of a scenario file."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from ..core.errors import SimulationError
+from ..recording import Recording, write_csv
+from ..recording.recording import column_heading
+from ..report.formatting import format_number
+from ..report.output_folder import atomic_folder, check_writable
+from ..report.run_chapter import run_chapter
+from ..report.write import write_into
+from ..scenario.scenario import Scenario, load_scenario
 from .options import Folder, Json
-from .terminal import print_json, print_table
-
-if TYPE_CHECKING:
-    from ..recording import Recording
-    from ..scenario.scenario import Scenario
+from .terminal import echo, print_json, print_table
 
 
 def simulate(
@@ -22,21 +26,17 @@ def simulate(
     out: Folder = Path("run"),
     json: Json = False,
 ) -> None:
-    """Simulate a plant under a command; the result is a recording like one from a bench.
+    """Simulate the plant of a scenario file.
 
     \b
-    Writes DIR/recording.csv, DIR/report.html and DIR/figures/.
-    A run that ends early leaves what was computed until then, and exit code 1: the last note says when, why, at
-    which state, and what to do.
+    Writes DIR/recording.csv, which has the format of a measurement file, DIR/report.html and DIR/figures/.
+    If a run is aborted, the partial results are written and the exit code is 1; the error states time, reason, state
+    and remedy.
 
     \b
     Examples:
       airmuscle simulate examples/fill_discharge.toml --out run
     """
-    from ..core.errors import SimulationError
-    from ..report.output_folder import check_writable
-    from ..scenario.scenario import load_scenario
-
     loaded = load_scenario(scenario)
     check_writable(out)
     try:
@@ -44,26 +44,25 @@ def simulate(
     except SimulationError as error:
         if error.recording is not None and len(error.recording):
             _write(loaded, error.recording, out)
-            typer.echo(f"what was computed until then stands in {out}", err=True)
+            echo(f"partial results were written to {out}", err=True)
         if error.interrupted:
             raise KeyboardInterrupt from None
         raise
     _write(loaded, recording, out)
     if json:
         print_json(
-            {"title": loaded.title, "rows": len(recording), "notes": recording.notes, "range": _range(recording)}
+            {"title": loaded.title, "rows": len(recording), "notes": recording.notes, "range": _ranges(recording)}
         )
         return
     _print(loaded, recording)
-    typer.echo(f"report: {out / 'report.html'}")
+    echo(f"report: {out / 'report.html'}")
 
 
-def _range(recording: Recording) -> dict[str, dict[str, float | str]]:
-    from ..recording.recording import header
-
+def _ranges(recording: Recording) -> dict[str, dict[str, float | str]]:
+    """Header, minimum, maximum and last value of each column [SI]."""
     return {
         name: {
-            "column": header(name),
+            "column": column_heading(name),
             "min": float(recording[name].min()),
             "max": float(recording[name].max()),
             "last": float(recording[name][-1]),
@@ -73,21 +72,14 @@ def _range(recording: Recording) -> dict[str, dict[str, float | str]]:
 
 
 def _print(scenario: Scenario, recording: Recording) -> None:
-    from ..report.wording import number
-
-    typer.echo(f"{scenario.title}: {len(recording)} rows over {scenario.duration:g} s")
-    rows = [tuple(number(v) for v in found.values()) for found in _range(recording).values()]
+    echo(f"{scenario.title}: {len(recording)} rows over {scenario.duration:g} s")
+    rows = [tuple(format_number(value) for value in column.values()) for column in _ranges(recording).values()]
     print_table(("column", "min", "max", "last"), rows, right=("min", "max", "last"))
     for note in recording.notes:
-        typer.echo(f"note: {note}")
+        echo(f"note: {note}")
 
 
 def _write(scenario: Scenario, recording: Recording, out: Path) -> None:
-    from ..recording.csv_writer import write_csv
-    from ..report.output_folder import atomic_folder
-    from ..report.run_chapter import run_chapter
-    from ..report.write import fill
-
-    with atomic_folder(out) as place:
-        write_csv(scenario.chosen(recording), place / "recording.csv")
-        fill(place, [run_chapter(scenario, recording)], title="Simulation")
+    with atomic_folder(out) as folder:
+        write_csv(scenario.select_columns(recording), folder / "recording.csv")
+        write_into(folder, [run_chapter(scenario, recording)], title="Simulation")

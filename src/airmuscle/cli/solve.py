@@ -1,29 +1,43 @@
-"""`airmuscle solve`: pressure, contraction and force of a muscle; two of them give the third."""
+"""`airmuscle solve`: pressure, contraction or force of a muscle, given the other two."""
 
 from __future__ import annotations
 
 import math
+import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from ..characteristic import Characteristic, ForceLaw, ValidityRange
+from ..core import leaves
+from ..core.errors import AirmuscleWarning, GeometryLimitError, PhysicsError, SolveError
+from ..core.plotting import save
+from ..core.units import quantity
+from ..library.catalogue import load_law
+from ..library.entry import Entry
+from ..pneumatics import Ambient
+from ..pneumatics.gas import check_above_vacuum
+from ..report.isobar_plot import (
+    WorkingPoint,
+    compute_isobars,
+    describe_point,
+    isobar_plot,
+    isobar_table,
+    validity_range_of,
+)
+from ..report.output_folder import atomic_folder
+from ..report.write import save_table
 from .options import Json, Name, OptionalFolder
-from .terminal import print_json, print_table
-
-if TYPE_CHECKING:
-    from ..characteristic.base import Characteristic
-    from ..characteristic.validity_range import ValidityRange
-    from ..library.entry import Entry
-    from ..report.chart import Point
+from .terminal import echo, percent, print_json, print_table
 
 UNITS = {"pressure": "Pa", "contraction": "1", "force": "N"}
 
 Pressure = Annotated[
-    str | None, typer.Option(metavar="QUANTITY", help="Pressure with its unit: '3 bar' (gauge), '400 kPa', '4 bara'.")
+    str | None, typer.Option(metavar="QUANTITY", help="Pressure with unit: '3 bar' (gauge), '400 kPa', '4 bara'.")
 ]
-Contraction = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Contraction, 0.12 or '12 %'.")]
-Force = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Tension with its unit: '100 N', '0.1 kN'.")]
+Contraction = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Contraction: 0.12 or '12 %'.")]
+Force = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Tension with unit: '100 N', '0.1 kN'.")]
 
 
 def solve(
@@ -34,11 +48,11 @@ def solve(
     out: OptionalFolder = None,
     json: Json = False,
 ) -> None:
-    """Give two of pressure, contraction and force of a muscle; get the third.
+    """Solve for pressure, contraction or force, given the other two.
 
     \b
-    Where several answers exist it is the one reached from rest.
-    With --out, DIR/isobars.png and DIR/isobars.csv: force over contraction, with the working point.
+    If several solutions exist, the result is the one reached from the state of rest.
+    With --out, DIR/isobars.png and DIR/isobars.csv show force over contraction, with the operating point.
 
     \b
     Examples:
@@ -46,112 +60,92 @@ def solve(
       airmuscle solve dmsp-20-300 --contraction "12 %" --force "100 N" --out chart
       airmuscle solve my/muscle.toml --pressure "400 kPa" --contraction 0.1 --json
     """
-    from ..library.catalogue import load
-    from ..report.chart import point_text, validity_range_of
-
     texts = {"pressure": pressure, "contraction": contraction, "force": force}
-    missing = [quantity for quantity, text in texts.items() if text is None]
+    missing = [name for name, text in texts.items() if text is None]
     if len(missing) != 1:
-        raise typer.BadParameter(f"give two of --pressure, --contraction and --force; {3 - len(missing)} given")
-    entry = load(name)
-    point, validity_range = (
-        _solved(entry.characteristic, texts),
-        validity_range_of(entry.characteristic, entry.validity_range),
-    )
+        raise typer.BadParameter(f"give two of --pressure, --contraction and --force, not {3 - len(missing)}")
+    entry = load_law(name)
+    point = _solve(entry.characteristic, texts)
+    validity_range = validity_range_of(entry.characteristic, entry.validity_range)
     _warn(point, validity_range)
     if json:
-        print_json(_as_data(entry, point, validity_range, missing[0]))
+        print_json(_to_dict(entry, point, validity_range, missing[0]))
     else:
-        typer.echo(f"{entry.name}: {entry.title}")
-        print_table(("quantity", "value", ""), _rows(entry, point, missing[0]), right=("value",))
+        echo(f"{entry.name}: {entry.title}")
+        print_table(("quantity", "value", "remark"), _rows(entry, point, missing[0]), right=("value",))
     if out is not None:
         _write(entry, point, validity_range, out)
-        typer.echo(f"chart: {out / 'isobars.png'}, data: {out / 'isobars.csv'} ({point_text(point)})", err=json)
+        echo(f"chart: {out / 'isobars.png'}, data: {out / 'isobars.csv'} ({describe_point(point)})", err=json)
 
 
-def _solved(characteristic: Characteristic, texts: dict[str, str | None]) -> Point:
-    from ..characteristic.base import ForceLaw
-    from ..core.errors import SolveError
-    from ..core.units import quantity
-    from ..pneumatics.gas import Ambient, check_above_vacuum
-    from ..report.chart import Point, point_text
-
-    given = {name: quantity(text, UNITS[name], where=f"--{name}") for name, text in texts.items() if text is not None}
-    if "pressure" in given:
-        check_above_vacuum(given["pressure"], Ambient())
-    if "contraction" in given and isinstance(characteristic, ForceLaw):  # others refuse by themselves
-        _check_reachable(characteristic, given["contraction"])
-    (wanted,) = UNITS.keys() - given.keys()
-    point = Point(**given, **{wanted: float(getattr(characteristic, wanted)(*given.values()))})
-    if not math.isfinite(sum(point)) or (wanted == "contraction" and not -0.5 <= point.contraction < 1.0):
+def _solve(characteristic: Characteristic, texts: dict[str, str | None]) -> WorkingPoint:
+    """The operating point. Raises SolveError, GeometryLimitError or UnitError."""
+    values = {name: quantity(text, UNITS[name], where=f"--{name}") for name, text in texts.items() if text is not None}
+    if "pressure" in values:
+        check_above_vacuum(values["pressure"], Ambient())
+    if "contraction" in values and isinstance(characteristic, ForceLaw):  # the other laws check it themselves
+        _check_contraction(characteristic, values["contraction"])
+    (unknown,) = UNITS.keys() - values.keys()
+    point = WorkingPoint(**values, **{unknown: float(getattr(characteristic, unknown)(*values.values()))})
+    if not math.isfinite(sum(point)) or (unknown == "contraction" and not -0.5 <= point.contraction < 1.0):
         raise SolveError(
-            f"{type(characteristic).__name__} answers with {point_text(point)}, which no muscle can be. "
-            "The question lies far outside the range of its numbers (airmuscle show)."
+            f"{type(characteristic).__name__}: the solution {describe_point(point)} is not physical. "
+            "Give values nearer to the validity range of the characteristic (airmuscle show)."
         )
     return point
 
 
-def _check_reachable(characteristic: Characteristic, contraction: float) -> None:
-    from ..core.errors import GeometryLimitError
-
+def _check_contraction(characteristic: Characteristic, contraction: float) -> None:
     low, high = characteristic.contraction_range
     if not low <= contraction <= high:
-        per_cent = contraction >= 1.0 and contraction / 100 <= high
-        hint = f" Is it in per cent? Write '{contraction:g} %'." if per_cent else ""
+        as_percentage = contraction >= 1.0 and contraction / 100 <= high
+        hint = f" For a percentage, write '{contraction:g} %'." if as_percentage else ""
         raise GeometryLimitError(
-            f"--contraction: {type(characteristic).__name__} cannot take a contraction of {100 * contraction:.6g} %; "
-            f"it reaches from {100 * low:.4g} to {100 * high:.4g} %.{hint}"
+            f"--contraction: {100 * contraction:.6g} % is outside the range of {type(characteristic).__name__}, "
+            f"{100 * low:.4g} to {percent(high)}.{hint}"
         )
 
 
-def _stiffness(entry: Entry, point: Point) -> float | None:
-    """-dF/deps at constant pressure [N]; None where the law has no single force at this point."""
-    from ..core.errors import PhysicsError
-
+def _stiffness(entry: Entry, point: WorkingPoint) -> float | None:
+    """-dF/deps at constant pressure [N]; None where the force is not unique or not defined."""
     try:
         return float(entry.characteristic.stiffness(point.pressure, point.contraction))
     except PhysicsError:
         return None
 
 
-def _warn(point: Point, validity_range: ValidityRange | None) -> None:
-    import warnings
-
-    from ..core.errors import AirmuscleWarning
-
+def _warn(point: WorkingPoint, validity_range: ValidityRange | None) -> None:
     if point.force < 0:
-        warnings.warn("a muscle pulls and never pushes: it is slack here.", AirmuscleWarning, stacklevel=2)
+        warnings.warn("the force is negative; a muscle cannot push and is slack here.", AirmuscleWarning, stacklevel=2)
     if validity_range is not None and not validity_range.contains(point.pressure, point.contraction):
         (p_low, p_high), (c_low, c_high) = validity_range.pressure, validity_range.contraction
         warnings.warn(
-            "the working point lies outside the range where the muscle was measured or printed, "
-            f"{p_low / 1e3:.4g} to {p_high / 1e3:.4g} kPa and {c_low:.2%} to {c_high:.2%}: "
-            "the answer is an extrapolation.",
+            "the operating point is outside the validity range of the characteristic, "
+            f"{p_low / 1e3:.4g} to {p_high / 1e3:.4g} kPa and {percent(c_low)} to {percent(c_high)}: "
+            "the result is an extrapolation.",
             AirmuscleWarning,
             stacklevel=2,
         )
 
 
 def _resting_length(entry: Entry) -> float | None:
-    from ..core.tree import leaves
-
     parts = (part for part in (entry.geometry, entry.characteristic) if part is not None)
-    found = (leaf.value for part in parts for leaf in leaves(part) if leaf.path.endswith("resting_length"))
-    return next(found, None)
+    lengths = (leaf.value for part in parts for leaf in leaves(part) if leaf.path.endswith("resting_length"))
+    return next(lengths, None)
 
 
-def _rows(entry: Entry, point: Point, wanted: str) -> list[tuple[str, str, str]]:
+def _rows(entry: Entry, point: WorkingPoint, unknown: str) -> list[tuple[str, str, str]]:
     values = {
         "pressure": f"{point.pressure / 1e3:.6g} kPa",
-        "contraction": f"{100 * point.contraction:.4g} %",
+        "contraction": percent(point.contraction),
         "force": f"{point.force:.6g} N",
     }
-    notes = {"pressure": "gauge"}
+    remarks = {"pressure": "gauge"}
     length = _resting_length(entry)
     if length:
-        notes["contraction"] = f"{1e3 * length * point.contraction:.4g} mm of {1e3 * length:.6g} mm"
+        remarks["contraction"] = f"{1e3 * length * point.contraction:.4g} mm of {1e3 * length:.6g} mm"
     rows = [
-        (name, value, "; ".join(filter(None, (notes.get(name, ""), "solved" if name == wanted else ""))))
+        (name, value, "; ".join(filter(None, (remarks.get(name, ""), "solved" if name == unknown else ""))))
         for name, value in values.items()
     ]
     stiffness = _stiffness(entry, point)
@@ -161,27 +155,25 @@ def _rows(entry: Entry, point: Point, wanted: str) -> list[tuple[str, str, str]]
     return [*rows, ("stiffness", per_length, "at constant pressure")]
 
 
-def _as_data(entry: Entry, point: Point, validity_range: ValidityRange | None, wanted: str) -> dict[str, Any]:
+def _to_dict(entry: Entry, point: WorkingPoint, validity_range: ValidityRange | None, unknown: str) -> dict[str, Any]:
+    """The operating point as plain data, all numbers SI."""
+    inside = None if validity_range is None else bool(validity_range.contains(point.pressure, point.contraction))
     return {
         "name": entry.name,
-        "solved": wanted,
+        "solved": unknown,
         **point._asdict(),
         "stiffness": _stiffness(entry, point),
         "resting_length": _resting_length(entry),
-        "inside_data": None
-        if validity_range is None
-        else bool(validity_range.contains(point.pressure, point.contraction)),
+        "inside_validity_range": inside,
         "units": {**UNITS, "pressure": "Pa gauge", "stiffness": "N per unit of contraction", "resting_length": "m"},
     }
 
 
-def _write(entry: Entry, point: Point, validity_range: ValidityRange | None, out: Path) -> None:
-    from ..core.plotting import save
-    from ..report.chart import chart, isobars, table
-    from ..report.output_folder import atomic_folder
-    from ..report.write import save_table
-
-    with atomic_folder(out) as place:
-        curves = isobars(entry.characteristic, validity_range, point)
-        save_table(table(curves), place / "isobars.csv")
-        save(chart(entry.characteristic, entry.title, curves, validity_range, point).figure, place / "isobars.png")
+def _write(entry: Entry, point: WorkingPoint, validity_range: ValidityRange | None, out: Path) -> None:
+    with atomic_folder(out) as folder:
+        curves = compute_isobars(entry.characteristic, validity_range, point)
+        save_table(isobar_table(curves), folder / "isobars.csv")
+        save(
+            isobar_plot(entry.characteristic, entry.title, curves, validity_range, point).figure,
+            folder / "isobars.png",
+        )

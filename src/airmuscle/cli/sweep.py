@@ -1,45 +1,47 @@
-"""`airmuscle sweep`: many runs of one scenario."""
+"""`airmuscle sweep`: parameter study of a scenario."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from ..core.errors import AirmuscleError, InputError, SimulationError
+from ..report.chapter import Table
+from ..report.formatting import format_number, table_rows
+from ..study import Study, StudyResult, dask_cluster, load_study, run_study
+from ..study.chapter import failure_table, sensitivity_table, write_study
+from ..study.executors import available_cores, process_pool
+from ..study.run import count_finished_runs
 from .interruption import check_interrupted
 from .options import Folder, Json
-from .terminal import print_json, print_table
-
-if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
-    from ..report.chapter import Table
-    from ..study import Study, StudyResult
+from .terminal import echo, print_json, print_table
 
 
 def sweep(
     study: Annotated[
         Path,
-        typer.Argument(metavar="STUDY.toml", help="A file with scenario, [vary], [design] and [outcome]."),
+        typer.Argument(metavar="STUDY.toml", help="A file with scenario, [vary], [design] and [metrics]."),
     ],
     out: Folder = Path("study"),
     workers: Annotated[
-        int | None, typer.Option(min=1, max=1024, help="Processes on this machine; all cores unless given.")
+        int | None, typer.Option(min=1, max=1024, metavar="N", help="Number of local processes; default: one per core.")
     ] = None,
     dask: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A running Dask cluster instead: tcp://host:8786.")
+        str | None, typer.Option(metavar="ADDRESS", help="Use a running Dask cluster, such as tcp://host:8786.")
     ] = None,
     json: Json = False,
 ) -> None:
-    """Run a study: a scenario many times, with numbers that vary on a grid or by chance.
+    """Run a parameter study of a scenario.
 
     \b
-    Writes DIR/results.csv (one row a run), DIR/report.html, DIR/figures/ and DIR/data/.
-    What is done is kept in DIR/chunks at once: after Ctrl-C or a kill the same command goes on from there, and
-    the result is the same to the last bit. A run that fails leaves its reason in results.csv.
+    The parameters vary on a grid or randomly. Writes DIR/results.csv (one row per run), DIR/report.html, DIR/figures/
+    and DIR/data/. Completed runs are saved in DIR/chunks: after an interruption the same command resumes the study,
+    with bit-identical results. If a run fails, results.csv states the reason.
 
     \b
     Examples:
@@ -47,119 +49,107 @@ def sweep(
       airmuscle sweep study.toml --workers 8
       airmuscle sweep study.toml --dask tcp://head-node:8786
     """
-    from ..core.errors import InputError, SimulationError
-    from ..study import load_study
-    from ..study.chapter import write_study
-
     if workers is not None and dask is not None:
         raise InputError("--workers and --dask exclude each other: a Dask cluster has its own workers.")
     result = _run(load_study(study), out, workers, dask)
     page = write_study(result, out)
     if json:
-        print_json(_as_data(result))
+        print_json(_to_dict(result))
     else:
         _print(result)
     if result.failed.size == len(result.study):
-        raise SimulationError(f"all {len(result.study)} runs failed; the first because: {result.reasons[0]}")
+        raise SimulationError(f"all {len(result.study)} runs failed; reason of the first: {result.failure_reasons[0]}")
     if not json:
-        typer.echo(f"results: {out / 'results.csv'}")
-        typer.echo(f"report: {page}")
+        echo(f"results: {out / 'results.csv'}")
+        echo(f"report: {page}")
 
 
 def _run(study: Study, out: Path, workers: int | None, dask: str | None) -> StudyResult:
-    """The study's result; when it ends early, a line says what is kept and how to go on."""
-    from ..core.errors import AirmuscleError
-    from ..study import run_study
-    from ..study.run import runs_kept
-
+    """The result of the study; if it is aborted, a message states how many runs were saved."""
     try:
-        with _bar(study.title) as show, _executor(study, workers, dask) as executor:
+        with _progress(study.title) as show, _executor(study, workers, dask) as executor:
             return run_study(study, out, executor, show)
     except (AirmuscleError, KeyboardInterrupt):
-        if done := runs_kept(study, out):  # counted where they lie: one may have come while all was stopping
-            kept = f"{done} of {len(study)} runs are kept in {out / 'chunks'}"
-            typer.echo(f"{kept}; the same command goes on from there", err=True)
+        if done := count_finished_runs(study, out):  # counted on disk: a run may have been completed during the abort
+            saved = f"{done} of {len(study)} runs are saved in {out / 'chunks'}"
+            echo(f"{saved}; the same command resumes from there", err=True)
         raise
 
 
 def _executor(
     study: Study, workers: int | None, dask: str | None
 ) -> contextlib.AbstractContextManager[Executor | None]:
-    from ..study import dask_cluster, processes
-    from ..study.executors import cores_here
-
     if dask is not None:
         return dask_cluster(dask)
-    return processes(min(workers or cores_here(), len(study.chunks)))
+    return process_pool(min(workers or available_cores(), len(study.chunks)))
 
 
 @contextlib.contextmanager
-def _bar(title: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar on stderr while the block lasts."""
+def _progress(title: str) -> Iterator[Callable[[int, int], None]]:
+    """Yield a callback (runs done, runs in total) that draws a progress bar on stderr."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(title, total=None)
+    with Progress(*columns, console=Console(stderr=True), transient=True) as display:
+        task = display.add_task(title, total=None)
 
-        def show(done: int, of: int) -> None:
+        def show(done: int, total: int) -> None:
             check_interrupted()
-            bar.update(task, completed=done, total=of)
+            display.update(task, completed=done, total=total)
 
         yield show
 
 
 def _print(result: StudyResult) -> None:
-    from ..study.chapter import reasons_table, sensitivity_table
-
     study, indices = result.study, result.indices()
     failed = f", {result.failed.size} failed" if result.failed.size else ""
-    typer.echo(f"{study.title}: {len(study)} runs{failed}, {study.design}")
+    echo(f"{study.title}: {len(study)} runs{failed}, {study.design}")
     if study.scalars:
         _print_table(result.statistics())
     if indices:
         _print_table(sensitivity_table(study, indices))
     if result.failed.size:
-        _print_table(reasons_table(result))
+        _print_table(failure_table(result))
 
 
 def _print_table(table: Table) -> None:
-    from ..report.wording import number, rows
-
-    words = [tuple(value if isinstance(value, str) else _short(number(value)) for value in row) for row in rows(table)]
+    rows = [
+        tuple(value if isinstance(value, str) else _round(format_number(value)) for value in r)
+        for r in table_rows(table)
+    ]
     numeric = [h.strip() for h, values in table.columns.items() if not isinstance(next(iter(values)), str)]
-    print_table([header.strip() for header in table.columns], words, right=numeric)
+    print_table([header.strip() for header in table.columns], rows, right=numeric)
 
 
-def _short(text: str) -> str:
-    """Four digits are enough beside each other."""
+def _round(text: str) -> str:
+    """A number with four significant digits; other texts are unchanged."""
     try:
         return f"{float(text):.4g}" if "." in text or "e" in text else text
     except ValueError:
         return text
 
 
-def _as_data(result: StudyResult) -> dict[str, Any]:
+def _to_dict(result: StudyResult) -> dict[str, Any]:
+    """A study as plain data, all numbers SI."""
     study = result.study
     statistics = result.statistics().columns if study.scalars else {}
-    indices = {
-        name: {
-            "first_order": found.first,
-            "first_order_interval": found.first_interval,
-            "total": found.total,
-            "total_interval": found.total_interval,
-        }
-        for name, found in result.indices().items()
-    }
     return {
         "title": study.title,
         "runs": len(study),
         "failed": int(result.failed.size),
-        "varied": [number.path for number in study.numbers],
+        "varied": [parameter.path for parameter in study.parameters],
         "outcomes": {
             name: {key: values[i] for key, values in statistics.items() if key != "outcome"}
             for i, name in enumerate(study.scalars)
         },
-        "sensitivities": indices,
+        "sensitivities": {
+            name: {
+                "first_order": indices.first,
+                "first_order_interval": indices.first_interval,
+                "total": indices.total,
+                "total_interval": indices.total_interval,
+            }
+            for name, indices in result.indices().items()
+        },
     }

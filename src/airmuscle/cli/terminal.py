@@ -1,41 +1,73 @@
-"""What commands print: tables for people, JSON for programs."""
+"""Terminal output: messages, tables and JSON, without raw control characters."""
 
 from __future__ import annotations
 
+import json
 import os
 import sys
+import unicodedata
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import typer
 
+from ..report.write import as_json
+
 WIDE = 160
-"""Columns of a table that goes to a file or another program, where no terminal says its width."""
+"""Width [characters] of a table that is written to a file or to another program."""
+
+
+def echo(text: str = "", *, err: bool = False) -> None:
+    """Print a message; every message of the command line passes through this function or through `print_table`."""
+    typer.echo(printable(text), err=err)
+
+
+def printable(text: str) -> str:
+    r"""The text with control characters and undecodable bytes replaced by escapes such as \x1b."""
+    return text if text.isprintable() else "".join(c if _is_printable(c) else _escape(c) for c in text)
 
 
 def print_json(content: Any) -> None:
-    """Print JSON that any reader takes; what is not finite is null."""
-    from ..report.write import as_json
-
-    typer.echo(as_json(content), nl=False)
+    """Print standard JSON; numbers that are not finite are null."""
+    lines = as_json(content).splitlines()
+    typer.echo("\n".join("".join(c if _is_printable(c) else json.dumps(c)[1:-1] for c in line) for line in lines))
 
 
 def print_table(headers: Sequence[str], rows: Iterable[Sequence[Any]], *, right: Sequence[str] = ()) -> None:
-    """Print a table; columns named in `right` stand flush right, a cell may be rich text."""
+    """Print a table; the columns named in `right` are right-aligned, a cell may be rich text."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, header_style="bold")
-    for i, header in enumerate(headers):  # what a row is about stays in one piece, so that it can be copied
-        table.add_column(header, justify="right" if header in right else "left", overflow="fold", no_wrap=i == 0)
+    for i, header in enumerate(headers):  # the first column is not wrapped, so that its names can be copied
+        justify: Any = "right" if header in right else "left"
+        table.add_column(without_markup(header), justify=justify, overflow="fold", no_wrap=i == 0)
     for row in rows:
-        table.add_row(*(cell if hasattr(cell, "plain") else _escaped(str(cell)) for cell in row))
-    wide = None if sys.stdout.isatty() or "COLUMNS" in os.environ else WIDE
-    Console(width=wide, highlight=False).print(table)
+        table.add_row(*(cell if hasattr(cell, "plain") else without_markup(str(cell)) for cell in row))
+    width = None if sys.stdout.isatty() or "COLUMNS" in os.environ else WIDE
+    Console(width=width, highlight=False, emoji=False).print(table)
 
 
-def _escaped(text: str) -> str:
+def without_markup(text: str) -> str:
+    """Printable text for rich, in which brackets are not markup."""
     from rich.markup import escape
 
-    return escape(text)
+    return escape(printable(text))
+
+
+def percent(ratio: float) -> str:
+    """A ratio as a percentage with four significant digits: `12.5 %`."""
+    return f"{100 * ratio:.4g} %"
+
+
+def _is_printable(character: str) -> bool:
+    return character.isprintable() or character in "\n\t" or unicodedata.category(character) == "Zs"
+
+
+def _escape(character: str) -> str:
+    """An escape; a byte that could not be decoded (U+DC80 to U+DCFF, PEP 383) is written as that byte."""
+    code = ord(character)
+    if 0xDC80 <= code <= 0xDCFF:
+        return f"\\x{code - 0xDC00:02x}"
+    return character.encode("unicode_escape").decode("ascii")

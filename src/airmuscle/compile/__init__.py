@@ -4,11 +4,11 @@
 system does not need.
 """
 
-from ..core.system import Differentiated, System
+from ..core.system import SensitivitySystem, System
 from ..core.variables import StateVariable
 
 __all__ = [
-    "Differentiated",
+    "SensitivitySystem",
     "StateVariable",
     "System",
 ]

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core import tree
 from ..core.arrays import Array
-from ..core.system import Differentiated, System
+from ..core.system import SensitivitySystem, System
 from . import functions, sensitivities, sensitivities_explicit
 from .functions import ArraySizes, TracedSystem
 from .functions_simd import lanes_module
@@ -32,7 +32,7 @@ class Program:
     def __init__(self, system: System) -> None:
         self._system = system
         self._form: TracedSystem | sensitivities.TangentSystem
-        if isinstance(system, Differentiated):
+        if isinstance(system, SensitivitySystem):
             self._form = sensitivities.tangent_system(system)
             text, self.sizes = sensitivities.implicit_module(self._form)
         else:

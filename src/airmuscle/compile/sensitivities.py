@@ -11,7 +11,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..core.system import Differentiated
+from ..core.system import SensitivitySystem
 from .functions import PARAMETERS, ArraySizes, Printer, TracedSystem, trace_system
 from .ir.instructions import Code, Operand, finished, recorded
 from .ir.jacobian import ZERO, Tape, derivatives
@@ -46,7 +46,7 @@ class TangentSystem:
         return [loaded(block, array, self.size + i * self.lanes, self.lanes) for i in range(self.size)]
 
 
-def tangent_system(system: Differentiated) -> TangentSystem:
+def tangent_system(system: SensitivitySystem) -> TangentSystem:
     """The inner system of a differentiated one, traced, with what is observed as its outputs."""
     import casadi
 
@@ -56,7 +56,7 @@ def tangent_system(system: Differentiated) -> TangentSystem:
         **{n: inner.o[i] for i, n in enumerate(inner.output_names)},
     }
     observed = casadi.densify(casadi.vertcat(casadi.SX(0, 1), *(found[n] for n in system.observed_names)))
-    return TangentSystem(dataclasses.replace(inner, o=observed), system.places, system.output_names)
+    return TangentSystem(dataclasses.replace(inner, o=observed), system.parameter_indices, system.output_names)
 
 
 class Values:

@@ -134,7 +134,9 @@ class SampledSignal(InputSignal):
         for name, given in self.points.items():
             points = _pairs("sampled signal", name, given)
             if not points:
-                raise ParameterError(f"the sampled signal of '{name}' has no points; write pairs of time [s] and value.")
+                raise ParameterError(
+                    f"the sampled signal of '{name}' has no points; write pairs of time [s] and value."
+                )
             _check_points("sampled signal", "times", name, points)
 
     @property

@@ -63,7 +63,9 @@ class PID(SisoController):
         "1", "b", "set-point weight of the proportional part", bounds=(0.0, 1.0), default=1.0
     )
     derivative_weight: float = parameter("1", "c", "set-point weight of the derivative", bounds=(0.0, 1.0), default=0.0)
-    tracking_time: float = parameter("s", "T_t", "tracking time of the anti-windup; 0: by the rule", bounds=(0.0, 1e6), default=0.0)
+    tracking_time: float = parameter(
+        "s", "T_t", "tracking time of the anti-windup; 0: by the rule", bounds=(0.0, 1e6), default=0.0
+    )
     initial_output: float = parameter("u", "u_0", "first command; without integral action the bias", default=0.0)
 
     def init(self) -> PIDMemory:

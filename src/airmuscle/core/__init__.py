@@ -1,20 +1,20 @@
-"""Foundations: parameters and models, parameter trees, operators over numbers and symbols, errors, references, units."""
+"""Foundations: models and parameters, parameter trees, numeric and symbolic operators, errors, references, units."""
 
 from . import ops
 from .arrays import Array
 from .declaration import Parameter, model, parameter, parameters
 from .reference import Reference, cite
-from .system import Differentiated, System
+from .system import SensitivitySystem, System
 from .tree import Leaf, flatten, leaves, structure, unflatten, with_parameters
 from .variables import Input, StateVariable
 
 __all__ = [
     "Array",
-    "Differentiated",
     "Input",
     "Leaf",
     "Parameter",
     "Reference",
+    "SensitivitySystem",
     "StateVariable",
     "System",
     "cite",

@@ -1,4 +1,4 @@
-"""Array: the type of every array of real numbers."""
+"""Array type: NumPy arrays of double-precision floats."""
 
 from __future__ import annotations
 
@@ -6,3 +6,4 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+"""A NumPy array of float64."""

@@ -1,7 +1,7 @@
-"""A law becomes symbols, and symbols give exact derivatives.
+"""Automatic differentiation of models: symbolic tracing with CasADi, exact derivatives and Jacobians.
 
-`slope` differentiates a law by one of its arguments wherever it is called: on numbers and arrays, inside a
-trace, or on JAX arrays. `jacobian` adds the derivatives by every parameter, which is what a fit needs.
+`derivative` differentiates a method with respect to one argument. It accepts numbers, arrays, CasADi symbols (inside
+a trace) and JAX arrays. `jacobian` returns the derivatives with respect to all parameters, as a fit requires.
 """
 
 from __future__ import annotations
@@ -17,54 +17,63 @@ import numpy.typing as npt
 from . import ops, tree
 from .errors import TraceError
 
-_functions: dict[Any, Any] = {}
+_traced_functions: dict[Any, Any] = {}
 
 
-def symbolic(thing: Any) -> tuple[Any, Any]:
-    """The model with a CasADi symbol in place of every leaf, and the vector of these symbols."""
+def symbolic(obj: Any) -> tuple[Any, Any]:
+    """Return the model with a CasADi symbol in place of every leaf, and the vector of these symbols."""
     import casadi
 
-    count = sum(1 for _ in tree.leaves(thing))
+    count = sum(1 for _ in tree.leaves(obj))
     vector = casadi.SX.sym("p", count)
-    return tree.unflatten(thing, [vector[i] for i in range(count)]), vector
+    return tree.unflatten(obj, [vector[i] for i in range(count)]), vector
 
 
 def check_finite(expression: Any, owner: str) -> None:
-    """Raise TraceError where a trace holds NaN or infinity: math.sqrt or float() of a symbol makes them silently."""
+    """Raise TraceError if a traced expression contains NaN or infinity.
+
+    math.sqrt, NumPy functions or float() applied to a symbol produce such constants without an error.
+    """
     import casadi
 
     function = casadi.Function("probe", casadi.symvar(expression), [expression])
     for i in range(function.n_instructions()):
         if function.instruction_id(i) == casadi.OP_CONST and not math.isfinite(function.instruction_constant(i)):
             raise TraceError(
-                f"{owner} traced to a constant that is not finite. Use airmuscle.core.ops instead of math and numpy, "
-                "and no float() of an argument."
+                f"{owner}: the traced expression contains a constant that is not finite. Use airmuscle.core.ops "
+                "instead of math and numpy, and do not call float() on an argument."
             )
 
 
-def _function(thing: Any, method: str, count: int) -> Any:
-    """The CasADi function (arguments, parameters) -> (value, by each argument, by parameters), traced once."""
+def _trace_with_derivatives(obj: Any, method: str, count: int) -> Any:
+    """Return the cached CasADi function (arguments, parameters) -> (value, d/d argument i, d/d parameters)."""
     import casadi
 
-    key = (tree.structure(thing), method, count)
-    if key not in _functions:
-        model, parameters = symbolic(thing)
+    key = (tree.structure(obj), method, count)
+    if key not in _traced_functions:
+        model, parameters = symbolic(obj)
         arguments = [casadi.SX.sym(f"x{i}") for i in range(count)]
         value = casadi.SX(getattr(model, method)(*arguments))
-        check_finite(value, f"{type(thing).__name__}.{method}")
+        check_finite(value, f"{type(obj).__name__}.{method}")
         outputs = [value, *(casadi.jacobian(value, x) for x in arguments), casadi.jacobian(value, parameters)]
-        _functions[key] = casadi.Function("law", [*arguments, parameters], casadi.cse(outputs))
-    return _functions[key]
+        _traced_functions[key] = casadi.Function("law", [*arguments, parameters], casadi.cse(outputs))
+    return _traced_functions[key]
 
 
-def _evaluated(thing: Any, method: str, arguments: tuple[Any, ...]) -> tuple[list[Any], tuple[int, ...], int]:
-    function = _function(thing, method, len(arguments))
-    results, shape = _at(function, [leaf.value for leaf in tree.leaves(thing)], arguments)
+def _evaluate_traced(obj: Any, method: str, arguments: tuple[Any, ...]) -> tuple[list[Any], tuple[int, ...], int]:
+    """Return the outputs of the traced function at the arguments, their shape and the number of points."""
+    function = _trace_with_derivatives(obj, method, len(arguments))
+    results, shape = _call_traced(function, [leaf.value for leaf in tree.leaves(obj)], arguments)
     return results, shape, math.prod(shape)
 
 
-def _at(function: Any, parameters: Sequence[Any], arguments: Sequence[Any]) -> tuple[list[Any], tuple[int, ...]]:
-    """What a traced function gives at numbers or arrays, and their shape; parameters may be arrays too, as of many."""
+def _call_traced(
+    function: Any, parameters: Sequence[Any], arguments: Sequence[Any]
+) -> tuple[list[Any], tuple[int, ...]]:
+    """Return the outputs of a traced function at numbers or arrays, and their shape.
+
+    Parameters may be arrays as well, for example one value per plant.
+    """
     many = any(isinstance(value, np.ndarray) and value.size > 1 for value in parameters)
     broadcast = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (*arguments, *(parameters if many else ()))))
     rows = [x.reshape(1, -1) for x in broadcast]
@@ -74,97 +83,105 @@ def _at(function: Any, parameters: Sequence[Any], arguments: Sequence[Any]) -> t
     return [r.full() for r in function(*rows[:count], vector)], broadcast[0].shape
 
 
-def derivative(thing: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
-    """The exact derivative of `thing.method(*arguments)` by argument number `wrt`, shaped like the arguments."""
+def derivative(obj: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
+    """Exact derivative of `obj.method(*arguments)` with respect to argument number `wrt`, shaped like the arguments.
+
+    Raises TraceError if the method cannot be traced.
+    """
     if ops.is_symbol(*arguments):
-        return _symbolic_slope(thing, method, arguments, wrt)
+        return _symbolic_derivative(obj, method, arguments, wrt)
     if _is_jax(*arguments):
-        return _jax_slope(thing, method, arguments, wrt)
-    results, shape, _ = _evaluated(thing, method, arguments)
-    found = results[1 + wrt].reshape(shape)
-    return float(found) if found.ndim == 0 else found
+        return _jax_derivative(obj, method, arguments, wrt)
+    results, shape, _ = _evaluate_traced(obj, method, arguments)
+    value = results[1 + wrt].reshape(shape)
+    return float(value) if value.ndim == 0 else value
 
 
-def _symbolic_slope(thing: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
+def _symbolic_derivative(obj: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
     import casadi
 
     symbol = casadi.SX.sym("x")
     inner = [symbol if i == wrt else x for i, x in enumerate(arguments)]
-    derivative = casadi.jacobian(casadi.SX(getattr(thing, method)(*inner)), symbol)
+    derivative = casadi.jacobian(casadi.SX(getattr(obj, method)(*inner)), symbol)
     return casadi.substitute(derivative, symbol, arguments[wrt])
 
 
-def _jax_slope(thing: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
+def _jax_derivative(obj: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
     import jax  # type: ignore[import-not-found, unused-ignore]
 
-    def along(x: Any) -> Any:
-        return getattr(thing, method)(*(x if i == wrt else a for i, a in enumerate(arguments)))
+    def partial(x: Any) -> Any:
+        return getattr(obj, method)(*(x if i == wrt else a for i, a in enumerate(arguments)))
 
-    at = jax.numpy.asarray(arguments[wrt], dtype=float)
-    return jax.jvp(along, (at,), (jax.numpy.ones_like(at),))[1]
+    point = jax.numpy.asarray(arguments[wrt], dtype=float)
+    return jax.jvp(partial, (point,), (jax.numpy.ones_like(point),))[1]
 
 
-def jvp(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], along: Sequence[Any]) -> tuple[Any, ...]:
-    """The exact derivative of a vector function over `ops` at a point, along a direction: J(at) along.
+def jvp(function: Callable[[Any], Sequence[Any]], point: Sequence[Any], direction: Sequence[Any]) -> tuple[Any, ...]:
+    """Jacobian-vector product J(point) direction of a vector function written over `ops`.
 
-    `at` and `along` hold numbers, CasADi symbols or JAX arrays; `function` takes the point as one sequence.
+    `point` and `direction` hold numbers, CasADi symbols or JAX arrays; `function` takes the point as one sequence.
     """
-    if _is_jax(*at, *along):
+    if _is_jax(*point, *direction):
         import jax  # type: ignore[import-not-found, unused-ignore]
 
-        point, direction = ([jax.numpy.asarray(x, dtype=float) for x in given] for given in (at, along))
-        return tuple(jax.jvp(lambda x: tuple(function(x)), (point,), (direction,))[1])
+        primals, tangents = ([jax.numpy.asarray(x, dtype=float) for x in values] for values in (point, direction))
+        return tuple(jax.jvp(lambda x: tuple(function(x)), (primals,), (tangents,))[1])
     import casadi
 
-    x, values = _symbolic_values(function, len(at))
-    return _put_in(casadi.jtimes(values, x, casadi.vertcat(*along)), x, at, ops.is_symbol(*at, *along))
+    x, values = _symbolic_values(function, len(point))
+    product = casadi.jtimes(values, x, casadi.vertcat(*direction))
+    return _substitute(product, x, point, ops.is_symbol(*point, *direction))
 
 
-def vjp(function: Callable[[Any], Sequence[Any]], at: Sequence[Any], weights: Sequence[Any]) -> tuple[Any, ...]:
-    """The exact gradient of the weighted sum of a vector function over `ops`: J(at)^T weights, as `directional`."""
-    if _is_jax(*at, *weights):
+def vjp(function: Callable[[Any], Sequence[Any]], point: Sequence[Any], weights: Sequence[Any]) -> tuple[Any, ...]:
+    """Vector-Jacobian product J(point)^T weights of a vector function written over `ops`; arguments as for `jvp`."""
+    if _is_jax(*point, *weights):
         import jax  # type: ignore[import-not-found, unused-ignore]
 
-        point = [jax.numpy.asarray(x, dtype=float) for x in at]
+        primals = [jax.numpy.asarray(x, dtype=float) for x in point]
         gradient = jax.grad(lambda x: sum(w * y for w, y in zip(weights, function(x), strict=True)))
-        return tuple(gradient(point))
+        return tuple(gradient(primals))
     import casadi
 
-    x, values = _symbolic_values(function, len(at))
-    return _put_in(casadi.jtimes(values, x, casadi.vertcat(*weights), True), x, at, ops.is_symbol(*at, *weights))
+    x, values = _symbolic_values(function, len(point))
+    product = casadi.jtimes(values, x, casadi.vertcat(*weights), True)
+    return _substitute(product, x, point, ops.is_symbol(*point, *weights))
 
 
-def value_and_derivative(thing: Any, method: str, count: int, wrt: int = 0) -> Callable[..., tuple[Any, Any]]:
-    """`thing.method` of `count` arguments together with its exact derivative by number `wrt`, for a search.
+def value_and_derivative(obj: Any, method: str, count: int, wrt: int = 0) -> Callable[..., tuple[Any, Any]]:
+    """Return a function that evaluates `obj.method` and its exact derivative with respect to argument `wrt`.
 
-    The function takes numbers, or arrays that broadcast, and gives numbers or arrays of their shape. The parameters of
-    `thing` may be arrays too.
+    `count` is the number of arguments of the method. The returned function takes numbers or arrays that broadcast and
+    returns (value, derivative) of their shape. The parameters of `obj` may be arrays as well.
+    Raises TraceError if the method cannot be traced.
     """
     import casadi
 
-    key = (tree.structure(thing), method, count, wrt)
-    if key not in _functions:
-        model, symbols = symbolic(thing)
+    key = (tree.structure(obj), method, count, wrt)
+    if key not in _traced_functions:
+        model, symbols = symbolic(obj)
         x = [casadi.SX.sym(f"x{i}") for i in range(count)]
         value = casadi.SX(getattr(model, method)(*x))
-        check_finite(value, f"{type(thing).__name__}.{method}")
-        _functions[key] = casadi.Function("law", [*x, symbols], casadi.cse([value, casadi.jacobian(value, x[wrt])]))
-    function, parameters = _functions[key], [leaf.value for leaf in tree.leaves(thing)]
+        check_finite(value, f"{type(obj).__name__}.{method}")
+        _traced_functions[key] = casadi.Function(
+            "law", [*x, symbols], casadi.cse([value, casadi.jacobian(value, x[wrt])])
+        )
+    function, parameters = _traced_functions[key], [leaf.value for leaf in tree.leaves(obj)]
     if any(isinstance(value, np.ndarray) for value in parameters):
-        return lambda *arguments: _valued(function, parameters, arguments)
+        return lambda *arguments: _evaluate_pair(function, parameters, arguments)
     vector = casadi.DM(np.array(parameters, dtype=float))
 
-    def both(*arguments: Any) -> tuple[Any, Any]:
+    def evaluate(*arguments: Any) -> tuple[Any, Any]:
         if any(isinstance(x, np.ndarray) for x in arguments):
-            return _valued(function, parameters, arguments)
+            return _evaluate_pair(function, parameters, arguments)
         value, derivative = function(*arguments, vector)
         return float(value), float(derivative)
 
-    return both
+    return evaluate
 
 
-def _valued(function: Any, parameters: Sequence[Any], arguments: Sequence[Any]) -> tuple[Any, Any]:
-    (value, derivative), shape = _at(function, parameters, arguments)
+def _evaluate_pair(function: Any, parameters: Sequence[Any], arguments: Sequence[Any]) -> tuple[Any, Any]:
+    (value, derivative), shape = _call_traced(function, parameters, arguments)
     return value.reshape(shape), derivative.reshape(shape)
 
 
@@ -179,22 +196,23 @@ def _symbolic_values(function: Callable[[Any], Sequence[Any]], count: int) -> tu
     return x, casadi.vertcat(*(casadi.SX(v) for v in function([x[i] for i in range(count)])))
 
 
-def _put_in(derivative: Any, x: Any, at: Sequence[Any], symbolic: bool) -> tuple[Any, ...]:
+def _substitute(derivative: Any, x: Any, point: Sequence[Any], symbolic: bool) -> tuple[Any, ...]:
+    """Return the components of `derivative` at a point: symbols if `symbolic`, else floats."""
     import casadi
 
-    found = casadi.substitute(derivative, x, casadi.vertcat(*at))
-    parts = tuple(found[i] for i in range(found.numel()))
-    return parts if symbolic else tuple(float(part) for part in parts)
+    result = casadi.substitute(derivative, x, casadi.vertcat(*point))
+    components = tuple(result[i] for i in range(result.numel()))
+    return components if symbolic else tuple(float(component) for component in components)
 
 
-def jacobian(thing: Any, method: str, *arguments: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Values (N,) of `thing.method` at N points, and their derivatives (N, P) by the P leaves of `thing`."""
-    results, _, count = _evaluated(thing, method, arguments)
+def jacobian(obj: Any, method: str, *arguments: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Values of `obj.method` at N points, shape (N,), and derivatives with respect to its P leaves, shape (N, P)."""
+    results, _, count = _evaluate_traced(obj, method, arguments)
     size = results[-1].size // max(count, 1)
     return results[0].reshape(-1), results[-1].reshape(count, size)
 
 
 @functools.cache
 def is_traceable(cls: type[Any]) -> bool:
-    """Whether a class of laws can be traced; a law that cannot says so in `traceable = False`."""
+    """Return whether a class of models can be traced; a class that cannot declares `traceable = False`."""
     return bool(getattr(cls, "traceable", True))

@@ -1,7 +1,7 @@
-"""How a parameter is declared, once, and how a frozen model is taken apart and put together again.
+"""Declaration and validation of models and their parameters.
 
 A declared field is a leaf (a float or a tuple of floats) with unit, symbol, meaning and bounds.
-Any other field is structure: another model, a tuple of models, a whole number, a name.
+Any other field is structure: another model, a tuple of models, an integer or a name.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ INFINITY = math.inf
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """What is declared about one parameter of a model."""
+    """Declaration of one parameter of a model."""
 
     name: str
     unit: str
@@ -42,10 +42,10 @@ def parameter(
     fitted: bool = True,
     **field: Any,
 ) -> Any:
-    """Declare a parameter on the field; docs, fits, TOML, command line and page read it here.
+    """Declare a parameter as a dataclass field; documentation, fits, TOML files and the command line read it from here.
 
-    `bounds` are closed and physical; `fitted=False` marks what a fit must leave alone (a length measured
-    with a ruler, a clamp). Values are SI, in `unit`.
+    `bounds` are closed and physical. `fitted=False` excludes the parameter from fits by default (a length measured
+    with a ruler, a clamp). Values are in SI units, in `unit`.
     """
     return dataclasses.field(
         metadata={"unit": unit, "symbol": symbol, "meaning": meaning, "bounds": bounds, "fitted": fitted},
@@ -55,10 +55,10 @@ def parameter(
 
 @dataclass_transform(frozen_default=True, field_specifiers=(parameter, dataclasses.field))
 def model(cls: type[T]) -> type[T]:
-    """A frozen dataclass whose declared parameters are checked when it is made.
+    """Make a class a frozen dataclass whose declared parameters are validated on construction.
 
-    It may be named in library and scenario files unless it says `from_file: ClassVar[bool] = False`. A model may define
-    `check(self)` for what several parameters must satisfy together; it raises ParameterError.
+    Library and scenario files may name the class unless it declares `from_file: ClassVar[bool] = False`. A model may
+    define `check(self)` for conditions on several parameters together; it raises ParameterError.
     """
     if "from_file" not in cls.__dict__:
         cls.from_file = True  # type: ignore[attr-defined]
@@ -67,100 +67,109 @@ def model(cls: type[T]) -> type[T]:
     return dataclasses.dataclass(frozen=True)(cls)
 
 
-def parameters(thing: Any) -> tuple[Parameter, ...]:
-    """The declared parameters of a model or model class, in order, without those of nested models."""
+def parameters(obj: Any) -> tuple[Parameter, ...]:
+    """Return the declared parameters of a model or model class, in order, without those of nested models."""
     return tuple(
-        Parameter(name=f.name, default=f.default, **f.metadata)
-        for f in dataclasses.fields(thing)
-        if "unit" in f.metadata
+        Parameter(name=f.name, default=f.default, **f.metadata) for f in dataclasses.fields(obj) if "unit" in f.metadata
     )
 
 
-def _validate(thing: Any) -> None:
-    lists = {f.name for f in dataclasses.fields(thing) if "tuple" in str(f.type)}
-    for declared in parameters(thing):
-        value = getattr(thing, declared.name)
+def _validate(obj: Any) -> None:
+    """Check every declared parameter, then the conditions of `check`. Raises ParameterError."""
+    lists = {f.name for f in dataclasses.fields(obj) if "tuple" in str(f.type)}
+    for declared in parameters(obj):
+        value = getattr(obj, declared.name)
         if isinstance(value, tuple | list | np.ndarray) != (declared.name in lists):
-            due = "several numbers, (1.0, 2.0)" if declared.name in lists else "one number"
+            expected = "several numbers, such as (1.0, 2.0)" if declared.name in lists else "one number"
             raise ParameterError(
-                f"{type(thing).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is {value!r}; "
-                f"it must be {due}."
+                f"{type(obj).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is {value!r}; "
+                f"it must be {expected}."
             )
-        object.__setattr__(thing, declared.name, _checked(type(thing).__name__, declared, value))
-    if hasattr(thing, "check"):
-        thing.check()
+        object.__setattr__(obj, declared.name, _check_value(type(obj).__name__, declared, value))
+    if hasattr(obj, "check"):
+        obj.check()
 
 
-def _checked(owner: str, declared: Parameter, value: Any) -> Any:
+def _check_value(owner: str, declared: Parameter, value: Any) -> Any:
+    """Return the value as float or tuple of floats. Raises ParameterError if it is not finite or out of bounds."""
     if isinstance(value, tuple | list | np.ndarray):
-        return tuple(_checked(owner, declared, v) for v in value)
+        return tuple(_check_value(owner, declared, v) for v in value)
     low, high = declared.bounds
     unit = "" if declared.unit == "1" else f" {declared.unit}"
-    where = f"{owner}.{declared.name} ({declared.symbol}, {declared.meaning})"
+    label = f"{owner}.{declared.name} ({declared.symbol}, {declared.meaning})"
     if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
-        raise ParameterError(f"{where} is {value!r}; it must be a number{unit and ' in' + unit}.")
+        raise ParameterError(f"{label} is {value!r}; it must be a number{unit and ' in' + unit}.")
     if not math.isfinite(value):
-        raise ParameterError(f"{where} is {value}; it must be finite.")
+        raise ParameterError(f"{label} is {value}; it must be finite.")
     if not low <= value <= high:
         raise ParameterError(
-            f"{where} is {value:g}{unit}; allowed are {low:g} to {high:g}{unit}."
-            f"{' Values are SI: check the unit.' if unit else _per_cent(float(value), high)}"
+            f"{label} is {value:g}{unit}; allowed range: {low:g} to {high:g}{unit}."
+            f"{' Values are in SI units; check the unit.' if unit else _percent_hint(float(value), high)}"
         )
     return float(value)
 
 
-def _per_cent(value: float, high: float) -> str:
-    """A question, where a ratio above its bound makes sense as per cent."""
+def _percent_hint(value: float, high: float) -> str:
+    """Return a hint if a ratio above its upper bound would be valid as a percentage, else an empty string."""
     return f" Is it in per cent? As a ratio it is {value / 100:g}." if 0 < value / 100 <= high <= 1 < value else ""
 
 
-def as_float(what: str, value: Any) -> float:
-    """The number that is given. Raises ParameterError for anything else, as text with a unit is."""
+def as_float(label: str, value: Any) -> float:
+    """Return the value as a float. Raises ParameterError for anything but a number, such as a text with a unit."""
     try:
         return float(0.0 + value)
     except (TypeError, ValueError):
-        raise ParameterError(f"{what} is {value!r}; it must be one number, in SI units.") from None
+        raise ParameterError(f"{label} is {value!r}; it must be one number, in SI units.") from None
 
 
-def as_finite_float(what: str, value: Any) -> float:
-    """The finite number that is given. Raises ParameterError for anything else."""
-    number = as_float(what, value)
+def as_finite_float(label: str, value: Any) -> float:
+    """Return the value as a finite float. Raises ParameterError for anything else."""
+    number = as_float(label, value)
     if not math.isfinite(number):
-        raise ParameterError(f"{what} is {value!r}; it must be finite.")
+        raise ParameterError(f"{label} is {value!r}; it must be finite.")
     return number
 
 
 @functools.cache
-def _kinds(cls: type[Any]) -> dict[str, type[Any]]:
-    """What the structural fields of a model class hold, where that is one class of models."""
+def _component_types(cls: type[Any]) -> dict[str, type[Any]]:
+    """Return the model class expected in each structural field, for fields annotated with a single class."""
     try:
         hints = typing.get_type_hints(cls)
-    except NameError:  # a class of one's own, whose annotations name what only a type checker imports
+    except NameError:  # a user-defined class whose annotations refer to names imported for type checking only
         return {}
-    plain = {f.name: hints[f.name] for f in dataclasses.fields(cls) if "unit" not in f.metadata}
-    return {n: k for n, k in plain.items() if isinstance(k, type) and k.__module__ not in ("builtins", "types")}
+    structural = {f.name: hints[f.name] for f in dataclasses.fields(cls) if "unit" not in f.metadata}
+    return {n: k for n, k in structural.items() if isinstance(k, type) and k.__module__ not in ("builtins", "types")}
 
 
-def check_structure(thing: Any) -> None:
-    """Raise ParameterError where a part, anywhere inside a model, is not of the kind that its field holds."""
-    if isinstance(thing, tuple):
-        for item in thing:
+def attribute_hint(obj: Any, kind: type[Any]) -> str:
+    """Sentence that names the fields of `obj` that hold an object of class `kind`; empty if there are none."""
+    if not dataclasses.is_dataclass(obj) or isinstance(obj, type):
+        return ""
+    names = [f".{f.name}" for f in dataclasses.fields(obj) if isinstance(getattr(obj, f.name), kind)]
+    return f" It contains one: write {' or '.join(names)} after it." if names else ""
+
+
+def check_structure(obj: Any) -> None:
+    """Raise ParameterError if a component, at any depth of a model, is not an instance of its field's class."""
+    if isinstance(obj, tuple):
+        for item in obj:
             check_structure(item)
-    elif dataclasses.is_dataclass(thing) and not isinstance(thing, type):
-        for name, kind in _kinds(type(thing)).items():
-            part = getattr(thing, name)
-            if not isinstance(part, kind):
+    elif dataclasses.is_dataclass(obj) and not isinstance(obj, type):
+        for name, kind in _component_types(type(obj)).items():
+            component = getattr(obj, name)
+            if not isinstance(component, kind):
                 raise ParameterError(
-                    f"{type(thing).__name__}: its {name} must be of {kind.__name__}; it is {str(part)[:80]}."
+                    f"{type(obj).__name__}: {name} must be an instance of {kind.__name__}; it is {str(component)[:80]}."
+                    f"{attribute_hint(component, kind)}"
                 )
-        for field in dataclasses.fields(thing):
-            check_structure(getattr(thing, field.name))
+        for field in dataclasses.fields(obj):
+            check_structure(getattr(obj, field.name))
 
 
 def check_field(cls: type[Any], name: str) -> None:
-    """Raise ParameterError, with the nearest name, where a model class has no field of this name."""
+    """Raise ParameterError, with the closest field name, if a model class has no field of this name."""
     known = [f.name for f in dataclasses.fields(cls) if f.init]
     if name not in known:
         raise ParameterError(
-            f"{cls.__name__} has no parameter '{name}'; there are {', '.join(known)}.{suggestion(name, known)}"
+            f"{cls.__name__} has no parameter '{name}'; its parameters are {', '.join(known)}.{suggestion(name, known)}"
         )

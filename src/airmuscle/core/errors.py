@@ -1,21 +1,21 @@
-"""Everything airmuscle raises on purpose. A message says where, what, what is allowed, what to do.
+"""Exceptions and warnings. A message states the location, the cause, the allowed values and the remedy.
 
 AirmuscleError
-├── InputError               something given from outside cannot be used
-│   ├── FileError            a file or folder that cannot be read or written
-│   ├── ColumnError          a recording lacks a column, or a column holds no numbers
-│   ├── UnitError            a unit that is unknown or of the wrong kind
-│   ├── ParameterError       a parameter missing, misspelt, mistyped or physically impossible
-│   └── UnknownName          no muscle, characteristic, component or paper of that name
-├── PhysicsError             the question has no answer in this model
-│   ├── NoSolution           no pressure, contraction or force satisfies the request
-│   ├── OutOfReach           a contraction that the geometry cannot take
-│   └── NoEquilibrium        a plant that cannot rest: names the muscle and the forces
-├── TraceError               a law that cannot be traced into a program
-├── IdentificationError      data that cannot determine what is asked
-└── SimulationError          a run that ended early; `.solution` is what was computed
+├── InputError               invalid input
+│   ├── FileError            a file or folder cannot be read or written
+│   ├── ColumnError          a recording lacks a column, or a column contains no numbers
+│   ├── UnitError            a unit is unknown or of the wrong dimension
+│   ├── ParameterError       a parameter is missing, misspelt, of the wrong type or physically impossible
+│   └── UnknownNameError     no muscle, characteristic, component or paper has that name
+├── PhysicsError             the model has no solution
+│   ├── SolveError           no pressure, contraction or force satisfies the request
+│   ├── GeometryLimitError   a contraction outside the range of the geometry
+│   └── EquilibriumError     a plant has no equilibrium; the message names the muscle and the forces
+├── TraceError               a model cannot be traced into a compiled program
+├── IdentificationError      the data cannot determine the requested quantities
+└── SimulationError          a simulation ended early; `.solution` contains the partial results
 
-AirmuscleWarning             works, but not as expected: a Python warning, not an error
+AirmuscleWarning             a result that may differ from what the user expects
 """
 
 from __future__ import annotations
@@ -26,39 +26,39 @@ from typing import Any
 
 
 class AirmuscleError(Exception):
-    """Base of everything airmuscle raises on purpose."""
+    """Base class of all exceptions of airmuscle."""
 
 
 class AirmuscleWarning(UserWarning):
-    """Something that works, but not as its reader may expect; the message says what."""
+    """Warning about a result that may differ from what the user expects; the message states the cause."""
 
 
 class InputError(AirmuscleError):
-    """Something given from outside cannot be used."""
+    """Invalid input."""
 
 
 class FileError(InputError):
-    """A file or folder that cannot be read or written."""
+    """A file or folder cannot be read or written."""
 
 
 class ColumnError(InputError):
-    """A recording lacks a column, or a column holds no numbers."""
+    """A recording lacks a column, or a column contains no numbers."""
 
 
 class UnitError(InputError):
-    """A unit that is unknown or of the wrong kind."""
+    """A unit is unknown or of the wrong dimension."""
 
 
 class ParameterError(InputError):
-    """A parameter that is missing, misspelt, mistyped or physically impossible."""
+    """A parameter is missing, misspelt, of the wrong type or physically impossible."""
 
 
 class UnknownNameError(InputError):
-    """No muscle, characteristic, component or paper of that name."""
+    """No muscle, characteristic, component or paper has that name."""
 
 
 class PhysicsError(AirmuscleError):
-    """The question has no answer in this model."""
+    """The model has no solution."""
 
 
 class SolveError(PhysicsError):
@@ -66,25 +66,25 @@ class SolveError(PhysicsError):
 
 
 class GeometryLimitError(PhysicsError):
-    """A contraction that the geometry cannot take."""
+    """A contraction outside the range of the geometry."""
 
 
 class EquilibriumError(PhysicsError):
-    """A plant that cannot rest; the message names the muscle and the forces."""
+    """A plant has no equilibrium; the message names the muscle and the forces."""
 
 
 class TraceError(AirmuscleError):
-    """A law that cannot be traced into a program."""
+    """A model cannot be traced into a compiled program."""
 
 
 class IdentificationError(AirmuscleError):
-    """Data that cannot determine what is asked."""
+    """The data cannot determine the requested quantities."""
 
 
 class SimulationError(AirmuscleError):
-    """A run that ended early; `.solution` is what was computed until then, or None.
+    """A simulation ended early.
 
-    `.recording` is the recording of the solution, `.interrupted` says whether the user ended the run.
+    `solution` is the Solution of the partial results, or None; `interrupted` is true if the user stopped the run.
     """
 
     def __init__(self, message: str, solution: Any = None, *, interrupted: bool = False) -> None:
@@ -94,11 +94,11 @@ class SimulationError(AirmuscleError):
 
     @property
     def recording(self) -> Any:
-        """The rows that were computed, or None."""
+        """Recording of the partial results, or None."""
         return None if self.solution is None else self.solution.recording
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
-    """A closing sentence for messages about unknown names: the nearest known one, or nothing."""
-    near = difflib.get_close_matches(str(name), list(known), n=1)
-    return f" Did you mean '{near[0]}'?" if near else ""
+    """Return a sentence that suggests the closest known name, or an empty string if none is close."""
+    matches = difflib.get_close_matches(str(name), list(known), n=1)
+    return f" Did you mean '{matches[0]}'?" if matches else ""

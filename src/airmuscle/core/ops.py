@@ -1,7 +1,7 @@
-"""The few mathematical functions that laws are written in.
+"""Mathematical functions over floats, NumPy arrays, CasADi symbols and JAX arrays.
 
-Each looks at its operands and answers with the library they belong to: floats and NumPy arrays are
-computed at once, CasADi symbols are traced, JAX arrays go to jax.numpy. Laws use these and + - * / **.
+Each function selects the library by the type of its operands: floats and NumPy arrays are evaluated at once, CasADi
+symbols are traced, JAX arrays are passed to jax.numpy. Models are written with these functions and + - * / **.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ pi = math.pi
 
 
 def _library(*operands: Value) -> ModuleType | None:
-    """The module that computes with these operands; None for plain numbers."""
-    found = None
+    """Return the module that handles these operands; None for plain numbers."""
+    library = None
     for operand in operands:
         if isinstance(operand, float | int):
             continue
@@ -30,46 +30,46 @@ def _library(*operands: Value) -> ModuleType | None:
             return sys.modules["casadi"]
         if root in ("jax", "jaxlib"):
             return sys.modules["jax.numpy"]
-        found = np
-    return found
+        library = np
+    return library
 
 
 def is_symbol(*operands: Value) -> bool:
-    """Whether any operand is a CasADi symbol, so that the law is being traced."""
+    """Return whether any operand is a CasADi symbol, that is, whether the model is being traced."""
     return any(type(x).__module__.startswith("casadi") for x in operands)
 
 
 def where(condition: Value, when_true: Value, when_false: Value) -> Value:
-    """`when_true` where the condition holds, else `when_false`; both sides are computed on arrays."""
+    """`when_true` where the condition is true, else `when_false`; arrays evaluate both."""
     library = _library(condition, when_true, when_false)
     if library is None:
         return when_true if condition else when_false
-    choose = library.where if hasattr(library, "where") else library.if_else
-    return choose(condition, when_true, when_false)
+    select = library.where if hasattr(library, "where") else library.if_else
+    return select(condition, when_true, when_false)
 
 
 def maximum(a: Value, b: Value) -> Value:
-    """The larger; traced as a comparison, whose derivative at equality is that of `a`."""
+    """The larger of two values; traced as a comparison whose derivative at equality is that of `a`."""
     return np.maximum(a, b) if _library(a, b) is np else where(a >= b, a, b)
 
 
 def minimum(a: Value, b: Value) -> Value:
-    """The smaller; traced as a comparison, whose derivative at equality is that of `b`, the one not the larger."""
+    """The smaller of two values; traced as a comparison whose derivative at equality is that of `b`."""
     return np.minimum(a, b) if _library(a, b) is np else where(a >= b, b, a)
 
 
 def clip(x: Value, low: Value, high: Value) -> Value:
-    """`x` held between `low` and `high`."""
+    """`x` limited to the interval from `low` to `high`."""
     return minimum(maximum(x, low), high)
 
 
 def absolute_value(x: Value) -> Value:
-    """|x|."""
+    """Absolute value |x|."""
     return where(x >= 0, x, -x)
 
 
 def both(a: Value, b: Value) -> Value:
-    """Logical and of two conditions."""
+    """Logical conjunction of two conditions."""
     library = _library(a, b)
     if library is None:
         return bool(a and b)
@@ -91,7 +91,7 @@ def sqrt(x: Value) -> Value:
 
 
 def exp(x: Value) -> Value:
-    """e**x."""
+    """Exponential function."""
     return _on_float(_unary("exp", x), x)
 
 

@@ -1,4 +1,4 @@
-"""How every figure of airmuscle looks: one size, one set of colours that survive print and colour blindness."""
+"""Plot style shared by all figures: size, fonts, and colours suited to print and colour blindness."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from typing import Any
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, RED, PURPLE = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7",
 )  # fmt: skip
-"""The palette of Okabe and Ito (2008)."""
+"""Colour palette of Okabe and Ito (2008)."""
 
 LINES = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BLACK)
-"""The order in which curves take colours."""
+"""Line colours in the order of the curves."""
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
-"""The order in which they take dashes, so that a grey print still tells them apart."""
+"""Line styles in the order of the curves, which remain distinguishable in greyscale print."""
 MARKERS = ("o", "s", "^", "D", "v", "x", "+")
+"""Markers in the order of the curves."""
 
 _STYLE: Any = {
     "font.size": 9, "axes.titlesize": 9, "axes.labelsize": 9, "legend.fontsize": 8, "xtick.labelsize": 8,
@@ -25,9 +26,9 @@ _STYLE: Any = {
 
 
 def new_figure(rows: int = 1, columns: int = 1, *, width: float = 6.3, height: float = 3.6, **subplots: Any) -> Any:
-    """A Matplotlib figure and its axes in the house style, laid out so that nothing overlaps (inches).
+    """Return a Matplotlib figure and its axes in the shared style with constrained layout.
 
-    The figure belongs to no window and no global state; save it with `figure.savefig`.
+    `width` and `height` are in inches. The figure has no window and no global state; write it with `save`.
     """
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -41,17 +42,17 @@ def new_figure(rows: int = 1, columns: int = 1, *, width: float = 6.3, height: f
 
 
 def save(figure: Any, path: Any) -> None:
-    """Write a figure byte-identically for the same content, to the format that the path's suffix names."""
+    """Write a figure in the format of the path's suffix; equal content gives identical bytes."""
     import matplotlib as mpl
 
-    _dress(figure)
+    _apply_text_style(figure)
     with mpl.rc_context(_STYLE):
         metadata = {"Date": None} if str(path).endswith(".svg") else None
         figure.savefig(path, metadata=metadata)
 
 
-def _dress(figure: Any) -> None:
-    """Give titles and legends the house style: Matplotlib sets it when they are made, outside our reach."""
+def _apply_text_style(figure: Any) -> None:
+    """Set the font sizes of titles and legends, which Matplotlib takes from the global style on creation."""
     legends = [*figure.legends, *(a.get_legend() for a in figure.axes if a.get_legend() is not None)]
     for legend in legends:
         legend.set_frame_on(False)
@@ -62,12 +63,16 @@ def _dress(figure: Any) -> None:
 
 
 def legend_outside(axes: Any, **options: Any) -> Any:
-    """A legend beside the axes, where it covers no data."""
-    style = {"fontsize": 8, "title_fontsize": 8, "frameon": False}  # the style's own hold only while a figure is made
+    """Add a legend to the right of the axes, where it covers no data."""
+    style = {
+        "fontsize": 8,
+        "title_fontsize": 8,
+        "frameon": False,
+    }  # the shared style applies only while the figure is created
     return axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, **{**style, **options})
 
 
 def legend_below(figure: Any, axes: Any, columns: int = 2) -> Any:
-    """One legend under all axes of a figure, for the curves of one of them."""
+    """Add one legend below all axes of a figure, with the curves of one of them."""
     handles, labels = axes.get_legend_handles_labels()
     return figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)

@@ -1,4 +1,4 @@
-"""Where a formula or a number comes from, and how to ask any object for its sources."""
+"""References of formulas and numbers; `cite` collects the references of an object."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from .errors import ParameterError
 
 @dataclasses.dataclass(frozen=True)
 class Reference:
-    """A paper, standard or data source; `note` says what was taken from where, or how far to trust it."""
+    """A paper, standard or data source.
+
+    `where` is the journal, proceedings, report or standard; `note` states what was taken from it, and its reliability.
+    """
 
     key: str
     authors: str
@@ -29,26 +32,29 @@ class Reference:
 
 
 CHOSEN = "chosen"
-"""The source of a number that no paper prints."""
+"""Label of a number that no paper prints."""
 
 
-def _walk(thing: Any) -> Iterator[Reference]:
-    yield from getattr(thing, "references", ())
-    if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
-        for field in dataclasses.fields(thing):
-            yield from _walk(getattr(thing, field.name))
-    elif isinstance(thing, tuple | list):
-        for item in thing:
+def _walk(obj: Any) -> Iterator[Reference]:
+    """Yield the references of an object and of its fields, with repetitions."""
+    yield from getattr(obj, "references", ())
+    if dataclasses.is_dataclass(obj) and not isinstance(obj, type):
+        for field in dataclasses.fields(obj):
+            yield from _walk(getattr(obj, field.name))
+    elif isinstance(obj, tuple | list):
+        for item in obj:
             yield from _walk(item)
 
 
-def cite(thing: Any) -> list[Reference]:
-    """Every source used by `thing`, found by walking its fields, each once, sorted by key.
+def cite(obj: Any) -> list[Reference]:
+    """Return the references of an object and of all its components, without repetitions, sorted by key.
 
-    `thing` is any noun of airmuscle: a law, a muscle, a plant, a fit, a library entry, or a tuple of them. Raises
-    ParameterError for anything else, as a name is.
+    `obj` is any object of airmuscle: a characteristic, a muscle, a plant, a fit, a library entry, or a tuple of them.
+    Raises ParameterError for anything else, such as a name.
     """
-    if not (dataclasses.is_dataclass(thing) or isinstance(thing, tuple | list) or hasattr(thing, "references")):
-        raise ParameterError(f"cite: {thing!r} is no model; load an entry by its name: cite(load('dmsp-20-300')).")
-    found = {reference.key: reference for reference in _walk(thing)}
-    return [found[key] for key in sorted(found)]
+    if not (dataclasses.is_dataclass(obj) or isinstance(obj, tuple | list) or hasattr(obj, "references")):
+        raise ParameterError(
+            f"cite: {obj!r} is not a model; load a library entry by its name: cite(load('dmsp-20-300'))."
+        )
+    by_key = {reference.key: reference for reference in _walk(obj)}
+    return [by_key[key] for key in sorted(by_key)]

@@ -21,12 +21,12 @@ class System(abc.ABC):
     @property
     @abc.abstractmethod
     def states(self) -> tuple[StateVariable, ...]:
-        """The states, in the order of their vector."""
+        """The states, in the order of the state vector."""
 
     @property
     @abc.abstractmethod
     def inputs(self) -> tuple[str, ...]:
-        """The names of the inputs, each linear in time between instants."""
+        """The names of the inputs, each piecewise linear in time."""
 
     @abc.abstractmethod
     def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> Mapping[str, Value]:
@@ -34,7 +34,7 @@ class System(abc.ABC):
 
     @abc.abstractmethod
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> Mapping[str, Value]:
-        """Further quantities of interest at a state."""
+        """Output quantities at a state."""
 
     @property
     def input_variables(self) -> tuple[Input, ...]:
@@ -87,7 +87,7 @@ class System(abc.ABC):
         return ""
 
 
-class Differentiated(System):
+class SensitivitySystem(System):
     """A system that carries another's states, then their derivatives along columns, state by state.
 
     It is a System like any other; its program is generated from the inner one, which costs less than its own rates.
@@ -98,15 +98,15 @@ class Differentiated(System):
 
     @property
     @abc.abstractmethod
-    def places(self) -> tuple[tuple[int, ...], ...]:
+    def parameter_indices(self) -> tuple[tuple[int, ...], ...]:
         """For every column the indices of the inner parameters that vary together."""
 
     @property
     @abc.abstractmethod
     def observed_names(self) -> tuple[str, ...]:
-        """Inner states and outputs that are given as outputs."""
+        """Inner states and outputs that are returned as outputs."""
 
     @property
     @abc.abstractmethod
     def output_names(self) -> tuple[str, ...]:
-        """Values of what is observed, the derivatives of each, their slopes in time."""
+        """Observed values, the derivatives of each, and their time derivatives."""

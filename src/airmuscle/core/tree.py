@@ -22,7 +22,7 @@ _STORED = "_tree_node"
 
 @dataclasses.dataclass(frozen=True)
 class Leaf:
-    """One number inside a model: its dotted path, its value and what is declared about it."""
+    """One number inside a model: its dotted path, its value and its declaration."""
 
     path: str
     value: Any
@@ -71,39 +71,39 @@ class _Identity:
         return id(self.value)
 
 
-def _is_hashable(thing: Any) -> bool:
+def _is_hashable(obj: Any) -> bool:
     try:
-        hash(thing)
+        hash(obj)
     except TypeError:
         return False
     return True
 
 
-def _is_model(thing: Any) -> bool:
-    return dataclasses.is_dataclass(thing) and not isinstance(thing, type)
+def _is_model(obj: Any) -> bool:
+    return dataclasses.is_dataclass(obj) and not isinstance(obj, type)
 
 
-def _node(thing: Any) -> _Node:
+def _node(obj: Any) -> _Node:
     """The node of a model, which is stored with it, or of any other value of a structural field."""
-    if isinstance(thing, tuple):
-        nodes = [_node(item) for item in thing]
+    if isinstance(obj, tuple):
+        nodes = [_node(item) for item in obj]
         return _Node(_intern((tuple, *(n.structure for n in nodes))), tuple(v for n in nodes for v in n.values))
-    if not _is_model(thing):
-        return _Node(_intern((type(thing), thing if _is_hashable(thing) else _Identity(thing))), ())
-    stored = thing.__dict__.get(_STORED)
+    if not _is_model(obj):
+        return _Node(_intern((type(obj), obj if _is_hashable(obj) else _Identity(obj))), ())
+    stored = obj.__dict__.get(_STORED)
     if stored is None:
-        stored = _model_node(thing)
-        thing.__dict__[_STORED] = stored
+        stored = _model_node(obj)
+        obj.__dict__[_STORED] = stored
     node: _Node = stored
     return node
 
 
-def _model_node(thing: Any) -> _Node:
-    declared = {p.name for p in parameters(thing)}
-    parts: list[Any] = [type(thing)]
+def _model_node(obj: Any) -> _Node:
+    declared = {p.name for p in parameters(obj)}
+    parts: list[Any] = [type(obj)]
     values: list[Any] = []
-    for field in dataclasses.fields(thing):
-        value = getattr(thing, field.name)
+    for field in dataclasses.fields(obj):
+        value = getattr(obj, field.name)
         if field.name in declared:
             several = isinstance(value, tuple)
             parts.append((field.name, len(value) if several else 1))
@@ -115,25 +115,25 @@ def _model_node(thing: Any) -> _Node:
     return _Node(_intern(tuple(parts)), tuple(values))
 
 
-def structure(thing: Any) -> Structure:
-    """The structure of a model; two models of equal structure have the same object, which is a fast key."""
-    return _node(thing).structure
+def structure(obj: Any) -> Structure:
+    """Return the structure of a model; models of equal structure share one object, which is a fast key."""
+    return _node(obj).structure
 
 
-def flatten(thing: Any) -> Array:
-    """The values of all leaves as one vector, in the order of `leaves`."""
-    return np.array(_node(thing).values, dtype=np.float64)
+def flatten(obj: Any) -> Array:
+    """Return the values of all leaves as one vector, in the order of `leaves`."""
+    return np.array(_node(obj).values, dtype=np.float64)
 
 
-def leaves(thing: Any, path: str = "") -> Iterator[Leaf]:
-    """Every declared number of a model and of the models inside it, in a fixed order."""
-    if isinstance(thing, tuple):
-        for i, item in enumerate(thing):
+def leaves(obj: Any, path: str = "") -> Iterator[Leaf]:
+    """Yield every declared number of a model and of the models inside it, in a fixed order."""
+    if isinstance(obj, tuple):
+        for i, item in enumerate(obj):
             yield from leaves(item, f"{path}[{i}]")
-    elif _is_model(thing):
-        declared = {p.name: p for p in parameters(thing)}
-        for field in dataclasses.fields(thing):
-            value = getattr(thing, field.name)
+    elif _is_model(obj):
+        declared = {p.name: p for p in parameters(obj)}
+        for field in dataclasses.fields(obj):
+            value = getattr(obj, field.name)
             inner = f"{path}.{field.name}" if path else field.name
             if field.name not in declared:
                 yield from leaves(value, inner)
@@ -143,43 +143,42 @@ def leaves(thing: Any, path: str = "") -> Iterator[Leaf]:
                 yield Leaf(inner, value, declared[field.name])
 
 
-def unflatten(thing: T, values: Sequence[Any]) -> T:
-    """The same model with other leaf values, in the order of `leaves`; symbols are put in unchecked."""
-    feed = iter(values)
-    rebuilt: T = _unflatten(thing, feed)
+def unflatten(obj: T, values: Sequence[Any]) -> T:
+    """Return the model with other leaf values, in the order of `leaves`; values, such as symbols, are not validated."""
+    rebuilt: T = _unflatten(obj, iter(values))
     return rebuilt
 
 
-def _unflatten(thing: Any, feed: Iterator[Any]) -> Any:
-    if isinstance(thing, tuple):
-        return tuple(_unflatten(item, feed) for item in thing)
-    if not _is_model(thing):
-        return thing
-    declared = {p.name for p in parameters(thing)}
-    new = object.__new__(type(thing))
-    for field in dataclasses.fields(thing):
-        value = getattr(thing, field.name)
+def _unflatten(obj: Any, values: Iterator[Any]) -> Any:
+    if isinstance(obj, tuple):
+        return tuple(_unflatten(item, values) for item in obj)
+    if not _is_model(obj):
+        return obj
+    declared = {p.name for p in parameters(obj)}
+    new = object.__new__(type(obj))
+    for field in dataclasses.fields(obj):
+        value = getattr(obj, field.name)
         if field.name not in declared:
-            value = _unflatten(value, feed)
+            value = _unflatten(value, values)
         elif isinstance(value, tuple):
-            value = tuple(next(feed) for _ in value)
+            value = tuple(next(values) for _ in value)
         else:
-            value = next(feed)
+            value = next(values)
         object.__setattr__(new, field.name, value)
     return new
 
 
-def with_parameters(thing: T, values: Sequence[float]) -> T:
-    """The same model with other leaf values, validated like a new object."""
-    checked: T = _revalidated(unflatten(thing, [float(v) for v in values]))
+def with_parameters(obj: T, values: Sequence[float]) -> T:
+    """Return the model with other leaf values, validated like a new object. Raises ParameterError."""
+    checked: T = _revalidate(unflatten(obj, [float(v) for v in values]))
     return checked
 
 
-def _revalidated(thing: Any) -> Any:
-    if isinstance(thing, tuple):
-        return tuple(_revalidated(item) for item in thing)
-    if _is_model(thing):
+def _revalidate(obj: Any) -> Any:
+    if isinstance(obj, tuple):
+        return tuple(_revalidate(item) for item in obj)
+    if _is_model(obj):
         return dataclasses.replace(
-            thing, **{f.name: _revalidated(getattr(thing, f.name)) for f in dataclasses.fields(thing) if f.init}
+            obj, **{f.name: _revalidate(getattr(obj, f.name)) for f in dataclasses.fields(obj) if f.init}
         )
-    return thing
+    return obj

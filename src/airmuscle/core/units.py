@@ -1,7 +1,8 @@
-"""Units at the border: everything inside is SI, pressure is gauge, contraction is a ratio.
+"""Unit conversion of inputs to SI; pressure is gauge, contraction is a ratio.
 
-`from airmuscle.units import bar, mm` gives factors, so that `6 * bar` is 600 000 Pa. Text such as `"300 mm"`,
-`"psia"` or `"kPa(a)"` is read here; gauge or absolute is part of a pressure's unit, and a plain `bar` is gauge.
+`from airmuscle.units import bar, mm` imports unit factors, so that `6 * bar` is 600 000 Pa. Text with a unit, such as
+`"300 mm"`, is parsed here. Gauge or absolute is part of the unit of a pressure: `"psia"` and `"kPa(a)"` are absolute,
+a plain `"bar"` is gauge.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from typing import Any
 from .errors import UnitError
 
 AMBIENT_PRESSURE = 101_325.0
-"""Standard atmosphere [Pa], what an absolute pressure is reduced by unless an ambient pressure is given."""
+"""Standard atmosphere [Pa], subtracted from an absolute pressure unless another ambient pressure is given."""
 
 ABSOLUTE = "Pa(a)"
-"""The declared unit of a pressure that is absolute by its meaning: of the ambient air, say."""
+"""Declared unit of a pressure that is absolute by definition, such as the ambient pressure."""
 
 m = N = Pa = s = kg = K = rad = J = W = 1.0
 mm, cm, km = 1e-3, 1e-2, 1e3
@@ -40,7 +41,7 @@ _FACTORS: dict[str, tuple[float, str]] = {
     "cm3": (1e-6, "m3"), "cm^3": (1e-6, "m3"), "N/bar": (1e-5, "N/Pa"), "MPa/m": (1e6, "Pa/m"),
     "GPa/m^2": (1e9, "Pa/m^2"), "MPa/m^3": (1e6, "Pa/m^3"),
 }  # fmt: skip
-"""Units that occur often; a test holds them equal to pint's, whose registry costs a command 0.4 s."""
+"""Factors of common units, tested against pint, whose registry takes 0.4 s to load."""
 
 _GAUGE_OR_ABSOLUTE = re.compile(
     r"^(?P<unit>(?:Pa|hPa|kPa|MPa|bar|mbar|psi|atm|torr))\s*[_ ]?\(?\s*(?P<kind>g|a|gauge|abs|absolute)\s*\)?$",
@@ -51,7 +52,10 @@ _SPELLING = {"pa": "Pa", "hpa": "hPa", "kpa": "kPa", "mpa": "MPa"}
 
 @dataclasses.dataclass(frozen=True)
 class UnitConversion:
-    """How a column or number in some unit becomes SI: `value * factor + offset`."""
+    """Conversion to SI: `value * factor + offset`.
+
+    `assumed_gauge` is true for a pressure whose unit does not state gauge or absolute.
+    """
 
     factor: float
     offset: float = 0.0
@@ -68,62 +72,71 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
-def _pint_text(unit: str) -> str:
-    """Our spelling of a unit in pint's grammar: `m3/(s Pa)` is `m**3/(s*Pa)`."""
+def _to_pint_syntax(unit: str) -> str:
+    """Return a unit in the syntax of pint: `m3/(s Pa)` becomes `m**3/(s*Pa)`."""
     powers = re.sub(r"([A-Za-z])\^?(\d)", r"\1**\2", unit.replace("³", "3").replace("²", "2"))
     return re.sub(r"(?<=[\w)])\s+(?=[\w(])", "*", powers).replace("%", "percent").replace("°C", "degC")
 
 
-_TOWER = re.compile(r"(\*\*|\^)[\s\d()+-]*(\*\*|\^)|(\*\*|\^)\s*\(?\s*[-+]?\s*\d{2}")
-"""Powers of powers and powers of ten or more: no unit has them, and working them out may never end."""
+_LARGE_EXPONENT = re.compile(r"(\*\*|\^)[\s\d()+-]*(\*\*|\^)|(\*\*|\^)\s*\(?\s*[-+]?\s*\d{2}")
+"""Nested exponents and exponents of ten or more: no unit has them, and their evaluation may not terminate."""
 
 
-def _by_pint(unit: str, target: str, where: str) -> UnitConversion:
+def _convert_with_pint(unit: str, target: str, where: str) -> UnitConversion:
+    """Return the conversion found by pint. Raises UnitError."""
     import pint
 
     try:
-        if _TOWER.search(unit):
+        if _LARGE_EXPONENT.search(unit):
             raise ValueError(unit)
         registry = _registry()
-        zero, one = (registry.Quantity(v, _pint_text(unit)).to(_pint_text(target)).magnitude for v in (0.0, 1.0))
+        zero, one = (
+            registry.Quantity(v, _to_pint_syntax(unit)).to(_to_pint_syntax(target)).magnitude for v in (0.0, 1.0)
+        )
     except pint.DimensionalityError:
-        raise UnitError(f"{where}unit '{unit}' cannot become {_kind(target)}: it measures something else.") from None
-    except Exception:  # pint and tokenize raise many kinds on text that is no unit
         raise UnitError(
-            f"{where}'{unit}' is no unit known here. Write it like 'mm', 'kPa', 'bara', 'N', '%' or 'm3/(s Pa)'."
+            f"{where}unit '{unit}' cannot be converted to {_describe_target(target)}: it measures another quantity."
+        ) from None
+    except Exception:  # pint and tokenize raise many exception types on text that is not a unit
+        raise UnitError(
+            f"{where}'{unit}' is not a known unit. Write it like 'mm', 'kPa', 'bara', 'N', '%' or 'm3/(s Pa)'."
         ) from None
     return UnitConversion(float(one - zero), float(zero))
 
 
-def _kind(target: str) -> str:
+def _describe_target(target: str) -> str:
+    """Return the target unit as it appears in a message."""
     return "a ratio" if target in ("1", "dimensionless") else f"'{target}'"
 
 
 def conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, where: str = "") -> UnitConversion:
-    """How values in `unit` become `target` (an SI unit; pressures become gauge).
+    """Return the conversion from `unit` to `target`, an SI unit; pressures become gauge pressures.
 
-    `where` opens the message of the UnitError raised for a unit that is unknown or measures something else.
+    `ambient` is the absolute ambient pressure [Pa] subtracted from absolute pressures; `where` is the prefix of error
+    messages. Raises UnitError for a unit that is unknown or of another dimension.
     """
     if target == ABSOLUTE:
-        if (found := _GAUGE_OR_ABSOLUTE.match(unit.strip())) and found["kind"].lower().startswith("g"):
+        if (match := _GAUGE_OR_ABSOLUTE.match(unit.strip())) and match["kind"].lower().startswith("g"):
             raise UnitError(f"{where}: unit '{unit}' is gauge, but this pressure is absolute; write kPa(a) or bara.")
         return dataclasses.replace(conversion(unit, "Pa", ambient=0.0, where=where), assumed_gauge=False)
     unit, where = unit.strip(), f"{where}: " if where else ""
     if unit == target and target != "Pa":
         return UnitConversion(1.0)
-    found = _GAUGE_OR_ABSOLUTE.match(unit)
-    if found:
+    match = _GAUGE_OR_ABSOLUTE.match(unit)
+    if match:
         if target != "Pa":
             raise UnitError(f"{where}unit '{unit}' is a pressure; a quantity in '{target}' was expected.")
-        bare = _SPELLING.get(found["unit"].lower(), found["unit"].lower())
-        absolute = found["kind"].lower().startswith("a")
+        bare = _SPELLING.get(match["unit"].lower(), match["unit"].lower())
+        absolute = match["kind"].lower().startswith("a")
         return UnitConversion(conversion(bare, "Pa").factor, -ambient if absolute else 0.0)
-    if unit in _FACTORS and {_FACTORS[unit][1], target} == {"1", "rad"}:  # pint takes an angle for a ratio
-        raise UnitError(f"{where}unit '{unit}' cannot become {_kind(target)}: it measures something else.")
+    if unit in _FACTORS and {_FACTORS[unit][1], target} == {"1", "rad"}:  # pint treats an angle as a ratio
+        raise UnitError(
+            f"{where}unit '{unit}' cannot be converted to {_describe_target(target)}: it measures another quantity."
+        )
     if unit in _FACTORS and _FACTORS[unit][1] == target:
         factor = _FACTORS[unit][0]
         return UnitConversion(factor, assumed_gauge=target == "Pa")
-    found_by_pint = _by_pint(unit or "dimensionless", "dimensionless" if target == "1" else target, where)
+    found_by_pint = _convert_with_pint(unit or "dimensionless", "dimensionless" if target == "1" else target, where)
     return dataclasses.replace(found_by_pint, assumed_gauge=target == "Pa")
 
 
@@ -131,37 +144,40 @@ _NUMBER = re.compile(r"^\s*(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)
 
 
 def quantity(value: float | str, target: str, *, ambient: float = AMBIENT_PRESSURE, where: str = "") -> float:
-    """A number in SI from `0.3` (already in `target`) or from text with its unit, `"300 mm"`.
+    """Return a number in SI from `0.3` (already in `target`) or from a text with a unit, `"300 mm"`.
 
-    Raises UnitError where the text holds no number, or its unit is unknown or of the wrong kind.
+    `ambient` and `where` as for `conversion`. Raises UnitError if the text contains no number, or if its unit is
+    unknown or of the wrong dimension.
     """
     prefix = f"{where}: " if where else ""
     if isinstance(value, float | int) and not isinstance(value, bool):
         with contextlib.suppress(OverflowError):
             return float(value)
         raise UnitError(f"{prefix}the number is too large.")
-    found = _NUMBER.match(value) if isinstance(value, str) else None
-    if not isinstance(value, str) or not found:
+    match = _NUMBER.match(value) if isinstance(value, str) else None
+    if not isinstance(value, str) or not match:
         raise UnitError(f"{prefix}{value!r} is not a number with a unit; write it like '6 bar' or '300 mm'.")
-    if re.match(r",\s*\d", found["unit"]):
-        pointed = value.replace(",", ".", 1)
-        raise UnitError(f"{prefix}'{value}' holds a comma; write the decimal sign as a point, '{pointed}'.")
-    if not found["unit"] and target != "1":
-        raise UnitError(f"{prefix}'{value}' carries no unit; write it like '{found['number']} {target}'.")
-    number = float(found["number"])
+    if re.match(r",\s*\d", match["unit"]):
+        corrected = value.replace(",", ".", 1)
+        raise UnitError(f"{prefix}'{value}' contains a comma; write a decimal point, '{corrected}'.")
+    if not match["unit"] and target != "1":
+        raise UnitError(f"{prefix}'{value}' has no unit; write it like '{match['number']} {target}'.")
+    number = float(match["number"])
     if not math.isfinite(number):
-        raise UnitError(f"{prefix}'{value}' is too large for a number.")
+        raise UnitError(f"{prefix}'{value}' is too large.")
     try:
-        return float(conversion(found["unit"], target, ambient=ambient, where=where)(number))
-    except UnitError as reason:
-        raise UnitError(f"{reason}{_nearest(found['unit'], target)}") from None
+        return float(conversion(match["unit"], target, ambient=ambient, where=where)(number))
+    except UnitError as error:
+        raise UnitError(f"{error}{_suggest_unit(match['unit'], target)}") from None
 
 
-def _nearest(unit: str, target: str) -> str:
-    """A closing sentence: the unit of the right kind whose spelling is nearest, in whatever case."""
+def _suggest_unit(unit: str, target: str) -> str:
+    """Return a sentence that suggests the closest unit of the right dimension, ignoring case, or an empty string."""
     pressures = ("bara", "barg", "psia", "psig") if target in ("Pa", ABSOLUTE) else ()
-    kind = "Pa" if target == ABSOLUTE else target
-    known = (*(name for name, (_, of) in _FACTORS.items() if of == kind and name), *pressures)
-    cases = {name.lower(): name for name in known}
-    near = difflib.get_close_matches(unit.lower(), cases, n=1)
-    return f" Did you mean '{cases[near[0]]}'?" if near and cases[near[0]] != unit and unit not in _FACTORS else ""
+    si_unit = "Pa" if target == ABSOLUTE else target
+    known = (*(name for name, (_, base) in _FACTORS.items() if base == si_unit and name), *pressures)
+    by_lower_case = {name.lower(): name for name in known}
+    matches = difflib.get_close_matches(unit.lower(), by_lower_case, n=1)
+    if not matches or unit in _FACTORS or by_lower_case[matches[0]] == unit:
+        return ""
+    return f" Did you mean '{by_lower_case[matches[0]]}'?"

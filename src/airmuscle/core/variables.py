@@ -1,4 +1,4 @@
-"""What a component brings into a plant: states that are integrated, and inputs that are commanded."""
+"""Declarations of states and inputs of plant components."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ T = TypeVar("T", "StateVariable", "Input")
 
 @dataclasses.dataclass(frozen=True)
 class StateVariable:
-    """One state: its name, its unit, and the size below which its relative error no longer matters."""
+    """A state: its name, its unit, and the nominal size below which its relative error does not matter."""
 
     name: str
     unit: str
@@ -21,25 +21,25 @@ class StateVariable:
 
 @dataclasses.dataclass(frozen=True)
 class Input:
-    """One input: its name, its unit, and the least and greatest value that may be commanded."""
+    """An input: its name, its unit, and the minimum and maximum command."""
 
     name: str
     unit: str = "1"
     minimum: float = 0.0
     maximum: float = 1.0
-    meaning: str = "opening, 0 shut to 1 open"
+    meaning: str = "opening, 0 closed to 1 open"
 
 
 def add_prefix(prefix: str, variables: tuple[T, ...]) -> tuple[T, ...]:
-    """The same variables, each with a prefix before its name."""
+    """Return the variables with a prefix before each name."""
     return tuple(dataclasses.replace(variable, name=f"{prefix}{variable.name}") for variable in variables)
 
 
 def select_prefix(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
-    """The values whose name begins with the prefix, by the rest of their names."""
+    """Return the values whose names begin with the prefix, keyed by the remaining names."""
     return {name.removeprefix(prefix): value for name, value in values.items() if name.startswith(prefix)}
 
 
 def with_prefix(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
-    """The values with a prefix before every name."""
+    """Return the values with a prefix before each name."""
     return {f"{prefix}{name}": value for name, value in values.items()}

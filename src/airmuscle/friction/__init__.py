@@ -1,4 +1,4 @@
-"""Force with memory, against the motion of a muscle."""
+"""Friction: hysteresis models of the force that opposes the motion of a muscle."""
 
 from .base import Friction, NoFriction
 from .bouc_wen import BoucWen

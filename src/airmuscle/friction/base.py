@@ -1,4 +1,4 @@
-"""What a friction law is: bristles that a motion bends, and the force with which they hold it back."""
+"""Friction (interface): hysteresis models with internal bristle states."""
 
 from __future__ import annotations
 
@@ -13,53 +13,53 @@ from ..core.variables import StateVariable
 
 
 class Friction(abc.ABC):
-    """A force against the motion that depends on the path which led here.
+    """Friction force that depends on the history of the displacement.
 
-    Bristles are mappings by the names of `states`; `speed` [m/s] and force [N] are positive in the direction in
-    which the muscle shortens, and the force counts against its tension. No law asks for the sign of the speed, so
-    that the rates are continuous and a plant stays easy to integrate.
+    Bristle deflections are mappings keyed by the names of `states`. `speed` [m/s] and force [N] are positive in the
+    direction of shortening, and the force is subtracted from the tension of the muscle. No model uses the sign of the
+    speed, so that the rates are continuous and can be integrated with large steps.
     """
 
     references: ClassVar[tuple[Reference, ...]] = ()
     rate_independent: ClassVar[bool] = True
-    """Whether the force depends on the path alone, however fast it was run through."""
+    """Whether the force depends on the path only, not on the speed."""
     linear_in: ClassVar[str | None] = None
-    """The field in which the force of `replay` is linear, if there is one: a fit then needs no search."""
+    """The field in which the force of `force_along` is linear, or None; a fit solves for it by linear least squares."""
 
     @property
     @abc.abstractmethod
     def states(self) -> tuple[StateVariable, ...]:
-        """The bristles; all are 0 in a muscle that has never moved."""
+        """The bristle deflections; all are zero in the relaxed state."""
 
     @abc.abstractmethod
     def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
-        """The time derivative of every bristle."""
+        """Time derivative of every bristle deflection at a speed [m/s]."""
 
     @abc.abstractmethod
     def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
-        """Force against the motion [N]."""
+        """Friction force [N] at a speed [m/s]."""
 
     @abc.abstractmethod
     def force_along(self, displacement: Any, time: Any = None) -> Any:
-        """Force [N] along a path [m] that starts with relaxed bristles; NumPy arrays of shape (N,).
+        """Force [N] along a displacement path [m] that starts with relaxed bristles; NumPy arrays of shape (N,).
 
-        The motion is taken as straight from one row to the next: turning points must be rows. `time` [s] matters to
-        laws that depend on speed; without it the motion is slow.
+        The motion is assumed linear between rows, so that every turning point must be a row. `time` [s] is used by
+        rate-dependent models; without it the motion is quasi-static.
         """
 
     @property
     @abc.abstractmethod
     def presliding_distance(self) -> float:
-        """Displacement from rest within which the force builds up [m], for figures and nominal sizes."""
+        """Characteristic displacement of presliding [m], used for plots and nominal sizes."""
 
-    def relaxed(self) -> dict[str, Value]:
-        """The bristles of a muscle that has never moved."""
+    def initial_state(self) -> dict[str, Value]:
+        """Bristle deflections of the relaxed state, all zero."""
         return {state.name: 0.0 for state in self.states}
 
 
 @model
 class NoFriction(Friction):
-    """F = 0: a muscle without hysteresis."""
+    """No friction: F = 0."""
 
     @property
     def states(self) -> tuple[StateVariable, ...]:

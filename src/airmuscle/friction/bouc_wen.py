@@ -1,4 +1,4 @@
-"""The Bouc-Wen hysteresis, in its normalised form."""
+"""Bouc-Wen hysteresis model in normalised form."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
 from .base import Friction
-from .path import autonomous
+from .path import relative_deflection
 
 BOUC1967 = Reference(
     key="bouc-1967",
@@ -37,25 +37,25 @@ ISMAIL2009 = Reference(
     doi="10.1007/s11831-009-9031-8",
     note="normalised form, and the bounds sigma >= 1/2, n >= 1 within which it cannot create energy",
 )
-LEAST = 1e-12
-"""Below this |w| counts as this, so that a power of it has a derivative at 0 (chosen)."""
+MIN_RELATIVE_DEFLECTION = 1e-12
+"""Lower bound of |w|, so that its powers are differentiable at zero (chosen)."""
 
 
 @model
 class BoucWen(Friction):
-    """dz/dt = v - sigma |v| |w|^(n-1) w + (sigma - 1) v |w|^n,  w = k z/F_C,  F = F_C w = k z.
+    """Bouc-Wen model: dz/dt = v - sigma |v| |w|^(n-1) w + (sigma - 1) v |w|^n,  w = k z/F_C,  F = F_C w = k z.
 
-    z deflection [m], w the same as a share of its limit, k stiffness from rest, F_C the force it tends to, n sharpness
-    of the transition, sigma shape of unloading. The usual A, beta, gamma overdetermine the loop; this is the
-    normalised form, rho = k/F_C. The elastic part of Bouc and Wen is the muscle's parallel spring. n = sigma = 1 is
-    Dahl's law; n to infinity is a single slipping element. Rate independent; inner loops drift as Dahl's do.
-    Reference: Bouc (1967), Wen (1976); normalised form Ismail, Ikhouane and Rodellar (2009).
+    z: deflection [m]; w: deflection relative to its limit [1]; k: initial stiffness; F_C: limit of the force;
+    n: sharpness of the transition; sigma: shape of unloading. The usual parameters A, beta, gamma are redundant; this
+    is the normalised form, rho = k/F_C. The elastic part of the Bouc-Wen model is the parallel spring of the muscle.
+    n = sigma = 1 gives the Dahl model; n to infinity gives a single slip element. Rate-independent; inner loops drift,
+    as in the Dahl model. Reference: Bouc (1967), Wen (1976); normalised form: Ismail, Ikhouane and Rodellar (2009).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (BOUC1967, WEN1976, ISMAIL2009)
 
-    stiffness: float = parameter("N/m", "k", "stiffness from rest", bounds=(1e-3, 1e9))
-    coulomb_force: float = parameter("N", "F_C", "friction force in sliding", bounds=(1e-6, 1e5))
+    stiffness: float = parameter("N/m", "k", "initial stiffness", bounds=(1e-3, 1e9))
+    coulomb_force: float = parameter("N", "F_C", "friction force in steady sliding", bounds=(1e-6, 1e5))
     sharpness: float = parameter("1", "n", "sharpness of the transition to sliding", bounds=(1.0, 20.0), default=1.0)
     unloading: float = parameter("1", "sigma", "shape of unloading", bounds=(0.5, 20.0), default=0.5)
 
@@ -67,17 +67,18 @@ class BoucWen(Friction):
     def presliding_distance(self) -> float:
         return self.coulomb_force / self.stiffness
 
-    def _bending(self, share: Value, speed: Value) -> Value:
-        size = ops.maximum(ops.absolute_value(share), LEAST) ** (self.sharpness - 1.0)
-        opposed = self.unloading * ops.absolute_value(speed) * share
-        along = (self.unloading - 1.0) * speed * ops.absolute_value(share)
-        return speed + size * (along - opposed)
+    def _deflection_rate(self, ratio: Value, speed: Value) -> Value:
+        """dz/dt [m/s] at the relative deflection w = `ratio`."""
+        power = ops.maximum(ops.absolute_value(ratio), MIN_RELATIVE_DEFLECTION) ** (self.sharpness - 1.0)
+        dissipative = self.unloading * ops.absolute_value(speed) * ratio
+        directional = (self.unloading - 1.0) * speed * ops.absolute_value(ratio)
+        return speed + power * (directional - dissipative)
 
     def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
-        return {"bristle": self._bending(bristles["bristle"] * self.stiffness / self.coulomb_force, speed)}
+        return {"bristle": self._deflection_rate(bristles["bristle"] * self.stiffness / self.coulomb_force, speed)}
 
     def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
         return self.stiffness * bristles["bristle"]
 
     def force_along(self, displacement: Any, time: Any = None) -> Any:
-        return self.coulomb_force * autonomous(self._bending, displacement, self.presliding_distance)
+        return self.coulomb_force * relative_deflection(self._deflection_rate, displacement, self.presliding_distance)

@@ -1,4 +1,4 @@
-"""Dahl's friction: one bristle that yields gradually."""
+"""Dahl friction model: one bristle with gradual sliding."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ DAHL1968 = Reference(
 
 @model
 class Dahl(Friction):
-    """dz/dt = v - sigma_0 |v| z/F_C,  F = sigma_0 z.
+    """Dahl model: dz/dt = v - sigma_0 |v| z/F_C,  F = sigma_0 z.
 
-    z deflection of the bristle [m], v speed, sigma_0 its stiffness, F_C the force that it tends to in sliding. From
-    rest, F = F_C (1 - exp(-sigma_0 x/F_C)). Rate independent; small inner loops do not close, they drift.
-    Reference: Dahl (1968), with the exponent 1.
+    z: deflection of the bristle [m]; v: speed [m/s]; sigma_0: stiffness of the bristle; F_C: Coulomb force. From the
+    relaxed state, F = F_C (1 - exp(-sigma_0 x/F_C)). Rate-independent; small inner loops do not close but drift.
+    Reference: Dahl (1968), with exponent 1.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (DAHL1968,)
 
     stiffness: float = parameter("N/m", "sigma_0", "stiffness of the bristle", bounds=(1e-3, 1e9))
-    coulomb_force: float = parameter("N", "F_C", "friction force in sliding", bounds=(1e-6, 1e5))
+    coulomb_force: float = parameter("N", "F_C", "friction force in steady sliding", bounds=(1e-6, 1e5))
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
@@ -46,8 +46,8 @@ class Dahl(Friction):
         return self.coulomb_force / self.stiffness
 
     def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
-        bent = self.stiffness * bristles["bristle"] / self.coulomb_force
-        return {"bristle": speed - ops.absolute_value(speed) * bent}
+        ratio = self.stiffness * bristles["bristle"] / self.coulomb_force
+        return {"bristle": speed - ops.absolute_value(speed) * ratio}
 
     def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
         return self.stiffness * bristles["bristle"]

@@ -1,4 +1,4 @@
-"""The LuGre friction: a bristle whose sliding force falls with speed, and viscous friction beside it."""
+"""LuGre friction model: bristle with the Stribeck effect, and viscous friction."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
 from .base import Friction
-from .path import deflection, speeds
+from .path import compute_speed, deflection
 
 CANUDAS_DE_WIT1995 = Reference(
     key="canudas-de-wit-1995",
-    authors="Canudas de Wit, C., Olsson, H., Astrom, K. J., Lischinsky, P.",
+    authors="Canudas de Wit, C., Olsson, H., Åström, K. J., Lischinsky, P.",
     title="A new model for control of systems with friction",
     where="IEEE Transactions on Automatic Control 40(3), 419-425",
     year=1995,
@@ -26,14 +26,14 @@ CANUDAS_DE_WIT1995 = Reference(
 
 @model
 class LuGre(Friction):
-    """dz/dt = v - sigma_0 |v| z/g(v),  F = sigma_0 z + sigma_1 dz/dt + sigma_2 v.
+    """LuGre model: dz/dt = v - sigma_0 |v| z/g(v),  F = sigma_0 z + sigma_1 dz/dt + sigma_2 v.
 
     g(v) = F_C + (F_S - F_C) exp(-(v/v_S)^2).
 
-    z mean deflection of the bristles [m], v speed, g(v) force of steady sliding (Stribeck's curve), F_C Coulomb's
-    force, F_S the force at break-away, v_S Stribeck's speed, sigma_1 and sigma_2 damping of the bristles and of the
-    sliding. Steady sliding gives F = g(v) sgn v + sigma_2 v. From speed to force it is passive if
-    sigma_2 > sigma_1 (F_S - F_C)/F_C. In the limit of slow motion it is Dahl's law with F_S.
+    z: mean deflection of the bristles [m]; v: speed [m/s]; g(v): force in steady sliding (Stribeck curve); F_C: Coulomb
+    force; F_S: static friction force; v_S: Stribeck speed; sigma_1, sigma_2: damping of the bristles and viscous
+    damping. Steady sliding gives F = g(v) sgn v + sigma_2 v. The map from speed to force is passive if
+    sigma_2 > sigma_1 (F_S - F_C)/F_C. For quasi-static motion the model reduces to the Dahl model with F_S.
     Reference: Canudas de Wit et al. (1995).
     """
 
@@ -41,15 +41,13 @@ class LuGre(Friction):
     rate_independent: ClassVar[bool] = False
 
     stiffness: float = parameter("N/m", "sigma_0", "stiffness of the bristles", bounds=(1e-3, 1e9))
-    coulomb_force: float = parameter("N", "F_C", "friction force in fast sliding", bounds=(1e-6, 1e5))
+    coulomb_force: float = parameter("N", "F_C", "Coulomb force: friction force in fast sliding", bounds=(1e-6, 1e5))
     stribeck_force: float = parameter(
-        "N", "F_S - F_C", "how much more the slowest sliding takes", bounds=(0.0, 1e5), default=0.0
+        "N", "F_S - F_C", "static friction force minus Coulomb force", bounds=(0.0, 1e5), default=0.0
     )
-    stribeck_speed: float = parameter(
-        "m/s", "v_S", "speed over which the sliding force falls", bounds=(1e-6, 100.0), default=0.01
-    )
+    stribeck_speed: float = parameter("m/s", "v_S", "Stribeck speed", bounds=(1e-6, 100.0), default=0.01)
     bristle_damping: float = parameter("N s/m", "sigma_1", "damping of the bristles", bounds=(0.0, 1e6), default=0.0)
-    damping: float = parameter("N s/m", "sigma_2", "viscous damping in sliding", bounds=(0.0, 1e6), default=0.0)
+    damping: float = parameter("N s/m", "sigma_2", "viscous damping", bounds=(0.0, 1e6), default=0.0)
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
@@ -60,20 +58,20 @@ class LuGre(Friction):
         return (self.coulomb_force + self.stribeck_force) / self.stiffness
 
     def sliding_force(self, speed: Value) -> Value:
-        """g(v), the size of the bristles' force in steady sliding [N]."""
+        """Magnitude g(v) of the bristle force in steady sliding [N]."""
         return self.coulomb_force + self.stribeck_force * ops.exp(-((speed / self.stribeck_speed) ** 2))
 
     def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
-        bent = self.stiffness * bristles["bristle"] / self.sliding_force(speed)
-        return {"bristle": speed - ops.absolute_value(speed) * bent}
+        ratio = self.stiffness * bristles["bristle"] / self.sliding_force(speed)
+        return {"bristle": speed - ops.absolute_value(speed) * ratio}
 
     def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
-        bending = self.rates(bristles, speed)["bristle"]
-        return self.stiffness * bristles["bristle"] + self.bristle_damping * bending + self.damping * speed
+        rate = self.rates(bristles, speed)["bristle"]
+        return self.stiffness * bristles["bristle"] + self.bristle_damping * rate + self.damping * speed
 
     def force_along(self, displacement: Any, time: Any = None) -> Any:
         if time is None:
             return self.stiffness * deflection(displacement, self.presliding_distance)
-        speed = speeds(displacement, time)
-        bend = deflection(displacement, self.sliding_force(speed) / self.stiffness)
-        return self.force({"bristle": bend}, speed)
+        speed = compute_speed(displacement, time)
+        bristle = deflection(displacement, self.sliding_force(speed) / self.stiffness)
+        return self.force({"bristle": bristle}, speed)

@@ -1,4 +1,4 @@
-"""Maxwell slip: springs in parallel, each of which slides once it is bent to its limit."""
+"""Maxwell-slip friction model: parallel springs, each sliding at its deflection limit."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
 from .base import Friction
-from .path import stops
+from .path import stop_operators
 
 IWAN1966 = Reference(
     key="iwan-1966",
@@ -21,7 +21,7 @@ IWAN1966 = Reference(
     where="Journal of Applied Mechanics 33(4), 893-900",
     year=1966,
     doi="10.1115/1.3625199",
-    note="springs with Coulomb sliders, in parallel",
+    note="parallel spring elements with Coulomb sliders",
 )
 GOLDFARB_CELANOVIC1997 = Reference(
     key="goldfarb-celanovic-1997",
@@ -30,7 +30,7 @@ GOLDFARB_CELANOVIC1997 = Reference(
     where="IEEE Control Systems Magazine 17(3), 69-79",
     year=1997,
     doi="10.1109/37.588158",
-    note="the same elements for the hysteresis of an actuator",
+    note="the same elements for the hysteresis of a piezoelectric actuator",
 )
 VO_MINH2011 = Reference(
     key="vo-minh-2011",
@@ -39,40 +39,41 @@ VO_MINH2011 = Reference(
     where="IEEE/ASME Transactions on Mechatronics 16(1), 177-186",
     year=2011,
     doi="10.1109/TMECH.2009.2038373",
-    note="the same elements for the hysteresis of a pneumatic artificial muscle; its numbers were not taken",
+    note="the same elements for the hysteresis of a pneumatic artificial muscle; its parameter values are not used",
 )
 
 
-def yielding(bend: Value, limit: Value, transition: Value, speed: Value) -> Value:
-    """The rate [m/s] of a bristle that slides at its limit [m], with a continuous start of sliding.
+def element_rate(deflection: Value, limit: Value, transition: Value, speed: Value) -> Value:
+    """Deflection rate [m/s] of an element that slides at its limit [m], with a continuous onset of sliding.
 
-    d(delta)/dt = v (1 - s),  s = (|delta|/Delta - 1 + eta)/eta within 0..1 where v bends it further, else 0.
+    d(delta)/dt = v (1 - s),  s = (|delta|/Delta - 1 + eta)/eta limited to 0..1 if v increases |delta|, else s = 0.
     """
-    onward = (bend / limit - 1.0 + transition) / transition
-    backward = (-bend / limit - 1.0 + transition) / transition
-    sliding = ops.maximum(speed, 0.0) * ops.clip(onward, 0.0, 1.0)
-    sliding_back = ops.minimum(speed, 0.0) * ops.clip(backward, 0.0, 1.0)
-    return speed - sliding - sliding_back
+    forward = (deflection / limit - 1.0 + transition) / transition
+    backward = (-deflection / limit - 1.0 + transition) / transition
+    sliding_forward = ops.maximum(speed, 0.0) * ops.clip(forward, 0.0, 1.0)
+    sliding_backward = ops.minimum(speed, 0.0) * ops.clip(backward, 0.0, 1.0)
+    return speed - sliding_forward - sliding_backward
 
 
 def check_equal_lengths(owner: str, stiffnesses: Sequence[Value], limits: Sequence[Value]) -> None:
-    """Raise ParameterError unless every element has a stiffness and a limit, one element at least."""
+    """Raise ParameterError unless every element has a stiffness and a limit, and there is at least one element."""
     if len(stiffnesses) != len(limits) or not limits:
         raise ParameterError(
-            f"{owner}: {len(stiffnesses)} stiffnesses and {len(limits)} limits; give one of each for every element."
+            f"{owner}: {len(stiffnesses)} stiffnesses and {len(limits)} limits; give one stiffness and one limit per "
+            "element."
         )
 
 
 @model
 class MaxwellSlip(Friction):
-    """F = Sum k_i delta_i,  d(delta_i)/dt = v, but 0 where |delta_i| = Delta_i and v would bend it further.
+    """Maxwell-slip model: F = Sum k_i delta_i,  d(delta_i)/dt = v, but 0 if |delta_i| = Delta_i and v increases it.
 
-    delta_i deflection of element i [m], k_i its stiffness, Delta_i the deflection at which it slides; so k_i Delta_i
-    is its Coulomb force. `replay` is exact. In a plant sliding starts over the last part eta (`transition`) of the
-    deflection, by d(delta)/dt = v (1 - s) with s rising from 0 at (1 - eta) Delta to 1 at Delta (chosen: linearly):
-    the deflection is then never farther than eta Delta from the exact one, and the friction stays passive.
-    Loops close, inner loops too, and each extremum wipes out the smaller ones before it (Masing's rules).
-    Reference: Iwan (1966); Goldfarb and Celanovic (1997); for muscles Vo-Minh et al. (2011).
+    delta_i: deflection of element i [m]; k_i: stiffness; Delta_i: deflection limit; k_i Delta_i: Coulomb force of the
+    element. `force_along` is exact. In a plant, sliding begins gradually over the last fraction eta (`transition`) of
+    the deflection: d(delta)/dt = v (1 - s), where s increases linearly (chosen) from 0 at (1 - eta) Delta to 1 at
+    Delta. The deflection then differs from the exact one by at most eta Delta, and the friction remains passive.
+    All loops close, including inner loops, and each extremum erases the memory of smaller previous ones (Masing's
+    rules). Reference: Iwan (1966); Goldfarb and Celanovic (1997); for muscles Vo-Minh et al. (2011).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (IWAN1966, GOLDFARB_CELANOVIC1997, VO_MINH2011)
@@ -80,10 +81,10 @@ class MaxwellSlip(Friction):
 
     stiffnesses: tuple[float, ...] = parameter("N/m", "k_i", "stiffness of each element", bounds=(0.0, 1e9))
     limits: tuple[float, ...] = parameter(
-        "m", "Delta_i", "deflection at which each element slides", bounds=(1e-9, 10.0), fitted=False
+        "m", "Delta_i", "deflection limit of each element", bounds=(1e-9, 10.0), fitted=False
     )
     transition: float = parameter(
-        "1", "eta", "share of the deflection over which sliding starts in a plant", bounds=(1e-4, 1.0),
+        "1", "eta", "fraction of the deflection over which sliding begins in a plant", bounds=(1e-4, 1.0),
         fitted=False, default=0.05,
     )  # fmt: skip
 
@@ -104,15 +105,15 @@ class MaxwellSlip(Friction):
     def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
         elements = enumerate(self.limits, 1)
         return {
-            f"bristle{i}": yielding(bristles[f"bristle{i}"], limit, self.transition, speed) for i, limit in elements
+            f"bristle{i}": element_rate(bristles[f"bristle{i}"], limit, self.transition, speed) for i, limit in elements
         }
 
     def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
         return sum(k * bristles[f"bristle{i}"] for i, k in enumerate(self.stiffnesses, 1))
 
-    def terms(self, displacement: Any) -> Any:
-        """The exact deflection [m] of every element along a path, shape (N, elements)."""
-        return stops(displacement, self.limits)
+    def element_deflections(self, displacement: Any) -> Any:
+        """Exact deflection [m] of every element along a displacement path [m], shape (N, elements)."""
+        return stop_operators(displacement, self.limits)
 
     def force_along(self, displacement: Any, time: Any = None) -> Any:
-        return self.terms(displacement) @ self.stiffnesses
+        return self.element_deflections(displacement) @ self.stiffnesses

@@ -1,115 +1,117 @@
-"""Forces along a path of numbers, row by row: what `replay` is made of. Straight from row to row, so exactly.
+"""Friction forces along a displacement path, row by row, exact for motion that is linear between rows.
 
-Programs never see this file, so it may use NumPy.
+This file works on numbers only, for `Friction.force_along`; it is never traced, so it may use NumPy.
 """
 
 from __future__ import annotations
 
 import itertools
-import math  # noqa: TID251  (no symbol comes here)
+import math  # noqa: TID251  (numbers only, never traced)
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np  # noqa: TID251  (no symbol comes here)
+import numpy as np  # noqa: TID251  (numbers only, never traced)
 
 from ..core.arrays import Array
 
-NODES, LAST = 4801, 24.0
-"""Nodes of the curve of `autonomous`, and the -ln((1 - w)/2) at which it ends: 1 - w is 8e-11 there (chosen)."""
+CURVE_NODES, CURVE_END = 4801, 24.0
+"""Nodes of the loading curve of `relative_deflection`, and its end -ln((1 - w)/2), where 1 - w is 8e-11 (chosen)."""
 
 
-def _moves(displacement: Any) -> Array:
+def _increments(displacement: Any) -> Array:
+    """Increments along a path, zero in the first row."""
     path = np.asarray(displacement, dtype=float)
     return np.diff(path, prepend=path[:1])
 
 
-def speeds(displacement: Any, time: Any) -> Array:
-    """Speed [m/s] on the way to every row; 0 in the first, and where no time passed."""
-    moves, spans = _moves(displacement), _moves(time)
-    return np.divide(moves, spans, out=np.zeros_like(moves), where=spans > 0)
+def compute_speed(displacement: Any, time: Any) -> Array:
+    """Mean speed [m/s] on the interval before every row; 0 in the first row and for intervals of zero duration."""
+    increments, durations = _increments(displacement), _increments(time)
+    return np.divide(increments, durations, out=np.zeros_like(increments), where=durations > 0)
 
 
-def deflection(displacement: Any, travel: Any) -> Array:
-    """z [m] along a path x that starts at z = 0, where dz/dx = 1 - z sgn dx/travel; shape (N,).
+def deflection(displacement: Any, sliding_length: Any) -> Array:
+    """Deflection z [m] along a path x that starts at z = 0, with dz/dx = 1 - z sgn(dx)/sliding_length; shape (N,).
 
-    `travel` [m] is one for the whole path, or one for the way to each row.
+    `sliding_length` [m] is one value for the whole path, or one per row for the interval before it.
     """
-    moves = _moves(displacement)
-    kept, goals = np.exp(-np.abs(moves) / travel).tolist(), (np.sign(moves) * travel).tolist()
-    found, bend = [], 0.0
-    for keep, goal in zip(kept, goals, strict=True):
-        bend = goal + (bend - goal) * keep if goal else bend
-        found.append(bend)
-    return np.array(found)
+    increments = _increments(displacement)
+    decay = np.exp(-np.abs(increments) / sliding_length).tolist()
+    limits = (np.sign(increments) * sliding_length).tolist()
+    deflections, z = [], 0.0
+    for factor, limit in zip(decay, limits, strict=True):
+        z = limit + (z - limit) * factor if limit else z
+        deflections.append(z)
+    return np.array(deflections)
 
 
-def stops(displacement: Any, limits: Sequence[float]) -> Array:
-    """The stop operators of these limits along a path, shape (N, limits): each follows x, held within -r..r."""
-    high = np.asarray(limits, dtype=float)
-    moves = _moves(displacement)
-    found, bend = np.empty((moves.size, high.size)), np.zeros(high.size)
-    for row, move in zip(found, moves, strict=True):
-        np.minimum(bend + move, high, out=bend)
-        np.maximum(bend, -high, out=bend)
-        row[:] = bend
-    return found
+def stop_operators(displacement: Any, limits: Sequence[float]) -> Array:
+    """Stop operators with these limits r [m] along a path: each follows x within -r..r; shape (N, limits)."""
+    upper = np.asarray(limits, dtype=float)
+    increments = _increments(displacement)
+    outputs, state = np.empty((increments.size, upper.size)), np.zeros(upper.size)
+    for row, increment in zip(outputs, increments, strict=True):
+        np.minimum(state + increment, upper, out=state)
+        np.maximum(state, -upper, out=state)
+        row[:] = state
+    return outputs
 
 
-def autonomous(bending: Callable[[Any, Any], Any], displacement: Any, travel: float) -> Array:
-    """w along a path x that starts at w = 0, where dw/dx = bending(w, +-1)/travel and |w| < 1; shape (N,).
+def relative_deflection(rate: Callable[[Any, Any], Any], displacement: Any, sliding_length: float) -> Array:
+    """w along a path x that starts at w = 0, with dw/dx = rate(w, +-1)/sliding_length and |w| < 1; shape (N,).
 
-    The law must be odd, bending(w, -1) = -bending(-w, 1): then all motion runs along one curve w(xi), and turning
-    round puts -w on it. The curve is integrated from dxi = dw/bending(w, 1) and interpolated, to 1e-6 for
-    the sharpest laws and 1e-8 for the usual ones.
+    The model must be odd, rate(w, -1) = -rate(-w, 1). All motion then follows one loading curve w(xi), and a reversal
+    continues on it from -w. The curve is integrated from dxi = dw/rate(w, 1) and interpolated, with an error of 1e-6
+    for the sharpest transitions and 1e-8 for usual ones.
     """
-    moves = _moves(displacement) / travel
-    share_at, place_of = _curve(bending)
-    found, place, heading = np.zeros(moves.size), place_of(0.0), 1.0
-    for part, way in _monotone(moves):
-        if way != heading:
-            place, heading = place_of(-float(share_at(place))), way
-        places = place + np.cumsum(np.abs(moves[part]))
-        place = float(places[-1])
-        found[part] = heading * share_at(places)
-    return found
+    increments = _increments(displacement) / sliding_length
+    curve, inverse = _loading_curve(rate)
+    result, xi, direction = np.zeros(increments.size), inverse(0.0), 1.0
+    for interval, sign in _monotone_intervals(increments):
+        if sign != direction:
+            xi, direction = inverse(-float(curve(xi))), sign
+        positions = xi + np.cumsum(np.abs(increments[interval]))
+        xi = float(positions[-1])
+        result[interval] = direction * curve(positions)
+    return result
 
 
-def _monotone(moves: Array) -> list[tuple[slice, float]]:
-    """The stretches of a path between its turning points, each with its sign; rests belong to what went before."""
-    ways = np.sign(moves)
-    moving = np.flatnonzero(ways)
-    turns = [i for before, i in itertools.pairwise(moving) if ways[i] != ways[before]]
-    ends = [0, *turns, moves.size]
-    return [(slice(a, b), float(ways[a:b][ways[a:b] != 0][0]) if ways[a:b].any() else 1.0)
+def _monotone_intervals(increments: Array) -> list[tuple[slice, float]]:
+    """Split a path at its turning points into intervals with their signs; rests belong to the preceding interval."""
+    signs = np.sign(increments)
+    moving = np.flatnonzero(signs)
+    turns = [i for previous, i in itertools.pairwise(moving) if signs[i] != signs[previous]]
+    ends = [0, *turns, increments.size]
+    return [(slice(a, b), float(signs[a:b][signs[a:b] != 0][0]) if signs[a:b].any() else 1.0)
             for a, b in itertools.pairwise(ends)]  # fmt: skip
 
 
-def _curve(bending: Callable[[Any, Any], Any]) -> tuple[Callable[[Any], Any], Callable[[float], float]]:
-    """w at a place xi, and the place of a w, on the curve from w = -1 at xi = 0 towards w = 1.
+def _loading_curve(rate: Callable[[Any, Any], Any]) -> tuple[Callable[[Any], Any], Callable[[float], float]]:
+    """Return w(xi) and its inverse on the curve from w = -1 at xi = 0 towards w = 1.
 
-    Its parameter is s = -ln((1 - w)/2), evenly spaced, so that the slow approach to 1 is as fine as the rest.
+    The curve parameter is s = -ln((1 - w)/2), with equidistant nodes, which also resolves the slow approach to 1.
     """
     from scipy.interpolate import CubicHermiteSpline
 
-    s = np.linspace(0.0, LAST, NODES)
-    s[np.searchsorted(s, math.log(2.0))] = math.log(2.0)  # a node at w = 0, where powers of |w| have their kink
+    s = np.linspace(0.0, CURVE_END, CURVE_NODES)
+    s[np.searchsorted(s, math.log(2.0))] = math.log(2.0)  # a node at w = 0, where powers of |w| have a kink
     points, weights = np.polynomial.legendre.leggauss(5)
     half = np.diff(s) / 2.0
     inner = s[:-1, None] + half[:, None] * (1.0 + points)
-    places = np.concatenate([[0.0], np.cumsum((_slowness(bending, inner) @ weights) * half)])
-    slopes = _slowness(bending, s)
-    forward, back = CubicHermiteSpline(places, s, 1.0 / slopes), CubicHermiteSpline(s, places, slopes)
+    xi = np.concatenate([[0.0], np.cumsum((_curve_derivative(rate, inner) @ weights) * half)])
+    slopes = _curve_derivative(rate, s)
+    s_of_xi, xi_of_s = CubicHermiteSpline(xi, s, 1.0 / slopes), CubicHermiteSpline(s, xi, slopes)
 
-    def share_at(place: Any) -> Any:
-        return 1.0 - 2.0 * np.exp(-forward(np.minimum(place, places[-1])))
+    def curve(position: Any) -> Any:
+        return 1.0 - 2.0 * np.exp(-s_of_xi(np.minimum(position, xi[-1])))
 
-    def place_of(share: float) -> float:
-        return float(back(min(-math.log(max((1.0 - share) / 2.0, math.exp(-LAST))), LAST)))
+    def inverse(w: float) -> float:
+        return float(xi_of_s(min(-math.log(max((1.0 - w) / 2.0, math.exp(-CURVE_END))), CURVE_END)))
 
-    return share_at, place_of
+    return curve, inverse
 
 
-def _slowness(bending: Callable[[Any, Any], Any], s: Array) -> Array:
-    """dxi/ds on the curve."""
-    share = 1.0 - 2.0 * np.exp(-s)
-    return np.asarray((1.0 - share) / bending(share, 1.0))
+def _curve_derivative(rate: Callable[[Any, Any], Any], s: Array) -> Array:
+    """dxi/ds on the loading curve."""
+    w = 1.0 - 2.0 * np.exp(-s)
+    return np.asarray((1.0 - w) / rate(w, 1.0))

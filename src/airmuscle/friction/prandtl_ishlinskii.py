@@ -1,4 +1,4 @@
-"""The modified Prandtl-Ishlinskii hysteresis: stop operators, and dead zones that make its loops lopsided."""
+"""Modified Prandtl-Ishlinskii hysteresis model: stop operators, and dead zones for asymmetric loops."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
 from .base import Friction
-from .maxwell_slip import check_equal_lengths, yielding
-from .path import stops
+from .maxwell_slip import check_equal_lengths, element_rate
+from .path import stop_operators
 
 KUHNEN2003 = Reference(
     key="kuhnen-2003",
@@ -23,7 +23,7 @@ KUHNEN2003 = Reference(
     where="European Journal of Control 9(4), 407-418",
     year=2003,
     doi="10.3166/ejc.9.407-418",
-    note="superposition of dead-zone operators behind a Prandtl-Ishlinskii operator; there made of play operators",
+    note="dead-zone operators in series with a Prandtl-Ishlinskii operator, there composed of play operators",
 )
 AL_JANAIDEH2011 = Reference(
     key="al-janaideh-2011",
@@ -33,35 +33,35 @@ AL_JANAIDEH2011 = Reference(
     where="IEEE/ASME Transactions on Mechatronics 16(4), 734-744",
     year=2011,
     doi="10.1109/TMECH.2010.2052366",
-    note="lopsided and saturating loops of actuators",
+    note="asymmetric and saturating loops of actuators",
 )
 
 
 @model
 class PrandtlIshlinskii(Friction):
-    """F = S(Sum k_i E_ri[x]),  S(u) = u + Sum w_j S_dj(u).
+    """Modified Prandtl-Ishlinskii model: F = S(Sum k_i E_ri[x]),  S(u) = u + Sum w_j S_dj(u).
 
-    E_r stop operator: it follows x, held within -r..r. S_d dead zone: max(u - d, 0) for d > 0, min(u - d, 0) for
-    d < 0. x displacement [m], k_i stiffness and r_i limit of each stop, d_j [N] and w_j [1] threshold and weight of
-    each dead zone. The weights must leave S rising, else friction would drive: 1 + the sum of the weights at work on
-    either side stays positive. Without dead zones the law is Maxwell slip. `replay` is exact; in a plant a stop yields
-    over the last part eta of its deflection as in MaxwellSlip. Stops in place of Kuhnen's plays make it a force that
-    saturates; the play part x - E_r[x] is the muscle's spring.
-    Reference: Kuhnen (2003); Al Janaideh et al. (2011).
+    E_r: stop operator, which follows x within the limits -r..r. S_d: dead zone, max(u - d, 0) for d > 0 and
+    min(u - d, 0) for d < 0. x: displacement [m]; k_i, r_i: stiffness and limit of each stop; d_j [N], w_j [1]:
+    threshold and weight of each dead zone. S must be increasing, otherwise friction would supply energy: on either
+    side, one plus the sum of the active weights must not be negative. Without dead zones the model is the Maxwell-slip
+    model. `force_along` is exact; in a plant a stop begins to slide over the last fraction eta of its deflection, as in
+    MaxwellSlip. Stop operators instead of Kuhnen's play operators give a force that saturates; the remainder
+    x - E_r[x] belongs to the parallel spring of the muscle. Reference: Kuhnen (2003); Al Janaideh et al. (2011).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (KUHNEN2003, AL_JANAIDEH2011)
 
     stiffnesses: tuple[float, ...] = parameter("N/m", "k_i", "stiffness of each stop", bounds=(0.0, 1e9))
     limits: tuple[float, ...] = parameter(
-        "m", "r_i", "deflection at which each stop slides", bounds=(1e-9, 10.0), fitted=False
+        "m", "r_i", "deflection limit of each stop", bounds=(1e-9, 10.0), fitted=False
     )
     thresholds: tuple[float, ...] = parameter(
-        "N", "d_j", "force from which each dead zone lets through", bounds=(-1e5, 1e5), fitted=False, default=()
+        "N", "d_j", "threshold force of each dead zone", bounds=(-1e5, 1e5), fitted=False, default=()
     )
     weights: tuple[float, ...] = parameter("1", "w_j", "weight of each dead zone", bounds=(-1.0, 100.0), default=())
     transition: float = parameter(
-        "1", "eta", "share of the deflection over which sliding starts in a plant", bounds=(1e-4, 1.0),
+        "1", "eta", "fraction of the deflection over which sliding begins in a plant", bounds=(1e-4, 1.0),
         fitted=False, default=0.05,
     )  # fmt: skip
 
@@ -69,8 +69,8 @@ class PrandtlIshlinskii(Friction):
         check_equal_lengths("PrandtlIshlinskii", self.stiffnesses, self.limits)
         if len(self.thresholds) != len(self.weights) or 0.0 in self.thresholds:
             raise ParameterError(
-                f"PrandtlIshlinskii: {len(self.thresholds)} thresholds and {len(self.weights)} weights; give one of "
-                "each for every dead zone, no threshold 0."
+                f"PrandtlIshlinskii: {len(self.thresholds)} thresholds and {len(self.weights)} weights; give one "
+                "threshold, other than 0, and one weight per dead zone."
             )
         for sign in (1.0, -1.0):
             slope = 1.0
@@ -78,8 +78,9 @@ class PrandtlIshlinskii(Friction):
                 slope += weight if sign * threshold > 0 else 0.0
                 if slope < 0:
                     raise ParameterError(
-                        f"PrandtlIshlinskii: with the weight {weight:g} at {threshold:g} N the force would fall as the "
-                        "stops bend further, and friction would drive. Sums of weights on either side must exceed -1."
+                        f"PrandtlIshlinskii: with the weight {weight:g} at {threshold:g} N the force would decrease "
+                        "with deflection, and friction would supply energy. On either side of zero force, the sum of "
+                        "the weights must not be less than -1."
                     )
 
     @property
@@ -94,18 +95,18 @@ class PrandtlIshlinskii(Friction):
 
     def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
         elements = enumerate(self.limits, 1)
-        return {f"stop{i}": yielding(bristles[f"stop{i}"], limit, self.transition, speed) for i, limit in elements}
+        return {f"stop{i}": element_rate(bristles[f"stop{i}"], limit, self.transition, speed) for i, limit in elements}
 
     def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
-        return self.shaped(sum(k * bristles[f"stop{i}"] for i, k in enumerate(self.stiffnesses, 1)))
+        return self.apply_dead_zones(sum(k * bristles[f"stop{i}"] for i, k in enumerate(self.stiffnesses, 1)))
 
-    def shaped(self, force: Value) -> Value:
-        """S(u): the force [N] of the stops after the dead zones."""
+    def apply_dead_zones(self, force: Value) -> Value:
+        """S(u): force [N] after the dead zones, from the force u [N] of the stops."""
         total = force
         for threshold, weight in zip(self.thresholds, self.weights, strict=True):
-            beyond = force - threshold
-            total = total + weight * ops.where(threshold > 0, ops.maximum(beyond, 0.0), ops.minimum(beyond, 0.0))
+            excess = force - threshold
+            total = total + weight * ops.where(threshold > 0, ops.maximum(excess, 0.0), ops.minimum(excess, 0.0))
         return total
 
     def force_along(self, displacement: Any, time: Any = None) -> Any:
-        return self.shaped(stops(displacement, self.limits) @ self.stiffnesses)
+        return self.apply_dead_zones(stop_operators(displacement, self.limits) @ self.stiffnesses)

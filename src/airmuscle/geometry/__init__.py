@@ -1,11 +1,11 @@
-"""Geometries: volume and outline of a muscle from its contraction."""
+"""Geometries: enclosed volume and outline of a muscle as functions of contraction."""
 
 from .base import Geometry
 from .braid import Braid
 from .catenary import Catenary
 from .chebyshev import ChebyshevGeometry
 from .circular_arc import CircularArc
-from .fibre_sum import EvenSpread, GivenSum, SumOverHalf, SumPastHalf
+from .fibre_sum import HalfShellFibreSum, PrintedFibreSum, UniformFibreSum, UserDefinedFibreSum
 from .parabola import Parabola, TrueArcParabola
 from .pleated import PleatedTube
 from .straight_fibre import StraightFibre
@@ -17,15 +17,15 @@ __all__ = [
     "Catenary",
     "ChebyshevGeometry",
     "CircularArc",
-    "EvenSpread",
     "Geometry",
-    "GivenSum",
+    "HalfShellFibreSum",
     "Parabola",
     "PleatedTube",
+    "PrintedFibreSum",
     "StraightFibre",
-    "SumOverHalf",
-    "SumPastHalf",
     "TabulatedGeometry",
     "TrueArcParabola",
+    "UniformFibreSum",
+    "UserDefinedFibreSum",
     "Vessel",
 ]

@@ -1,4 +1,4 @@
-"""The enclosed volume and the outline of a muscle, from its contraction."""
+"""Geometry (interface): enclosed volume and outline of a muscle as functions of contraction."""
 
 from __future__ import annotations
 
@@ -14,10 +14,26 @@ from ..core.ops import Value
 from ..core.reference import Reference
 
 
-class Geometry(abc.ABC):
-    """Volume [m3] and outline of a muscle; contraction is (L0 - L)/L0.
+def check_contraction_range(contraction: Value, limits: tuple[float, float], owner: str, remark: str = "") -> None:
+    """Raise GeometryLimitError if a contraction [1] is outside `limits`; symbols are not checked.
 
-    Every geometry declares `resting_length` L0 [m]: between the fittings, unpressurised and unloaded.
+    `owner` names the model and `remark` extends the message.
+    """
+    if not isinstance(contraction, float | int | np.ndarray | np.generic):
+        return
+    values = np.asarray(contraction, dtype=float)
+    outside = ~((values >= limits[0]) & (values <= limits[1]))
+    if outside.any():
+        raise GeometryLimitError(
+            f"{owner}: a contraction of {100 * values[outside].flat[0]:.4g} % is outside its range, "
+            f"{100 * limits[0]:.4g} to {100 * limits[1]:.4g} %{remark}."
+        )
+
+
+class Geometry(abc.ABC):
+    """Volume [m3] and outline of a muscle; contraction is (L_0 - L)/L_0.
+
+    Every geometry declares `resting_length` L_0 [m]: the length between the fittings, unpressurised and unloaded.
     """
 
     references: ClassVar[tuple[Reference, ...]] = ()
@@ -27,30 +43,24 @@ class Geometry(abc.ABC):
     @property
     @abc.abstractmethod
     def contraction_range(self) -> tuple[float, float]:
-        """The contractions [1] that this geometry can take."""
+        """Minimum and maximum contraction [1] of this geometry."""
 
     @abc.abstractmethod
     def volume(self, contraction: Value) -> Value:
-        """Enclosed volume [m3] at a contraction [1]; arrays give arrays."""
+        """Enclosed volume [m3] at a contraction [1], a scalar or an array; the result has the same shape."""
 
     @abc.abstractmethod
     def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        """Axial positions from the middle [m] and radii there [m], each of shape (points,).
+        """Axial positions from the middle [m] and radii [m] at a contraction [1], each of shape (points,).
 
-        Raises OutOfReach where the geometry cannot take this contraction.
+        Raises GeometryLimitError if the contraction is outside `contraction_range`.
         """
 
-    def volume_growth(self, contraction: Value) -> Value:
-        """dV/deps [m3], exact; virtual work makes p dV/deps / L0 the tension of an ideal muscle."""
+    def volume_derivative(self, contraction: Value) -> Value:
+        """Exact derivative dV/deps [m3]; by virtual work, p (dV/deps)/L_0 is the tension of an ideal muscle."""
         return autodiff.derivative(self, "volume", contraction)
 
     def check_contraction(self, contraction: Value) -> None:
-        """Raise OutOfReach, naming the limits, for any contraction that this geometry cannot take."""
-        low, high = self.contraction_range
+        """Raise GeometryLimitError if a contraction [1] is outside `contraction_range`."""
         values = np.asarray(contraction, dtype=float)
-        outside = ~((values >= low) & (values <= high))
-        if outside.any():
-            raise GeometryLimitError(
-                f"{type(self).__name__} cannot take a contraction of {values[outside].flat[0]:.2%}; "
-                f"it reaches from {low:.2%} to {high:.2%}."
-            )
+        check_contraction_range(values, self.contraction_range, type(self).__name__)

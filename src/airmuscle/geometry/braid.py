@@ -1,4 +1,4 @@
-"""Inextensible cylindrical braid: McKibben, Shadow and fluidic muscles."""
+"""Inextensible cylindrical braid of McKibben, Shadow and Festo fluidic muscles."""
 
 from __future__ import annotations
 
@@ -26,25 +26,27 @@ CHOU_HANNAFORD_1996 = Reference(
 
 @model
 class Braid(Geometry):
-    """A cylinder of threads of fixed length b that wind n times around it.
+    """Cylindrical braid of inextensible threads of length b, each wound n times around the cylinder.
 
         cos(theta) = (1 - eps) cos(theta_0),   r = r_0 sin(theta)/sin(theta_0),   V = pi r^2 L
 
-    theta angle of the threads to the axis, r_0 and theta_0 at rest, L = L_0 (1 - eps). The same as the formula of
-    Chou and Hannaford with b = L_0/cos(theta_0) and n = b sin(theta_0)/(2 pi r_0).
+    theta: angle between threads and axis; r_0, theta_0: radius and angle at rest; L = L_0 (1 - eps): length. Identical
+    to the formula of Chou and Hannaford (1996) with b = L_0/cos(theta_0) and n = b sin(theta_0)/(2 pi r_0).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (CHOU_HANNAFORD_1996,)
 
     radius: float = parameter("m", "r_0", "radius of the braid at rest", bounds=(1e-4, 0.2))
-    braid_angle: float = parameter("rad", "theta_0", "angle of the threads to the axis at rest", bounds=(0.05, 1.5))
+    braid_angle: float = parameter(
+        "rad", "theta_0", "angle between the threads and the axis at rest", bounds=(0.05, 1.5)
+    )
     resting_length: float = parameter(
         "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
     )
 
     @property
     def contraction_range(self) -> tuple[float, float]:
-        """From straight threads to a braid of no length."""
+        """From straight threads to zero length."""
         return (1.0 - 1.0 / ops.cos(self.braid_angle), 1.0)
 
     def volume(self, contraction: Value) -> Value:

@@ -1,4 +1,4 @@
-"""A polynomial that stands in for a geometry without closed form, and says how far it is off."""
+"""Chebyshev polynomial approximation of a geometry, with its approximation error."""
 
 from __future__ import annotations
 
@@ -11,37 +11,40 @@ from ..core.errors import ParameterError
 from ..core.ops import Value
 from .base import Geometry
 
-_PLACES = 1001
-"""Where the error of a stand-in is measured: close enough for the corners in the slope of a table."""
+_ERROR_POINTS = 1001
+"""Points at which the approximation error is evaluated; dense enough for the kinks in the slope of a table."""
 
 
 @model
 class ChebyshevGeometry(Geometry):
-    """V = Sum_k a_k T_k(x),   x = (2 eps - eps_low - eps_high)/(eps_high - eps_low).
+    """Polynomial volume: V = Sum_k a_k T_k(x),   x = (2 eps - eps_low - eps_high)/(eps_high - eps_low).
 
-    T_k Chebyshev polynomials, by Clenshaw's scheme; outside the validity range the volume goes on by its tangent. The outline
-    is the cylinder of this volume: draw the geometry it stands in for instead. `volume_error` and `growth_error`
-    are the largest differences to that one in V and dV/deps, as `as_polynomial` measured them.
+    T_k: Chebyshev polynomials, evaluated by Clenshaw's recurrence. Outside the validity range the volume is
+    extrapolated linearly. The outline is the cylinder of this volume; plot the approximated geometry instead.
+    `volume_error` and `derivative_error` are the maximum errors of V and dV/deps, as evaluated by `as_polynomial`.
     """
 
     coefficients: tuple[float, ...] = parameter("m3", "a_k", "coefficients of the Chebyshev polynomials", fitted=False)
-    min_contraction: float = parameter("1", "eps_low", "lower end of the validity range in contraction", fitted=False)
-    max_contraction: float = parameter("1", "eps_high", "upper end of the validity range in contraction", fitted=False)
+    min_contraction: float = parameter("1", "eps_low", "lower limit of the validity range in contraction", fitted=False)
+    max_contraction: float = parameter(
+        "1", "eps_high", "upper limit of the validity range in contraction", fitted=False
+    )
     resting_length: float = parameter(
         "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
     )
     volume_error: float = parameter(
-        "m3", "dV", "largest error of the volume on the validity range", fitted=False, default=0.0
+        "m3", "dV", "maximum error of the volume in the validity range", fitted=False, default=0.0
     )
-    growth_error: float = parameter(
-        "m3", "dV'", "largest error of dV/deps on the validity range", fitted=False, default=0.0
+    derivative_error: float = parameter(
+        "m3", "dV'", "maximum error of dV/deps in the validity range", fitted=False, default=0.0
     )
 
     def check(self) -> None:
         if len(self.coefficients) < 2 or not self.min_contraction < self.max_contraction < 1.0:
             raise ParameterError(
                 f"ChebyshevGeometry: {len(self.coefficients)} coefficients on contractions {self.min_contraction:g} "
-                f"to {self.max_contraction:g}; it needs two coefficients at least and rising ends below 1."
+                f"to {self.max_contraction:g}; at least two coefficients and min_contraction < max_contraction < 1 "
+                "are required."
             )
 
     @property
@@ -56,7 +59,7 @@ class ChebyshevGeometry(Geometry):
         return value + slope * (x - inner)
 
     def _clenshaw(self, x: Value) -> tuple[Value, Value]:
-        """The polynomial and its slope by x, from b_k = a_k + 2 x b_(k+1) - b_(k+2) and its derivative."""
+        """Polynomial and derivative with respect to x, from b_k = a_k + 2 x b_(k+1) - b_(k+2) and its derivative."""
         b: Value = 0.0
         b_next: Value = 0.0
         d: Value = 0.0
@@ -73,27 +76,30 @@ class ChebyshevGeometry(Geometry):
         return np.linspace(-length / 2, length / 2, points), np.full(points, radius)
 
 
-def as_polynomial(geometry: Geometry, degree: int = 16, reach: tuple[float, float] | None = None) -> ChebyshevGeometry:
-    """A traceable geometry that interpolates `geometry` on `reach` (all of its own where none is given).
+def as_polynomial(
+    geometry: Geometry, degree: int = 16, contraction_range: tuple[float, float] | None = None
+) -> ChebyshevGeometry:
+    """Return a traceable geometry that interpolates `geometry` at the Chebyshev points of a contraction range [1].
 
-    Interpolates at the Chebyshev points; the errors are measured at 1001 places. A growth that is infinite at zero
-    contraction, as of straight fibres, needs a `reach` that begins above zero.
+    The default range is that of the geometry. The errors are evaluated at 1001 points. If dV/deps is infinite at zero
+    contraction, as for straight fibres, the range must begin above zero. Raises GeometryLimitError if the range
+    exceeds that of the geometry.
     """
-    low, high = reach or geometry.contraction_range
+    low, high = contraction_range or geometry.contraction_range
     geometry.check_contraction([low, high])
     middle, half = (low + high) / 2, (high - low) / 2
-    fit = np.polynomial.chebyshev.chebinterpolate(
-        lambda x: geometry.volume(_inside(middle + half * x, low, high)), degree
+    coefficients = np.polynomial.chebyshev.chebinterpolate(
+        lambda x: geometry.volume(_clip_to_range(middle + half * x, low, high)), degree
     )
-    found = ChebyshevGeometry(tuple(fit), low, high, geometry.resting_length)
-    between = np.linspace(low, high, _PLACES)
+    polynomial = ChebyshevGeometry(tuple(coefficients), low, high, geometry.resting_length)
+    points = np.linspace(low, high, _ERROR_POINTS)
     errors = (
-        np.abs(found.volume(between) - geometry.volume(between)).max(),
-        np.abs(found.volume_growth(between) - geometry.volume_growth(between)).max(),
+        np.abs(polynomial.volume(points) - geometry.volume(points)).max(),
+        np.abs(polynomial.volume_derivative(points) - geometry.volume_derivative(points)).max(),
     )
-    return ChebyshevGeometry(tuple(fit), low, high, geometry.resting_length, *(float(e) for e in errors))
+    return ChebyshevGeometry(tuple(coefficients), low, high, geometry.resting_length, *(float(e) for e in errors))
 
 
-def _inside(contraction: npt.NDArray[np.float64], low: float, high: float) -> npt.NDArray[np.float64]:
-    """Rounding must not carry a sample past the end of the reach."""
+def _clip_to_range(contraction: npt.NDArray[np.float64], low: float, high: float) -> npt.NDArray[np.float64]:
+    """Clip samples that rounding has moved beyond the limits."""
     return np.clip(contraction, low, high)

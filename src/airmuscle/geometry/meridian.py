@@ -1,4 +1,4 @@
-"""The assumed outline of one segment between two end rings, and what its integrals are called."""
+"""Meridian (interface): assumed outline of one segment between two rings, and its integrals."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ SAGA_2007 = Reference(
     "Journal of Intelligent Material Systems and Structures 18:175-180",
     2007,
     "10.1177/1045389X06063462",
-    "equations (1) to (19), Table 1; restored from a damaged copy and derived again",
+    "equations (1) to (19), Table 1; restored from a damaged copy and rederived",
 )
 
-
 Profile = tuple[Array, Array]
+"""Axial positions [m] and radii [m]."""
 
 
 class Segment(NamedTuple):
-    """One segment of the muscle at a contraction: x along the axis, r the radius, s the arc, r_0 at the ends."""
+    """One segment of the muscle at a contraction. x: axial position; r: radius; s: arc length; r_0: end radius."""
 
     end_radius: Value
     """r_0 [m]."""
     length: Value
     """Chord l [m]."""
     arc: Value
-    """Int ds [m]; the fibre's length, but for an outline that only nearly keeps it."""
-    largest_radius: Value
-    """Radius in the middle [m]."""
+    """Int ds [m]; equal to the fibre length except for approximate meridians."""
+    max_radius: Value
+    """Maximum radius, in the middle [m]."""
     end_sine: Value
     """Sine of the end slope angle phi_0."""
     end_cosine: Value
@@ -50,7 +50,7 @@ class Segment(NamedTuple):
 
     @property
     def half_section(self) -> Value:
-        """A_1 = Int r dx [m2], on which the pressure drives the half shell apart."""
+        """A_1 = Int r dx [m2], the projected area of the half shell on which the pressure acts."""
         return self.excess + self.end_radius * self.length
 
     @property
@@ -60,21 +60,21 @@ class Segment(NamedTuple):
 
 
 class Meridian(abc.ABC):
-    """The curve that straight fibres are taken to follow, in one segment of fibre length l_0 and end radius r_0."""
+    """Assumed shape of the fibres in one segment of fibre length l_0 and end radius r_0."""
 
     references: ClassVar[tuple[Reference, ...]] = (SAGA_2007,)
     max_contraction: ClassVar[float] = 0.5
-    """Past 50 % every outline has long passed its largest volume or, the parabola (3), its largest radius."""
+    """Above 50 % every meridian is beyond its maximum volume or, for the parabola (3), beyond its maximum radius."""
 
     @abc.abstractmethod
     def segment(self, contraction: Value, fibre_length: Value, end_radius: Value) -> Segment:
-        """Everything about the segment at a contraction [1]; lengths [m]; arrays broadcast."""
+        """Shape and integrals of the segment at a contraction [1]; lengths in [m]; arrays broadcast."""
 
     @abc.abstractmethod
-    def profile(self, contraction: float, fibre_length: float, end_radius: float, along: Array) -> Profile:
-        """Positions from the middle [m] and radii there [m] at places `along` the outline, -1 to 1 from end to end."""
+    def profile(self, contraction: float, fibre_length: float, end_radius: float, position: Array) -> Profile:
+        """Axial positions from the middle [m] and radii [m] at normalised positions from -1 to 1 along the outline."""
 
 
-def volume_of(end_radius: Value, length: Value, excess: Value, excess_squared: Value) -> Value:
+def segment_volume(end_radius: Value, length: Value, excess: Value, excess_squared: Value) -> Value:
     """pi Int r^2 dx from Int (r - r_0) dx and Int (r - r_0)^2 dx."""
     return ops.pi * (end_radius**2 * length + 2 * end_radius * excess + excess_squared)

@@ -1,4 +1,4 @@
-"""Volume from a table: measured, or computed elsewhere."""
+"""Geometry interpolated from a table of measured or computed volumes."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ from .base import Geometry
 
 @model
 class TabulatedGeometry(Geometry):
-    """V(eps) a monotone cubic (PCHIP) through the rows (eps_i, V_i); its outline is the cylinder of this volume.
+    """Monotone piecewise cubic interpolation (PCHIP) of V(eps) through the rows (eps_i, V_i).
 
-    Contractions outside the table raise OutOfReach. Not closed-form: a plant takes it through `as_polynomial`,
-    which states what it changes. Reference for the cubic: Fritsch and Carlson, SIAM J. Numer. Anal. 17:238 (1980).
+    The outline is the cylinder of this volume. Contractions outside the table raise GeometryLimitError. The geometry
+    is not in closed form; for a plant, approximate it with `as_polynomial`, which states the approximation error.
+    Reference: Fritsch and Carlson, SIAM J. Numer. Anal. 17:238 (1980).
     """
 
     traceable: ClassVar[bool] = False
 
-    contractions: tuple[float, ...] = parameter("1", "eps_i", "contractions of the rows, rising", fitted=False)
+    contractions: tuple[float, ...] = parameter("1", "eps_i", "contractions of the rows, increasing", fitted=False)
     volumes: tuple[float, ...] = parameter("m3", "V_i", "volumes of the rows", bounds=(0.0, 1.0), fitted=False)
     resting_length: float = parameter(
         "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
@@ -34,8 +35,8 @@ class TabulatedGeometry(Geometry):
         rows = len(self.contractions)
         if rows < 2 or rows != len(self.volumes) or (np.diff(self.contractions) <= 0).any():
             raise ParameterError(
-                f"TabulatedGeometry: {rows} contractions and {len(self.volumes)} volumes; it needs two rows at least, "
-                "each with both, in the order of rising contraction."
+                f"TabulatedGeometry: {rows} contractions and {len(self.volumes)} volumes; at least two rows are "
+                "required, each with both values, in order of increasing contraction."
             )
 
     @property
@@ -46,7 +47,7 @@ class TabulatedGeometry(Geometry):
         self.check_contraction(contraction)
         return _curve(self)(contraction)[()]
 
-    def volume_growth(self, contraction: Value) -> Value:
+    def volume_derivative(self, contraction: Value) -> Value:
         self.check_contraction(contraction)
         return _curve(self).derivative()(contraction)[()]
 
@@ -58,6 +59,6 @@ class TabulatedGeometry(Geometry):
 
 @functools.lru_cache(maxsize=64)
 def _curve(geometry: TabulatedGeometry) -> Any:
-    from scipy.interpolate import PchipInterpolator  # slow to import, and most laws do without
+    from scipy.interpolate import PchipInterpolator  # slow to import and rarely needed
 
     return PchipInterpolator(geometry.contractions, geometry.volumes, extrapolate=False)

@@ -1,4 +1,4 @@
-"""A rigid vessel: the volume does not depend on contraction."""
+"""Rigid vessel: a volume independent of contraction."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .base import Geometry
 
 @model
 class Vessel(Geometry):
-    """V constant: a chamber on a bench, or a muscle whose contraction nobody recorded (with a wall that swells)."""
+    """Constant volume: a test chamber, or a muscle (with an expanding wall) whose contraction was not recorded."""
 
-    enclosed_volume: float = parameter("m3", "V_0", "volume", bounds=(1e-7, 1e-1))
+    enclosed_volume: float = parameter("m3", "V_0", "enclosed volume", bounds=(1e-7, 1e-1))
     resting_length: float = parameter(
         "m", "L_0", "length between the fittings", bounds=(1e-3, 10.0), fitted=False, default=0.2
     )
@@ -26,7 +26,7 @@ class Vessel(Geometry):
     def volume(self, contraction: Value) -> Value:
         return self.enclosed_volume + 0.0 * contraction
 
-    def volume_growth(self, contraction: Value) -> Value:
+    def volume_derivative(self, contraction: Value) -> Value:
         return 0.0 * contraction
 
     def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:

@@ -1,4 +1,4 @@
-"""Parameters from measurements: `fit` and what it returns, `compare` and what stands around them."""
+"""Static identification: fits, uncertainty, model selection, conversion and shape constraints."""
 
 from .bootstrapping import Bootstrap, bootstrap
 from .candidates import Candidate, standard_candidates
@@ -11,7 +11,7 @@ from .model_selection import Comparison, compare
 from .profile_likelihood import ProfileLikelihood, profile, weakly_determined
 from .result import Estimate, Fit
 from .static_fit import fit
-from .surface.shape import ShapedFit, fit_shaped, shape_breaks
+from .surface.shape import ShapeConstrainedFit, find_shape_violations, fit_shape_constrained
 
 __all__ = [
     "UNCENSORED",
@@ -31,17 +31,17 @@ __all__ = [
     "ModelConversion",
     "ProfileLikelihood",
     "RunSplit",
-    "ShapedFit",
+    "ShapeConstrainedFit",
     "SoftL1",
     "SpecimenSplit",
     "bootstrap",
     "compare",
     "confidence_band",
     "convert",
+    "find_shape_violations",
     "fit",
-    "fit_shaped",
+    "fit_shape_constrained",
     "profile",
-    "shape_breaks",
     "standard_candidates",
     "weakly_determined",
 ]

@@ -1,4 +1,4 @@
-"""A fit repeated on runs drawn anew: how sure its parameters are where rows of one run repeat each other."""
+"""Bootstrap of a fit: refits to resampled groups of rows (runs, levels or specimens)."""
 
 from __future__ import annotations
 
@@ -14,41 +14,42 @@ from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
 from ..recording import Recording
-from .cross_validation import GroupSplit, natural
+from .cross_validation import GroupSplit, default_split
 from .loss import LeastSquares
 from .problem import FitProblem
 from .result import Fit
-from .solve import design, is_linear, solve
+from .solver import design_matrix, is_linear, solve
 
-Places = npt.NDArray[np.intp]
-_LEAST = 1e-10
-"""Least eigenvalue of a refit's normal matrix, in the basis where that of all rows is one (chosen)."""
+RowIndices = npt.NDArray[np.intp]
+_MIN_EIGENVALUE = 1e-10
+"""Minimum eigenvalue of the normal matrix of a refit, in the basis in which that of all rows is 1 (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Bootstrap:
-    """Parameters of every refit, shape (refits, P); a refit that its runs do not determine is a row of NaN."""
+    """Parameters of every refit, shape (refits, P); a row of NaN where the drawn groups do not determine them."""
 
     fit: Fit
     values: Array
-    parts: int
+    group_count: int
     seed: int
 
     @property
-    def standard_deviations(self) -> Array:
+    def standard_errors(self) -> Array:
+        """Standard deviation of every parameter over the refits, shape (P,)."""
         return np.asarray(np.nanstd(self.values, axis=0, ddof=1))
 
     @property
-    def lost(self) -> int:
-        """Refits whose runs do not determine the parameters."""
+    def failed_refits(self) -> int:
+        """Number of refits whose groups do not determine the parameters."""
         return int(np.isnan(self.values).any(axis=1).sum())
 
     def intervals(self, level: float = 0.95) -> Array:
-        """Lower and upper end of each parameter, shape (P, 2): quantiles of the refits."""
+        """Percentile confidence interval of each parameter, lower and upper limit, shape (P, 2)."""
         return np.asarray(np.nanquantile(self.values, [(1 - level) / 2, (1 + level) / 2], axis=0).T)
 
     def model(self, refit: int) -> Characteristic:
-        """The law of one refit."""
+        """The law with the parameters of one refit."""
         law: Characteristic = tree.unflatten(self.fit.problem.law, self.fit.problem.leaf_values(self.values[refit]))
         return law
 
@@ -62,91 +63,100 @@ def bootstrap(
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
 ) -> Bootstrap:
-    """Refit a law to parts of its data drawn with replacement (Efron and Tibshirani (1993), An Introduction to the
+    """Refit a law to groups of its data drawn with replacement (Efron and Tibshirani (1993), An Introduction to the
     Bootstrap, chapter 9).
 
-    `recordings` are those that were fitted; `by` says what is drawn: RunSplit(), Levels(...) or SpecimenSplit(), without it
-    the first of which there are three. Rows that are cut off take part as far as the fit itself contradicts them.
-    Laws linear in their parameters are refitted all at once; others one by one from where the fit came to, and
-    `progress` is called with the part done.
+    recordings  those that were fitted
+    by          the groups: RunSplit(), LevelSplit(...) or SpecimenSplit(); by default the first of these that has at
+                least three groups
+    progress    called with the completed fraction
+
+    Censored rows are active where the original fit violates their bound. A law that is linear in its parameters is
+    refitted by one matrix product; any other law is refitted iteratively from the parameters of the original fit.
     Raises IdentificationError.
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    which, count = _parts(fit, runs, by or natural(runs))
-    drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=refits).astype(float)
+    group, count = _assign_groups(fit, runs, by or default_split(runs))
+    draws = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=refits).astype(float)
     problem = fit.problem
-    at_once = is_linear(problem) and isinstance(fit.loss, LeastSquares)
-    values = _linear(problem, fit.values, which, drawn) if at_once else _one_by_one(fit, which, drawn, progress)
+    linear = is_linear(problem) and isinstance(fit.loss, LeastSquares)
+    values = (
+        _refit_linear(problem, fit.values, group, draws) if linear else _refit_iteratively(fit, group, draws, progress)
+    )
     return Bootstrap(fit, values, count, seed)
 
 
-def _parts(fit: Fit, runs: Sequence[Recording], by: GroupSplit) -> tuple[Places, int]:
-    """The number of the part that each fitted row belongs to, and how many there are."""
+def _assign_groups(fit: Fit, runs: Sequence[Recording], by: GroupSplit) -> tuple[RowIndices, int]:
+    """The index of the group of each fitted row, and the number of groups."""
     labels = np.concatenate(by.labels(runs))
     columns = [np.concatenate([run[name] for run in runs]) for name in ("pressure", "contraction", "force")]
     labels = labels[~np.isnan(np.stack(columns)).any(axis=0)]
     if labels.size != len(fit.recording):
         raise IdentificationError(
-            f"the fit has {len(fit.recording)} rows and these recordings {labels.size}: give the ones that were fitted."
+            f"the fit has {len(fit.recording)} rows, but the recordings have {labels.size}. Give the recordings that "
+            "were fitted."
         )
-    names, which = np.unique(labels, return_inverse=True)
+    names, group = np.unique(labels, return_inverse=True)
     if names.size < 3:
         raise IdentificationError(
-            f"only {names.size} {by.word}s to draw from: no scatter can be told. Give more runs, or draw by "
-            "Levels('contraction')."
+            f"a bootstrap needs 3 {by.group_name}s or more, but the data have {names.size}, so a spread cannot be "
+            "estimated. Give more runs, or resample by LevelSplit('contraction')."
         )
-    return which, int(names.size)
+    return group, int(names.size)
 
 
-def _linear(problem: FitProblem, values: Array, which: Places, drawn: Array) -> Array:
-    """All refits from the normal matrices of the parts: one product of (refits, parts) with (parts, P^2 + P)."""
-    matrix, constant = design(problem)
-    counting = problem.counting(matrix @ values + constant)
-    scale = np.linalg.norm(matrix[counting], axis=0)
-    # An orthonormal basis of the whole design keeps the normal matrices near the identity.
-    weighted = problem.weights[counting, None] * (matrix[counting] / scale)
+def _refit_linear(problem: FitProblem, values: Array, group: RowIndices, draws: Array) -> Array:
+    """All refits from the normal matrices of the groups: one product of (refits, groups) with (groups, P^2 + P)."""
+    matrix, constant = design_matrix(problem)
+    active = problem.active_rows(matrix @ values + constant)
+    scale = np.linalg.norm(matrix[active], axis=0)
+    # An orthonormal basis of the complete design matrix keeps the normal matrices near the identity.
+    weighted = problem.weights[active, None] * (matrix[active] / scale)
     triangle: Array = np.asarray(np.linalg.qr(weighted, mode="r"))
     rows = np.linalg.solve(triangle.T, weighted.T).T
-    goal = problem.weights[counting] * (problem.goal - constant)[counting]
+    target = problem.weights[active] * (problem.target - constant)[active]
     size = rows.shape[1]
-    sums = np.zeros((drawn.shape[1], size * size + size))
-    for part in range(drawn.shape[1]):
-        here = rows[which[counting] == part]
-        sums[part, : size * size] = (here.T @ here).ravel()
-        sums[part, size * size :] = here.T @ goal[which[counting] == part]
-    both = drawn @ sums
-    normal, right = both[:, : size * size].reshape(-1, size, size), both[:, size * size :]
-    determined = _determined(normal)
-    found = np.full(right.shape, np.nan)
-    found[determined] = np.linalg.solve(normal[determined], right[determined][..., None])[..., 0]
-    return np.asarray(np.linalg.solve(triangle, found.T).T / scale)
+    sums = np.zeros((draws.shape[1], size * size + size))
+    for i in range(draws.shape[1]):
+        block = rows[group[active] == i]
+        sums[i, : size * size] = (block.T @ block).ravel()
+        sums[i, size * size :] = block.T @ target[group[active] == i]
+    totals = draws @ sums
+    normal, right = totals[:, : size * size].reshape(-1, size, size), totals[:, size * size :]
+    determined = _has_full_rank(normal)
+    solutions = np.full(right.shape, np.nan)
+    solutions[determined] = np.linalg.solve(normal[determined], right[determined][..., None])[..., 0]
+    return np.asarray(np.linalg.solve(triangle, solutions.T).T / scale)
 
 
-def _determined(normal: Array) -> npt.NDArray[np.bool_]:
-    """Which normal matrices have full rank; all at once where all have, which Cholesky's factors tell soonest."""
+def _has_full_rank(normal: Array) -> npt.NDArray[np.bool_]:
+    """Mask of the normal matrices of full rank; the Cholesky factors are the fast test for the case that all are."""
     with contextlib.suppress(np.linalg.LinAlgError):
         pivots = np.diagonal(np.linalg.cholesky(normal), axis1=1, axis2=2)
-        if (pivots**2 > _LEAST).all():
+        if (pivots**2 > _MIN_EIGENVALUE).all():
             return np.ones(len(normal), dtype=bool)
-    return np.asarray(np.linalg.eigvalsh(normal)[:, 0] > _LEAST)
+    return np.asarray(np.linalg.eigvalsh(normal)[:, 0] > _MIN_EIGENVALUE)
 
 
-def _one_by_one(fit: Fit, which: Places, drawn: Array, progress: Callable[[float], None] | None = None) -> Array:
-    found = np.full((drawn.shape[0], len(fit.estimates)), np.nan)
-    for i, counts in enumerate(drawn):
+def _refit_iteratively(
+    fit: Fit, group: RowIndices, draws: Array, progress: Callable[[float], None] | None = None
+) -> Array:
+    """Refits one by one, each started at the parameters of the original fit."""
+    values = np.full((draws.shape[0], len(fit.estimates)), np.nan)
+    for i, counts in enumerate(draws):
         if progress is not None:
-            progress(i / len(drawn))
-        times = counts[which]
-        kept = times > 0
+            progress(i / len(draws))
+        repeats = counts[group]
+        drawn = repeats > 0
         problem = dataclasses.replace(
             fit.problem,
-            data=fit.problem.data.rows(kept),
-            goal=fit.problem.goal[kept],
-            sides=fit.problem.sides[kept],
-            weights=fit.problem.weights[kept] * np.sqrt(times[kept]),
+            data=fit.problem.data.rows(drawn),
+            target=fit.problem.target[drawn],
+            censoring=fit.problem.censoring[drawn],
+            weights=fit.problem.weights[drawn] * np.sqrt(repeats[drawn]),
         )
         try:
-            found[i] = solve(problem, fit.loss, fit.values).values
+            values[i] = solve(problem, fit.loss, fit.values).values
         except (IdentificationError, np.linalg.LinAlgError):
             continue
-    return found
+    return values

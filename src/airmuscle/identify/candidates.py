@@ -1,4 +1,4 @@
-"""The laws that a comparison tries where none are named, each with values to start from."""
+"""Standard candidate laws of a model comparison, with initial values scaled by the data."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from ..characteristic.base import Characteristic
 from ..geometry.braid import Braid
 from ..recording import Recording
 
-_WIDE = 1e6
-"""Clamp [N] of a surface inside another law: beyond any muscle."""
-_ANGLE = 0.45
-"""Angle of the braid [rad] that searches start from; those of fluidic muscles lie within 0.15 of it."""
+_UNREACHED_FORCE = 1e6
+"""Upper clamp [N] of a surface inside another law: above the force of any muscle."""
+_INITIAL_BRAID_ANGLE = 0.45
+"""Initial braid angle [rad]; the angles of fluidic muscles lie within 0.15 of it."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Candidate:
-    """A law to be compared: its structure and start values, and the parameters that stay as they are."""
+    """A law to be compared: its structure and initial values, and the names of the parameters that are not fitted."""
 
     name: str
     law: Characteristic
@@ -42,70 +42,73 @@ class Candidate:
 
 @dataclasses.dataclass(frozen=True)
 class DataScales:
-    """What start values are scaled by."""
+    """Maxima of the data, by which initial values are scaled; all SI."""
 
     force: float
     pressure: float
     contraction: float
-    length: float | None
-    """Resting length [m] of the longest muscle, where all are known."""
-    lengths: int
-    """How many different ones."""
+    max_length: float | None
+    """Maximum resting length [m]; None unless every recording states one."""
+    length_count: int
+    """Number of different resting lengths; 0 unless every recording states one."""
 
     @classmethod
-    def of(cls, recordings: Sequence[Recording]) -> DataScales:
-        """Of all rows of all recordings."""
+    def from_recordings(cls, recordings: Sequence[Recording]) -> DataScales:
+        """The scales of all rows of all recordings."""
         force, pressure, contraction = (
             max(float(np.nanmax(run[name])) for run in recordings) for name in ("force", "pressure", "contraction")
         )
-        given = [run.constants.get("resting_length") for run in recordings]
-        known = {float(length) for length in given if length is not None}
-        everywhere = len(given) > 0 and None not in given
-        return cls(force, pressure, contraction, max(known) if everywhere else None, len(known) if everywhere else 0)
+        lengths = [run.constants.get("resting_length") for run in recordings]
+        known = {float(length) for length in lengths if length is not None}
+        complete = len(lengths) > 0 and None not in lengths
+        return cls(force, pressure, contraction, max(known) if complete else None, len(known) if complete else 0)
 
     @property
-    def radius(self) -> float:
-        """That of a braid which would pull the greatest force at the greatest pressure."""
-        area = math.pi * self.pressure * (3 / math.tan(_ANGLE) ** 2 - 1 / math.sin(_ANGLE) ** 2)
+    def braid_radius(self) -> float:
+        """Radius [m] of a braid that exerts the maximum force at the maximum pressure, limited to 0.2 to 100 mm."""
+        angle = _INITIAL_BRAID_ANGLE
+        area = math.pi * self.pressure * (3 / math.tan(angle) ** 2 - 1 / math.sin(angle) ** 2)
         return min(max(math.sqrt(max(self.force, 1.0) / area), 2e-4), 0.1)
 
 
 def standard_candidates(recordings: Sequence[Recording]) -> tuple[Candidate, ...]:
-    """Every law that can be started from data alone; those that need a length, where the recordings state it."""
-    sizes = DataScales.of(recordings)
-    found = [Candidate(f"surface of degree {n}", surface(n, 2 * sizes.force)) for n in range(1, 7)]
-    found += [_sarosi(sizes), _hunt(sizes)]
-    if sizes.length is not None:
-        found += _of_a_length(sizes, sizes.length)
-    if sizes.lengths > 1 and sizes.length is not None:
-        found += _families(sizes.length)
-    return tuple(found)
+    """Every law whose initial values follow from the data; laws with a length only if the recordings state one."""
+    scales = DataScales.from_recordings(recordings)
+    candidates = [Candidate(f"surface of degree {n}", blank_surface(n, 2 * scales.force)) for n in range(1, 7)]
+    candidates += [_sarosi2012(scales), _hunt2017(scales)]
+    if scales.max_length is not None:
+        candidates += _laws_with_length(scales, scales.max_length)
+    if scales.length_count > 1 and scales.max_length is not None:
+        candidates += _length_families(scales.max_length)
+    return tuple(candidates)
 
 
-def surface(degree: int, max_force: float = _WIDE) -> ContractileSurface:
-    """A surface without coefficients yet, and with no clamp among the points."""
+def blank_surface(degree: int, max_force: float = _UNREACHED_FORCE) -> ContractileSurface:
+    """A surface with coefficients of zero, clamped above all measured forces."""
     return ContractileSurface.blank(degree, max_force=max(max_force, 1.0))
 
 
-def _sarosi(sizes: DataScales) -> Candidate:
-    scale = sizes.force / 1500.0  # of a DMSP-20, whose measured map these values fit
-    by_pressure = scale * 6e5 / sizes.pressure
+def _sarosi2012(scales: DataScales) -> Candidate:
+    factor = scales.force / 1500.0  # relative to a DMSP-20, whose measured map these values fit
+    by_pressure = factor * 6e5 / scales.pressure
     return Candidate(
         "Sarosi2012",
-        Sarosi2012(1.2e-4 * by_pressure, 420 * scale, -57.0, -8.7e-3 * by_pressure, 2.7e-3 * by_pressure, -310 * scale),
+        Sarosi2012(
+            1.2e-4 * by_pressure, 420 * factor, -57.0, -8.7e-3 * by_pressure, 2.7e-3 * by_pressure, -310 * factor
+        ),
     )
 
 
-def _hunt(sizes: DataScales) -> Candidate:
-    scale = 450.0 / sizes.force  # the printed values are of a 10 mm muscle, which pulls about so much
-    greatest = min(max(sizes.contraction, 0.02), 0.5)
-    law = Hunt2017(greatest, span_by_force=0.331e-3 * scale * greatest / 0.17, by_force=1.23e3 * scale)
+def _hunt2017(scales: DataScales) -> Candidate:
+    factor = 450.0 / scales.force  # the published values are of a 10 mm muscle, with a maximum force of about 450 N
+    max_contraction = min(max(scales.contraction, 0.02), 0.5)
+    law = Hunt2017(max_contraction, span_by_force=0.331e-3 * factor * max_contraction / 0.17, by_force=1.23e3 * factor)
     return Candidate("Hunt2017", law)
 
 
-def _of_a_length(sizes: DataScales, length: float) -> list[Candidate]:
-    braid = Braid(sizes.radius, _ANGLE, length)
-    # The modulus of a DMSP-10 in terms of L/L_0; the wall's thickness only multiplies it, so that it stays.
+def _laws_with_length(scales: DataScales, length: float) -> list[Candidate]:
+    braid = Braid(scales.braid_radius, _INITIAL_BRAID_ANGLE, length)
+    # The modulus of a DMSP-10 in terms of L/L_0. The wall thickness only multiplies it and is therefore fixed.
     modulus = (74.085e6, -172.3e6 / length, 114.8e6 / length**2, -13.26e6 / length**3)
     return [
         Candidate("ChouHannaford1996", ChouHannaford1996(braid)),
@@ -116,14 +119,14 @@ def _of_a_length(sizes: DataScales, length: float) -> list[Candidate]:
     ]
 
 
-def _families(length: float) -> list[Candidate]:
-    found = []
+def _length_families(length: float) -> list[Candidate]:
+    candidates = []
     for degree in range(2, 6):
-        inner = surface(degree)
-        found.append(Candidate(f"effective length, degree {degree}", EffectiveLength(inner, length, 0.005)))
+        inner = blank_surface(degree)
+        candidates.append(Candidate(f"effective length, degree {degree}", EffectiveLength(inner, length, 0.005)))
         for change in range(1, min(degree, 3) + 1):
-            words = f"degree {degree}, its change {change}"
-            args = (inner, surface(change), length, length)
-            found.append(Candidate(f"term in 1/L0, {words}", InverseLength(*args)))
-            found.append(Candidate(f"term in ln L0, {words}", LogarithmicLength(*args)))
-    return found
+            degrees = f"degree {degree}, change of degree {change}"
+            args = (inner, blank_surface(change), length, length)
+            candidates.append(Candidate(f"term in 1/L0, {degrees}", InverseLength(*args)))
+            candidates.append(Candidate(f"term in ln L0, {degrees}", LogarithmicLength(*args)))
+    return candidates

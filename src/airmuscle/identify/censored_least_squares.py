@@ -1,4 +1,4 @@
-"""Least squares of a law linear in its parameters, where rows that were cut off count on one side only."""
+"""Censored least squares of a law that is linear in its parameters."""
 
 from __future__ import annotations
 
@@ -8,56 +8,56 @@ from ..core.arrays import Array
 from .problem import FitProblem
 
 RANK_TOLERANCE = 1e-10
-"""Singular values of the scaled design below this part of the greatest count as zero (chosen): a parameter that
-ten digits of the data do not determine is not determined."""
-_SLIGHT = 1e-4
-"""Weight of a row that is cut off and not contradicted, where nothing else decides (chosen)."""
-_PASSES = 200
-"""Most Newton steps with rows that are cut off; they end by themselves, and none that were seen took 30."""
+"""Relative tolerance below which a singular value of the scaled design matrix counts as zero (chosen): a parameter
+that is not determined within ten digits of the data is not determined."""
+_INACTIVE_WEIGHT = 1e-4
+"""Weight of an inactive censored row, where the uncensored rows alone do not determine all parameters (chosen)."""
+_MAX_ITERATIONS = 200
+"""Maximum number of Newton steps with censored rows; the iteration is finite and took fewer than 30 in all tests."""
 _RCOND = 1e-13
 
 
-def least_squares_of(problem: FitProblem, slopes: Array, constant: Array) -> Array:
-    """The x for which `slopes` (N, P) @ x + `constant` (N,) meets the goal best: at once, or on the rows that count.
+def solve_censored_least_squares(problem: FitProblem, jacobian: Array, constant: Array) -> Array:
+    """The parameters x that minimise the weighted residuals of `jacobian` (N, P) @ x + `constant` (N,).
 
-    Squares on one side of a bound make a convex sum, of which each pass is a Newton step, halved where the whole of it
-    goes too far. Where the measured rows alone leave parameters open, a law may fall below its bounds without end; of
-    all that are equally good, the one nearest to the bounds is taken.
+    A censored row contributes only where the law violates its bound. The one-sided squares form a convex sum; each
+    iteration is a Newton step, halved until the sum does not increase. Where the uncensored rows alone do not determine
+    all parameters, the minimum is not unique: of all equally good solutions the one closest to the bounds is returned.
     """
-    norms = np.linalg.norm(slopes, axis=0)
+    norms = np.linalg.norm(jacobian, axis=0)
     norms[norms == 0] = 1.0
-    matrix = problem.weights[:, None] * (slopes / norms)
-    goal = problem.weights * (problem.goal - constant)
-    if not problem.sides.any():
-        return np.asarray(np.linalg.lstsq(matrix, goal, rcond=_RCOND)[0] / norms)
-    uncounted = 0.0 if measured_alone_determine(problem, slopes) else _SLIGHT
+    matrix = problem.weights[:, None] * (jacobian / norms)
+    target = problem.weights * (problem.target - constant)
+    if not problem.censoring.any():
+        return np.asarray(np.linalg.lstsq(matrix, target, rcond=_RCOND)[0] / norms)
+    inactive = 0.0 if is_determined_without_censored(problem, jacobian) else _INACTIVE_WEIGHT
 
-    def shares(scaled: Array) -> Array:
-        return np.where(problem.counting(slopes @ (scaled / norms) + constant), 1.0, uncounted)
+    def row_weights(scaled: Array) -> Array:
+        return np.where(problem.active_rows(jacobian @ (scaled / norms) + constant), 1.0, inactive)
 
-    def squares(scaled: Array) -> float:
-        return float(np.sum((shares(scaled) * (matrix @ scaled - goal)) ** 2))
+    def sum_of_squares(scaled: Array) -> float:
+        return float(np.sum((row_weights(scaled) * (matrix @ scaled - target)) ** 2))
 
-    share, found = np.ones(len(goal)), np.zeros(len(norms))
-    for passes in range(_PASSES):
-        step = np.linalg.lstsq(share[:, None] * matrix, share * goal, rcond=_RCOND)[0] - found
-        if passes:
-            least = squares(found)
-            step = next((t * step for t in 0.5 ** np.arange(30) if squares(found + t * step) <= least), 0.0 * step)
-        found, previous = found + step, share
-        share = shares(found)
-        if np.array_equal(share, previous):
+    weights, x = np.ones(len(target)), np.zeros(len(norms))
+    for iteration in range(_MAX_ITERATIONS):
+        step = np.linalg.lstsq(weights[:, None] * matrix, weights * target, rcond=_RCOND)[0] - x
+        if iteration:
+            current = sum_of_squares(x)
+            step = next((t * step for t in 0.5 ** np.arange(30) if sum_of_squares(x + t * step) <= current), 0.0 * step)
+        x, previous = x + step, weights
+        weights = row_weights(x)
+        if np.array_equal(weights, previous):
             break
-    return np.asarray(found / norms)
+    return np.asarray(x / norms)
 
 
-def measured_alone_determine(problem: FitProblem, slopes: Array) -> bool:
-    """Whether all parameters are determined without the rows that are cut off."""
-    return not problem.sides.any() or measured_rank(problem, slopes) == slopes.shape[1]
+def is_determined_without_censored(problem: FitProblem, jacobian: Array) -> bool:
+    """Whether the uncensored rows alone determine all parameters."""
+    return not problem.censoring.any() or uncensored_rank(problem, jacobian) == jacobian.shape[1]
 
 
-def measured_rank(problem: FitProblem, slopes: Array) -> int:
-    """How many parameters the rows that are not cut off determine by themselves."""
-    matrix = (problem.weights[:, None] * slopes)[problem.sides == 0]
+def uncensored_rank(problem: FitProblem, jacobian: Array) -> int:
+    """Rank of the weighted design matrix of the uncensored rows."""
+    matrix = (problem.weights[:, None] * jacobian)[problem.censoring == 0]
     norms = np.linalg.norm(matrix, axis=0)
     return int(np.linalg.matrix_rank(matrix / np.where(norms > 0, norms, 1.0), rtol=RANK_TOLERANCE))

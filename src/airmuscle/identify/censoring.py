@@ -1,4 +1,4 @@
-"""Points that say only on which side of them the truth lies: a slack muscle, a sensor at its end."""
+"""Censored observations: rows at zero force (slack muscle) or at the limit of the force sensor."""
 
 from __future__ import annotations
 
@@ -12,50 +12,53 @@ import numpy.typing as npt
 from ..characteristic.base import Characteristic, ForceLaw
 from ..recording import Recording
 from ..recording.segment import estimate_sensors
-from .weights import deviations
+from .weights import sensor_deviations
 
 
 @dataclasses.dataclass(frozen=True)
 class Censoring:
-    """The range of force [N] within which a point was measured; at its ends, and beyond, it was cut off.
+    """The range of force [N] within which a row is a measured value; at its limits and beyond it is a bound.
 
-    A row at or below `min_force` says that the muscle, could it push, would give this much or less; a row at
-    or above `max_force` that it would give this much or more. A fit counts such a row only where the law
-    contradicts it. Give the resolution of the sensor as `min_force` where slack rows read a little more than 0.
+    A row at or below `min_force` states that the force of the law is at most `min_force` there, since a slack muscle
+    cannot push; a row at or above `max_force`, that it is at least `max_force`. Such a censored row contributes to the
+    fit only where the law violates this bound. Set `min_force` to the resolution of the sensor where slack rows read
+    slightly more than 0.
     """
 
     min_force: float = 0.0
     max_force: float = math.inf
 
-    def sides(self, force: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """By row: 0 measured, 1 cut off below (the truth is less), -1 cut off above."""
+    def signs(self, force: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """By row: 0 uncensored, 1 censored below (the true force is at most the limit), -1 censored above."""
         return (force <= self.min_force) * 1.0 - (force >= self.max_force) * 1.0
 
 
 UNCENSORED = Censoring(-math.inf, math.inf)
-"""Every row is fitted as it stands."""
+"""No censoring: every row is a measured value."""
 
 
-def censoring_of(law: Characteristic) -> Censoring:
-    """What a fit assumes: the range that a law in force is clamped to, from zero where it has none.
+def default_censoring(law: Characteristic) -> Censoring:
+    """The range of force to which a force law is clamped, from zero if it has no clamp.
 
-    Laws in contraction or pressure come from hung loads, of which zero is one like any other: nothing is cut off.
+    Laws that give contraction or pressure are measured with suspended loads, of which zero is an ordinary value: no
+    row is censored.
     """
     if not isinstance(law, ForceLaw):
         return UNCENSORED
     return Censoring(getattr(law, "min_force", 0.0), getattr(law, "max_force", math.inf))
 
 
-def within_sensor(censoring: Censoring, law: Characteristic, runs: Sequence[Recording]) -> Censoring:
-    """The range narrowed to what the force sensor of the runs can read, where it shows an end at which it is cut off.
+def narrow_to_sensor(censoring: Censoring, law: Characteristic, runs: Sequence[Recording]) -> Censoring:
+    """The range reduced to that of the force sensor, where the recordings show a limit at which it saturates.
 
-    Told only where all runs state their time and come from one rig; laws in force alone, which can use a bound.
+    Applies to force laws only. The limits are estimated only if every recording has a time column and all come from
+    one test rig; otherwise `censoring` is returned unchanged.
     """
     timed = bool(runs) and all("time" in run.columns and "force" in run.columns and len(run) for run in runs)
-    if not isinstance(law, ForceLaw) or not timed or deviations(runs, "force") is not None:
+    if not isinstance(law, ForceLaw) or not timed or sensor_deviations(runs, "force") is not None:
         return censoring
     sensor = estimate_sensors(runs)["force"]
-    near = 0.25 * sensor.resolution
+    margin = 0.25 * sensor.resolution
     return Censoring(
-        max(censoring.min_force, sensor.lower_limit + near), min(censoring.max_force, sensor.upper_limit - near)
+        max(censoring.min_force, sensor.lower_limit + margin), min(censoring.max_force, sensor.upper_limit - margin)
     )

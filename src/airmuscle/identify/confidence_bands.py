@@ -1,4 +1,4 @@
-"""How far a fitted law may be from the truth at a point, and a reading from both."""
+"""Confidence and prediction bands of a fitted law."""
 
 from __future__ import annotations
 
@@ -15,36 +15,42 @@ from .result import Fit
 
 
 class Band(NamedTuple):
-    """What the law gives at the points, unclamped, and the ends between which the truth lies at the level."""
+    """The fitted quantity at the points, not clamped, with the lower and upper limit of its band; shape (N,) each."""
 
     value: Array
     low: Array
     high: Array
 
 
-def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, reading: bool = False) -> Band:
-    """The band of a fit at points: value -+ t sqrt(g^T C g), in the quantity that the law gives.
+def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, prediction: bool = False) -> Band:
+    """The confidence band of a fit at points: value -+ t sqrt(g^T C g), in the fitted quantity [SI].
 
-    g is the gradient of the law by its parameters, C their covariance, t Student's quantile at N - P degrees of
-    freedom. With `reading` the noise of one more reading is added to the law's own uncertainty. `points` carry the
-    columns that the law asks for, and a resting length where it was fitted to several. A parameter on a bound is
-    taken as known. The errors must be independent: readings of one slow ramp are not, and `bootstrap` by runs tells
-    how much that is. Raises IdentificationError where no point was to spare.
+    g is the gradient of the law with respect to its parameters, C their covariance, t the quantile of Student's
+    distribution with N - P degrees of freedom. `prediction` gives the prediction band of one further observation: the
+    residual variance is added. `points` has the columns that the law takes as arguments, and the constant
+    `resting_length` if the law was fitted to several lengths. A parameter on a bound is treated as known.
+
+    The band assumes independent residuals. Rows of one slow ramp are correlated; `bootstrap` by runs shows the effect.
+    Raises IdentificationError without degrees of freedom, or for a level outside 0 to 1.
     """
     from scipy.special import stdtrit
 
-    spare = int(np.count_nonzero(fit.sides == 0)) - len(fit.estimates)
-    if spare <= 0 or not np.isfinite(fit.sigma):
-        raise IdentificationError(f"{fit.recording.origin}: as many points as parameters, so no band can be told.")
+    degrees_of_freedom = int(np.count_nonzero(fit.censoring == 0)) - len(fit.estimates)
+    if degrees_of_freedom <= 0 or not np.isfinite(fit.sigma):
+        raise IdentificationError(
+            f"{fit.recording.origin}: the band cannot be computed, because there are no more uncensored rows than "
+            "parameters. Measure more points."
+        )
     if not 0 < level < 1:
-        raise IdentificationError(f"the level of a band is {level:g}; it must lie between 0 and 1, as 0.95 does.")
-    columns = {name: points[name] for name in fit.direction.arguments}
-    rest = points.constants.get(RESTING_LENGTH)
-    if rest is not None:
-        columns[RESTING_LENGTH] = np.full(len(points), float(rest))
+        raise IdentificationError(f"the confidence level is {level:g}; it must lie between 0 and 1, e.g. 0.95.")
+    columns = {name: points[name] for name in fit.fitted_quantity.arguments}
+    length = points.constants.get(RESTING_LENGTH)
+    if length is not None:
+        columns[RESTING_LENGTH] = np.full(len(points), float(length))
     problem = dataclasses.replace(fit.problem, data=Recording(columns, points.origin))
-    value, slopes = problem.modelled(fit.values), problem.slopes(fit.values)
+    value, jacobian = problem.predict(fit.values), problem.jacobian(fit.values)
     covariance = np.nan_to_num(fit.covariance, nan=0.0)
-    variance = np.einsum("ni,ij,nj->n", slopes, covariance, slopes)
-    half = float(stdtrit(spare, 0.5 + level / 2)) * np.sqrt(np.maximum(variance, 0.0) + reading * fit.sigma**2)
+    variance = np.einsum("ni,ij,nj->n", jacobian, covariance, jacobian)
+    quantile = float(stdtrit(degrees_of_freedom, 0.5 + level / 2))
+    half = quantile * np.sqrt(np.maximum(variance, 0.0) + prediction * fit.sigma**2)
     return Band(value, value - half, value + half)

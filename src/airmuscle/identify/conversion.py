@@ -1,4 +1,4 @@
-"""One model into another: `convert`, and how far the two are apart."""
+"""Conversion of one characteristic into another: least-squares approximation and its error."""
 
 from __future__ import annotations
 
@@ -15,86 +15,91 @@ from ..recording import Recording
 from .censoring import UNCENSORED
 from .static_fit import fit
 
-POINTS = 24
-"""Pressures and contractions that the other law is fitted to; one more of each judges it."""
+GRID_POINTS = 24
+"""Grid points in pressure and in contraction for the fit; the error is evaluated on a grid with one more of each."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ModelConversion:
-    """The other model with the parameters that bring it nearest, and its errors in force over the validity range."""
+    """The fitted target model, and its error in force over the validity range."""
 
     model: Characteristic
-    rms: float
-    """Root mean square difference [N], at points between those of the fit."""
+    rmse: float
+    """Root mean square error [N], at points between those of the fit."""
     max_error: float
-    """The greatest difference [N], other less first."""
-    pressure: float
-    """Where it stands [Pa]."""
-    contraction: float
-    """Where it stands [1]."""
-    judged: Recording
-    """The points between, where the first law pulls, with its force and the `error` of the other [N]."""
+    """Error of maximum magnitude [N], target minus source."""
+    max_error_pressure: float
+    """Gauge pressure [Pa] of the maximum error."""
+    max_error_contraction: float
+    """Contraction [1] of the maximum error."""
+    check_points: Recording
+    """The points where the error was evaluated: force of the source law [N], and `error` of the target [N]."""
 
     def __str__(self) -> str:
         return (
-            f"{type(self.model).__name__}: rms {self.rms:.4g} N, greatest {self.max_error:.4g} N at "
-            f"{self.pressure / 1e3:.4g} kPa and {self.contraction:.2%}"
+            f"{type(self.model).__name__}: rms error {self.rmse:.4g} N, maximum error {self.max_error:.4g} N at "
+            f"{self.max_error_pressure / 1e3:.4g} kPa and {self.max_error_contraction:.2%}"
         )
 
 
 def convert(characteristic: Characteristic, other: Characteristic, validity_range: ValidityRange) -> ModelConversion:
-    """The parameters of `other` that meet `characteristic` best on a validity range, where it pulls, and the error that stays.
+    """Approximate `characteristic` by the model of `other` on a validity range, by least squares in force.
 
-    `other` gives the structure and the start values, as in `fit`. Raises IdentificationError where the validity range does not
-    determine it, NoSolution where the first law pulls nowhere on it.
+    `other` gives the structure and the initial values, as in `fit`. Only points where `characteristic` gives a positive
+    force are used. Raises IdentificationError where the validity range does not determine the parameters of `other`,
+    SolveError where `characteristic` gives no positive force on it.
     """
-    given = on_grid(characteristic, validity_range, POINTS)
+    data = sample_on_grid(characteristic, validity_range, GRID_POINTS)
     law: Any = other
-    if hasattr(law, "max_force") and law.max_force <= float(given["force"].max()):
-        law = dataclasses.replace(law, max_force=2.0 * float(given["force"].max()))
-    model = fit(law, given, censoring=UNCENSORED).model
-    judged = on_grid(characteristic, validity_range, POINTS + 1)
-    difference = _forces(model, judged["pressure"], judged["contraction"]) - judged["force"]
-    lacking = np.flatnonzero(~np.isfinite(difference))
-    if lacking.size:
-        p, c = judged["pressure"][lacking[0]], judged["contraction"][lacking[0]]
+    if hasattr(law, "max_force") and law.max_force <= float(data["force"].max()):
+        law = dataclasses.replace(law, max_force=2.0 * float(data["force"].max()))
+    model = fit(law, data, censoring=UNCENSORED).model
+    check_points = sample_on_grid(characteristic, validity_range, GRID_POINTS + 1)
+    difference = _evaluate_force(model, check_points["pressure"], check_points["contraction"]) - check_points["force"]
+    missing = np.flatnonzero(~np.isfinite(difference))
+    if missing.size:
+        p, c = check_points["pressure"][missing[0]], check_points["contraction"][missing[0]]
         raise IdentificationError(
-            f"{type(other).__name__}, brought as near as it comes, has no force at {lacking.size} of {len(judged)} "
-            f"points where {type(characteristic).__name__} pulls, the first at {p / 1e3:.4g} kPa and {c:.2%}; choose a "
-            "smaller validity range."
+            f"the fitted {type(other).__name__} has no force at {missing.size} of {len(check_points)} points where "
+            f"{type(characteristic).__name__} has one, the first at {p / 1e3:.4g} kPa and {c:.2%}. Choose a smaller "
+            "validity range."
         )
-    at = int(np.argmax(np.abs(difference)))
+    worst = int(np.argmax(np.abs(difference)))
     return ModelConversion(
-        model, float(np.sqrt(np.mean(difference**2))), float(difference[at]), float(judged["pressure"][at]),
-        float(judged["contraction"][at]), judged.with_columns(error=difference),
+        model, float(np.sqrt(np.mean(difference**2))), float(difference[worst]),
+        float(check_points["pressure"][worst]), float(check_points["contraction"][worst]),
+        check_points.with_columns(error=difference),
     )  # fmt: skip
 
 
-def on_grid(law: Characteristic, validity_range: ValidityRange, count: int) -> Recording:
-    """The forces of a law on a grid of the validity range, denser towards its edges; points without force or slack left out.
+def sample_on_grid(law: Characteristic, validity_range: ValidityRange, count: int) -> Recording:
+    """The forces of a law on a Chebyshev-Lobatto grid of the validity range, `count` points in each direction.
 
-    Raises NoSolution where none is left.
+    Points without a positive force are omitted. Raises SolveError where no point is left.
     """
-    places = (1 - np.cos(np.pi * np.arange(count) / (count - 1))) / 2
+    nodes = (1 - np.cos(np.pi * np.arange(count) / (count - 1))) / 2
     (p_low, p_high), (c_low, c_high) = validity_range.pressure, validity_range.contraction
-    pressure, contraction = np.meshgrid(p_low + (p_high - p_low) * places, c_low + (c_high - c_low) * places)
+    pressure, contraction = np.meshgrid(p_low + (p_high - p_low) * nodes, c_low + (c_high - c_low) * nodes)
     p, c = pressure.ravel(), contraction.ravel()
-    force = _forces(law, p, c)
+    force = _evaluate_force(law, p, c)
     pulls = force > 0
     if not pulls.any():
-        raise SolveError(f"{type(law).__name__} pulls nowhere on the validity range: nothing to convert.")
+        raise SolveError(
+            f"{type(law).__name__} gives no positive force on the validity range, so it cannot be converted. Choose "
+            "another validity range."
+        )
     columns = {"pressure": p[pulls], "contraction": c[pulls], "force": force[pulls]}
     return Recording(columns, type(law).__name__)
 
 
-def _forces(law: Characteristic, pressure: Array, contraction: Array) -> Array:
-    """Forces [N]; NaN where the law has none, found by halving the points."""
+def _evaluate_force(law: Characteristic, pressure: Array, contraction: Array) -> Array:
+    """Forces [N]; NaN where the law has none. Such points are isolated by bisection of the arrays."""
     try:
-        found = np.asarray(law.force(pressure, contraction), dtype=float)
+        force = np.asarray(law.force(pressure, contraction), dtype=float)
     except SolveError:
         if pressure.size == 1:
             return np.array([np.nan])
         half = pressure.size // 2
-        parts = (_forces(law, pressure[s], contraction[s]) for s in (slice(None, half), slice(half, None)))
+        parts = (_evaluate_force(law, pressure[s], contraction[s]) for s in (slice(None, half), slice(half, None)))
         return np.concatenate(list(parts))
-    return np.asarray(found + np.zeros(pressure.size))
+    return np.asarray(force + np.zeros(pressure.size))

@@ -1,4 +1,4 @@
-"""The correlation index by which the Kosice papers judge a model against measurements."""
+"""Correlation index IK, the measure of fit in the papers from Košice."""
 
 from __future__ import annotations
 
@@ -13,47 +13,47 @@ from ..core.errors import IdentificationError
 
 @dataclasses.dataclass(frozen=True)
 class CorrelationIndex:
-    """IK = sqrt(1 - SSE/SST), SSE = Sum (k_i - y_i)^2, SST = Sum (mean(y) - y_i)^2; k_i model, y_i measured.
+    """IK = sqrt(1 - SSE/SST), SSE = Sum (k_i - y_i)^2, SST = Sum (mean(y) - y_i)^2; k_i modelled, y_i measured.
 
-    Where SSE > SST the mean of the measurements is a better model than the model, and IK does not exist;
-    `explained` = 1 - SSE/SST then says how far off it is.
-    Reference: Borzikova et al., the index beside their plane curves.
+    Where SSE > SST the model is worse than the mean of the measurements and IK is undefined; `r_squared` is then
+    negative.
+    Reference: Borzíková et al., the index given next to their plane curves.
     """
 
-    explained: float
-    """1 - SSE/SST [1], at most 1; this is R2."""
+    r_squared: float
+    """Coefficient of determination R^2 = 1 - SSE/SST [1], at most 1."""
 
     @property
-    def exists(self) -> bool:
-        """Whether there is an index at all."""
-        return self.explained >= 0.0
+    def is_defined(self) -> bool:
+        """Whether IK exists, that is R^2 >= 0."""
+        return self.r_squared >= 0.0
 
     @property
     def value(self) -> float | None:
-        """IK [1], or None where it does not exist; never NaN."""
-        return math.sqrt(self.explained) if self.exists else None
+        """IK [1], or None where it is undefined; never NaN."""
+        return math.sqrt(self.r_squared) if self.is_defined else None
 
     def __str__(self) -> str:
         if self.value is None:
-            return f"no index: 1 - SSE/SST = {self.explained:.4g} is negative"
+            return f"undefined, because 1 - SSE/SST = {self.r_squared:.4g} is negative"
         return f"IK = {self.value:.4f}"
 
 
 def correlation_index(measured: npt.ArrayLike, modelled: npt.ArrayLike) -> CorrelationIndex:
-    """The index of modelled against measured values, shape (N,) each and in one unit.
+    """The correlation index of modelled and measured values, shape (N,) each, in the same unit.
 
-    Raises IdentificationError where a value is not finite, the shapes differ, or the measurements do not
-    vary.
+    Raises IdentificationError where a value is not finite, the shapes differ, there are fewer than two values, or the
+    measured values do not vary.
     """
     y, k = np.asarray(measured, dtype=float), np.asarray(modelled, dtype=float)
     if y.shape != k.shape or y.size < 2:
         raise IdentificationError(
-            f"correlation index: {y.size} measured and {k.size} modelled values; as many of each, and two at the "
-            "least, are wanted."
+            f"correlation index: there are {y.size} measured and {k.size} modelled values; give the same number of "
+            "each, at least two."
         )
     if not (np.isfinite(y).all() and np.isfinite(k).all()):
-        raise IdentificationError("correlation index: a value is not finite; drop such rows first.")
+        raise IdentificationError("correlation index: a value is not finite. Remove such rows first.")
     total = float(np.sum((y.mean() - y) ** 2))
     if total == 0.0:
-        raise IdentificationError("correlation index: all measured values are equal, so it is not defined.")
+        raise IdentificationError("correlation index: undefined, because all measured values are equal.")
     return CorrelationIndex(1.0 - float(np.sum((k - y) ** 2)) / total)

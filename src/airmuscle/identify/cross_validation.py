@@ -1,7 +1,7 @@
-"""What a cross-validation leaves out at once: a whole run, level or specimen, never random rows.
+"""Cross-validation splits by run, level, specimen or block.
 
-Neighbouring rows of one run repeat each other. A law that was fitted to some of them meets the others, and
-learns nothing of the next run from that.
+Rows are left out in groups, never at random: neighbouring rows of one run are correlated, so that a law fitted to some
+of them also fits the others, which says nothing about its error on a new run.
 """
 
 from __future__ import annotations
@@ -18,30 +18,31 @@ from ..core.errors import IdentificationError, ParameterError
 from ..recording import Recording
 
 Labels = npt.NDArray[np.str_]
-MOST = 12
-"""Most parts that are made; more are put together, neighbours first (chosen: each costs a fit a law)."""
-KEPT = ""
-"""Name of the rows that are never left out."""
+MAX_LEVELS = 12
+"""Maximum number of levels; beyond it neighbouring levels are merged (chosen: every level costs a fit of each law)."""
+ALWAYS_FITTED = ""
+"""Label of the rows that are in every training set."""
 
 
 class GroupSplit(abc.ABC):
-    """How the rows of recordings fall into parts, each of which is left out in turn."""
+    """A division of the rows of recordings into groups; each group is left out in turn (one fold)."""
 
-    word: ClassVar[str]
+    group_name: ClassVar[str]
+    """Noun for one group, used in reports."""
     purpose: ClassVar[str]
-    """What a law is for that does well on parts like these, as a recommendation says it."""
+    """The use for which a low error on such groups recommends a law, as a phrase for reports."""
 
     @abc.abstractmethod
     def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
-        """The name of the part that each row belongs to, one array a recording; KEPT where it is in every fit."""
+        """The group of each row, one array for each recording; ALWAYS_FITTED for rows that are never left out."""
 
 
 @dataclasses.dataclass(frozen=True)
 class RunSplit(GroupSplit):
-    """Each recording is a part."""
+    """Each recording is a group."""
 
-    word: ClassVar[str] = "run"
-    purpose: ClassVar[str] = "another run of the kind that was measured"
+    group_name: ClassVar[str] = "run"
+    purpose: ClassVar[str] = "further runs of the same kind"
 
     def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
         names = [run.origin for run in recordings]
@@ -51,15 +52,15 @@ class RunSplit(GroupSplit):
 
 @dataclasses.dataclass(frozen=True)
 class SpecimenSplit(GroupSplit):
-    """Each muscle is a part, told by the constant `specimen`, or else by its resting length."""
+    """Each muscle is a group, identified by the constant `specimen`, or else by its resting length."""
 
-    word: ClassVar[str] = "specimen"
-    purpose: ClassVar[str] = "a muscle of the type that was not measured"
+    group_name: ClassVar[str] = "specimen"
+    purpose: ClassVar[str] = "other muscles of the same type"
 
     def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
-        return [np.full(len(run), self._name(run)) for run in recordings]
+        return [np.full(len(run), self._specimen_name(run)) for run in recordings]
 
-    def _name(self, run: Recording) -> str:
+    def _specimen_name(self, run: Recording) -> str:
         if "specimen" in run.constants:
             return str(run.constants["specimen"])
         length = run.constants.get("resting_length")
@@ -68,83 +69,89 @@ class SpecimenSplit(GroupSplit):
 
 @dataclasses.dataclass(frozen=True)
 class LevelSplit(GroupSplit):
-    """Each level at which a quantity was held is a part; values closer than `gap` of their range are one level."""
+    """Each level of a quantity is a group; values closer than `min_gap` times their range belong to one level."""
 
     quantity: str
-    gap: float = 0.02
-    word: ClassVar[str] = "level"
-    purpose: ClassVar[str] = "levels between those measured, and one step beyond"
+    min_gap: float = 0.02
+    group_name: ClassVar[str] = "level"
+    purpose: ClassVar[str] = "levels between the measured ones and one step beyond"
 
     def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
         values = np.concatenate([run[self.quantity] for run in recordings])
         ordered = np.sort(values[np.isfinite(values)])
         span = float(np.ptp(ordered)) if ordered.size else 0.0
-        ends = np.flatnonzero(np.diff(ordered) > self.gap * span) + 1
+        ends = np.flatnonzero(np.diff(ordered) > self.min_gap * span) + 1
         groups = np.split(ordered, ends if span > 0 else [])
-        middles = np.array([float(np.median(group)) for group in groups])
-        while middles.size > MOST:
-            nearest = int(np.argmin(np.diff(middles)))
-            middles = np.delete(middles, nearest)
-        edges = (middles[1:] + middles[:-1]) / 2
-        names = np.array([f"{self.quantity} {middle:.4g}" for middle in middles])
+        centres = np.array([float(np.median(group)) for group in groups])
+        while centres.size > MAX_LEVELS:
+            nearest = int(np.argmin(np.diff(centres)))
+            centres = np.delete(centres, nearest)
+        edges = (centres[1:] + centres[:-1]) / 2
+        names = np.array([f"{self.quantity} {centre:.4g}" for centre in centres])
         return [names[np.searchsorted(edges, run[self.quantity])] for run in recordings]
 
 
 @dataclasses.dataclass(frozen=True)
 class BlockSplit(GroupSplit):
-    """Stretches of a quantity within every run, so that each run and each muscle has a say in every fit.
+    """Blocks of a quantity within every run, so that every run and every muscle is part of each training set.
 
-    A run's range is cut into `2 count` stretches; every `count`-th belongs to one part, in the next run one further.
-    The first and the last stay in every fit: what is asked lies between them. Rows of a stretch repeat each other, and
-    so are left out together (Roberts et al., Ecography 40:913 (2017)).
+    The range of a run is divided into `2 folds` intervals. Every `folds`-th interval belongs to one group, shifted by
+    one interval from run to run. The first and the last interval are in every training set, so that a law is evaluated
+    by interpolation only. The rows of an interval are correlated and are therefore left out together (Roberts et al.,
+    Ecography 40:913 (2017)).
     """
 
     quantity: str = "pressure"
-    count: int = 5
-    word: ClassVar[str] = "block"
-    purpose: ClassVar[str] = "the muscles and contractions that were measured, within their range"
+    folds: int = 5
+    group_name: ClassVar[str] = "block"
+    purpose: ClassVar[str] = "the measured muscles and contractions, within the measured range"
 
     def __post_init__(self) -> None:
-        if self.count < 2:
-            raise ParameterError(
-                f"BlockSplit.count is {self.count}; there must be 2 or more parts to leave out in turn."
-            )
+        if self.folds < 2:
+            raise ParameterError(f"BlockSplit.folds is {self.folds}; it must be 2 or more.")
 
     def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
-        names = np.array([f"block {k + 1}" for k in range(self.count)])
-        found = []
+        names = np.array([f"block {k + 1}" for k in range(self.folds)])
+        labels = []
         for i, run in enumerate(recordings):
-            stretch = self._stretch(run[self.quantity])
-            inside = (stretch > 0) & (stretch < 2 * self.count - 1)
-            found.append(np.where(inside, names[(i + stretch) % self.count], KEPT))
-        return found
+            interval = self._interval_index(run[self.quantity])
+            inside = (interval > 0) & (interval < 2 * self.folds - 1)
+            labels.append(np.where(inside, names[(i + interval) % self.folds], ALWAYS_FITTED))
+        return labels
 
-    def _stretch(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.intp]:
+    def _interval_index(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.intp]:
         low, high = float(np.nanmin(values)), float(np.nanmax(values))
-        shares = (np.nan_to_num(values, nan=low) - low) / (high - low if high > low else 1.0)
-        return np.minimum((2 * self.count * shares).astype(np.intp), 2 * self.count - 1)
+        fractions = (np.nan_to_num(values, nan=low) - low) / (high - low if high > low else 1.0)
+        return np.minimum((2 * self.folds * fractions).astype(np.intp), 2 * self.folds - 1)
 
 
-def parts(recordings: Sequence[Recording], leave_out: GroupSplit) -> tuple[list[Labels], list[str]]:
-    """Labels by row and the parts in their order. Raises IdentificationError where there are fewer than two."""
+def label_folds(recordings: Sequence[Recording], leave_out: GroupSplit) -> tuple[list[Labels], list[str]]:
+    """The label of each row, and the names of the folds in order.
+
+    Raises IdentificationError where there are fewer than two groups.
+    """
     labels = leave_out.labels(recordings)
     names = list(dict.fromkeys(str(name) for array in labels for name in dict.fromkeys(array.tolist())))
-    names = [name for name in names if name != KEPT]
+    names = [name for name in names if name != ALWAYS_FITTED]
     if len(names) < 2:
         raise IdentificationError(
-            f"{recordings[0].origin if recordings else 'no recording'}: all rows are of one {leave_out.word}, so none "
-            "can be left out. Give more runs, or leave out Levels('contraction') or Levels('pressure')."
+            f"{recordings[0].origin if recordings else 'no recording'}: cross-validation needs two groups or more, but "
+            f"all rows belong to one {leave_out.group_name}. Give more runs, or leave out LevelSplit('contraction') or "
+            "LevelSplit('pressure')."
         )
     return labels, names
 
 
-def natural(recordings: Sequence[Recording]) -> GroupSplit:
-    """SpecimenSplit where there are three or more, else runs, else levels of contraction, else of pressure."""
-    choices: tuple[GroupSplit, ...] = (SpecimenSplit(), RunSplit(), LevelSplit("contraction"), LevelSplit("pressure"))
-    for choice in choices:
-        if len({name for array in choice.labels(recordings) for name in array.tolist()}) >= 3:
-            return choice
+def default_split(recordings: Sequence[Recording]) -> GroupSplit:
+    """The first split with three groups or more: specimens, runs, levels of contraction, levels of pressure.
+
+    Raises IdentificationError where there is none.
+    """
+    splits: tuple[GroupSplit, ...] = (SpecimenSplit(), RunSplit(), LevelSplit("contraction"), LevelSplit("pressure"))
+    for split in splits:
+        if len({name for array in split.labels(recordings) for name in array.tolist()}) >= 3:
+            return split
     raise IdentificationError(
-        "Fewer than three specimens, runs, levels of contraction and levels of pressure: laws cannot be compared by "
-        "what they leave out. Measure at more levels."
+        "cross-validation needs three groups or more, but there are fewer than three specimens, runs, levels of "
+        "contraction and levels of pressure. Measure at more levels."
     )

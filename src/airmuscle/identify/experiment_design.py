@@ -1,8 +1,8 @@
-"""Which static runs to measure: a D-optimal design over the runs that a bench can do.
+"""D-optimal design of static experiments: isobaric and isometric runs within the limits of a test rig.
 
-The information of a design is M = Sum J^T J / sigma^2, J the derivatives of what the law gives by its free parameters
-at every point of every run. D-optimal runs make det M greatest, so the volume of the confidence ellipsoid least; they
-are chosen one by one and then exchanged while that helps.
+The information matrix of a design is M = Sum J^T J / sigma^2, where J holds the derivatives of the quantity that the
+law gives with respect to its free parameters, at every point of every run. D-optimal runs maximise det M, and so
+minimise the volume of the confidence ellipsoid. They are selected greedily and then improved by exchanges.
 Reference: Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
 """
 
@@ -20,20 +20,20 @@ from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
 from ..recording import Recording
 from .censoring import UNCENSORED
-from .dynamic.identifiability import EXACT, Undetermined, identifiable
+from .identifiability import EXACT_RANK_TOLERANCE, UndeterminedCombination, analyse_identifiability
 from .problem import make_problem
 
-LEVELS = 13
-"""Levels of pressure, and of contraction, among the candidates; chosen."""
-FEWEST = 3
-"""A candidate with fewer points within the limits is no run; chosen."""
-RIDGE = 1e-9
-"""Information that every direction has before the first run, so that runs can be compared one by one."""
+LEVEL_COUNT = 13
+"""Levels of pressure, and of contraction, of the candidate runs; chosen."""
+MIN_POINTS = 3
+"""Minimum number of feasible points of a run; chosen."""
+REGULARISATION = 1e-9
+"""Relative information added in every direction, so that designs of fewer runs than parameters can be compared."""
 
 
 @dataclasses.dataclass(frozen=True)
 class BenchLimits:
-    """What a bench can do: the validity range of gauge pressure [Pa] and contraction, the greatest tension [N]."""
+    """Limits of a test rig: the range of gauge pressure [Pa] and contraction [1], and the maximum force [N]."""
 
     validity_range: ValidityRange
     max_force: float
@@ -41,46 +41,51 @@ class BenchLimits:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PlannedRun:
-    """A static run: one quantity held at a level while the other is swept, with the tension to expect."""
+    """A static run: `constant` names the quantity that is kept constant while the other is swept.
 
-    held: str
+    The columns are gauge pressure [Pa], contraction [1] and the expected force [N], shape (points,) each.
+    """
+
+    constant: str
     pressure: Array
     contraction: Array
     force: Array
 
     @property
     def swept(self) -> str:
-        return "contraction" if self.held == "pressure" else "pressure"
+        """The quantity that is swept, `contraction` or `pressure`."""
+        return "contraction" if self.constant == "pressure" else "pressure"
 
     @property
     def level(self) -> float:
-        return float(getattr(self, self.held)[0])
+        """The value of the constant quantity [SI]."""
+        return float(getattr(self, self.constant)[0])
 
     @property
-    def ends(self) -> tuple[float, float]:
-        """First and last value of what is swept."""
+    def sweep_limits(self) -> tuple[float, float]:
+        """First and last value of the swept quantity [SI]."""
         values = getattr(self, self.swept)
         return float(values[0]), float(values[-1])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Plan:
-    """The runs to measure, in rising order of what is held, and what they will tell."""
+class ExperimentPlan:
+    """The runs to measure, sorted by the constant quantity and its level, and the expected precision."""
 
     runs: tuple[PlannedRun, ...]
     names: tuple[str, ...]
     values: Array
-    deviations: Array
-    """Standard deviation to expect of every parameter."""
-    gain: float
-    """Root of det M per parameter over that of as many runs spread evenly: how much information a run carries."""
-    undetermined: tuple[Undetermined, ...]
+    standard_errors: Array
+    """Expected standard error of every parameter [SI]."""
+    relative_d_efficiency: float
+    """(det M / det M_0)^(1/P), M_0 the information matrix of the same number of evenly spaced runs."""
+    undetermined: tuple[UndeterminedCombination, ...]
 
     def recording(self) -> Recording:
-        """The points in order, to be followed on the bench: run, pressure, contraction, and the force to expect."""
+        """The points in order, as a set-point list for the test rig: run, pressure, contraction, expected force."""
         numbers = np.concatenate([np.full(r.force.size, i + 1.0) for i, r in enumerate(self.runs)])
         columns = {n: np.concatenate([getattr(r, n) for r in self.runs]) for n in ("pressure", "contraction", "force")}
-        return Recording({"run": numbers, **columns}, "plan of static runs; force is what the start of the fit expects")
+        return Recording({"run": numbers, **columns}, "plan of static runs; force is that of the initial parameters")
 
 
 def optimal_design(
@@ -91,118 +96,128 @@ def optimal_design(
     points: int = 15,
     sigma: float = 1.0,
     fixed: Collection[str] = (),
-) -> Plan:
-    """The D-optimal choice of isobaric and isometric runs for fitting a characteristic, started from its own values.
+) -> ExperimentPlan:
+    """The D-optimal isobaric and isometric runs for fitting a characteristic, linearised at its present parameters.
 
-    points  of a run, evenly spread over what is swept
-    sigma   standard deviation of one reading, in the unit of what the law gives
-    fixed   parameters that the fit will leave alone
+    runs    number of runs
+    points  points of a run, evenly spaced over the swept quantity
+    sigma   standard deviation of one observation, in the unit of the quantity that the law gives
+    fixed   parameters that will not be fitted
 
-    Raises IdentificationError where the bench leaves no runs, ParameterError for limits that make no sense.
+    Raises IdentificationError where no run is feasible, ParameterError for invalid arguments.
     """
-    if runs < 1 or points < FEWEST or not sigma > 0 or not bench.max_force > 0:
+    if runs < 1 or points < MIN_POINTS or not sigma > 0 or not bench.max_force > 0:
         raise ParameterError(
-            f"plan needs one run or more of {FEWEST} points or more, sigma and greatest force above 0."
+            f"optimal_design needs runs >= 1, points >= {MIN_POINTS}, sigma > 0 and a maximum force > 0; given are "
+            f"{runs}, {points}, {sigma:g} and {bench.max_force:g}."
         )
-    candidates = possible_runs(characteristic, bench, points)
-    names, values, designs = _designs(characteristic, candidates, fixed)
-    information = np.array([design.T @ design for design in designs])
-    chosen = _exchanged(information, _greedy(information, runs))
-    chosen.sort(key=lambda i: (candidates[i].held != "pressure", candidates[i].level))
+    candidates = candidate_runs(characteristic, bench, points)
+    names, values, jacobians = _jacobians(characteristic, candidates, fixed)
+    information = np.array([jacobian.T @ jacobian for jacobian in jacobians])
+    selected = _exchange(information, _select_greedily(information, runs))
+    selected.sort(key=lambda i: (candidates[i].constant != "pressure", candidates[i].level))
     even = np.unique(np.linspace(0, len(candidates) - 1, runs).astype(int))
     difference = (
-        _logarithm(information, chosen) - _logarithm(information, even) + values.size * np.log(even.size / runs)
+        _log_determinant(information, selected)
+        - _log_determinant(information, even)
+        + values.size * np.log(even.size / runs)
     )
     scales = np.where(values == 0, 1.0, np.abs(values))
-    found = identifiable(np.vstack([designs[i] for i in chosen]) / scales / sigma, names, scales, tolerance=EXACT)
-    deviations = np.sqrt(np.diag(found.inverse())) * scales
-    gain = float(np.exp(difference / values.size))
-    return Plan(tuple(candidates[i] for i in chosen), names, values, deviations, gain, found.undetermined)
+    scaled = np.vstack([jacobians[i] for i in selected]) / scales / sigma
+    analysis = analyse_identifiability(scaled, names, scales, tolerance=EXACT_RANK_TOLERANCE)
+    standard_errors = np.sqrt(np.diag(analysis.inverse())) * scales
+    efficiency = float(np.exp(difference / values.size))
+    chosen_runs = tuple(candidates[i] for i in selected)
+    return ExperimentPlan(chosen_runs, names, values, standard_errors, efficiency, analysis.undetermined)
 
 
-def possible_runs(characteristic: Characteristic, bench: BenchLimits, points: int) -> list[PlannedRun]:
-    """Isobaric and isometric runs on even levels, each cut to where the tension is positive and within the limit."""
-    sides = {"pressure": bench.validity_range.pressure, "contraction": bench.validity_range.contraction}
-    found = []
-    for held, swept in (("pressure", "contraction"), ("contraction", "pressure")):
-        (low, high), (first, last) = sides[held], sides[swept]
-        for level in np.linspace(low, high, LEVELS):
-            found += _run(characteristic, bench, held, float(level), np.linspace(first, last, 201), points)
-    if not found:
+def candidate_runs(characteristic: Characteristic, bench: BenchLimits, points: int) -> list[PlannedRun]:
+    """Isobaric and isometric runs on evenly spaced levels, each limited to forces above 0 and up to the maximum."""
+    limits = {"pressure": bench.validity_range.pressure, "contraction": bench.validity_range.contraction}
+    runs = []
+    for constant, swept in (("pressure", "contraction"), ("contraction", "pressure")):
+        (low, high), (first, last) = limits[constant], limits[swept]
+        for level in np.linspace(low, high, LEVEL_COUNT):
+            runs += _feasible_run(characteristic, bench, constant, float(level), np.linspace(first, last, 201), points)
+    if not runs:
         raise IdentificationError(
-            f"{type(characteristic).__name__} pulls nowhere between 0 and {bench.max_force:g} N within the "
-            "bench's pressures and contractions. Widen the limits, or look at the units."
+            f"no run is feasible: {type(characteristic).__name__} gives no force between 0 and {bench.max_force:g} N "
+            "within the pressures and contractions of the test rig. Widen the limits, or check the units."
         )
-    return found
+    return runs
 
 
-def _run(
-    law: Characteristic, bench: BenchLimits, held: str, level: float, sweep: Array, points: int
+def _feasible_run(
+    law: Characteristic, bench: BenchLimits, constant: str, level: float, sweep: Array, points: int
 ) -> list[PlannedRun]:
-    allowed = sweep[_allowed(law, bench, held, level, sweep)]
-    if allowed.size < FEWEST:
+    feasible = sweep[_is_feasible(law, bench, constant, level, sweep)]
+    if feasible.size < MIN_POINTS:
         return []
-    values = np.linspace(allowed[0], allowed[-1], points)
-    values = values[_allowed(law, bench, held, level, values)]
-    if values.size < FEWEST:
+    values = np.linspace(feasible[0], feasible[-1], points)
+    values = values[_is_feasible(law, bench, constant, level, values)]
+    if values.size < MIN_POINTS:
         return []
-    pressure, contraction = _places(held, level, values)
-    return [PlannedRun(held, pressure, contraction, np.asarray(law.force(pressure, contraction), dtype=float))]
+    pressure, contraction = _coordinates(constant, level, values)
+    return [PlannedRun(constant, pressure, contraction, np.asarray(law.force(pressure, contraction), dtype=float))]
 
 
-def _allowed(law: Characteristic, bench: BenchLimits, held: str, level: float, values: Array) -> npt.NDArray[np.bool_]:
-    force = np.asarray(law.force(*_places(held, level, values)), dtype=float)
+def _is_feasible(
+    law: Characteristic, bench: BenchLimits, constant: str, level: float, values: Array
+) -> npt.NDArray[np.bool_]:
+    force = np.asarray(law.force(*_coordinates(constant, level, values)), dtype=float)
     return np.asarray(np.isfinite(force) & (force > 0) & (force <= bench.max_force))
 
 
-def _places(held: str, level: float, values: Array) -> tuple[Array, Array]:
-    steady = np.full(values.size, level)
-    return (steady, values) if held == "pressure" else (values, steady)
+def _coordinates(constant: str, level: float, values: Array) -> tuple[Array, Array]:
+    """Pressure and contraction of the points of a sweep."""
+    levels = np.full(values.size, level)
+    return (levels, values) if constant == "pressure" else (values, levels)
 
 
-def _designs(
+def _jacobians(
     law: Characteristic, candidates: Sequence[PlannedRun], fixed: Collection[str]
 ) -> tuple[tuple[str, ...], Array, list[Array]]:
-    """Names and values of the free parameters, and every candidate's design by parameters relative to their size."""
+    """Names and values of the free parameters, and the Jacobian of every candidate by relative parameters."""
     columns = {n: np.concatenate([getattr(r, n) for r in candidates]) for n in ("pressure", "contraction", "force")}
     data = Recording(columns, "candidate runs")
     problem = make_problem(law, data, UNCENSORED, np.ones(len(data)), fixed)
-    values = problem.start
-    slopes = problem.slopes(values) * np.where(values == 0, 1.0, np.abs(values))
-    if not np.isfinite(slopes).all():
+    values = problem.initial_values
+    jacobian = problem.jacobian(values) * np.where(values == 0, 1.0, np.abs(values))
+    if not np.isfinite(jacobian).all():
         raise IdentificationError(
-            f"{type(law).__name__} is not smooth within the bench's limits; raise the least pressure or contraction."
+            f"the derivatives of {type(law).__name__} are not finite within the limits of the test rig. Increase the "
+            "minimum pressure or the minimum contraction."
         )
     ends = np.cumsum([r.force.size for r in candidates])[:-1]
     paths = tuple(problem.leaves[i].path for i in problem.free)
-    return paths, values, np.split(slopes, ends)
+    return paths, values, np.split(jacobian, ends)
 
 
-def _logarithm(information: Array, chosen: Sequence[int] | Array) -> float:
-    """log det of the information of these runs, with the ridge in units of what all runs together tell."""
+def _log_determinant(information: Array, selected: Sequence[int] | Array) -> float:
+    """log det of the regularised information of these runs, scaled by the information of all candidates."""
     size = information.shape[1]
     lengths = np.sqrt(np.maximum(np.diag(information.sum(axis=0)), 1e-300))
-    even = information[list(chosen)].sum(axis=0) / np.outer(lengths, lengths)
-    return float(np.linalg.slogdet(even + RIDGE * np.eye(size))[1])
+    scaled = information[list(selected)].sum(axis=0) / np.outer(lengths, lengths)
+    return float(np.linalg.slogdet(scaled + REGULARISATION * np.eye(size))[1])
 
 
-def _greedy(information: Array, runs: int) -> list[int]:
-    chosen: list[int] = []
+def _select_greedily(information: Array, runs: int) -> list[int]:
+    selected: list[int] = []
     for _ in range(runs):
-        gains = [_logarithm(information, [*chosen, i]) for i in range(len(information))]
-        chosen.append(int(np.argmax(gains)))
-    return chosen
+        determinants = [_log_determinant(information, [*selected, i]) for i in range(len(information))]
+        selected.append(int(np.argmax(determinants)))
+    return selected
 
 
-def _exchanged(information: Array, chosen: list[int]) -> list[int]:
-    """Each run exchanged for a better one until none is."""
-    best, improved = _logarithm(information, chosen), True
+def _exchange(information: Array, selected: list[int]) -> list[int]:
+    """Replace single runs as long as the determinant increases."""
+    best, improved = _log_determinant(information, selected), True
     while improved:
         improved = False
-        for k in range(len(chosen)):
-            rest = chosen[:k] + chosen[k + 1 :]
-            gains = [_logarithm(information, [*rest, i]) for i in range(len(information))]
-            if max(gains) > best + 1e-9:
-                best, improved = max(gains), True
-                chosen = [*rest, int(np.argmax(gains))]
-    return chosen
+        for k in range(len(selected)):
+            rest = selected[:k] + selected[k + 1 :]
+            determinants = [_log_determinant(information, [*rest, i]) for i in range(len(information))]
+            if max(determinants) > best + 1e-9:
+                best, improved = max(determinants), True
+                selected = [*rest, int(np.argmax(determinants))]
+    return selected

@@ -1,4 +1,4 @@
-"""How much an error counts in a fit: its square, or less than its square where it may be an outlier."""
+"""Loss functions of a fit: squared, Huber and soft L1."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from ..core.errors import ParameterError
 
 
 class Loss(abc.ABC):
-    """The sum of scale^2 rho((error/scale)^2) over the points is what a fit makes least."""
+    """A function rho of the squared scaled residuals; a fit minimises the sum of scale^2 rho((residual/scale)^2)."""
 
     scale: float
 
     @abc.abstractmethod
     def rho(self, z: Array) -> Array:
-        """rho(z) and its first and second derivative, shape (3, N), for z = (error/scale)^2."""
+        """rho(z) and its first and second derivative, shape (3, N), for z = (residual/scale)^2 >= 0, shape (N,)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class LeastSquares(Loss):
-    """rho = z: every error counts by its square."""
+    """rho = z: ordinary least squares."""
 
     scale: float = 1.0
 
@@ -33,8 +33,9 @@ class LeastSquares(Loss):
 
 @dataclasses.dataclass(frozen=True)
 class Huber(Loss):
-    """rho = z up to 1, 2 sqrt(z) - 1 beyond: errors above `scale`, in the unit of the fitted quantity, count linearly.
+    """rho = z for z <= 1, 2 sqrt(z) - 1 beyond: residuals above `scale` contribute linearly.
 
+    `scale` has the unit of the fitted quantity [SI].
     Reference: Huber, P. J. (1964), "Robust estimation of a location parameter", Annals of Mathematical Statistics.
     """
 
@@ -51,7 +52,7 @@ class Huber(Loss):
 
 @dataclasses.dataclass(frozen=True)
 class SoftL1(Loss):
-    """rho = 2 (sqrt(1 + z) - 1): a smooth passage from the square to the size of the error around `scale`."""
+    """rho = 2 (sqrt(1 + z) - 1): a smooth transition from squared to absolute residuals at `scale` [SI]."""
 
     scale: float
 
@@ -66,6 +67,6 @@ class SoftL1(Loss):
 def _check_scale(loss: Loss) -> None:
     if not 0 < loss.scale < np.inf:
         raise ParameterError(
-            f"{type(loss).__name__}.scale is {loss.scale!r}; it must be greater than zero, in the unit of the fitted "
-            "quantity: about three times the noise."
+            f"{type(loss).__name__}.scale is {loss.scale!r}; it must be positive and finite, in the unit of the fitted "
+            "quantity. Use about three times the standard deviation of the noise."
         )

@@ -1,4 +1,4 @@
-"""Which law to take: every candidate fitted, and judged by what it says of data that it was not given."""
+"""Model selection by cross-validation."""
 
 from __future__ import annotations
 
@@ -13,81 +13,87 @@ from ..core.arrays import Array
 from ..core.errors import AirmuscleError, IdentificationError
 from ..recording import Recording
 from .candidates import Candidate, standard_candidates
-from .cross_validation import GroupSplit, Labels, natural, parts
-from .force_of import force_of
+from .cross_validation import GroupSplit, Labels, default_split, label_folds
+from .force_evaluation import evaluate_force
 from .loss import LeastSquares, Loss
+from .model_evidence import aicc
 from .result import Fit
 from .static_fit import fit
 
 
 @dataclasses.dataclass(frozen=True)
 class FoldScore:
-    """What a law that had not seen a part says of it."""
+    """The out-of-sample error of a law on one fold."""
 
-    part: str
-    rms: float
+    fold: str
+    rmse: float
     """Root mean square error in force [N]."""
     rows: int
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RankedModel:
-    """A candidate that the data determine."""
+    """A candidate whose parameters the data determine, with its scores."""
 
     candidate: Candidate
     fit: Fit
-    in_sample: float
-    """Root mean square error in force [N] on the rows that it was fitted to."""
-    cross_validated: float
-    """The same on parts that were left out, each row once [N]."""
+    in_sample_rmse: float
+    """Root mean square error in force [N] on the rows of the fit."""
+    cross_validated_rmse: float
+    """Root mean square error in force [N] on the rows left out, over all folds."""
     aicc: float
-    """n ln(SSE/n) + 2 K + 2 K (K + 1)/(n - K - 1), errors in force, K with the noise's own."""
-    left_out: tuple[FoldScore, ...]
+    """Akaike's information criterion of the in-sample errors in force, corrected for small samples."""
+    fold_scores: tuple[FoldScore, ...]
 
     @property
-    def parameters(self) -> int:
+    def parameter_count(self) -> int:
+        """Number of fitted parameters."""
         return len(self.fit.estimates)
 
 
 @dataclasses.dataclass(frozen=True)
-class Excluded:
-    """A candidate that the data cannot determine, and why."""
+class ExcludedModel:
+    """A candidate whose parameters the data do not determine, with the reason."""
 
     name: str
-    why: str
+    reason: str
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Comparison:
-    """Contenders from the least cross-validated error upwards, and those that were excluded; `print` it."""
+    """The ranked models, lowest cross-validated error first, and the excluded candidates; `print` it."""
 
-    contenders: tuple[RankedModel, ...]
-    excluded: tuple[Excluded, ...]
+    ranking: tuple[RankedModel, ...]
+    excluded: tuple[ExcludedModel, ...]
     leave_out: GroupSplit
     recommended: RankedModel
     reason: str
 
     @property
     def purpose(self) -> str:
-        """What the recommended law is for: what was left out decides it."""
+        """The use for which the recommended law is best; it follows from the groups that were left out."""
         return self.leave_out.purpose
 
     def __getitem__(self, name: str) -> RankedModel:
-        """A contender by its name."""
-        found = {contender.candidate.name: contender for contender in self.contenders}
-        if name not in found:
-            raise IdentificationError(f"no contender '{name}'; there are {', '.join(found)}.")
-        return found[name]
+        """A ranked model by its name. Raises IdentificationError."""
+        models = {model.candidate.name: model for model in self.ranking}
+        if name not in models:
+            raise IdentificationError(f"the comparison has no model '{name}'; it has {', '.join(models)}.")
+        return models[name]
 
     def __str__(self) -> str:
+        title = (
+            f"Leave-one-{self.leave_out.group_name}-out cross-validation, rms errors in force; the ranking is for "
+            f"{self.purpose}."
+        )
         head = f"{'law':<40}{'parameters':>11}{'in sample':>12}{'left out':>12}{'AICc':>12}"
         rows = [
-            f"{c.candidate.name:<40}{c.parameters:>11}{c.in_sample:>10.4g} N{c.cross_validated:>10.4g} N{c.aicc:>12.1f}"
-            for c in self.contenders
+            f"{m.candidate.name:<40}{m.parameter_count:>11}{m.in_sample_rmse:>10.4g} N"
+            f"{m.cross_validated_rmse:>10.4g} N{m.aicc:>12.1f}"
+            for m in self.ranking
         ]
-        out = [f"excluded: {e.name}. {e.why}" for e in self.excluded]
-        said = f"Left out in turn: each {self.leave_out.word}, so the ranking is for {self.purpose}."
-        return "\n".join([said, "", head, *rows, "", self.reason, *out])
+        excluded = [f"excluded: {e.name}. {e.reason}" for e in self.excluded]
+        return "\n".join([title, "", head, *rows, "", self.reason, *excluded])
 
 
 def compare(
@@ -98,103 +104,103 @@ def compare(
     loss: Loss = LeastSquares(),
     progress: Callable[[str], None] | None = None,
 ) -> Comparison:
-    """Fit all candidates, rank them by their error on parts that were left out, and recommend one.
+    """Fit all candidates, rank them by their cross-validated error in force, and recommend one.
 
-    Without `candidates` all laws are tried that can be started from data alone. `leave_out` is RunSplit(),
-    Levels("contraction"), Levels("pressure"), SpecimenSplit() or BlockSplit(), and decides what the ranking is for (its
-    `purpose`): a law for muscles not measured is not the best one for those measured. Without it the first that the
-    data have three of: specimens, runs, levels. All errors are compared in force, whatever a law is solved for. The
-    simplest law is recommended that is no worse than the best by more than one standard error of their difference
-    (Breiman et al., Classification and Regression Trees (1984), section 3.4.3). Raises IdentificationError where none
-    is determined.
+    candidates  by default `standard_candidates`, the laws whose initial values follow from the data
+    leave_out   RunSplit(), LevelSplit("contraction"), LevelSplit("pressure"), SpecimenSplit() or BlockSplit(); it
+                defines the purpose of the ranking: the best law for other muscles is not the best for the measured
+                ones. By default the first of specimens, runs and levels with three groups or more
+    progress    called with the name of each candidate
+
+    The recommended law is the one with the fewest parameters among those whose error is not larger than the lowest one
+    by more than one standard error of the difference (Breiman et al., Classification and Regression Trees (1984),
+    section 3.4.3). Raises IdentificationError where no candidate is determined.
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    how = leave_out or natural(runs)
-    labels, names = parts(runs, how)
-    contenders, excluded = [], []
+    split = leave_out or default_split(runs)
+    labels, names = label_folds(runs, split)
+    ranking, excluded = [], []
     for candidate in candidates if candidates is not None else standard_candidates(runs):
         if progress is not None:
             progress(candidate.name)
         try:
-            contenders.append(_judged(candidate, runs, labels, names, loss))
+            ranking.append(_cross_validate(candidate, runs, labels, names, loss))
         except AirmuscleError as error:
-            excluded.append(Excluded(candidate.name, str(error)))
-    if not contenders:
-        whys = "\n".join(f"{e.name}: {e.why}" for e in excluded)
-        raise IdentificationError(f"the data determine none of the {len(excluded)} candidates.\n{whys}")
-    contenders.sort(key=lambda c: (c.cross_validated, c.parameters))
-    chosen, reason = _recommended(contenders, how)
-    return Comparison(tuple(contenders), tuple(excluded), how, chosen, reason)
+            excluded.append(ExcludedModel(candidate.name, str(error)))
+    if not ranking:
+        reasons = "\n".join(f"{e.name}: {e.reason}" for e in excluded)
+        raise IdentificationError(f"the data determine none of the {len(excluded)} candidates.\n{reasons}")
+    ranking.sort(key=lambda m: (m.cross_validated_rmse, m.parameter_count))
+    recommended, reason = _recommend(ranking, split)
+    return Comparison(tuple(ranking), tuple(excluded), split, recommended, reason)
 
 
-def _judged(
+def _cross_validate(
     candidate: Candidate, runs: Sequence[Recording], labels: Sequence[Labels], names: Sequence[str], loss: Loss
 ) -> RankedModel:
-    whole = fit(candidate.law, runs, loss=loss, fixed=candidate.fixed)
-    ceiling = 3 * max(float(np.nanmax(run["force"])) for run in runs)
-    everywhere = errors_in_force(whole.model, runs, ceiling)
-    left_out, errors = [], []
+    full_fit = fit(candidate.law, runs, loss=loss, fixed=candidate.fixed)
+    max_force = 3 * max(float(np.nanmax(run["force"])) for run in runs)
+    in_sample = force_residuals(full_fit.model, runs, max_force)
+    scores, out_of_sample = [], []
     for name in names:
-        others = [run.rows(own != name) for run, own in zip(runs, labels, strict=True) if (own != name).any()]
-        these = [run.rows(own == name) for run, own in zip(runs, labels, strict=True) if (own == name).any()]
+        training = [run.rows(label != name) for run, label in zip(runs, labels, strict=True) if (label != name).any()]
+        test = [run.rows(label == name) for run, label in zip(runs, labels, strict=True) if (label == name).any()]
         try:
-            model = fit(whole.model, others, loss=loss, fixed=candidate.fixed).model
+            model = fit(full_fit.model, training, loss=loss, fixed=candidate.fixed).model
         except AirmuscleError as error:
-            raise IdentificationError(f"Without {name} it is not determined: {error}") from None
-        found = errors_in_force(model, these, ceiling)
-        if found.size:
-            left_out.append(FoldScore(name, _rms(found), found.size))
-            errors.append(found)
+            raise IdentificationError(f"Not determined without {name}: {error}") from None
+        residuals = force_residuals(model, test, max_force)
+        if residuals.size:
+            scores.append(FoldScore(name, _rms(residuals), residuals.size))
+            out_of_sample.append(residuals)
+    criterion = aicc(float(np.mean(in_sample**2)), in_sample.size, len(full_fit.estimates))
     return RankedModel(
-        candidate, whole, _rms(everywhere), _rms(np.concatenate(errors)), _aicc(everywhere, len(whole.estimates)),
-        tuple(left_out),
-    )  # fmt: skip
-
-
-def errors_in_force(model: Characteristic, runs: Sequence[Recording], ceiling: float) -> Array:
-    """Model less measured force [N] at the rows where the muscle pulled, each run by the law of its length."""
-    found = []
-    for run in runs:
-        rows = run.rows((run["force"] > 0) & np.isfinite(run["pressure"] + run["contraction"] + run["force"]))
-        law: Any = model
-        rest = run.constants.get("resting_length")
-        if rest is not None and hasattr(law, "of_length"):
-            law = law.of_length(float(rest))
-        found.append(force_of(law, rows["pressure"], rows["contraction"], ceiling) - rows["force"])
-    return np.concatenate(found)
-
-
-def _rms(errors: Array) -> float:
-    return float(np.sqrt(np.mean(errors**2)))
-
-
-def _aicc(errors: Array, parameters: int) -> float:
-    """Hurvich and Tsai, Biometrika 76:297 (1989); infinite where there are too few points for it."""
-    n, k = errors.size, parameters + 1
-    if n - k - 1 <= 0:
-        return float("inf")
-    return float(n * np.log(max(float(np.mean(errors**2)), 1e-300)) + 2 * k + 2 * k * (k + 1) / (n - k - 1))
-
-
-def _recommended(contenders: Sequence[RankedModel], how: GroupSplit) -> tuple[RankedModel, str]:
-    best = contenders[0]
-    close = [c for c in contenders if _excess(c, best) <= 0]
-    chosen = min(close, key=lambda c: (c.parameters, c.cross_validated))
-    said = f"Recommended for {how.purpose}: {chosen.candidate.name}, "
-    said += f"{chosen.cross_validated:.4g} N on each {how.word} left out"
-    if chosen is best:
-        return chosen, f"{said}, the least of all, with {chosen.parameters} parameters."
-    return chosen, (
-        f"{said} with {chosen.parameters} parameters: {best.candidate.name} has {best.cross_validated:.4g} N with "
-        f"{best.parameters}, which is not better by more than one standard error of the difference."
+        candidate, full_fit, _rms(in_sample), _rms(np.concatenate(out_of_sample)), criterion, tuple(scores)
     )
 
 
-def _excess(contender: RankedModel, best: RankedModel) -> float:
-    """Mean square error beyond the best's, less one standard error of that difference over the parts."""
-    pairs = zip(contender.left_out, best.left_out, strict=True)
-    difference = np.array([a.rms**2 - b.rms**2 for a, b in pairs])
-    rows = np.array([part.rows for part in best.left_out], dtype=float)
+def force_residuals(model: Characteristic, runs: Sequence[Recording], max_force: float) -> Array:
+    """Residuals (model - measured) in force [N] at the rows with a positive force, with the law of each run's length.
+
+    `max_force` [N] limits the force of laws that give contraction or pressure.
+    """
+    residuals = []
+    for run in runs:
+        rows = run.rows((run["force"] > 0) & np.isfinite(run["pressure"] + run["contraction"] + run["force"]))
+        law: Any = model
+        length = run.constants.get("resting_length")
+        if length is not None and hasattr(law, "with_resting_length"):
+            law = law.with_resting_length(float(length))
+        residuals.append(evaluate_force(law, rows["pressure"], rows["contraction"], max_force) - rows["force"])
+    return np.concatenate(residuals)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[RankedModel, str]:
+    """The model by the one-standard-error rule, and the reason as a sentence with the numbers."""
+    best = ranking[0]
+    equivalent = [m for m in ranking if _excess_error(m, best) <= 0]
+    recommended = min(equivalent, key=lambda m: (m.parameter_count, m.cross_validated_rmse))
+    text = (
+        f"Recommended for {split.purpose}: {recommended.candidate.name} with {recommended.parameter_count} parameters, "
+        f"rms error {recommended.cross_validated_rmse:.4g} N in leave-one-{split.group_name}-out cross-validation"
+    )
+    if recommended is best:
+        return recommended, f"{text}, the lowest of all."
+    return recommended, (
+        f"{text}. The error of {best.candidate.name} with {best.parameter_count} parameters, "
+        f"{best.cross_validated_rmse:.4g} N, is not lower by more than one standard error of the difference."
+    )
+
+
+def _excess_error(model: RankedModel, best: RankedModel) -> float:
+    """Difference of the mean square errors [N^2], minus one standard error of it over the folds."""
+    pairs = zip(model.fold_scores, best.fold_scores, strict=True)
+    difference = np.array([a.rmse**2 - b.rmse**2 for a, b in pairs])
+    rows = np.array([score.rows for score in best.fold_scores], dtype=float)
     mean = float(np.average(difference, weights=rows))
     spread = float(np.sqrt(np.average((difference - mean) ** 2, weights=rows) / max(difference.size - 1, 1)))
     return mean - spread

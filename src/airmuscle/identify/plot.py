@@ -1,4 +1,4 @@
-"""The figure of a fit: model against measurement, and the errors over it."""
+"""Figure of a fit: modelled against measured values, and residuals."""
 
 from __future__ import annotations
 
@@ -6,34 +6,40 @@ import textwrap
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from ..core.arrays import Array
 from ..core.plotting import BLACK, BLUE, RED, new_figure
-from .result import Fit
 
-_SHOWN = {"force": (1.0, "N"), "contraction": (100.0, "%"), "pressure": (1e-3, "kPa")}
+_DISPLAY_UNITS = {"force": (1.0, "N"), "contraction": (100.0, "%"), "pressure": (1e-3, "kPa")}
 
 
-def plot_fit(fit: Fit) -> Any:
-    """Parity on the left, errors on the right; rows cut off at the ends of the range of force stand out."""
-    factor, unit = _SHOWN[fit.direction.quantity]
-    measured = fit.recording[fit.direction.quantity] * factor
-    modelled, errors = fit.modelled * factor, fit.errors * factor
-    figure, (parity, residual) = new_figure(1, 2, width=7.0, height=3.4)
+def plot_fit(quantity: str, measured: Array, modelled: Array, censored: npt.NDArray[np.bool_], title: str) -> Any:
+    """Parity plot on the left, residuals (model - measured) on the right, with censored rows marked.
+
+    quantity            name of the fitted quantity
+    measured, modelled  its values [SI], shape (N,) each
+    censored            mask of the censored rows, shape (N,)
+
+    Returns a Matplotlib figure.
+    """
+    factor, unit = _DISPLAY_UNITS[quantity]
+    residuals = (modelled - measured) * factor
+    measured, modelled = measured * factor, modelled * factor
+    figure, (left, right) = new_figure(1, 2, width=7.0, height=3.4)
     ends = [min(measured.min(), modelled.min()), max(measured.max(), modelled.max())]
-    parity.plot(ends, ends, color=BLACK, linewidth=0.8, label="model = measured")
+    left.plot(ends, ends, color=BLACK, linewidth=0.8, label="model = measured")
     for rows, colour, marker, label in (
-        (fit.sides == 0, BLUE, "o", "measured"),
-        (fit.sides != 0, RED, "x", "cut off, a bound only"),
+        (~censored, BLUE, "o", "measured"),
+        (censored, RED, "x", "censored (bound)"),
     ):
         if np.any(rows):
             style = {"color": colour, "marker": marker, "linestyle": "none", "markersize": 3.5}
-            parity.plot(measured[rows], modelled[rows], label=label, **style)
-            residual.plot(measured[rows], errors[rows], **style)
-    residual.axhline(0.0, color=BLACK, linewidth=0.8)
-    name = fit.direction.quantity
-    parity.set(xlabel=f"measured {name} [{unit}]", ylabel=f"modelled {name} [{unit}]")
-    residual.set(xlabel=f"measured {name} [{unit}]", ylabel=f"model less measured [{unit}]")
-    figure.legend(*parity.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=8)
-    title = f"{type(fit.model).__name__} fitted to {fit.recording.origin}"
+            left.plot(measured[rows], modelled[rows], label=label, **style)
+            right.plot(measured[rows], residuals[rows], **style)
+    right.axhline(0.0, color=BLACK, linewidth=0.8)
+    left.set(xlabel=f"measured {quantity} [{unit}]", ylabel=f"modelled {quantity} [{unit}]")
+    right.set(xlabel=f"measured {quantity} [{unit}]", ylabel=f"residual (model - measured) [{unit}]")
+    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=8)
     figure.suptitle(textwrap.fill(title, 90), fontsize=9)
     return figure

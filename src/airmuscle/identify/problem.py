@@ -1,4 +1,4 @@
-"""What a fit is to do: the law, its free parameters, and the points in the direction that the law gives."""
+"""FitProblem: law, free parameters, data points and the quantity in which residuals are taken."""
 
 from __future__ import annotations
 
@@ -19,92 +19,101 @@ from ..recording.columns import QUANTITIES
 from .censoring import Censoring
 
 RESTING_LENGTH = "resting_length"
-"""Column of the length of muscle by row, in data of several specimens."""
+"""Column with the resting length [m] of every row, in data of several specimens."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Direction:
-    """Which of the three a law gives: the method that a fit compares, its arguments and its answer."""
+class FittedQuantity:
+    """The quantity that a law gives as a function of the other two: the method that computes it and its arguments."""
 
     method: str
     arguments: tuple[str, str]
-    quantity: str
+    name: str
 
     @property
     def unit(self) -> str:
-        return QUANTITIES[self.quantity].unit
+        """SI unit of the quantity."""
+        return QUANTITIES[self.name].unit
 
 
-FORCE = Direction("unclamped", ("pressure", "contraction"), "force")
-CONTRACTION = Direction("contraction", ("pressure", "force"), "contraction")
-PRESSURE = Direction("pressure", ("contraction", "force"), "pressure")
+FORCE = FittedQuantity("unclamped_force", ("pressure", "contraction"), "force")
+CONTRACTION = FittedQuantity("contraction", ("pressure", "force"), "contraction")
+PRESSURE = FittedQuantity("pressure", ("contraction", "force"), "pressure")
 
 
-def by_specimen(law: Any, data: Recording) -> list[tuple[Any, npt.NDArray[np.intp]]]:
-    """The law of each length of muscle in the data, and its rows: one law for all where it knows of no lengths."""
-    if RESTING_LENGTH not in data.columns or not hasattr(law, "of_length"):
+def split_by_length(law: Any, data: Recording) -> list[tuple[Any, npt.NDArray[np.intp]]]:
+    """The law of each resting length in the data with the indices of its rows.
+
+    A law that does not depend on the resting length is returned once, with all rows.
+    """
+    if RESTING_LENGTH not in data.columns or not hasattr(law, "with_resting_length"):
         return [(law, np.arange(len(data)))]
     lengths = data[RESTING_LENGTH]
-    return [(_of_length(law, float(length)), np.flatnonzero(lengths == length)) for length in np.unique(lengths)]
+    return [(_with_length(law, float(length)), np.flatnonzero(lengths == length)) for length in np.unique(lengths)]
 
 
-def _of_length(law: Any, length: float) -> Any:
-    """As `law.of_length`, but unchecked: a search may pass where the law has no meaning."""
+def _with_length(law: Any, length: float) -> Any:
+    """As `law.with_resting_length`, but without validation, because a search may pass through invalid parameters."""
     leaves = tree.leaves(law)
     return tree.unflatten(law, [length if leaf.path == RESTING_LENGTH else leaf.value for leaf in leaves])
 
 
 def evaluate(law: Any, method: str, arguments: tuple[str, str], data: Recording) -> Array:
-    """What a law, or that of each length, gives at every row; shape (N,)."""
-    found = np.zeros(len(data))
-    for specimen, rows in by_specimen(law, data):
-        found[rows] = getattr(specimen, method)(*(data[name][rows] for name in arguments))
-    return found
+    """The values of `law.method(*arguments)` at every row, with the law of the row's resting length; shape (N,)."""
+    values = np.zeros(len(data))
+    for specimen, rows in split_by_length(law, data):
+        values[rows] = getattr(specimen, method)(*(data[name][rows] for name in arguments))
+    return values
 
 
-def direction_of(law: Characteristic) -> Direction:
-    """The direction in which a law is given, where its errors are compared."""
-    for kind, direction in ((ForceLaw, FORCE), (ContractionLaw, CONTRACTION), (PressureLaw, PRESSURE)):
+def fitted_quantity_of(law: Characteristic) -> FittedQuantity:
+    """The quantity that a law gives, in which residuals are taken. Raises IdentificationError."""
+    for kind, quantity in ((ForceLaw, FORCE), (ContractionLaw, CONTRACTION), (PressureLaw, PRESSURE)):
         if isinstance(law, kind):
-            return direction
-    raise IdentificationError(f"{type(law).__name__} is no law in force, contraction or pressure; it cannot be fitted.")
+            return quantity
+    raise IdentificationError(
+        f"{type(law).__name__} cannot be fitted, because it gives neither force nor contraction nor pressure."
+    )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class FitProblem:
-    """N points and the P parameters to be found from them."""
+    """N data points and the P free parameters of a law."""
 
     law: Any
-    direction: Direction
+    fitted_quantity: FittedQuantity
     data: Recording
-    goal: Array
-    """Measured values, or the bound of a row that was cut off, in the law's direction; shape (N,)."""
-    sides: Array
-    """0 where the law shall meet the goal, 1 where it may lie below, -1 where it may lie above; shape (N,)."""
+    target: Array
+    """Measured value, or the bound of a censored row, in the fitted quantity [SI]; shape (N,)."""
+    censoring: Array
+    """0 uncensored, 1 the law may lie below the target, -1 the law may lie above it; shape (N,)."""
     weights: Array
-    """By which the errors are multiplied, 1 in the mean; shape (N,)."""
+    """Factors of the residuals, with a root mean square of 1; shape (N,)."""
     leaves: tuple[Leaf, ...]
     free: tuple[int, ...]
-    """Which of the leaves are to be found."""
+    """Indices of the leaves that are fitted."""
 
     @property
     def arguments(self) -> tuple[Array, Array]:
-        first, second = self.direction.arguments
+        """The arguments of the law at every row [SI]; shape (N,) each."""
+        first, second = self.fitted_quantity.arguments
         return self.data[first], self.data[second]
 
     @property
-    def start(self) -> Array:
+    def initial_values(self) -> Array:
+        """The free parameters as the law has them; shape (P,)."""
         return np.array([self.leaves[i].value for i in self.free], dtype=float)
 
     @property
     def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds of the free parameters; shape (P,) each."""
         pairs = np.array([self.leaves[i].declared.bounds for i in self.free], dtype=float)
         return pairs[:, 0], pairs[:, 1]
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """A short name for each free parameter: its term in a sum, else its symbol."""
-        terms = getattr(self.law, "terms", ())
+        """A short label for each free parameter: its term in a polynomial, else its symbol, else its path."""
+        terms = getattr(self.law, "term_labels", ())
         field = getattr(self.law, "linear_in", None)
         texts = {f"{field}[{i}]": f"a({term})" for i, term in enumerate(terms)}
         symbols = [self.leaves[i].declared.symbol for i in self.free]
@@ -113,77 +122,83 @@ class FitProblem:
         return tuple(texts.get(path, name) for path, name in zip(paths, names, strict=True))
 
     def leaf_values(self, values: Sequence[float] | Array) -> list[float]:
-        """All leaves of the law, with these values of the free ones."""
-        found = [leaf.value for leaf in self.leaves]
+        """All leaves of the law with these values of the free parameters."""
+        leaf_values = [leaf.value for leaf in self.leaves]
         for i, value in zip(self.free, values, strict=True):
-            found[i] = float(value)
-        return found
+            leaf_values[i] = float(value)
+        return leaf_values
 
-    def modelled(self, values: Array) -> Array:
-        """What the law gives with these parameters; shape (N,)."""
+    def predict(self, values: Array) -> Array:
+        """The fitted quantity at every row with these parameters [SI]; shape (N,)."""
         law = tree.unflatten(self.law, self.leaf_values(values))
-        with np.errstate(all="ignore"):  # what is not finite is refused, or the search steps back from it
-            return evaluate(law, self.direction.method, self.direction.arguments, self.data)
+        with np.errstate(all="ignore"):  # non-finite values raise an error at the start; later the search backtracks
+            return evaluate(law, self.fitted_quantity.method, self.fitted_quantity.arguments, self.data)
 
-    def errors(self, modelled: Array) -> Array:
-        """Weighted errors; a row that was cut off has one only where the law contradicts it."""
-        difference = modelled - self.goal
-        return self.weights * np.where(self.sides * difference < 0, 0.0, difference)
+    def residuals(self, modelled: Array) -> Array:
+        """Weighted residuals; that of a censored row is 0 unless the law violates its bound; shape (N,)."""
+        difference = modelled - self.target
+        return self.weights * np.where(self.censoring * difference < 0, 0.0, difference)
 
-    def counting(self, modelled: Array) -> npt.NDArray[np.bool_]:
-        """The rows that have a say: those measured, and those cut off that the law contradicts."""
-        return np.asarray((self.sides == 0) | (self.sides * (modelled - self.goal) > 0))
+    def active_rows(self, modelled: Array) -> npt.NDArray[np.bool_]:
+        """Mask of the uncensored rows and of the censored rows whose bound the law violates; shape (N,)."""
+        return np.asarray((self.censoring == 0) | (self.censoring * (modelled - self.target) > 0))
 
-    def slopes(self, values: Array) -> Array:
-        """The derivatives of `modelled` by the free parameters, shape (N, P): exact where the law can be traced."""
-        if _can_be_traced(self.law):
+    def jacobian(self, values: Array) -> Array:
+        """Derivatives of `predict` with respect to the free parameters, shape (N, P).
+
+        Exact if the law is traceable, otherwise by central differences.
+        """
+        if _is_traceable(self.law):
             law = tree.unflatten(self.law, self.leaf_values(values))
-            found = np.empty((len(self.data), len(self.leaves)))
-            for specimen, rows in by_specimen(law, self.data):
+            by_leaf = np.empty((len(self.data), len(self.leaves)))
+            for specimen, rows in split_by_length(law, self.data):
                 arguments = (values[rows] for values in self.arguments)
-                found[rows] = autodiff.jacobian(specimen, self.direction.method, *arguments)[1]
-            return found[:, list(self.free)]
-        return self._differences(values)
+                by_leaf[rows] = autodiff.jacobian(specimen, self.fitted_quantity.method, *arguments)[1]
+            return by_leaf[:, list(self.free)]
+        return self._finite_differences(values)
 
-    def _differences(self, values: Array) -> Array:
+    def _finite_differences(self, values: Array) -> Array:
         low, high = self.bounds
         columns = []
         for i, value in enumerate(values):
-            step = np.cbrt(np.finfo(float).eps) * max(abs(value), abs(self.start[i]), 1e-8)
+            step = np.cbrt(np.finfo(float).eps) * max(abs(value), abs(self.initial_values[i]), 1e-8)
             up, down = values.copy(), values.copy()
             up[i], down[i] = min(value + step, high[i]), max(value - step, low[i])
-            columns.append((self.modelled(up) - self.modelled(down)) / (up[i] - down[i]))
+            columns.append((self.predict(up) - self.predict(down)) / (up[i] - down[i]))
         return np.column_stack(columns)
 
 
-def _can_be_traced(thing: Any) -> bool:
-    """Whether a law and all models inside it are closed-form."""
+def _is_traceable(thing: Any) -> bool:
+    """Whether a law and all models inside it are closed-form expressions."""
     if isinstance(thing, tuple):
-        return all(_can_be_traced(item) for item in thing)
+        return all(_is_traceable(item) for item in thing)
     kind: type[Any] = type(thing)
     if not dataclasses.is_dataclass(kind):
         return True
     inside = (getattr(thing, field.name) for field in dataclasses.fields(thing))
-    return autodiff.is_traceable(kind) and all(_can_be_traced(item) for item in inside)
+    return autodiff.is_traceable(kind) and all(_is_traceable(item) for item in inside)
 
 
 def make_problem(
     law: Characteristic, data: Recording, censoring: Censoring, weights: Array, fixed: Collection[str]
 ) -> FitProblem:
-    """The problem of fitting a law to points. Raises IdentificationError where it cannot be posed."""
-    direction = direction_of(law)
-    sides = censoring.sides(data["force"])
-    goal = data[direction.quantity]
-    if direction is FORCE:
-        goal = np.where(sides > 0, censoring.min_force, np.where(sides < 0, censoring.max_force, goal))
-    elif direction is PRESSURE:
-        sides = -sides  # where the force is less than stated, the pressure that would hold it is more
+    """The problem of fitting a law to data points; `fixed` names parameters that are not fitted.
+
+    Raises IdentificationError where there are too few rows, ParameterError for an unknown name.
+    """
+    quantity = fitted_quantity_of(law)
+    signs = censoring.signs(data["force"])
+    target = data[quantity.name]
+    if quantity is FORCE:
+        target = np.where(signs > 0, censoring.min_force, np.where(signs < 0, censoring.max_force, target))
+    elif quantity is PRESSURE:
+        signs = -signs  # a smaller force at the same pressure means that the stated force needs a higher pressure
     leaves = tuple(tree.leaves(law))
     _check_known(law, leaves, fixed)
     free = tuple(i for i, leaf in enumerate(leaves) if leaf.declared.fitted and not _is_fixed(leaf, fixed))
-    measured = int(np.count_nonzero(sides == 0))
+    measured = int(np.count_nonzero(signs == 0))
     _check_row_count(law, data, len(free), measured)
-    return FitProblem(law, direction, data, goal, sides, weights, leaves, free)
+    return FitProblem(law, quantity, data, target, signs, weights, leaves, free)
 
 
 def _is_fixed(leaf: Leaf, fixed: Collection[str]) -> bool:
@@ -196,7 +211,7 @@ def _check_known(law: Characteristic, leaves: Sequence[Leaf], fixed: Collection[
         if name not in known:
             fields = list(dict.fromkeys(leaf.path.partition("[")[0] for leaf in leaves))
             raise ParameterError(
-                f"{type(law).__name__} has no parameter '{name}' to hold fixed; there are {', '.join(fields)}."
+                f"{type(law).__name__} has no parameter '{name}' to be fixed; its parameters are {', '.join(fields)}."
                 f"{suggestion(name, known)}"
             )
 
@@ -204,16 +219,16 @@ def _check_known(law: Characteristic, leaves: Sequence[Leaf], fixed: Collection[
 def _check_row_count(law: Characteristic, data: Recording, free: int, measured: int) -> None:
     name = f"{data.origin}: {type(law).__name__}"
     if free == 0:
-        raise IdentificationError(f"{name} has no parameter left to be fitted. Hold fewer fixed.")
-    cut_off = len(data) - measured
+        raise IdentificationError(f"{name} has no free parameter. Fix fewer parameters.")
+    censored = len(data) - measured
     if len(data) and not measured:
         raise IdentificationError(
-            f"{name}: all {cut_off} rows are cut off at the ends of the range of force, so none was measured. Fit rows "
-            "in which the muscle pulls, or give the range with censoring=."
+            f"{name}: all {censored} rows are censored (at zero force, or at the limit of the force range), so there "
+            "is no measured value. Give rows with a positive force, or give the range with censoring=."
         )
     if measured < free:
-        also = f" ({cut_off} more are cut off at zero or full force and count as bounds only)" if cut_off else ""
+        also = f" ({censored} further rows are censored and give bounds only)" if censored else ""
         raise IdentificationError(
-            f"{name} has {free} parameters to be found, but only {measured} points were measured{also}. Measure more, "
-            "choose a law with fewer parameters or a lower degree, or hold some with fixed=."
+            f"{name} has {free} free parameters, but only {measured} rows are measured values{also}. Measure more "
+            "points, choose a law with fewer parameters or a lower degree, or fix parameters with fixed=."
         )

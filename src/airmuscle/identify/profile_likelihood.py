@@ -1,4 +1,4 @@
-"""How far one parameter can go if all others follow: the interval that a standard deviation only guesses at."""
+"""Profile-likelihood confidence intervals of a static fit."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from ..core.errors import IdentificationError
 from .loss import LeastSquares
 from .problem import FitProblem
 from .result import Fit
-from .solve import is_linear, solve
+from .solver import is_linear, solve
 
-_TIED = 0.99
-"""Correlation from which two parameters count as tied (chosen)."""
-_LOOSE = 0.5
-"""Standard deviation, over the value, from which a parameter counts as loose (chosen)."""
-_DOUBLINGS = 12
-"""Steps outwards, each twice the one before: 4096 standard deviations without an end are none."""
-_HALVINGS = 18
+_HIGH_CORRELATION = 0.99
+"""Absolute correlation above which the standard error of a parameter is not trusted (chosen)."""
+_HIGH_RELATIVE_ERROR = 0.5
+"""Standard error relative to the value above which it is not trusted (chosen)."""
+_MAX_DOUBLINGS = 12
+"""Maximum number of outward steps, each twice the previous one: up to 4096 standard errors."""
+_BISECTIONS = 18
 
 
 @dataclasses.dataclass(frozen=True)
 class ProfileLikelihood:
-    """A parameter's interval at a level; an end that the data do not set is infinite."""
+    """Confidence interval of a parameter; a limit that the data do not determine is infinite."""
 
     name: str
     unit: str
@@ -33,71 +33,85 @@ class ProfileLikelihood:
     level: float
 
     def __str__(self) -> str:
-        ends = [f"{end:.6g}" if np.isfinite(end) else "no end" for end in (self.low, self.high)]
-        return f"{self.name} {self.value:.6g} {self.unit}, {self.level:.0%} within {ends[0]} to {ends[1]}"
+        ends = [f"{end:.4g}" if np.isfinite(end) else "unbounded" for end in (self.low, self.high)]
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"{self.name} {self.value:.4g}{unit}, {self.level:.0%} confidence interval {ends[0]} to {ends[1]}"
 
 
 def weakly_determined(fit: Fit) -> tuple[str, ...]:
-    """Parameters whose standard deviation cannot be trusted: tied to another, or loose beside their own value."""
-    tied = np.abs(np.nan_to_num(fit.correlations - np.eye(len(fit.estimates)))).max(axis=1, initial=0.0)
-    curved = not is_linear(fit.problem)  # else a standard deviation is exact, however large
+    """Names of the parameters whose standard error is not reliable.
+
+    These are highly correlated with another parameter or, in a nonlinear fit, have a large relative standard error.
+    """
+    correlation = np.abs(np.nan_to_num(fit.correlations - np.eye(len(fit.estimates)))).max(axis=1, initial=0.0)
+    nonlinear = not is_linear(fit.problem)  # in a linear fit a standard error is exact, however large
     return tuple(
         e.name
-        for e, tie in zip(fit.estimates, tied, strict=True)
-        if not e.on_bound and (tie > _TIED or (curved and e.stderr > _LOOSE * abs(e.value)))
+        for e, r in zip(fit.estimates, correlation, strict=True)
+        if not e.on_bound and (r > _HIGH_CORRELATION or (nonlinear and e.stderr > _HIGH_RELATIVE_ERROR * abs(e.value)))
     )
 
 
 def profile(fit: Fit, name: str, *, level: float = 0.95) -> ProfileLikelihood:
-    """The interval of one parameter by its profile likelihood (Bates and Watts (1988), Nonlinear Regression, 6.1).
+    """The profile-likelihood interval of one parameter (Bates and Watts (1988), Nonlinear Regression, 6.1).
 
-    All values at which the least sum of squares over the other parameters stays below S (1 + F/(N - P)), F Fisher's
-    quantile with 1 and N - P degrees of freedom. Raises IdentificationError, also for a robust fit.
+    It holds all values for which the sum of squares, minimised over the other parameters, stays below
+    S (1 + F/(N - P)), where F is the quantile of Fisher's distribution with 1 and N - P degrees of freedom. Raises
+    IdentificationError for a robust fit, a parameter on its bound, or without degrees of freedom.
     """
     from scipy.special import stdtrit
 
     if not isinstance(fit.loss, LeastSquares):
-        raise IdentificationError("a profile needs a fit by least squares; a robust loss is no likelihood of noise.")
+        raise IdentificationError(
+            "a likelihood profile needs a fit by least squares, because a robust loss is no likelihood of the noise. "
+            "Fit with LeastSquares()."
+        )
     estimate = fit[name]
-    spare = int(np.count_nonzero(fit.sides == 0)) - len(fit.estimates)
-    if spare <= 0 or not np.isfinite(estimate.stderr):
-        raise IdentificationError(f"{name} stands on a bound, or no point is to spare: it has no profile.")
+    degrees_of_freedom = int(np.count_nonzero(fit.censoring == 0)) - len(fit.estimates)
+    if degrees_of_freedom <= 0 or not np.isfinite(estimate.stderr):
+        raise IdentificationError(
+            f"{name} has no likelihood profile, because it is on its bound or there are no more uncensored rows than "
+            "parameters."
+        )
     index = fit.names.index(name)
-    least = _squares(fit.problem, fit.values)
-    ceiling = least * (1 + float(stdtrit(spare, 0.5 + level / 2)) ** 2 / spare)
-    low, high = (_end(fit, index, sign * estimate.stderr, ceiling) for sign in (-1, 1))
+    minimum = _sum_of_squares(fit.problem, fit.values)
+    threshold = minimum * (1 + float(stdtrit(degrees_of_freedom, 0.5 + level / 2)) ** 2 / degrees_of_freedom)
+    low, high = (_find_limit(fit, index, sign * estimate.stderr, threshold) for sign in (-1, 1))
     return ProfileLikelihood(name, estimate.unit, estimate.value, low, high, level)
 
 
-def _squares(problem: FitProblem, values: np.ndarray) -> float:
-    return float(np.sum(problem.errors(problem.modelled(values)) ** 2))
+def _sum_of_squares(problem: FitProblem, values: np.ndarray) -> float:
+    return float(np.sum(problem.residuals(problem.predict(values)) ** 2))
 
 
-def _end(fit: Fit, index: int, step: float, ceiling: float) -> float:
-    """Where the profile passes the ceiling on one side; infinite where it never does, or a bound comes first."""
+def _find_limit(fit: Fit, index: int, step: float, threshold: float) -> float:
+    """The value at which the profile exceeds the threshold on one side.
+
+    Infinite where it never does, or where a bound is reached first.
+    """
     problem, estimate = fit.problem, fit.estimates[index]
     leaf = problem.free[index]
     low, high = problem.leaves[leaf].declared.bounds
     others = tuple(i for i in problem.free if i != leaf)
     inside, outside = estimate.value, estimate.value
-    for doubling in range(_DOUBLINGS):
+    for doubling in range(_MAX_DOUBLINGS):
         inside, outside = outside, float(np.clip(estimate.value + step * 2.0**doubling, low, high))
-        if inside == outside:  # at the bound, and still no worse
+        if inside == outside:  # the bound is reached below the threshold
             return -np.inf if step < 0 else np.inf
-        if _constrained_squares(problem, others, leaf, outside) > ceiling:
+        if _constrained_sum_of_squares(problem, others, leaf, outside) > threshold:
             break
     else:
         return -np.inf if step < 0 else np.inf
-    for _ in range(_HALVINGS):
+    for _ in range(_BISECTIONS):
         middle = (inside + outside) / 2
-        above = _constrained_squares(problem, others, leaf, middle) > ceiling
+        above = _constrained_sum_of_squares(problem, others, leaf, middle) > threshold
         inside, outside = (inside, middle) if above else (middle, outside)
     return (inside + outside) / 2
 
 
-def _constrained_squares(problem: FitProblem, others: tuple[int, ...], leaf: int, value: float) -> float:
-    """The least sum of squares with one leaf held at a value."""
+def _constrained_sum_of_squares(problem: FitProblem, others: tuple[int, ...], leaf: int, value: float) -> float:
+    """The minimum sum of squares with one leaf fixed at a value."""
     leaves = list(problem.leaves)
     leaves[leaf] = dataclasses.replace(leaves[leaf], value=value)
-    held = dataclasses.replace(problem, leaves=tuple(leaves), free=others)
-    return _squares(held, solve(held, LeastSquares()).values if others else np.zeros(0))
+    constrained = dataclasses.replace(problem, leaves=tuple(leaves), free=others)
+    return _sum_of_squares(constrained, solve(constrained, LeastSquares()).values if others else np.zeros(0))

@@ -1,9 +1,10 @@
-"""What a fit returns: the fitted law, how sure its parameters are, how well it meets the data, and where."""
+"""Fit: estimates, standard errors and residual statistics of a static fit."""
 
 from __future__ import annotations
 
 import dataclasses
 import html
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,12 +17,13 @@ from ..core.errors import ParameterError, suggestion
 from ..recording import Recording
 from .correlation_index import CorrelationIndex
 from .loss import Loss
-from .problem import CONTRACTION, FORCE, Direction, FitProblem, evaluate
+from .plot import plot_fit
+from .problem import CONTRACTION, FORCE, FitProblem, FittedQuantity, evaluate
 
 
 @dataclasses.dataclass(frozen=True)
 class Estimate:
-    """A fitted parameter: value and standard deviation, NaN where it stands on a bound or no point is to spare."""
+    """A fitted parameter with its standard error, NaN on a bound or without degrees of freedom; SI."""
 
     name: str
     label: str
@@ -31,10 +33,21 @@ class Estimate:
     meaning: str
     on_bound: bool
 
+    @property
+    def display_unit(self) -> str:
+        """The unit as text, empty for a dimensionless parameter."""
+        return "" if self.unit == "1" else self.unit
+
+    def format_interval(self) -> str:
+        """Two standard errors as text, or why there are none."""
+        if self.on_bound:
+            return "on bound"
+        return f"{2 * self.stderr:.3g}" if np.isfinite(self.stderr) else "unknown"
+
 
 @dataclasses.dataclass(frozen=True)
 class WorstPoint:
-    """The greatest error, model less measured, and the point where it occurs, all SI."""
+    """The residual (model - measured) of maximum magnitude and the point where it occurs, all SI."""
 
     error: float
     pressure: float
@@ -44,156 +57,161 @@ class WorstPoint:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Fit:
-    """A fitted characteristic with its pedigree; `print` it, or `.plot()` it.
+    """A fitted characteristic with its data and statistics; `print` it, or `.plot()` it.
 
-    Errors are compared in the quantity that the law gives. `rmse`, `index` and `sigma` are over the rows that
-    were measured, `max_error` over all rows: those cut off at the ends of the range of force have an error
-    only where the law contradicts them.
+    Residuals are in the fitted quantity. `rmse`, `correlation_index` and `sigma` are over the uncensored rows,
+    `max_error` over all rows; a censored row has a residual only where the law violates its bound.
     """
 
     model: Characteristic
     estimates: tuple[Estimate, ...]
     correlations: Array
-    """Of the estimates, in their order, shape (P, P)."""
+    """Correlation matrix of the estimates, in their order, shape (P, P)."""
     rank: int
     condition: float
-    """Of the design at the solution, its columns brought to length 1."""
+    """Condition number of the design matrix at the solution, with columns of unit norm."""
     sigma: float
-    """Standard deviation of the errors, N - P in the denominator."""
+    """Standard deviation of the residuals with N - P degrees of freedom [SI]."""
     rmse: float
     max_error: WorstPoint
-    index: CorrelationIndex | None
-    """1 - SSE/SST and its root; None where the measured values do not vary."""
+    correlation_index: CorrelationIndex | None
+    """IK and R^2; None where the measured values do not vary."""
     rows_censored: int
     rows_dropped: int
     recording: Recording
-    """The rows that were used: pressure, contraction, force."""
-    direction: Direction
-    sides: npt.NDArray[np.float64]
-    """By row: 0 measured, else cut off: the model may lie below (1) or above (-1)."""
+    """The rows of the fit: pressure, contraction, force."""
+    fitted_quantity: FittedQuantity
+    censoring: npt.NDArray[np.float64]
+    """By row: 0 uncensored, 1 the model may lie below the bound, -1 the model may lie above it."""
     problem: FitProblem
-    """What was posed, for refits: points, goals, weights and the free parameters."""
+    """The fitted problem, for refits: data, targets, weights and free parameters."""
     loss: Loss
     notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
-        """An estimate by its parameter's name, `geometry.radius`."""
+        """An estimate by the path of its parameter, for example `geometry.radius`. Raises ParameterError."""
         for estimate in self.estimates:
             if estimate.name == name:
                 return estimate
         raise ParameterError(
-            f"the fit has no parameter '{name}'; there are {', '.join(self.names)}.{suggestion(name, self.names)}"
+            f"the fit has no parameter '{name}'; it has {', '.join(self.names)}.{suggestion(name, self.names)}"
         )
 
     @property
     def names(self) -> tuple[str, ...]:
+        """Paths of the fitted parameters."""
         return tuple(estimate.name for estimate in self.estimates)
 
     @property
     def values(self) -> Array:
+        """Estimated values [SI], shape (P,)."""
         return np.array([estimate.value for estimate in self.estimates])
 
     @property
-    def standard_deviations(self) -> Array:
+    def standard_errors(self) -> Array:
+        """Standard errors of the estimates [SI], shape (P,); NaN for a parameter on a bound."""
         return np.array([estimate.stderr for estimate in self.estimates])
 
     @property
     def covariance(self) -> Array:
-        """Of the estimates, in their order, shape (P, P); NaN for a parameter on a bound."""
-        return np.asarray(self.correlations * np.outer(self.standard_deviations, self.standard_deviations))
+        """Covariance matrix of the estimates, in their order, shape (P, P); NaN for a parameter on a bound."""
+        return np.asarray(self.correlations * np.outer(self.standard_errors, self.standard_errors))
 
     @property
     def rows_used(self) -> int:
-        """Rows that took part, those cut off among them."""
+        """Number of rows of the fit, including the censored ones."""
         return len(self.recording)
 
     @property
     def r2(self) -> float | None:
-        """1 - SSE/SST over the measured rows; None where they do not vary."""
-        return None if self.index is None else self.index.explained
+        """Coefficient of determination over the uncensored rows; None where they do not vary."""
+        return None if self.correlation_index is None else self.correlation_index.r_squared
 
     @property
-    def correlation_index(self) -> float | None:
-        """sqrt(R2), or None where it does not exist."""
-        return None if self.index is None else self.index.value
+    def ik(self) -> float | None:
+        """Correlation index sqrt(R^2), or None where it is undefined."""
+        return None if self.correlation_index is None else self.correlation_index.value
 
     @property
     def modelled(self) -> Array:
-        """What the fitted model gives at the rows that were used, as a user of it sees it: clamped."""
-        return evaluate(self.model, self.direction.quantity, self.direction.arguments, self.recording)
+        """The fitted quantity of the model at the rows of the fit, clamped as the model is [SI]; shape (N,)."""
+        quantity = self.fitted_quantity
+        return evaluate(self.model, quantity.name, quantity.arguments, self.recording)
 
     @property
-    def errors(self) -> Array:
-        """Model less measured by row, clamped as the model is."""
-        return self.modelled - self.recording[self.direction.quantity]
+    def residuals(self) -> Array:
+        """Model - measured at the rows of the fit, clamped as the model is [SI]; shape (N,)."""
+        return self.modelled - self.recording[self.fitted_quantity.name]
 
     @property
-    def ranges(self) -> dict[str, tuple[float, float]]:
-        """Where there was data, in pressure, contraction and force: outside the fit says nothing."""
+    def data_ranges(self) -> dict[str, tuple[float, float]]:
+        """Minimum and maximum of pressure, contraction and force in the data; outside them the fit is extrapolated."""
         columns = ((name, self.recording[name]) for name in ("pressure", "contraction", "force"))
         return {name: (float(values.min()), float(values.max())) for name, values in columns}
 
     @property
     def validity_range(self) -> ValidityRange:
-        """The validity range of validity in pressure and contraction. Raises ParameterError where either did not vary."""
-        ranges = self.ranges
+        """The range of the data in pressure and contraction. Raises ParameterError where one of them did not vary."""
+        ranges = self.data_ranges
         return ValidityRange(*ranges["pressure"], *ranges["contraction"])
 
     def plot(self) -> Any:
-        """Model against measurement, and the errors over it; a Matplotlib figure."""
-        from .plot import plot_fit
+        """Modelled against measured values, and the residuals; a Matplotlib figure."""
+        quantity = self.fitted_quantity.name
+        return plot_fit(quantity, self.recording[quantity], self.modelled, self.censoring != 0, self._title)
 
-        return plot_fit(self)
+    @property
+    def _title(self) -> str:
+        return f"{type(self.model).__name__} fitted to {self.recording.origin}"
 
     def __str__(self) -> str:
-        rows = [("parameter", "", "value", "2 sd", "unit", "meaning")]
-        rows += [(e.name, e.label, f"{e.value:.6g}", _twice(e), e.unit, e.meaning) for e in self.estimates]
-        widths = [max(len(row[i]) for row in rows) for i in range(5)]
-        table = ["  ".join([*(c.ljust(w) for c, w in zip(row, widths, strict=False)), row[5]]).rstrip() for row in rows]
         notes = [f"note: {note}" for note in self.notes]
-        head = f"{type(self.model).__name__} fitted to {self.recording.origin}"
-        return "\n".join([head, "", *table, "", *(f"{name:<18}{text}" for name, text in self.summary()), *notes])
+        statistics = (f"{name:<18}{text}" for name, text in self.summary())
+        return "\n".join([self._title, "", *estimate_table(self.estimates), "", *statistics, *notes])
 
     def summary(self) -> list[tuple[str, str]]:
-        """The figures of the fit as lines of name and text with units."""
+        """The goodness of fit as pairs of a name and a text with units."""
         worst = self.max_error
-        place = f"at {worst.pressure / 1e3:.4g} kPa, {worst.contraction:.2%}, {worst.force:.4g} N"
-        index = "not defined: the measured values do not vary" if self.index is None else str(self.index)
-        r2 = f"{self.r2:.6f}" if self.r2 is not None else "not defined"
-        ranges = self.ranges
+        point = f"at {worst.pressure / 1e3:.4g} kPa, {worst.contraction:.2%}, {worst.force:.4g} N"
+        undefined = "undefined, because the measured values do not vary"
+        index = undefined if self.correlation_index is None else str(self.correlation_index)
+        r2 = undefined if self.r2 is None else f"{self.r2:.6f}"
+        ranges = self.data_ranges
         (p0, p1), (c0, c1), (f0, f1) = ranges["pressure"], ranges["contraction"], ranges["force"]
         return [
-            ("rows", f"{self.rows_used} used, {self.rows_censored} of them cut off; {self.rows_dropped} dropped"),
-            ("rms error", self.in_words(self.rmse)),
-            ("greatest error", f"{self.in_words(worst.error)} {place}"),
-            ("sigma", self.in_words(self.sigma)),
+            ("rows", f"{self.rows_used} used, {self.rows_censored} of them censored; {self.rows_dropped} dropped"),
+            ("rms error", self.format_residual(self.rmse)),
+            ("maximum error", f"{self.format_residual(worst.error)} {point}"),
+            ("residual std", self.format_residual(self.sigma)),
             ("R2", r2),
             ("correlation index", index),
             ("rank, condition", f"{self.rank} of {len(self.estimates)}, {self.condition:.3g}"),
-            ("valid for", f"{p0 / 1e3:.4g} to {p1 / 1e3:.4g} kPa, {c0:.2%} to {c1:.2%}, {f0:.4g} to {f1:.4g} N"),
+            ("data range", f"{p0 / 1e3:.4g} to {p1 / 1e3:.4g} kPa, {c0:.2%} to {c1:.2%}, {f0:.4g} to {f1:.4g} N"),
         ]
 
-    def in_words(self, error: float) -> str:
-        """An error of the fitted quantity with the unit that people use for it."""
-        if self.direction is FORCE:
-            return f"{error:.4g} N"
-        return f"{error:.4%}" if self.direction is CONTRACTION else f"{error / 1e3:.4g} kPa"
+    def format_residual(self, residual: float) -> str:
+        """A residual [SI] as text in the usual unit of the fitted quantity."""
+        if self.fitted_quantity is FORCE:
+            return f"{residual:.4g} N"
+        return f"{residual:.4%}" if self.fitted_quantity is CONTRACTION else f"{residual / 1e3:.4g} kPa"
 
     def _repr_html_(self) -> str:
         cells = "".join(
             f"<tr><td>{html.escape(e.name)}</td><td>{html.escape(e.label)}</td>"
-            f"<td>{e.value:.6g} &plusmn; {_twice(e)}</td>"
-            f"<td>{html.escape(e.unit)}</td><td>{html.escape(e.meaning)}</td></tr>"
+            f"<td>{e.value:.6g} &plusmn; {e.format_interval()}</td>"
+            f"<td>{html.escape(e.display_unit)}</td><td>{html.escape(e.meaning)}</td></tr>"
             for e in self.estimates
         )
         lines = "<br>".join(f"{name}: {html.escape(text)}" for name, text in self.summary())
         notes = "".join(f"<br>{html.escape(note)}" for note in self.notes)
-        head = f"<b>{type(self.model).__name__} fitted to {html.escape(self.recording.origin)}</b>"
-        titles = "<tr><th>parameter</th><th></th><th>value &plusmn; 2 sd</th><th>unit</th><th>meaning</th></tr>"
+        head = f"<b>{html.escape(self._title)}</b>"
+        titles = "<tr><th>parameter</th><th></th><th>value &plusmn; 2 SE</th><th>unit</th><th>meaning</th></tr>"
         return f"{head}<table>{titles}{cells}</table>{lines}{notes}"
 
 
-def _twice(estimate: Estimate) -> str:
-    if estimate.on_bound:
-        return "on bound"
-    return f"{2 * estimate.stderr:.3g}" if np.isfinite(estimate.stderr) else "unknown"
+def estimate_table(estimates: Sequence[Estimate]) -> list[str]:
+    """The lines of a text table of estimates; SE is the standard error."""
+    rows = [("parameter", "", "value", "2 SE", "unit", "meaning")]
+    rows += [(e.name, e.label, f"{e.value:.6g}", e.format_interval(), e.display_unit, e.meaning) for e in estimates]
+    widths = [max(len(row[i]) for row in rows) for i in range(5)]
+    return ["  ".join([*(c.ljust(w) for c, w in zip(row, widths, strict=False)), row[5]]).rstrip() for row in rows]

@@ -1,4 +1,4 @@
-"""A static characteristic from measured points: `fit`."""
+"""Fit of a static characteristic to measured points: `fit`."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
 from ..recording import Recording
-from .censoring import Censoring, censoring_of, within_sensor
+from .censoring import Censoring, default_censoring, narrow_to_sensor
 from .correlation_index import correlation_index
 from .loss import LeastSquares, Loss
-from .problem import RESTING_LENGTH, FitProblem, direction_of, evaluate, make_problem
+from .problem import RESTING_LENGTH, FitProblem, evaluate, fitted_quantity_of, make_problem
 from .result import Estimate, Fit, WorstPoint
-from .solve import Solution, solve
-from .statistics import Statistics, statistics
-from .weights import deviations
+from .solver import Solution, solve
+from .statistics import FitStatistics, compute_statistics
+from .weights import sensor_deviations
 
-POINT = ("pressure", "contraction", "force")
+POINT_COLUMNS = ("pressure", "contraction", "force")
 ILL_CONDITIONED = 1e5
-"""Condition of the scaled design above which a note is made (chosen): half of the digits of a float are lost."""
+"""Condition number of the scaled design matrix above which a note is added (chosen): half of the digits are lost."""
 
 
 def fit(
@@ -37,47 +37,56 @@ def fit(
     sigma: npt.ArrayLike | None = None,
     fixed: Collection[str] = (),
 ) -> Fit:
-    """The parameters of a characteristic that meet measured points best.
+    """Estimate the parameters of a characteristic from measured points.
 
-    `characteristic` gives the structure and the start values; its parameters that are declared as not fitted, and
-    those named in `fixed`, stay. Errors are taken in the direction that the law gives (force, contraction or
-    pressure), within the declared bounds. Rows at zero or full force, or where the force sensor shows that it is cut
-    off, count only where the law contradicts them; `censoring` states another range, `UNCENSORED` takes every row as
-    it stands.
-    `sigma` are the standard deviations of the rows, of which only the ratios matter; without it recordings from
-    several rigs weigh by what their sensors resolve, and `sigma=1.0` weighs all alike. `loss` is LeastSquares(),
-    Huber(scale) or SoftL1(scale), the scale in the unit of the fitted quantity.
+    characteristic  structure and initial values; parameters declared as not fitted keep their value
+    recording       one recording or several, with the columns pressure [Pa], contraction [1] and force [N]
+    loss            LeastSquares(), Huber(scale) or SoftL1(scale), the scale in the unit of the fitted quantity
+    censoring       the range of force within which rows are measured values. By default rows at zero force, at the
+                    clamp of the law, or at the limit of the force sensor are censored: they contribute only where the
+                    law violates their bound. `UNCENSORED` treats all rows as measured values
+    sigma           standard deviations of the rows, of which only the ratios matter. By default the rows of different
+                    test rigs are weighted by the standard deviations of their sensors; `sigma=1.0` weights all rows
+                    equally
+    fixed           names of further parameters that keep their value
 
-    Raises IdentificationError where the points cannot determine the parameters, and says which.
+    Residuals are taken in the quantity that the law gives (force, contraction or pressure), and the parameters stay
+    within their declared bounds. Raises IdentificationError where the data do not determine the parameters, and names
+    these.
     """
     _check_types(characteristic, recording)
-    data, dropped = _points(recording)
-    by_rig = None if sigma is not None else _by_rig(characteristic, recording)
-    weights = _weights(data, dropped, sigma if by_rig is None else _by_row(by_rig, recording))
+    data, dropped = _join_recordings(recording)
+    by_recording = None if sigma is not None else _deviations_by_recording(characteristic, recording)
+    weights = _row_weights(data, dropped, sigma if by_recording is None else _repeat_by_row(by_recording, recording))
     data, weights = data.rows(~dropped), weights[~dropped]
-    law = _with_validity_range(_of_length(characteristic, data), data)
+    law = _with_validity_range(_with_length(characteristic, data), data)
     runs = [recording] if isinstance(recording, Recording) else list(recording)
-    problem = make_problem(law, data, censoring or within_sensor(censoring_of(law), law, runs), weights, fixed)
+    problem = make_problem(law, data, censoring or narrow_to_sensor(default_censoring(law), law, runs), weights, fixed)
     solution = solve(problem, loss)
-    found = statistics(problem, solution, loss)
-    notes = (*_notes(problem, found, loss, int(np.count_nonzero(dropped))), *_of_rigs(by_rig, problem))
-    notes += _narrow(problem, solution, loss)
-    return _result(problem, solution, found, loss, int(np.count_nonzero(dropped)), notes)
+    statistics = compute_statistics(problem, solution, loss)
+    dropped_count = int(np.count_nonzero(dropped))
+    notes = (*_collect_notes(problem, statistics, loss, dropped_count), *_weighting_notes(by_recording, problem))
+    notes += _loss_scale_notes(problem, solution, loss)
+    return _build_result(problem, solution, statistics, loss, dropped_count, notes)
 
 
 def _check_types(characteristic: object, recording: object) -> None:
     if not isinstance(characteristic, Characteristic):
-        raise ParameterError(f"fit: {str(characteristic)[:80]} is no characteristic, as load(...).characteristic is.")
+        raise ParameterError(
+            f"fit: {str(characteristic)[:80]} is not a characteristic. Give one, for example load(...).characteristic."
+        )
     runs = recording if isinstance(recording, Sequence) else [recording]
     for run in runs:
         if not isinstance(run, Recording):
-            raise ParameterError(f"fit: {str(run)[:80]} is no Recording, as read, read_csv and simulate return it.")
+            raise ParameterError(
+                f"fit: {str(run)[:80]} is not a Recording. Give one, as returned by read, read_csv or simulate."
+            )
 
 
-def _points(recording: Recording | Sequence[Recording]) -> tuple[Recording, npt.NDArray[np.bool_]]:
-    """Pressure, contraction and force of one or several recordings, and the rows where one of them is missing."""
+def _join_recordings(recording: Recording | Sequence[Recording]) -> tuple[Recording, npt.NDArray[np.bool_]]:
+    """The points of one or several recordings, and the mask of the rows with a missing value."""
     runs = [recording] if isinstance(recording, Recording) else list(recording)
-    columns = {name: np.concatenate([run[name] for run in runs]) for name in POINT} if runs else {}
+    columns = {name: np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS} if runs else {}
     origins = list(dict.fromkeys(run.origin for run in runs))
     few = len(origins) <= 3
     origin = " + ".join(origins if few else [*origins[:2], f"{len(origins) - 2} more"]) or "no recording"
@@ -85,7 +94,7 @@ def _points(recording: Recording | Sequence[Recording]) -> tuple[Recording, npt.
         if np.isinf(values).any():
             row = int(np.argmax(np.isinf(values)))
             raise IdentificationError(
-                f"{origin}, row {row + 1}: {name} is {values[row]}. Leave such rows out, as with "
+                f"{origin}, row {row + 1}: {name} is {values[row]}. Remove such rows, for example with "
                 f"recording.rows(np.isfinite(recording['{name}']))."
             )
     missing = np.isnan(np.stack(list(columns.values()))).any(axis=0) if columns else np.zeros(0, dtype=bool)
@@ -93,167 +102,172 @@ def _points(recording: Recording | Sequence[Recording]) -> tuple[Recording, npt.
     if len(lengths) > 1 and all(RESTING_LENGTH in run.constants for run in runs):
         by_row = [np.full(len(run), float(run.constants[RESTING_LENGTH])) for run in runs]
         columns[RESTING_LENGTH] = np.concatenate(by_row)
-    rest = lengths.pop() if len(lengths) == 1 else None
-    return Recording(columns, origin, {} if rest is None else {"resting_length": rest}), missing
+    length = lengths.pop() if len(lengths) == 1 else None
+    return Recording(columns, origin, {} if length is None else {"resting_length": length}), missing
 
 
-def _weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLike | None) -> Array:
+def _row_weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLike | None) -> Array:
     if sigma is None:
         return np.ones(len(data))
     deviations = np.broadcast_to(np.asarray(sigma, dtype=float), (len(data),))
     if not (np.isfinite(deviations) & (deviations > 0))[~dropped].all():
-        raise IdentificationError(f"{data.origin}: every sigma must be finite and greater than zero.")
+        raise IdentificationError(f"{data.origin}: every sigma must be finite and positive.")
     weights = 1.0 / deviations
     return np.asarray(weights / np.sqrt(np.mean(weights[~dropped] ** 2)))
 
 
-def _by_rig(law: Characteristic, recording: Recording | Sequence[Recording]) -> Array | None:
-    """The sensors' deviations by recording, where there are several that differ."""
+def _deviations_by_recording(law: Characteristic, recording: Recording | Sequence[Recording]) -> Array | None:
+    """The standard deviations of the sensors by recording; None unless they differ."""
     if isinstance(recording, Recording) or len(recording) < 2:
         return None
-    return deviations(recording, direction_of(law).quantity)
+    return sensor_deviations(recording, fitted_quantity_of(law).name)
 
 
-def _by_row(by_rig: Array, recording: Any) -> Array:
-    return np.repeat(by_rig, [len(run) for run in recording])
+def _repeat_by_row(by_recording: Array, recording: Any) -> Array:
+    return np.repeat(by_recording, [len(run) for run in recording])
 
 
-def _of_rigs(by_rig: Array | None, problem: FitProblem) -> list[str]:
-    if by_rig is None:
+def _weighting_notes(by_recording: Array | None, problem: FitProblem) -> list[str]:
+    if by_recording is None:
         return []
+    unit = "" if problem.fitted_quantity.unit == "1" else f" {problem.fitted_quantity.unit}"
     return [
-        "The recordings come from rigs whose sensors differ: rows weigh by standard deviations of "
-        f"{min(by_rig):.3g} to {max(by_rig):.3g} {problem.direction.unit}; sigma=1.0 counts all alike."
+        "The recordings come from test rigs with different sensors: rows are weighted by standard deviations of "
+        f"{min(by_recording):.3g} to {max(by_recording):.3g}{unit}; sigma=1.0 weights all rows equally."
     ]
 
 
-def _of_length(law: Any, data: Recording) -> Any:
-    """A law for muscles of any length as that of the muscle in the data, where there is one."""
-    rest = data.constants.get(RESTING_LENGTH)
-    return law.of_length(float(rest)) if rest is not None and hasattr(law, "of_length") else law
+def _with_length(law: Any, data: Recording) -> Any:
+    """A law for muscles of any resting length, at the resting length of the data if there is one."""
+    length = data.constants.get(RESTING_LENGTH)
+    return law.with_resting_length(float(length)) if length is not None and hasattr(law, "with_resting_length") else law
 
 
 def _with_validity_range(law: Characteristic, data: Recording) -> Characteristic:
-    """The law on the validity range of the data, where it has one."""
+    """A surface scaled to the validity range of the data; any other law unchanged."""
     with_validity_range = getattr(law, "with_validity_range", None)
     if with_validity_range is None or not len(data):
         return law
-    for name, unit in (("pressure", "Pa"), ("contraction", "1")):
+    for name, unit in (("pressure", " Pa"), ("contraction", "")):
         if np.ptp(data[name]) == 0:
             raise IdentificationError(
-                f"{data.origin}: {name} is {data[name][0]:g} {unit} in every row, so no surface over it can be fitted. "
+                f"{data.origin}: {name} is {data[name][0]:g}{unit} in every row, so a surface cannot be fitted. "
                 f"Measure at several levels of {name}."
             )
-    boxed: Characteristic = with_validity_range(
+    scaled: Characteristic = with_validity_range(
         *((float(data[n].min()), float(data[n].max())) for n in ("pressure", "contraction"))
     )
-    return boxed
+    return scaled
 
 
-def _result(
-    problem: FitProblem, solution: Solution, found: Statistics, loss: Loss, dropped: int, notes: tuple[str, ...]
+def _build_result(
+    problem: FitProblem, solution: Solution, statistics: FitStatistics, loss: Loss, dropped: int, notes: tuple[str, ...]
 ) -> Fit:
-    data, quantity = problem.data, problem.direction.quantity
+    data, quantity = problem.data, problem.fitted_quantity.name
     model = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
-    clamped = evaluate(model, quantity, problem.direction.arguments, data)
-    measured = problem.sides == 0
-    errors = clamped - data[quantity]
-    # a row cut off is wrong only where the law contradicts it; what it reads is not what was there
-    contradicted = np.where(measured, errors, problem.errors(clamped) / problem.weights)
-    worst = int(np.argmax(np.abs(contradicted)))
+    clamped = evaluate(model, quantity, problem.fitted_quantity.arguments, data)
+    measured = problem.censoring == 0
+    residuals = clamped - data[quantity]
+    # a censored row has a residual only where the law violates its bound; its reading is not a measured value
+    violations = np.where(measured, residuals, problem.residuals(clamped) / problem.weights)
+    worst = int(np.argmax(np.abs(violations)))
     varies = bool(np.ptp(data[quantity][measured]) > 0)
     return Fit(
         model=model,
-        estimates=_estimates(problem, solution, found),
-        correlations=found.correlations,
-        rank=found.rank,
-        condition=found.condition,
-        sigma=found.sigma,
-        rmse=float(np.sqrt(np.mean(errors[measured] ** 2))),
-        max_error=WorstPoint(float(contradicted[worst]), *(float(data[name][worst]) for name in POINT)),
-        index=correlation_index(data[quantity][measured], clamped[measured]) if varies else None,
+        estimates=_build_estimates(problem, solution, statistics),
+        correlations=statistics.correlations,
+        rank=statistics.rank,
+        condition=statistics.condition,
+        sigma=statistics.sigma,
+        rmse=float(np.sqrt(np.mean(residuals[measured] ** 2))),
+        max_error=WorstPoint(float(violations[worst]), *(float(data[name][worst]) for name in POINT_COLUMNS)),
+        correlation_index=correlation_index(data[quantity][measured], clamped[measured]) if varies else None,
         rows_censored=int(np.count_nonzero(~measured)),
         rows_dropped=dropped,
         recording=data,
-        direction=problem.direction,
-        sides=problem.sides,
+        fitted_quantity=problem.fitted_quantity,
+        censoring=problem.censoring,
         problem=dataclasses.replace(problem, law=model, leaves=tuple(tree.leaves(model))),
         loss=loss,
         notes=notes,
     )
 
 
-def _estimates(problem: FitProblem, solution: Solution, found: Statistics) -> tuple[Estimate, ...]:
+def _build_estimates(problem: FitProblem, solution: Solution, statistics: FitStatistics) -> tuple[Estimate, ...]:
     leaves = (problem.leaves[i] for i in problem.free)
     columns = zip(
         leaves,
         problem.labels,
         solution.values.tolist(),
-        found.deviations.tolist(),
-        found.on_bound.tolist(),
+        statistics.standard_errors.tolist(),
+        statistics.on_bound.tolist(),
         strict=True,
     )
     return tuple(
-        Estimate(leaf.path, label, value, deviation, leaf.declared.unit, leaf.declared.meaning, bound)
-        for leaf, label, value, deviation, bound in columns
+        Estimate(leaf.path, label, value, stderr, leaf.declared.unit, leaf.declared.meaning, on_bound)
+        for leaf, label, value, stderr, on_bound in columns
     )
 
 
-def _notes(problem: FitProblem, found: Statistics, loss: Loss, dropped: int) -> tuple[str, ...]:
-    """What a reader of the fit must know, in sentences."""
+def _collect_notes(problem: FitProblem, statistics: FitStatistics, loss: Loss, dropped: int) -> tuple[str, ...]:
+    """Remarks on the data and the fit that affect its interpretation, as sentences."""
     notes = []
-    cut_off = int(np.count_nonzero(problem.sides))
-    at_zero = int(np.count_nonzero((problem.data["force"] <= 0) & (problem.sides == 0)))
+    censored = int(np.count_nonzero(problem.censoring))
+    at_zero = int(np.count_nonzero((problem.data["force"] <= 0) & (problem.censoring == 0)))
     if dropped:
-        notes.append(f"{dropped} rows with a missing value (NaN) were left out.")
-    if cut_off:
+        notes.append(f"{dropped} rows with a missing value (NaN) were dropped.")
+    if censored:
         notes.append(
-            f"{cut_off} rows are cut off at the ends of the range of force and count only where the law contradicts "
-            "them; censoring=UNCENSORED fits them as they stand."
+            f"{censored} rows are censored (at zero force, or at the limit of the force range) and contribute only "
+            "where the law violates their bound; censoring=UNCENSORED treats them as measured values."
         )
-    if found.measured_rank < found.rank:
+    if statistics.uncensored_rank < statistics.rank:
         notes.append(
-            f"The measured rows determine {found.measured_rank} of {found.rank} parameters; the others only have "
-            "bounds, where the rows are cut off, and stand as near to these as they can."
+            f"The uncensored rows determine {statistics.uncensored_rank} of {statistics.rank} parameters; the others "
+            "are limited only by the bounds of the censored rows, and the law is as close to these as possible."
         )
     if at_zero:
         notes.append(
-            f"{at_zero} rows at zero force or below are fitted as they stand; give censoring=Censoring() if the muscle "
-            "was slack there."
+            f"{at_zero} rows at zero force or below are treated as measured values; give censoring=Censoring() if the "
+            "muscle was slack there."
         )
-    notes += _other_lengths(problem)
-    notes += [f"{name} stopped at its bound; the value is not a measured one." for name in _bounded(problem, found)]
-    if not np.isfinite(found.sigma):
-        notes.append("As many points as parameters: the standard deviations are unknown.")
-    if found.condition > ILL_CONDITIONED:
-        notes.append(f"The parameters are nearly indistinct (condition {found.condition:.2g}).")
+    notes += _length_notes(problem)
+    notes += [
+        f"{name} is on its bound; its value is not determined by the data."
+        for name in _parameters_on_bound(problem, statistics)
+    ]
+    if not np.isfinite(statistics.sigma):
+        notes.append("There are as many rows as parameters, so the standard errors are unknown.")
+    if statistics.condition > ILL_CONDITIONED:
+        notes.append(f"The problem is ill-conditioned (condition number {statistics.condition:.2g}).")
     if not isinstance(loss, LeastSquares):
-        notes.append(f"Robust: {loss}, in {problem.direction.unit}.")
+        unit = problem.fitted_quantity.unit
+        notes.append(f"Robust loss: {loss}{'' if unit == '1' else f', in {unit}'}.")
     return tuple(notes)
 
 
-def _narrow(problem: FitProblem, solution: Solution, loss: Loss) -> tuple[str, ...]:
-    """A robust loss so narrow that nearly every row is an outlier to it."""
-    measured = problem.sides == 0
-    errors = np.abs(problem.errors(solution.modelled))[measured]
-    inside = int(np.count_nonzero(errors <= loss.scale))
-    if isinstance(loss, LeastSquares) or inside >= errors.size / 2:
+def _loss_scale_notes(problem: FitProblem, solution: Solution, loss: Loss) -> tuple[str, ...]:
+    """A remark where the scale of a robust loss is so small that most rows count as outliers."""
+    measured = problem.censoring == 0
+    residuals = np.abs(problem.residuals(solution.modelled))[measured]
+    inside = int(np.count_nonzero(residuals <= loss.scale))
+    if isinstance(loss, LeastSquares) or inside >= residuals.size / 2:
         return ()
     return (
-        f"Only {inside} of {errors.size} rows lie within the scale of {loss}: the standard deviations come out too "
-        "small. A scale of about three times the noise gives ones to be trusted.",
+        f"Only {inside} of {residuals.size} residuals are within the scale of {loss}, so the standard errors are too "
+        "small. Use a scale of about three times the standard deviation of the noise.",
     )
 
 
-def _other_lengths(problem: FitProblem) -> list[str]:
-    """A law made for another specimen: its contraction, and so its parameters, mean something else."""
-    rest = problem.data.constants.get("resting_length")
+def _length_notes(problem: FitProblem) -> list[str]:
+    """A remark where the law is of another resting length than the data, since contraction is relative to it."""
+    length = problem.data.constants.get("resting_length")
     return [
-        f"The recording is of a muscle of {rest:.6g} m, {leaf.path} is {leaf.value:.6g} m."
+        f"The muscle in the recording has a resting length of {length:.4g} m, but {leaf.path} is {leaf.value:.4g} m."
         for leaf in problem.leaves
-        if leaf.declared.name == "resting_length" and rest is not None and abs(leaf.value - float(rest)) > 1e-6
+        if leaf.declared.name == "resting_length" and length is not None and abs(leaf.value - float(length)) > 1e-6
     ]
 
 
-def _bounded(problem: FitProblem, found: Statistics) -> list[str]:
-    return [problem.leaves[i].path for i, bound in zip(problem.free, found.on_bound, strict=True) if bound]
+def _parameters_on_bound(problem: FitProblem, statistics: FitStatistics) -> list[str]:
+    return [problem.leaves[i].path for i, on_bound in zip(problem.free, statistics.on_bound, strict=True) if on_bound]

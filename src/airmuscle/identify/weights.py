@@ -1,4 +1,4 @@
-"""What a row weighs: the inverse of its sensor's standard deviation, where recordings come from several rigs."""
+"""Sensor standard deviations by recording, for inverse-variance weights across test rigs."""
 
 from __future__ import annotations
 
@@ -11,45 +11,46 @@ from ..core.errors import ColumnError
 from ..recording import Recording
 from ..recording.segment import estimate_sensors
 
-APART = 2.0
-"""Ratio of neighbouring deviations from which on two sensors differ (chosen: one sensor's estimates scatter less)."""
+MIN_SENSOR_RATIO = 2.0
+"""Minimum ratio of neighbouring standard deviations of two different sensors (chosen: estimates of the standard
+deviation of one sensor differ less)."""
 
 
-def deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
-    """The standard deviation [SI] of one reading in each recording; None where all readings weigh alike.
+def sensor_deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
+    """The standard deviation of one observation in each recording [SI], shape (recordings,).
 
-    Noise and rounding count where every recording states its time; else rounding alone, since the order of other rows
-    is no history. Recordings whose deviations lie close together count as of one rig and share their median. None too
-    where a sensor shows neither noise nor resolution.
+    It includes noise and quantisation where every recording has a time column, otherwise quantisation alone, because
+    the rows are then in no known order. Recordings with similar standard deviations are attributed to one test rig and
+    share their median. None where all recordings are of one rig, or a sensor shows neither noise nor resolution.
     """
     timed = all("time" in run.columns for run in runs)
-    each = []
+    estimates = []
     for run in runs:
         try:
-            each.append(_deviation(run, quantity, timed))
+            estimates.append(_sensor_deviation(run, quantity, timed))
         except ColumnError:
             return None
-        if not each[-1] > 0:  # the others need not be looked at
+        if not estimates[-1] > 0:
             return None
-    alone = np.array(each)
-    order = np.argsort(alone)
-    if not alone.size:
+    single = np.array(estimates)
+    order = np.argsort(single)
+    if not single.size:
         return None
-    rigs = np.split(order, np.flatnonzero(alone[order][1:] > APART * alone[order][:-1]) + 1)
+    rigs = np.split(order, np.flatnonzero(single[order][1:] > MIN_SENSOR_RATIO * single[order][:-1]) + 1)
     if len(rigs) < 2:
         return None
-    found = np.empty(alone.size)
+    deviations = np.empty(single.size)
     for rig in rigs:
-        found[rig] = np.median(alone[rig])
-    return found
+        deviations[rig] = np.median(single[rig])
+    return deviations
 
 
-def _deviation(run: Recording, quantity: str, timed: bool) -> float:
-    """Of one recording's sensor; 0 where it shows nothing."""
+def _sensor_deviation(run: Recording, quantity: str, timed: bool) -> float:
+    """The standard deviation of the sensor of one recording; 0 where it cannot be estimated."""
     values = run[quantity][np.isfinite(run[quantity])]
     if not values.size:
         return 0.0
     sensor = estimate_sensors(Recording({quantity: values}, run.origin)).get(quantity)
     if sensor is None:
         return 0.0
-    return sensor.deviation if timed else float(sensor.resolution / np.sqrt(12.0))
+    return sensor.std if timed else float(sensor.resolution / np.sqrt(12.0))

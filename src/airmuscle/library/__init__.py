@@ -1,1 +1,1 @@
-"""The catalogue: one TOML per specimen or paper, with its sources and its checks."""
+"""Library: parameter sets of muscles, laws and valves as TOML files, with sources and checks."""

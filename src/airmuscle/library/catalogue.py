@@ -1,105 +1,90 @@
-"""The catalogue: library entries by name, and muscle files of the user in the same form.
+"""Loading of library entries and data sets by name, and of files of the same form by path.
 
-`load("dmsp-20-300")` and `load("my/muscle.toml")` give an Entry; a unique beginning of a name is enough.
+`load("dmsp-20-300")`, `load("matrix-821")` and `load("my/muscle.toml")` return an Entry or a ValveEntry; a unique
+beginning of a name is sufficient.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import tomllib
-import warnings
-from collections.abc import Iterable
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ..core.errors import AirmuscleWarning, FileError, UnknownNameError, suggestion
-from .entry import Check, Entry
-from .read import entry_from
-from .write import save, to_toml
-
-if TYPE_CHECKING:
-    from ..recording import Recording
-
-__all__ = [
-    "Check",
-    "Entry",
-    "complete",
-    "list_library",
-    "load",
-    "load_data",
-    "measured_names",
-    "parsed",
-    "save",
-    "to_toml",
-]  # fmt: skip
-
-FOLDER = Path(__file__).parent
-DATA = FOLDER / "data"
+from ..core.errors import ParameterError, UnknownNameError
+from ..recording import Recording, read_csv
+from .build import build_valve_entry
+from .entry import Entry, issue_warning
+from .entry_file import build_entry
+from .files import (
+    DATA,
+    LAWS,
+    VALVES,
+    complete_name,
+    is_path,
+    list_data,
+    list_laws,
+    list_library,
+    list_valves,
+    read_toml,
+)
+from .valve_entry import ValveEntry
 
 
-def list_library() -> tuple[str, ...]:
-    """The names of all library entries, sorted."""
-    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+def load(name_or_path: str | Path) -> Entry | ValveEntry:
+    """A library entry (muscle, law or valve) by its name or a unique beginning of it, or a file by its path.
 
-
-def measured_names() -> tuple[str, ...]:
-    """The names of all measured or tabulated data sets that come with the library, sorted."""
-    return tuple(sorted(path.stem for path in DATA.glob("*.csv")))
-
-
-def load(name_or_path: str | Path) -> Entry:
-    """A library entry by its name or a unique beginning of it, or a muscle file by its path.
-
-    Raises UnknownName, FileError, ParameterError or UnitError, saying where; an entry that carries a warning
-    issues it as an AirmuscleWarning.
+    In a plant, write `.muscle` of an Entry, and `.valve` or `.exhaust` of a ValveEntry. Raises UnknownNameError,
+    FileError, ParameterError or UnitError with the location. A warning of the entry is issued as an AirmuscleWarning.
     """
-    text = str(name_or_path)
-    is_path = isinstance(name_or_path, Path) or text.endswith(".toml") or "/" in text or "\\" in text
-    path = Path(name_or_path) if is_path else FOLDER / f"{complete(text, list_library(), 'library entry')}.toml"
-    entry = entry_from(parsed(path), path.stem, path if is_path else Path(path.name), path.parent)
-    if entry.warning:
-        warnings.warn(f"{entry.name}: {entry.warning}", AirmuscleWarning, stacklevel=2)
+    if is_path(name_or_path):
+        path = file = Path(name_or_path)
+    else:
+        name = complete_name(str(name_or_path), list_library(), "library entry")
+        path = (VALVES if name in list_valves() else LAWS) / f"{name}.toml"
+        file = Path(path.name)
+    tables = read_toml(path)
+    entry: Entry | ValveEntry
+    if _describes_valve(tables):
+        entry = build_valve_entry(tables, path.stem, file)
+    else:
+        entry = build_entry(tables, path.stem, file, path.parent)
+    issue_warning(entry.name, entry.warning, stacklevel=2)
+    return entry
+
+
+def load_law(name_or_path: str | Path) -> Entry:
+    """A muscle or a law by its name or a unique beginning of it, or its file by its path; as `load`, without valves."""
+    if is_path(name_or_path):
+        path = file = Path(name_or_path)
+    else:
+        path = LAWS / f"{_complete_law_name(str(name_or_path))}.toml"
+        file = Path(path.name)
+    tables = read_toml(path)
+    if _describes_valve(tables):
+        raise ParameterError(f"{file}: the file describes a valve; a muscle or a law is required.")
+    entry = build_entry(tables, path.stem, file, path.parent)
+    issue_warning(entry.name, entry.warning, stacklevel=2)
     return entry
 
 
 def load_data(name: str) -> Recording:
-    """A data set that comes with the library, by its name or a unique beginning of it.
+    """A data set of the library by its name or a unique beginning of it.
 
-    The head of its file, with source and licence, is the last of the Recording's notes.
+    The last note of the Recording is the header of the file, with source and licence.
     """
-    from ..recording import read_csv  # pandas, which no entry without data needs
-
-    path = DATA / f"{complete(str(name), measured_names(), 'data set')}.csv"
+    path = DATA / f"{complete_name(str(name), list_data(), 'data set')}.csv"
     recording: Recording = read_csv(path)
     lines = path.read_text(encoding="utf-8").splitlines()
-    head = " ".join(line.lstrip("# ") for line in lines if line.startswith("#") and " = " not in line)
-    return dataclasses.replace(recording, notes=(*recording.notes, head))
+    header = " ".join(line.lstrip("# ") for line in lines if line.startswith("#") and " = " not in line)
+    return dataclasses.replace(recording, notes=(*recording.notes, header))
 
 
-def complete(name: str, known: Iterable[str], kind: str) -> str:
-    """The one known name that is, or begins with, `name`. Raises UnknownName with what there is."""
-    known = tuple(known)
-    if name in known:
-        return name
-    found = [candidate for candidate in known if name and candidate.startswith(name)]
-    if len(found) > 1:
-        raise UnknownNameError(f"'{name}' is the beginning of several: {', '.join(found)}. Write more of it.")
-    if not found:
-        raise UnknownNameError(f"no {kind} '{name}'; there are {', '.join(known)}.{suggestion(name, known)}")
-    return found[0]
+def _describes_valve(tables: Mapping[str, Any]) -> bool:
+    return "valve" in tables and "characteristic" not in tables
 
 
-def parsed(path: Path) -> dict[str, Any]:
-    """The tables of a TOML file. Raises FileError where it cannot be read or is not TOML."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise FileError(f"{path}: there is no such file.") from None
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read ({error.strerror}).") from None
-    except UnicodeDecodeError as error:
-        raise FileError(f"{path}: is not UTF-8 text (byte {error.start}). Save it as UTF-8.") from None
-    except tomllib.TOMLDecodeError as error:
-        raise FileError(f"{path}: is not TOML: {error}.") from None
-    except (ValueError, RecursionError) as error:  # a name with a null byte, brackets nested past any use
-        raise FileError(f"{path}: cannot be read ({error}).") from None
+def _complete_law_name(name: str) -> str:
+    if name in list_valves():
+        raise UnknownNameError(f"'{name}' is a valve; a muscle or a law is required: {', '.join(list_laws())}.")
+    return complete_name(name, list_laws(), "muscle or law")

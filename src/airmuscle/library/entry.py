@@ -1,30 +1,28 @@
-"""What a library file describes: a muscle or a law with its sources, its trust and its checks."""
+"""Entry: a library file of a muscle or a law, with sources, provenance and checks."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+import warnings
 
 from ..characteristic.base import Characteristic, ForceLaw
 from ..characteristic.validity_range import ValidityRange
-from ..core.errors import UnknownNameError
+from ..core.errors import AirmuscleWarning, UnknownNameError
 from ..core.reference import Reference
+from ..friction.base import Friction
 from ..geometry.base import Geometry
+from ..muscle import CreepElements, Damper, Muscle, SeriesElement, Spring, Stop, Wall
 
-if TYPE_CHECKING:
-    from ..friction.base import Friction
-    from ..muscle import CreepElements, Damper, Muscle, Series, Spring, Stop, Wall
-
-OPTIONAL = ("spring", "damper", "friction", "wall", "series", "stop", "creep")
-"""Parts that a muscle may do without, as fields of an entry and tables of its file."""
+OPTIONAL_PARTS = ("spring", "damper", "friction", "wall", "series", "stop", "creep")
+"""Optional elements of a muscle, as fields of an entry and tables of its file."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Check:
-    """A published number that the entry must give: `quantity` at the `given` values, within a tolerance."""
+    """Published value that an entry must reproduce: `quantity` under `conditions` within a tolerance, all SI."""
 
     quantity: str
-    given: tuple[tuple[str, float], ...]
+    conditions: tuple[tuple[str, float], ...]
     equals: float
     tolerance: float
     source: str
@@ -32,10 +30,11 @@ class Check:
 
 @dataclasses.dataclass(frozen=True)
 class Entry:
-    """One library file: a muscle or a law as it was read, all numbers SI.
+    """Library entry of a muscle or a law, all numbers SI; `muscle` is the Muscle for use in a plant.
 
-    `provenance` says how the numbers came here (printed, measured, second hand, fitted, chosen), `warning` what a user
-    must know before using it, and `validity_range` where the entry was measured or printed, when the file says so.
+    `provenance` is the origin of the numbers (printed, measured, secondary source, fitted, chosen), `warning` a
+    restriction of use, which is issued when the entry is loaded, and `validity_range` the range of the measurements or
+    the publication, if the file states it.
     """
 
     name: str
@@ -47,7 +46,7 @@ class Entry:
     damper: Damper | None = None
     friction: Friction | None = None
     wall: Wall | None = None
-    series: Series | None = None
+    series: SeriesElement | None = None
     stop: Stop | None = None
     creep: CreepElements | None = None
     note: str = ""
@@ -58,15 +57,20 @@ class Entry:
 
     @property
     def muscle(self) -> Muscle:
-        """The muscle made of the entry's parts. Raises UnknownName where parts are missing."""
-        from ..muscle import Muscle
-
+        """Muscle with the elements of the entry. Raises UnknownNameError if the entry is a law without a geometry, or
+        a law that is not solved for the force."""
         if not isinstance(self.characteristic, ForceLaw) or self.geometry is None:
-            lack = (
+            missing = (
                 "a [geometry], which its file or [plant.muscle] can give"
                 if self.geometry is None
                 else "a law solved for the force: see as_force_law"
             )
-            raise UnknownNameError(f"{self.name} is a characteristic, not yet a muscle; it lacks {lack}.")
-        given = {part: getattr(self, part) for part in OPTIONAL if getattr(self, part) is not None}
-        return Muscle(self.characteristic, self.geometry, validity_range=self.validity_range, **given)
+            raise UnknownNameError(f"{self.name} is a characteristic, not a muscle; it lacks {missing}.")
+        parts = {part: getattr(self, part) for part in OPTIONAL_PARTS if getattr(self, part) is not None}
+        return Muscle(self.characteristic, self.geometry, validity_range=self.validity_range, **parts)
+
+
+def issue_warning(name: str, warning: str, stacklevel: int) -> None:
+    """Issue the warning of an entry, if it has one, as an AirmuscleWarning; `stacklevel` counts from the caller."""
+    if warning:
+        warnings.warn(f"{name}: {warning}", AirmuscleWarning, stacklevel=stacklevel + 1)

@@ -1,55 +1,58 @@
-"""An entry in the library's own form: what `load` reads back to the same numbers."""
+"""Writing of library entries, model tables and scenarios as TOML that the loaders read back to the same numbers."""
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import FileError, ParameterError
-from .entry import OPTIONAL, Check, Entry
+from .build import TEXT_KEYS
+from .entry import OPTIONAL_PARTS, Check, Entry
 
 
 def to_toml(entry: Entry) -> str:
-    """The text of a library file for this entry; numbers in SI, with all their digits."""
-    texts = {key: getattr(entry, key) for key in ("title", "provenance", "note", "warning")}
-    lines = [f"{key} = {_value(text)}" for key, text in texts.items() if text]
-    for part in ("characteristic", "geometry", *OPTIONAL):
-        built = getattr(entry, part)
-        belongs_to_law = part == "geometry" and built == getattr(entry.characteristic, "geometry", None)
-        if built is not None and not belongs_to_law:
-            lines += part_lines(part, built)
+    """Text of the library file of an entry; numbers in SI units with all digits."""
+    tables: dict[str, Any] = {key: getattr(entry, key) for key in TEXT_KEYS if getattr(entry, key)}
+    for part in ("characteristic", "geometry", *OPTIONAL_PARTS):
+        thing = getattr(entry, part)
+        belongs_to_law = part == "geometry" and thing == getattr(entry.characteristic, "geometry", None)
+        if thing is not None and not belongs_to_law:
+            tables[part] = _model_table(thing)
     if entry.validity_range is not None:
-        lines += _table("validity_range", dataclasses.asdict(entry.validity_range))
-    for check in entry.checks:
-        lines += _table("[check]", _row(check))
-    for reference in entry.references:
-        lines += _table("[reference]", {k: v for k, v in dataclasses.asdict(reference).items() if v not in (None, "")})
-    return "\n".join(lines) + "\n"
+        tables["validity_range"] = dataclasses.asdict(entry.validity_range)
+    if entry.checks:
+        tables["check"] = [_check_table(check) for check in entry.checks]
+    if entry.references:
+        tables["reference"] = [
+            {key: value for key, value in dataclasses.asdict(reference).items() if value not in (None, "")}
+            for reference in entry.references
+        ]
+    return _to_text(tables)
 
 
-def part_lines(name: str, thing: Any) -> list[str]:
-    """The lines of one table of such a file: [friction], say, with the model and its numbers."""
-    return list(_table(name, _described(thing)))
+def part_toml(name: str, thing: Any) -> str:
+    """Text of one table of a library file, such as [friction], with the model and its parameters."""
+    return _to_text({name: _model_table(thing)})
 
 
 def scenario_toml(title: str, plant: Any, command: Mapping[str, Any], run: Mapping[str, Any], note: str = "") -> str:
-    """The text of a scenario that `load_scenario` reads back: a plant with all its numbers, a command as written."""
-    lines = [f"# {line}" for line in note.splitlines()]
-    lines += [f"title = {_value(title)}", *_table("plant", _described(plant))]
-    lines += [*_table("command", command), *_table("run", run)]
-    return "\n".join(lines) + "\n"
+    """Text of a scenario that `load_scenario` reads: a plant with all parameters, the command and run tables.
+
+    Each line of `note` becomes a comment at the beginning.
+    """
+    comments = "".join(f"# {line}\n" for line in note.splitlines())
+    return comments + _to_text({"title": title, "plant": _model_table(plant), "command": command, "run": run})
 
 
 def save(entry: Entry, path: str | Path) -> Path:
-    """Write an entry to a file that `load` reads back, whole or not at all. Raises FileError."""
+    """Write an entry to a file that `load` reads; the file is complete or unchanged. Raises FileError."""
     if not isinstance(entry, Entry):
-        raise ParameterError(f"save: {str(entry)[:80]} is no library entry; build one with Entry, or load and replace.")
+        raise ParameterError(f"save: {str(entry)[:80]} is not an Entry; build one with Entry, or load and replace one.")
     if not isinstance(path, str | Path):
-        raise FileError(f"save: {path!r} is no path; name a file.")
+        raise FileError(f"save: {path!r} is not a path; give a text or a Path.")
     path = Path(path)
     unfinished = path.with_name(f"{path.name}.part")
     try:
@@ -62,37 +65,35 @@ def save(entry: Entry, path: str | Path) -> Path:
     return path
 
 
-def _described(thing: Any) -> dict[str, Any]:
-    """A model as the table that `build` reads; fields that are None are left out, being their default."""
+def _to_text(tables: Mapping[str, Any]) -> str:
+    import tomlkit
+
+    return tomlkit.dumps(_plain(tables))
+
+
+def _model_table(thing: Any) -> dict[str, Any]:
+    """A model as the table that `build` reads; fields that are None have this default and are left out."""
     fields = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing) if f.init}
-    return {"model": type(thing).__name__, **{k: _structured(v) for k, v in fields.items() if v is not None}}
+    return {"model": type(thing).__name__, **{name: value for name, value in fields.items() if value is not None}}
 
 
-def _structured(value: Any) -> Any:
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return _described(value)
-    return [_structured(v) for v in value] if isinstance(value, tuple) else value
-
-
-def _row(check: Check) -> dict[str, Any]:
-    return {"quantity": check.quantity, **dict(check.given), "equals": check.equals,
+def _check_table(check: Check) -> dict[str, Any]:
+    return {"quantity": check.quantity, **dict(check.conditions), "equals": check.equals,
             "tolerance": check.tolerance, "source": check.source}  # fmt: skip
 
 
-def _table(name: str, values: Mapping[str, Any]) -> Iterator[str]:
-    """A table's lines, its plain values first, then the tables inside it."""
-    yield f"\n[{name}]"
-    yield from (f"{key} = {_value(value)}" for key, value in values.items() if not isinstance(value, Mapping))
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            yield from _table(f"{name}.{key}", value)
-
-
-def _value(value: Any) -> str:
+def _plain(value: Any) -> Any:
+    """Models as tables, tuples as lists, NumPy numbers as floats; in a table, values stand before inner tables."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return _plain(_model_table(value))
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_value(v)}" for key, v in value.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(_value(v) for v in value) + "]"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return json.dumps(value) if isinstance(value, bool | int) else repr(float(value))
+        plain = {key: _plain(item) for key, item in value.items()}
+        return dict(sorted(plain.items(), key=lambda item: _is_table(item[1])))
+    if isinstance(value, tuple | list):
+        return [_plain(item) for item in value]
+    return value if isinstance(value, str | bool | int) else float(value)
+
+
+def _is_table(value: Any) -> bool:
+    """Whether TOML writes a value as a table or an array of tables."""
+    return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(item, dict) for item in value))

@@ -1,13 +1,13 @@
-"""What a muscle pulls at."""
+"""Mechanisms: the mechanical loads on which muscles act."""
 
 from .antagonistic_joint import AntagonisticJoint
 from .base import Coordinate, Mechanism
 from .contact import HuntCrossley
 from .end_stops import JointWithEndStops, WithEndStops
 from .hanging_mass import HangingMass
-from .held import Held
 from .isometric import Isometric
 from .isotonic import Isotonic
+from .latch import WithLatch
 from .lever import Lever
 from .muscles_in_series import MusclesInSeries
 from .offsets import WithOffsets
@@ -20,7 +20,6 @@ __all__ = [
     "AntagonisticJoint",
     "Coordinate",
     "HangingMass",
-    "Held",
     "HuntCrossley",
     "Isometric",
     "Isotonic",
@@ -33,5 +32,6 @@ __all__ = [
     "Pulley",
     "SpringLoad",
     "WithEndStops",
+    "WithLatch",
     "WithOffsets",
 ]

@@ -1,4 +1,4 @@
-"""A mechanism in generalised coordinates: how far it shortens each muscle, and how it moves under their pull."""
+"""Mechanism (interface) in generalised coordinates: muscle contractions and equations of motion."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ INFINITY = float("inf")
 
 @dataclasses.dataclass(frozen=True)
 class Coordinate:
-    """One generalised coordinate with the name of its speed; `nominal` are sizes below which errors do not matter.
+    """One generalised coordinate and the name of its speed.
 
-    `least` and `greatest` say where a search for rest may look; they are no stops.
+    `nominal` and `nominal_speed` are the magnitudes below which errors do not matter. `lower_limit` and `upper_limit`
+    bound the search for equilibria; they are not end stops.
     """
 
     name: str
@@ -30,37 +31,40 @@ class Coordinate:
 
     @property
     def acceleration(self) -> str:
-        """The name of its acceleration: that of its speed with the one word for the other."""
-        found = self.speed.replace("speed", "acceleration")
-        return found if found != self.speed else f"{self.name}.acceleration"
+        """Name of the acceleration: the name of the speed with "acceleration" instead of "speed"."""
+        name = self.speed.replace("speed", "acceleration")
+        return name if name != self.speed else f"{self.name}.acceleration"
 
 
 class Mechanism(abc.ABC):
-    """What muscles pull at. Coordinates q and speeds v are mappings by the names of `coordinates`."""
+    """Mechanical load of one or more muscles (interface).
+
+    Coordinates q and speeds v are mappings from the names in `coordinates` to values.
+    """
 
     @property
     @abc.abstractmethod
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """The generalised coordinates, in order."""
+        """Generalised coordinates, in order."""
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """The inputs that act on the mechanism."""
+        """Inputs of the mechanism."""
         return ()
 
     @property
-    def muscles(self) -> int | None:
-        """How many muscles it takes; None for any number."""
+    def muscle_count(self) -> int | None:
+        """Number of muscles that act on the mechanism; None for any number."""
         return None
 
     @abc.abstractmethod
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
-        """Contraction [1] of every muscle, of resting lengths [m], at coordinates q."""
+        """Contraction of each muscle at coordinates q, for resting lengths [m]."""
 
     def contraction_speeds(
         self, q: Mapping[str, Value], v: Mapping[str, Value], resting_lengths: Sequence[Value]
     ) -> tuple[Value, ...]:
-        """Speed of shortening [m/s] of every muscle, derived from `contractions`."""
+        """Speed of shortening [m/s] of each muscle, the time derivative of `contractions` times the resting length."""
         names = [c.name for c in self.coordinates]
         if not names:
             return tuple(0.0 for _ in resting_lengths)
@@ -74,36 +78,37 @@ class Mechanism(abc.ABC):
     def generalised_forces(
         self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
     ) -> dict[str, Value]:
-        """Generalised force of the muscles' tensions [N] on every coordinate: virtual work, J^T F, from `contractions`.
+        """Generalised force on each coordinate from the muscle tensions [N], by virtual work: J^T F.
 
-        Newtons for a coordinate in metres, newton metres for an angle.
+        J is the Jacobian of the muscle shortenings by the coordinates, from `contractions`. Units: [N] for a coordinate
+        in metres, [N m] for an angle.
         """
         names = [c.name for c in self.coordinates]
         if not names:
             return {}
-        found = autodiff.vjp(
+        forces = autodiff.vjp(
             lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths),
             [q[name] for name in names],
             [tension * length for tension, length in zip(tensions, resting_lengths, strict=True)],
         )
-        return dict(zip(names, found, strict=True))
+        return dict(zip(names, forces, strict=True))
 
     @abc.abstractmethod
     def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
-        """Acceleration of every coordinate under the generalised forces `pulls` and the mechanism's own."""
+        """Acceleration of each coordinate under the generalised muscle forces and the forces of the mechanism."""
 
     def dissipated_power(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
-        """Power [W] that leaves it otherwise than to the muscles: by its own dampers, stops and drives."""
+        """Power [W] that leaves the mechanism through its dampers, end stops and drives."""
         return 0.0
 
     def potential_energy(self, q: Mapping[str, Value]) -> Value:
-        """Energy of position [J]."""
+        """Potential energy [J]."""
         return 0.0
 
     def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
-        """Energy of motion [J]."""
+        """Kinetic energy [J]."""
         return 0.0

@@ -1,4 +1,4 @@
-"""Contact of two bodies, after Hunt and Crossley: continuous where it begins and where it ends."""
+"""Hunt-Crossley contact: a contact force that is continuous at the beginning and the end of contact."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ HUNT_CROSSLEY1975 = Reference(
     where="Journal of Applied Mechanics 42(2), 440-445",
     year=1975,
     doi="10.1115/1.3423596",
-    note="force of a contact whose damping grows with the depth",
+    note="contact force with a damping proportional to the elastic force",
 )
 
 
 @model
 class HuntCrossley:
-    """F = K delta^(3/2) (1 + c delta'), never pulling.
+    """Hunt-Crossley contact: F = K delta^(3/2) max(1 + c delta', 0).
 
-    delta depth of the contact [m], K stiffness, c damping: the force begins and ends at zero without a jump, and a
-    slow impact at a speed v ends with (1 - 2/3 c v) of it (for c v = 0.1 that is 0.933, and exactly 0.938).
-    Reference: Hunt and Crossley (1975); the exponent is that of Hertz.
+    delta contact depth [m], K stiffness, c damping. The force is zero and continuous at the beginning and the end of
+    contact and never pulls. For a slow impact at a speed v, the coefficient of restitution is about 1 - 2/3 c v (0.933
+    for c v = 0.1; the exact value is 0.938).
+    Reference: Hunt and Crossley (1975), with the exponent of Hertz.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (HUNT_CROSSLEY1975,)
@@ -35,18 +36,18 @@ class HuntCrossley:
     damping: float = parameter("s/m", "c", "damping of the contact", bounds=(0.0, 100.0), default=0.5)
 
     def force(self, depth: Value, speed: Value) -> Value:
-        """Force [N] at a depth [m], 0 where there is no contact, that grows at a speed [m/s]."""
-        return self.elastic(depth) * ops.maximum(1.0 + self.damping * speed, 0.0)
+        """Contact force [N] at a depth [m], 0 without contact, that increases at a speed [m/s]."""
+        return self.elastic_force(depth) * ops.maximum(1.0 + self.damping * speed, 0.0)
 
-    def elastic(self, depth: Value) -> Value:
-        """Force [N] at a depth [m] that does not change; times c it is the coefficient of the damping [N s/m]."""
-        return self.stiffness * depth * _root(depth)
+    def elastic_force(self, depth: Value) -> Value:
+        """Elastic part of the contact force [N] at a depth [m]; times c it is the damping coefficient [N s/m]."""
+        return self.stiffness * depth * _regularised_sqrt(depth)
 
-    def energy(self, depth: Value) -> Value:
-        """Energy [J] that it holds elastically at a depth [m]: (2/5) K delta^(5/2)."""
-        return 0.4 * self.stiffness * depth**2 * _root(depth)
+    def elastic_energy(self, depth: Value) -> Value:
+        """Elastic energy [J] at a depth [m]: (2/5) K delta^(5/2)."""
+        return 0.4 * self.stiffness * depth**2 * _regularised_sqrt(depth)
 
 
-def _root(depth: Value) -> Value:
-    """Square root whose slope stays finite at zero, where the depth before it makes the product vanish."""
+def _regularised_sqrt(depth: Value) -> Value:
+    """Square root with a finite derivative at zero, where the factor depth makes the product zero."""
     return ops.sqrt(ops.maximum(depth, 1e-30))

@@ -1,20 +1,18 @@
-"""A weight below the muscle."""
+"""Hanging mass: a weight below the muscle."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ..core.constants import STANDARD_GRAVITY
 from ..core.declaration import model, parameter
 from ..core.ops import Value
 from .translation import Translation
 
-STANDARD_GRAVITY = 9.80665
-"""Standard acceleration of gravity [m/s2] (ISO 80000-3)."""
-
 
 @model
 class HangingMass(Translation):
-    """m y'' = F - m g, with y upwards from where the muscle has its resting length."""
+    """Hanging mass: m y'' = F - m g, with y upwards from the position at the resting length of the muscle."""
 
     mass: float = parameter("kg", "m", "mass of the load", bounds=(1e-4, 1e5))
     gravity: float = parameter(
@@ -22,9 +20,9 @@ class HangingMass(Translation):
     )
 
     def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
-        return {"position": pulls["position"] / self.mass - self.gravity}
+        return {"position": forces["position"] / self.mass - self.gravity}
 
     def potential_energy(self, q: Mapping[str, Value]) -> Value:
         return self.mass * self.gravity * q["position"]

@@ -1,4 +1,4 @@
-"""A frame that holds the muscle at one length."""
+"""Isometric load: the muscle is fixed at a constant length."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from .base import Coordinate, Mechanism
 
 @model
 class Isometric(Mechanism):
-    """eps stays what it is; the muscle only builds up tension."""
+    """Isometric load: constant contraction eps; the mechanism has no degree of freedom."""
 
-    contraction: float = parameter("1", "eps", "contraction at which the muscle is held", bounds=(-0.2, 0.9))
+    contraction: float = parameter("1", "eps", "contraction at which the muscle is fixed", bounds=(-0.2, 0.9))
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
@@ -23,6 +23,6 @@ class Isometric(Mechanism):
         return tuple(self.contraction for _ in resting_lengths)
 
     def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
         return {}

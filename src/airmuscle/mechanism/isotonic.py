@@ -1,4 +1,4 @@
-"""A constant force against the muscle, as a force-controlled bench holds it."""
+"""Isotonic load: a constant force against the muscle, as on a force-controlled test bench."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from .translation import Translation
 
 @model
 class Isotonic(Translation):
-    """m y'' = F - F_c - d y', with y from where the muscle has its resting length.
+    """Isotonic load: m y'' = F - F_c - d y', with y from the position at the resting length of the muscle.
 
-    F_c constant force, m mass that moves along and does not weigh, d damping. The smaller the mass, the nearer the
-    tension stays to F_c. All muscles pull at the same place.
+    F_c constant force, m moving mass without weight, d damping. The smaller the mass, the closer the tension is to F_c.
+    All muscles act on the same point in parallel.
     """
 
     force: float = parameter("N", "F_c", "constant force against the muscles", bounds=(0.0, 1e6))
-    mass: float = parameter("kg", "m", "mass that moves along", bounds=(1e-4, 1e5))
+    mass: float = parameter("kg", "m", "moving mass, without weight", bounds=(1e-4, 1e5))
     damping: float = parameter("N s/m", "d", "damping coefficient of the load", bounds=(0.0, 1e6), default=0.0)
 
     def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
-        return {"position": (pulls["position"] - self.force - self.damping * v["speed"]) / self.mass}
+        return {"position": (forces["position"] - self.force - self.damping * v["speed"]) / self.mass}
 
     def dissipated_power(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
         return self.damping * v["speed"] ** 2
 

@@ -1,30 +1,31 @@
-"""Several muscles one after the other, with a mass at each place where two of them meet."""
+"""Muscles in series, with a mass at each connection node."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ..core.constants import STANDARD_GRAVITY
 from ..core.declaration import check_structure, model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from .base import Coordinate, Mechanism
-from .hanging_mass import STANDARD_GRAVITY
 from .wrapper import MechanismWrapper
 
 
 @model
 class MusclesInSeries(MechanismWrapper):
-    """m_i x_i'' = F_i - F_(i+1) - m_i g - d x_i' for every node, and the inner mechanism under the last muscle.
+    """Muscles in series: m_i x_i'' = F_i - F_(i+1) - m_i g - d x_i' for each node; the last muscle acts on `inner`.
 
         L_i eps_i = x_i - x_(i-1),   x_0 = 0,   x_n = L eps(q) of the inner mechanism, with L = sum L_i
 
-    x_i way of node i towards the first fitting, from where all muscles have their resting lengths; m_i its mass, d
-    damping of the nodes. The chain pulls at the inner mechanism as one muscle of length L would.
+    x_i displacement of node i towards the first fitting from the position at which all muscles have their resting
+    lengths, m_i node mass, d damping coefficient of the nodes. The chain acts on the inner mechanism like one muscle of
+    resting length L.
     """
 
     inner: Mechanism
-    node_masses: tuple[float, ...] = parameter("kg", "m_i", "mass of each node between two muscles", bounds=(1e-4, 1e4))
-    damping: float = parameter("N s/m", "d", "damping coefficient of every node", bounds=(0.0, 1e6), default=0.0)
+    node_masses: tuple[float, ...] = parameter("kg", "m_i", "mass of each node", bounds=(1e-4, 1e4))
+    damping: float = parameter("N s/m", "d", "damping coefficient of each node", bounds=(0.0, 1e6), default=0.0)
     gravity: float = parameter(
         "m/s^2", "g", "acceleration of gravity", bounds=(0.0, 20.0), fitted=False, default=STANDARD_GRAVITY
     )
@@ -32,20 +33,22 @@ class MusclesInSeries(MechanismWrapper):
     def check(self) -> None:
         check_structure(self)
         if not self.node_masses:
-            raise ParameterError("MusclesInSeries: give the mass of each node; two muscles have one node between them.")
-        if self.inner.muscles not in (None, 1):
             raise ParameterError(
-                f"MusclesInSeries: the inner mechanism must take one muscle, as which the chain acts; "
-                f"{type(self.inner).__name__} takes {self.inner.muscles}."
+                "MusclesInSeries: node_masses is empty; give the mass of each node. Two muscles have one node."
+            )
+        if self.inner.muscle_count not in (None, 1):
+            raise ParameterError(
+                "MusclesInSeries: the inner mechanism must take one muscle, because the chain acts like one; "
+                f"{type(self.inner).__name__} takes {self.inner.muscle_count}."
             )
 
     @property
-    def muscles(self) -> int | None:
+    def muscle_count(self) -> int | None:
         return len(self.node_masses) + 1
 
     @property
     def nodes(self) -> tuple[Coordinate, ...]:
-        """The coordinates of the nodes."""
+        """Coordinates of the nodes."""
         count = range(1, len(self.node_masses) + 1)
         return tuple(Coordinate(f"node{i}.position", f"node{i}.speed", "m", 0.01, 0.1) for i in count)
 
@@ -56,8 +59,8 @@ class MusclesInSeries(MechanismWrapper):
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         total = sum(resting_lengths)
         (last,) = self.inner.contractions(q, [total])
-        places = [0.0, *(q[node.name] for node in self.nodes), total * last]
-        return tuple((places[i + 1] - places[i]) / length for i, length in enumerate(resting_lengths))
+        positions = [0.0, *(q[node.name] for node in self.nodes), total * last]
+        return tuple((positions[i + 1] - positions[i]) / length for i, length in enumerate(resting_lengths))
 
     def generalised_forces(
         self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
@@ -66,24 +69,24 @@ class MusclesInSeries(MechanismWrapper):
         return {**nodes, **self.inner.generalised_forces(q, tensions[-1:], [sum(resting_lengths)])}
 
     def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
         nodes = {
-            node.name: (pulls[node.name] - self.damping * v[node.speed]) / mass - self.gravity
+            node.name: (forces[node.name] - self.damping * v[node.speed]) / mass - self.gravity
             for node, mass in zip(self.nodes, self.node_masses, strict=True)
         }
-        return {**nodes, **self.inner.acceleration(q, v, pulls, inputs)}
+        return {**nodes, **self.inner.acceleration(q, v, forces, inputs)}
 
     def dissipated_power(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
-        own = sum(self.damping * v[node.speed] ** 2 for node in self.nodes)
-        return own + self.inner.dissipated_power(q, v, pulls, inputs)
+        nodes = sum(self.damping * v[node.speed] ** 2 for node in self.nodes)
+        return nodes + self.inner.dissipated_power(q, v, forces, inputs)
 
     def potential_energy(self, q: Mapping[str, Value]) -> Value:
-        lifted = sum(mass * q[node.name] for node, mass in zip(self.nodes, self.node_masses, strict=True))
-        return self.gravity * lifted + self.inner.potential_energy(q)
+        mass_moment = sum(mass * q[node.name] for node, mass in zip(self.nodes, self.node_masses, strict=True))
+        return self.gravity * mass_moment + self.inner.potential_energy(q)
 
     def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
-        own = sum(0.5 * mass * v[node.speed] ** 2 for node, mass in zip(self.nodes, self.node_masses, strict=True))
-        return own + self.inner.kinetic_energy(q, v)
+        nodes = sum(0.5 * mass * v[node.speed] ** 2 for node, mass in zip(self.nodes, self.node_masses, strict=True))
+        return nodes + self.inner.kinetic_energy(q, v)

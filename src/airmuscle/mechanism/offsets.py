@@ -1,4 +1,4 @@
-"""Muscles that are not at their resting lengths where the coordinates are zero."""
+"""Contraction offsets: muscles that are contracted or pre-stretched at the zero position of a mechanism."""
 
 from __future__ import annotations
 
@@ -13,22 +13,20 @@ from .wrapper import MechanismWrapper
 
 @model
 class WithOffsets(MechanismWrapper):
-    """eps_i = eps_0i + eps_i,inner: each muscle mounted with a contraction of its own; negative is pre-stretched."""
+    """Contraction offsets: eps_i = eps_0i + eps_i,inner; a negative offset is a pre-stretch."""
 
     inner: Mechanism
-    offsets: tuple[float, ...] = parameter(
-        "1", "eps_0i", "contraction of each muscle where the inner mechanism has it at none", bounds=(-0.5, 0.9)
-    )
+    offsets: tuple[float, ...] = parameter("1", "eps_0i", "contraction offset of each muscle", bounds=(-0.5, 0.9))
 
     def check(self) -> None:
-        if self.inner.muscles not in (None, len(self.offsets)):
+        if self.inner.muscle_count not in (None, len(self.offsets)):
             raise ParameterError(
-                f"WithOffsets: {type(self.inner).__name__} takes {self.inner.muscles} muscles; {len(self.offsets)} offsets "
-                "are given."
+                f"WithOffsets: {type(self.inner).__name__} takes {self.inner.muscle_count} muscles; "
+                f"{len(self.offsets)} offsets are given. Give one for each muscle."
             )
 
     @property
-    def muscles(self) -> int | None:
+    def muscle_count(self) -> int | None:
         return len(self.offsets)
 
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:

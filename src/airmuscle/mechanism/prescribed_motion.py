@@ -1,4 +1,4 @@
-"""A motion that a drive forces upon the muscle, as a tensile testing machine does."""
+"""Prescribed motion: a drive moves the muscle, as in a tensile testing machine."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from .base import Coordinate, Mechanism
 
 @model
 class PrescribedMotion(Mechanism):
-    """y'' = a(t), whatever the muscles pull; the drive takes up the work F y'.
+    """Prescribed motion: y'' = a(t), independent of the muscle forces; the drive absorbs the power F y'.
 
-    y position from where the muscle has its resting length, a the input. Inputs are linear between instants, so that
-    y can follow any cubic spline exactly: `airmuscle.control.trajectory.follow` gives its accelerations and its start.
+    y position relative to that at the resting length of the muscle, a the input. Input signals may be piecewise linear,
+    so that y follows a cubic spline exactly: `airmuscle.control.trajectory.spline_trajectory` returns the acceleration
+    signal and the initial state.
     """
 
     @property
@@ -24,7 +25,7 @@ class PrescribedMotion(Mechanism):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        return (Input("prescribed_acceleration", "m/s^2", -1e5, 1e5, "acceleration that the drive forces"),)
+        return (Input("prescribed_acceleration", "m/s^2", -1e5, 1e5, "acceleration prescribed by the drive"),)
 
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return tuple(q["position"] / length for length in resting_lengths)
@@ -35,11 +36,11 @@ class PrescribedMotion(Mechanism):
         return {"position": sum(tensions, 0.0)}
 
     def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
         return {"position": inputs["prescribed_acceleration"]}
 
     def dissipated_power(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
-        return pulls["position"] * v["speed"]
+        return forces["position"] * v["speed"]

@@ -1,4 +1,4 @@
-"""A mass on a spring and a damper."""
+"""Spring load: a mass with a spring and a damper."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from .translation import Translation
 
 @model
 class SpringLoad(Translation):
-    """m y'' = F - F_0 - k y - d y', with y from where the muscle has its resting length.
+    """Spring load: m y'' = F - F_0 - k y - d y', with y from the position at the resting length of the muscle.
 
-    m mass, k stiffness, d damping, F_0 force of the spring at y = 0; a weight m g may be a part of it. All muscles
-    pull at the same place.
+    m mass, k stiffness, d damping coefficient, F_0 preload at y = 0, which may include a weight m g. All muscles act on
+    the same point in parallel.
     """
 
     mass: float = parameter("kg", "m", "mass of the load", bounds=(1e-4, 1e5))
     stiffness: float = parameter("N/m", "k", "stiffness of the spring", bounds=(0.0, 1e8))
     damping: float = parameter("N s/m", "d", "damping coefficient of the load", bounds=(0.0, 1e6), default=0.0)
-    preload: float = parameter("N", "F_0", "force of the spring at position 0", bounds=(-1e6, 1e6), default=0.0)
+    preload: float = parameter("N", "F_0", "preload at position 0", bounds=(-1e6, 1e6), default=0.0)
 
     def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
-        held = self.preload + self.stiffness * q["position"] + self.damping * v["speed"]
-        return {"position": (pulls["position"] - held) / self.mass}
+        resistance = self.preload + self.stiffness * q["position"] + self.damping * v["speed"]
+        return {"position": (forces["position"] - resistance) / self.mass}
 
     def dissipated_power(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
         return self.damping * v["speed"] ** 2
 

@@ -1,4 +1,4 @@
-"""A mass that all muscles pull along one line, at the same place."""
+"""Translation (base class): a mass on which all muscles act in parallel along one line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .base import Coordinate, Mechanism
 
 
 class Translation(Mechanism, abc.ABC):
-    """One coordinate, the position y [m] from where the muscles have their resting length; shortening is y."""
+    """One coordinate: the position y [m], which is the shortening of the muscles from their resting length."""
 
     mass: float
 

@@ -1,4 +1,4 @@
-"""What stands around any mechanism and changes a part of it."""
+"""MechanismWrapper: base class of wrappers of a mechanism."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .base import Coordinate, Mechanism
 
 
 class MechanismWrapper(Mechanism):
-    """All is the inner mechanism's, but what a wrapper says otherwise; it adds to the pulls, or to the contractions."""
+    """Wrapper that forwards everything to the inner mechanism; subclasses override forces or contractions."""
 
     inner: Mechanism
 
@@ -23,8 +23,8 @@ class MechanismWrapper(Mechanism):
         return self.inner.inputs
 
     @property
-    def muscles(self) -> int | None:
-        return self.inner.muscles
+    def muscle_count(self) -> int | None:
+        return self.inner.muscle_count
 
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return self.inner.contractions(q, resting_lengths)
@@ -35,14 +35,14 @@ class MechanismWrapper(Mechanism):
         return self.inner.generalised_forces(q, tensions, resting_lengths)
 
     def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
-        return self.inner.acceleration(q, v, pulls, inputs)
+        return self.inner.acceleration(q, v, forces, inputs)
 
     def dissipated_power(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
-        return self.inner.dissipated_power(q, v, pulls, inputs)
+        return self.inner.dissipated_power(q, v, forces, inputs)
 
     def potential_energy(self, q: Mapping[str, Value]) -> Value:
         return self.inner.potential_energy(q)

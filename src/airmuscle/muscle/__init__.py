@@ -1,23 +1,22 @@
-"""The muscle after Hill, and the elements that stand beside its contractile one."""
+"""Hill-type muscle model: contractile element, parallel and series elements, wall, end stop."""
 
 from .creep import CreepElements
 from .damper import Damper, DirectionalDamper, LinearDamper, PressureDamper
-from .muscle import INNER, Muscle
+from .muscle import INNER_CONTRACTION, Muscle
 from .reynolds2003 import Reynolds2003Damper, Reynolds2003Spring
-from .series import RigidSeries, Series, SeriesSpring
+from .series import RigidSeriesElement, SeriesElement, SeriesSpring
 from .serres2009 import Serres2009Damper, Serres2009Spring
 from .spring import CubicSpring, LinearSpring, Spring
 from .stop import EndStop, NoStop, Stop
-from .wall import LaggingWall, RigidWall, SwellingWall, Wall
+from .wall import RigidWall, SwellingWall, ViscoelasticWall, Wall
 
 __all__ = [
-    "INNER",
+    "INNER_CONTRACTION",
     "CreepElements",
     "CubicSpring",
     "Damper",
     "DirectionalDamper",
     "EndStop",
-    "LaggingWall",
     "LinearDamper",
     "LinearSpring",
     "Muscle",
@@ -25,14 +24,15 @@ __all__ = [
     "PressureDamper",
     "Reynolds2003Damper",
     "Reynolds2003Spring",
-    "RigidSeries",
+    "RigidSeriesElement",
     "RigidWall",
-    "Series",
+    "SeriesElement",
     "SeriesSpring",
     "Serres2009Damper",
     "Serres2009Spring",
     "Spring",
     "Stop",
     "SwellingWall",
+    "ViscoelasticWall",
     "Wall",
 ]

@@ -1,4 +1,4 @@
-"""A muscle after Hill: contractile element, parallel spring and damper between two fittings, and its volume."""
+"""Hill-type muscle: contractile element, parallel spring and damper, series element, and enclosed volume."""
 
 from __future__ import annotations
 
@@ -20,38 +20,39 @@ from ..friction.base import Friction, NoFriction
 from ..geometry.base import Geometry
 from .creep import CreepElements
 from .damper import Damper, LinearDamper
-from .series import RigidSeries, Series, SeriesSpring
-from .series_equilibrium import settled_inside
+from .series import RigidSeriesElement, SeriesElement, SeriesSpring
+from .series_equilibrium import solve_inner_contraction, without_derivative
 from .spring import LinearSpring, Spring
 from .stop import NoStop, Stop
 from .wall import RigidWall, Wall
 
 RELAXED: Mapping[str, Value] = MappingProxyType({})
-"""States of a muscle that are not named stand at 0."""
-INNER = "inner_contraction"
-"""The state of a muscle with a compliant series element: contraction of its contractile part."""
+"""Relaxed state of a muscle: every state that is not given is 0."""
+INNER_CONTRACTION = "inner_contraction"
+"""Name of the state of a muscle with a series spring: the contraction of its contractile element."""
 
 
 class MuscleForce(NamedTuple):
-    """What a muscle does at one moment: tension, friction [N], and the speed of its contractile part [m/s]."""
+    """Tension [N], friction force [N] and shortening speed of the contractile element [m/s] at one instant."""
 
     tension: Value
     friction: Value
-    speed: Value
+    inner_speed: Value
 
 
 @model
 class Muscle:
-    """Two ports, pneumatic (p, V) and mechanical (F, v), after Hill.
+    """Hill-type muscle with a pneumatic port (p, V) and a mechanical port (F, v).
 
         F = max(0, F_KE(p, eps) - F_PP(p, eps) - F_TL(p, eps, v) - F_R - F_C) - F_S
 
-    F_KE contractile characteristic, F_PP parallel spring, F_TL damper, F_R friction, F_C creeping elements, F_S end
-    stop. A muscle pulls; only its end stop pushes. With a series spring of stretch s all of that acts inside it, and
-    the contraction eps' of the contractile part is a state: F_SE(s) = F(p, eps', v') without the max, as what is inside
-    may push itself apart; damper and stop turn what is left of the force into the speed v' = L0 eps''.
-    Reference: Hosovsky et al., equation (1), which has contractile element, spring and damper; the others are off
-    unless given.
+    F_KE force law of the contractile element, F_PP parallel spring, F_TL damper, F_R friction, F_C creep elements, F_S
+    end stop. A muscle only pulls; only its end stop can push. With a series spring of stretch s, all these elements act
+    behind the spring, and the contraction eps' of the contractile element is a state: F_SE(s) = F(p, eps', v') without
+    the max, because the inner elements may push against each other. Damper and end stop then determine the speed
+    v' = L0 deps'/dt from the force imbalance.
+    Reference: Hošovský et al., equation (1), with contractile element, spring and damper; all other elements are
+    optional and off by default.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (HOSOVSKY_HILL,)
@@ -63,105 +64,124 @@ class Muscle:
     friction: Friction = NoFriction()
     name: str = "muscle"
     validity_range: ValidityRange | None = None
-    """Where its numbers were measured, if that is known: a run says when and how far it left it."""
+    """Range in which the parameters were identified, if known; a simulation reports when and how far it is left."""
     wall: Wall = RigidWall()
-    series: Series = RigidSeries()
+    series: SeriesElement = RigidSeriesElement()
     stop: Stop = NoStop()
     creep: CreepElements = CreepElements()
 
     @classmethod
     def ideal(cls, geometry: Geometry, name: str = "muscle") -> Muscle:
-        """A muscle whose tension follows from its volume by virtual work, so that it neither makes nor loses energy."""
+        """An energy-conserving muscle: its tension follows from its volume by the principle of virtual work."""
         return cls(VirtualWork(geometry), geometry, name=name)
 
     def check(self) -> None:
         kinds = {"contractile": Characteristic, "geometry": Geometry, "spring": Spring, "damper": Damper, "wall": Wall,
-                 "friction": Friction, "series": Series, "stop": Stop, "creep": CreepElements}  # fmt: skip
+                 "friction": Friction, "series": SeriesElement, "stop": Stop, "creep": CreepElements}  # fmt: skip
         for field, kind in kinds.items():
             part = getattr(self, field)
             if not isinstance(part, kind):
-                raise ParameterError(f"Muscle: its {field} must be a {kind.__name__}; it is {part!r}.")
+                raise ParameterError(f"Muscle: {field} is {part!r}; it must be a {kind.__name__}.")
         if not isinstance(self.name, str) or not self.name:
-            raise ParameterError(f"Muscle: its name is {self.name!r}; it must be a word, as 'left'.")
+            raise ParameterError(f"Muscle: name is {self.name!r}; it must be a non-empty text, such as 'left'.")
         if not isinstance(self.validity_range, ValidityRange | None):
-            raise ParameterError(f"Muscle: its validity range must be a Box, or None; it is {self.validity_range!r}.")
+            raise ParameterError(
+                f"Muscle: validity_range is {self.validity_range!r}; it must be a ValidityRange or None."
+            )
         if isinstance(self.series, SeriesSpring):
             self._check_series_elements()
 
     def _check_series_elements(self) -> None:
-        for pressure in (-1e5, 0.0, 1e6):  # every damper is linear in pressure, or made of lines
+        for pressure in (-1e5, 0.0, 1e6):  # every damper is linear or piecewise linear in pressure
             if not min(self.damper.coefficients(pressure, 0.0)) > 0.0:
                 raise ParameterError(
-                    f"{self.name}: a series spring needs a damper greater than 0 beside the contractile element, which "
-                    f"gives its speed; at {pressure / 1e3:g} kPa gauge that of {self.damper} is not."
+                    f"{self.name}: with a series spring, the damping coefficient must be greater than 0, because it "
+                    "determines the speed of the contractile element; at "
+                    f"{pressure / 1e3:g} kPa gauge that of {self.damper} is not."
                 )
         if not self.friction.rate_independent:
             raise ParameterError(
-                f"{self.name}: beside a series spring friction must not depend on speed; {self.friction} does. "
+                f"{self.name}: with a series spring, the friction must be rate-independent; {self.friction} is not. "
                 "Use Dahl, MaxwellSlip, BoucWen or PrandtlIshlinskii."
             )
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
-        """Bristles of its friction, creeping springs, wall, contraction of its contractile part."""
-        inner = StateVariable(INNER, "1", 0.05, "contraction of the contractile part")
+        """State variables: friction bristles, creep elements, wall, contraction of the contractile element."""
+        inner = StateVariable(INNER_CONTRACTION, "1", 0.05, "contraction of the contractile element")
         compliant = (inner,) if isinstance(self.series, SeriesSpring) else ()
         return (*self.friction.states, *self.creep.states, *self.wall.states, *compliant)
 
-    def settled(self, pressure: Value, contraction: Value) -> dict[str, Value]:
-        """Its states at rest at a gauge pressure [Pa] and contraction [1], as if it had never moved."""
-        found: dict[str, Value] = {state.name: 0.0 for state in (*self.friction.states, *self.creep.states)}
-        found |= self.wall.settled(pressure)
+    def steady_state(self, pressure: Value, contraction: Value) -> dict[str, Value]:
+        """Steady state at a gauge pressure [Pa] and a contraction, with relaxed friction and creep elements."""
+        state: dict[str, Value] = {variable.name: 0.0 for variable in (*self.friction.states, *self.creep.states)}
+        state |= self.wall.steady_state(pressure)
         if isinstance(self.series, SeriesSpring):
-            found[INNER] = settled_inside(self, pressure, contraction)
-        return found
+            length, limits = self.geometry.resting_length, self.geometry.contraction_range
+            state[INNER_CONTRACTION] = solve_inner_contraction(
+                autodiff.value_and_derivative(self, "internal_imbalance", 3, wrt=1)
+                if self.contractile.traceable and self.geometry.traceable
+                else without_derivative(self.internal_imbalance),
+                self.series.stiffness * length,
+                limits,
+                pressure,
+                contraction,
+            )
+        return state
 
     def internal_imbalance(self, pressure: Value, inner_contraction: Value, contraction: Value) -> Value:
-        """Pull of the contractile part at standstill less that of its series spring [N], which falls with the first's
-        contraction [1]; 0 at rest."""
+        """Static force of the contractile element minus that of the series spring [N]; 0 in the steady state.
+
+        It decreases with the inner contraction.
+        """
         assert isinstance(self.series, SeriesSpring)
         stretch = (inner_contraction - contraction) * self.geometry.resting_length
         return self.static_force(pressure, inner_contraction) - self.series.force(stretch)
 
     def inner_contraction(self, contraction: Value, state: Mapping[str, Value] = RELAXED) -> Value:
-        """Contraction [1] of the contractile part, where the fittings stand at `contraction`."""
-        return state[INNER] if isinstance(self.series, SeriesSpring) else contraction
+        """Contraction of the contractile element for a contraction of the muscle between its fittings."""
+        return state[INNER_CONTRACTION] if isinstance(self.series, SeriesSpring) else contraction
 
     def volume(self, inner_contraction: Value, state: Mapping[str, Value] = RELAXED) -> Value:
-        """Volume [m3] at a contraction [1] of the contractile part."""
+        """Enclosed volume [m3] at a contraction of the contractile element."""
         enclosed = self.geometry.volume(inner_contraction)
         return enclosed + self.wall.volume(state) if self.wall.states else enclosed
 
-    def pull(
+    def compute_force(
         self, pressure: Value, inner_contraction: Value, contraction: Value, speed: Value,
         state: Mapping[str, Value] = RELAXED,
     ) -> MuscleForce:  # fmt: skip
-        """What it does at gauge pressure [Pa], contraction [1] inside and at the fittings, speed [m/s] of these."""
+        """Tension, friction and inner speed at a gauge pressure [Pa] and a speed of shortening [m/s].
+
+        `inner_contraction` is that of the contractile element; `contraction` and `speed` are those of the muscle
+        between its fittings.
+        """
         if not isinstance(self.series, SeriesSpring):
             friction = self.friction_force(speed, state)
             return MuscleForce(self.tension(pressure, contraction, speed, state), friction, speed)
         tension = self.series.force((inner_contraction - contraction) * self.geometry.resting_length)
-        left = self.unclamped_tension(pressure, inner_contraction, 0.0, state) - tension
-        inside = self.damper.speed(pressure, inner_contraction, left)
+        imbalance = self.unclamped_tension(pressure, inner_contraction, 0.0, state) - tension
+        inner_speed = self.damper.speed(pressure, inner_contraction, imbalance)
         if not isinstance(self.stop, NoStop):
-            # The contact never pulls: of the speeds with and without it the lesser is the one at which it does not.
-            still, growth = self.stop.parts(inner_contraction, self.geometry.resting_length)
-            inside = ops.minimum(inside, self.damper.speed(pressure, inner_contraction, left - still, growth))
-        return MuscleForce(tension, self.friction_force(inside, state), inside)
+            # The contact never pulls: the smaller of the speeds without and with the contact satisfies this condition.
+            static_force, damping = self.stop.static_force_and_damping(inner_contraction, self.geometry.resting_length)
+            stopped_speed = self.damper.speed(pressure, inner_contraction, imbalance - static_force, damping)
+            inner_speed = ops.minimum(inner_speed, stopped_speed)
+        return MuscleForce(tension, self.friction_force(inner_speed, state), inner_speed)
 
     def rates(self, state: Mapping[str, Value], pressure: Value, inner_speed: Value) -> dict[str, Value]:
-        """The time derivatives of its states at gauge pressure [Pa] and speed [m/s] of its contractile part."""
-        rates = self.friction.rates(self._bristles(state), inner_speed)
+        """Time derivatives of the states at a gauge pressure [Pa] and an inner speed of shortening [m/s]."""
+        rates = self.friction.rates(self._bristle_state(state), inner_speed)
         rates |= self.creep.rates(state, inner_speed)
         rates |= self.wall.rates(state, pressure)
         if isinstance(self.series, SeriesSpring):
-            rates[INNER] = inner_speed / self.geometry.resting_length
+            rates[INNER_CONTRACTION] = inner_speed / self.geometry.resting_length
         return rates
 
     def tension(
         self, pressure: Value, contraction: Value, speed: Value = 0.0, state: Mapping[str, Value] = RELAXED
     ) -> Value:
-        """Pull on the load [N] at gauge pressure [Pa], contraction [1], speed of contraction [m/s], rigid in series."""
+        """Tension [N] at gauge pressure [Pa], contraction and speed of shortening [m/s], without a series spring."""
         taut = ops.maximum(self.unclamped_tension(pressure, contraction, speed, state), 0.0)
         if isinstance(self.stop, NoStop):
             return taut
@@ -170,36 +190,35 @@ class Muscle:
     def unclamped_tension(
         self, pressure: Value, contraction: Value, speed: Value = 0.0, state: Mapping[str, Value] = RELAXED
     ) -> Value:
-        """The sum of the elements' forces [N]; where it is negative the muscle hangs slack."""
+        """Sum of the forces of all elements but the end stop [N]; where it is negative, the muscle is slack."""
         total = (
             self.contractile.force(pressure, contraction)
             - self.spring.force(pressure, contraction, self.geometry.resting_length)
             - self.damper.force(pressure, contraction, speed)
             - self.friction_force(speed, state)
         )
-        return total - self.creep.force({**self._still(), **state}) if self.creep.states else total
+        return total - self.creep.force({**self._relaxed_creep(), **state}) if self.creep.states else total
 
     def static_force(self, pressure: Value, contraction: Value) -> Value:
-        """The sum of the elements' forces [N] at standstill, end stop and all, with everything else relaxed."""
+        """Sum of the forces of all elements and the end stop [N] at zero speed, friction and creep relaxed."""
         elements = self.unclamped_tension(pressure, contraction)
         return elements - self.stop.force(contraction, 0.0, self.geometry.resting_length)
 
     def friction_force(self, speed: Value, state: Mapping[str, Value] = RELAXED) -> Value:
-        """Force of the friction against contraction [N]."""
-        return self.friction.force(self._bristles(state), speed)
+        """Friction force against shortening [N]."""
+        return self.friction.force(self._bristle_state(state), speed)
 
-    def _bristles(self, state: Mapping[str, Value]) -> dict[str, Value]:
+    def _bristle_state(self, state: Mapping[str, Value]) -> dict[str, Value]:
         return {s.name: state.get(s.name, 0.0) for s in self.friction.states}
 
-    def _still(self) -> dict[str, Value]:
+    def _relaxed_creep(self) -> dict[str, Value]:
         return {s.name: 0.0 for s in self.creep.states}
 
     def stiffness(self, pressure: Value, contraction: Value) -> Value:
-        """-dF/deps at constant pressure [N], exact where the muscle is taut; divide by the resting length for N/m.
+        """Static stiffness -dF/deps at constant pressure [N]; divide by the resting length for N/m.
 
-        That of the contractile part with spring and end stop: a series spring makes the muscle softer.
-
-        With shut valves the pressure rises as the muscle is pulled, and it is stiffer: module `stiffness`. Friction is
-        left out: its bristles add theirs until they slide.
+        Exact where the muscle is taut. Stiffness of the contractile element with spring and end stop; a series spring
+        reduces that of the muscle, and friction, which increases it until the bristles slide, is not included. With
+        closed valves the pressure changes and the stiffness is larger: see `airmuscle.analysis.static_stiffness`.
         """
         return -autodiff.derivative(self, "static_force", pressure, contraction, wrt=1)

@@ -1,4 +1,4 @@
-"""The series element of Hill's muscle: what gives way between the contractile element and the load."""
+"""Series elements of the Hill-type muscle: compliance between the contractile element and the load."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from ..core.declaration import model, parameter
 from ..core.ops import Value
 
 
-class Series:
-    """An element in series with the contractile one."""
+class SeriesElement:
+    """Element in series with the contractile element (base class)."""
 
 
 @model
-class RigidSeries(Series):
-    """Nothing gives way: the contractile element is as contracted as the muscle. The third paper leaves it out too."""
+class RigidSeriesElement(SeriesElement):
+    """Rigid connection: contractile element and muscle have the same contraction, as in Hošovský et al."""
 
 
 @model
-class SeriesSpring(Series):
-    """F = k s for a stretch s > 0, and slack below: fittings, rope or sensor that stretch under tension."""
+class SeriesSpring(SeriesElement):
+    """Tension-only spring: F = k max(s, 0) with stretch s, for compliant fittings, ropes or sensors."""
 
     stiffness: float = parameter("N/m", "k_SE", "stiffness of the series element", bounds=(1.0, 1e9))
 

@@ -1,4 +1,4 @@
-"""An end stop inside a muscle: it cannot shorten beyond a limit."""
+"""End stops inside a muscle: limits of its contraction."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from ..mechanism.contact import HuntCrossley
 
 
 class Stop(abc.ABC):
-    """What keeps a muscle from shortening further; it may push."""
+    """Element that limits the contraction of a muscle by a pushing force (interface)."""
 
     @abc.abstractmethod
     def force(self, contraction: Value, speed: Value, resting_length: Value) -> Value:
-        """Force [N] against contraction [1] at a speed of shortening [m/s]."""
+        """Force [N] against contraction at a speed of shortening [m/s]."""
 
     @abc.abstractmethod
-    def parts(self, contraction: Value, resting_length: Value) -> tuple[Value, Value]:
-        """Force [N] at standstill, and the coefficient [N s/m] by which it grows with the speed of shortening."""
+    def static_force_and_damping(self, contraction: Value, resting_length: Value) -> tuple[Value, Value]:
+        """Force [N] at zero speed, and the slope of the force over the speed of shortening [N s/m]."""
 
 
 @model
 class NoStop(Stop):
-    """Nothing but its own law ends the muscle's way."""
+    """No end stop: the contraction is limited by the force law alone."""
 
     def force(self, contraction: Value, speed: Value, resting_length: Value) -> Value:
         return 0.0
 
-    def parts(self, contraction: Value, resting_length: Value) -> tuple[Value, Value]:
+    def static_force_and_damping(self, contraction: Value, resting_length: Value) -> tuple[Value, Value]:
         return 0.0, 0.0
 
 
 @model
 class EndStop(Stop):
-    """A contact after Hunt and Crossley that begins at a contraction."""
+    """End stop: a Hunt-Crossley contact that begins at a given contraction."""
 
     contraction: float = parameter("1", "eps_s", "contraction at which the contact begins", bounds=(-0.5, 0.95))
     contact: HuntCrossley
@@ -43,10 +43,10 @@ class EndStop(Stop):
     def force(self, contraction: Value, speed: Value, resting_length: Value) -> Value:
         return self.contact.force(self.depth(contraction, resting_length), speed)
 
-    def parts(self, contraction: Value, resting_length: Value) -> tuple[Value, Value]:
-        still = self.contact.elastic(self.depth(contraction, resting_length))
-        return still, self.contact.damping * still
+    def static_force_and_damping(self, contraction: Value, resting_length: Value) -> tuple[Value, Value]:
+        static_force = self.contact.elastic_force(self.depth(contraction, resting_length))
+        return static_force, self.contact.damping * static_force
 
     def depth(self, contraction: Value, resting_length: Value) -> Value:
-        """How far [m] the muscle is beyond where the contact begins."""
+        """Contact depth [m]; 0 without contact."""
         return ops.maximum(contraction - self.contraction, 0.0) * resting_length

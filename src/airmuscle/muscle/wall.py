@@ -1,4 +1,4 @@
-"""The wall of a muscle: volume beyond that of the geometry, which follows the pressure with a lag."""
+"""Wall models: volume in addition to that of the geometry, dependent on pressure."""
 
 from __future__ import annotations
 
@@ -12,87 +12,88 @@ from ..core.variables import StateVariable
 
 
 class Wall:
-    """What the volume of a muscle has beyond its geometry's."""
+    """Wall whose deformation adds volume to that of the geometry (base class: no added volume)."""
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
-        """Its states; none, if it does not give."""
+        """State variables; none for a rigid wall."""
         return ()
 
-    def settled(self, pressure: Value) -> dict[str, Value]:
-        """Its states at rest at a gauge pressure [Pa]."""
+    def steady_state(self, pressure: Value) -> dict[str, Value]:
+        """Steady state at a gauge pressure [Pa]."""
         return {}
 
     def volume(self, state: Mapping[str, Value]) -> Value:
-        """Volume [m3] that it adds."""
+        """Added volume [m3]."""
         return 0.0
 
     def rates(self, state: Mapping[str, Value], pressure: Value) -> dict[str, Value]:
-        """The time derivative of its states at a gauge pressure [Pa]."""
+        """Time derivatives of the states at a gauge pressure [Pa]."""
         return {}
 
 
 @model
 class RigidWall(Wall):
-    """The volume is the geometry's."""
+    """Rigid wall: the volume is that of the geometry."""
 
 
-class _Lagging(Wall):
-    """V_w' = (V_s(p) - V_w)/tau."""
+class _FirstOrderWall(Wall):
+    """First-order lag of the added volume: V_w' = (V_s(p) - V_w)/tau."""
 
-    lag: float
+    time_constant: float
 
     @abc.abstractmethod
-    def settled_volume(self, pressure: Value) -> Value:
-        """Volume [m3] that it comes to at a gauge pressure [Pa]."""
+    def steady_volume(self, pressure: Value) -> Value:
+        """Added volume [m3] in the steady state at a gauge pressure [Pa]."""
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
-        return (StateVariable("wall_volume", "m3", 1e-6, "volume that the wall adds"),)
+        return (StateVariable("wall_volume", "m3", 1e-6, "volume added by the wall"),)
 
-    def settled(self, pressure: Value) -> dict[str, Value]:
-        return {"wall_volume": self.settled_volume(pressure)}
+    def steady_state(self, pressure: Value) -> dict[str, Value]:
+        return {"wall_volume": self.steady_volume(pressure)}
 
     def volume(self, state: Mapping[str, Value]) -> Value:
         return state["wall_volume"]
 
     def rates(self, state: Mapping[str, Value], pressure: Value) -> dict[str, Value]:
-        return {"wall_volume": (self.settled_volume(pressure) - state["wall_volume"]) / self.lag}
+        return {"wall_volume": (self.steady_volume(pressure) - state["wall_volume"]) / self.time_constant}
 
 
 @model
-class LaggingWall(_Lagging):
-    """An elastic wall that gives way with a lag: V_w' = (c p - V_w)/tau, a spring and a damper in parallel.
+class ViscoelasticWall(_FirstOrderWall):
+    """Viscoelastic (Kelvin-Voigt) wall: V_w' = (c p - V_w)/tau, a spring and a damper in parallel.
 
-    p gauge pressure, c compliance, tau lag. It is passive: of the work p V_w' it stores V_w^2/(2 c), and the rest,
-    tau V_w'^2/c, is heat.
+    p gauge pressure, c compliance, tau time constant. The wall is passive: the power p V_w' is the rate of the stored
+    energy V_w^2/(2 c) plus the dissipated power tau V_w'^2/c.
     """
 
-    compliance: float = parameter("m3/Pa", "c", "volume that the wall adds for each pascal", bounds=(0.0, 1e-8))
-    lag: float = parameter("s", "tau", "time by which the wall lags", bounds=(1e-4, 100.0))
+    compliance: float = parameter("m3/Pa", "c", "compliance: added volume per pressure", bounds=(0.0, 1e-8))
+    time_constant: float = parameter("s", "tau", "time constant of the wall", bounds=(1e-4, 100.0))
 
-    def settled_volume(self, pressure: Value) -> Value:
+    def steady_volume(self, pressure: Value) -> Value:
         return self.compliance * pressure
 
 
 @model
-class SwellingWall(_Lagging):
-    """An unloaded muscle whose length nobody recorded: its volume grows between a threshold and a limit of pressure.
+class SwellingWall(_FirstOrderWall):
+    """Sigmoidal volume increase of an unloaded muscle whose length was not recorded.
 
-        V_w' = (V_g g(p) - V_w)/tau,   g = 1/(1 + exp(-(p - p_h)/p_w)) less its value at p = 0
+        V_w' = (V_g g(p) - V_w)/tau,   g(p) = s(p) - s(0),   s(p) = 1/(1 + exp(-(p - p_h)/p_w))
 
-    V_g growth to the shortest length, p_h gauge pressure in the middle of that growth, p_w its breadth, tau lag. A
-    lumped description, chosen; the contraction of the plant's muscle is then held, and its force means nothing.
+    V_g volume increase up to the shortest length, p_h gauge pressure at the midpoint of the increase, p_w its width in
+    pressure, tau time constant. This lumped model is chosen, not published. Fix the contraction of the muscle
+    (`Isometric`) when it is used; the force of the muscle then has no meaning.
     """
 
-    growth_volume: float = parameter("m3", "V_g", "growth of the volume to the shortest length", bounds=(0.0, 1e-1))
-    middle: float = parameter("Pa", "p_h", "gauge pressure in the middle of the growth", bounds=(0.0, 1e6))
-    breadth: float = parameter("Pa", "p_w", "breadth in pressure of the growth", bounds=(1e3, 1e6))
-    lag: float = parameter("s", "tau", "time by which the wall lags", bounds=(1e-4, 100.0))
+    growth_volume: float = parameter("m3", "V_g", "volume increase up to the shortest length", bounds=(0.0, 1e-1))
+    midpoint_pressure: float = parameter("Pa", "p_h", "gauge pressure at the midpoint", bounds=(0.0, 1e6))
+    pressure_width: float = parameter("Pa", "p_w", "width of the increase in pressure", bounds=(1e3, 1e6))
+    time_constant: float = parameter("s", "tau", "time constant of the wall", bounds=(1e-4, 100.0))
 
-    def settled_volume(self, pressure: Value) -> Value:
-        return self.growth_volume * (self._share(pressure) - self._share(0.0))
+    def steady_volume(self, pressure: Value) -> Value:
+        return self.growth_volume * (self._sigmoid(pressure) - self._sigmoid(0.0))
 
-    def _share(self, pressure: Value) -> Value:
-        # Beyond 50 breadths the share is 0 or 1 to the last digit; the exponential and its slope stay finite.
-        return 1.0 / (1.0 + ops.exp(ops.clip((self.middle - pressure) / self.breadth, -50.0, 50.0)))
+    def _sigmoid(self, pressure: Value) -> Value:
+        # Beyond 50 widths the sigmoid is 0 or 1 to machine precision; the clip keeps exp and its derivative finite.
+        return 1.0 / (1.0 + ops.exp(ops.clip((self.midpoint_pressure - pressure) / self.pressure_width, -50.0, 50.0)))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from ..core.ops import Value
 from ..muscle import Muscle
-from ..pneumatics.gas import Air, Ambient, Gas, gauge
+from ..pneumatics.gas import Air, Ambient, Gas, gauge_pressure
 
 
 class MuscleState(NamedTuple):
@@ -38,12 +38,12 @@ def muscle_state(
     inner = muscle.inner_contraction(contraction, state)
     volume = muscle.volume(inner, state)
     air = gas.air(state, volume, ambient)
-    pressure = gauge(air.pressure, ambient)
-    pull = muscle.pull(pressure, inner, contraction, speed, state)
-    rates = muscle.rates(state, pressure, pull.speed)
-    growth = muscle.geometry.volume_growth(inner) * pull.speed / muscle.geometry.resting_length
+    pressure = gauge_pressure(air.pressure, ambient)
+    pull = muscle.compute_force(pressure, inner, contraction, speed, state)
+    rates = muscle.rates(state, pressure, pull.inner_speed)
+    growth = muscle.geometry.volume_derivative(inner) * pull.inner_speed / muscle.geometry.resting_length
     growth = sum((rates[s.name] for s in muscle.wall.states), growth)
     return MuscleState(
-        contraction, speed, volume, air, pressure, pull.tension, pull.friction, inner, pull.speed, growth, state,
+        contraction, speed, volume, air, pressure, pull.tension, pull.friction, inner, pull.inner_speed, growth, state,
         rates,
     )  # fmt: skip

@@ -18,7 +18,7 @@ from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..pneumatics import Circuit, CircuitFlows
 from ..pneumatics.gas import Air, Ambient, Flow, Gas, Polytropic, check_above_vacuum
-from ..pneumatics.ports import by_muscle, by_port
+from ..pneumatics.ports import key_by_muscle, key_by_port
 from .diagnostics import (
     Enclosure,
     check_enclosures,
@@ -148,11 +148,11 @@ class Plant(System):
 
     def _outside(self, prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
         """Values under a circuit's own names, by the plant's names."""
-        return by_muscle(self.prefixes, values) if self._shared else with_prefix(prefix, values)
+        return key_by_muscle(self.prefixes, values) if self._shared else with_prefix(prefix, values)
 
     def _within(self, prefix: str, values: Mapping[str, Value]) -> Mapping[str, Value]:
         """Values under the plant's names, by a circuit's own names."""
-        return by_port(self.prefixes, values) if self._shared else select_prefix(prefix, values)
+        return key_by_port(self.prefixes, values) if self._shared else select_prefix(prefix, values)
 
     def muscle_states(self, state: Mapping[str, Value]) -> tuple[MuscleState, ...]:
         """Every muscle at a state."""
@@ -171,7 +171,7 @@ class Plant(System):
         """Flows, rates and outputs of every circuit."""
         airs = self._by_circuit([muscle.air for muscle in muscles])
         return tuple(
-            circuit.respond(air, self._within(prefix, state), select_prefix(prefix, inputs), self.ambient)
+            circuit.compute_flows(air, self._within(prefix, state), select_prefix(prefix, inputs), self.ambient)
             for (prefix, circuit), air in zip(self._circuits(), airs, strict=True)
         )
 

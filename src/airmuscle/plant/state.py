@@ -34,7 +34,9 @@ def state_vector(system: System, state: Mapping[str, float]) -> Array:
         _check_names(names, state)
     values = np.array([as_float(f"the initial state's {name}", state[name]) for name in names], dtype=float)
     if not np.isfinite(values).all():
-        raise ParameterError(f"the initial state must be finite; it is {dict(zip(names, values.tolist(), strict=True))}.")
+        raise ParameterError(
+            f"the initial state must be finite; it is {dict(zip(names, values.tolist(), strict=True))}."
+        )
     for i in np.flatnonzero(values < np.asarray(system.state_lower_bounds)):
         raise ParameterError(
             f"the initial state's {names[i]} is {values[i]:.4g} {system.states[i].unit}; it must not be negative. Use "

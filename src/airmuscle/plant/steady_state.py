@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from ..core.ops import Value
 from ..core.variables import select_prefix, with_prefix
 from ..muscle import Muscle
-from ..pneumatics.gas import Air, Ambient, Gas, absolute
+from ..pneumatics.gas import Air, Ambient, Gas, absolute_pressure
 
 
 def settle_muscles(
@@ -17,7 +17,7 @@ def settle_muscles(
     """`state` with the muscles' own states, in steady state unless they are given, and the volume [m3] of each."""
     settled, volumes = dict(state), []
     for muscle, prefix, pressure, contraction in zip(muscles, prefixes, pressures, contractions, strict=True):
-        own = {**muscle.settled(pressure, contraction), **select_prefix(prefix, state)}
+        own = {**muscle.steady_state(pressure, contraction), **select_prefix(prefix, state)}
         volumes.append(muscle.volume(muscle.inner_contraction(contraction, own), own))
         settled = {**with_prefix(prefix, own), **settled}
     return settled, volumes
@@ -30,7 +30,7 @@ def fill_muscles(
     filled: dict[str, Value] = {}
     airs = []
     for prefix, pressure, volume in zip(prefixes, pressures, volumes, strict=True):
-        content = gas.state_at(absolute(pressure, ambient), volume, ambient)
+        content = gas.state_at(absolute_pressure(pressure, ambient), volume, ambient)
         airs.append(gas.air(content, volume, ambient))
         filled |= with_prefix(prefix, content)
     return filled, airs

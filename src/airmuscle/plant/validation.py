@@ -59,13 +59,13 @@ def _check_counts(muscles: Sequence[Muscle], circuit: Any, circuits: Sequence[Ci
     names = [m.name for m in muscles]
     if not names:
         raise ParameterError("Plant: it has no muscle; give one, or a tuple of them.")
-    ports = sum(c.ports for c in circuits)
+    ports = sum(c.port_count for c in circuits)
     if ports != len(names):
         raise ParameterError(f"Plant: its circuits feed {ports} muscles; {len(names)} are given.")
-    if mechanism.muscles not in (None, len(names)):
+    if mechanism.muscle_count not in (None, len(names)):
         owner = type(mechanism).__name__
-        raise ParameterError(f"Plant: {owner} takes {mechanism.muscles} muscles; {len(names)} are given.")
-    if isinstance(circuit, tuple) and any(c.ports != 1 for c in circuits):
+        raise ParameterError(f"Plant: {owner} takes {mechanism.muscle_count} muscles; {len(names)} are given.")
+    if isinstance(circuit, tuple) and any(c.port_count != 1 for c in circuits):
         raise ParameterError("Plant: give a circuit that feeds several muscles alone, not in a tuple.")
     if len(set(names)) < len(names):
         raise ParameterError(f"Plant: muscles need different names; they are {names}.")

@@ -1,15 +1,15 @@
-"""What brings air into a muscle and lets it out: supplies, valves, tubes, circuits."""
+"""Pneumatic circuits: air supplies, valves and tubes between supply and muscle."""
 
 from .check_valve import CheckValve
 from .circuit import Circuit, CircuitFlows
 from .combination import in_parallel, in_series
 from .distributed_tube import DistributedTube
-from .fill_discharge import ClosedChamber, FillDischarge, ThreePosition
-from .gas import Air, Ambient, EnergyBalance, Flow, Gas, Isothermal, Polytropic, absolute, gauge
-from .indexed_valve import IndexedValve
+from .fill_discharge import ClosedChamber, FillDischarge, ThreePositionValve
+from .gas import Air, Ambient, EnergyBalance, Flow, Gas, Isothermal, Polytropic, absolute_pressure, gauge_pressure
 from .manifold import Manifold, WithLeak
 from .orifice import Orifice
 from .proportional import ProportionalRegulator, ProportionalValve, SecondOrderLag
+from .subsonic_index_valve import SubsonicIndexValve
 from .supply import AirSource, RegulatedSupply, SharedSupply, Supply, Tank
 from .tube import Tube, TubeOrifice
 from .tube_model import TubeModel
@@ -29,7 +29,6 @@ __all__ = [
     "FillDischarge",
     "Flow",
     "Gas",
-    "IndexedValve",
     "Isothermal",
     "Manifold",
     "Orifice",
@@ -39,17 +38,18 @@ __all__ = [
     "RegulatedSupply",
     "SecondOrderLag",
     "SharedSupply",
+    "SubsonicIndexValve",
     "Supply",
     "Tank",
-    "ThreePosition",
+    "ThreePositionValve",
     "Tube",
     "TubeModel",
     "TubeOrifice",
     "Valve",
     "WithLeak",
     "WithTubes",
-    "absolute",
-    "gauge",
+    "absolute_pressure",
+    "gauge_pressure",
     "in_parallel",
     "in_series",
 ]

@@ -1,4 +1,4 @@
-"""A valve that lets air through one way only."""
+"""Check valve: an orifice that passes flow in one direction only."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from .orifice import Orifice
 
 @model
 class CheckValve(Orifice):
-    """Any orifice, closed against the flow back:  qm = max(0, qm of the orifice).
+    """Check valve around any orifice: qm = max(0, qm of the orifice).
 
-    Its cracking pressure is the orifice's: `CheckValve(IndexedValve(C, b, cracking_pressure=20 * kPa))`. The flow is
-    continuous, as it is zero where the direction turns. The mass and the sticking of the closing body are not in it.
+    A cracking pressure belongs to the orifice: `CheckValve(SubsonicIndexValve(C, b, cracking_pressure=20 * kPa))`. The
+    flow is continuous, because it is zero at the reversal. Inertia and friction of the closing body are neglected.
     """
 
     orifice: Orifice

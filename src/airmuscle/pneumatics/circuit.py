@@ -1,4 +1,4 @@
-"""What a circuit is: it takes air from a supply, and gives each muscle the flow that its valves let through."""
+"""Circuit (interface): the flows from an air supply through valves to the muscles."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from .gas import NO_FLOW, Air, Ambient, Flow
 from .supply import AirSource
 
 SUPPLY = "supply."
-"""What the names of the supply's states begin with."""
+"""Prefix of the state names of the supply."""
 
 
 @dataclasses.dataclass(frozen=True)
 class CircuitFlows:
-    """What a circuit does at one moment: flow into every muscle, rates of its own states, what one may want to see.
+    """Flows, rates and outputs of a circuit at one instant.
 
-    `drawn` is what it takes from its supply, `exhausted` what it gives to the surroundings.
+    `flows` are the flows into each muscle, `drawn` is the flow from the supply, `exhausted` the flow to the
+    surroundings, `rates` are the time derivatives of the circuit's states and `outputs` additional quantities by name.
     """
 
     flows: tuple[Flow, ...]
@@ -32,53 +33,53 @@ class CircuitFlows:
 
 
 class Circuit(abc.ABC):
-    """The pneumatic side of one muscle or more: inputs that are commanded, states, and the flow that follows."""
+    """Pneumatic circuit of one or more muscles: inputs, states and the flows into the muscles (interface)."""
 
     references: ClassVar[tuple[Reference, ...]] = ()
     supply: AirSource
 
     @property
-    def ports(self) -> int:
-        """How many muscles it feeds."""
+    def port_count(self) -> int:
+        """Number of muscles that the circuit feeds."""
         return 1
 
     @property
     @abc.abstractmethod
     def inputs(self) -> tuple[Input, ...]:
-        """What is commanded."""
+        """Inputs of the circuit: valve openings, commands or set points."""
 
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        """Its states without those of its supply."""
+        """State variables without those of the supply."""
         return ()
 
-    def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
-        """Its own states at rest, with every input at zero and this air in the muscles."""
+    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        """Steady state without the supply, for zero inputs and the air states of the muscles."""
         return {}
 
     @abc.abstractmethod
     def supplied_flow(
-        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
-        """What it does between this air at its supply and this air in the muscles."""
+        """Flows for the air state at the supply and the air states of the muscles; `rates` without the supply."""
 
     def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
-        """Where a run, columns (N,) by its names, went beyond what its laws describe: in words, by part."""
+        """Warnings by prefix of the part where a run left the validity range; `columns` are arrays (N,) by name."""
         return {}
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        """All its states."""
+        """State variables of circuit and supply."""
         return (*self.own_states(ambient), *add_prefix(SUPPLY, self.supply.states(ambient)))
 
-    def steady_state(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
-        """All its states at rest."""
-        return {**self.own_settled(airs, ambient), **with_prefix(SUPPLY, self.supply.steady_state(ambient))}
+    def steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        """Steady state of circuit and supply for zero inputs and the air states of the muscles."""
+        return {**self.own_steady_state(air_states, ambient), **with_prefix(SUPPLY, self.supply.steady_state(ambient))}
 
-    def respond(
-        self, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value], ambient: Ambient
+    def compute_flows(
+        self, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value], ambient: Ambient
     ) -> CircuitFlows:
-        """What it does with this air in the muscles; `drawn` is then what comes from outside the plant."""
-        of_supply = select_prefix(SUPPLY, state)
-        done = self.supplied_flow(self.supply.air(of_supply, ambient), airs, state, inputs, ambient)
-        rates, taken = self.supply.balance(of_supply, done.drawn, ambient)
-        return dataclasses.replace(done, rates={**done.rates, **with_prefix(SUPPLY, rates)}, drawn=taken)
+        """Flows and rates of circuit and supply; `drawn` is the flow from outside the plant."""
+        supply = select_prefix(SUPPLY, state)
+        flows = self.supplied_flow(self.supply.air(supply, ambient), air_states, state, inputs, ambient)
+        rates, inflow = self.supply.balance(supply, flows.drawn, ambient)
+        return dataclasses.replace(flows, rates={**flows.rates, **with_prefix(SUPPLY, rates)}, drawn=inflow)

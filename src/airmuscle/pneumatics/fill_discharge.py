@@ -1,4 +1,4 @@
-"""On/off valves that fill a muscle and let it out; a muscle shut off for good."""
+"""Circuits with on/off valves for one muscle, and the closed chamber."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .orifice import Orifice
 from .supply import AirSource, Supply
 
 
-def surroundings(ambient: Ambient) -> Air:
-    """The air around the plant."""
+def ambient_air(ambient: Ambient) -> Air:
+    """Air state of the surroundings."""
     return Air(ambient.pressure, ambient.temperature)
 
 
 @model
 class FillDischarge(Circuit):
-    """Two on/off valves: one from the supply, one to the surroundings."""
+    """Two on/off valves: a fill valve from the supply and a discharge valve to the surroundings."""
 
     supply: AirSource
     fill: Orifice
@@ -33,17 +33,17 @@ class FillDischarge(Circuit):
         return (Input("fill"), Input("discharge"))
 
     def supplied_flow(
-        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
-        incoming = orifice_flow(self.fill, inlet, airs[0], inputs["fill"])
-        outgoing = orifice_flow(self.discharge, airs[0], surroundings(ambient), inputs["discharge"])
-        return CircuitFlows((incoming - outgoing,), incoming, outgoing)
+        inflow = orifice_flow(self.fill, inlet, air_states[0], inputs["fill"])
+        outflow = orifice_flow(self.discharge, air_states[0], ambient_air(ambient), inputs["discharge"])
+        return CircuitFlows((inflow - outflow,), inflow, outflow)
 
 
 @model
-class ThreePosition(Circuit):
-    """A 3/3 valve with closed centre: one input, `valve`; 1 fills, 0 shuts, -1 discharges, less is part of the area."""
+class ThreePositionValve(Circuit):
+    """3/3 valve with closed centre and one input `valve`: 1 fill, 0 closed, -1 discharge; proportional between."""
 
     supply: AirSource
     fill: Orifice
@@ -51,21 +51,21 @@ class ThreePosition(Circuit):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        return (Input("valve", "1", -1.0, 1.0, "1 fill, 0 shut, -1 discharge"),)
+        return (Input("valve", "1", -1.0, 1.0, "1 fill, 0 closed, -1 discharge"),)
 
     def supplied_flow(
-        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
-        place = inputs["valve"]
-        incoming = orifice_flow(self.fill, inlet, airs[0], ops.maximum(place, 0.0))
-        outgoing = orifice_flow(self.discharge, airs[0], surroundings(ambient), ops.maximum(-place, 0.0))
-        return CircuitFlows((incoming - outgoing,), incoming, outgoing)
+        position = inputs["valve"]
+        inflow = orifice_flow(self.fill, inlet, air_states[0], ops.maximum(position, 0.0))
+        outflow = orifice_flow(self.discharge, air_states[0], ambient_air(ambient), ops.maximum(-position, 0.0))
+        return CircuitFlows((inflow - outflow,), inflow, outflow)
 
 
 @model
 class ClosedChamber(Circuit):
-    """No connection at all: the air mass stays what it is."""
+    """Closed chamber: no flow, constant air mass."""
 
     supply: AirSource = Supply(0.0)
 
@@ -74,7 +74,7 @@ class ClosedChamber(Circuit):
         return ()
 
     def supplied_flow(
-        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
         return CircuitFlows((NO_FLOW,))

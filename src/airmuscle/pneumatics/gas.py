@@ -1,6 +1,7 @@
-"""Dry ideal air: how gauge becomes absolute, and how what a chamber holds gives its pressure.
+"""Gas models of dry ideal air: pressure and temperature of a chamber; gauge and absolute pressure.
 
-Air mass is the state of a chamber, so that mass is conserved whatever the tolerance; pressure follows from it.
+The state of a chamber is its air mass, from which the pressure follows, so that mass is conserved independently of the
+integration tolerance.
 """
 
 from __future__ import annotations
@@ -21,15 +22,15 @@ from ..core.variables import StateVariable
 GAS_CONSTANT = 287.05
 """Specific gas constant of dry air [J/(kg K)]."""
 HEAT_CAPACITY_RATIO = 1.4
-"""Ratio of the specific heats of a diatomic ideal gas, as dry air is taken for here."""
-HEAT_AT_CONSTANT_VOLUME = GAS_CONSTANT / (HEAT_CAPACITY_RATIO - 1.0)
+"""Ratio of the specific heats of dry air, taken as a diatomic ideal gas."""
+SPECIFIC_HEAT_CONSTANT_VOLUME = GAS_CONSTANT / (HEAT_CAPACITY_RATIO - 1.0)
 """Specific heat c_v of dry air [J/(kg K)]."""
-HEAT_AT_CONSTANT_PRESSURE = HEAT_CAPACITY_RATIO * HEAT_AT_CONSTANT_VOLUME
+SPECIFIC_HEAT_CONSTANT_PRESSURE = HEAT_CAPACITY_RATIO * SPECIFIC_HEAT_CONSTANT_VOLUME
 """Specific heat c_p of dry air [J/(kg K)]."""
 REFERENCE_DENSITY = 1.185
 """Density of air at the reference atmosphere of ISO 8778, 100 kPa and 293.15 K [kg/m3]."""
 REFERENCE_TEMPERATURE = 293.15
-"""Temperature of that reference atmosphere [K]."""
+"""Temperature of the reference atmosphere of ISO 8778 [K]."""
 
 ISO8778 = Reference(
     "iso-8778", "ISO", "Fluid power: standard reference atmosphere", "ISO 8778", 2003,
@@ -39,7 +40,7 @@ ISO8778 = Reference(
 
 @model
 class Ambient:
-    """The air around the muscle."""
+    """Ambient air: absolute pressure and temperature of the surroundings."""
 
     references: ClassVar[tuple[Reference, ...]] = (ISO8778,)
 
@@ -56,27 +57,27 @@ class Ambient:
     )
 
 
-def absolute(pressure: Value, ambient: Ambient) -> Value:
-    """Absolute pressure [Pa] from gauge pressure [Pa]; the one place where gauge becomes absolute."""
+def absolute_pressure(pressure: Value, ambient: Ambient) -> Value:
+    """Absolute pressure [Pa] from gauge pressure [Pa]; the only such conversion in the package."""
     return pressure + ambient.pressure
 
 
-def gauge(pressure: Value, ambient: Ambient) -> Value:
+def gauge_pressure(pressure: Value, ambient: Ambient) -> Value:
     """Gauge pressure [Pa] from absolute pressure [Pa]."""
     return pressure - ambient.pressure
 
 
 def check_above_vacuum(pressure: float, ambient: Ambient) -> None:
-    """Raise ParameterError for a gauge pressure [Pa] at or below absolute zero."""
-    if not absolute(pressure, ambient) > 0:
+    """Raise ParameterError for a gauge pressure [Pa] at or below absolute vacuum."""
+    if not absolute_pressure(pressure, ambient) > 0:
         raise ParameterError(
-            f"a gauge pressure of {pressure / 1e3:.6g} kPa lies below absolute zero "
-            f"({-ambient.pressure / 1e3:.6g} kPa gauge). Is it in another unit?"
+            f"a gauge pressure of {pressure / 1e3:.6g} kPa is not above absolute vacuum "
+            f"({-ambient.pressure / 1e3:.6g} kPa gauge). Check the unit."
         )
 
 
 class Air(NamedTuple):
-    """Air at one place: absolute pressure [Pa] and temperature [K]."""
+    """Air state: absolute pressure [Pa] and temperature [K]."""
 
     pressure: Value
     temperature: Value
@@ -84,7 +85,7 @@ class Air(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Flow:
-    """Air on its way: mass flow [kg/s], and the enthalpy that it carries, c_p T m' [W]."""
+    """Air flow: mass flow [kg/s] and enthalpy flow c_p T m' [W]."""
 
     mass: Value
     enthalpy: Value
@@ -100,51 +101,51 @@ class Flow:
 
 
 NO_FLOW = Flow(0.0, 0.0)
-"""No air moves."""
+"""Zero flow."""
 
 
 class Gas(abc.ABC):
-    """How the air in a chamber takes up pressure. What a chamber holds is a mapping by the names of `states`."""
+    """Gas model of the air in a chamber (interface). A state is a mapping from the names in `states` to values."""
 
     references: ClassVar[tuple[Reference, ...]] = ()
 
     @abc.abstractmethod
     def states(self, volume: Value, ambient: Ambient) -> tuple[StateVariable, ...]:
-        """The states of a chamber of about this volume [m3], `air_mass` first."""
+        """State variables of a chamber, `air_mass` first; the volume [m3] sets their nominal values."""
 
     @abc.abstractmethod
-    def air(self, content: Mapping[str, Value], volume: Value, ambient: Ambient) -> Air:
-        """Pressure and temperature of what a chamber holds, in a volume [m3]."""
+    def air(self, state: Mapping[str, Value], volume: Value, ambient: Ambient) -> Air:
+        """Air state of a chamber with a volume [m3]."""
 
     @abc.abstractmethod
     def state_at(self, pressure: Value, volume: Value, ambient: Ambient) -> dict[str, Value]:
-        """What a volume [m3] holds at rest at an absolute pressure [Pa]."""
+        """State of a chamber with a volume [m3] at rest at an absolute pressure [Pa] and ambient temperature."""
 
     @abc.abstractmethod
     def rates(
-        self, content: Mapping[str, Value], air: Air, flow: Flow, volume_rate: Value, ambient: Ambient
+        self, state: Mapping[str, Value], air: Air, flow: Flow, volume_rate: Value, ambient: Ambient
     ) -> dict[str, Value]:
-        """The time derivative of every state, as air flows in and the volume grows at `volume_rate` [m3/s]."""
+        """Time derivatives of the states for an inflow and a rate of change of the volume [m3/s]."""
 
     @abc.abstractmethod
-    def available_energy(self, content: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
-        """Energy [J] that the chamber can give; along the process its slope by volume is minus the pressure."""
+    def available_energy(self, state: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
+        """Available energy [J]; its derivative with respect to volume along the process is minus the pressure."""
 
     @abc.abstractmethod
-    def energy_flow(self, content: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
-        """Power [W] that comes in with the flow."""
+    def energy_flow(self, state: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
+        """Power [W] that enters with the flow."""
 
     @abc.abstractmethod
     def sound_speed(self, air: Air) -> Value:
-        """Speed [m/s] at which a small disturbance travels: sqrt(dp/drho) along the process."""
+        """Speed of sound [m/s]: sqrt(dp/drho) along the process."""
 
     def heat_flow(self, air: Air, ambient: Ambient) -> Value:
-        """Heat [W] that the wall gives to the air, where the gas keeps account of it."""
+        """Heat flow [W] from the wall to the air; 0 for a gas model without heat transfer."""
         return 0.0
 
 
 class BarotropicGas(Gas):
-    """Air that keeps to one process, so that its mass and volume alone give its pressure."""
+    """Barotropic gas: the pressure is a function of air mass and volume along one process (interface)."""
 
     @abc.abstractmethod
     def pressure(self, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
@@ -152,43 +153,43 @@ class BarotropicGas(Gas):
 
     @abc.abstractmethod
     def air_mass(self, pressure: Value, volume: Value, ambient: Ambient) -> Value:
-        """Air mass [kg] that has an absolute pressure [Pa] in a volume [m3]."""
+        """Air mass [kg] at an absolute pressure [Pa] in a volume [m3]."""
 
     @abc.abstractmethod
     def energy(self, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
-        """Energy [J] that the air can give along this process; its slope by volume is minus the absolute pressure."""
+        """Available energy [J]; its derivative with respect to volume is minus the absolute pressure."""
 
     @abc.abstractmethod
     def temperature(self, pressure: Value, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
-        """Temperature [K] of an air mass [kg] that has an absolute pressure [Pa] in a volume [m3]."""
+        """Temperature [K] of an air mass [kg] at an absolute pressure [Pa] in a volume [m3]."""
 
     def states(self, volume: Value, ambient: Ambient) -> tuple[StateVariable, ...]:
-        size = self.air_mass(ambient.pressure, volume, ambient)
-        return (StateVariable("air_mass", "kg", size, "mass of the air"),)
+        nominal = self.air_mass(ambient.pressure, volume, ambient)
+        return (StateVariable("air_mass", "kg", nominal, "air mass"),)
 
-    def air(self, content: Mapping[str, Value], volume: Value, ambient: Ambient) -> Air:
-        pressure = self.pressure(content["air_mass"], volume, ambient)
-        return Air(pressure, self.temperature(pressure, content["air_mass"], volume, ambient))
+    def air(self, state: Mapping[str, Value], volume: Value, ambient: Ambient) -> Air:
+        pressure = self.pressure(state["air_mass"], volume, ambient)
+        return Air(pressure, self.temperature(pressure, state["air_mass"], volume, ambient))
 
     def state_at(self, pressure: Value, volume: Value, ambient: Ambient) -> dict[str, Value]:
         return {"air_mass": self.air_mass(pressure, volume, ambient)}
 
     def rates(
-        self, content: Mapping[str, Value], air: Air, flow: Flow, volume_rate: Value, ambient: Ambient
+        self, state: Mapping[str, Value], air: Air, flow: Flow, volume_rate: Value, ambient: Ambient
     ) -> dict[str, Value]:
         return {"air_mass": flow.mass}
 
-    def available_energy(self, content: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
-        return self.energy(content["air_mass"], volume, ambient)
+    def available_energy(self, state: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
+        return self.energy(state["air_mass"], volume, ambient)
 
-    def energy_flow(self, content: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
-        per_mass = autodiff.jvp(lambda x: [self.energy(x[0], volume, ambient)], [content["air_mass"]], [1.0])
+    def energy_flow(self, state: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
+        per_mass = autodiff.jvp(lambda x: [self.energy(x[0], volume, ambient)], [state["air_mass"]], [1.0])
         return per_mass[0] * flow.mass
 
 
 @model
 class Isothermal(BarotropicGas):
-    """Boyle-Mariotte: p V = m R T at the ambient temperature, as in the paper of Hosovsky et al."""
+    """Isothermal gas: p V = m R T at ambient temperature, as in Hošovský et al."""
 
     def pressure(self, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
         return air_mass * (GAS_CONSTANT * ambient.temperature) / volume
@@ -209,12 +210,12 @@ class Isothermal(BarotropicGas):
 
 @model
 class Polytropic(BarotropicGas):
-    """p / rho^n constant along the process, through the state of the ambient air.
+    """Polytropic gas: p / rho^n is constant and equal to that of the ambient air.
 
         p = p_amb (m R T_amb / (p_amb V))^n,   so that   p' = n (R T m' - p V') / V   with T = p V / (m R)
 
-    n towards 1 is isothermal, 1.4 adiabatic. The process passes through ambient pressure and temperature; air that has
-    cooled down at a higher pressure is not described by it.
+    n -> 1 is isothermal, n = 1.4 adiabatic. The process passes through ambient pressure and temperature; air that has
+    cooled at a higher pressure is not described.
     """
 
     exponent: float = parameter("1", "n", "polytropic exponent", bounds=(1.001, 1.667), default=1.2)
@@ -239,26 +240,26 @@ class Polytropic(BarotropicGas):
 
 @model
 class EnergyBalance(Gas):
-    """First law for the air in a chamber, with heat from its wall, which stays at ambient temperature.
+    """Energy balance (first law) of the air in a chamber, with heat transfer from a wall at ambient temperature.
 
         m' = sum m'_i,   U' = sum c_p T_i m'_i - p V' + hA (T_amb - T),   T = U/(m c_v),   p = (gamma - 1) U/V
 
-    m air mass, U internal energy, T_i the temperature of the air where each flow comes from, hA heat that passes the
-    wall for each kelvin. hA = 0 is adiabatic, a large hA isothermal. Dry ideal air, gamma = 1.4.
+    m air mass, U internal energy, T_i upstream temperature of each flow, hA heat transfer coefficient times area.
+    hA = 0 is adiabatic, a large hA isothermal. Dry ideal air, gamma = 1.4.
     """
 
-    heat_transfer: float = parameter("W/K", "hA", "heat transfer between air and wall", bounds=(0.0, 1e5))
+    heat_transfer: float = parameter("W/K", "hA", "heat transfer coefficient times wall area", bounds=(0.0, 1e5))
 
     def states(self, volume: Value, ambient: Ambient) -> tuple[StateVariable, ...]:
         rest = self.state_at(ambient.pressure, volume, ambient)
         return (
-            StateVariable("air_mass", "kg", rest["air_mass"], "mass of the air"),
+            StateVariable("air_mass", "kg", rest["air_mass"], "air mass"),
             StateVariable("internal_energy", "J", rest["internal_energy"], "internal energy of the air"),
         )
 
-    def air(self, content: Mapping[str, Value], volume: Value, ambient: Ambient) -> Air:
-        energy = content["internal_energy"]
-        temperature = energy / (content["air_mass"] * HEAT_AT_CONSTANT_VOLUME)
+    def air(self, state: Mapping[str, Value], volume: Value, ambient: Ambient) -> Air:
+        energy = state["internal_energy"]
+        temperature = energy / (state["air_mass"] * SPECIFIC_HEAT_CONSTANT_VOLUME)
         return Air((HEAT_CAPACITY_RATIO - 1.0) * energy / volume, temperature)
 
     def state_at(self, pressure: Value, volume: Value, ambient: Ambient) -> dict[str, Value]:
@@ -268,19 +269,19 @@ class EnergyBalance(Gas):
         }
 
     def rates(
-        self, content: Mapping[str, Value], air: Air, flow: Flow, volume_rate: Value, ambient: Ambient
+        self, state: Mapping[str, Value], air: Air, flow: Flow, volume_rate: Value, ambient: Ambient
     ) -> dict[str, Value]:
         energy = flow.enthalpy - air.pressure * volume_rate + self.heat_flow(air, ambient)
         return {"air_mass": flow.mass, "internal_energy": energy}
 
-    def available_energy(self, content: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
-        return content["internal_energy"]
+    def available_energy(self, state: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
+        return state["internal_energy"]
 
-    def energy_flow(self, content: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
+    def energy_flow(self, state: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
         return flow.enthalpy
 
     def sound_speed(self, air: Air) -> Value:
-        """That of adiabatic sound; a heat transfer that is large within a period brings it down to the isothermal."""
+        """Adiabatic speed of sound [m/s]; a heat transfer that is fast against the period reduces it to isothermal."""
         return ops.sqrt(HEAT_CAPACITY_RATIO * GAS_CONSTANT * air.temperature)
 
     def heat_flow(self, air: Air, ambient: Ambient) -> Value:

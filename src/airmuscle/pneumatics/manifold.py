@@ -1,4 +1,4 @@
-"""Circuits made of circuits: one that leaks, and several on one supply."""
+"""WithLeak and Manifold: a circuit with leakage, and several circuits on one supply."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from .circuit import SUPPLY, Circuit, CircuitFlows
-from .fill_discharge import surroundings
+from .fill_discharge import ambient_air
 from .flow import orifice_flow
 from .gas import Air, Ambient
 from .orifice import Orifice
@@ -21,7 +21,7 @@ from .wrapper import CircuitWrapper
 
 @model
 class WithLeak(CircuitWrapper):
-    """A circuit whose muscles also lose air to the surroundings through a leak each."""
+    """Circuit with a leak from each of its muscles to the surroundings."""
 
     circuit: Circuit
     leak: Orifice
@@ -29,22 +29,22 @@ class WithLeak(CircuitWrapper):
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         return self.circuit.own_states(ambient)
 
-    def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
-        return self.circuit.own_settled(airs, ambient)
+    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        return self.circuit.own_steady_state(air_states, ambient)
 
     def supplied_flow(
-        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
-        done = self.circuit.supplied_flow(inlet, airs, state, inputs, ambient)
-        lost = [orifice_flow(self.leak, air, surroundings(ambient)) for air in airs]
-        flows = tuple(flow - leaking for flow, leaking in zip(done.flows, lost, strict=True))
-        return dataclasses.replace(done, flows=flows, exhausted=sum(lost, done.exhausted))
+        inner = self.circuit.supplied_flow(inlet, air_states, state, inputs, ambient)
+        leakage = [orifice_flow(self.leak, air, ambient_air(ambient)) for air in air_states]
+        flows = tuple(flow - leak for flow, leak in zip(inner.flows, leakage, strict=True))
+        return dataclasses.replace(inner, flows=flows, exhausted=sum(leakage, inner.exhausted))
 
 
 @model
 class Manifold(Circuit):
-    """Several circuits on one supply, so that one that draws much starves the others; each has a name."""
+    """Manifold: several named circuits on one supply; a large flow in one reduces the supply pressure of all."""
 
     supply: AirSource
     branches: tuple[Circuit, ...]
@@ -53,61 +53,70 @@ class Manifold(Circuit):
     def check(self) -> None:
         check_structure(self)
         for field, kind in (("branches", Circuit), ("names", str)):
-            given = getattr(self, field)
-            if not isinstance(given, tuple) or not all(isinstance(item, kind) for item in given):
-                raise ParameterError(f"Manifold: its {field} must be a tuple of {kind.__name__}; they are {given!r}.")
+            value = getattr(self, field)
+            if not isinstance(value, tuple) or not all(isinstance(item, kind) for item in value):
+                raise ParameterError(f"Manifold: {field} is {value!r}; it must be a tuple of {kind.__name__}.")
         if len(self.names) != len(self.branches) or len(set(self.names)) != len(self.names) or not self.names:
-            raise ParameterError(f"Manifold: {len(self.branches)} branches need as many different names: {self.names}.")
+            raise ParameterError(
+                f"Manifold: names is {self.names}; give a distinct name for each of the {len(self.branches)} branches."
+            )
         for name in self.names:
             if not name or "." in name or f"{name}." == SUPPLY:
                 raise ParameterError(
-                    f"Manifold: a branch cannot be named {name!r}; give a word without a dot, and not 'supply', which "
-                    "names the manifold's own."
+                    f"Manifold: a branch cannot be named {name!r}; give a name without a dot and other than 'supply', "
+                    "which is reserved for the supply of the manifold."
                 )
         for name, branch in zip(self.names, self.branches, strict=True):
             if not isinstance(branch.supply, SharedSupply):
                 raise ParameterError(
-                    f"Manifold: branch '{name}' has a supply of its own; give it SharedSupply(), as the manifold feeds it."
+                    f"Manifold: the supply of branch '{name}' is {type(branch.supply).__name__}; it must be "
+                    "SharedSupply(), because the manifold feeds all branches."
                 )
 
-    def _parts(self) -> Iterator[tuple[str, Circuit]]:
+    def _named_branches(self) -> Iterator[tuple[str, Circuit]]:
         return zip((f"{name}." for name in self.names), self.branches, strict=True)
 
+    def _branch_air(self, air_states: tuple[Air, ...]) -> Iterator[tuple[str, Circuit, tuple[Air, ...]]]:
+        """Prefix and circuit of each branch, with the air states of its muscles."""
+        first = 0
+        for name, branch in self._named_branches():
+            yield name, branch, air_states[first : first + branch.port_count]
+            first += branch.port_count
+
     @property
-    def ports(self) -> int:
-        return sum(branch.ports for branch in self.branches)
+    def port_count(self) -> int:
+        return sum(branch.port_count for branch in self.branches)
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        return tuple(i for name, branch in self._parts() for i in add_prefix(name, branch.inputs))
+        return tuple(i for name, branch in self._named_branches() for i in add_prefix(name, branch.inputs))
 
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        return tuple(s for name, branch in self._parts() for s in add_prefix(name, branch.own_states(ambient)))
+        return tuple(s for name, branch in self._named_branches() for s in add_prefix(name, branch.own_states(ambient)))
 
-    def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
-        found: dict[str, Value] = {}
-        left = list(airs)
-        for name, branch in self._parts():
-            mine, left = tuple(left[: branch.ports]), left[branch.ports :]
-            found |= with_prefix(name, branch.own_settled(mine, ambient))
-        return found
+    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        state: dict[str, Value] = {}
+        for name, branch, branch_air in self._branch_air(air_states):
+            state |= with_prefix(name, branch.own_steady_state(branch_air, ambient))
+        return state
 
     def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
-        found: dict[str, str] = {}
-        for name, branch in self._parts():
-            found |= with_prefix(name, branch.validity_warnings(select_prefix(name, columns), ambient))
-        return found
+        warnings: dict[str, str] = {}
+        for name, branch in self._named_branches():
+            warnings |= with_prefix(name, branch.validity_warnings(select_prefix(name, columns), ambient))
+        return warnings
 
     def supplied_flow(
-        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
-        total, left = CircuitFlows(()), list(airs)
-        for name, branch in self._parts():
-            mine, left = tuple(left[: branch.ports]), left[branch.ports :]
-            done = branch.supplied_flow(inlet, mine, select_prefix(name, state), select_prefix(name, inputs), ambient)
+        total = CircuitFlows(())
+        for name, branch, branch_air in self._branch_air(air_states):
+            part = branch.supplied_flow(
+                inlet, branch_air, select_prefix(name, state), select_prefix(name, inputs), ambient
+            )
             total = CircuitFlows(
-                total.flows + done.flows, total.drawn + done.drawn, total.exhausted + done.exhausted,
-                {**total.rates, **with_prefix(name, done.rates)}, {**total.outputs, **with_prefix(name, done.outputs)},
+                total.flows + part.flows, total.drawn + part.drawn, total.exhausted + part.exhausted,
+                {**total.rates, **with_prefix(name, part.rates)}, {**total.outputs, **with_prefix(name, part.outputs)},
             )  # fmt: skip
         return total

@@ -1,4 +1,4 @@
-"""What every restriction that air flows through has in common."""
+"""Orifice (interface): mass flow through a restriction."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from ..core.ops import Value
 
 
 class Orifice(abc.ABC):
-    """A restriction between two pressures: a valve, a silencer, a leak, a port.
+    """Flow restriction between two pressures: valve, silencer, leak or port (interface).
 
-    Laws of this kind are continuous, pass nothing at equal pressures, and never pass air uphill.
+    Flow laws are continuous, give no flow at equal pressures, and never a flow towards the higher pressure.
     """
 
     @abc.abstractmethod
     def mass_flow(self, upstream: Value, downstream: Value, opening: Value, temperature: Value) -> Value:
         """Mass flow [kg/s] from absolute pressure `upstream` to `downstream` [Pa] of air at `temperature` [K].
 
-        `opening` scales the conductance, 0 shut to 1 fully open; the flow is negative when it reverses.
+        `opening` scales the conductance from 0 (closed) to 1 (fully open). A reversed flow is negative.
         """

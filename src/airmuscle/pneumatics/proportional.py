@@ -1,4 +1,4 @@
-"""Valves that follow a command continuously: the 5/3 proportional valve and the proportional pressure regulator."""
+"""Proportional valves: 5/3 proportional directional valve and proportional pressure regulator."""
 
 from __future__ import annotations
 
@@ -10,119 +10,122 @@ from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.variables import Input, StateVariable
 from .circuit import Circuit, CircuitFlows
-from .fill_discharge import surroundings
+from .fill_discharge import ambient_air
 from .flow import orifice_flow, proportional_opening
-from .gas import NO_FLOW, Air, Ambient, Flow, absolute, gauge
+from .gas import NO_FLOW, Air, Ambient, absolute_pressure, gauge_pressure
 from .orifice import Orifice
 from .supply import AirSource
 
 
 @model
 class SecondOrderLag:
-    """A second-order lag: x'' = w^2 (u - x) - 2 zeta w x', w = 2 pi f."""
+    """Second-order lag of a position x behind a command u: x'' = w^2 (u - x) - 2 zeta w x', w = 2 pi f."""
 
     frequency: float = parameter("Hz", "f", "natural frequency", bounds=(0.1, 1e4))
     damping_ratio: float = parameter("1", "zeta", "damping ratio", bounds=(0.05, 10.0), default=1.0)
 
-    def rates(self, place: Value, speed: Value, command: Value) -> tuple[Value, Value]:
-        """The time derivatives of place and speed."""
+    def rates(self, position: Value, speed: Value, command: Value) -> tuple[Value, Value]:
+        """Time derivatives of position and speed."""
         w = 2.0 * ops.pi * self.frequency
-        return speed, w**2 * (command - place) - 2.0 * self.damping_ratio * w * speed
+        return speed, w**2 * (command - position) - 2.0 * self.damping_ratio * w * speed
 
 
 @model
 class ProportionalValve(Circuit):
-    """A 5/3 valve whose spool follows the command; it feeds one muscle (its second port plugged) or two.
+    """5/3 proportional directional valve for one muscle (second port plugged) or two muscles.
 
-        port A: filled by (s - o)/(1 - o) of the fill orifice, discharged by (-s - o)/(1 - o) of the other; port B by -s
+        opening of fill = clip((s - o)/(1 - o), 0, 1),   opening of discharge = clip((-s - o)/(1 - o), 0, 1)
 
-    s place of the spool, -1 to 1, o overlap as a share of its stroke (negative: underlap, which leaks in the middle).
-    Fill and discharge have an orifice each, so that their areas may differ.
+    s spool position from -1 to 1 at the first port, -s at the second; o overlap as a fraction of the stroke (negative
+    for underlap, with leakage at the centre). Fill and discharge have separate orifices, whose areas may differ.
     """
 
     supply: AirSource
     fill: Orifice
     discharge: Orifice
     spool: SecondOrderLag
-    overlap: float = parameter("1", "o", "overlap, share of the stroke", bounds=(-0.5, 0.9), default=0.0)
-    muscles: int = 1
-    """How many muscles it feeds, one or two."""
+    overlap: float = parameter("1", "o", "overlap as a fraction of the stroke", bounds=(-0.5, 0.9), default=0.0)
+    muscle_count: int = 1
+    """Number of muscles, 1 or 2."""
 
     def check(self) -> None:
-        if isinstance(self.muscles, bool) or self.muscles not in (1, 2):
-            raise ParameterError(f"ProportionalValve: it feeds one muscle or two, not {self.muscles!r}.")
+        if isinstance(self.muscle_count, bool) or self.muscle_count not in (1, 2):
+            raise ParameterError(f"ProportionalValve: muscle_count is {self.muscle_count!r}; it must be 1 or 2.")
 
     @property
-    def ports(self) -> int:
-        return self.muscles
+    def port_count(self) -> int:
+        return self.muscle_count
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        return (Input("command", "1", -1.0, 1.0, "place of the spool: 1 fills the first muscle, -1 discharges it"),)
+        return (Input("command", "1", -1.0, 1.0, "spool position: 1 fills the first muscle, -1 discharges it"),)
 
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         speed = 2.0 * ops.pi * self.spool.frequency
-        return (StateVariable("spool", "1", 1.0, "place of the spool"),
-                StateVariable("spool_speed", "1/s", speed, "speed of the spool"))  # fmt: skip
+        return (StateVariable("spool", "1", 1.0, "spool position"),
+                StateVariable("spool_speed", "1/s", speed, "spool speed"))  # fmt: skip
 
-    def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
         return {"spool": 0.0, "spool_speed": 0.0}
 
-    def opening(self, place: Value) -> Value:
-        """Opening [1] of an edge with the spool at `place` towards it."""
-        return proportional_opening(place - self.overlap, 1.0 - self.overlap)
+    def opening(self, position: Value) -> Value:
+        """Opening of a control edge for a spool position towards this edge."""
+        return proportional_opening(position - self.overlap, 1.0 - self.overlap)
 
     def supplied_flow(
-        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
-        place, flows, drawn, exhausted = state["spool"], [], NO_FLOW, NO_FLOW
-        for air, towards in zip(airs, (place, -place), strict=False):
-            incoming = orifice_flow(self.fill, inlet, air, self.opening(towards))
-            outgoing = orifice_flow(self.discharge, air, surroundings(ambient), self.opening(-towards))
-            flows.append(incoming - outgoing)
-            drawn, exhausted = drawn + incoming, exhausted + outgoing
-        moving, pushed = self.spool.rates(place, state["spool_speed"], inputs["command"])
-        return CircuitFlows(tuple(flows), drawn, exhausted, {"spool": moving, "spool_speed": pushed})
+        spool, flows, drawn, exhausted = state["spool"], [], NO_FLOW, NO_FLOW
+        for air, position in zip(air_states, (spool, -spool), strict=False):
+            inflow = orifice_flow(self.fill, inlet, air, self.opening(position))
+            outflow = orifice_flow(self.discharge, air, ambient_air(ambient), self.opening(-position))
+            flows.append(inflow - outflow)
+            drawn, exhausted = drawn + inflow, exhausted + outflow
+        speed, acceleration = self.spool.rates(spool, state["spool_speed"], inputs["command"])
+        return CircuitFlows(tuple(flows), drawn, exhausted, {"spool": speed, "spool_speed": acceleration})
 
 
 @model
 class ProportionalRegulator(Circuit):
-    """A pressure regulator that follows a set point: second order, with the flow that its two orifices let through.
+    """Proportional pressure regulator: second-order lag of the set point and a fill and a discharge orifice.
 
-        fill opens by clip((r - p)/B, 0, 1), discharge by clip((p - r)/B, 0, 1),   r'' = w^2 (u - r) - 2 zeta w r'
+        opening of fill = clip((r - p)/B, 0, 1),   opening of discharge = clip((p - r)/B, 0, 1)
+        r'' = w^2 (u - r) - 2 zeta w r'
 
-    u set point, r the pressure that it regulates to, p the pressure at its outlet, B the error at which it is fully
-    open: near the set point it is slow, far from it its flow is that of the open orifice.
+    u set point, r lagged set point, p outlet pressure, B proportional band, the control error at full opening.
     """
 
     supply: AirSource
     fill: Orifice
     discharge: Orifice
     lag: SecondOrderLag
-    band: float = parameter("Pa", "B", "error at which it is fully open", bounds=(100.0, 1e6), default=2e4)
-    max_setpoint: float = parameter("Pa", "u_max", "greatest set point", bounds=(1e3, 5e6), fitted=False, default=1e6)
+    band: float = parameter(
+        "Pa", "B", "proportional band: control error at full opening", bounds=(100.0, 1e6), default=2e4
+    )
+    max_setpoint: float = parameter("Pa", "u_max", "maximum set point", bounds=(1e3, 5e6), fitted=False, default=1e6)
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        return (Input("setpoint", "Pa", 0.0, self.max_setpoint, "gauge pressure to regulate to"),)
+        return (Input("setpoint", "Pa", 0.0, self.max_setpoint, "set gauge pressure"),)
 
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         rate = 1e5 * 2.0 * ops.pi * self.lag.frequency
-        return (StateVariable("regulated", "Pa", 1e5, "gauge pressure that it regulates to"),
-                StateVariable("regulated_rate", "Pa/s", rate, "rate of that pressure"))  # fmt: skip
+        return (StateVariable("lagged_setpoint", "Pa", 1e5, "lagged set point, gauge pressure"),
+                StateVariable("lagged_setpoint_rate", "Pa/s", rate, "rate of the lagged set point"))  # fmt: skip
 
-    def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
-        return {"regulated": gauge(airs[0].pressure, ambient), "regulated_rate": 0.0}
+    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        return {"lagged_setpoint": gauge_pressure(air_states[0].pressure, ambient), "lagged_setpoint_rate": 0.0}
 
     def supplied_flow(
-        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
-        (air,) = airs
-        error = absolute(state["regulated"], ambient) - air.pressure
-        incoming = orifice_flow(self.fill, inlet, air, proportional_opening(error, self.band))
-        outgoing = orifice_flow(self.discharge, air, surroundings(ambient), proportional_opening(-error, self.band))
-        moving, pushed = self.lag.rates(state["regulated"], state["regulated_rate"], inputs["setpoint"])
-        flow: Flow = incoming - outgoing
-        return CircuitFlows((flow,), incoming, outgoing, {"regulated": moving, "regulated_rate": pushed})
+        (air,) = air_states
+        setpoint, setpoint_rate = state["lagged_setpoint"], state["lagged_setpoint_rate"]
+        error = absolute_pressure(setpoint, ambient) - air.pressure
+        inflow = orifice_flow(self.fill, inlet, air, proportional_opening(error, self.band))
+        outflow = orifice_flow(self.discharge, air, ambient_air(ambient), proportional_opening(-error, self.band))
+        first, second = self.lag.rates(setpoint, setpoint_rate, inputs["setpoint"])
+        rates = {"lagged_setpoint": first, "lagged_setpoint_rate": second}
+        return CircuitFlows((inflow - outflow,), inflow, outflow, rates)

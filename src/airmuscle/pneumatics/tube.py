@@ -1,4 +1,4 @@
-"""The tube between a valve and a muscle as volume and resistance, in one piece or many."""
+"""Lumped tube between valve and muscle: volume and flow resistance, in one or more segments."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ ECKERSTEN = Reference(
     "Simplified flow calculations for pneumatic components",
     "Atlas Copco, Stockholm; after P. Beater, Pneumatic Drives, Springer 2007",
     1975,
-    note="conductance and critical ratio of a tube; second hand, held against Darcy's law in the tests",
+    note="conductance and critical ratio of a tube; secondary source, compared with Darcy's law in the tests",
 )
-_ANY = Valve(1e-8, 0.3)
+_TEMPLATE_VALVE = Valve(1e-8, 0.3)
 
 
 @model
 class TubeOrifice(Orifice):
-    """The flow through a smooth tube, ends and all, as an orifice after ISO 6358.
+    """Flow through a smooth tube including end losses, as an orifice after ISO 6358.
 
         C = 0.029 D^2/sqrt(L/D^1.25 + 510),   b = 474 C/D^2
 
-    C in m3/(s Pa); D inner diameter, L length [m]. An empirical formula, in numbers that belong to these units.
-    Reference: Eckersten (1975), after Beater (2007).
+    C sonic conductance [m3/(s Pa)], b critical pressure ratio, D inner diameter [m], L length [m]. The formula is
+    empirical; its constants hold for these units. Reference: Eckersten (1975), after Beater (2007).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (ECKERSTEN,)
@@ -46,66 +46,68 @@ class TubeOrifice(Orifice):
 
     @property
     def conductance(self) -> Value:
-        """C [m3/(s Pa)]."""
+        """Sonic conductance C [m3/(s Pa)]."""
         return 0.029 * self.diameter**2 / ops.sqrt(self.length / self.diameter**1.25 + 510.0)
 
     @property
     def critical_ratio(self) -> Value:
-        """b [1]."""
+        """Critical pressure ratio b."""
         return 474.0 * self.conductance / self.diameter**2
 
     def mass_flow(self, upstream: Value, downstream: Value, opening: Value, temperature: Value) -> Value:
-        valve = unflatten(_ANY, (self.conductance, self.critical_ratio, _ANY.laminar_ratio))
+        valve = unflatten(_TEMPLATE_VALVE, (self.conductance, self.critical_ratio, _TEMPLATE_VALVE.laminar_ratio))
         return valve.mass_flow(upstream, downstream, opening, temperature)
 
 
 @model
 class Tube(TubeModel):
-    """A volume, and an orifice from it to the muscle; or `pieces` of them one after the other.
+    """Lumped tube: a volume with an orifice towards the muscle, divided into n segments in series.
 
-    `orifice` is the whole tube's. Each of n pieces has 1/n of the volume and sqrt(n) times the conductance, which is
-    exact for the flow law of a tube with friction, q^2 = C^2 (p_1^2 - p_2^2), that is for a critical ratio of 0, and
-    near equal pressures for any. It knows no inertia, so a step is felt at once at the other end, if weakly:
-    `DistributedTube` shows delay and resonance. The valve is at the volume.
+    `orifice` and `volume` describe the whole tube. Each of n segments has 1/n of the volume and sqrt(n) times the
+    conductance. This is exact for the flow law of a tube with friction, q^2 = C^2 (p_1^2 - p_2^2), which is a critical
+    ratio of 0, and for any critical ratio near equal pressures. The model has no inertia: a pressure step has an
+    immediate, though small, effect at the other end; `DistributedTube` describes delay and resonance. The valve feeds
+    the volume of the first segment.
     """
 
     orifice: Orifice
     volume: float = parameter("m3", "V_t", "volume of the tube", bounds=(1e-9, 1e-2))
-    pieces: int = 1
+    segment_count: int = 1
     gas: Gas = Isothermal()
 
     @classmethod
-    def of_size(cls, length: float, diameter: float, pieces: int = 1, gas: Gas = Isothermal()) -> Tube:
-        """The tube of a length and an inner diameter [m]: its volume, and the flow of a `TubeOrifice`."""
-        return cls(TubeOrifice(length, diameter), ops.pi / 4.0 * diameter**2 * length, pieces, gas)
+    def from_dimensions(cls, length: float, diameter: float, segment_count: int = 1, gas: Gas = Isothermal()) -> Tube:
+        """Tube of a length and an inner diameter [m], with the flow of a `TubeOrifice`."""
+        return cls(TubeOrifice(length, diameter), ops.pi / 4.0 * diameter**2 * length, segment_count, gas)
 
     def check(self) -> None:
-        check_segment_count("Tube", self.pieces)
+        check_segment_count("Tube", self.segment_count)
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        of_piece = self.gas.states(self.volume / self.pieces, ambient)
-        return tuple(state for name in self.names for state in add_prefix(name, of_piece))
+        segment = self.gas.states(self.volume / self.segment_count, ambient)
+        return tuple(state for prefix in self.prefixes for state in add_prefix(prefix, segment))
 
     def steady_state(self, air: Air, ambient: Ambient) -> dict[str, Value]:
-        content = self.gas.state_at(air.pressure, self.volume / self.pieces, ambient)
-        return {name: value for prefix in self.names for name, value in with_prefix(prefix, content).items()}
+        segment = self.gas.state_at(air.pressure, self.volume / self.segment_count, ambient)
+        return {name: value for prefix in self.prefixes for name, value in with_prefix(prefix, segment).items()}
 
     def air_states(self, state: Mapping[str, Value], ambient: Ambient) -> tuple[Air, ...]:
-        held = (select_prefix(name, state) for name in self.names)
-        return tuple(self.gas.air(content, self.volume / self.pieces, ambient) for content in held)
+        segments = (select_prefix(prefix, state) for prefix in self.prefixes)
+        return tuple(self.gas.air(segment, self.volume / self.segment_count, ambient) for segment in segments)
 
     def rates(
-        self, state: Mapping[str, Value], airs: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
+        self, state: Mapping[str, Value], air_states: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
     ) -> tuple[dict[str, Value], Flow]:
         rates: dict[str, Value] = {}
-        for name, air, after in zip(self.names, airs, (*airs[1:], muscle), strict=True):
-            onward = orifice_flow(self.orifice, air, after, self.pieces**0.5)
-            rates |= with_prefix(name, self.gas.rates(select_prefix(name, state), air, flow - onward, 0.0, ambient))
-            flow = onward
+        for prefix, air, downstream in zip(self.prefixes, air_states, (*air_states[1:], muscle), strict=True):
+            outflow = orifice_flow(self.orifice, air, downstream, self.segment_count**0.5)
+            segment = self.gas.rates(select_prefix(prefix, state), air, flow - outflow, 0.0, ambient)
+            rates |= with_prefix(prefix, segment)
+            flow = outflow
         return rates, flow
 
 
-def check_segment_count(owner: str, pieces: int) -> None:
-    """Raise ParameterError unless a tube is cut into 1 to 200 pieces."""
-    if isinstance(pieces, bool) or not (isinstance(pieces, int) and 1 <= pieces <= 200):
-        raise ParameterError(f"{owner}: pieces is {pieces!r}; give a whole number from 1 to 200.")
+def check_segment_count(owner: str, segment_count: int) -> None:
+    """Raise ParameterError unless the number of segments of a tube is an integer from 1 to 200."""
+    if isinstance(segment_count, bool) or not (isinstance(segment_count, int) and 1 <= segment_count <= 200):
+        raise ParameterError(f"{owner}: segment_count is {segment_count!r}; give an integer from 1 to 200.")

@@ -1,4 +1,4 @@
-"""What lies between a valve and a muscle, seen from both ends."""
+"""TubeModel (interface): the flow at both ends of a tube between valve and muscle."""
 
 from __future__ import annotations
 
@@ -13,34 +13,36 @@ from .gas import Air, Ambient, Flow
 
 
 class TubeModel(abc.ABC):
-    """A tube of one model or another. States are mappings by the names of `states`."""
+    """Tube between valve and muscle (interface). States are mappings from the names in `states` to values."""
 
     references: ClassVar[tuple[Reference, ...]] = ()
-    pieces: int
+    segment_count: int
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """What the names of each piece's states begin with, from the valve to the muscle."""
-        return ("tube.",) if self.pieces == 1 else tuple(f"tube{i}." for i in range(1, self.pieces + 1))
+    def prefixes(self) -> tuple[str, ...]:
+        """Prefixes of the state names of each segment, from valve to muscle."""
+        if self.segment_count == 1:
+            return ("tube.",)
+        return tuple(f"tube{i}." for i in range(1, self.segment_count + 1))
 
     @abc.abstractmethod
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        """What its pieces hold, and what flows in it where that is a state."""
+        """State variables of all segments."""
 
     @abc.abstractmethod
     def steady_state(self, air: Air, ambient: Ambient) -> dict[str, Value]:
-        """Its states at rest at the pressure of the muscle."""
+        """Steady state without flow at the pressure of the air in the muscle."""
 
     @abc.abstractmethod
     def air_states(self, state: Mapping[str, Value], ambient: Ambient) -> tuple[Air, ...]:
-        """The air in every piece, from the valve to the muscle."""
+        """Air state of each segment, from valve to muscle."""
 
     @abc.abstractmethod
     def rates(
-        self, state: Mapping[str, Value], airs: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
+        self, state: Mapping[str, Value], air_states: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
     ) -> tuple[dict[str, Value], Flow]:
-        """Rates of its states while `flow` comes in from the valve, and the flow into the muscle."""
+        """Time derivatives of the states for a flow from the valve, and the flow into the muscle."""
 
     def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
-        """Where a run, columns (N,) by its names, went beyond what its law describes: in words, by piece."""
+        """Warnings by segment prefix where a run left the validity range; `columns` are arrays (N,) by name."""
         return {}

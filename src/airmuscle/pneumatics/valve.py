@@ -1,4 +1,4 @@
-"""Flow of air through a valve after ISO 6358."""
+"""Valve flow after ISO 6358."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ ISO6358 = Reference(
     "Pneumatic fluid power: determination of flow-rate characteristics of components using compressible fluids",
     "ISO 6358-1",
     2013,
-    note="sonic conductance C, critical pressure ratio b; flow linear in the pressure difference near equal pressures",
+    note="sonic conductance C, critical pressure ratio b; linear in the pressure difference near equal pressures",
 )
 
 
 @model
 class Valve(Orifice):
-    """An on/off valve or orifice with sonic conductance C and critical pressure ratio b.
+    """Valve or orifice after ISO 6358, with sonic conductance C and critical pressure ratio b.
 
         qm = C rho0 p1 sqrt(T0/T1) phi,   phi = 1                                choked, p2/p1 <= b
                                           phi = sqrt(1 - ((p2/p1 - b)/(1 - b))^2)  subsonic
                                           phi = k (1 - p2/p1)                     laminar, p2/p1 > r
 
-    p1 the larger, p2 the smaller absolute pressure; the flow takes the sign of their difference. rho0, T0 the
-    reference atmosphere of ISO 8778. The laminar chord meets the subsonic law at r; it takes away the infinite
-    slope at equal pressures. Reference: ISO 6358-1; Hosovsky et al., equations cited as (2) and (6).
+    p1 larger, p2 smaller absolute pressure; the sign of the flow is that of their difference. rho0, T0 reference
+    atmosphere of ISO 8778. The laminar chord intersects the subsonic law at r and removes its infinite slope at equal
+    pressures. Reference: ISO 6358-1; Hošovský et al., equations cited as (2) and (6).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (ISO6358,)
@@ -45,19 +45,19 @@ class Valve(Orifice):
     def mass_flow(self, upstream: Value, downstream: Value, opening: Value, temperature: Value) -> Value:
         """Mass flow [kg/s] from absolute pressure `upstream` to `downstream` [Pa] of air at `temperature` [K].
 
-        `opening` scales the conductance, 0 shut to 1 fully open; the flow is negative when it reverses.
+        `opening` scales the conductance from 0 (closed) to 1 (fully open). A reversed flow is negative.
         """
         high, low = ops.maximum(upstream, downstream), ops.minimum(upstream, downstream)
-        beyond = ops.maximum(low - self.critical_ratio * high, 0.0) / (1.0 - self.critical_ratio)
-        # Both branches are concave in the difference, so the smaller is the chord near equal pressures and the
-        # ellipse elsewhere. The floor under the root (1 Pa) keeps its slope finite where the chord rules.
-        ellipse = ops.sqrt(ops.maximum(high**2 - beyond**2, 1.0))
+        subsonic = ops.maximum(low - self.critical_ratio * high, 0.0) / (1.0 - self.critical_ratio)
+        # Both branches are concave in the pressure difference, so the smaller one is the chord near equal pressures
+        # and the ellipse elsewhere. The lower bound of the square root (1 Pa) keeps its derivative finite.
+        ellipse = ops.sqrt(ops.maximum(high**2 - subsonic**2, 1.0))
         chord = self.laminar_slope() * (high - low)
         flow = ops.minimum(ellipse, chord)
         scale = self.conductance * REFERENCE_DENSITY * ops.sqrt(REFERENCE_TEMPERATURE / temperature)
         return opening * scale * ops.where(upstream >= downstream, flow, -flow)
 
     def laminar_slope(self) -> Value:
-        """k of the laminar chord [1]."""
-        beyond = (self.laminar_ratio - self.critical_ratio) / (1.0 - self.critical_ratio)
-        return ops.sqrt(1.0 - beyond**2) / (1.0 - self.laminar_ratio)
+        """Slope k of the laminar chord."""
+        subsonic = (self.laminar_ratio - self.critical_ratio) / (1.0 - self.critical_ratio)
+        return ops.sqrt(1.0 - subsonic**2) / (1.0 - self.laminar_ratio)

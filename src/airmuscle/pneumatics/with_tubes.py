@@ -1,4 +1,4 @@
-"""A circuit whose valves feed its muscles through tubes."""
+"""WithTubes: a circuit with a tube between its valves and each muscle."""
 
 from __future__ import annotations
 
@@ -9,56 +9,59 @@ from ..core.declaration import model
 from ..core.ops import Value
 from ..core.variables import StateVariable, add_prefix, select_prefix, with_prefix
 from .circuit import Circuit, CircuitFlows
-from .gas import Air, Ambient, gauge
-from .ports import port
+from .gas import Air, Ambient, gauge_pressure
+from .ports import port_prefix
 from .tube_model import TubeModel
 from .wrapper import CircuitWrapper
 
 
 @model
 class WithTubes(CircuitWrapper):
-    """A tube between a circuit's valves and each of its muscles.
+    """Circuit with a tube between its valves and each of its muscles.
 
-    `tube.pressure` is that in the tube; with several pieces `tube1.pressure`, ... from the valve on. Where one circuit
-    feeds several muscles, a plant calls each tube by its muscle, `left.tube.pressure`.
+    The output `tube.pressure` is the pressure in the tube; with several segments, `tube1.pressure`, ... are numbered
+    from the valve. If one circuit feeds several muscles, a plant prefixes each tube with the name of its muscle, as in
+    `left.tube.pressure`.
     """
 
     circuit: Circuit
     tube: TubeModel
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """What the names of each muscle's tube begin with."""
-        return ("",) if self.ports == 1 else tuple(port(i) for i in range(1, self.ports + 1))
+    def prefixes(self) -> tuple[str, ...]:
+        """Prefixes of the names of each muscle's tube."""
+        return ("",) if self.port_count == 1 else tuple(port_prefix(i) for i in range(1, self.port_count + 1))
 
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        of_tube = self.tube.states(ambient)
-        return (*self.circuit.own_states(ambient), *(s for name in self.names for s in add_prefix(name, of_tube)))
+        tube = self.tube.states(ambient)
+        return (*self.circuit.own_states(ambient), *(s for prefix in self.prefixes for s in add_prefix(prefix, tube)))
 
-    def own_settled(self, airs: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
-        found = self.circuit.own_settled(airs, ambient)
-        for name, air in zip(self.names, airs, strict=True):
-            found |= with_prefix(name, self.tube.steady_state(air, ambient))
-        return found
+    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        state = self.circuit.own_steady_state(air_states, ambient)
+        for prefix, air in zip(self.prefixes, air_states, strict=True):
+            state |= with_prefix(prefix, self.tube.steady_state(air, ambient))
+        return state
 
     def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
-        found = self.circuit.validity_warnings(columns, ambient)
-        for name in self.names:
-            found |= with_prefix(name, self.tube.validity_warnings(select_prefix(name, columns), ambient))
-        return found
+        warnings = self.circuit.validity_warnings(columns, ambient)
+        for prefix in self.prefixes:
+            warnings |= with_prefix(prefix, self.tube.validity_warnings(select_prefix(prefix, columns), ambient))
+        return warnings
 
     def supplied_flow(
-        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
-        held = [select_prefix(name, state) for name in self.names]
-        along = [self.tube.air_states(content, ambient) for content in held]
-        done = self.circuit.supplied_flow(inlet, tuple(pieces[0] for pieces in along), state, inputs, ambient)
-        rates, outputs, flows = dict(done.rates), dict(done.outputs), []
-        for name, content, pieces, flow, air in zip(self.names, held, along, done.flows, airs, strict=True):
-            of_tube, onward = self.tube.rates(content, pieces, flow, air, ambient)
-            rates |= with_prefix(name, of_tube)
-            for piece, inside in zip(self.tube.names, pieces, strict=True):
-                outputs[f"{name}{piece}pressure"] = gauge(inside.pressure, ambient)
-            flows.append(onward)
-        return CircuitFlows(tuple(flows), done.drawn, done.exhausted, rates, outputs)
+        tubes = [select_prefix(prefix, state) for prefix in self.prefixes]
+        in_tubes = [self.tube.air_states(tube, ambient) for tube in tubes]
+        inner = self.circuit.supplied_flow(inlet, tuple(segments[0] for segments in in_tubes), state, inputs, ambient)
+        rates, outputs, flows = dict(inner.rates), dict(inner.outputs), []
+        for prefix, tube, segments, inflow, air in zip(
+            self.prefixes, tubes, in_tubes, inner.flows, air_states, strict=True
+        ):
+            tube_rates, outflow = self.tube.rates(tube, segments, inflow, air, ambient)
+            rates |= with_prefix(prefix, tube_rates)
+            for segment, in_segment in zip(self.tube.prefixes, segments, strict=True):
+                outputs[f"{prefix}{segment}pressure"] = gauge_pressure(in_segment.pressure, ambient)
+            flows.append(outflow)
+        return CircuitFlows(tuple(flows), inner.drawn, inner.exhausted, rates, outputs)

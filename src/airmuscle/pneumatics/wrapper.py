@@ -1,4 +1,4 @@
-"""What stands between a circuit and its muscles is a circuit too, with the same supply, muscles and inputs."""
+"""CircuitWrapper: base class of wrappers of a circuit."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from .supply import AirSource
 
 
 class CircuitWrapper(Circuit, abc.ABC):
-    """A circuit around another one."""
+    """Wrapper between a circuit and its muscles; supply, ports and inputs are those of the inner circuit."""
 
     circuit: Circuit
 
     @property
-    def supply(self) -> AirSource:  # type: ignore[override]  # the circuit's own
+    def supply(self) -> AirSource:  # type: ignore[override]  # forwarded, not stored
         return self.circuit.supply
 
     @property
-    def ports(self) -> int:
-        return self.circuit.ports
+    def port_count(self) -> int:
+        return self.circuit.port_count
 
     def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
         return self.circuit.validity_warnings(columns, ambient)

@@ -1,12 +1,12 @@
-"""One run, measured or simulated: the same type, so that the two always compare."""
+"""Recordings: measured and simulated runs in one type, and their readers and writers."""
 
 from .columns import QUANTITIES, Quantity
 from .csv_reader import read_csv
 from .csv_writer import write_csv
+from .downsampling import BlockMeans, Decimation
 from .mapping import ColumnMapping
 from .reader import read
 from .recording import Recording
-from .thinning import BlockMeans, Decimation
 
 __all__ = [
     "QUANTITIES",

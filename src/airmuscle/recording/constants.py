@@ -1,4 +1,4 @@
-"""What does not change in a run: stated by the user, by a comment of the file, or by a column of one value."""
+"""Constants of a run, given by the user, by a comment in the file, or by a column with a single value."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from ..core.errors import ColumnError
 from ..core.units import conversion, quantity
 from .table import RawTable
 
-UNITS = {"resting_length": "m", "ambient": "Pa"}
-"""The SI unit of the constants that have one."""
+CONSTANT_UNITS = {"resting_length": "m", "ambient": "Pa"}
+"""The SI units of the constants that have a unit."""
 _NAMES = {
     "resting_length": ("resting_length", "rest_length", "initial_length", "original_length", "l0", "l_0", "ruhelänge"),
     "ambient": ("ambient", "ambient_pressure", "atmospheric_pressure", "barometer"),
@@ -25,47 +25,52 @@ _WITH_UNIT = re.compile(
 )
 
 
-def constant_name(text: str) -> tuple[str, str] | None:
-    """The constant that a heading names, and its unit or ''; None where it names none."""
-    found = _WITH_UNIT.fullmatch(text.strip())
-    name, unit = (found["name"], found["square"] or found["round"] or found["loose"] or "") if found else (text, "")
+def parse_constant_name(text: str) -> tuple[str, str] | None:
+    """Name and unit ('' if not stated) of the constant in a heading; None if it names no constant."""
+    match = _WITH_UNIT.fullmatch(text.strip())
+    name, unit = (match["name"], match["square"] or match["round"] or match["loose"] or "") if match else (text, "")
     for constant, names in _NAMES.items():
         if re.sub(r"[\s-]+", "_", name.strip()).lower() in names:
             return constant, unit
     return None
 
 
-def stated_constants(table: RawTable, given: Mapping[str, float | str]) -> dict[str, Any]:
-    """The constants of a run in SI: the file's comments, then what the user gives."""
-    found: dict[str, Any] = {}
-    for text, value in {**table.remarks, **given}.items():
-        named = constant_name(text)
-        if named and named[1] and not isinstance(value, str):
-            value = f"{value!r} {named[1]}"
-        found[named[0] if named else text] = value
-    for name, unit in UNITS.items():
-        if name in found:
-            found[name] = quantity(found[name], unit, ambient=0.0, where=f"{table.origin}: {name}")
-            if not found[name] > 0:
-                raise ColumnError(f"{table.origin}: {name} is {found[name]:g} {unit}; it must be greater than zero.")
-    return found
+def collect_constants(table: RawTable, user_constants: Mapping[str, float | str]) -> dict[str, Any]:
+    """The constants of a run in SI units; those given by the user override those in the comments of the file.
 
-
-def constant_of_column(table: RawTable, heading: str, unit: str | None, values: Array) -> tuple[str, float] | None:
-    """The constant that a column states by holding it in every row; None where the heading names none.
-
-    Raises ColumnError where the column changes: then it is no constant of one run.
+    Raises ColumnError or UnitError.
     """
-    named = constant_name(heading)
-    if named is None:
+    constants: dict[str, Any] = {}
+    for text, value in {**table.constants, **user_constants}.items():
+        parsed = parse_constant_name(text)
+        if parsed and parsed[1] and not isinstance(value, str):
+            value = f"{value!r} {parsed[1]}"
+        constants[parsed[0] if parsed else text] = value
+    for name, unit in CONSTANT_UNITS.items():
+        if name in constants:
+            constants[name] = quantity(constants[name], unit, ambient=0.0, where=f"{table.origin}: {name}")
+            if not constants[name] > 0:
+                raise ColumnError(f"{table.origin}: {name} is {constants[name]:g} {unit}; it must be positive.")
+    return constants
+
+
+def constant_from_column(table: RawTable, heading: str, unit: str | None, values: Array) -> tuple[str, float] | None:
+    """Name and SI value of the constant that a column states in every row; None if the heading names no constant.
+
+    Raises ColumnError if the values differ between rows.
+    """
+    parsed = parse_constant_name(heading)
+    if parsed is None:
         return None
-    name, own_unit = named
-    change = conversion(unit or own_unit or UNITS[name], UNITS[name], ambient=0.0, where=f"{table.origin}: {heading}")
+    name, own_unit = parsed
+    change = conversion(
+        unit or own_unit or CONSTANT_UNITS[name], CONSTANT_UNITS[name], ambient=0.0, where=f"{table.origin}: {heading}"
+    )
     first = float(values[0])
     if not np.allclose(values, first, rtol=1e-9, atol=0.0):
         row = int(np.argmax(~np.isclose(values, first, rtol=1e-9, atol=0.0)))
         raise ColumnError(
-            f"{table.place(row)}: {heading} changes from {first:g} to {values[row]:g}, but it is one number of a run. "
-            "Put the specimens into a file each."
+            f"{table.location(row)}: {heading} changes from {first:g} to {values[row]:g}, but must be constant "
+            "within a run. Write each specimen to a separate file."
         )
     return name, float(change(first))

@@ -1,4 +1,4 @@
-"""Reading a bench file that is text: `read_csv`."""
+"""Reader of a text table: `read_csv`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from .interpret import interpret
-from .raw_csv import raw_csv
+from .raw_csv import read_csv_table
 from .recording import Recording
 
 
@@ -18,17 +18,17 @@ def read_csv(
     ambient: float | str | None = None,
     specimen: str | None = None,
 ) -> Recording:
-    """A bench file as a Recording in SI units.
+    """Read one text file as a Recording in SI units.
 
-    Headings name each column with its unit (`pressure [kPa]`, `p / bara`, `length_mm`) or a row of units follows
-    them; `units` gives those that the file does not state, by quantity or heading. Delimiter (comma, semicolon,
-    tab), decimal comma, encoding and comment lines (#, %) are recognised. `resting_length` L0 (metres, or text
-    such as "300 mm") turns length into contraction; `ambient` is the absolute pressure (pascal, or text) that
-    absolute pressures are reduced by, 101.325 kPa unless the file says otherwise. A comment such as
-    `# resting_length [mm] = 300` states the same in the file.
+    Each column heading states the unit (`pressure [kPa]`, `p / bara`, `length_mm`), or a row of units follows the
+    headings; `units` gives the units that the file does not state, by quantity or heading. Delimiter (comma,
+    semicolon, tab), decimal comma, encoding and comment lines (#, %) are detected. `resting_length` L0 [m], or a text
+    such as "300 mm", allows conversion between length and contraction. `ambient` is the ambient pressure [Pa], or a
+    text, subtracted from absolute pressures; the default is 101.325 kPa unless the file states another value. A
+    comment such as `# resting_length [mm] = 300` in the file has the same effect.
 
-    Raises FileError, ColumnError or UnitError with file, line, value and remedy.
+    Raises FileError, ColumnError or UnitError; the message names file, line, value and remedy.
     """
-    given = {"resting_length": resting_length, "ambient": ambient, "specimen": specimen}
-    stated = {name: value for name, value in given.items() if value is not None}
-    return interpret(raw_csv(path), units=units or {}, constants=stated)
+    arguments = {"resting_length": resting_length, "ambient": ambient, "specimen": specimen}
+    constants = {name: value for name, value in arguments.items() if value is not None}
+    return interpret(read_csv_table(path), units=units or {}, constants=constants)

@@ -1,4 +1,4 @@
-"""Writing a Recording so that reading it again gives the same numbers to the last digit."""
+"""Writer of a Recording as CSV; reading the file again returns bit-identical numbers."""
 
 from __future__ import annotations
 
@@ -9,44 +9,46 @@ from pathlib import Path
 from typing import TextIO
 
 from ..core.errors import FileError, ParameterError
-from .recording import Recording, header
-
-_UNITS = {"resting_length": "m", "ambient": "Pa"}
+from .constants import CONSTANT_UNITS
+from .recording import Recording, column_heading
 
 
 def write_csv(recording: Recording, path: str | Path) -> Path:
-    """Write a recording in SI units; headings carry the units, comments above them origin, constants and notes.
+    """Write a recording in SI units and return the path.
 
-    The file appears whole or not at all, and an older one stays until then. Raises FileError.
+    The column headings state the units; comments above them state origin, constants and notes. The file is replaced
+    atomically: an existing file remains unchanged if writing fails. Raises FileError or ParameterError.
     """
     if not isinstance(recording, Recording):
-        raise ParameterError(f"write_csv: {str(recording)[:80]} is no Recording, as simulate and read_csv return it.")
+        raise ParameterError(
+            f"write_csv: {str(recording)[:80]} is not a Recording. Pass the result of simulate, read or read_csv."
+        )
     if not isinstance(path, str | Path):
-        raise FileError(f"write_csv: {path!r} is no path; name a file.")
+        raise FileError(f"write_csv: {path!r} is not a path. Pass the name of a file.")
     path = Path(path)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        with unfinished.open("w", encoding="utf-8", newline="") as file:
+        with temporary.open("w", encoding="utf-8", newline="") as file:
             _write(recording, file)
-        unfinished.replace(path)
+        temporary.replace(path)
     except OSError as reason:
         raise FileError(
-            f"{path}: cannot be written ({reason.strerror or reason}). Choose a folder that exists and is open to you."
+            f"{path}: cannot be written ({reason.strerror or reason}). Choose an existing folder with write permission."
         ) from None
     finally:
-        _discard(unfinished)
+        _discard(temporary)
     return path
 
 
 def _write(recording: Recording, file: TextIO) -> None:
     file.write(f"# {_one_line(recording.origin)}\n")
     for name, value in recording.constants.items():
-        unit = f" [{_UNITS[name]}]" if name in _UNITS else ""
+        unit = f" [{CONSTANT_UNITS[name]}]" if name in CONSTANT_UNITS else ""
         file.write(f"# {name}{unit} = {json.dumps(value, ensure_ascii=False)}\n")
     for note in recording.notes:
         file.write(f"# Note: {_one_line(note)}\n")
     table = csv.writer(file, lineterminator="\n")
-    table.writerow([header(name) for name in recording])
+    table.writerow([column_heading(name) for name in recording])
     table.writerows(zip(*(recording[name].tolist() for name in recording), strict=True))
 
 
@@ -54,8 +56,8 @@ def _one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-def _discard(unfinished: Path) -> None:
+def _discard(temporary: Path) -> None:
     try:
-        unfinished.unlink()
+        temporary.unlink()
     except OSError:
-        return  # it was renamed, or never begun
+        return  # already renamed, or never created

@@ -1,4 +1,4 @@
-"""What the heading of a column says: which quantity it is, and in which unit it was written."""
+"""Column headings: quantity and unit."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 from .columns import QUANTITIES
 
-# Letters that mean something else in the other case are told apart; every other name is not.
-_LETTERS = {"t": "time", "T": "temperature", "v": "speed", "V": "volume"}
+# Only these single letters are case-sensitive.
+_CASE_SENSITIVE = {"t": "time", "T": "temperature", "v": "speed", "V": "volume"}
 _SYNONYMS = {
     "p": "pressure", "druck": "pressure", "gauge_pressure": "pressure",
     "f": "force", "load": "force", "tension": "force", "kraft": "force", "weight": "force",
@@ -21,7 +21,7 @@ _SYNONYMS = {
     **{name: name for name in QUANTITIES},
 }  # fmt: skip
 
-SPELLINGS: dict[str, tuple[str, ...]] = {
+UNIT_SPELLINGS: dict[str, tuple[str, ...]] = {
     "Pa": (
         "Pa", "kPa", "MPa", "bar", "mbar", "psi", "bara", "barg", "kPa(a)", "kPa(g)", "kPaa", "kPag", "psia", "psig",
         "bar(a)", "bar(g)", "Pa(a)", "Pa(g)",
@@ -30,9 +30,9 @@ SPELLINGS: dict[str, tuple[str, ...]] = {
     "m/s^2": ("m/s^2", "m/s2"), "m3": ("m3", "cm3"), "kg": ("kg", "g"), "kg/s": ("kg/s", "g/s"), "K": ("K", "°C"),
     "rad": ("rad", "deg"), "rad/s": ("rad/s", "deg/s"), "rad/s^2": ("rad/s^2", "deg/s^2"),
 }  # fmt: skip
-"""How units of each kind are usually written: what messages suggest, and what counts in `pressure_kPa`."""
+"""Usual spellings of the units of each quantity, used in suggestions and to recognise a suffix as in `pressure_kPa`."""
 
-_MARKED = tuple(
+_MARKED_FORMS = tuple(
     re.compile(pattern)
     for pattern in (
         r"(?P<name>.*?)\s*\[(?P<unit>.*)\]",
@@ -40,12 +40,12 @@ _MARKED = tuple(
         r"(?P<name>.+?)\s*/\s*(?P<unit>.+)",
     )
 )
-_LOOSE = re.compile(r"(?P<name>.+)[_\s](?P<unit>\S+)")
+_SUFFIX_FORM = re.compile(r"(?P<name>.+)[_\s](?P<unit>\S+)")
 
 
 @dataclasses.dataclass(frozen=True)
 class Heading:
-    """A heading taken apart. `name` is a quantity's, or the whole text where no quantity is known by it."""
+    """A parsed heading. `name` is the name of a known quantity, or the whole text if the quantity is unknown."""
 
     text: str
     name: str
@@ -54,40 +54,40 @@ class Heading:
 
     @property
     def target(self) -> str | None:
-        """The SI unit of the quantity; None where it is not known."""
+        """The SI unit of the quantity; None if the quantity is unknown."""
         return QUANTITIES[self.name.rpartition(".")[2]].unit if self.known else None
 
 
-def known_name(text: str) -> str | None:
-    """The quantity meant by a name or a synonym in any case; `left.p` is `left.pressure`."""
+def find_quantity_name(text: str) -> str | None:
+    """The quantity of a name or synonym in upper or lower case (`left.p` gives `left.pressure`); None if unknown."""
     prefix, dot, last = text.strip().rpartition(".")
-    found = _LETTERS.get(last) or _SYNONYMS.get(re.sub(r"[\s-]+", "_", last.strip()).lower())
-    return prefix + dot + found if found else None
+    name = _CASE_SENSITIVE.get(last) or _SYNONYMS.get(re.sub(r"[\s-]+", "_", last.strip()).lower())
+    return prefix + dot + name if name else None
 
 
-def read_heading(text: str) -> Heading:
-    """`pressure [kPa]`, `pressure (kPa)`, `pressure_kPa`, `Pressure / kPa` and `p` say that it is the pressure."""
+def parse_heading(text: str) -> Heading:
+    """Parse a heading: `pressure [kPa]`, `pressure (kPa)`, `pressure_kPa`, `Pressure / kPa` or `p`."""
     text = text.strip()
-    for name, unit in _splits(text):
+    for name, unit in _candidate_splits(text):
         return Heading(text, name, unit.strip(), True)
-    known = known_name(text)
-    return Heading(text, known or text, None, known is not None)
+    name_only = find_quantity_name(text)
+    return Heading(text, name_only or text, None, name_only is not None)
 
 
-def _splits(text: str) -> Iterator[tuple[str, str]]:
-    """Quantity and unit, where a heading holds both; after a mere blank or _ it must be a usual unit."""
-    for form in _MARKED:
-        found = form.fullmatch(text)
-        name = known_name(found["name"]) if found else None
-        if found and name:
-            yield name, found["unit"]
-    found = _LOOSE.fullmatch(text)
-    name = known_name(found["name"]) if found else None
-    if found and name and found["unit"] in SPELLINGS[QUANTITIES[name.rpartition(".")[2]].unit]:
-        yield name, found["unit"]
+def _candidate_splits(text: str) -> Iterator[tuple[str, str]]:
+    """Quantity and unit of a heading that states both; after a blank or underscore only a usual unit is accepted."""
+    for form in _MARKED_FORMS:
+        match = form.fullmatch(text)
+        name = find_quantity_name(match["name"]) if match else None
+        if match and name:
+            yield name, match["unit"]
+    match = _SUFFIX_FORM.fullmatch(text)
+    name = find_quantity_name(match["name"]) if match else None
+    if match and name and match["unit"] in UNIT_SPELLINGS[QUANTITIES[name.rpartition(".")[2]].unit]:
+        yield name, match["unit"]
 
 
-def stated_unit(text: str) -> tuple[str, str | None]:
-    """Name and unit of a heading whose quantity is not known, `height [mm]`; no unit where it states none."""
-    found = next((found for form in _MARKED if (found := form.fullmatch(text.strip()))), None)
-    return (found["name"].strip(), found["unit"].strip()) if found else (text.strip(), None)
+def split_unit(text: str) -> tuple[str, str | None]:
+    """Name and unit of a heading with an unknown quantity, such as `height [mm]`; the unit is None if not stated."""
+    match = next((match for form in _MARKED_FORMS if (match := form.fullmatch(text.strip()))), None)
+    return (match["name"].strip(), match["unit"].strip()) if match else (text.strip(), None)

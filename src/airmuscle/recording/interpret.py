@@ -1,6 +1,6 @@
-"""From a table of headings and cells, whatever file it came from, to a Recording in SI units.
+"""Conversion of a raw table, from any file format, into a Recording in SI units.
 
-Here gauge is told from absolute, units are converted, and what cannot have been measured is refused.
+Units are converted, absolute pressures become gauge pressures, and implausible values are rejected.
 """
 
 from __future__ import annotations
@@ -11,143 +11,146 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..core.arrays import Array
+from ..core.constants import STANDARD_GRAVITY
 from ..core.errors import ColumnError, UnitError, suggestion
 from ..core.units import AMBIENT_PRESSURE, UnitConversion, conversion
 from .clock import seconds_from_clock
 from .columns import QUANTITIES
-from .constants import constant_of_column, stated_constants
-from .heading import SPELLINGS, Heading, known_name, read_heading
-from .plausible import check_plausible
+from .constants import collect_constants, constant_from_column
+from .heading import UNIT_SPELLINGS, Heading, find_quantity_name, parse_heading
+from .plausibility import check_plausible
 from .recording import Recording
 from .table import Cells, RawTable
-
-STANDARD_GRAVITY = 9.80665
-"""What makes a load in kg a force [m/s2] (ISO 80000-3)."""
 
 
 def interpret(
     table: RawTable, *, units: Mapping[str, str], constants: Mapping[str, float | str], ordered: bool = True
 ) -> Recording:
-    """The Recording that a table holds; `units` and `constants` given by the user go before the file's own.
+    """Convert a table to a Recording; `units` and `constants` given by the user override those of the file.
 
-    Time that repeats or runs backwards is refused, unless `ordered` is false.
-    Raises ColumnError or UnitError with file, row, value and remedy.
+    Time that does not increase is rejected unless `ordered` is false.
+    Raises ColumnError or UnitError; the message names file, row, value and remedy.
     """
-    found = stated_constants(table, constants)
-    headings = _headings(table, units)
+    run_constants = collect_constants(table, constants)
+    headings = _resolve_headings(table, units)
     for heading, cells in zip(headings, table.columns, strict=True):
         if not heading.known and not isinstance(cells, list):
-            stated = constant_of_column(table, heading.text, heading.unit, cells)
-            found = {stated[0]: stated[1], **found} if stated else found
-    ambient = float(found.get("ambient", AMBIENT_PRESSURE))
+            constant = constant_from_column(table, heading.text, heading.unit, cells)
+            run_constants = {constant[0]: constant[1], **run_constants} if constant else run_constants
+    ambient = float(run_constants.get("ambient", AMBIENT_PRESSURE))
     columns: dict[str, Array] = {}
-    notes: list[str] = [*table.notes, *_overruled(table, headings)]
+    notes: list[str] = [*table.notes, *_override_notes(table, headings)]
     for heading, cells in zip(headings, table.columns, strict=True):
         if heading.known:
-            columns[heading.name], note = _in_si(table, heading, cells, ambient)
+            columns[heading.name], note = _convert_column(table, heading, cells, ambient)
         else:
-            note = _kept(table, heading, cells, columns)
+            note = _keep_unknown_column(table, heading, cells, columns)
         notes += [note] if note and note not in notes else []
-    check_plausible(table, columns, found.get("resting_length"), ambient, ordered=ordered)
+    check_plausible(table, columns, run_constants.get("resting_length"), ambient, ordered=ordered)
     written = {h.name: h.unit for h in headings if h.known and h.unit}
-    return Recording(columns, table.origin, found, tuple(notes), written)
+    return Recording(columns, table.origin, run_constants, tuple(notes), written)
 
 
-def _headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
-    """The headings with their units: the user's, the unit row's or their own, in this order."""
-    read = [read_heading(text) for text in table.headings]
-    stated = {known_name(key) or key: unit for key, unit in units.items()}
-    keys = [key for heading in read for key in (heading.name, heading.text)]
-    for key in stated:
+def _resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
+    """The headings with their units, from the user, the unit row or the heading itself, in this order of precedence."""
+    parsed = [parse_heading(text) for text in table.headings]
+    user_units = {find_quantity_name(key) or key: unit for key, unit in units.items()}
+    keys = [key for heading in parsed for key in (heading.name, heading.text)]
+    for key in user_units:
         if key not in keys:
-            known = [heading.name for heading in read]
-            there = f"there are {', '.join(known)}.{suggestion(key, known)}"
-            raise ColumnError(f"{table.origin}: a unit is given for '{key}', but {there}")
+            names = [heading.name for heading in parsed]
+            raise ColumnError(
+                f"{table.origin}: a unit is given for '{key}', but the columns are {', '.join(names)}."
+                f"{suggestion(key, names)}"
+            )
     row = table.units or ()
-    found = [
-        Heading(h.text, h.name, stated.get(h.name, stated.get(h.text)) or below or h.unit, h.known)
-        for h, below in zip(read, [*row, *[""] * (len(read) - len(row))], strict=False)
+    headings = [
+        Heading(h.text, h.name, user_units.get(h.name, user_units.get(h.text)) or below or h.unit, h.known)
+        for h, below in zip(parsed, [*row, *[""] * (len(parsed) - len(row))], strict=False)
     ]
-    _check_unique(table, found)
-    if not any(heading.known for heading in found):
-        _check_any(table, found)
-    return found
+    _check_unique(table, headings)
+    if not any(heading.known for heading in headings):
+        raise _no_known_column(table, headings)
+    return headings
 
 
-def _overruled(table: RawTable, headings: list[Heading]) -> list[str]:
-    """A word on every column whose own unit gave way to the one that the user stated."""
+def _override_notes(table: RawTable, headings: list[Heading]) -> list[str]:
+    """One note for each column whose unit in the file was overridden by the user."""
     row = [*(table.units or ()), *[""] * len(headings)]
-    own = [below or read_heading(h.text).unit for h, below in zip(headings, row, strict=False)]
+    own = [below or parse_heading(h.text).unit for h, below in zip(headings, row, strict=False)]
     return [
-        f"{h.name} is taken in {h.unit}, as stated, although the file says {unit}"
+        f"The {h.name} is read in {h.unit}, as specified by the user; the file states {unit}."
         for h, unit in zip(headings, own, strict=True)
         if unit and h.unit and unit != h.unit
     ]
 
 
 def _check_unique(table: RawTable, headings: list[Heading]) -> None:
-    seen: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for heading in headings:
-        if heading.name in seen and heading.text:
+        if heading.name in texts and heading.text:
             raise ColumnError(
-                f"{table.origin}: columns '{seen[heading.name]}' and '{heading.text}' both hold the {heading.name}. "
-                f"Rename or delete one; of several muscles, write 'left.{heading.name}' and 'right.{heading.name}'."
+                f"{table.origin}: columns '{texts[heading.name]}' and '{heading.text}' both contain the "
+                f"{heading.name}. Rename or delete one of them; for several muscles, write 'left.{heading.name}' and "
+                f"'right.{heading.name}'."
             )
-        seen[heading.name] = heading.text
+        texts[heading.name] = heading.text
 
 
-def _check_any(table: RawTable, headings: list[Heading]) -> None:
+def _no_known_column(table: RawTable, headings: list[Heading]) -> ColumnError:
     names = [heading.text for heading in headings]
     near = [n for name in names for n in difflib.get_close_matches(name.lower(), QUANTITIES, n=1)]
     hint = f" Did you mean '{near[0]}'?" if near else ""
-    raise ColumnError(
-        f"{table.origin}: none of the columns ({', '.join(names)}) is known; known are {', '.join(QUANTITIES)}.{hint}"
+    return ColumnError(
+        f"{table.origin}: no column is a known quantity ({', '.join(names)}); known quantities are "
+        f"{', '.join(QUANTITIES)}.{hint}"
     )
 
 
-def _in_si(table: RawTable, heading: Heading, cells: Cells, ambient: float) -> tuple[Array, str]:
-    """A known column in SI units, and a note where its unit left something open."""
+def _convert_column(table: RawTable, heading: Heading, cells: Cells, ambient: float) -> tuple[Array, str]:
+    """A known column in SI units, and a note on any assumption about its unit."""
     if heading.name == "time" and isinstance(cells, list):
         seconds = seconds_from_clock(cells)
         if seconds is not None:
-            return seconds, f"The time is read from a clock and counted from its first instant, {cells[0]}."
+            return seconds, f"The time column contains clock times; time is counted from the first, {cells[0]}."
     change = _conversion(table, heading, ambient)
-    values = _numbers(table, heading, cells)
+    values = _parse_numbers(table, heading, cells)
     if change.assumed_gauge:
-        said = f"unit '{heading.unit}' does not say; write bara or kPa(a) if it is absolute."
-        return change(values), f"The {heading.name} is taken as gauge: its {said}"
+        reason = f"the unit '{heading.unit}' does not state it. Write bara or kPa(a) for an absolute pressure."
+        return change(values), f"The {heading.name} is read as gauge: {reason}"
     if heading.unit is None:
-        return values, f"The {heading.name} has no unit and is taken as a ratio."
+        return values, f"The {heading.name} has no unit and is read as a ratio."
     if heading.target == "N" and _is_mass(heading.unit):
-        said = f"stated in {heading.unit}; it is taken as a weight under standard gravity, {STANDARD_GRAVITY} m/s2."
-        return change(values), f"The {heading.name} is {said}"
+        assumption = f"stated in {heading.unit} and converted with standard gravity, {STANDARD_GRAVITY} m/s2."
+        return change(values), f"The {heading.name} is {assumption}"
     return change(values), ""
 
 
 def _conversion(table: RawTable, heading: Heading, ambient: float) -> UnitConversion:
     target = heading.target or "1"
     where = f"{table.origin}, column '{heading.text}'"
-    usual = ", ".join(SPELLINGS[target])
+    usual = ", ".join(UNIT_SPELLINGS[target])
     if heading.unit is None:
         if target == "1":
             return UnitConversion(1.0)
+        example = f"{heading.name} [{UNIT_SPELLINGS[target][1 % len(UNIT_SPELLINGS[target])]}]"
         raise UnitError(
-            f"{where}: no unit is stated. Head it '{heading.name} [{SPELLINGS[target][1 % len(SPELLINGS[target])]}]' "
-            f"or give units={{'{heading.name}': ...}}; usual are {usual}."
+            f"{where}: no unit is stated. Rename the column header to '{example}', or pass "
+            f"units={{'{heading.name}': ...}}; usual units are {usual}."
         )
     try:
         if target == "N" and _is_mass(heading.unit):
             return UnitConversion(conversion(heading.unit, "kg").factor * STANDARD_GRAVITY)
         return conversion(heading.unit, target, ambient=ambient, where=where)
     except UnitError as reason:
-        cases = {spelling.lower(): spelling for spelling in SPELLINGS[target]}
+        cases = {spelling.lower(): spelling for spelling in UNIT_SPELLINGS[target]}
         near = difflib.get_close_matches(heading.unit.lower(), cases, n=1)
-        hint = f" Did you mean '{cases[near[0]]}'?" if near else f" The {heading.name} is usually in {usual}."
+        hint = f" Did you mean '{cases[near[0]]}'?" if near else f" Usual units of the {heading.name} are {usual}."
         raise UnitError(f"{reason}{hint}") from None
 
 
 def _is_mass(unit: str) -> bool:
-    if unit in SPELLINGS["N"]:
+    if unit in UNIT_SPELLINGS["N"]:
         return False
     try:
         return bool(conversion(unit, "kg"))
@@ -155,38 +158,39 @@ def _is_mass(unit: str) -> bool:
         return False
 
 
-def _numbers(table: RawTable, heading: Heading, cells: Cells) -> Array:
-    """The cells as numbers. Raises ColumnError at the first that is none, or not finite."""
+def _parse_numbers(table: RawTable, heading: Heading, cells: Cells) -> Array:
+    """The cells as numbers. Raises ColumnError at the first cell that is not a finite number."""
     if isinstance(cells, list):
         for row, cell in enumerate(cells):
             try:
                 float(cell)
             except ValueError:
-                said = f"'{cell}' is not a number" if cell else "has an empty cell"
+                problem = f"'{cell}' is not a number" if cell else "has an empty cell"
                 raise ColumnError(
-                    f"{table.place(row)}: {heading.name} {said}. Correct the cell or delete the {table.row_word}."
+                    f"{table.location(row)}: {heading.name} {problem}. Correct the cell or delete the "
+                    f"{table.row_label}."
                 ) from None
     values = np.array(cells, dtype=float)
     bad = ~np.isfinite(values)
     if bad.any():
         row = int(np.argmax(bad))
         raise ColumnError(
-            f"{table.place(row)}: {heading.name} is {values[row]}, which no sensor measures (the column has "
-            f"{np.count_nonzero(bad)} such cells). Delete the {table.row_word}, or fill the gap before reading."
+            f"{table.location(row)}: {heading.name} is {values[row]}; it must be finite (non-finite cells in the "
+            f"column: {np.count_nonzero(bad)}). Delete the {table.row_label}, or fill the gap before reading."
         )
     return values
 
 
-def _kept(table: RawTable, heading: Heading, cells: Cells, columns: dict[str, Array]) -> str:
-    """Keep an unknown column as it is where it holds numbers; the note on it, if any."""
+def _keep_unknown_column(table: RawTable, heading: Heading, cells: Cells, columns: dict[str, Array]) -> str:
+    """Keep an unknown numeric column without conversion, and return the note on the column, if any."""
     if isinstance(cells, list):
         if not any(cells):
             return ""
-        return f"Column '{heading.text}' holds text and is left out."
-    stated = constant_of_column(table, heading.text, heading.unit, cells)
-    if stated:
-        return f"Column '{heading.text}' holds one value and states the {stated[0]}: {stated[1]:.9g} (SI)."
+        return f"Column '{heading.text}' contains text and is ignored."
+    constant = constant_from_column(table, heading.text, heading.unit, cells)
+    if constant:
+        return f"Column '{heading.text}' is constant and states the {constant[0]}: {constant[1]:.4g} (SI)."
     columns[heading.text or "unnamed"] = cells
     near = difflib.get_close_matches(heading.text.partition(" ")[0].lower(), QUANTITIES, n=1)
     hint = f" Did you mean '{near[0]}'?" if near else ""
-    return f"Column '{heading.text}' is no known quantity and is kept as it is, without conversion.{hint}"
+    return f"Column '{heading.text}' is not a known quantity and is kept without conversion.{hint}"

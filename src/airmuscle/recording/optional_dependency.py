@@ -1,4 +1,4 @@
-"""The packages that read the file formats of laboratories; they come with the extra `lab`."""
+"""Optional packages that read laboratory file formats; the extra `lab` installs them."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any, TypeVar
 
 from ..core.errors import AirmuscleError, FileError
 
-Read = TypeVar("Read")
+Result = TypeVar("Result")
 
 
-def lab_package(name: str, path: Path) -> Any:
-    """The package by its name. Raises FileError with what to install where it is missing."""
+def import_lab_package(name: str, path: Path) -> Any:
+    """Import a package by its name. Raises FileError with the install command if it is missing."""
     try:
         return importlib.import_module(name)
     except ImportError:
@@ -22,16 +22,17 @@ def lab_package(name: str, path: Path) -> Any:
         ) from None
 
 
-def import_optional(path: Path, what: str, read: Callable[[], Read]) -> Read:
-    """What `read` makes of a file; whatever these packages raise becomes one FileError that names the file."""
+def run_reader(path: Path, format_name: str, read: Callable[[], Result]) -> Result:
+    """Call `read` and return its result; any exception of the package becomes a FileError that names the file."""
     if not path.is_file():
         raise FileError(f"{path}: cannot be read (there is no such file). Check the name and the folder.")
     try:
         return read()
     except AirmuscleError:
         raise
-    except Exception as reason:  # each package raises kinds of its own on a damaged file
-        said = " ".join(str(reason).split())[:120] or type(reason).__name__
+    except Exception as reason:  # each package raises its own exceptions for a damaged file
+        detail = " ".join(str(reason).split())[:120] or type(reason).__name__
         raise FileError(
-            f"{path.name}: cannot be read as {what} ({said}). Is the file complete, and its ending right?"
+            f"{path.name}: cannot be read as {format_name} ({detail}). Check that the file is complete and that its "
+            "extension matches its format."
         ) from None

@@ -1,4 +1,4 @@
-"""Text tables as laboratories write them: from bytes to a RawTable, with nothing yet understood of its columns."""
+"""Reader of text tables: from bytes to an uninterpreted RawTable."""
 
 from __future__ import annotations
 
@@ -9,69 +9,79 @@ import numpy as np
 
 from ..core.errors import ColumnError, FileError
 from .table import Cells, RawTable
-from .text_form import Lines, TextForm, TextHeader, cells_of, encoding_of, head_of, holds_something, is_comment
+from .text_format import (
+    NumberedLines,
+    TextFormat,
+    TextHeader,
+    detect_encoding,
+    has_content,
+    is_comment,
+    parse_header,
+    split_cells,
+)
 
 _COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 _POINT_NUMBER = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 
 
-def raw_csv(path: str | Path, form: TextForm = TextForm()) -> RawTable:
-    """The table in a text file. Raises FileError or ColumnError."""
+def read_csv_table(path: str | Path, text_format: TextFormat = TextFormat()) -> RawTable:
+    """Read the table in a text file. Raises FileError or ColumnError."""
     if not isinstance(path, str | Path):
-        raise FileError(f"read_csv: {path!r} is no path; name a file.")
+        raise FileError(f"read_csv: {path!r} is not a path. Pass the name of a file.")
     path = Path(path)
-    lines = [(i, line) for i, line in enumerate(re.split(r"\r\n|\n|\r", _text(path)), 1) if holds_something(line)]
-    head = head_of(path.name, lines, form)
-    body = [(i, line) for i, line in lines if not is_comment(line)][head.rows_above :]
-    columns = parsed(path.name, head, body, form)
+    lines = [(i, line) for i, line in enumerate(re.split(r"\r\n|\n|\r", _read_text(path)), 1) if has_content(line)]
+    header = parse_header(path.name, lines, text_format)
+    body = [(i, line) for i, line in lines if not is_comment(line)][header.header_lines :]
+    columns = parse_columns(path.name, header, body, text_format)
     rows = np.array([i for i, _ in body], dtype=np.int64)
-    return RawTable(path.name, head.headings, head.units, columns, rows, remarks=head.remarks)
+    return RawTable(path.name, header.headings, header.units, columns, rows, constants=header.constants)
 
 
-def _text(path: Path) -> str:
+def _read_text(path: Path) -> str:
     try:
         content = path.read_bytes()
     except OSError as reason:
         raise FileError(f"{path}: cannot be read ({reason.strerror}). Check the name and the folder.") from None
     if not content.strip():
         raise FileError(f"{path}: the file is empty.")
-    return content.decode(encoding_of(content), errors="replace")
+    return content.decode(detect_encoding(content), errors="replace")
 
 
-def parsed(origin: str, head: TextHeader, body: Lines, form: TextForm) -> tuple[Cells, ...]:
-    """The columns, by a fast parser where every cell is a number, otherwise cell by cell."""
-    comma = form.decimal != "." and head.delimiter != "," and any("," in line for _, line in body)
+def parse_columns(origin: str, header: TextHeader, body: NumberedLines, text_format: TextFormat) -> tuple[Cells, ...]:
+    """The columns, from a fast parser if every cell is a number, otherwise cell by cell. Raises ColumnError."""
+    comma = text_format.decimal != "." and header.delimiter != "," and any("," in line for _, line in body)
     lines = [line.replace(",", ".") if comma else line for _, line in body]
-    separator = None if head.delimiter == " " else head.delimiter
+    separator = None if header.delimiter == " " else header.delimiter
     try:
         numbers = np.loadtxt(lines, delimiter=separator, comments=None, ndmin=2, quotechar='"')
     except ValueError:
-        numbers = np.empty((0, 0))  # a text, an empty cell or a ragged row: `_by_cells` says in which line
-    doubtful = comma and any("." in line for _, line in body)
-    if doubtful or numbers.shape != (len(body), len(head.headings)):
-        return _by_cells(origin, head, body, comma, form.decimal)
+        numbers = np.empty((0, 0))  # a text, an empty cell or a ragged row: `_parse_by_cell` reports the line
+    ambiguous = comma and any("." in line for _, line in body)
+    if ambiguous or numbers.shape != (len(body), len(header.headings)):
+        return _parse_by_cell(origin, header, body, comma, text_format.decimal)
     return tuple(np.ascontiguousarray(column) for column in numbers.T)
 
 
-def _by_cells(origin: str, head: TextHeader, body: Lines, comma: bool, decimal: str | None) -> tuple[Cells, ...]:
-    rows = [cells_of(line, head.delimiter) for _, line in body]
-    width = len(head.headings)
+def _parse_by_cell(
+    origin: str, header: TextHeader, body: NumberedLines, comma: bool, decimal: str | None
+) -> tuple[Cells, ...]:
+    rows = [split_cells(line, header.delimiter) for _, line in body]
+    width = len(header.headings)
     for (line, _), row in zip(body, rows, strict=True):
         if len(row) < width or any(row[width:]):
-            hint = (
-                " If the comma is a decimal comma, separate the columns by ';' or tab." if head.delimiter == "," else ""
-            )
+            hint = " If the comma is a decimal comma, separate the columns by ';' or tab."
             raise ColumnError(
-                f"{origin}, line {line}: {len(row)} cells stand under {width} headings ({', '.join(head.headings)})."
-                f"{hint} Lines that are no part of the table must begin with '#'."
+                f"{origin}, line {line}: the line must have {width} cells ({', '.join(header.headings)}); it has "
+                f"{len(row)}."
+                f"{hint if header.delimiter == ',' else ''} Start lines that are not part of the table with '#'."
             )
     if comma and decimal is None:
         _check_decimal_sign(origin, body, rows)
-    return tuple(_numbers_or_texts([_pointed(row[i], decimal) for row in rows]) for i in range(width))
+    return tuple(_to_cells([_with_decimal_point(row[i], decimal) for row in rows]) for i in range(width))
 
 
-def _pointed(cell: str, decimal: str | None) -> str:
-    """A number with a decimal point; where the decimal sign was told, the other one parts thousands."""
+def _with_decimal_point(cell: str, decimal: str | None) -> str:
+    """A number with a decimal point; if the decimal sign is given, the other sign separates thousands."""
     if decimal is None:
         return cell.replace(",", ".") if _COMMA_NUMBER.fullmatch(cell) else cell
     thousands = "." if decimal == "," else ","
@@ -79,24 +89,24 @@ def _pointed(cell: str, decimal: str | None) -> str:
     return plain if re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?", plain) else cell
 
 
-def _numbers_or_texts(cells: list[str]) -> Cells:
+def _to_cells(cells: list[str]) -> Cells:
     try:
         return np.array([float(cell) for cell in cells])
     except ValueError:
         return cells
 
 
-def _check_decimal_sign(origin: str, body: Lines, rows: list[list[str]]) -> None:
-    """`1,234` beside `0.5` may be a thousand or a bit more than one: refuse to guess."""
-    found: dict[str, tuple[int, str]] = {}
+def _check_decimal_sign(origin: str, body: NumberedLines, rows: list[list[str]]) -> None:
+    """Raise ColumnError if both signs occur: next to `0.5`, the comma in `1,234` may separate thousands."""
+    first_use: dict[str, tuple[int, str]] = {}
     for (line, _), row in zip(body, rows, strict=True):
         for cell in row:
             sign = "," if _COMMA_NUMBER.fullmatch(cell) else "." if _POINT_NUMBER.fullmatch(cell) else ""
-            found.setdefault(sign, (line, cell))
-    if "," in found and "." in found:
-        (line, cell), (other, example) = found[","], found["."]
+            first_use.setdefault(sign, (line, cell))
+    if "," in first_use and "." in first_use:
+        (line, cell), (other, example) = first_use[","], first_use["."]
         raise ColumnError(
-            f"{origin}, line {line}: is the comma in '{cell}' a decimal comma? Line {other} has a decimal point "
-            f"('{example}'). Write all numbers with one decimal sign and without a sign for thousands, or say which "
-            "one it is: decimal=','."
+            f"{origin}, line {line}: the comma in '{cell}' is ambiguous, because line {other} contains a decimal point "
+            f"('{example}'). Write all numbers with the same decimal sign and without thousands separators, or specify "
+            "the decimal sign: decimal=','."
         )

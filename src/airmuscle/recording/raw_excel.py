@@ -1,4 +1,4 @@
-"""Excel workbooks: every worksheet that holds a table is one."""
+"""Reader of Excel workbooks: one table for each worksheet that contains one."""
 
 from __future__ import annotations
 
@@ -10,112 +10,118 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import ColumnError, FileError, suggestion
-from .header import are_headings, check_header, remark, unit_row
-from .optional_dependency import import_optional, lab_package
+from .header import are_headings, missing_header_error, parse_constant_comment, parse_unit_row
+from .optional_dependency import import_lab_package, run_reader
 from .table import Cells, RawTable
 
 Rows = list[tuple[int, list[Any]]]
-"""Rows of a worksheet with their numbers, counted from 1; no row is empty."""
+"""Non-empty rows of a worksheet with their numbers, counted from 1."""
 
 
-def raw_excel(path: Path, sheet: str | None = None, *, headless: bool = False) -> tuple[RawTable, ...]:
-    """A table for every worksheet that holds one, or for the one named. Raises FileError or ColumnError."""
-    openpyxl = lab_package("openpyxl", path)
+def read_excel_tables(path: Path, sheet: str | None = None, *, headerless: bool = False) -> tuple[RawTable, ...]:
+    """Read one table from each worksheet that contains one, or from the named worksheet.
+
+    With `headerless`, columns without headings are named by their numbers. Raises FileError or ColumnError.
+    """
+    openpyxl = import_lab_package("openpyxl", path)
 
     def read() -> dict[str, Rows]:
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
         try:
-            _check_present(path, sheet, book.sheetnames)
+            _check_sheet_exists(path, sheet, book.sheetnames)
             names = [w.title for w in book.worksheets] if sheet is None else [sheet]
-            return {name: _filled(book[name].iter_rows(values_only=True)) for name in names}
+            return {name: _nonempty_rows(book[name].iter_rows(values_only=True)) for name in names}
         finally:
             book.close()
 
-    sheets = {
-        name: rows for name, rows in import_optional(path, "an Excel workbook", read).items() if _holds_table(rows)
-    }
+    contents = run_reader(path, "an Excel workbook", read)
+    sheets = {name: rows for name, rows in contents.items() if _contains_table(rows)}
     if not sheets:
-        raise FileError(f"{path.name}: no worksheet holds a table. A table has a row of headings and rows of numbers.")
+        raise FileError(
+            f"{path.name}: no worksheet contains a table. A table consists of a row of headings and rows of numbers."
+        )
     several = len(sheets) > 1
     return tuple(
-        _table(f"{path.name}, sheet '{name}'" if several else path.name, rows, headless)
+        _parse_table(f"{path.name}, sheet '{name}'" if several else path.name, rows, headerless)
         for name, rows in sheets.items()
     )
 
 
-def _check_present(path: Path, sheet: str | None, names: list[str]) -> None:
+def _check_sheet_exists(path: Path, sheet: str | None, names: list[str]) -> None:
     if sheet is not None and sheet not in names:
-        raise FileError(f"{path.name}: no sheet '{sheet}'; there are {', '.join(names)}.{suggestion(sheet, names)}")
+        raise FileError(
+            f"{path.name}: no sheet '{sheet}'; the sheets are {', '.join(names)}.{suggestion(sheet, names)}"
+        )
 
 
-def _filled(rows: Iterable[tuple[Any, ...]]) -> Rows:
+def _nonempty_rows(rows: Iterable[tuple[Any, ...]]) -> Rows:
     return [(i, list(row)) for i, row in enumerate(rows, 1) if any(cell not in (None, "") for cell in row)]
 
 
-def _holds_table(rows: Rows) -> bool:
+def _contains_table(rows: Rows) -> bool:
     return any(_is_numeric(row) for _, row in rows)
 
 
-def _table(origin: str, rows: Rows, headless: bool) -> RawTable:
-    """The table of a worksheet; what stands above the headings counts as remarks."""
-    start = _heading_row(rows)
-    remarks = dict(found for _, row in rows[:start] if (found := _remark(row)))
+def _parse_table(origin: str, rows: Rows, headerless: bool) -> RawTable:
+    """The table of a worksheet; rows above the headings may state constants."""
+    start = _find_heading_row(rows)
+    constants = dict(constant for _, row in rows[:start] if (constant := _parse_constant(row)))
     first, cells = rows[start]
     used = [j for j, cell in enumerate(cells) if cell not in (None, "")]
     if are_headings([_text(c) for c in cells]):
         headings, body = [_text(cells[j]) for j in used], rows[start + 1 :]
-    elif headless:
+    elif headerless:
         headings, body = [str(n) for n in range(1, len(used) + 1)], rows[start:]
     else:
-        raise check_header(f"{origin}, row {first}")
+        raise missing_header_error(f"{origin}, row {first}")
     below = [_text(_cell(body[0][1], j)) for j in used] if body else []
-    units = unit_row(headings, below)
+    units = parse_unit_row(headings, below)
     body = body[1:] if units else body
     if not body:
-        raise FileError(f"{origin}: there are headings ({', '.join(headings)}) but no rows of numbers below them.")
-    _check_inside(origin, headings, used, body)
+        raise FileError(f"{origin}: no rows of numbers below the headings ({', '.join(headings)}).")
+    _check_headings_cover(origin, headings, used, body)
     columns = tuple(_column([_cell(row, j) for _, row in body]) for j in used)
-    return RawTable(origin, tuple(headings), units, columns, np.array([i for i, _ in body]), "row", remarks)
+    return RawTable(origin, tuple(headings), units, columns, np.array([i for i, _ in body]), "row", constants)
 
 
-def _heading_row(rows: Rows) -> int:
-    """The last row above the numbers that is as wide as they are; where it holds their units, the one above it."""
+def _find_heading_row(rows: Rows) -> int:
+    """The index of the last row above the numbers that is as wide as they are, or of the row above the unit row."""
     numeric = next((i for i, (_, row) in enumerate(rows) if _is_numeric(row)), 0)
     width = sum(c not in (None, "") for c in rows[numeric][1])
     above = [i for i in range(numeric) if sum(c not in (None, "") for c in rows[i][1]) >= width]
     if not above:
         return numeric
-    two = len(above) > 1 and above[-2] == above[-1] - 1
+    adjacent = len(above) > 1 and above[-2] == above[-1] - 1
     last = [_text(c) for c in rows[above[-1]][1]]
-    return above[-2] if two and unit_row([_text(c) for c in rows[above[-2]][1]], last) else above[-1]
+    return above[-2] if adjacent and parse_unit_row([_text(c) for c in rows[above[-2]][1]], last) else above[-1]
 
 
 def _is_numeric(row: list[Any]) -> bool:
-    """Whether a row belongs to the numbers: more than half of its cells do, beside texts like an operator's name."""
+    """Whether more than half of the cells of a row are numbers; the others may be texts such as the operator's name."""
     cells = [c for c in row if c not in (None, "")]
     numbers = sum(isinstance(c, float | int | datetime.date | datetime.time) for c in cells)
     return 2 * numbers > len(cells)
 
 
-def _remark(row: list[Any]) -> tuple[str, float | str] | None:
-    """`resting_length | 300 mm` in two cells, `resting_length | 300 | mm` in three, or a comment as in text files."""
+def _parse_constant(row: list[Any]) -> tuple[str, float | str] | None:
+    """A constant in two cells (`resting_length | 300 mm`), in three (`resting_length | 300 | mm`), or as a comment."""
     cells = [_text(c) for c in row if c not in (None, "")]
-    head, rest = (cells[0].rstrip(" :="), " ".join(cells[1:])) if len(cells) > 1 else (cells[0], "")
-    text = f"{head} = {rest}" if rest else head
-    return remark(text if text[0] in "#%" else f"# {text}")
+    name, value = (cells[0].rstrip(" :="), " ".join(cells[1:])) if len(cells) > 1 else (cells[0], "")
+    text = f"{name} = {value}" if value else name
+    return parse_constant_comment(text if text[0] in "#%" else f"# {text}")
 
 
 def _cell(row: list[Any], j: int) -> Any:
     return row[j] if j < len(row) else None
 
 
-def _check_inside(origin: str, headings: list[str], used: list[int], body: Rows) -> None:
+def _check_headings_cover(origin: str, headings: list[str], used: list[int], body: Rows) -> None:
     for i, row in body:
         outside = [j for j, cell in enumerate(row) if cell not in (None, "") and j not in used]
         if outside:
             raise ColumnError(
-                f"{origin}, row {i}: '{_text(row[outside[0]])}' stands under no heading (there are "
-                f"{', '.join(headings)}). Name its column, or move what is no part of the table elsewhere."
+                f"{origin}, row {i}: the cell '{_text(row[outside[0]])}' has no heading (the headings are "
+                f"{', '.join(headings)}). Add a heading to its column, or move the cell outside the rows of the table."
             )
 
 

@@ -1,7 +1,7 @@
-"""MATLAB files, v5 to v7.3: vectors of one length are a table, a struct of them is one too.
+"""Reader of MATLAB files, v5 to v7.3: one table for the vectors of each struct, and for those outside any struct.
 
-Also read: a matrix beside a list of texts that names its columns (`importdata` writes `data` and `colheaders`), and
-what Simulink saves as a structure with time.
+Also supported: a matrix next to a list of column names (`importdata` writes `data` and `colheaders`), and the
+structure with time that Simulink saves.
 """
 
 from __future__ import annotations
@@ -14,47 +14,50 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import ColumnError, FileError, suggestion
-from .common_rows import Channel, common_rows
-from .optional_dependency import import_optional, lab_package
+from .channels import Channel, merge_channels
+from .optional_dependency import import_lab_package, run_reader
 from .table import RawTable
 
-_OWN = ("__header__", "__version__", "__globals__", "#refs#", "#subsystem#")
+_INTERNAL_NAMES = ("__header__", "__version__", "__globals__", "#refs#", "#subsystem#")
 
 
-def raw_mat(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
-    """A table for each struct that holds vectors, and for those outside any, or for the one struct named."""
-    pymatreader = lab_package("pymatreader", path)
+def read_mat_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
+    """Read one table from each struct with vectors, or from the named struct. Raises FileError or ColumnError."""
+    pymatreader = import_lab_package("pymatreader", path)
 
     def read() -> Mapping[str, Any]:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # on objects it cannot read; what is missing then is said below
+            warnings.simplefilter("ignore")  # about unreadable objects; the error below reports missing vectors
             return dict(pymatreader.read_mat(str(path)))
 
-    variables = {name: value for name, value in import_optional(path, "MATLAB", read).items() if name not in _OWN}
-    found = dict(_groups("", variables))
-    if group is not None and group not in found:
-        there = f"there are {', '.join(name or '(no struct)' for name in found)}.{suggestion(group, found)}"
-        raise FileError(f"{path.name}: no struct '{group}' with vectors; {there}")
-    chosen = found if group is None else {group: found[group]}
-    if not chosen:
+    contents = run_reader(path, "MATLAB", read)
+    variables = {name: value for name, value in contents.items() if name not in _INTERNAL_NAMES}
+    groups = dict(_find_groups("", variables))
+    if group is not None and group not in groups:
+        names = ", ".join(name or "(no struct)" for name in groups)
         raise FileError(
-            f"{path.name}: no vector of numbers was found among {', '.join(variables) or 'no variables'}. Objects "
-            "(timeseries, table) cannot be read: save vectors or a struct of them, or write the table as CSV."
+            f"{path.name}: no struct '{group}' with vectors; the structs are {names}.{suggestion(group, groups)}"
         )
-    constants = _constants(variables)
-    return tuple(_table(path, name, fields, constants, len(found) > 1) for name, fields in chosen.items())
+    selected = groups if group is None else {group: groups[group]}
+    if not selected:
+        raise FileError(
+            f"{path.name}: no vector of numbers (the file contains {', '.join(variables) or 'no variables'}). Objects "
+            "(timeseries, table) cannot be read: save vectors or a struct of vectors, or write the table as CSV."
+        )
+    constants = _scalar_fields(variables)
+    return tuple(_make_table(path, name, fields, constants, len(groups) > 1) for name, fields in selected.items())
 
 
-def _groups(name: str, fields: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """The structs with vectors by their dotted names, the variables outside any under ''."""
+def _find_groups(name: str, fields: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """The structs with vectors by their dotted names; the variables outside any struct have the name ''."""
     if "time" in fields and "signals" in fields:
-        yield name, _simulink(fields)
+        yield name, _simulink_signals(fields)
         return
     if any(_is_vector(value) or _is_matrix(value) for value in fields.values()):
         yield name, fields
     for key, value in fields.items():
         if isinstance(value, Mapping):
-            yield from _groups(f"{name}.{key}".lstrip("."), value)
+            yield from _find_groups(f"{name}.{key}".lstrip("."), value)
 
 
 def _is_vector(value: Any) -> bool:
@@ -65,17 +68,19 @@ def _is_matrix(value: Any) -> bool:
     return isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "biuf" and min(value.shape) > 0
 
 
-def _simulink(fields: Mapping[str, Any]) -> dict[str, Any]:
+def _simulink_signals(fields: Mapping[str, Any]) -> dict[str, Any]:
     signals = fields["signals"]
     parts = signals if isinstance(signals, Sequence) else [signals]
-    if isinstance(signals, Mapping) and isinstance(signals.get("values"), list):  # an array of structs, by fields
+    if isinstance(signals, Mapping) and isinstance(
+        signals.get("values"), list
+    ):  # an array of structs, stored field by field
         parts = [dict(zip(signals, each, strict=True)) for each in zip(*signals.values(), strict=True)]
     named = {str(p.get("label") or f"signal {i}"): np.asarray(p["values"]) for i, p in enumerate(parts, 1)}
     return {"time_s": fields["time"], **named}
 
 
-def _constants(fields: Mapping[str, Any]) -> dict[str, float | str]:
-    """Single numbers and texts of the file."""
+def _scalar_fields(fields: Mapping[str, Any]) -> dict[str, float | str]:
+    """The fields that are single numbers or texts."""
     return {
         name: value.item() if isinstance(value, np.generic) else value
         for name, value in fields.items()
@@ -83,17 +88,17 @@ def _constants(fields: Mapping[str, Any]) -> dict[str, float | str]:
     }
 
 
-def _table(
+def _make_table(
     path: Path, name: str, fields: Mapping[str, Any], constants: Mapping[str, float | str], several: bool
 ) -> RawTable:
     origin = f"{path.name}, {name or 'variables'}" if several else path.name
     channels = list(_channels(origin, fields))
-    return common_rows(origin, channels, {**constants, **_constants(fields)})
+    return merge_channels(origin, channels, {**constants, **_scalar_fields(fields)})
 
 
 def _channels(origin: str, fields: Mapping[str, Any]) -> Iterator[Channel]:
-    stated = fields.get("units", fields.get("unit", {}))
-    units = stated if isinstance(stated, Mapping) else {}
+    units_field = fields.get("units", fields.get("unit", {}))
+    units = units_field if isinstance(units_field, Mapping) else {}
     for name, value in fields.items():
         if _is_vector(value):
             yield Channel(name, value, unit=str(units.get(name, "")))
@@ -101,11 +106,13 @@ def _channels(origin: str, fields: Mapping[str, Any]) -> Iterator[Channel]:
             names = _column_names(name, value.shape[1], fields)
             yield from (Channel(names[j], value[:, j]) for j in range(value.shape[1]))
         elif isinstance(value, np.ndarray) and value.ndim > 2:
-            raise ColumnError(f"{origin}: '{name}' has {value.ndim} dimensions; a table has two. Save columns of it.")
+            raise ColumnError(
+                f"{origin}: '{name}' has {value.ndim} dimensions; a table has two. Save its columns separately."
+            )
 
 
 def _column_names(name: str, width: int, fields: Mapping[str, Any]) -> list[str]:
-    """The names that a list of texts beside the matrix gives its columns, else MATLAB's own: `data(:,1)`."""
+    """The column names from a list of texts next to the matrix, otherwise MATLAB index expressions: `data(:,1)`."""
     for value in fields.values():
         texts = value.tolist() if isinstance(value, np.ndarray) and value.dtype.kind in "UO" else value
         if isinstance(texts, list) and len(texts) == width and all(isinstance(t, str) for t in texts):

@@ -1,4 +1,4 @@
-"""MDF 3 and 4, the format of ASAM: groups of channels, each group with a time of its own."""
+"""Reader of MDF 3 and 4 (ASAM): groups of channels, each group with its own time channel."""
 
 from __future__ import annotations
 
@@ -9,28 +9,29 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import FileError, suggestion
-from .common_rows import Channel, common_rows
-from .optional_dependency import import_optional, lab_package
+from .channels import Channel, merge_channels
+from .optional_dependency import import_lab_package, run_reader
 from .table import RawTable
 
-_TIME = 1
-"""The kind of a master channel that is a time, in both versions of the format."""
+_TIME_MASTER = 1
+"""Type of a master channel that contains time, in both versions of the format."""
 
 
-def raw_mdf(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
-    """The table of all channels, or of one channel group by its name. Raises FileError or ColumnError."""
-    asammdf = lab_package("asammdf", path)
+def read_mdf_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
+    """Read one table from all channels, or from the named channel group. Raises FileError or ColumnError."""
+    asammdf = import_lab_package("asammdf", path)
 
     def read() -> tuple[RawTable, ...]:
         with asammdf.MDF(path) as file:
             names = [_group_name(g, i) for i, g in enumerate(file.groups)]
             if group is not None and group not in names:
-                there = f"there are {', '.join(names)}.{suggestion(group, names)}"
-                raise FileError(f"{path.name}: no group '{group}'; {there}")
-            chosen = [i for i, name in enumerate(names) if group in (None, name)]
-            return (common_rows(path.name, list(_channels(file, chosen)), {}),)
+                raise FileError(
+                    f"{path.name}: no group '{group}'; the groups are {', '.join(names)}.{suggestion(group, names)}"
+                )
+            selected = [i for i, name in enumerate(names) if group in (None, name)]
+            return (merge_channels(path.name, list(_channels(file, selected)), {}),)
 
-    return import_optional(path, "MDF", read)
+    return run_reader(path, "MDF", read)
 
 
 def _group_name(group: Any, index: int) -> str:
@@ -50,4 +51,4 @@ def _channels(file: Any, groups: list[int]) -> Iterator[Channel]:
 
 
 def _is_time(master: Any) -> bool:
-    return getattr(master, "sync_type", _TIME) == _TIME
+    return getattr(master, "sync_type", _TIME_MASTER) == _TIME_MASTER

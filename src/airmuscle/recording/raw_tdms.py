@@ -1,4 +1,4 @@
-"""TDMS, the format of LabVIEW: a group of channels is a table."""
+"""Reader of TDMS (LabVIEW): one table for each group of channels."""
 
 from __future__ import annotations
 
@@ -9,50 +9,55 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import FileError, suggestion
-from .common_rows import Channel, common_rows
-from .optional_dependency import import_optional, lab_package
+from .channels import Channel, merge_channels
+from .optional_dependency import import_lab_package, run_reader
 from .table import RawTable
 
 
-def raw_tdms(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
-    """A table for every group that holds channels, or for the one named. Raises FileError or ColumnError."""
-    nptdms = lab_package("nptdms", path)
+def read_tdms_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
+    """Read one table from each group with channels, or from the named group. Raises FileError or ColumnError."""
+    nptdms = import_lab_package("nptdms", path)
 
     def read() -> tuple[RawTable, ...]:
         with nptdms.TdmsFile.open(path) as file:
-            filled = {g.name: g for g in file.groups() if any(len(c) for c in g.channels())}
-            chosen = _chosen(path, filled, group)
-            several = len(chosen) > 1
-            return tuple(_table(path, g, dict(file.properties), several) for g in chosen)
+            nonempty = {g.name: g for g in file.groups() if any(len(c) for c in g.channels())}
+            selected = _select_groups(path, nonempty, group)
+            several = len(selected) > 1
+            return tuple(_make_table(path, g, dict(file.properties), several) for g in selected)
 
-    return import_optional(path, "TDMS", read)
+    return run_reader(path, "TDMS", read)
 
 
-def _chosen(path: Path, groups: dict[str, Any], name: str | None) -> list[Any]:
+def _select_groups(path: Path, groups: dict[str, Any], name: str | None) -> list[Any]:
     if not groups:
-        raise FileError(f"{path.name}: the file holds no channel with values.")
+        raise FileError(f"{path.name}: no channel contains values.")
     if name is None:
         return list(groups.values())
     if name not in groups:
-        raise FileError(f"{path.name}: no group '{name}'; there are {', '.join(groups)}.{suggestion(name, groups)}")
+        raise FileError(
+            f"{path.name}: no group '{name}'; the groups are {', '.join(groups)}.{suggestion(name, groups)}"
+        )
     return [groups[name]]
 
 
-def _table(path: Path, group: Any, properties: dict[str, Any], several: bool) -> RawTable:
-    stated = {**properties, **group.properties}
-    remarks = {name: value for name, value in stated.items() if isinstance(value, float | int | str)}
-    remarks = {name: value for name, value in remarks.items() if name not in ("name", "description", "title", "author")}
+def _make_table(path: Path, group: Any, properties: dict[str, Any], several: bool) -> RawTable:
+    merged = {**properties, **group.properties}
+    constants = {
+        name: value
+        for name, value in merged.items()
+        if isinstance(value, float | int | str) and name not in ("name", "description", "title", "author")
+    }
     origin = f"{path.name}, group '{group.name}'" if several else path.name
-    return common_rows(origin, [_channel(c) for c in group.channels()], remarks)
+    return merge_channels(origin, [_make_channel(c) for c in group.channels()], constants)
 
 
-def _channel(channel: Any) -> Channel:
+def _make_channel(channel: Any) -> Channel:
     unit = str(channel.properties.get("unit_string") or channel.properties.get("NI_UnitDescription") or "")
-    return Channel(channel.name, channel[:], _time(channel), unit)
+    return Channel(channel.name, channel[:], _waveform_time(channel), unit)
 
 
-def _time(channel: Any) -> Array | None:
-    """The times of a waveform; a step of zero is what LabVIEW writes for a channel that is none."""
+def _waveform_time(channel: Any) -> Array | None:
+    """The times of a waveform [s]; None for other channels, for which LabVIEW writes a step of zero."""
     step = float(channel.properties.get("wf_increment", 0.0))
     if not step > 0.0:
         return None

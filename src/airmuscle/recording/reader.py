@@ -1,4 +1,4 @@
-"""Reading whatever a laboratory has: one file, several, a folder; the ending of a file says what it is."""
+"""Reader of laboratory files: one file, several files, a glob pattern or a folder; the extension gives the format."""
 
 from __future__ import annotations
 
@@ -7,33 +7,33 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from ..core.errors import FileError
-from .agreement import check_agreement
+from .downsampling import Decimation, Downsampling, downsample
 from .interpret import interpret
-from .large_csv import Progress, is_large, large_csv
-from .mapping import ColumnMapping, mapped, read_mapping
-from .raw_csv import raw_csv
-from .raw_excel import raw_excel
-from .raw_mat import raw_mat
-from .raw_mdf import raw_mdf
-from .raw_tdms import raw_tdms
+from .large_csv import Progress, is_large_file, read_large_csv
+from .mapping import ColumnMapping, apply_mapping, read_mapping
+from .raw_csv import read_csv_table
+from .raw_excel import read_excel_tables
+from .raw_mat import read_mat_tables
+from .raw_mdf import read_mdf_tables
+from .raw_tdms import read_tdms_tables
 from .recording import Recording
 from .table import RawTable
-from .thinning import Decimation, Downsampling, thinned
+from .unit_consistency import check_unit_consistency
 
 Source = str | Path | Iterable[str | Path]
 Tables = tuple[RawTable, ...]
 
-TEXT = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn")
-_BINARY: Mapping[str, Callable[[Path, ColumnMapping], Tables]] = {
-    ".xlsx": lambda path, m: raw_excel(path, m.sheet, headless=m.text_form.headless),
-    ".xlsm": lambda path, m: raw_excel(path, m.sheet, headless=m.text_form.headless),
-    ".mat": lambda path, m: raw_mat(path, m.group),
-    ".tdms": lambda path, m: raw_tdms(path, m.group),
-    ".mf4": lambda path, m: raw_mdf(path, m.group),
-    ".mdf": lambda path, m: raw_mdf(path, m.group),
+TEXT_EXTENSIONS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn")
+_BINARY_READERS: Mapping[str, Callable[[Path, ColumnMapping], Tables]] = {
+    ".xlsx": lambda path, m: read_excel_tables(path, m.sheet, headerless=m.text_format.headerless),
+    ".xlsm": lambda path, m: read_excel_tables(path, m.sheet, headerless=m.text_format.headerless),
+    ".mat": lambda path, m: read_mat_tables(path, m.group),
+    ".tdms": lambda path, m: read_tdms_tables(path, m.group),
+    ".mf4": lambda path, m: read_mdf_tables(path, m.group),
+    ".mdf": lambda path, m: read_mdf_tables(path, m.group),
 }
-ENDINGS = (*TEXT, *_BINARY)
-"""Endings of the files that are read."""
+EXTENSIONS = (*TEXT_EXTENSIONS, *_BINARY_READERS)
+"""Extensions of the supported files."""
 
 
 def read(
@@ -49,66 +49,86 @@ def read(
     decimal: str | None = None,
     sheet: str | None = None,
     group: str | None = None,
-    thinning: Downsampling = Decimation(),
+    downsampling: Downsampling = Decimation(),
     ordered: bool = True,
     progress: Progress | None = None,
 ) -> tuple[Recording, ...]:
-    """The recordings in a file, several files, a glob (`runs/*.csv`) or a folder, in SI units.
+    """Read the recordings in a file, several files, a glob pattern (`runs/*.csv`) or a folder, in SI units.
 
-    Text (CSV), Excel, MAT, TDMS and MDF are told by the ending. `mapping` is a TOML file, or a ColumnMapping, with
-    what files do not say of themselves; what is given by keyword goes before it. `columns` names columns by heading
-    or number: {"Channel 1": "pressure [bara]", 3: "length [mm]"}. A load in kg becomes a force by standard gravity.
-    Files that contradict each other's units are refused, and time that does not increase unless `ordered` is false.
-    Very long files are thinned, which a note says; `progress` is called with a file's name and the part of it read.
+    mapping       a TOML file or a ColumnMapping with what the files do not state; keyword arguments override it
+    columns       headings by heading or number: {"Channel 1": "pressure [bara]", 3: "length [mm]"}
+    units         units by quantity or heading: {"pressure": "kPa(a)"}
+    resting_length, ambient, specimen  constants of the runs; lengths [m] and pressures [Pa], or texts with a unit
+    delimiter, decimal, sheet, group   as in ColumnMapping
+    downsampling  reduction of very long files, which a note reports
+    ordered       whether time must increase
+    progress      called with the name of a file and the fraction that has been read
 
-    Raises FileError, ColumnError, UnitError or ParameterError with file, row, value and remedy.
+    The extension gives the format: text (CSV), Excel, MAT, TDMS or MDF. A load in kg becomes a force with standard
+    gravity. Files whose units contradict each other are rejected.
+
+    Raises FileError, ColumnError, UnitError or ParameterError; the message names file, row, value and remedy.
     """
     base = mapping if isinstance(mapping, ColumnMapping) else read_mapping(mapping) if mapping else ColumnMapping()
-    told = base.with_given(
+    column_mapping = base.with_overrides(
         columns=columns, resting_length=resting_length, ambient=ambient, specimen=specimen, delimiter=delimiter,
         decimal=decimal, sheet=sheet, group=group,
     )  # fmt: skip
-    found = [
-        interpret(mapped(table, told), units=units or {}, constants=told.constants, ordered=ordered)
-        for path in files(source)
-        for table in tables(path, told, thinning, progress)
+    recordings = [
+        interpret(
+            apply_mapping(table, column_mapping),
+            units=units or {},
+            constants=column_mapping.constants,
+            ordered=ordered,
+        )
+        for path in find_files(source)
+        for table in read_tables(path, column_mapping, downsampling, progress)
     ]
-    check_agreement(found)
-    return tuple(found)
+    check_unit_consistency(recordings)
+    return tuple(recordings)
 
 
-def files(source: Source) -> list[Path]:
-    """The files meant by a path, a glob, a folder or several of these, in the order of their names."""
+def find_files(source: Source) -> list[Path]:
+    """The files of a path, a glob pattern, a folder or several of these, each sorted by name. Raises FileError."""
     if not isinstance(source, str | Path):
         if not isinstance(source, Iterable):
-            raise FileError(f"read: {source!r} is no path; name a file, a folder, a glob, or several of them.")
-        return [path for each in source for path in files(each)]
+            raise FileError(
+                f"read: {source!r} is not a path. Pass a file, a folder, a glob pattern, or a list of them."
+            )
+        return [path for each in source for path in find_files(each)]
     path = Path(source)
     if path.is_dir():
-        found = sorted(p for p in path.iterdir() if p.suffix.lower() in ENDINGS and not p.name.startswith("."))
-        if not found:
-            raise FileError(f"{path}: the folder holds no file that can be read; those end in {', '.join(ENDINGS)}.")
-        return found
+        files = sorted(p for p in path.iterdir() if p.suffix.lower() in EXTENSIONS and not p.name.startswith("."))
+        if not files:
+            raise FileError(
+                f"{path}: the folder contains no supported file; supported extensions are {', '.join(EXTENSIONS)}."
+            )
+        return files
     if glob.has_magic(str(path)) and not path.exists():
-        found = sorted(Path(p) for p in glob.glob(str(path), recursive=True))
-        if not found:
-            raise FileError(f"{path}: no file is called so. Check the pattern and the folder.")
-        return found
+        files = sorted(Path(p) for p in glob.glob(str(path), recursive=True))
+        if not files:
+            raise FileError(f"{path}: no file matches the pattern. Check the pattern and the folder.")
+        return files
     return [path]
 
 
-def tables(path: Path, told: ColumnMapping, thinning: Downsampling, progress: Progress | None = None) -> Tables:
-    """The tables of one file, as yet uninterpreted. Raises FileError or ColumnError."""
+def read_tables(
+    path: Path, mapping: ColumnMapping, downsampling: Downsampling, progress: Progress | None = None
+) -> Tables:
+    """The uninterpreted tables of one file. Raises FileError or ColumnError."""
     suffix = path.suffix.lower()
-    if suffix in _BINARY:
-        return tuple(thinned(table, thinning) for table in _BINARY[suffix](path, told))
+    if suffix in _BINARY_READERS:
+        return tuple(downsample(table, downsampling) for table in _BINARY_READERS[suffix](path, mapping))
     if suffix in (".xls", ".ods"):
-        raise FileError(f"{path.name}: {suffix} is not read. Save it as .xlsx or .csv.")
-    if suffix not in TEXT and _is_binary(path):
-        raise FileError(f"{path.name}: this is no text, and its ending tells no format; read are {', '.join(ENDINGS)}.")
-    if is_large(path):
-        return (large_csv(path, told.text_form, thinning, progress),)
-    return (thinned(raw_csv(path, told.text_form), thinning),)
+        raise FileError(f"{path.name}: the format {suffix} is not supported. Save the file as .xlsx or .csv.")
+    if suffix not in TEXT_EXTENSIONS and _is_binary(path):
+        raise FileError(
+            f"{path.name}: unknown binary format; supported extensions are {', '.join(EXTENSIONS)}. Rename or convert "
+            "the file."
+        )
+    if is_large_file(path):
+        return (read_large_csv(path, mapping.text_format, downsampling, progress),)
+    return (downsample(read_csv_table(path, mapping.text_format), downsampling),)
 
 
 def _is_binary(path: Path) -> bool:

@@ -1,4 +1,4 @@
-"""The recording itself: SI columns on common rows, constants, and where it came from."""
+"""Recording: SI columns with common rows, constants and origin."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from ..core.arrays import Array
 from ..core.errors import ColumnError, suggestion
 from ..core.units import conversion
 from .columns import quantity_of
-from .heading import stated_unit
+from .heading import split_unit
+from .plot import plot_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,11 +21,13 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Recording:
-    """Columns in SI units, each of shape (N,), that share their rows.
+    """Columns in SI units, each of shape (N,), with common rows.
 
-    `constants` hold what does not change in the run (resting_length [m], ambient [Pa], specimen);
-    `origin` is a file's name, or how it was simulated; `notes` are what the reader should know of it; `units` are
-    those that a file stated, before its columns became SI.
+    columns    values by column name
+    origin     name of the file, or description of the simulation
+    constants  constants of the run: resting_length [m], ambient [Pa], specimen
+    notes      notes for the user, such as assumptions made by the reader
+    units      units stated in the file, before conversion to SI
     """
 
     columns: Mapping[str, Array]
@@ -37,7 +40,7 @@ class Recording:
         arrays = {name: np.asarray(values, dtype=float) for name, values in self.columns.items()}
         sizes = {name: values.shape for name, values in arrays.items()}
         if len(set(sizes.values())) > 1 or any(len(shape) != 1 for shape in sizes.values()):
-            raise ColumnError(f"{self.origin}: columns must be vectors of one length; they are {sizes}.")
+            raise ColumnError(f"{self.origin}: columns must be vectors of equal length; their shapes are {sizes}.")
         arrays = {name: values.view() for name, values in arrays.items()}
         for values in arrays.values():
             values.setflags(write=False)
@@ -53,7 +56,8 @@ class Recording:
         return recording
 
     def __getitem__(self, name: str) -> Array:
-        """A column by its name; `contraction` and `length` follow from each other when L0 is known."""
+        """A column by its name, shape (N,). `contraction` and `length` are converted into each other if the resting
+        length is known. Raises ColumnError for an unknown column."""
         if name in self.columns:
             return self.columns[name]
         resting_length = self.constants.get("resting_length")
@@ -64,12 +68,12 @@ class Recording:
                 return resting_length * (1.0 - self.columns["contraction"])
         known = list(self.columns)
         remedy = (
-            " Give the resting length to have it from the length."
+            " Specify the resting length to convert the length to a contraction."
             if name == "contraction" and "length" in known
             else ""
         )
         raise ColumnError(
-            f"{self.origin}: no column '{name}'; there are {', '.join(known)}.{suggestion(name, known)}{remedy}"
+            f"{self.origin}: no column '{name}'; the columns are {', '.join(known)}.{suggestion(name, known)}{remedy}"
         )
 
     def __contains__(self, name: str) -> bool:
@@ -86,39 +90,42 @@ class Recording:
         return iter(self.columns)
 
     def in_unit(self, name: str, unit: str | None) -> Array:
-        """A column in this SI unit. A column of no known quantity was taken as it stood; the unit that its heading
-        states, as in `height [mm]`, counts here, unless None is asked for, and its name is also 'height'. Raises
-        ColumnError and UnitError."""
+        """A column in the given SI unit, shape (N,).
+
+        A column of an unknown quantity, such as `height [mm]`, is stored without conversion. It is converted here from
+        the unit in its heading, unless `unit` is None, and its name may be given as 'height'. Raises ColumnError or
+        UnitError.
+        """
         for heading, values in self.columns.items():
-            plain, stated = stated_unit(heading)
-            if stated is not None and name in (heading, plain):
-                convert = conversion(stated, unit, where=f"{self.origin}, {heading}") if unit else np.asarray
+            plain, heading_unit = split_unit(heading)
+            if heading_unit is not None and name in (heading, plain):
+                convert = conversion(heading_unit, unit, where=f"{self.origin}, {heading}") if unit else np.asarray
                 return np.asarray(convert(values))
         return self[name]
 
-    def rows(self, chosen: Any) -> Recording:
-        """The recording with only the rows picked by a mask, slice or index array."""
-        return dataclasses.replace(self, columns={name: values[chosen] for name, values in self.columns.items()})
+    def rows(self, selection: Any) -> Recording:
+        """The recording reduced to the rows that a mask, slice or index array selects."""
+        return dataclasses.replace(self, columns={name: values[selection] for name, values in self.columns.items()})
 
     def with_columns(self, **columns: Any) -> Recording:
-        """The recording with further, or other, columns in SI units."""
+        """The recording with added or replaced columns in SI units."""
         return dataclasses.replace(self, columns={**self.columns, **columns})
 
     def with_constants(self, **constants: float | str) -> Recording:
-        """The recording with further, or other, constants."""
+        """The recording with added or replaced constants."""
         return dataclasses.replace(self, constants={**self.constants, **constants})
 
     def to_pandas(self) -> pd.DataFrame:
-        """A data frame whose headers carry the units: `pressure [Pa]`."""
+        """The recording as a data frame with units in the column headings: `pressure [Pa]`."""
         import pandas as pd
 
-        return pd.DataFrame({header(name): values for name, values in self.columns.items()})
+        return pd.DataFrame({column_heading(name): values for name, values in self.columns.items()})
 
     def plot(self, *names: str) -> Any:
-        """Columns over time, or over the row number, one axis each; a Matplotlib figure."""
-        from .plot import plot_recording
-
-        return plot_recording(self, names)
+        """A Matplotlib figure of the named columns, or of all, over time, or over the row number without time."""
+        columns = {name: self[name] for name in (names or self) if name != "time"}
+        time = self.columns.get("time")
+        return plot_columns(columns, time, self.origin)
 
     def __repr__(self) -> str:
         return f"Recording({self.origin}: {len(self)} rows of {', '.join(self.columns)})"
@@ -128,7 +135,7 @@ class Recording:
         return f"<b>{self.origin}</b>{note}{self.to_pandas().describe().to_html(float_format='%.6g')}"
 
 
-def header(name: str) -> str:
-    """A column's heading with its unit, as files and data frames carry it."""
+def column_heading(name: str) -> str:
+    """The heading of a column with its SI unit, for files and data frames: `pressure [Pa]`."""
     quantity = quantity_of(name)
     return f"{name} [{quantity.unit}]" if quantity else name

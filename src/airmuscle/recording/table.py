@@ -1,6 +1,6 @@
-"""A table as a file holds it: headings and cells, before anyone knows what they mean.
+"""RawTable: headings and cells of a file before interpretation.
 
-Every reader of a file format ends here, and `interpret` begins here; only this stands between the two.
+Every file reader returns RawTables, and `interpret` converts them to Recordings.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ import numpy as np
 import numpy.typing as npt
 
 Cells = npt.NDArray[np.float64] | list[str]
-"""A column: numbers where the reader found nothing else, otherwise its texts."""
+"""A column: numbers if the reader found only numbers, otherwise texts."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RawTable:
-    """Columns that share their rows, each with its heading, and where every row stands in the file.
+    """Columns with common rows, their headings, and the number of each row in the file.
 
-    `units` is a row of units below the headings, where there is one; `remarks` are what the file states in its
-    comments (resting_length, specimen). A row is called `row_word` and its number in messages: "line 41".
+    `units` is the unit row below the headings, if any; `constants` are those stated in the comments of the file
+    (resting_length, specimen). `row_label` names a row in messages: "line 41".
     """
 
     origin: str
@@ -28,10 +28,10 @@ class RawTable:
     units: tuple[str, ...] | None
     columns: tuple[Cells, ...]
     rows: npt.NDArray[np.int64]
-    row_word: str = "line"
-    remarks: Mapping[str, float | str] = dataclasses.field(default_factory=dict)
+    row_label: str = "line"
+    constants: Mapping[str, float | str] = dataclasses.field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
-    def place(self, row: int) -> str:
-        """Where a row stands, to open a message with: `bench.csv, line 41`."""
-        return f"{self.origin}, {self.row_word} {self.rows[row]}"
+    def location(self, row: int) -> str:
+        """The location of a row in the file, for messages: `bench.csv, line 41`."""
+        return f"{self.origin}, {self.row_label} {self.rows[row]}"

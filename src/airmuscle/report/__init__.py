@@ -1,1 +1,1 @@
-"""Reports: chapters of claims, tables and figures, and the files they become."""
+"""Reports: chapters with claims, tables and figures; HTML, JSON and CSV output."""

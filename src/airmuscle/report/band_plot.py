@@ -1,91 +1,88 @@
-"""The figure of a fit's bands: where the law may lie, and where one more reading would."""
+"""Plot of the confidence and prediction bands of a fit."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core import plotting
 from ..core.errors import IdentificationError
+from ..identify import Fit, confidence_band
 from ..recording import Recording
 from .chapter import Plot
 from .levels import levels_of
 
-if TYPE_CHECKING:
-    from ..identify.result import Fit
-
 LEVEL = 0.95
-MOST = 5
-"""Curves that still stand apart with their bands."""
+MAX_CURVES = 5
+"""Maximum number of curves: more bands would overlap."""
 POINTS = 121
-_DRAWN = {"pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "force": (1.0, "N")}
+_DISPLAY_UNITS = {"pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "force": (1.0, "N")}
 
 
-class _Roles(NamedTuple):
-    """Which quantity is held on a curve, and which runs along it."""
+class _CurveAxes(NamedTuple):
+    """The quantity that is constant on a curve, and the one that varies along it."""
 
-    held: str
-    along: str
+    constant: str
+    varying: str
 
 
-_ROLES = {
-    "force": _Roles("pressure", "contraction"),
-    "contraction": _Roles("pressure", "force"),
-    "pressure": _Roles("contraction", "force"),
+_CURVE_AXES = {
+    "force": _CurveAxes("pressure", "contraction"),
+    "contraction": _CurveAxes("pressure", "force"),
+    "pressure": _CurveAxes("contraction", "force"),
 }
 
-
-def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
-    """Curves of the fitted law with 95 % bands, and half their width beside; None where no band can be told."""
-    from ..identify.confidence_bands import confidence_band
-
-    answer, roles = fit.direction.quantity, _ROLES[fit.direction.quantity]
-    levels = levels_of(fit.recording[roles.held], MOST)
-    figure, (left, right) = plotting.new_figure(1, 2, width=7.4, height=3.7)
-    (factor, unit), (across, across_unit) = _DRAWN[answer], _DRAWN[roles.along]
-    for i, level in enumerate(levels):
-        points = _along(fit, roles, float(level))
-        try:
-            law, reading = (confidence_band(fit, points, level=LEVEL, reading=r) for r in (False, True))
-        except IdentificationError:
-            return None
-        colour = plotting.LINES[i % len(plotting.LINES)]
-        x = across * np.where(law.value < 0 if answer == "force" else False, np.nan, points[roles.along])
-        scale, word = _DRAWN[roles.held]
-        style = {"color": colour, "linestyle": plotting.DASHES[i % 5]}
-        left.plot(x, factor * law.value, label=f"{scale * level:.4g} {word}", **style)
-        left.fill_between(x, factor * reading.low, factor * reading.high, color=colour, alpha=0.15, linewidth=0)
-        left.fill_between(x, factor * law.low, factor * law.high, color=colour, alpha=0.35, linewidth=0)
-        right.plot(x, factor * (law.high - law.value), **style)
-        right.plot(x, factor * (reading.high - reading.value), color=colour, linewidth=0.7, alpha=0.7)
-    _points(left, fit, roles, factor, across)
-    left.set(xlabel=f"{roles.along} [{across_unit}]", ylabel=f"{answer} [{unit}]")
-    right.set(xlabel=f"{roles.along} [{across_unit}]", ylabel=f"half width of the band [{unit}]", ylim=(0.0, None))
-    plotting.legend_below(figure, left, columns=MOST + 1)
-    return Plot(name, _CAPTION, figure)
-
-
 _CAPTION = (
-    "95 % bands at levels that were measured, dark for the law, faint for one more reading; on the right half their "
-    "width, thick for the law, thin for a reading, as far as the muscle pulls. They take errors as independent, which "
-    "those of one slow ramp are not."
+    "Left: 95 % confidence bands (dark) and prediction bands of one further measurement (light) at measured levels. "
+    "Right: half width of the confidence bands (thick) and the prediction bands (thin), for non-negative forces. The "
+    "bands assume independent errors; the errors within one slow ramp are correlated."
 )
 
 
-def _along(fit: Fit, roles: _Roles, level: float) -> Recording:
-    """Points over the data's range at one level, of the length of muscle that most rows have."""
-    low, high = fit.ranges[roles.along]
-    columns = {roles.along: np.linspace(low, high, POINTS), roles.held: np.full(POINTS, level)}
+def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
+    """Return the fitted curves with 95 % bands and the half width of the bands; None if no band can be computed."""
+    quantity, curve = fit.fitted_quantity.name, _CURVE_AXES[fit.fitted_quantity.name]
+    levels = levels_of(fit.recording[curve.constant], MAX_CURVES)
+    figure, (left, right) = plotting.new_figure(1, 2, width=7.4, height=3.7)
+    (factor, unit), (x_factor, x_unit) = _DISPLAY_UNITS[quantity], _DISPLAY_UNITS[curve.varying]
+    for i, level in enumerate(levels):
+        points = _curve_points(fit, curve, float(level))
+        try:
+            confidence, prediction = (confidence_band(fit, points, level=LEVEL, prediction=r) for r in (False, True))
+        except IdentificationError:
+            return None
+        colour = plotting.LINES[i % len(plotting.LINES)]
+        x = x_factor * np.where(confidence.value < 0 if quantity == "force" else False, np.nan, points[curve.varying])
+        scale, level_unit = _DISPLAY_UNITS[curve.constant]
+        style = {"color": colour, "linestyle": plotting.DASHES[i % 5]}
+        left.plot(x, factor * confidence.value, label=f"{scale * level:.4g} {level_unit}", **style)
+        left.fill_between(x, factor * prediction.low, factor * prediction.high, color=colour, alpha=0.15, linewidth=0)
+        left.fill_between(x, factor * confidence.low, factor * confidence.high, color=colour, alpha=0.35, linewidth=0)
+        right.plot(x, factor * (confidence.high - confidence.value), **style)
+        right.plot(x, factor * (prediction.high - prediction.value), color=colour, linewidth=0.7, alpha=0.7)
+    _draw_measured(left, fit, curve, factor, x_factor)
+    left.set(xlabel=f"{curve.varying} [{x_unit}]", ylabel=f"{quantity} [{unit}]")
+    right.set(xlabel=f"{curve.varying} [{x_unit}]", ylabel=f"half width of the band [{unit}]", ylim=(0.0, None))
+    plotting.legend_below(figure, left, columns=MAX_CURVES + 1)
+    return Plot(name, _CAPTION, figure)
+
+
+def _curve_points(fit: Fit, curve: _CurveAxes, level: float) -> Recording:
+    """Return points over the range of the data at one level, for the median resting length."""
+    low, high = fit.data_ranges[curve.varying]
+    columns = {curve.varying: np.linspace(low, high, POINTS), curve.constant: np.full(POINTS, level)}
     lengths = fit.recording.columns.get("resting_length")
     constants = {} if lengths is None else {"resting_length": float(np.median(lengths))}
     return Recording(columns, fit.recording.origin, constants)
 
 
-def _points(axes: Any, fit: Fit, roles: _Roles, factor: float, across: float) -> None:
-    measured = fit.recording.rows(fit.sides == 0)
+def _draw_measured(axes: Any, fit: Fit, curve: _CurveAxes, factor: float, x_factor: float) -> None:
+    measured = fit.recording.rows(fit.censoring == 0)
     style = {"marker": ".", "linestyle": "none", "markersize": 2, "color": plotting.BLACK, "alpha": 0.35}
-    axes.plot(across * measured[roles.along], factor * measured[fit.direction.quantity], label="measured", **style)
-    values = factor * measured[fit.direction.quantity]
+    axes.plot(
+        x_factor * measured[curve.varying], factor * measured[fit.fitted_quantity.name], label="measured", **style
+    )
+    values = factor * measured[fit.fitted_quantity.name]
     margin = 0.08 * float(np.ptp(values)) or 1.0
     axes.set_ylim(float(values.min()) - margin, float(values.max()) + margin)

@@ -1,4 +1,4 @@
-"""What a report is made of: chapters with claims, tables and figures. A verdict is computed, never written down."""
+"""Building blocks of a report: chapters with claims, tables and figures; every verdict is computed."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.reference import Reference
+from .formula import to_plain
 
 HOLDS, DIFFERS, NOT_PRINTED = "holds", "differs", "not printed"
 
 
 @dataclasses.dataclass(frozen=True)
 class PublishedValue(abc.ABC):
-    """What a paper prints for a claim, and how a reproduced number is held against it.
+    """The value that a paper prints for a claim, and the criterion for the reproduced number.
 
-    Where a paper says only "low" or "comparable", the bound is `chosen`: then no number counts as published, and the
-    bound stands as the tolerance.
+    Where a paper says only "low" or "comparable", the bound is `chosen`: then `claims.json` gives no published
+    value, and the bound as the tolerance.
     """
 
     value: float
@@ -30,25 +31,25 @@ class PublishedValue(abc.ABC):
 
     @abc.abstractmethod
     def agrees(self, reproduced: float) -> bool:
-        """Whether the reproduced number bears the claim out."""
+        """Whether the reproduced number confirms the claim."""
 
 
 class Equal(PublishedValue):
-    """The reproduced number lies within the tolerance of the printed one."""
+    """Criterion: the reproduced number equals the printed one within the tolerance."""
 
     def agrees(self, reproduced: float) -> bool:
         return abs(reproduced - self.value) <= self.tolerance
 
 
 class AtLeast(PublishedValue):
-    """The reproduced number reaches the printed one, less the tolerance."""
+    """Criterion: the reproduced number is not below the printed one minus the tolerance."""
 
     def agrees(self, reproduced: float) -> bool:
         return reproduced >= self.value - self.tolerance
 
 
 class AtMost(PublishedValue):
-    """The reproduced number does not pass the printed one, plus the tolerance."""
+    """Criterion: the reproduced number is not above the printed one plus the tolerance."""
 
     def agrees(self, reproduced: float) -> bool:
         return reproduced <= self.value + self.tolerance
@@ -56,10 +57,10 @@ class AtMost(PublishedValue):
 
 @dataclasses.dataclass(frozen=True)
 class Claim:
-    """One statement of a paper, what it prints and what was computed here.
+    """One statement of a paper with the printed and the reproduced value.
 
-    `printed` is None where the paper gives nothing to compare with; `reproduced` is None where nothing was
-    computed. Either way the verdict is "not printed". `note` says why a claim differs, or what was chosen.
+    `printed` is None if the paper gives no value to compare with, `reproduced` is None if no value can be computed;
+    in both cases the verdict is "not printed". `note` gives the reason of a difference, or the values chosen.
     """
 
     paper: str
@@ -76,17 +77,17 @@ class Claim:
         return HOLDS if self.printed.agrees(self.reproduced) else DIFFERS
 
     def as_dict(self) -> dict[str, Any]:
-        """The claim as `claims.json` holds it."""
-        held = self.printed
+        """Return the claim as a record of `claims.json`."""
+        printed = self.printed
         return {
             "paper": self.paper,
-            "claim": self.claim,
-            "published": None if held is None or held.chosen else held.value,
+            "claim": to_plain(self.claim),
+            "published": None if printed is None or printed.chosen else printed.value,
             "reproduced": self.reproduced,
             "unit": self.unit,
-            "tolerance": None if held is None else held.value if held.chosen else held.tolerance,
+            "tolerance": None if printed is None else printed.value if printed.chosen else printed.tolerance,
             "verdict": self.verdict,
-            "note": self.note,
+            "note": to_plain(self.note),
         }
 
 
@@ -99,19 +100,19 @@ class Table:
     columns: Mapping[str, npt.NDArray[Any] | list[Any]]
     note: str = ""
     shown: bool = True
-    """Whether the report prints it; long series are only written to their file."""
+    """Whether the page shows it; long series are only written to their file."""
 
     def __post_init__(self) -> None:
         lengths = {
             header: len(np.atleast_1d(np.asarray(values, dtype=object))) for header, values in self.columns.items()
         }
         if len(set(lengths.values())) > 1:
-            raise ValueError(f"table {self.name}: columns differ in length: {lengths}")
+            raise ValueError(f"table {self.name}: all columns must have the same length, not {lengths}.")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Plot:
-    """A Matplotlib figure with its caption. Written to figures/<name>.svg and .png and into the report."""
+    """A Matplotlib figure with its caption. Embedded in the page and written to figures/<name>.svg and .png."""
 
     name: str
     caption: str
@@ -120,7 +121,7 @@ class Plot:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Chapter:
-    """One paper's part of the report: what it claims, what came out, and where every number is from."""
+    """A chapter of a report: summary, claims, tables, figures, references and the sources of all values."""
 
     paper: str
     title: str
@@ -130,4 +131,4 @@ class Chapter:
     plots: tuple[Plot, ...] = ()
     references: tuple[Reference, ...] = ()
     chosen: tuple[tuple[str, str, str], ...] = ()
-    """Numbers that stand behind the figures: (what, value with unit, source or "chosen")."""
+    """Values used for the figures: (meaning, value with unit, source or "chosen")."""

@@ -1,109 +1,108 @@
-"""The chapter of a report that a comparison of laws fills."""
+"""Report chapter: a comparison of laws by cross-validation."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.plotting import BLUE, LINES, MARKERS, legend_outside, new_figure
+from ..identify import Comparison, Fit
 from .chapter import Chapter, Plot, Table
+from .formula import symbol_formula, to_mathtext
 
-if TYPE_CHECKING:
-    from ..identify.model_selection import Comparison
-    from ..identify.result import Fit
-
-_SHOWN = {"pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "force": (1.0, "N")}
-_MOST_NAMES = 24
-"""Parameters whose names still fit beside the figure of their correlations."""
-_CURVES = 6
+_DISPLAY_UNITS = {"pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "force": (1.0, "N")}
+_MAX_LABELS = 24
+"""Maximum number of parameters that are labelled in the figure of the correlations."""
+_MAX_CURVES = 6
 
 
-def compare_chapter(found: Comparison) -> Chapter:
-    """Ranking, exclusions, errors by part, and the figures of the recommended fit."""
-    fit = found.recommended.fit
+def compare_chapter(comparison: Comparison) -> Chapter:
+    """Return the chapter of a comparison: ranking, exclusions, errors by fold, figures of the recommended fit."""
+    fit = comparison.recommended.fit
+    tables = (_ranking(comparison), _excluded(comparison), _fold_table(comparison))
     return Chapter(
         paper="comparison",
-        title="Which law to take",
-        summary=f"{found.reason}\n\nLeft out in turn: each {found.leave_out.word}. All errors are in force, over the "
-        "rows in which the muscle pulled.",
-        tables=tuple(table for table in (_ranking(found), _excluded(found), _parts(found)) if table is not None),
+        title="Model selection",
+        summary=f"{comparison.reason}\n\nCross-validation: each {comparison.leave_out.group_name} is left out in turn. All "
+        "errors are errors of the force, over the rows with a positive force.",
+        tables=tuple(table for table in tables if table is not None),
         plots=(
-            Plot("left-out", "Error on each part by laws that had not seen it.", _by_part(found)),
-            Plot("residuals", "Errors of the recommended law against each variable.", residuals(fit)),
-            Plot("correlations", "Correlations of its parameters.", correlations(fit)),
+            Plot("left-out", "Cross-validation error of the laws on each fold.", _fold_figure(comparison)),
+            Plot("residuals", "Residuals of the recommended law over each variable.", residual_figure(fit)),
+            Plot("correlations", "Correlations of the parameters of the recommended law.", correlation_figure(fit)),
         ),
     )
 
 
-def _ranking(found: Comparison) -> Table:
-    contenders = found.contenders
+def _ranking(comparison: Comparison) -> Table:
+    contenders = comparison.ranking
     return Table(
         "ranking",
-        "Laws by their error on what was left out",
+        "Ranking by cross-validation error",
         {
             "law": [c.candidate.name for c in contenders],
-            "parameters": [c.parameters for c in contenders],
-            "in sample [N]": [c.in_sample for c in contenders],
-            "left out [N]": [c.cross_validated for c in contenders],
+            "parameters": [c.parameter_count for c in contenders],
+            "in-sample rms error [N]": [c.in_sample_rmse for c in contenders],
+            "cross-validation rms error [N]": [c.cross_validated_rmse for c in contenders],
             "AICc": [c.aicc for c in contenders],
         },
     )
 
 
-def _excluded(found: Comparison) -> Table | None:
-    if not found.excluded:
+def _excluded(comparison: Comparison) -> Table | None:
+    if not comparison.excluded:
         return None
-    columns = {"law": [e.name for e in found.excluded], "why": [e.why for e in found.excluded]}
-    return Table("excluded", "Laws that these data do not determine", columns)
+    columns = {"law": [e.name for e in comparison.excluded], "reason": [e.reason for e in comparison.excluded]}
+    return Table("excluded", "Laws whose parameters the data do not determine", columns)
 
 
-def _parts(found: Comparison) -> Table:
-    parts = {part.part: None for c in found.contenders for part in c.left_out}
-    columns: dict[str, Any] = {"part": list(parts)}
-    for contender in found.contenders:
-        errors = {part.part: part.rms for part in contender.left_out}
+def _fold_table(comparison: Comparison) -> Table:
+    parts = {part.fold: None for c in comparison.ranking for part in c.fold_scores}
+    columns: dict[str, Any] = {"fold": list(parts)}
+    for contender in comparison.ranking:
+        errors = {part.fold: part.rmse for part in contender.fold_scores}
         columns[f"{contender.candidate.name} [N]"] = [errors.get(part, float("nan")) for part in parts]
-    return Table("left-out-parts", "Errors by part", columns, shown=False)
+    return Table("left-out-parts", "Errors by fold", columns, shown=False)
 
 
-def _by_part(found: Comparison) -> Any:
+def _fold_figure(comparison: Comparison) -> Any:
     figure, axes = new_figure(width=7.0, height=3.6)
-    for i, contender in enumerate(found.contenders[:_CURVES]):
-        errors = [part.rms for part in contender.left_out]
+    for i, contender in enumerate(comparison.ranking[:_MAX_CURVES]):
+        errors = [part.rmse for part in contender.fold_scores]
         axes.plot(errors, MARKERS[i], color=LINES[i], linestyle=":", linewidth=0.8, label=contender.candidate.name)
-    names = [part.part for part in found.contenders[0].left_out]
-    axes.set_xticks(range(len(names)), [_short(name) for name in names], rotation=30, ha="right")
-    axes.set(ylabel=f"rms error, {found.leave_out.word} left out [N]", yscale="log")
+    names = [part.fold for part in comparison.ranking[0].fold_scores]
+    axes.set_xticks(range(len(names)), [_shorten(name) for name in names], rotation=30, ha="right")
+    axes.set(ylabel=f"rms error, {comparison.leave_out.group_name} left out [N]", yscale="log")
     legend_outside(axes)
     return figure
 
 
-def _short(name: str) -> str:
+def _shorten(name: str) -> str:
     return name if len(name) <= 22 else f"...{name[-20:]}"
 
 
-def residuals(fit: Fit) -> Any:
-    """Model less measured against pressure, contraction and force."""
-    factor, unit = _SHOWN[fit.direction.quantity]
-    figure, places = new_figure(1, 3, width=7.5, height=2.8, sharey=True)
-    for axes, (name, (scale, word)) in zip(places, _SHOWN.items(), strict=True):
-        axes.plot(fit.recording[name] * scale, fit.errors * factor, "o", color=BLUE, markersize=2.5, alpha=0.6)
+def residual_figure(fit: Fit) -> Any:
+    """Return the figure of the residuals over pressure, contraction and force."""
+    factor, unit = _DISPLAY_UNITS[fit.fitted_quantity.name]
+    figure, panels = new_figure(1, 3, width=7.5, height=2.8, sharey=True)
+    for axes, (name, (scale, axis_unit)) in zip(panels, _DISPLAY_UNITS.items(), strict=True):
+        axes.plot(fit.recording[name] * scale, fit.residuals * factor, "o", color=BLUE, markersize=2.5, alpha=0.6)
         axes.axhline(0.0, color="black", linewidth=0.8)
-        axes.set(xlabel=f"measured {name} [{word}]")
-    places[0].set(ylabel=f"model less measured\n{fit.direction.quantity} [{unit}]")
+        axes.set(xlabel=f"measured {name} [{axis_unit}]")
+    panels[0].set(ylabel=f"residual of\n{fit.fitted_quantity.name} [{unit}]")
     return figure
 
 
-def correlations(fit: Fit) -> Any:
-    """The correlation matrix as a map from -1 to 1."""
+def correlation_figure(fit: Fit) -> Any:
+    """Return the figure of the correlation matrix, on a colour scale from -1 to 1."""
     size = len(fit.estimates)
     figure, axes = new_figure(width=5.2, height=4.4)
     image = axes.imshow(np.asarray(fit.correlations), vmin=-1, vmax=1, cmap="RdBu_r")
-    if size <= _MOST_NAMES:
-        labels = [estimate.label for estimate in fit.estimates]
+    if size <= _MAX_LABELS:
+        labels = [to_mathtext(symbol_formula(estimate.label)) for estimate in fit.estimates]
         axes.set_xticks(range(size), labels, rotation=90)
         axes.set_yticks(range(size), labels)
     axes.grid(False)
-    figure.colorbar(image, ax=axes, label="correlation [1]")
+    figure.colorbar(image, ax=axes, label="correlation")
     return figure

@@ -1,4 +1,4 @@
-"""The page: one file that holds its figures, so that it can be mailed, archived and printed."""
+"""HTML page of a report: one file with embedded figures and formulas as MathML, without scripts."""
 
 from __future__ import annotations
 
@@ -11,22 +11,50 @@ from pathlib import Path
 from typing import Any
 
 from .chapter import Chapter
+from .formatting import (
+    MARKS,
+    P_VALUE,
+    count_verdicts,
+    format_cell,
+    format_p_value,
+    format_published,
+    format_unit,
+    is_number_text,
+    table_rows,
+    typographic,
+)
+from .formula import symbol_formula, to_mathml, to_plain
 from .versions import versions
-from .wording import MARKS, number, published, rows, tally
 
-GREATEST_VECTOR = 600_000
-"""Bytes of SVG above which a figure enters the page as PNG: a dense chart would make the page slow."""
+MAX_SVG_BYTES = 600_000
+"""Figures with a larger SVG are embedded as PNG: a dense chart would make the page slow."""
+MAX_LINE = 26
+"""Characters of a text in a table cell that is not wrapped."""
+SYMBOL, UNIT = "symbol", "unit"
+"""Headers of columns with a special format."""
+_BRACKETS = re.compile(r"\s*\[([^\]]*)\]$")
 
 
-def page(chapters: Sequence[Chapter], figures: Path, *, title: str, date: datetime.date) -> str:
-    """The HTML of a report whose figures lie in the folder `figures` as <name>.svg and <name>.png."""
-    import jinja2  # needed by reports alone
+def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date: datetime.date) -> str:
+    """Return the HTML of a report; the folder `figures` contains its figures as <name>.svg and <name>.png."""
+    import jinja2  # needed by reports only
+    from markupsafe import Markup
 
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters.update(
-        number=number, published=published, anchor=anchor, paragraphs=paragraphs, rows=rows, is_numeric=is_numeric
+        cell=lambda value, header="": Markup(render_cell(header, value)),
+        header=lambda text: Markup(render_header(text)),
+        formulas=lambda text: Markup(to_mathml(text)),
+        plain=to_plain,
+        published=lambda claim: typographic(format_published(claim)),
+        unit=format_unit,
+        anchor=anchor,
+        paragraphs=paragraphs,
+        rows=table_rows,
+        is_numeric=is_numeric,
+        is_short=is_short,
     )
     template = resources.files(__package__).joinpath("template.html").read_text(encoding="utf-8")
     claims = tuple(claim for chapter in chapters for claim in chapter.claims)
@@ -34,36 +62,62 @@ def page(chapters: Sequence[Chapter], figures: Path, *, title: str, date: dateti
         title=title,
         date=date.isoformat(),
         chapters=chapters,
-        verdicts=tally(claims),
-        tally=tally,
+        verdicts=count_verdicts(claims),
+        count_verdicts=count_verdicts,
         marks=MARKS,
         versions=versions(),
-        image=lambda plot: image(figures / plot.name),
+        zip=zip,
+        image=lambda plot: image_data_uri(figures / plot.name),
     )
 
 
-def image(stem: Path) -> str:
-    """A data address that holds the figure: its SVG, or its PNG where that is smaller by far."""
+def render_cell(header: str, value: Any) -> str:
+    """Return the HTML of a table cell; the column's header decides on the format of symbols, units and p-values."""
+    if header == P_VALUE:
+        return to_mathml(format_p_value(value))
+    if header == SYMBOL and isinstance(value, str):
+        return to_mathml(symbol_formula(value))
+    if header == UNIT and isinstance(value, str):
+        return to_mathml(format_unit(value))
+    return to_mathml(format_cell(value))
+
+
+def render_header(header: str) -> str:
+    """Return the HTML of a column header: its unit with superscripts, without the unit 1."""
+    unit = _BRACKETS.search(header)
+    if unit is None:
+        return to_mathml(header)
+    name, shown = header[: unit.start()], format_unit(unit[1])
+    return to_mathml(f"{name} [{shown}]" if shown else name)
+
+
+def image_data_uri(stem: Path) -> str:
+    """Return a figure as a data URI: the SVG, or the PNG if the SVG is larger than `MAX_SVG_BYTES`."""
     vector = stem.with_name(f"{stem.name}.svg").read_bytes()
-    if len(vector) <= GREATEST_VECTOR:
-        return _address("image/svg+xml", vector)
-    return _address("image/png", stem.with_name(f"{stem.name}.png").read_bytes())
+    if len(vector) <= MAX_SVG_BYTES:
+        return _data_uri("image/svg+xml", vector)
+    return _data_uri("image/png", stem.with_name(f"{stem.name}.png").read_bytes())
 
 
-def _address(kind: str, content: bytes) -> str:
-    return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
+def _data_uri(media_type: str, content: bytes) -> str:
+    return f"data:{media_type};base64,{base64.b64encode(content).decode('ascii')}"
 
 
 def anchor(text: str) -> str:
-    """A name that a link within the page can carry."""
+    """Return the identifier of a link target within the page."""
     return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
 
 
 def paragraphs(text: str) -> list[str]:
-    """The paragraphs of a text, which blank lines part."""
+    """Return the paragraphs of a text, which are separated by blank lines."""
     return [" ".join(part.split()) for part in re.split(r"\n\s*\n", text) if part.strip()]
 
 
+def is_short(value: Any) -> bool:
+    """Whether a cell is shown on one line."""
+    return isinstance(value, str) and len(to_plain(value)) <= MAX_LINE
+
+
 def is_numeric(values: Sequence[Any]) -> bool:
-    """Whether a column holds numbers, which stand flush right."""
-    return not any(isinstance(value, str) for value in values)
+    """Whether a column contains numbers only, which are aligned to the right."""
+    return all(not isinstance(value, str) or is_number_text(value) for value in values)

@@ -1,122 +1,121 @@
-"""The chapters of a report on friction: a loop each, with every law tried on it."""
+"""Report chapters: hysteresis loops with all fitted friction laws, and creep."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.plotting import BLACK, BLUE, RED, legend_below, new_figure
+from ..identify.hysteresis import HysteresisFit, HysteresisLoop, LoopFit
+from ..identify.hysteresis.plot import plot_loops
+from ..recording.display_units import display_scale
+from ..recording.segment import motion_direction
 from .chapter import Chapter, Plot, Table
+from .formatting import P_VALUE
 from .parameters import parameter_table
 
-if TYPE_CHECKING:
-    from ..identify.hysteresis import HysteresisFit, HysteresisLoop, LoopFit
 
-
-def hysteresis_chapters(found: Sequence[LoopFit], creep: Sequence[str] = ()) -> list[Chapter]:
-    """One chapter a loop; what was said of creep stands in the last."""
-    chapters = [_chapter(each, "" if len(found) == 1 else f"-{i}") for i, each in enumerate(found, 1)]
+def hysteresis_chapters(loop_fits: Sequence[LoopFit], creep: Sequence[str] = ()) -> list[Chapter]:
+    """Return one chapter per loop; the sentences on creep form the last chapter."""
+    chapters = [_chapter(each, "" if len(loop_fits) == 1 else f"-{i}") for i, each in enumerate(loop_fits, 1)]
     if creep:
         chapters.append(Chapter("creep", "Creep", "\n\n".join(creep)))
     return chapters
 
 
-def _chapter(found: LoopFit, suffix: str) -> Chapter:
-    from ..identify.hysteresis.plot import plot_loops
-
-    loop, best = found.loop, found.recommended
-    shown = best or (found.fits[0] if found.fits else None)
-    plots = [Plot(f"loop{suffix}", "The loop as measured; faint rows do not count.", _measured(loop))]
-    tables = [_laws(found, suffix)]
+def _chapter(loop_fit: LoopFit, suffix: str) -> Chapter:
+    loop = loop_fit.loop
+    shown = loop_fit.recommended or (loop_fit.fits[0] if loop_fit.fits else None)
+    plots = [Plot(f"loop{suffix}", "Measured loop; light: rows that are not used.", _loop_figure(loop))]
+    tables = [_law_table(loop_fit, suffix)]
     references: tuple[Any, ...] = ()
     if shown is not None:
         law = type(shown.friction).__name__
-        plots.append(Plot(f"friction{suffix}", f"What {law} explains of the loop.", shown.plot()))
-        inner = f"{law} with the fitted numbers: from rest, around the outer loop and through two minor loops."
-        plots.append(Plot(f"minor-loops{suffix}", inner, plot_loops(shown.friction, loop.slide.axis)))
+        plots.append(Plot(f"friction{suffix}", f"Loop and hysteresis described by {law}.", shown.plot()))
+        caption = f"{law} with the fitted parameters: initial loading, outer loop and two minor loops."
+        plots.append(Plot(f"minor-loops{suffix}", caption, plot_loops(shown.friction, loop.friction_path.axis)))
         tables.append(parameter_table(shown.friction, f"parameters{suffix}", f"Parameters of {law}"))
         references = shown.friction.references
     return Chapter(
         paper=f"friction{suffix}",
-        title=f"{loop.recording.origin}: {loop.in_words}",
-        summary="\n\n".join(_said(found, shown)),
+        title=f"{loop.recording.origin}: {loop.description}",
+        summary="\n\n".join(_summary(loop_fit, shown)),
         tables=tuple(tables),
         plots=tuple(plots),
         references=references,
     )
 
 
-def _said(found: LoopFit, shown: HysteresisFit | None) -> list[str]:
-    loop = found.loop
-    said = [counted(loop)]
-    if shown is not None and found.recommended is None:
-        said.append(f"The data justify none of the laws; {type(shown.friction).__name__} is shown as the nearest.")
+def _summary(loop_fit: LoopFit, shown: HysteresisFit | None) -> list[str]:
+    loop = loop_fit.loop
+    sentences = [describe_row_counts(loop)]
+    if shown is not None and loop_fit.recommended is None:
+        sentences.append(
+            f"The data justify none of the laws; {type(shown.friction).__name__} is shown as the best one."
+        )
     if shown is not None:
-        said.append(shown.verdict)
-    if not found.enters_a_plant:
-        said.append(
-            "The muscle was held at one length, so that its threads were moved by the pressure: only a force by "
-            "pressure is determined. Such a friction describes isometric loops and does not enter a plant. Run a loop "
-            "of contraction at constant pressure for one that does."
+        sentences.append(shown.verdict)
+    if not loop_fit.usable_in_plant:
+        sentences.append(
+            "The loop is isometric: the pressure moved the fibres at constant length, and only a friction force over "
+            "pressure is determined. Such a friction describes isometric loops and cannot be used in a plant. For a "
+            "friction that can, measure a loop of contraction at constant pressure."
         )
     if loop.repeat is not None:
-        said.append(f"Judged on {loop.repeat[0].origin}, a second run at the same level.")
-    return [*said, *(f"{name} was not fitted: {why}" for name, why in found.failed.items())]
+        sentences.append(f"Validated on {loop.repeat[0].origin}, a second run at the same level.")
+    return [*sentences, *(f"{name} was not fitted: {reason}" for name, reason in loop_fit.failed.items())]
 
 
-def counted(loop: HysteresisLoop) -> str:
-    """How many rows of either branch count."""
-    from ..recording.segment import motion_direction
-
-    way = motion_direction(loop.slide.path(loop.recording), loop.recording.columns.get("time"))
-    up, down = (int(np.count_nonzero((way == sign) & loop.chosen)) for sign in (1, -1))
-    text = f"{up} rows on the way up and {down} on the way down count, of {len(loop.recording)}."
+def describe_row_counts(loop: HysteresisLoop) -> str:
+    """Return a sentence with the number of rows used from each branch."""
+    direction = motion_direction(loop.friction_path.displacement(loop.recording), loop.recording.columns.get("time"))
+    up, down = (int(np.count_nonzero((direction == sign) & loop.fitted_rows)) for sign in (1, -1))
+    text = f"{up} rows of the rising branch and {down} of the falling branch are used, of {len(loop.recording)}."
     if 10 * min(up, down) < max(up, down):
-        text += " One branch has hardly any: let all rows count, or run the loop more slowly."
+        text += " One branch has very few rows: use all rows, or measure the loop more slowly."
     return text
 
 
-def _laws(found: LoopFit, suffix: str) -> Table:
-    fits = found.fits
-    repeated = found.loop.repeat is not None
+def _law_table(loop_fit: LoopFit, suffix: str) -> Table:
+    fits = loop_fit.fits
+    repeated = loop_fit.loop.repeat is not None
     return Table(
         f"laws{suffix}",
-        "Friction laws, the most telling first",
+        "Friction laws, best first",
         {
             "law": [type(f.friction).__name__ for f in fits],
-            "rms without [N]": [f.plain_rmse for f in fits],
-            "rms [N]": [f.rmse for f in fits],
-            **({"rms on second run [N]": [f.repeat_rmse for f in fits]} if repeated else {}),
-            "gap before [N]": [f.gap for f in fits],
-            "gap left [N]": [f.gap_left for f in fits],
-            "AICc falls by": [f.aicc_gain for f in fits],
-            "by chance": [f.chance for f in fits],
+            "rms error without friction [N]": [f.rmse_without_friction for f in fits],
+            "rms error [N]": [f.rmse for f in fits],
+            **({"rms error on second run [N]": [f.repeat_rmse for f in fits]} if repeated else {}),
+            "branch gap without friction [N]": [f.gap for f in fits],
+            "remaining branch gap [N]": [f.residual_gap for f in fits],
+            "reduction of AICc": [f.aicc_reduction for f in fits],
+            P_VALUE: [f.p_value for f in fits],
             "justified": ["yes" if f.justified else "no" for f in fits],
-            "not determined": [", ".join(f.unsettled) for f in fits],
+            "not determined": [", ".join(f.undetermined) for f in fits],
         },
     )
 
 
-def _measured(loop: HysteresisLoop) -> Any:
-    """Force over what is swept, by branch; rows that do not count are faint."""
-    from ..recording.plot import scale
-    from ..recording.segment import motion_direction
-
+def _loop_figure(loop: HysteresisLoop) -> Any:
+    """Return a figure of the force over the varied quantity, by branch; rows that are not used are light."""
     recording = loop.recording
-    name = "contraction" if "contraction" in loop.run.swept or "length" in loop.run.swept else "pressure"
-    factor, unit = scale(name)
-    way = motion_direction(loop.slide.path(recording), recording.columns.get("time"))
+    name = (
+        "contraction" if "contraction" in loop.run.swept_columns or "length" in loop.run.swept_columns else "pressure"
+    )
+    factor, unit = display_scale(name)
+    direction = motion_direction(loop.friction_path.displacement(recording), recording.columns.get("time"))
     figure, axes = new_figure(width=6.0, height=3.9)
     axes.plot(recording[name] * factor, recording["force"], color=BLACK, linewidth=0.5, alpha=0.3)
-    for sign, colour, word in ((1, BLUE, "rising"), (-1, RED, "falling")):
+    for sign, colour, branch in ((1, BLUE, "rising"), (-1, RED, "falling")):
         for rows, alpha, label in (
-            ((way == sign) & ~loop.chosen, 0.05, None),
-            ((way == sign) & loop.chosen, 0.8, word),
+            ((direction == sign) & ~loop.fitted_rows, 0.05, None),
+            ((direction == sign) & loop.fitted_rows, 0.8, branch),
         ):
             style = {"marker": "o", "linestyle": "none", "markersize": 3, "alpha": alpha, "color": colour}
             axes.plot(recording[name][rows] * factor, recording["force"][rows], label=label, **style)
-    axes.set(xlabel=f"{name} [{unit}]", ylabel="force [N]", title=f"{recording.origin}: {loop.in_words}")
+    axes.set(xlabel=f"{name} [{unit}]", ylabel="force [N]", title=f"{recording.origin}: {loop.description}")
     legend_below(figure, axes)
     return figure

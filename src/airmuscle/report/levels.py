@@ -1,20 +1,23 @@
-"""The levels at which a bench held a quantity, for curves through its points."""
+"""Levels of a quantity that a test rig keeps constant, for curves through the measured points."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..core.arrays import Array
-from .chart import SAME_PRESSURE
+from .isobar_plot import PRESSURE_TOLERANCE
 
 
-def levels_of(values: Array, most: int) -> Array:
-    """The medians of groups that lie closer together than a bench holds them, at most so many, spread evenly."""
+def levels_of(values: Array, max_count: int) -> Array:
+    """Return the levels of a measured quantity, at most `max_count` of them, evenly selected, in its unit.
+
+    A level is the median of values closer together than a test rig controls them; a ramp gives quantiles.
+    """
     ordered = np.sort(values)
-    ends = np.flatnonzero(np.diff(ordered) > SAME_PRESSURE * np.abs(ordered).max()) + 1
+    ends = np.flatnonzero(np.diff(ordered) > PRESSURE_TOLERANCE * np.abs(ordered).max()) + 1
     levels = np.array([np.median(group) for group in np.split(ordered, ends)])
-    if levels.size == 1 and np.ptp(ordered) > 2 * SAME_PRESSURE * np.abs(ordered).max():  # a ramp has no levels
-        return np.asarray(np.quantile(ordered, np.linspace(0.1, 0.9, most)))
-    if levels.size <= most:
+    if levels.size == 1 and np.ptp(ordered) > 2 * PRESSURE_TOLERANCE * np.abs(ordered).max():  # a ramp has no levels
+        return np.asarray(np.quantile(ordered, np.linspace(0.1, 0.9, max_count)))
+    if levels.size <= max_count:
         return levels
-    return np.asarray(levels[np.unique(np.linspace(0, levels.size - 1, most).astype(int))])
+    return np.asarray(levels[np.unique(np.linspace(0, levels.size - 1, max_count).astype(int))])

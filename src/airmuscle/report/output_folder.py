@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Atomic output folders: the files of a command appear completely or not at all."""
 
 from __future__ import annotations
 
@@ -14,73 +14,73 @@ from ..core.errors import FileError
 
 @contextlib.contextmanager
 def atomic_folder(folder: Path | str) -> Iterator[Path]:
-    """A fresh empty folder whose files move into `folder` once the block has ended well.
+    """Yield an empty temporary folder whose files are moved into `folder` when the block ends without an exception.
 
-    When the block raises, or the files cannot be written, `folder` stays as it was, and does not appear if it
-    was not there. Files of the same name are replaced, others left alone. Raises FileError.
+    If the block raises, or the files cannot be written, `folder` remains unchanged, or is not created. Files of the
+    same name are replaced, other files are kept. Raises FileError.
     """
     target = Path(folder)
-    with _as_file_error(target):
-        made = _missing(target)
+    with _raise_file_errors(target):
+        created = _missing_folders(target)
     try:
-        with _as_file_error(target):
+        with _raise_file_errors(target):
             target.mkdir(parents=True, exist_ok=True)
-            place = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=target))
+            staging = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=target))
         try:
-            yield place
-            with _as_file_error(target):
-                _move_up(place, target)
+            yield staging
+            with _raise_file_errors(target):
+                _move_files(staging, target)
         finally:
-            shutil.rmtree(place, ignore_errors=True)
+            shutil.rmtree(staging, ignore_errors=True)
     except BaseException:
-        _remove_empty(made)
+        _remove_empty_folders(created)
         raise
 
 
 def check_writable(folder: Path | str) -> None:
-    """Raise FileError now, before long work, where `staged` could not write later; leaves nothing behind."""
+    """Raise FileError before a long computation if `atomic_folder` cannot write to `folder`; leaves no files."""
     target = Path(folder)
-    with _as_file_error(target):
-        made = _missing(target)
+    with _raise_file_errors(target):
+        created = _missing_folders(target)
     try:
         with atomic_folder(target):
             return
     finally:
-        _remove_empty(made)
+        _remove_empty_folders(created)
 
 
 @contextlib.contextmanager
-def _as_file_error(target: Path) -> Iterator[None]:
+def _raise_file_errors(target: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
         at = f" ({error.filename})" if error.filename and Path(error.filename) != target else ""
         raise FileError(
-            f"{target}: cannot be written to: {error.strerror or error}{at}. Name a folder that you may write to."
+            f"{target}: cannot be written to: {error.strerror or error}{at}. Specify a folder with write permission."
         ) from error
 
 
-def _missing(folder: Path) -> list[Path]:
-    """The folders that `mkdir(parents=True)` would make, innermost first."""
+def _missing_folders(folder: Path) -> list[Path]:
+    """Return the folders that `mkdir(parents=True)` would create, innermost first."""
     return [path for path in (folder, *folder.parents) if not path.exists()]
 
 
-def _remove_empty(folders: list[Path]) -> None:
+def _remove_empty_folders(folders: list[Path]) -> None:
     for folder in folders:
-        with contextlib.suppress(OSError):  # never made, or something else has since been put there
+        with contextlib.suppress(OSError):  # not created, or no longer empty
             folder.rmdir()
 
 
-def _move_up(place: Path, target: Path) -> None:
-    """Move every file to its place in `target`; the folders of all exist before the first file moves."""
-    files = sorted(path for path in place.rglob("*") if path.is_file())
-    moves = [(path, target / path.relative_to(place)) for path in files]
-    for _, goal in moves:
-        if goal.is_dir():
-            raise IsADirectoryError(21, "a folder of that name is there", str(goal))
-        if goal.parent.exists() and not goal.parent.is_dir():
-            raise NotADirectoryError(20, "a file of that name is there", str(goal.parent))
-    for _, goal in moves:
-        goal.parent.mkdir(parents=True, exist_ok=True)
-    for path, goal in moves:
-        os.replace(path, goal)
+def _move_files(staging: Path, target: Path) -> None:
+    """Move all files into `target`; every folder is created before the first file is moved."""
+    files = sorted(path for path in staging.rglob("*") if path.is_file())
+    moves = [(path, target / path.relative_to(staging)) for path in files]
+    for _, destination in moves:
+        if destination.is_dir():
+            raise IsADirectoryError(21, "a folder of this name exists", str(destination))
+        if destination.parent.exists() and not destination.parent.is_dir():
+            raise NotADirectoryError(20, "a file of this name exists", str(destination.parent))
+    for _, destination in moves:
+        destination.parent.mkdir(parents=True, exist_ok=True)
+    for path, destination in moves:
+        os.replace(path, destination)

@@ -1,4 +1,4 @@
-"""A simulated run as a chapter: its courses, what was commanded and what came of it, parameters, settings, sources."""
+"""Report chapter: a simulated run with its time series, inputs, parameters, settings and references."""
 
 from __future__ import annotations
 
@@ -12,31 +12,32 @@ from ..core.reference import cite
 from ..recording import Recording
 from ..scenario.scenario import Scenario
 from .chapter import Chapter, Plot
-from .loop_chapter import controller_table, corners, loop_plot
+from .control_loop_plot import controller_table, loop_plot, segment_vertices
+from .formatting import format_number, typographic
 from .parameters import parameter_table
 
-SHOWN = ("pressure", "contraction", "force", "friction", "position", "angle", "speed", "angular_speed")
-"""Columns that the figure draws, in this order; the file holds all."""
-MOST_PIECES = 300
-"""Pieces of a command that a figure tells apart; of a longer one it shows the beginning."""
-MOST_HELD = 50_000
-"""Pieces that a figure draws where no driver makes pulses, which it need not tell apart."""
-MOST_CHANGES = 6
-"""Changes of an input that are spelt out."""
+PLOTTED = ("pressure", "contraction", "force", "friction", "position", "angle", "speed", "angular_speed")
+"""Quantities plotted, in this order; the recording contains all."""
+MAX_DRIVER_SEGMENTS = 300
+"""Segments of an input with drivers that a figure resolves; of a longer input only the beginning is plotted."""
+MAX_SEGMENTS = 50_000
+"""Segments plotted without drivers: there are no pulses to resolve."""
+MAX_LISTED_CHANGES = 6
+"""Maximum number of changes of an input that are listed one by one."""
 
 
 def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
-    """The chapter of a run, whole or as far as it came."""
+    """Return the chapter of a run, complete or up to its early end."""
     notes = "\n\n".join(_sentence(note) for note in recording.notes)
     loop = scenario.command if isinstance(scenario.command, ControlLoop) else None
     plots = [loop_plot(scenario, loop, recording)] if loop else []
-    plots.append(Plot("run", f"{scenario.title}, simulated.", recording.plot(*_shown(recording))))
+    plots.append(Plot("run", f"{scenario.title}: simulated time series.", recording.plot(*_plotted_columns(recording))))
     if scenario.plant.inputs:
-        plots.append(_inputs(scenario, recording))
+        plots.append(_input_plot(scenario, recording))
     return Chapter(
         paper="simulation",
         title=scenario.title,
-        summary=f"{_length(scenario, recording)} The recording is recording.csv.\n\n{notes}",
+        summary=f"{_describe_duration(scenario, recording)} All columns are in recording.csv.\n\n{notes}",
         plots=tuple(plots),
         tables=(
             parameter_table(scenario.plant, "parameters", "Parameters of the plant"),
@@ -51,82 +52,86 @@ def _sentence(note: str) -> str:
     return f"{note[:1].upper()}{note[1:].rstrip('.')}."
 
 
-def _length(scenario: Scenario, recording: Recording) -> str:
+def _describe_duration(scenario: Scenario, recording: Recording) -> str:
     reached, end = float(recording["time"][-1]), scenario.start_time + scenario.duration
     if reached < end:
-        return f"A run of {scenario.duration:g} s that ended early, at {reached:.6g} s; the last note says why."
-    return f"A run of {scenario.duration:g} s."
+        return f"Simulation of {scenario.duration:g} s, ended early at {reached:.4g} s; the last note gives the reason."
+    return f"Simulation of {scenario.duration:g} s."
 
 
-def _shown(recording: Recording) -> list[str]:
-    own = [name for name in recording if not name.startswith((SETPOINT, MEASURED, COMMAND))]
-    return [name for kind in SHOWN for name in own if name.rpartition(".")[2] == kind]
+def _plotted_columns(recording: Recording) -> list[str]:
+    columns = [name for name in recording if not name.startswith((SETPOINT, MEASURED, COMMAND))]
+    return [name for quantity in PLOTTED for name in columns if name.rpartition(".")[2] == quantity]
 
 
-def _inputs(scenario: Scenario, recording: Recording) -> Plot:
-    """Every input as the plant had it, with its jumps, and behind it what a driver was told."""
+def _input_plot(scenario: Scenario, recording: Recording) -> Plot:
+    """Return the plot of the inputs that act on the plant, with their steps, and of the commands of drivers."""
     command, inputs = scenario.command, scenario.plant.inputs
     if isinstance(command, ControlLoop):
         command = command.as_open_loop(recording)
-    units = {given.name: "" if given.unit == "1" else f"\n[{given.unit}]" for given in scenario.plant.input_variables}
+    units = {item.name: "" if item.unit == "1" else f"\n[{item.unit}]" for item in scenario.plant.input_variables}
     start, reached = scenario.start_time, float(recording["time"][-1])
     end = reached if reached > start else start + scenario.duration
-    had = command.segments(inputs, start, end - start)
-    shortened = had.ends.size > (MOST_PIECES if isinstance(command, WithDrivers) else MOST_HELD)
+    applied = command.segments(inputs, start, end - start)
+    shortened = applied.ends.size > (MAX_DRIVER_SEGMENTS if isinstance(command, WithDrivers) else MAX_SEGMENTS)
     if shortened:
-        had = command.segments(inputs, start, float(had.ends[MOST_PIECES - 1]) - start)
-    told = (
-        command.inner.segments(inputs, start, float(had.ends[-1]) - start) if isinstance(command, WithDrivers) else None
-    )
+        applied = command.segments(inputs, start, float(applied.ends[MAX_DRIVER_SEGMENTS - 1]) - start)
+    plotted = float(applied.ends[-1]) - start
+    commanded = command.inner.segments(inputs, start, plotted) if isinstance(command, WithDrivers) else None
     figure, axes = new_figure(
         len(inputs), 1, height=0.9 + 0.9 * len(inputs), sharex=True, sharey=len(set(units.values())) == 1, squeeze=False
-    )  # one height for all of one unit: openings are compared
+    )  # one scale for inputs of the same unit: openings are compared
     for i, (name, axis) in enumerate(zip(inputs, axes[:, 0], strict=True)):
-        if told is not None:
-            axis.plot(*corners(told, start, i), color=BLACK, linestyle="--", linewidth=0.9, label="command")
-        axis.plot(*corners(had, start, i), color=BLUE, label="what the plant had")
+        if commanded is not None:
+            vertices = segment_vertices(commanded, start, i)
+            axis.plot(*vertices, color=BLACK, linestyle="--", linewidth=0.9, label="command")
+        axis.plot(*segment_vertices(applied, start, i), color=BLUE, label="applied input")
         axis.set_ylabel(f"{name}{units[name]}")
     axes[-1, 0].set_xlabel("time [s]")
     figure.align_ylabels()
-    if told is not None:
+    if commanded is not None:
         legend_below(figure, axes[0, 0])
-    part = f"; the first {MOST_PIECES} pieces" if shortened else ""
-    behind = "; dashed, what the drivers were told" if told is not None else ""
-    return Plot("inputs", f"Inputs of the plant{part}{behind}.", figure)
+    part = f" (first {MAX_DRIVER_SEGMENTS} segments)" if shortened else ""
+    legend = "; dashed: commands to the drivers" if commanded is not None else ""
+    return Plot("inputs", f"Inputs applied to the plant{part}{legend}.", figure)
 
 
 def _settings(scenario: Scenario) -> tuple[tuple[str, str, str], ...]:
-    start = ", ".join(f"{name} {value:.6g}" for name, value in scenario.start.items())
+    start = ", ".join(f"{name} {typographic(format_number(value))}" for name, value in scenario.start.items())
     return (
-        ("method", str(scenario.method), "scenario"),
-        ("start (SI)", start, "scenario"),
-        ("command", in_words(scenario.command), "scenario"),
+        ("integrator", str(scenario.method), "scenario"),
+        ("initial state (SI)", start, "scenario"),
+        ("inputs", describe_input(scenario.command), "scenario"),
     )
 
 
-def in_words(command: InputSignal | ControlLoop) -> str:
-    """A command in a sentence, however long its tables are."""
+def describe_input(command: InputSignal | ControlLoop) -> str:
+    """Return an input signal or control loop as one sentence; long tables are summarised."""
     if isinstance(command, ControlLoop):
         controller = command.controller
-        looks = f"every {command.period:g} s {type(controller).__name__} commands {', '.join(controller.inputs)}"
+        name, inputs = type(controller).__name__, ", ".join(controller.inputs)
         others = WithDrivers(command.other_inputs, command.drivers) if command.drivers else command.other_inputs
-        return f"{looks}; set point: {in_words(command.setpoint)}; beside: {in_words(others)}"
+        return (
+            f"{name}, sample time {command.period:g} s, manipulated inputs {inputs}; set point: "
+            f"{describe_input(command.setpoint)}; other inputs: {describe_input(others)}"
+        )
     if isinstance(command, WithDrivers):
-        chains = (f"{name} by {', '.join(map(str, chain))}" for name, chain in command.chains.items())
-        return f"{in_words(command.inner)}; driven: {'; '.join(chains)}"
+        chains = (f"{name}: {', '.join(map(str, chain))}" for name, chain in command.chains.items())
+        return f"{describe_input(command.inner)}; drivers: {'; '.join(chains)}"
     if isinstance(command, Periodic):
-        return f"every {command.period:g} s: {in_words(command.inner)}"
+        return f"periodic, {command.period:g} s: {describe_input(command.inner)}"
     if isinstance(command, Schedule):
-        return "; ".join(_changes(name, rows, "from") for name, rows in command.changes.items()) or "none"
+        return "; ".join(_describe_changes(name, rows, "from") for name, rows in command.changes.items()) or "none"
     if isinstance(command, SampledSignal):
-        return "; ".join(_changes(name, rows, "at") for name, rows in command.points.items()) or "none"
+        return "; ".join(_describe_changes(name, rows, "at") for name, rows in command.points.items()) or "none"
     return str(command)
 
 
-def _changes(name: str, rows: Sequence[tuple[float, float]], word: str) -> str:
-    if len(rows) > MOST_CHANGES:
+def _describe_changes(name: str, rows: Sequence[tuple[float, float]], preposition: str) -> str:
+    if len(rows) > MAX_LISTED_CHANGES:
         values = [value for _, value in rows]
         return (
-            f"{name}: {len(rows)} values from {min(values):g} to {max(values):g}, {rows[0][0]:g} to {rows[-1][0]:g} s"
+            f"{name}: {len(rows)} values between {min(values):g} and {max(values):g}, "
+            f"{rows[0][0]:g} to {rows[-1][0]:g} s"
         )
-    return f"{name} {', '.join(f'{value:g} {word} {time:g} s' for time, value in rows)}"
+    return f"{name} {', '.join(f'{value:g} {preposition} {time:g} s' for time, value in rows)}"

@@ -1,72 +1,76 @@
-"""The chapter of a report on the shape that a muscle's force must have."""
+"""Report chapter: a force surface fitted with shape constraints (monotonicity)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.plotting import DASHES, LINES, legend_outside, new_figure
+from ..identify import Fit, ShapeConstrainedFit
+from ..identify.surface.monotonicity import MonotonicityViolation
 from .chapter import Chapter, Plot, Table
 from .levels import levels_of
 
-if TYPE_CHECKING:
-    from ..identify.result import Fit
-    from ..identify.surface.breaks import MonotonicityViolation
-    from ..identify.surface.shape import ShapedFit
-
-CURVES = 5
+MAX_CURVES = 5
 POINTS = 161
 
 
-def shape_chapter(shaped: ShapedFit, loose: Fit, free: int) -> Chapter:
-    """What the conditions changed, and what they cost; `free` counts the points of free contraction."""
-    zero = f", and is zero at {free} points of free contraction" if free else ""
-    verdict = "breaks none of these rules" if not shaped.broken else "breaks them where the table says"
+def shape_chapter(shaped: ShapeConstrainedFit, unconstrained: Fit, free: int) -> Chapter:
+    """Return the chapter of a constrained fit and its cost; `free` is the number of points of free contraction."""
+    zero = f", and it is zero at {free} points of free contraction" if free else ""
+    verdict = (
+        "satisfies these constraints too"
+        if not shaped.unconstrained_violations
+        else "violates them in the regions of the table"
+    )
     return Chapter(
         paper="shape",
-        title="A force that keeps a muscle's shape",
-        summary=f"The muscle file holds this surface: its force nowhere falls with pressure nor rises with contraction "
-        f"on its validity range{zero}. Its rms error is {shaped.rmse:.4g} N, against {shaped.unconstrained:.4g} N of the surface "
-        f"without conditions, which {verdict}. Uncertainties and bands below are of the surface without conditions.",
+        title="Shape-constrained surface",
+        summary="The muscle file contains the constrained surface: within its validity range the force does not "
+        f"decrease with pressure and does not increase with contraction{zero}. Its rms error is {shaped.rmse:.4g} N, "
+        f"compared with {shaped.unconstrained_rmse:.4g} N of the unconstrained surface, which {verdict}. The uncertainties "
+        "and bands below are those of the unconstrained surface.",
         tables=(
-            breaks_table(shaped.broken, "shape-loose", "Where the surface without conditions behaves as no muscle"),
+            violation_table(
+                shaped.unconstrained_violations, "shape-loose", "Monotonicity violations of the unconstrained surface"
+            ),
         )
-        if shaped.broken
+        if shaped.unconstrained_violations
         else (),
-        plots=(Plot("shaped", "Solid: with conditions. Dashed: without.", _both(shaped, loose)),),
+        plots=(Plot("shaped", "Solid: constrained. Dashed: unconstrained.", _surface_figure(shaped, unconstrained)),),
     )
 
 
-def breaks_table(found: Sequence[MonotonicityViolation], name: str, title: str) -> Table:
-    """The places where a law breaks a rule, largest first."""
+def violation_table(violations: Sequence[MonotonicityViolation], name: str, title: str) -> Table:
+    """Return a table of the regions in which a law is not monotonic, largest first."""
     return Table(
         name,
         title,
         {
-            "rule": [each.rule.words for each in found],
-            "from [kPa]": [each.pressure[0] / 1e3 for each in found],
-            "to [kPa]": [each.pressure[1] / 1e3 for each in found],
-            "from [%]": [100 * each.across[0] for each in found],
-            "to [%]": [100 * each.across[1] for each in found],
-            "share of the validity range [%]": [100 * each.share for each in found],
-            "worst at [kPa]": [each.worst[0] / 1e3 for each in found],
-            "worst at [%]": [100 * each.worst[1] for each in found],
+            "constraint": [each.rule.description for each in violations],
+            "from [kPa]": [each.pressure[0] / 1e3 for each in violations],
+            "to [kPa]": [each.pressure[1] / 1e3 for each in violations],
+            "from [%]": [100 * each.second_argument[0] for each in violations],
+            "to [%]": [100 * each.second_argument[1] for each in violations],
+            "fraction of the validity range [%]": [100 * each.area_fraction for each in violations],
+            "worst at [kPa]": [each.worst_point[0] / 1e3 for each in violations],
+            "worst at [%]": [100 * each.worst_point[1] for each in violations],
         },
-        "Gauge pressure and contraction. airmuscle fit --shape fits a surface without such places.",
+        "Gauge pressure and contraction. `airmuscle fit --shape` fits a surface without such regions.",
     )
 
 
-def _both(shaped: ShapedFit, loose: Fit) -> Any:
+def _surface_figure(shaped: ShapeConstrainedFit, unconstrained: Fit) -> Any:
     figure, axes = new_figure(width=6.6, height=3.9)
-    contraction = np.linspace(*loose.ranges["contraction"], POINTS)
-    for i, pressure in enumerate(levels_of(loose.recording["pressure"], CURVES)):
+    contraction = np.linspace(*unconstrained.data_ranges["contraction"], POINTS)
+    for i, pressure in enumerate(levels_of(unconstrained.recording["pressure"], MAX_CURVES)):
         colour = LINES[i % len(LINES)]
         rows = np.full(POINTS, pressure)
-        shown = {"color": colour, "label": f"{pressure / 1e3:.4g} kPa"}
-        axes.plot(100 * contraction, shaped.model.force(rows, contraction), **shown)
-        axes.plot(100 * contraction, loose.model.force(rows, contraction), color=colour, linestyle=DASHES[1])
+        style = {"color": colour, "label": f"{pressure / 1e3:.4g} kPa"}
+        axes.plot(100 * contraction, shaped.model.force(rows, contraction), **style)
+        axes.plot(100 * contraction, unconstrained.model.force(rows, contraction), color=colour, linestyle=DASHES[1])
     axes.set(xlabel="contraction [%]", ylabel="force [N]")
     legend_outside(axes, title="gauge pressure")
     return figure

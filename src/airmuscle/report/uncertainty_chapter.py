@@ -1,152 +1,165 @@
-"""The chapter of a report on how sure the parameters are: standard deviation, bootstrap and profile side by side."""
+"""Report chapter: uncertainty of the parameters by standard errors, bootstrap and profile likelihood."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.plotting import BLACK, BLUE, RED, legend_below, new_figure
+from ..identify import Bootstrap, Fit, ProfileLikelihood
 from .chapter import Chapter, Plot, Table
+from .formatting import MISSING, format_number, format_unit
+from .formula import symbol_formula, to_mathtext
 
-if TYPE_CHECKING:
-    from ..identify.bootstrapping import Bootstrap
-    from ..identify.profile_likelihood import ProfileLikelihood
-    from ..identify.result import Fit
-
-MOST_ROWS = 40
-NORMAL = 1.96
-MOST_LOST = 0.1
-"""Share of refits without an answer from which on the rest are a selection (chosen)."""
-REACH = 12.0
-"""Standard deviations to which the figure reaches; an interval beyond it ends in an arrow."""
+MAX_ROWS = 40
+"""Maximum number of parameters in the figure."""
+NORMAL_QUANTILE = 1.96
+"""Half width of a 95 % interval in standard deviations."""
+UNBOUNDED = "unbounded"
+"""End of an interval that the data do not limit."""
+MAX_FAILED_SHARE = 0.1
+"""Fraction of failed refits above which the remaining ones are a biased selection (chosen)."""
+AXIS_LIMIT = 12.0
+"""Limit of the figure in standard errors; a longer interval ends in an arrow."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """What was asked of a fit beyond its standard deviations."""
+    """Bootstrap and profile likelihood of a fit, if requested."""
 
     fit: Fit
     bootstrap: Bootstrap | None = None
     profiles: tuple[ProfileLikelihood, ...] = ()
 
     @property
-    def asked(self) -> bool:
-        """Whether anything was."""
+    def requested(self) -> bool:
+        """Whether there is a bootstrap or a profile."""
         return self.bootstrap is not None or bool(self.profiles)
 
     def lines(self) -> list[str]:
-        """The same in lines for a terminal."""
-        found = [f"profile: {profile}" for profile in self.profiles]
+        """Return the intervals as lines of text for a terminal."""
+        lines = [f"profile: {profile}" for profile in self.profiles]
         if self.bootstrap is not None:
-            ends, drawn = self.bootstrap.intervals(), self.bootstrap
-            found.append(_drawn(drawn))
-            found += [
-                f"  {e.name}: 95 % of the refits within {low:.6g} to {high:.6g} {e.unit}"
-                for e, (low, high) in zip(self.fit.estimates, ends, strict=True)
+            lines.append(_describe_bootstrap(self.bootstrap))
+            lines += [
+                f"  {e.name}: 95 % {format_number(low)} to {format_number(high)} {format_unit(e.unit)}".rstrip()
+                for e, (low, high) in zip(self.fit.estimates, self.bootstrap.intervals(), strict=True)
             ]
-        return found
+        return lines
 
     def as_data(self) -> dict[str, Any]:
-        """The same as plain data, SI."""
-        found: dict[str, Any] = {}
+        """Return the intervals as plain data, all SI."""
+        data: dict[str, Any] = {}
         if self.profiles:
-            found["profiles"] = {p.name: {"low": p.low, "high": p.high, "level": p.level} for p in self.profiles}
+            data["profiles"] = {p.name: {"low": p.low, "high": p.high, "level": p.level} for p in self.profiles}
         if self.bootstrap is not None:
-            found["bootstrap"] = {
+            data["bootstrap"] = {
                 "refits": len(self.bootstrap.values),
-                "parts": self.bootstrap.parts,
-                "lost": self.bootstrap.lost,
+                "parts": self.bootstrap.group_count,
+                "lost": self.bootstrap.failed_refits,
                 "seed": self.bootstrap.seed,
-                "deviations": dict(zip(self.fit.names, self.bootstrap.standard_deviations.tolist(), strict=True)),
+                "deviations": dict(zip(self.fit.names, self.bootstrap.standard_errors.tolist(), strict=True)),
                 "intervals": dict(zip(self.fit.names, self.bootstrap.intervals().tolist(), strict=True)),
             }
-        return found
+        return data
 
 
-def _drawn(drawn: Bootstrap) -> str:
-    lost = f"; {drawn.lost} of them did not determine the parameters" if drawn.lost else ""
-    if drawn.lost > MOST_LOST * len(drawn.values):
-        lost += ", too many to trust the rest: give more runs, or a law with fewer parameters"
-    return f"bootstrap: {len(drawn.values)} refits to {drawn.parts} parts drawn anew, seed {drawn.seed}{lost}"
+def _describe_bootstrap(bootstrap: Bootstrap) -> str:
+    failed = f"; {bootstrap.failed_refits} of them did not determine the parameters" if bootstrap.failed_refits else ""
+    if bootstrap.failed_refits > MAX_FAILED_SHARE * len(bootstrap.values):
+        failed += ", so the intervals are not reliable: add runs, or use a law with fewer parameters"
+    return f"bootstrap: {len(bootstrap.values)} refits, {bootstrap.group_count} blocks resampled, seed {bootstrap.seed}{failed}"
 
 
-def uncertainty_chapter(found: Uncertainty) -> Chapter:
-    """Intervals of every parameter by each way that was asked for, as a table and a figure."""
-    said = ["95 % intervals. The standard deviation supposes independent errors and a law nearly straight in its "
-            "parameters."]  # fmt: skip
-    if found.bootstrap is not None:
-        said.append(f"{_drawn(found.bootstrap).capitalize()}. Wider intervals than those of the standard deviation say "
-                    "that rows of one part repeat each other.")  # fmt: skip
-    if found.profiles:
-        said.append("A profile holds one parameter and finds all others anew; an end that the data do not set is open.")
+def uncertainty_chapter(uncertainty: Uncertainty) -> Chapter:
+    """Return the chapter of the 95 % intervals of every parameter by each requested method."""
+    sentences = [
+        "95 % intervals. Standard errors assume independent errors and a law that is nearly linear in its parameters."
+    ]
+    if uncertainty.bootstrap is not None:
+        sentences.append(
+            f"{_describe_bootstrap(uncertainty.bootstrap).capitalize()}. Wider bootstrap intervals indicate that the "
+            "errors within a block are correlated."
+        )
+    if uncertainty.profiles:
+        sentences.append(
+            "A profile fixes one parameter and estimates all others again; an interval is unbounded where the data do "
+            "not limit the parameter."
+        )
     return Chapter(
         paper="uncertainty",
-        title="How sure the parameters are",
-        summary="\n\n".join(said),
-        tables=(_table(found),),
-        plots=(Plot("intervals", "Intervals in standard deviations of the fit; an arrow goes on.", _figure(found)),),
+        title="Uncertainty of the parameters",
+        summary="\n\n".join(sentences),
+        tables=(_table(uncertainty),),
+        plots=(Plot("intervals", _CAPTION, _figure(uncertainty)),),
     )
 
 
-def _table(found: Uncertainty) -> Table:
-    estimates = found.fit.estimates
-    half = NORMAL * found.fit.standard_deviations
+_CAPTION = "95 % intervals in units of the standard error; an arrow marks an interval beyond the axis."
+
+
+def _table(uncertainty: Uncertainty) -> Table:
+    fit, estimates = uncertainty.fit, uncertainty.fit.estimates
+    half = NORMAL_QUANTILE * fit.standard_errors
     columns: dict[str, Any] = {
         "parameter": [e.name for e in estimates],
         "value (SI)": [e.value for e in estimates],
-        "2.5 %, sd": found.fit.values - half,
-        "97.5 %, sd": found.fit.values + half,
+        "2.5 %, standard error": fit.values - half,
+        "97.5 %, standard error": fit.values + half,
     }
-    if found.bootstrap is not None:
-        ends = found.bootstrap.intervals()
+    if uncertainty.bootstrap is not None:
+        ends = uncertainty.bootstrap.intervals()
         columns |= {"2.5 %, bootstrap": ends[:, 0], "97.5 %, bootstrap": ends[:, 1]}
-    if found.profiles:
-        by_name = {profile.name: profile for profile in found.profiles}
-        columns["2.5 %, profile"] = [_end(by_name.get(e.name), "low") for e in estimates]
-        columns["97.5 %, profile"] = [_end(by_name.get(e.name), "high") for e in estimates]
+    if uncertainty.profiles:
+        by_name = {profile.name: profile for profile in uncertainty.profiles}
+        columns["2.5 %, profile"] = [_interval_end(by_name.get(e.name), "low") for e in estimates]
+        columns["97.5 %, profile"] = [_interval_end(by_name.get(e.name), "high") for e in estimates]
     columns["unit"] = ["" if e.unit == "1" else e.unit for e in estimates]
     return Table("intervals", "95 % intervals", columns)
 
 
-def _end(profile: ProfileLikelihood | None, side: str) -> float | str:
+def _interval_end(profile: ProfileLikelihood | None, side: str) -> float | str:
     if profile is None:
-        return ""
+        return MISSING
     end = float(getattr(profile, side))
-    return end if np.isfinite(end) else "open"
+    return end if np.isfinite(end) else UNBOUNDED
 
 
-def _figure(found: Uncertainty) -> Any:
-    shown = [i for i, e in enumerate(found.fit.estimates) if np.isfinite(e.stderr) and e.stderr > 0][:MOST_ROWS]
-    figure, axes = new_figure(width=6.4, height=1.6 + 0.24 * max(len(shown), 3))
-    by_name = {profile.name: (profile.low, profile.high) for profile in found.profiles}
-    ends = None if found.bootstrap is None else found.bootstrap.intervals()
-    for row, i in enumerate(shown):
-        estimate = found.fit.estimates[i]
-        ways = [((-NORMAL, NORMAL), BLACK, "standard deviation", 0.0)]
+def _figure(uncertainty: Uncertainty) -> Any:
+    estimates = uncertainty.fit.estimates
+    plotted = [i for i, e in enumerate(estimates) if np.isfinite(e.stderr) and e.stderr > 0][:MAX_ROWS]
+    figure, axes = new_figure(width=6.4, height=1.6 + 0.24 * max(len(plotted), 3))
+    by_name = {profile.name: (profile.low, profile.high) for profile in uncertainty.profiles}
+    ends = None if uncertainty.bootstrap is None else uncertainty.bootstrap.intervals()
+    for row, i in enumerate(plotted):
+        estimate = estimates[i]
+        intervals = [((-NORMAL_QUANTILE, NORMAL_QUANTILE), BLACK, "standard error", 0.0)]
         if ends is not None:
-            ways.append((tuple((ends[i] - estimate.value) / estimate.stderr), BLUE, "bootstrap", 0.25))
+            intervals.append((tuple((ends[i] - estimate.value) / estimate.stderr), BLUE, "bootstrap", 0.25))
         if estimate.name in by_name:
             pair = (np.array(by_name[estimate.name]) - estimate.value) / estimate.stderr
-            ways.append((tuple(pair), RED, "profile", -0.25))
-        for ends_of_it, colour, label, shift in ways:
-            _interval(axes, ends_of_it, row + shift, colour, label)
+            intervals.append((tuple(pair), RED, "profile", -0.25))
+        for interval, colour, label, shift in intervals:
+            _draw_interval(axes, interval, row + shift, colour, label)
     axes.axvline(0.0, color=BLACK, linewidth=0.6)
-    axes.set_yticks(range(len(shown)), [found.fit.estimates[i].label for i in shown])
+    axes.set_yticks(range(len(plotted)), [to_mathtext(symbol_formula(estimates[i].label)) for i in plotted])
     axes.invert_yaxis()
-    axes.set(xlabel="distance from the estimate [standard deviations of the fit]")
+    axes.set(xlabel="deviation from the estimate [standard errors]")
     widest = max((abs(v) for line in axes.lines for v in np.atleast_1d(line.get_xdata())), default=1.0)
     axes.set_xlim(-1.1 * max(widest, 2.5), 1.1 * max(widest, 2.5))
     legend_below(figure, axes, 3)
     return figure
 
 
-def _interval(axes: Any, pair: Any, at: float, colour: str, label: str) -> None:
-    known = axes.get_legend_handles_labels()[1]
-    low, high = np.clip(np.nan_to_num(np.array(pair, dtype=float), posinf=REACH, neginf=-REACH), -REACH, REACH)
-    name = None if label in known else label
-    axes.plot([low, high], [at, at], color=colour, linewidth=2.2, solid_capstyle="butt", label=name)
+def _draw_interval(axes: Any, interval: Any, row: float, colour: str, label: str) -> None:
+    labels = axes.get_legend_handles_labels()[1]
+    low, high = np.clip(
+        np.nan_to_num(np.array(interval, dtype=float), posinf=AXIS_LIMIT, neginf=-AXIS_LIMIT), -AXIS_LIMIT, AXIS_LIMIT
+    )
+    label_once = None if label in labels else label
+    axes.plot([low, high], [row, row], color=colour, linewidth=2.2, solid_capstyle="butt", label=label_once)
     for end, marker in ((low, "<"), (high, ">")):
-        if abs(end) >= REACH:
-            axes.plot([end], [at], marker=marker, color=colour, markersize=5)
+        if abs(end) >= AXIS_LIMIT:
+            axes.plot([end], [row], marker=marker, color=colour, markersize=5)

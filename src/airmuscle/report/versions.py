@@ -1,4 +1,4 @@
-"""What a report says about its own making, so that it can be made again."""
+"""Software versions of a report, for reproducibility."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "casadi", "matplotlib")
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """The versions of airmuscle, Python and the packages that compute; `not installed` where one is missing."""
+    """Return the versions of airmuscle, Python and the numerical packages; `not installed` for a missing one."""
     return {
         "airmuscle": _version("airmuscle"),
         "Python": platform.python_version(),

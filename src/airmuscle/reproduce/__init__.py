@@ -1,4 +1,4 @@
-"""The three papers, each reproduced claim by claim in a file of its own, and what runs them."""
+"""Reproduction of three papers, claim by claim."""
 
 from .run import PAPERS, reproduce
 

@@ -1,6 +1,6 @@
-"""Borzikova, Balara and Pitel on the Shadow Air Muscle SAM 30 x 290: what their paper claims, judged.
+"""Report chapter: Borzíková, Balara and Piteľ, contraction of the Shadow Air Muscle SAM 30 x 290.
 
-Its measurements are lost and its figures too; the three plane curves that it prints are the data here.
+The measurements and figures of the paper are lost; its three printed plane curves serve as data.
 """
 
 from __future__ import annotations
@@ -11,105 +11,142 @@ import numpy as np
 
 from ..characteristic.base import ContractionLaw
 from ..characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
+from ..core.constants import STANDARD_GRAVITY
 from ..identify.surface.basis import Chebyshev, LoadRange, conditioning
-from ..identify.surface.exponential import linearised, nonlinear
+from ..identify.surface.exponential import fit_linearised, fit_nonlinear
 from ..recording import Recording
 from ..report.chapter import AtLeast, Chapter, Claim, Equal
+from ..report.formatting import format_number, typographic
 from .borzikova_figures import plots
 from .borzikova_surfaces import (
     AS_EXPONENT,
+    CORRECTED,
     EXPONENTIAL,
-    MISPRINT_MENDED,
+    MISPRINT_CORRECTED,
     PRINTED,
-    REPAIRED,
     index_on_curves,
-    rounded,
+    round_contraction,
     surfaces,
 )
 from .borzikova_tables import CATALOGUE_TABLE, CATALOGUE_TEXT, tables
 
 PAPER = "borzikova"
 GRAVITY = 9.80665
-"""Standard fall [m/s2], which the paper takes as 10."""
+"""Standard gravity [m/s2]; the paper uses 10."""
+
+
+SUMMARY = (
+    r"The paper describes the contraction by \(k = k_\text{max}\,(1 - \text{e}^{v})\) with the exponent "
+    r"\(v = \sum_{i=0}^{4} \sum_{j=0}^{2} a_{ij}\,p^i F^j\), equation (1), where \(p\) is in bar and \(F\) in N. "
+    "Its measurements are lost; its three printed plane curves are used instead.\n\n"
+    r"The printed matrix cannot be the exponent \(v\). It is the direct polynomial "
+    r"\(k = \sum a_{ij}\,p^i F^j\) in per cent, with one misprinted exponent and two coefficients with too few "
+    "digits. Equation (1), fitted here, reproduces the curves exactly with both fitting procedures, because "
+    "three loads determine a quadratic in the force. Between the loads both surfaces violate the monotonicity "
+    "of a muscle, so a monotone surface is given as well."
+)
+
+CHOSEN = (
+    ("maximum pressure", "3.5 bar", "inferred: the catalogue pressure; the range is not printed"),
+    ("loads", "45, 130, 260 N", "printed for 4.5, 13, 26 kg"),
+    (r"\(k_\text{max}\)", "40 %", "printed"),
+    ("pressures sampled on each curve", "15, evenly spaced", "chosen: the number of measured points is lost"),
+    (
+        "disturbances",
+        "rounding to 0.5 %; normally distributed noise, standard deviation 0.5 %, seeds 0 to 99",
+        "chosen",
+    ),
+    (
+        r"\(a_{02}\), \(a_{12}\), \(a_{22}\) of the corrected matrix",
+        "−7.55 × 10⁻⁵, 0.002404, −0.002259",
+        "misprint; within rounding of the print",
+    ),
+    ("minimum slope of the monotone fit", "10⁻⁹, scaled", "chosen"),
+)
 
 
 def curve_claims(curves: PlaneCurves) -> tuple[Claim, ...]:
-    """The three printed indices, which nothing that is left can confirm or refute."""
+    """Return the claims of the three printed correlation indices, which cannot be verified."""
     return tuple(
         Claim(
             PAPER,
-            f"correlation index of the plane curve under {curve.force:g} N",
+            f"correlation index of the plane curve at {curve.force:g} N",
             Equal(curve.printed_index, 0.0005),
             None,
             "1",
-            "The index compares the curve with the measured points, which are lost; it cannot be computed again.",
+            "The index compares the curve with the measured points, which are lost, so it cannot be computed.",
         )
         for curve in curves.curves
     )
 
 
 def surface_claim(name: str, law: ContractionLaw, curves: PlaneCurves) -> Claim:
-    """Whether a surface follows the plane curves as well as these, by their least index, follow the measurements.
+    """Return the claim that a surface fits the plane curves as well as these fit the measurements (minimum index).
 
-    No index is printed for the surface. Where it does not exist the claim carries 1 - SSE/SST, and says so.
+    The paper prints no index for the surface. If the index does not exist, the claim contains 1 - SSE/SST and says so.
     """
-    found = index_on_curves(law, curves)
-    if found.value is None:
-        note = f"No index exists: SSE > SST, and 1 - SSE/SST = {found.explained:.4g} stands in its place."
+    index = index_on_curves(law, curves)
+    if index.value is None:
+        value = typographic(format_number(index.r_squared))
+        note = rf"The index does not exist as SSE > SST; the value is \(1 - \text{{SSE}}/\text{{SST}}\) = {value}."
     else:
-        note = f"Index over 15 even pressures of each curve, 0 to {curves.max_pressure / 1e5:g} bar."
+        note = f"Index at 15 evenly spaced pressures of each curve, 0 to {curves.max_pressure / 1e5:g} bar."
     return Claim(
         PAPER,
-        f"{name}: correlation index on the three plane curves, against the least that is printed for these",
+        f"{name}: correlation index on the three plane curves, not below the minimum printed for these",
         AtLeast(min(c.printed_index for c in curves.curves), 0.0005),
-        found.explained if found.value is None else found.value,
+        index.r_squared if index.value is None else index.value,
         "1",
         note,
     )
 
 
 def rank_claim(recording: Recording) -> Claim:
-    """Whether the data determine the coefficients of equation (1)."""
-    found = conditioning(recording, Chebyshev(LoadRange.of_recording(recording)))
+    """Return the claim that the data determine the coefficients of equation (1)."""
+    design = conditioning(recording, Chebyshev(LoadRange.from_recording(recording)))
     loads = np.unique(recording["force"]).size
     return Claim(
         PAPER,
-        f"{loads} loads determine the coefficients of equation (1), fourth degree in p and second in F",
+        rf"{loads} loads determine the coefficients of equation (1), of degree 4 in \(p\) and 2 in \(F\)",
         Equal(15.0),
-        float(found.rank),
+        float(design.rank),
         "1",
-        "Rank of the design. Three loads fix a quadratic in F exactly, so none can be left out for a test.",
+        r"Rank of the design matrix. Three loads determine a quadratic in \(F\) exactly, so no load can be left out "
+        "for validation.",
     )
 
 
 def procedure_claim(recording: Recording, saturation: float) -> Claim:
-    """Whether the spreadsheet's linearisation gives the least S(A), as the paper takes it to."""
-    by_logarithm, by_contraction = linearised(recording, saturation), nonlinear(recording, saturation)
+    """Return the claim that the linearised fit minimises the sum of squares S(A), as the paper assumes."""
+    by_logarithm, by_contraction = fit_linearised(recording, saturation), fit_nonlinear(recording, saturation)
     return Claim(
         PAPER,
-        "the linearised fit of equation (1) gives the least S(A): its rms over that of least squares on k",
+        r"the linearised fit of equation (1) minimises \(S(A)\): ratio of its rms error to that of least squares on "
+        r"\(k\)",
         Equal(1.0, 0.005),
-        by_logarithm.rms / by_contraction.rms,
+        by_logarithm.rmse / by_contraction.rmse,
         "1",
-        f"Plane curves rounded to 0.5 %: rms {by_logarithm.rms:.4%} linearised, {by_contraction.rms:.4%} by least "
-        "squares on k; the logarithm weighs points near k_max too heavily. Tolerance chosen.",
+        f"Plane curves rounded to 0.5 %: rms error {100 * by_logarithm.rmse:.4g} % linearised, "
+        rf"{100 * by_contraction.rmse:.4g} % by least squares on \(k\); the logarithm gives points near "
+        r"\(k_\text{max}\) too much weight. The tolerance is chosen.",
     )
 
 
 def load_claim() -> Claim:
-    """Whether the loads in kilogram and newton agree."""
+    """Return the claim that the loads in kilograms and newtons agree."""
     return Claim(
         PAPER,
         "a load of 26 kg is 260 N",
         Equal(260.0, 0.5),
-        26.0 * GRAVITY,
+        26.0 * STANDARD_GRAVITY,
         "N",
-        "The paper takes g as 10 m/s2; true are 44.1, 127.5 and 255.0 N. Its numbers are kept.",
+        r"The paper uses \(g\) = 10 m/s²; with standard gravity the loads are 44.1, 127.5 and 255.0 N. The printed "
+        "values are used.",
     )
 
 
 def catalogue_claims(curves: PlaneCurves) -> tuple[Claim, ...]:
-    """The catalogue that the paper prints, against its own text and its own measurements."""
+    """Return the claims of the printed catalogue, compared with the text and the measurements of the same paper."""
     heaviest = max(curves.curves, key=lambda c: c.force)
     pressures = np.linspace(0.0, curves.max_pressure, 351)
     in_table = dict(zip(CATALOGUE_TABLE["diameter [mm]"], CATALOGUE_TABLE["load at 3.5 bar [kg]"], strict=True))
@@ -121,58 +158,44 @@ def catalogue_claims(curves: PlaneCurves) -> tuple[Claim, ...]:
             Equal(float(in_table[30])),
             float(in_text[30]),
             "kg",
-            "Reproduced is what the text of the same paper gives for it; both are kept.",
+            "The reproduced value is the one in the text of the same paper.",
         ),
         Claim(
             PAPER,
-            "text: 25 % contraction under 30 kg",
+            "text: 25 % contraction at 30 kg",
             AtLeast(25.0),
             100.0 * float(np.max(heaviest.contraction(pressures))),
             "%",
-            f"The paper's own curve under {heaviest.force:g} N, a smaller load, at the best pressure up to "
-            f"{curves.max_pressure / 1e5:g} bar. The pressure meant in the text is not printed.",
+            f"Maximum of the plane curve at {heaviest.force:g} N, a smaller load, up to "
+            f"{curves.max_pressure / 1e5:g} bar. The text does not give the pressure.",
         ),
     )
 
 
 def claims(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> tuple[Claim, ...]:
-    """All claims of the paper, judged with these curves and surfaces."""
-    judged = (AS_EXPONENT, PRINTED, MISPRINT_MENDED, REPAIRED, EXPONENTIAL)
+    """Return all claims of the paper for these curves and surfaces."""
+    evaluated = (AS_EXPONENT, PRINTED, MISPRINT_CORRECTED, CORRECTED, EXPONENTIAL)
     return (
         *curve_claims(curves),
-        *(surface_claim(name, laws[name], curves) for name in judged),
+        *(surface_claim(name, laws[name], curves) for name in evaluated),
         rank_claim(curves.sample()),
-        procedure_claim(rounded(curves.sample()), curves.curves[0].saturation),
+        procedure_claim(round_contraction(curves.sample()), curves.curves[0].saturation),
         load_claim(),
         *catalogue_claims(curves),
     )
 
 
 def chapter() -> Chapter:
-    """The chapter of the report."""
+    """Return the chapter of the report."""
     curves = SAM_30X290
     laws = surfaces(curves)
     return Chapter(
         paper=PAPER,
-        title="Borzikova, Balara, Pitel: contraction of the Shadow Air Muscle SAM 30 x 290",
-        summary=(
-            "The paper's three plane curves stand for its measurements, which are lost. Its matrix cannot be the "
-            "exponent of its equation (1): it is a direct polynomial with one misprinted exponent and two "
-            "coefficients with too few digits. Equation (1) itself, fitted here, passes through the curves "
-            "exactly, whichever procedure is used, because three loads fix a quadratic in force. Between the "
-            "loads both surfaces break what a muscle must keep, so a monotone one is given beside them."
-        ),
+        title="Borzíková, Balara, Piteľ: contraction of the Shadow Air Muscle SAM 30 × 290",
+        summary=SUMMARY,
         claims=claims(curves, laws),
         tables=tables(curves, laws),
         plots=plots(curves, laws),
         references=(BORZIKOVA,),
-        chosen=(
-            ("greatest pressure", "3.5 bar", "inferred: the catalogue pressure; the paper's range is not printed"),
-            ("loads", "45, 130, 260 N", "printed for 4.5, 13, 26 kg"),
-            ("k_max", "40 %", "printed"),
-            ("pressures sampled on each curve", "15, even", "chosen; the number of measured points is lost"),
-            ("disturbances", "rounded to 0.5 %; normal, sd 0.5 %, seeds 0 to 99", "chosen"),
-            ("a_02, a_12, a_22 of the repaired matrix", "-7.55e-5, 0.002404, -0.002259", "misprint; within rounding"),
-            ("least slope of the monotone fit", "1e-9, scaled", "chosen"),
-        ),
+        chosen=CHOSEN,
     )

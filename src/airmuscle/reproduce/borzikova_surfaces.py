@@ -1,4 +1,4 @@
-"""The surfaces that the chapter on Borzikova et al. judges, and the disturbed data that it fits."""
+"""Contraction surfaces of the chapter on Borzíková et al., and the disturbed data for their fits."""
 
 from __future__ import annotations
 
@@ -12,61 +12,61 @@ from ..characteristic.borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExp
 from ..core.errors import AirmuscleWarning
 from ..identify.correlation_index import CorrelationIndex, correlation_index
 from ..identify.surface.basis import LoadRange
-from ..identify.surface.monotone import monotone
-from ..library.catalogue import load
+from ..identify.surface.monotone import fit_monotone
+from ..library.catalogue import load_law
 from ..recording import Recording
 
-MISPRINT = 2
-"""Place of a_02, whose exponent is misprinted, among the coefficients."""
-MENDED_A02 = -7.55e-5
+MISPRINT_INDEX = 2
+"""Index of a_02, whose exponent is misprinted, in the coefficients."""
+CORRECTED_A02 = -7.55e-5
 
 AS_EXPONENT = "printed matrix as exponent of (1)"
 PRINTED = "direct, as printed"
-MISPRINT_MENDED = "direct, a_02 mended alone"
-REPAIRED = "direct, repaired"
-EXPONENTIAL = "exponential (1), by us"
+MISPRINT_CORRECTED = r"direct, \(a_{02}\) corrected only"
+CORRECTED = "direct, corrected"
+EXPONENTIAL = "exponential (1), fitted here"
 MONOTONE = "exponential (1), monotone"
 
 
 def surfaces(curves: PlaneCurves = SAM_30X290) -> dict[str, ContractionLaw]:
-    """Every surface that the chapter judges, by the name that it has there."""
+    """Return all surfaces of the chapter by name."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", AirmuscleWarning)  # that it is misprinted is what the chapter shows
-        printed = load("borzikova-direct-printed").characteristic
-    repaired = load("borzikova-direct-repaired").characteristic
-    exponential = load("borzikova-exponential").characteristic
+        warnings.simplefilter("ignore", AirmuscleWarning)  # the chapter shows the misprint
+        printed = load_law("borzikova-direct-printed").characteristic
+    corrected = load_law("borzikova-direct-repaired").characteristic
+    exponential = load_law("borzikova-exponential").characteristic
     assert isinstance(printed, BorzikovaDirect)
-    assert isinstance(repaired, BorzikovaDirect)
+    assert isinstance(corrected, BorzikovaDirect)
     assert isinstance(exponential, BorzikovaExponential)
     saturation = curves.curves[0].saturation
     return {
-        AS_EXPONENT: BorzikovaExponential(printed.coefficients, *LoadRange.of_law(printed), saturation=saturation),
+        AS_EXPONENT: BorzikovaExponential(printed.coefficients, *LoadRange.from_law(printed), saturation=saturation),
         PRINTED: printed,
-        MISPRINT_MENDED: with_a02(printed, MENDED_A02),
-        REPAIRED: repaired,
+        MISPRINT_CORRECTED: with_a02(printed, CORRECTED_A02),
+        CORRECTED: corrected,
         EXPONENTIAL: exponential,
-        MONOTONE: monotone(curves.sample(), saturation).model,
+        MONOTONE: fit_monotone(curves.sample(), saturation).model,
     }
 
 
 def with_a02(law: BorzikovaDirect, a02: float) -> BorzikovaDirect:
-    """The surface with another coefficient of F^2."""
-    coefficients = (*law.coefficients[:MISPRINT], a02, *law.coefficients[MISPRINT + 1 :])
+    """Return the surface with another coefficient of F^2."""
+    coefficients = (*law.coefficients[:MISPRINT_INDEX], a02, *law.coefficients[MISPRINT_INDEX + 1 :])
     return dataclasses.replace(law, coefficients=coefficients)
 
 
 def index_on_curves(law: ContractionLaw, curves: PlaneCurves) -> CorrelationIndex:
-    """The correlation index of a surface on 15 even pressures of each plane curve."""
+    """Return the correlation index of a surface at 15 evenly spaced pressures of each plane curve."""
     data = curves.sample()
     return correlation_index(data["contraction"], law.contraction(data["pressure"], data["force"]))
 
 
-def rounded(recording: Recording, step: float = 0.005) -> Recording:
-    """The recording with contractions rounded to a step [1]."""
+def round_contraction(recording: Recording, step: float = 0.005) -> Recording:
+    """Return the recording with contractions rounded to multiples of `step` [1]."""
     return recording.with_columns(contraction=np.round(recording["contraction"] / step) * step)
 
 
-def noisy(recording: Recording, seed: int, deviation: float = 0.005) -> Recording:
-    """The recording with normal noise of a standard deviation [1] on its contractions."""
+def add_noise(recording: Recording, seed: int, deviation: float = 0.005) -> Recording:
+    """Return the recording with normally distributed noise on the contractions, of standard deviation [1]."""
     noise = deviation * np.random.default_rng(seed).standard_normal(len(recording))
     return recording.with_columns(contraction=recording["contraction"] + noise)

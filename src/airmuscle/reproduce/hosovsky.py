@@ -1,4 +1,4 @@
-"""The third paper: dynamics after Hill's muscle model, with valves by ISO 6358 and the gas equation."""
+"""Report chapter: Hošovský et al., muscle dynamics by Hill's model with valves by ISO 6358."""
 
 from __future__ import annotations
 
@@ -13,142 +13,174 @@ from ..core.plotting import LINES, legend_outside, new_figure
 from ..core.reference import cite
 from ..geometry.base import Geometry
 from ..identify import Fit
-from ..identify.censored_least_squares import measured_rank
+from ..identify.censored_least_squares import uncensored_rank
 from ..library import catalogue
 from ..report.chapter import Chapter, Claim, Equal, Plot, Table
-from . import hosovsky_causes as causing
+from . import hosovsky_effects as causing
 from . import hosovsky_fill as filling
 from . import hosovsky_release as releasing
-from .hosovsky_plant import MAPS, MATRIX, MATRIX_CATALOGUE, PAPER, Numbers, muscle, surface, surface_fit
+from .hosovsky_plant import (
+    FORCE_MAPS,
+    MATRIX,
+    MATRIX_CATALOGUE,
+    PAPER,
+    UnpublishedParameters,
+    muscle,
+    surface,
+    surface_fit,
+)
 
-SUMMARY = """The muscle of Hosovsky et al. has a contractile element given by a polynomial of total degree five in
-contraction and pressure (21 coefficients, clamped to 0..1200 N), a parallel spring and a damper; two on/off valves
-by ISO 6358 fill and discharge it. The paper prints neither the coefficients nor mass, spring, damper and geometry.
-The surface is therefore fitted to the measured map of a DMSP-20-300, and second to Festo's tool table; valves,
-supply, schedule, released mass and solver are as printed; every other number is listed below with its source, and
-each verdict on the quick release says whether it survives the whole range of every chosen number."""
+SUMMARY = r"""The equation of motion (1) is
+\(m\,\ddot{y} + F_\text{TL} + F_\text{PP} = F_\text{KE} - F_\text{E}\), with the forces of the damper \(F_\text{TL}\),
+the parallel spring \(F_\text{PP}\) and the contractile element \(F_\text{KE}\), and the external force \(F_\text{E}\).
+\(F_\text{KE}\) is a polynomial of total degree five in contraction and pressure with 21 coefficients, limited to 0 to
+1200 N. Two on/off valves by ISO 6358 fill and discharge the muscle.
+
+The paper prints neither the coefficients nor mass, spring, damper and geometry. The surface is fitted to the measured
+force map of a DMSP-20-300, and alternatively to the table of Festo's sizing tool. Valves, supply, schedule, released
+mass and integrator are as printed. All other values are listed below with their sources. Every verdict on the quick
+release states whether it holds over the ranges of all chosen values."""
 
 
-def surface_claims(found: Fit) -> tuple[Claim, ...]:
-    """The form of the contractile surface, counted and measured."""
+def surface_claims(fit: Fit) -> tuple[Claim, ...]:
+    """Return the claims on the contractile surface: number and rank of its coefficients, force limits."""
     law = surface()
-    measured = measured_rank(found.problem, found.problem.slopes(found.values))
+    rank = uncensored_rank(fit.problem, fit.problem.jacobian(fit.values))
     force = law.force(np.linspace(0, 1e6, 51)[:, None], np.linspace(-0.05, 0.4, 46)[None, :])
+    positive = "coefficients determined by the rows of the force map with a positive force"
+    note = f"Condition number {fit.condition:.3g} (scaled); rms error {fit.rmse:.3g} N. "
+    note += " ".join(map(_sentence, fit.notes))
+    limit = "force compensator: {} force of the surface"
     return (
         Claim(PAPER, "coefficients of a polynomial of total degree five", Equal(21, 0), len(exponents(5)), "1"),
-        Claim(PAPER, "coefficients that the rows of the map that pull determine", Equal(21, 0), measured, "1",
-              f"condition {found.condition:.3g}, scaled; rms {found.rmse:.3g} N. " + " ".join(found.notes)),
-        Claim(PAPER, "force compensator: greatest force of the surface", Equal(1200.0, 0.0), float(force.max()), "N"),
-        Claim(PAPER, "force compensator: least force of the surface", Equal(0.0, 0.0), float(force.min()), "N"),
-    )  # fmt: skip
+        Claim(PAPER, positive, Equal(21, 0), rank, "1", note),
+        Claim(PAPER, limit.format("maximum"), Equal(1200.0, 0.0), float(force.max()), "N"),
+        Claim(PAPER, limit.format("minimum"), Equal(0.0, 0.0), float(force.min()), "N"),
+    )
+
+
+def _sentence(note: str) -> str:
+    return f"{note[:1].upper()}{note[1:].rstrip('.')}."
 
 
 def surface_figure() -> Plot:
-    """The surface's isobars through the measured points, as the paper's Fig. 2 shows its surface."""
-    law, data = surface(), catalogue.load_data(MAPS[0])
+    """Return the isobars of the surface and the measured points; Fig. 2 of the paper shows the surface."""
+    law, data = surface(), catalogue.load_data(FORCE_MAPS[0])
     figure, axes = new_figure()
     contraction = np.linspace(0.0, 0.26, 200)
     for i, pressure in enumerate((675e3, 525e3, 375e3, 250e3, 135e3)):
-        here = np.isclose(data["pressure"], pressure)
+        rows = np.isclose(data["pressure"], pressure)
         axes.plot(contraction * 100, law.force(pressure, contraction), color=LINES[i], label=f"{pressure / 1e3:g} kPa")
-        axes.plot(data["contraction"][here] * 100, data["force"][here], "o", color=LINES[i])
+        axes.plot(data["contraction"][rows] * 100, data["force"][rows], "o", color=LINES[i])
     axes.axhline(1200.0, color="0.4", linewidth=0.8, linestyle=":")
     axes.set(xlabel="contraction [%]", ylabel="force [N]", xlim=(0, 27), ylim=(-30, 1700))
     legend_outside(axes, title="gauge pressure")
-    caption = "Contractile surface (lines) fitted to a measured DMSP-20-300 (points), clamped to 0..1200 N (dotted)."
+    caption = "Contractile surface (lines) fitted to a measured DMSP-20-300 (points), limited to 0 to 1200 N (dotted)."
     return Plot("hosovsky_surface", caption, figure)
 
 
-def coefficients() -> Table:
-    """The fitted coefficients in plain units, p in bar: what the paper leaves out, for this muscle."""
-    plain = {name: surface(name).plain_coefficients(1e5) for name in MAPS}
+def coefficient_table() -> Table:
+    """Return the fitted coefficients in plain units, p in bar, which the paper does not print."""
+    plain = {name: surface(name).monomial_coefficients(1e5) for name in FORCE_MAPS}
     powers = exponents(5)
     columns: dict[str, list[float] | list[int]] = {
         "power of contraction": [i for i, _ in powers],
         "power of pressure": [j for _, j in powers],
     }
-    for name in MAPS:
+    for name in FORCE_MAPS:
         columns[f"{name} [N/bar^j]"] = [plain[name][power] for power in powers]
-    note = "F = Sum a_ij eps^i p^j with eps as a ratio and p gauge in bar; inside the validity range of its data only"
-    return Table("hosovsky_coefficients", "The 21 coefficients in plain units", columns, note)
+    note = (
+        r"\(F = \sum a_{ij}\,\varepsilon^i p^j\) with the contraction \(\varepsilon\) as a ratio and the gauge "
+        r"pressure \(p\) in bar; only within the validity range of the data."
+    )
+    return Table("hosovsky_coefficients", "Fitted coefficients of the contractile surface", columns, note)
 
 
-def chapter(numbers: Numbers | None = None, suspected: causing.Suspected | None = None) -> Chapter:
-    """The chapter of the report; `numbers` and those of the suspected causes are what the paper does not print."""
-    numbers, suspected = numbers or Numbers(), suspected or causing.Suspected()
-    fill = filling.run_fill(numbers)
-    effects = causing.effects(numbers, suspected)
-    low, high = releasing.pair(numbers)
-    ranges = releasing.over_ranges(numbers)
+def chapter(
+    parameters: UnpublishedParameters | None = None, suspected: causing.SuspectedCauses | None = None
+) -> Chapter:
+    """Return the chapter of the report; both arguments contain values that the paper does not print."""
+    parameters, suspected = parameters or UnpublishedParameters(), suspected or causing.SuspectedCauses()
+    fill = filling.run_fill(parameters)
+    effects = causing.compute_effects(parameters, suspected)
+    low, high = releasing.release_pair(parameters)
+    ranges = releasing.range_table(parameters)
     return Chapter(
         PAPER,
-        "Hosovsky et al.: muscle dynamics after Hill",
+        "Hošovský et al.: muscle dynamics by Hill's model",
         SUMMARY,
         claims=(
             *surface_claims(surface_fit()),
-            *filling.claims(fill, causing.in_words(effects)),
+            *filling.claims(fill, causing.describe_effects(effects)),
             *releasing.claims(low, high, ranges),
         ),
         tables=(
-            causing.table(effects),
+            causing.effect_table(effects),
             ranges,
-            coefficients(),
-            maxwell_table(numbers),
-            _extrapolation(fill, low, high),
-            *_series(fill, low, high),
+            coefficient_table(),
+            maxwell_table(parameters),
+            _extrapolation_table(fill, low, high),
+            *_time_series(fill, low, high),
         ),
         plots=(
             surface_figure(),
             filling.valve_figure(MATRIX, fill.plant.ambient.temperature),
             filling.figure_3(fill),
-            causing.figure(effects),
+            causing.effect_plot(effects),
             releasing.figure_4(low, high),
         ),
-        references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(catalogue.load(MAPS[0]))),
-        chosen=(*numbers.rows(), *suspected.rows()),
+        references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(catalogue.load_law(FORCE_MAPS[0]))),
+        chosen=(*parameters.as_rows(), *suspected.as_rows()),
     )
 
 
-def maxwell_table(numbers: Numbers) -> Table:
-    """How far muscle force and volume are from one potential, for the fitted surfaces and the measured muscles' law."""
-    shape = muscle(numbers).geometry
+def maxwell_table(parameters: UnpublishedParameters) -> Table:
+    """Return the Maxwell defects of the fitted surfaces and of the law of the measured muscles."""
+    shape = muscle(parameters).geometry
     laws: dict[str, tuple[Characteristic, Geometry]]
-    laws = {f"surface fitted to {name}, before the clamp": (surface_fit(name).model, shape) for name in MAPS}
+    laws = {f"surface fitted to {name}, without the limits": (surface_fit(name).model, shape) for name in FORCE_MAPS}
     for name in ("dmsp-20-300", "dmsp-10-250"):
-        entry = catalogue.load(name)
+        entry = catalogue.load_law(name)
         laws[f"Martens-Boblan 2017, {name}"] = (entry.characteristic, entry.muscle.geometry)
     validity_ranges = [
-        surface(MAPS[0]).validity_range,
-        surface(MAPS[1]).validity_range,
-        *(catalogue.load(n).validity_range for n in ("dmsp-20-300", "dmsp-10-250")),
+        surface(FORCE_MAPS[0]).validity_range,
+        surface(FORCE_MAPS[1]).validity_range,
+        *(catalogue.load_law(n).validity_range for n in ("dmsp-20-300", "dmsp-10-250")),
     ]
-    found = [
+    defects = [
         maxwell_defect(law, volume, validity_range)
         for (law, volume), validity_range in zip(laws.values(), validity_ranges, strict=True)
         if validity_range
     ]
     columns: dict[str, list[Any]] = {
         "muscle": list(laws),
-        "greatest |dF/dp + dV/dL| [mm2]": [d.worst * 1e6 for d in found],
-        "relative to the greatest dV/dL [%]": [d.relative * 100 for d in found],
-        "at pressure [kPa]": [d.pressure / 1e3 for d in found],
-        "at contraction [%]": [d.contraction * 100 for d in found],
+        r"largest \(\left|\frac{\partial F}{\partial p} + \frac{\text{d}V}{\text{d}L}\right|\) [mm2]": [
+            d.worst * 1e6 for d in defects
+        ],
+        r"relative to the largest \(\frac{\text{d}V}{\text{d}L}\) [%]": [d.relative * 100 for d in defects],
+        "at pressure [kPa]": [d.pressure / 1e3 for d in defects],
+        "at contraction [%]": [d.contraction * 100 for d in defects],
     }
-    note = "where the muscle pulls, over the validity range of its data; the defect times an area of pressure and length is energy"
-    return Table("hosovsky_maxwell", "Maxwell defect of fitted muscles over their validity range", columns, note)
+    note = (
+        "Points with a positive force within the validity range of the data. The integral of the defect over an area "
+        "in the plane of pressure and length is an energy."
+    )
+    return Table("hosovsky_maxwell", "Maxwell defect of fitted muscles over their validity ranges", columns, note)
 
 
-def _extrapolation(fill: filling.Fill, low: releasing.Release, high: releasing.Release) -> Table:
-    """When and how far the runs left the validity range in which the surface has data."""
+def _extrapolation_table(fill: filling.FillRun, low: releasing.Release, high: releasing.Release) -> Table:
+    """Return the times and extents of extrapolation beyond the data of the surface, by run."""
     runs = {"fill and discharge": fill.adaptive, f"release from {low.pressure / 1e3:g} kPa": low.run}
     runs[f"release from {high.pressure / 1e3:g} kPa"] = high.run
-    left = [(name, note) for name, run in runs.items() for note in run.notes if "outside the validity range" in note]
-    columns = {"run": [name for name, _ in left], "what": [note for _, note in left]}
-    return Table("hosovsky_boxes", "Where the runs left the data of the contractile surface", columns)
+    extrapolations = [
+        (name, note) for name, run in runs.items() for note in run.notes if "outside the validity range" in note
+    ]
+    columns = {"run": [name for name, _ in extrapolations], "extrapolation": [note for _, note in extrapolations]}
+    return Table("hosovsky_boxes", "Extrapolation beyond the data of the contractile surface", columns)
 
 
-def _series(fill: filling.Fill, low: releasing.Release, high: releasing.Release) -> tuple[Table, ...]:
-    """The runs behind Figs. 3 and 4, for the data folder."""
+def _time_series(fill: filling.FillRun, low: releasing.Release, high: releasing.Release) -> tuple[Table, ...]:
+    """Return the time series of Figs. 3 and 4; only written to files."""
     runs = {"hosovsky_fill": fill.adaptive, "hosovsky_release_low": low.run, "hosovsky_release_high": high.run}
     names = (("time", "s"), ("pressure", "Pa"), ("contraction", "1"), ("position", "m"), ("force", "N"))
     return tuple(

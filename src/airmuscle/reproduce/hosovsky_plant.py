@@ -1,4 +1,4 @@
-"""The plant of the third paper: what is printed, what is measured elsewhere, and what had to be chosen."""
+"""Plant of Hošovský et al.: printed values, values measured elsewhere, and chosen values."""
 
 from __future__ import annotations
 
@@ -10,20 +10,21 @@ from ..core.reference import CHOSEN, Reference
 from ..geometry.braid import Braid
 from ..identify import Fit, fit
 from ..library import catalogue
-from ..mechanism import HangingMass, Held, Mechanism
+from ..mechanism import HangingMass, Mechanism, WithLatch
 from ..muscle import LinearDamper, LinearSpring, Muscle, RigidWall, Spring, Wall
 from ..plant.plant import Plant
 from ..pneumatics import FillDischarge, Orifice, Supply, TubeModel, Valve, WithTubes
 from ..pneumatics.gas import Ambient, Gas, Isothermal
+from ..report.formatting import format_number, format_quantity, typographic
 
 PAPER = "hosovsky"
-MAPS = ("dmsp-20-300", "festo-tool-dmsp-20")
-"""Where the contractile surface comes from, as the paper does not print it: measured, and second the tool table."""
+FORCE_MAPS = ("dmsp-20-300", "festo-tool-dmsp-20")
+"""Data of the contractile surface, which the paper does not print: a measured force map and the sizing-tool table."""
 
 MATRIX = Valve(2.6167e-9, 0.433)
 """MATRIX EMX821.104C224: b = 0.433 and the digits of C are printed; the exponent e-9 is lost in our copy."""
-FULL_PRESSURE = 650e3 - 101_325.0
-"""The 650 kPa step, taken as absolute (inferred from the sensor's range of 0..0.6 MPa); gauge [Pa]."""
+SUPPLY_PRESSURE = 650e3 - 101_325.0
+"""The step of 650 kPa, assumed to be absolute (inferred from the sensor range of 0 to 0.6 MPa); gauge [Pa]."""
 RELEASED_MASS = 30.0
 """Load of the quick release [kg], printed."""
 
@@ -31,14 +32,14 @@ MATRIX_CATALOGUE = Reference(
     "matrix-821",
     "MATRIX",
     "Solenoid valves series 820",
-    "as quoted by Hosovsky et al.",
+    "as quoted by Hošovský et al.",
     note="EMX821.104C224, 3-position 2-way on/off with closed centre; C = 2.6167e-9 m3/(s Pa), b = 0.433",
 )
 
 
 @dataclasses.dataclass(frozen=True)
-class Chosen:
-    """A number that the paper does not print: what was taken, its range for the verdicts, and why."""
+class ChosenValue:
+    """A parameter that the paper does not print: value, range for the verdicts, unit, meaning and source."""
 
     value: float
     low: float
@@ -47,59 +48,63 @@ class Chosen:
     meaning: str
     source: str = CHOSEN
 
+    def as_row(self) -> tuple[str, str, str]:
+        """Return (meaning, value with unit and range, source) for the report."""
+        low, high = (typographic(format_number(end)) for end in (self.low, self.high))
+        return self.meaning, f"{format_quantity(self.value, self.unit)} (range {low} to {high})", self.source
+
 
 @dataclasses.dataclass(frozen=True)
-class Numbers:
-    """Every number behind the figures of this paper that it does not print."""
+class UnpublishedParameters:
+    """All parameters of the simulated figures that the paper does not print."""
 
-    load: Chosen = Chosen(10.0, 2.0, 20.0, "kg", "load in fill and discharge")
-    stiffness: Chosen = Chosen(1000.0, 0.0, 4000.0, "N/m", "parallel spring, constant as in the paper")
-    damping: Chosen = Chosen(200.0, 100.0, 400.0, "N s/m", "damper, constant as in the paper")
-    length: Chosen = Chosen(0.300, 0.200, 0.400, "m", "resting length", "of the measured specimen; the range is chosen")
-    braid_angle: Chosen = Chosen(
-        0.42616, 0.38, 0.50, "rad", "braid angle of the volume", "Martens and Boblan 2017; the range is chosen"
+    load: ChosenValue = ChosenValue(10.0, 2.0, 20.0, "kg", "load during fill and discharge")
+    stiffness: ChosenValue = ChosenValue(1000.0, 0.0, 4000.0, "N/m", "parallel spring, constant as in the paper")
+    damping: ChosenValue = ChosenValue(200.0, 100.0, 400.0, "N s/m", "damper, constant as in the paper")
+    length: ChosenValue = ChosenValue(0.300, 0.200, 0.400, "m", "resting length", "measured specimen; range chosen")
+    braid_angle: ChosenValue = ChosenValue(
+        0.42616, 0.38, 0.50, "rad", "braid angle, for the volume", "Martens and Boblan 2017; range chosen"
     )
-    low_pressure: Chosen = Chosen(200e3, 150e3, 250e3, "Pa", "lower initial pressure of the release, gauge")
-    high_pressure: Chosen = Chosen(400e3, 350e3, 500e3, "Pa", "higher initial pressure of the release, gauge")
+    low_pressure: ChosenValue = ChosenValue(200e3, 150e3, 250e3, "Pa", "lower initial gauge pressure of the release")
+    high_pressure: ChosenValue = ChosenValue(400e3, 350e3, 500e3, "Pa", "higher initial gauge pressure of the release")
 
-    def varied(self, name: str, value: float) -> Numbers:
-        """The numbers with one of them at another value."""
+    def with_value(self, name: str, value: float) -> UnpublishedParameters:
+        """Return the parameters with another value of one of them."""
         return dataclasses.replace(self, **{name: dataclasses.replace(getattr(self, name), value=value)})
 
-    def corners(self) -> tuple[tuple[str, float], ...]:
-        """Each number at both ends of its range, one at a time."""
-        ranges = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        return tuple((name, end) for name, n in ranges.items() for end in (n.low, n.high))
+    def range_ends(self) -> tuple[tuple[str, float], ...]:
+        """Return (name, value) for both ends of the range of every parameter."""
+        items = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return tuple((name, end) for name, item in items.items() for end in (item.low, item.high))
 
-    def rows(self) -> tuple[tuple[str, str, str], ...]:
-        """What, value with range and unit, source: as the report lists them."""
-        ranges = [getattr(self, field.name) for field in dataclasses.fields(self)]
-        return tuple((n.meaning, f"{n.value:g} {n.unit} (range {n.low:g} to {n.high:g})", n.source) for n in ranges)
+    def as_rows(self) -> tuple[tuple[str, str, str], ...]:
+        """Return (meaning, value with unit and range, source) of every parameter for the report."""
+        return tuple(getattr(self, field.name).as_row() for field in dataclasses.fields(self))
 
 
 @functools.cache
-def surface_fit(data: str = MAPS[0]) -> Fit:
-    """The 21 coefficients fitted to a force map of the library; rows clamped at zero force are censored."""
+def surface_fit(data: str = FORCE_MAPS[0]) -> Fit:
+    """Return the fit of the 21 coefficients to a force map of the library; rows clamped at zero force are censored."""
     return fit(ContractileSurface.blank(5, max_force=1e5), catalogue.load_data(data))
 
 
-def surface(data: str = MAPS[0]) -> ContractileSurface:
-    """The fitted surface under the force compensator of the paper, 0..1200 N."""
-    found = surface_fit(data).model
-    assert isinstance(found, ContractileSurface)
-    return dataclasses.replace(found, max_force=1200.0)
+def surface(data: str = FORCE_MAPS[0]) -> ContractileSurface:
+    """Return the fitted surface, limited to 0 to 1200 N by the force compensator of the paper."""
+    fitted = surface_fit(data).model
+    assert isinstance(fitted, ContractileSurface)
+    return dataclasses.replace(fitted, max_force=1200.0)
 
 
-def muscle(numbers: Numbers, data: str = MAPS[0], spring: Spring | None = None) -> Muscle:
-    """The Hill muscle of equation (1)."""
-    braid = Braid(0.010, numbers.braid_angle.value, numbers.length.value)
+def muscle(parameters: UnpublishedParameters, data: str = FORCE_MAPS[0], spring: Spring | None = None) -> Muscle:
+    """Return the Hill muscle of equation (1)."""
+    braid = Braid(0.010, parameters.braid_angle.value, parameters.length.value)
     return Muscle(
-        surface(data), braid, spring or LinearSpring(numbers.stiffness.value), LinearDamper(numbers.damping.value)
+        surface(data), braid, spring or LinearSpring(parameters.stiffness.value), LinearDamper(parameters.damping.value)
     )
 
 
 def plant(
-    numbers: Numbers,
+    parameters: UnpublishedParameters,
     mechanism: Mechanism,
     *,
     gas: Gas | None = None,
@@ -107,20 +112,23 @@ def plant(
     wall: Wall | None = None,
     valve: Orifice = MATRIX,
     tube: TubeModel | None = None,
-    data: str = MAPS[0],
+    data: str = FORCE_MAPS[0],
 ) -> Plant:
-    """Muscle, two valves with closed centre, load and gas; isothermal, no line, a rigid wall as in the paper."""
-    valves = FillDischarge(Supply(FULL_PRESSURE), valve, valve)
-    fed = dataclasses.replace(muscle(numbers, data, spring), wall=wall or RigidWall())
+    """Return the plant: muscle, two valves with closed centre, load and gas.
+
+    The defaults are those of the paper: isothermal gas, rigid wall, no line.
+    """
+    valves = FillDischarge(Supply(SUPPLY_PRESSURE), valve, valve)
+    actuator = dataclasses.replace(muscle(parameters, data, spring), wall=wall or RigidWall())
     circuit = valves if tube is None else WithTubes(valves, tube)
-    return Plant(fed, circuit, mechanism, gas or Isothermal(), Ambient())
+    return Plant(actuator, circuit, mechanism, gas or Isothermal(), Ambient())
 
 
-def hanging(numbers: Numbers) -> HangingMass:
-    """The load of the fill and discharge."""
-    return HangingMass(numbers.load.value)
+def hanging_load(parameters: UnpublishedParameters) -> HangingMass:
+    """Return the load during fill and discharge."""
+    return HangingMass(parameters.load.value)
 
 
-def latched() -> Held:
-    """The load of the quick release behind its latch."""
-    return Held(HangingMass(RELEASED_MASS))
+def latched_load() -> WithLatch:
+    """Return the latched load of the quick release."""
+    return WithLatch(HangingMass(RELEASED_MASS))

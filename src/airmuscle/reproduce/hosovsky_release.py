@@ -1,4 +1,4 @@
-"""Quick release, Fig. 4 of the third paper: 30 kg, two initial pressures, valves shut."""
+"""Quick release, Fig. 4 of Hošovský et al.: 30 kg, two initial pressures, closed valves."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from ..control.inputs import Schedule
 from ..core.plotting import DASHES, LINES, legend_below, new_figure
 from ..recording import Recording
 from ..report.chapter import AtLeast, AtMost, Claim, Plot, Table
-from ..simulation.integrators import Rodas4
+from ..report.formatting import format_unit
 from ..simulation import simulate
-from .hosovsky_plant import MAPS, PAPER, Numbers, latched, plant
+from ..simulation.integrators import Rodas4
+from .hosovsky_plant import FORCE_MAPS, PAPER, UnpublishedParameters, latched_load, plant
 
 RELEASED_AT, DURATION = 0.5, 6.0
 SCHEDULE = Schedule({"held": ((0.0, 1.0), (RELEASED_AT, 0.0))})
-COMPARABLE = 0.30
-"""Dampings count as comparable when they differ by at most this fraction of the larger (chosen)."""
+MAX_DAMPING_DIFFERENCE = 0.30
+"""Maximum relative difference of comparable damping, as a fraction of the larger value (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Release:
-    """One release: its run and what is read off it."""
+    """One release: the simulation and its characteristic values, SI units."""
 
     pressure: float
     run: Recording
@@ -34,12 +35,16 @@ class Release:
     decay_rate: float
 
 
-def release(numbers: Numbers, pressure: float, data: str = MAPS[0]) -> Release:
-    """Clamped at zero contraction at a gauge pressure [Pa], valves shut, then let go."""
-    system = plant(numbers, latched(), data=data)
+def release(parameters: UnpublishedParameters, pressure: float, data: str = FORCE_MAPS[0]) -> Release:
+    """Simulate the release of a muscle clamped at zero contraction, at a gauge pressure [Pa], with closed valves."""
+    system = plant(parameters, latched_load(), data=data)
     run = simulate(
-        system, SCHEDULE, duration=DURATION, initial_state=system.state_at(pressure=pressure),
-        integrator=Rodas4(1e-9), output_times=1e-3
+        system,
+        SCHEDULE,
+        duration=DURATION,
+        initial_state=system.state_at(pressure=pressure),
+        integrator=Rodas4(1e-9),
+        output_times=1e-3,
     )
     free = run["time"] >= RELEASED_AT
     ratio, rate = damping(run["time"][free], run["position"][free], run["speed"][free])
@@ -47,95 +52,102 @@ def release(numbers: Numbers, pressure: float, data: str = MAPS[0]) -> Release:
 
 
 def damping(time: npt.NDArray[Any], position: npt.NDArray[Any], speed: npt.NDArray[Any]) -> tuple[float, float]:
-    """Damping ratio [1] and decay rate [1/s] by the logarithmic decrement of the first three swings.
+    """Return damping ratio [1] and decay rate [1/s] from the logarithmic decrement of the first three half-cycles.
 
-    A swing is the way from one turning point to the next, so the place of rest need not be known. NaN where the
-    motion turns fewer than three times (overdamped).
+    A half-cycle is the distance between two turning points, so the equilibrium position is not needed. NaN if there
+    are fewer than four turning points (overdamped).
     """
     turns = np.flatnonzero(np.sign(speed[1:-1]) * np.sign(speed[2:]) < 0) + 1
     if turns.size < 4:
         return float("nan"), float("nan")
     fraction = speed[turns] / (speed[turns] - speed[turns + 1])
-    at = time[turns] + fraction * (time[turns + 1] - time[turns])
+    instants = time[turns] + fraction * (time[turns + 1] - time[turns])
     step = time[turns + 1] - time[turns]
-    reached = position[turns] + 0.5 * speed[turns] * fraction * step
-    swings = np.abs(np.diff(reached[:4]))
-    half_decrement = float(np.log(swings[0] / swings[2]) / 2)
+    extremes = position[turns] + 0.5 * speed[turns] * fraction * step
+    half_cycles = np.abs(np.diff(extremes[:4]))
+    half_decrement = float(np.log(half_cycles[0] / half_cycles[2]) / 2)
     ratio = half_decrement / np.hypot(np.pi, half_decrement)
-    return float(ratio), half_decrement / float(np.mean(np.diff(at[:4])))
+    return float(ratio), half_decrement / float(np.mean(np.diff(instants[:4])))
 
 
-def pair(numbers: Numbers, data: str = MAPS[0]) -> tuple[Release, Release]:
-    """Both initial pressures, the lower first."""
+def release_pair(parameters: UnpublishedParameters, data: str = FORCE_MAPS[0]) -> tuple[Release, Release]:
+    """Simulate the releases from both initial pressures; the lower one first."""
     return (
-        release(numbers, numbers.low_pressure.value, data),
-        release(numbers, numbers.high_pressure.value, data),
+        release(parameters, parameters.low_pressure.value, data),
+        release(parameters, parameters.high_pressure.value, data),
     )
 
 
-def compared(low: Release, high: Release) -> dict[str, float]:
-    """The four statements as numbers: two differences that must be positive, two relative differences of damping."""
+def compare_releases(low: Release, high: Release) -> dict[str, float]:
+    """Return the four statements as values: two differences that must be positive, two relative damping differences."""
 
-    def apart(a: float, b: float) -> float:
+    def relative_difference(a: float, b: float) -> float:
         return abs(a - b) / max(abs(a), abs(b))
 
     return {
         "acceleration": high.initial_acceleration - low.initial_acceleration,
         "contraction": (high.max_contraction - low.max_contraction) * 100,
-        "relative damping": apart(high.damping_ratio, low.damping_ratio),
-        "absolute damping": apart(high.decay_rate, low.decay_rate),
+        "relative damping": relative_difference(high.damping_ratio, low.damping_ratio),
+        "absolute damping": relative_difference(high.decay_rate, low.decay_rate),
     }
 
 
-def over_ranges(numbers: Numbers) -> Table:
-    """The four statements with every chosen number at both ends of its range, and on the second force map."""
-    cases = [("as chosen", numbers, MAPS[0]), ("surface fitted to the tool table", numbers, MAPS[1])]
-    for name, value in numbers.corners():
-        if name == "load":  # hangs on the muscle in fill and discharge only
+def range_table(parameters: UnpublishedParameters) -> Table:
+    """Return the four statements for both ends of the range of every chosen value, and for the second force map."""
+    cases = [
+        ("nominal values", parameters, FORCE_MAPS[0]),
+        ("surface fitted to the tool table", parameters, FORCE_MAPS[1]),
+    ]
+    for name, value in parameters.range_ends():
+        if name == "load":  # used during fill and discharge only
             continue
-        unit = getattr(numbers, name).unit
-        cases.append((f"{name.replace('_', ' ')} {value:g} {unit}", numbers.varied(name, value), MAPS[0]))
-    found = [compared(*pair(case, data)) for _, case, data in cases]
-    columns: dict[str, Any] = {"varied": [name for name, _, _ in cases]}
+        unit = getattr(parameters, name).unit
+        cases.append((f"{name.replace('_', ' ')} {value:g} {unit}", parameters.with_value(name, value), FORCE_MAPS[0]))
+    values = [compare_releases(*release_pair(case, data)) for _, case, data in cases]
+    columns: dict[str, Any] = {"varied parameter": [name for name, _, _ in cases]}
     for key, unit in (
         ("acceleration", "m/s2"),
         ("contraction", "% of length"),
         ("relative damping", "1"),
         ("absolute damping", "1"),
     ):
-        columns[f"{key}, difference [{unit}]"] = [row[key] for row in found]
-    note = f"differences of damping relative to the larger; comparable up to {COMPARABLE:g} (chosen)"
-    return Table("hosovsky_release_ranges", "Quick release over the range of every chosen number", columns, note)
+        columns[f"{key}, difference [{unit}]"] = [row[key] for row in values]
+    note = (
+        "Damping differences are relative to the larger value; they are comparable up to "
+        f"{MAX_DAMPING_DIFFERENCE:g} (chosen)."
+    )
+    return Table("hosovsky_release_ranges", "Quick release over the ranges of all chosen values", columns, note)
 
 
 def claims(low: Release, high: Release, ranges: Table) -> tuple[Claim, ...]:
-    """The paper's statements on Fig. 4; each note says whether it holds over all chosen ranges."""
-    values = compared(low, high)
+    """Return the claims on Fig. 4; every note states whether the claim holds over the ranges of all chosen values."""
+    values = compare_releases(low, high)
     columns = list(ranges.columns.values())[1:]
-    alike, more = AtMost(COMPARABLE, chosen=True), AtLeast(0.0)
+    similar, higher = AtMost(MAX_DAMPING_DIFFERENCE, chosen=True), AtLeast(0.0)
     statements = (
-        ("a higher initial pressure gives a higher first acceleration: difference", "acceleration", more, "m/s2"),
-        ("a higher initial pressure gives a larger greatest contraction: difference", "contraction", more, "%"),
-        ("relative damping is comparable in both: difference of the damping ratios", "relative damping", alike, "1"),
-        ("absolute damping is comparable in both: difference of the decay rates", "absolute damping", alike, "1"),
-    )  # fmt: skip
-    found = []
+        ("a higher initial pressure gives a higher initial acceleration: difference", "acceleration", higher, "m/s2"),
+        ("a higher initial pressure gives a larger maximum contraction: difference", "contraction", higher, "%"),
+        ("relative damping is comparable: relative difference of the damping ratios", "relative damping", similar, "1"),
+        ("absolute damping is comparable: relative difference of the decay rates", "absolute damping", similar, "1"),
+    )
+    result = []
     for (text, key, printed, unit), column in zip(statements, columns, strict=True):
-        failing = [n for n, v in zip(ranges.columns["varied"], column, strict=True) if not printed.agrees(v)]
-        held = "holds" if not failing else f"fails for {', '.join(failing)}; holds otherwise"
+        failing = [n for n, v in zip(ranges.columns["varied parameter"], column, strict=True) if not printed.agrees(v)]
+        outcome = "it holds" if not failing else f"it does not hold for {', '.join(failing)}; otherwise it holds"
         note = (
-            f"{low.pressure / 1e3:g} and {high.pressure / 1e3:g} kPa gauge (chosen); over the range of every chosen "
-            f"number {min(column):.3g} to {max(column):.3g} {unit}: {held}"
+            f"Initial gauge pressures {low.pressure / 1e3:g} and {high.pressure / 1e3:g} kPa (chosen). Over the ranges "
+            f"of all chosen values: {min(column):.3g} to {max(column):.3g} {format_unit(unit)}".rstrip()
+            + f"; {outcome}."
         )
-        found.append(Claim(PAPER, text, printed, values[key], unit, note))
-    return tuple(found)
+        result.append(Claim(PAPER, text, printed, values[key], unit, note))
+    return tuple(result)
 
 
 def figure_4(low: Release, high: Release) -> Plot:
-    """Contraction and acceleration after the release, as Fig. 4."""
+    """Return Fig. 4: contraction and acceleration after the release."""
     figure, axes = new_figure(2, 1, height=4.6, sharex=True)
     for i, one in enumerate((low, high)):
-        label = f"{one.pressure / 1e3:g} kPa gauge"
+        label = f"{one.pressure / 1e3:g} kPa (gauge)"
         style = {"color": LINES[i], "linestyle": DASHES[i], "label": label}
         axes[0].plot(one.run["time"] - RELEASED_AT, one.run["contraction"] * 100, **style)
         axes[1].plot(one.run["time"] - RELEASED_AT, one.run["acceleration"], **style)
@@ -143,5 +155,5 @@ def figure_4(low: Release, high: Release) -> Plot:
     axes[1].set(ylabel="acceleration [m/s²]", xlabel="time after the release [s]", xlim=(-0.2, 3.0))
     legend_below(figure, axes[0])
     return Plot(
-        "hosovsky_fig4", "Quick release of 30 kg from zero contraction at two initial pressures, as Fig. 4.", figure
+        "hosovsky_fig4", "Quick release of 30 kg from zero contraction at two initial pressures, as in Fig. 4.", figure
     )

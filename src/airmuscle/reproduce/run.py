@@ -1,4 +1,4 @@
-"""RunSplit the papers' chapters and writes their report."""
+"""Reproduction of the papers: computes their chapters and writes the report."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-from ..library.catalogue import complete
+from ..library.files import complete_name
 from ..report.chapter import Chapter
 from ..report.output_folder import check_writable
 from ..report.write import write_report
@@ -19,12 +19,12 @@ PAPERS: dict[str, str] = {
     "borzikova": "airmuscle.reproduce.borzikova",
     "hosovsky": "airmuscle.reproduce.hosovsky",
 }
-"""The papers in the order of the report, each with the module whose `chapter()` reproduces it."""
+"""The papers in the order of the report, each with the module whose function `chapter()` reproduces it."""
 
-TITLE = "Three papers on pneumatic artificial muscles, reproduced"
+TITLE = "Reproduction of three papers on pneumatic artificial muscles"
 
 Stage = Callable[[str], AbstractContextManager[Any]]
-"""Given a paper's name, what surrounds its computation: a progress display, a clock, nothing."""
+"""Context manager around the computation of the named paper, such as a progress display."""
 
 
 def reproduce(
@@ -34,17 +34,17 @@ def reproduce(
     stage: Stage = contextlib.nullcontext,
     finished: Callable[[Chapter], Any] = lambda chapter: None,
 ) -> Path:
-    """Reproduce the named papers, all if None, and return the path of the report's page.
+    """Reproduce the named papers, or all if None, and return the path of the report's page.
 
-    A unique beginning of a name is enough. `finished` is told each chapter as it is done. A run that is
-    interrupted, or whose later paper fails, still writes the chapters that are complete. Raises UnknownName,
-    FileError, and what a chapter raises.
+    A unique beginning of a name is sufficient. `finished` is called with each completed chapter. If the computation
+    is interrupted or a paper fails, the completed chapters are still written. Raises UnknownNameError, FileError,
+    and the exceptions of a chapter.
     """
-    chosen = named(papers)
+    selected = select_papers(papers)
     check_writable(folder)
     chapters: list[Chapter] = []
     try:
-        for name in chosen:
+        for name in selected:
             with stage(name):
                 chapters.append(importlib.import_module(PAPERS[name]).chapter())
             finished(chapters[-1])
@@ -55,7 +55,7 @@ def reproduce(
     return write_report(chapters, folder, title=TITLE)
 
 
-def named(papers: Sequence[str] | None) -> list[str]:
-    """The full names of these papers, each once, in the report's order; all if there are none."""
-    wanted = {complete(paper, PAPERS, "paper") for paper in papers or PAPERS}
-    return [name for name in PAPERS if name in wanted]
+def select_papers(papers: Sequence[str] | None) -> list[str]:
+    """Return the full names of the given papers in the order of the report, each once; all if none is given."""
+    requested = {complete_name(paper, PAPERS, "paper") for paper in papers or PAPERS}
+    return [name for name in PAPERS if name in requested]

@@ -1,4 +1,4 @@
-"""Saga, Nakamura and Yaegashi 2007, the straight-fibre muscle: what their paper claims, judged."""
+"""Report chapter: Saga, Nakamura and Yaegashi 2007, the straight-fibre muscle, with a verdict on every claim."""
 
 from __future__ import annotations
 
@@ -6,39 +6,42 @@ from ..geometry.circular_arc import FERRARESI_2001
 from ..geometry.meridian import SAGA_2007
 from ..geometry.pleated import DAERDEN_LEFEBER_2001
 from ..report.chapter import Chapter
-from .saga2007_claims import ACCURATE, LOW_PRESSURE, PAPER, all_claims
+from .saga2007_claims import ACCURACY_LIMIT, LOW_PRESSURE, PAPER, all_claims
 from .saga2007_figures import plots
 from .saga2007_tables import tables
 
-SUMMARY = """A closed formula for a rubber tube with fibres along its axis. As printed it contradicts itself: the
-pressure on the half shell is twice what its own integrand gives (w), the end slope is l/a where the
-outline's is l/(2a) (q), one fibre past the half is summed, and the rubber is integrated along the
-axis instead of the arc. Every reading is carried; the default is the printed one with the fibre sum
-mended and the rubber's slope and intercept exchanged (line B). Only w 2, q 2 meets the paper's
-claim of 200 N at 35 % and 0.11 MPa, and mechanics allows no muscle of this size more than 88.9 N
-there. Against the exact meridian with the same rubber, the one reading that is exact mechanics is
-within 11 % up to 20 % contraction and 61 % low at 40 %, which is the paper's own verdict on itself,
-from a second side. The circle closed by virtual work is as simple, keeps energy, and is within 0.7
-% from 100 N up to 30 %; the balances keep no energy."""
+SUMMARY = r"""The paper gives a closed-form model of a rubber tube with fibres along its axis. The printed equations are
+inconsistent in four places. The pressure force on the half shell is twice the integral of its own integrand (factor
+\(w\)). The end slope of the fibres is \(l/a\), whereas the outline has the slope \(l/(2a)\) (factor \(q\)). The fibre
+sum includes one fibre beyond the half. The hoop stress is integrated along the axis instead of the arc. All
+interpretations are evaluated. The default is the printed model with the corrected fibre sum and with slope and
+intercept of the rubber line exchanged (line B).
+
+Only the interpretation \(w = 2\), \(q = 2\) reaches the claimed 200 N at 35 % and 0.11 MPa, but mechanics limits the
+tension of any muscle of this size to 88.9 N there. Compared with the exact meridian with the same rubber, the only
+interpretation that is exact mechanics for its outline is within 11 % up to 20 % contraction and 61 % low at 40 %; this
+agrees with the paper's own assessment of its accuracy. A circular meridian with virtual work is equally simple,
+conserves energy, and is within 0.7 % of the exact meridian at 100 N and more up to 30 %. The force balances are not
+conservative."""
 
 CHOSEN = (
-    ("wall, fibres, fibre length, end diameter", "2 mm, 16, 72 mm, 12 mm", "Table 1"),
-    ("rubber, line A", "0.1263 eps + 0.3 MPa", "text; MPa inferred from the axes of Fig. 4"),
-    ("rubber, line B", "0.3 eps + 0.1263 MPa", "chosen: the same numbers exchanged"),
-    ("fibre sum", "5.12583", "chosen: (15) without the fibre past the half; printed limit gives 4.93074"),
-    ("rings", "equal segments in series, width 0, diameter d_0", "chosen: not printed"),
+    ("wall thickness, fibres, fibre length, end diameter", "2 mm, 16, 72 mm, 12 mm", "Table 1"),
+    ("rubber, line A", r"\(0.1263\,\varepsilon + 0.3\) MPa", "text; the unit MPa is inferred from the axes of Fig. 4"),
+    ("rubber, line B", r"\(0.3\,\varepsilon + 0.1263\) MPa", "chosen: slope and intercept exchanged"),
+    ("fibre sum", "5.126", "chosen: (15) without the fibre beyond the half; the printed limit gives 4.931"),
+    ("rings", r"equal segments in series, width 0, diameter \(d_0\)", "chosen: not printed"),
     ("loads", "0, 50, 100, 200 N", "chosen: Fig. 8 states none"),
-    ("low pressure in claim 3", f"{LOW_PRESSURE / 1e6:g} MPa", "chosen: a quarter of the axis of Fig. 8"),
-    ("accurate in claim 5", f"{ACCURATE:.0%} of the pressure", "chosen"),
+    ("limit of low pressure in claim 3", f"{LOW_PRESSURE / 1e6:g} MPa", "chosen: a quarter of the axis of Fig. 8"),
+    ("limit of accuracy in claim 5", f"{100 * ACCURACY_LIMIT:g} % of the pressure", "chosen"),
 )
 
 
 def chapter() -> Chapter:
-    """The chapter of the report: claims with their verdicts, tables, figures, and where every number is from."""
+    """Return the chapter of the report: claims with verdicts, tables, figures, and the sources of all values."""
     return Chapter(
         paper=PAPER,
-        title="Saga, Nakamura, Yaegashi 2007: a muscle reinforced by straight fibres",
-        summary=SUMMARY.replace("\n", " "),
+        title="Saga, Nakamura, Yaegashi 2007: muscle reinforced by straight fibres",
+        summary=SUMMARY,
         claims=all_claims(),
         tables=tables(),
         plots=plots(),

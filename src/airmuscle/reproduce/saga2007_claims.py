@@ -1,6 +1,6 @@
-"""What Saga et al. 2007 claim, judged for any reading of their model and for the exact meridian.
+"""Claims of Saga et al. 2007, evaluated for any interpretation of their model and for the exact meridian.
 
-Each function takes the model, so that another fibre sum or projection factor may earn another verdict.
+Every function takes the model, so that the verdict follows from its fibre sum, projection factor and rubber.
 """
 
 from __future__ import annotations
@@ -16,174 +16,183 @@ from ..core.errors import SolveError
 from ..report.chapter import AtLeast, AtMost, Claim, Equal, PublishedValue
 from .saga2007_muscle import (
     DEFAULT,
+    INTERPRETATIONS,
     LINES,
     PRESSURE,
-    READINGS,
-    exact,
-    mechanics,
+    contraction_at,
+    exact_mechanics,
+    exact_meridian,
+    interpretation,
+    interpretation_name,
     pressure_along,
-    reached,
-    reading,
     with_rings,
 )
 
 PAPER = "saga2007"
 LOW_PRESSURE = 0.04e6
-"""What counts as low [Pa]: a quarter of the pressure axis of Fig. 8; chosen."""
-ACCURATE = 0.15
-"""The error of the pressure that counts as accurate; chosen."""
+"""Limit of a low pressure [Pa]: a quarter of the pressure axis of Fig. 8 (chosen)."""
+ACCURACY_LIMIT = 0.15
+"""Limit of the relative pressure error of an accurate model (chosen)."""
 FIG_2 = (0.05, 0.10, 0.15, 0.20, 0.25)
-"""The contractions that Fig. 2 shows."""
+"""Contractions of the outlines in Fig. 2 [1]."""
 
 
-def _claim(text: str, printed: PublishedValue, found: float, unit: str, name: str, note: str) -> Claim:
-    return Claim(PAPER, f"{text} [{name}]", printed, found, unit, note)
+def _claim(text: str, printed: PublishedValue, reproduced: float, unit: str, name: str, note: str) -> Claim:
+    return Claim(PAPER, f"{text} [{name}]", printed, reproduced, unit, note)
 
 
 def contraction_claim(law: Characteristic, name: str) -> Claim:
-    """Claim 1: more than 35 % at 0.11 MPa, taken as unloaded."""
-    found = reached(law, PRESSURE, 0.0)
-    end = found >= law.contraction_range[1] * (1 - 1e-6)
-    note = "No load is stated; taken as none. "
-    note += "The model asks for less than 0.11 MPa over all its reach and runs away." if end else ""
-    note += "Even the exact meridian stays below." if isinstance(law, ExactMeridian) else ""
-    text = "1. Without ring, contraction exceeds 35 % at 0.11 MPa"
-    return _claim(text, AtLeast(35.0), 100 * found, "%", name, note.strip())
+    """Return claim 1: contraction above 35 % at 0.11 MPa, evaluated without load."""
+    reached = contraction_at(law, PRESSURE, 0.0)
+    at_end = reached >= law.contraction_range[1] * (1 - 1e-6)
+    note = "The load is not stated; assumed to be zero. "
+    note += "The model needs less than 0.11 MPa over its whole range, so the value is its end." if at_end else ""
+    note += "Even the exact meridian does not reach 35 %." if isinstance(law, ExactMeridian) else ""
+    text = "1. Without rings, the contraction exceeds 35 % at 0.11 MPa"
+    return _claim(text, AtLeast(35.0), 100 * reached, "%", name, note.strip())
 
 
 def lifting_claim(law: Characteristic, name: str) -> Claim:
-    """Claim 2: 200 N at 0.11 MPa by a contraction of 35 % or more, both at once as the introduction has it."""
-    found = reached(law, PRESSURE, 200.0)
-    note = "The contraction at 0.11 MPa under 200 N."
-    note += " As a maximum of its own, at small contraction, 200 N is met." if 0 < found < 0.1 else ""
-    return _claim("2. About 200 N at 0.11 MPa by 35 % or more", AtLeast(35.0), 100 * found, "%", name, note)
+    """Return claim 2: 200 N at 0.11 MPa and a contraction of 35 % or more together, as in the introduction."""
+    reached = contraction_at(law, PRESSURE, 200.0)
+    note = "Contraction at 0.11 MPa under a load of 200 N."
+    note += " As a separate maximum, at small contraction, 200 N is reached." if 0 < reached < 0.1 else ""
+    return _claim("2. About 200 N at 0.11 MPa and 35 % or more", AtLeast(35.0), 100 * reached, "%", name, note)
 
 
-def ceiling_claim() -> Claim:
-    """Claim 2 against mechanics: what fibres that do not stretch can pull at all, without any rubber."""
-    found = PRESSURE * float(exact(LINES["A"]).geometry.area(0.35))
+def force_limit_claim() -> Claim:
+    """Return claim 2 for the maximum tension of inextensible fibres without rubber."""
+    max_tension = PRESSURE * float(exact_meridian(LINES["A"]).geometry.effective_area(0.35))
     note = (
-        "The most that inextensible fibres of 72 mm on ends of 12 mm can pull, by virtual work and without rubber; "
-        "either rubber line lowers it. Claims 1 and 2 cannot hold together."
+        "Maximum tension of inextensible fibres of 72 mm on ends of 12 mm, by virtual work and without rubber; either "
+        "rubber line reduces it. Claims 1 and 2 cannot hold simultaneously."
     )
-    return _claim("2. 200 N at 0.11 MPa and 35 %", AtLeast(200.0), found, "N", "any rubber", note)
+    return _claim("2. 200 N at 0.11 MPa and 35 %", AtLeast(200.0), max_tension, "N", "any rubber", note)
 
 
-def start_claims(law: Saga2007, name: str) -> tuple[Claim, Claim]:
-    """Claim 3 and the sentence that speaks against it: low pressure at the start, or high."""
-    first, later = (float(law.balancing_pressure(c, 0.0)) for c in (0.01, 0.10))
-    needed = max(law.starting_pressure, first)
+def initial_pressure_claims(law: Saga2007, name: str) -> tuple[Claim, Claim]:
+    """Return claim 3, low initial pressure, and the paper's contradicting sentence, high initial pressure."""
+    first, later = (float(law.equilibrium_pressure(c, 0.0)) for c in (0.01, 0.10))
+    needed = max(law.threshold_pressure, first)
     low = _claim(
-        "3. Contraction starts at low pressure",
+        "3. Contraction starts at a low pressure",
         AtMost(LOW_PRESSURE / 1e6, chosen=True),
         needed / 1e6,
         "MPa",
         name,
-        "Pressure to pass 1 % unloaded. Low is a quarter of the axis of Fig. 8, chosen. It speaks for line B.",
+        "Pressure for 1 % without load. The bound is a quarter of the axis of Fig. 8 (chosen). The sentence supports "
+        "line B.",
     )
     high = _claim(
-        "High pressure is generally needed at the initial stage",
+        "A high pressure is generally needed at the initial stage",
         AtLeast(1.0),
         needed / later,
         "1",
         name,
-        "Pressure to pass 1 % over that at 10 %, unloaded. It speaks for line A, against claim 3.",
+        "Ratio of the pressures for 1 % and for 10 %, without load. The sentence supports line A and contradicts claim "
+        "3.",
     )
     return low, high
 
 
 def ring_claim(law: Saga2007, name: str, force: float) -> Claim:
-    """Claim 4: rings lower the contraction at a given pressure, so that they raise the pressure for one."""
+    """Return claim 4: rings reduce the contraction at a given pressure, or raise the pressure for a contraction."""
     contraction = np.geomspace(1e-7, 0.35, 200)
-    runs = [np.asarray(pressure_along(with_rings(law, n), contraction, force)) for n in (0, 1, 2)]
-    ratio = min(float(np.min(more / fewer)) for fewer, more in itertools.pairwise(runs))
-    where = f"{name}, {force:g} N"
-    note = "Least ratio, up to 35 %, of the pressure with a ring more to that without. "
-    note += "Rings as equal segments in series are inferred." + (_unstable(law, force))
-    return _claim("4. No ring contracts most", AtLeast(1.0), ratio, "1", where, note)
+    pressures = [np.asarray(pressure_along(with_rings(law, n), contraction, force)) for n in (0, 1, 2)]
+    ratio = min(float(np.min(more / fewer)) for fewer, more in itertools.pairwise(pressures))
+    note = "Minimum ratio, up to 35 %, of the pressures with one ring more and without it. "
+    note += "Equal segments in series are inferred." + (_stability_note(law, force))
+    text = "4. The muscle without rings contracts most"
+    return _claim(text, AtLeast(1.0), ratio, "1", f"{name}, {force:g} N", note)
 
 
-def _unstable(law: Saga2007, force: float) -> str:
-    falling = any(with_rings(law, n).snapping_load > force for n in (1, 2))
-    return " Where pressure falls, equal segments are unstable: they do not contract alike." if falling else ""
+def _stability_note(law: Saga2007, force: float) -> str:
+    falling = any(with_rings(law, n).snap_through_load > force for n in (1, 2))
+    return " Where the pressure falls with contraction, equal segments contract unequally." if falling else ""
 
 
 def strength_claims(law: Saga2007, name: str, force: float) -> tuple[Claim, ...]:
-    """Claim 4, second half: rings raise the pressure that the muscle bears, measured by strain and by fibre tension."""
-    text, where = "4. Rings raise the pressure borne: {} with two rings over none", f"{name}, {force:g} N"
-    runs = [with_rings(law, n) for n in (0, 2)]
+    """Return claim 4, second part: rings raise the pressure that the muscle withstands, by strain and fibre tension."""
+    text = "4. Rings raise the pressure that the muscle withstands: ratio of the {} with two rings and without"
+    case = f"{name}, {force:g} N"
+    muscles = [with_rings(law, n) for n in (0, 2)]
     try:
-        points = [float(run.contraction(PRESSURE, force)) for run in runs]
+        points = [float(muscle.contraction(PRESSURE, force)) for muscle in muscles]
     except SolveError:
-        note = "One of the two has no stable contraction at 0.11 MPa."
-        return (Claim(PAPER, f"{text.format('strain')} [{where}]", AtMost(1.0), None, "1", note),)
-    strains = [float(run.middle_strain(c)) for run, c in zip(runs, points, strict=True)]
-    tensions = [float(run.end_tension(PRESSURE, c, force)) for run, c in zip(runs, points, strict=True)]
-    note = "At 0.11 MPa and equal load. No strength is printed; the measure is chosen."
+        note = "One of the two muscles has no stable contraction at 0.11 MPa."
+        return (Claim(PAPER, f"{text.format('strains')} [{case}]", AtMost(1.0), None, "1", note),)
+    strains = [float(muscle.middle_strain(c)) for muscle, c in zip(muscles, points, strict=True)]
+    tensions = [float(muscle.end_tension(PRESSURE, c, force)) for muscle, c in zip(muscles, points, strict=True)]
+    note = "At 0.11 MPa and equal load. The paper gives no strength; the measure is chosen."
     return tuple(
-        _claim(text.format(measure), AtMost(1.0), pair[1] / pair[0], "1", where, note)
-        for measure, pair in (("strain of the rubber", strains), ("tension of a fibre", tensions))
+        _claim(text.format(measure), AtMost(1.0), pair[1] / pair[0], "1", case, note)
+        for measure, pair in (("rubber strains", strains), ("fibre tensions", tensions))
     )
 
 
 def accuracy_claims(law: Saga2007, name: str) -> tuple[Claim, ...]:
-    """Claim 5, with the exact meridian in place of the lost measurements, and where the rubber test ends."""
-    truth = exact(law.rubber, law.geometry.rings)
+    """Return claim 5, with the exact meridian instead of the lost measurements, and the end of the rubber test."""
+    reference = exact_meridian(law.rubber, law.geometry.rings)
     low, high = np.linspace(0.01, 0.20, 20), np.linspace(0.25, 0.40, 16)
     below, above = (
-        100 * float(np.max(np.abs(law.balancing_pressure(c, 100.0) / truth.balance_at(c, 100.0).pressure - 1)))
+        100
+        * float(np.max(np.abs(law.equilibrium_pressure(c, 100.0) / reference.shape_at_force(c, 100.0).pressure - 1)))
         for c in (low, high)
     )
-    note = "Largest error of the pressure at 100 N against the exact meridian; the measurements are lost. "
-    note += "15 % counts as accurate, chosen."
+    note = "Maximum pressure error at 100 N relative to the exact meridian; the measurements are lost. "
+    note += "The bound of 15 % is chosen."
     end = 100 * law.contraction_at_strain(RUBBER_TEST_STRAIN)
-    strain_note = "Where the rubber in the middle passes a strain of 3, the end of the rubber test; (10) with (2), (3)."
+    strain_note = "Contraction at which the rubber in the middle reaches a strain of 3, the end of the rubber test, "
+    strain_note += "by (10) with (2) and (3)."
+    limit, case = 100 * ACCURACY_LIMIT, f"{name}, 100 N"
     return (
-        _claim("5. Accurate below 20 %", AtMost(100 * ACCURATE, chosen=True), below, "%", f"{name}, 100 N", note),
-        _claim("5. Departs above 20 %", AtLeast(100 * ACCURATE, chosen=True), above, "%", f"{name}, 100 N", note),
-        _claim("5. The model departs at 20 %", Equal(20.0, 2.0), end, "%", "outline (2), (3)", strain_note),
+        _claim("5. The model is accurate below 20 %", AtMost(limit, chosen=True), below, "%", case, note),
+        _claim("5. The model deviates above 20 %", AtLeast(limit, chosen=True), above, "%", case, note),
+        _claim("5. The deviation begins at 20 %", Equal(20.0, 2.0), end, "%", "outline by (2), (3)", strain_note),
     )
 
 
 def outline_claim(law: Saga2007) -> Claim:
-    """Claim 6: the outlines of Fig. 2 lie within its axis."""
-    radii = [1e3 * float(law.geometry.segment(c).largest_radius) for c in FIG_2]
-    printed = ", ".join(f"{r:.2f}" for r in radii)
-    note = f"The curves are lost, the axis is 0 to 0.03 m. Largest radii at 5, 10, 15, 20, 25 %: {printed} mm."
-    return _claim("6. Fig. 2: all outlines lie within 0.03 m", AtMost(30.0), max(radii), "mm", "(2), (3)", note)
+    """Return claim 6: the outlines of Fig. 2 lie within its axis."""
+    radii = [1e3 * float(law.geometry.segment(c).max_radius) for c in FIG_2]
+    radii_text = ", ".join(f"{r:.2f}" for r in radii)
+    note = f"The curves are lost; the axis is 0 to 0.03 m. Largest radii at 5, 10, 15, 20, 25 %: {radii_text} mm."
+    return _claim(
+        "6. Fig. 2: all outlines lie within 0.03 m", AtMost(30.0), max(radii), "mm", "outline by (2), (3)", note
+    )
 
 
 def feed_forward_claim(law: Saga2007, name: str, force: float) -> Claim:
-    """Claim 7: the share of wanted contractions that the pressure of the formula brings about, starting from rest."""
-    wanted = np.linspace(0.01, 0.35, 35)
-    pressures = law.balancing_pressure(wanted, force)
-    met = sum(_returns(law, float(p), force, float(c)) for p, c in zip(pressures, wanted, strict=True))
-    note = "Share of the contractions 1 to 35 % that the formula's pressure leads to, from rest and to 1e-9. "
-    note += "Where pressure falls with contraction the muscle snaps past what was wanted." if met < wanted.size else ""
-    text = "7. The closed form serves feed-forward control"
-    return _claim(text, AtLeast(1.0), met / wanted.size, "1", f"{name}, {force:g} N", note.strip())
+    """Return claim 7: the fraction of target contractions that the pressure of the formula produces from rest."""
+    targets = np.linspace(0.01, 0.35, 35)
+    pressures = law.equilibrium_pressure(targets, force)
+    met = sum(_reaches_target(law, float(p), force, float(c)) for p, c in zip(pressures, targets, strict=True))
+    note = "Fraction of the target contractions 1 to 35 % reached from rest, within 10⁻⁹, with the formula's pressure. "
+    note += "Where the pressure falls with contraction, the muscle snaps past the target." if met < targets.size else ""
+    text = "7. The closed form is suitable for feed-forward control"
+    return _claim(text, AtLeast(1.0), met / targets.size, "1", f"{name}, {force:g} N", note.strip())
 
 
-def _returns(law: Saga2007, pressure: float, force: float, wanted: float) -> bool:
+def _reaches_target(law: Saga2007, pressure: float, force: float, target: float) -> bool:
     try:
-        return abs(float(law.contraction(pressure, force)) - wanted) < 1e-9
+        return abs(float(law.contraction(pressure, force)) - target) < 1e-9
     except SolveError:
         return False
 
 
 def axis_claim(law: Saga2007, name: str, force: float) -> Claim:
-    """Fig. 8 shows pressures up to 0.16 MPa for contractions up to 0.4: what load would that take?"""
-    found = float(np.max(law.balancing_pressure(np.linspace(0.0, 0.4, 81), force))) / 1e6
-    note = "Greatest pressure of the formula for 0 to 40 %; the load of Fig. 8 is not stated."
-    return _claim("Fig. 8 spans 0.16 MPa", AtLeast(0.16), found, "MPa", f"{name}, {force:g} N", note)
+    """Return the claim of Fig. 8: pressures up to 0.16 MPa for contractions up to 40 %, at an assumed load."""
+    max_pressure = float(np.max(law.equilibrium_pressure(np.linspace(0.0, 0.4, 81), force))) / 1e6
+    note = "Maximum pressure of the formula for 0 to 40 %; the load of Fig. 8 is not stated."
+    return _claim("Fig. 8 extends to 0.16 MPa", AtLeast(0.16), max_pressure, "MPa", f"{name}, {force:g} N", note)
 
 
 def claims_of(law: Saga2007, name: str) -> tuple[Claim, ...]:
-    """All claims that depend on the model, for one reading of it."""
+    """Return all claims that depend on the model, for one interpretation."""
     return (
         contraction_claim(law, name),
         lifting_claim(law, name),
-        *start_claims(law, name),
+        *initial_pressure_claims(law, name),
         *(ring_claim(law, name, force) for force in (0.0, 100.0)),
         *strength_claims(law, name, 200.0),
         *accuracy_claims(law, name),
@@ -194,19 +203,19 @@ def claims_of(law: Saga2007, name: str) -> tuple[Claim, ...]:
 
 
 def all_claims() -> tuple[Claim, ...]:
-    """The default reading in full, and the other readings and the exact meridian where they decide otherwise."""
-    default = "w 2, q 1, line B"
-    printed_a = reading(LINES["A"], 2.0, 1.0)
-    others = {name: law for name, law in READINGS.items() if law != DEFAULT}
-    truths = {f"exact meridian, line {name}": exact(line) for name, line in LINES.items()}
-    found = [
+    """Return all claims for the default, and those for which other interpretations or models give other verdicts."""
+    default, printed = interpretation_name(2, 1, "B"), interpretation_name(2, 1, "A")
+    printed_a = interpretation(LINES["A"], 2.0, 1.0)
+    others = {name: law for name, law in INTERPRETATIONS.items() if law != DEFAULT}
+    exact_laws = {f"exact meridian, line {name}": exact_meridian(line) for name, line in LINES.items()}
+    claims = [
         *claims_of(DEFAULT, default),
-        *(contraction_claim(law, name) for name, law in truths.items()),
-        *(lifting_claim(law, name) for name, law in (others | truths).items()),
-        ceiling_claim(),
-        *start_claims(printed_a, "w 2, q 1, line A"),
-        ring_claim(printed_a, "w 2, q 1, line A", 0.0),
-        *accuracy_claims(mechanics(LINES["A"]), "exact mechanics, line A")[:2],
-        feed_forward_claim(printed_a, "w 2, q 1, line A", 0.0),
+        *(contraction_claim(law, name) for name, law in exact_laws.items()),
+        *(lifting_claim(law, name) for name, law in (others | exact_laws).items()),
+        force_limit_claim(),
+        *initial_pressure_claims(printed_a, printed),
+        ring_claim(printed_a, printed, 0.0),
+        *accuracy_claims(exact_mechanics(LINES["A"]), "exact mechanics, line A")[:2],
+        feed_forward_claim(printed_a, printed, 0.0),
     ]
-    return tuple(sorted(found, key=lambda claim: claim.claim[:2] if claim.claim[0].isdigit() else "9"))
+    return tuple(sorted(claims, key=lambda claim: claim.claim[:2] if claim.claim[0].isdigit() else "9"))

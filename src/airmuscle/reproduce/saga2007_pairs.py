@@ -1,7 +1,7 @@
-"""Five outlines by three closures of the straight-fibre muscle, each held against its exact meridian.
+"""Pairs of outline and closure of the straight-fibre muscle, compared with its exact meridian.
 
-The outline says what shape the fibres take, the closure which balance gives the force; the previous model, of
-Ferraresi et al. 2001, is the circle with the balance at the middle.
+The outline is the shape of the fibres, the closure the balance that determines the force: five outlines and three
+closures. The previous model, Ferraresi et al. 2001, is the circle with the balance at the middle.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..characteristic.rubber import AlongArc, RubberIntegral, RubberLine
+from ..characteristic.rubber import ArcIntegral, RubberIntegral, RubberLine
 from ..core import autodiff
 from ..core.arrays import Array
 from ..core.declaration import model
@@ -23,7 +23,7 @@ from ..geometry.parabola import Parabola, TrueArcParabola
 from ..geometry.pleated import PleatedTube
 from ..geometry.straight_fibre import FibreTube, StraightFibre
 from ..report.chapter import Table
-from .saga2007_muscle import DIAMETER, LENGTH, LINES, WALL, exact
+from .saga2007_muscle import DIAMETER, LENGTH, LINES, WALL, exact_meridian
 
 OUTLINES: dict[str, FibreTube] = {
     "parabola (3)": StraightFibre(LENGTH, DIAMETER, meridian=Parabola()),
@@ -34,21 +34,21 @@ OUTLINES: dict[str, FibreTube] = {
 }
 CONTRACTIONS = np.array([0.01, 0.05, 0.10, 0.20, 0.30, 0.40])
 EVEN_SPREAD = 1 / np.pi
-"""M/m of evenly spread fibres, which every outline of revolution needs."""
+"""M/m of evenly distributed fibres, as required for every outline of revolution."""
 
 
-class Share(NamedTuple):
-    """F = p area - rubber."""
+class ForceBalance(NamedTuple):
+    """Force balance F = p area - rubber."""
 
     area: Array
     """F/p without rubber [m2]."""
     rubber: Array
-    """What the rubber takes [N]."""
+    """Force of the rubber [N]."""
 
 
 @model
-class Stored:
-    """The rubber's energy of one segment over contraction, to be differentiated."""
+class SegmentEnergy:
+    """Elastic energy of the rubber of one segment as a function of contraction."""
 
     tube: StraightFibre
     rubber: RubberLine
@@ -58,16 +58,16 @@ class Stored:
         return WALL * self.rubber.energy(segment.arc_excess, segment.arc_excess_squared, segment.end_radius)
 
 
-def _energy_growth(tube: FibreTube, rubber: RubberLine, contraction: Array) -> Array:
-    """dU/deps [J] of one segment; the exact outline, which has no formula, by differences."""
+def _energy_derivative(tube: FibreTube, rubber: RubberLine, contraction: Array) -> Array:
+    """Return dU/deps [J] of one segment; for the exact outline, which is not closed-form, by finite differences."""
     if isinstance(tube, StraightFibre):
-        return np.asarray(autodiff.derivative(Stored(tube, rubber), "energy", contraction))
+        return np.asarray(autodiff.derivative(SegmentEnergy(tube, rubber), "energy", contraction))
 
     if not (rubber.slope or rubber.intercept):
         return np.zeros_like(contraction)
 
-    def energy(at: Array) -> Array:
-        segment = tube.segment(at)
+    def energy(values: Array) -> Array:
+        segment = tube.segment(values)
         return np.asarray(WALL * rubber.energy(segment.arc_excess, segment.arc_excess_squared, tube.end_radius))
 
     step = 1e-3 * contraction
@@ -75,68 +75,76 @@ def _energy_growth(tube: FibreTube, rubber: RubberLine, contraction: Array) -> A
     return (8 * narrow - wide) / (12 * step)
 
 
-def _lever(segment: Segment, sine_or_slope: Value, radius: Value, rubber: Value) -> Share:
+def _moment_balance(segment: Segment, sine_or_slope: Value, radius: Value, rubber: Value) -> ForceBalance:
     lever = EVEN_SPREAD * sine_or_slope
-    return Share(segment.half_section / lever - np.pi * radius**2, rubber / lever)
+    return ForceBalance(segment.half_section / lever - np.pi * radius**2, rubber / lever)
 
 
-def closures(
-    tube: FibreTube, rubber: RubberLine, contraction: Array, along: RubberIntegral = AlongArc()
-) -> dict[str, Share]:
-    """The three closures of one outline over contraction, w = 1 and M = m/pi; the rubber of the balances `along`."""
+def force_balances(
+    tube: FibreTube, rubber: RubberLine, contraction: Array, along: RubberIntegral = ArcIntegral()
+) -> dict[str, ForceBalance]:
+    """Return the three closures of one outline over contraction, with w = 1 and M = m/pi.
+
+    `along` is the rubber integral of the two balances.
+    """
     segment = tube.segment(contraction)
     hoop = WALL * along.hoop_stress(rubber, segment)
-    growth = tube.volume_growth(contraction) / tube.resting_length
+    growth = tube.volume_derivative(contraction) / tube.resting_length
     return {
-        "end balance": _lever(segment, segment.end_slope, segment.end_radius, hoop),
-        "middle balance": _lever(segment, segment.end_sine, segment.largest_radius, hoop),
-        "virtual work": Share(growth, _energy_growth(tube, rubber, contraction) / tube.fibre_length),
+        "end balance": _moment_balance(segment, segment.end_slope, segment.end_radius, hoop),
+        "middle balance": _moment_balance(segment, segment.end_sine, segment.max_radius, hoop),
+        "virtual work": ForceBalance(growth, _energy_derivative(tube, rubber, contraction) / tube.fibre_length),
     }
 
 
-def pressure(share: Share, force: float) -> Array:
-    """(F + rubber)/area [Pa]; NaN where the area is not positive: past the pole nothing balances."""
+def balance_pressure(balance: ForceBalance, force: float) -> Array:
+    """Return (F + rubber)/area [Pa]; NaN where the area is not positive: beyond the pole there is no equilibrium."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(share.area > 0, (force + share.rubber) / share.area, np.nan)
+        return np.where(balance.area > 0, (force + balance.rubber) / balance.area, np.nan)
 
 
 @functools.lru_cache(maxsize=16)
-def _shares(rubber: RubberLine, contraction: tuple[float, ...]) -> dict[tuple[str, str], Share]:
-    """All 15 pairs (outline, closure), kept for the loads that ask for them."""
-    at = np.array(contraction)
+def _all_balances(rubber: RubberLine, contraction: tuple[float, ...]) -> dict[tuple[str, str], ForceBalance]:
+    """Return the balances of all 15 pairs (outline, closure); cached, as they do not depend on the load."""
+    contractions = np.array(contraction)
     return {
-        (outline, closure): share
+        (outline, closure): balance
         for outline, tube in OUTLINES.items()
-        for closure, share in closures(tube, rubber, at).items()
+        for closure, balance in force_balances(tube, rubber, contractions).items()
     }
 
 
 def pressures(rubber: RubberLine, force: float, contraction: Array) -> dict[tuple[str, str], Array]:
-    """The pressure [Pa] of each of the 15 pairs (outline, closure)."""
-    return {pair: pressure(share, force) for pair, share in _shares(rubber, tuple(contraction)).items()}
+    """Return the pressure [Pa] of each of the 15 pairs (outline, closure)."""
+    return {
+        pair: balance_pressure(balance, force) for pair, balance in _all_balances(rubber, tuple(contraction)).items()
+    }
 
 
 def ideal_errors(contraction: Array) -> dict[tuple[str, str], Array]:
-    """Error of F/p of each pair against the exact meridian, both without rubber [1]."""
-    truth = np.asarray(PleatedTube(LENGTH, DIAMETER).area(contraction))
-    found = _shares(RubberLine(0.0, 0.0), tuple(contraction))
-    return {pair: share.area / truth - 1 for pair, share in found.items()}
+    """Return the relative error of F/p of each pair, compared with the exact meridian, both without rubber [1]."""
+    reference = np.asarray(PleatedTube(LENGTH, DIAMETER).effective_area(contraction))
+    balances = _all_balances(RubberLine(0.0, 0.0), tuple(contraction))
+    return {pair: balance.area / reference - 1 for pair, balance in balances.items()}
 
 
 def errors(rubber: RubberLine, force: float, contraction: Array) -> dict[tuple[str, str], Array]:
-    """Error of the pressure of each pair against the exact meridian with rubber [1]; NaN where either has none."""
-    truth = np.asarray(exact(rubber).balance_at(contraction, force).pressure)
-    return {pair: found / truth - 1 for pair, found in pressures(rubber, force, contraction).items()}
+    """Return the relative pressure error of each pair, compared with the exact meridian with rubber [1].
+
+    NaN where either of the two is undefined.
+    """
+    reference = np.asarray(exact_meridian(rubber).shape_at_force(contraction, force).pressure)
+    return {pair: value / reference - 1 for pair, value in pressures(rubber, force, contraction).items()}
 
 
 def tables() -> tuple[Table, ...]:
-    """The 15 pairs without rubber, and with it under two loads."""
-    found = [_table("ideal", "tension over pressure, no rubber", ideal_errors(CONTRACTIONS))]
+    """Return the errors of the 15 pairs without rubber, and with rubber at two loads."""
+    result = [_table("ideal", "tension per pressure, without rubber", ideal_errors(CONTRACTIONS))]
     for name, line in LINES.items():
         for force in (0.0, 100.0):
             title = f"pressure with rubber line {name} at {force:g} N"
-            found.append(_table(f"{name}_{force:g}N".lower(), title, errors(line, force, CONTRACTIONS)))
-    return tuple(found)
+            result.append(_table(f"{name}_{force:g}N".lower(), title, errors(line, force, CONTRACTIONS)))
+    return tuple(result)
 
 
 def _table(name: str, title: str, rows: dict[tuple[str, str], Array]) -> Table:
@@ -145,16 +153,10 @@ def _table(name: str, title: str, rows: dict[tuple[str, str], Array]) -> Table:
         "closure": [closure for _, closure in rows],
     }
     for i, c in enumerate(CONTRACTIONS):
-        columns[f"error at {c:.0%} [%]"] = [round(100 * float(row[i]), 2) for row in rows.values()]
+        columns[f"error at {100 * c:g} % [%]"] = [round(100 * float(row[i]), 2) for row in rows.values()]
     note = (
-        "Against the exact meridian of the same muscle. w = 1, M = m/pi, rubber along the arc. nan: past the pole, "
-        "or no exact shape (line A unloaded at 1 %). The previous model is the circle with the middle balance."
+        r"Compared with the exact meridian of the same muscle; \(w = 1\), \(M = m/\pi\), rubber along the arc. No "
+        "value: beyond the pole, or no exact outline (line A without load at 1 %). The previous model is the circle "
+        "with the middle balance."
     )
-    return Table(f"saga2007_pairs_{name}", f"Error of outline and closure: {title}", columns, note)
-
-
-if __name__ == "__main__":
-    for table in tables():
-        print(f"\n{table.title}")
-        for row in zip(*table.columns.values(), strict=True):
-            print("  ".join(f"{cell!s:>22}" if isinstance(cell, str) else f"{cell:9.2f}" for cell in row))
+    return Table(f"saga2007_pairs_{name}", f"Error of the pairs of outline and closure: {title}", columns, note)

@@ -1,1 +1,1 @@
-"""Scenario files: a plant, its inputs and a run in TOML; dynamic identification from such a file."""
+"""Scenario files: plants, commands, runs and dynamic fits as TOML."""

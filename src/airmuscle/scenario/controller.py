@@ -1,17 +1,17 @@
-"""The table [command.controller] of a scenario: what closes a loop, how often it looks, and what it is to follow.
+"""Table [command.controller] of a scenario: controller, sample time and set point of a closed loop.
 
 [command]
-hold = [["0 s", 1]]                         inputs that the controller does not command, as without one
+hold = [["0 s", 1]]                         inputs that the controller does not command, as in an open loop
 [command.controller]
-model = "PID"                               a controller and its parameters, in any unit that fits where it stands
-measured = "pressure"                       a state or output of the plant
-commanded = "fill"                          an input; or { model = "SplitRange", positive = "fill", negative = "discharge" }
+model = "PID"                               a controller and its parameters, in any unit that fits its signals
+measured = "pressure"                       controlled variable: a state or output of the plant
+commanded = "fill"                          an input; or { model = "SplitRange", positive = "fill", negative = "vent" }
 gain = "0.4 1/bar"
 integral_time = "300 ms"
-period = "5 ms"                             from one sample to the next
-[command.controller.setpoint]               a command of its own: rows, model, file, columns, period
+period = "5 ms"                             sample time
+[command.controller.setpoint]               input signal of the set point: rows, model, file, columns, period
 pressure = [["0 s", "1 bar"], ["2 s", "3 bar"]]
-[command.drivers]                           as without a controller
+[command.drivers]                           as in an open loop
 """
 
 from __future__ import annotations
@@ -27,90 +27,100 @@ from ..core.declaration import Parameter, parameters
 from ..core.errors import ParameterError
 from ..core.variables import Input
 from ..library.build import build
-from ..library.location import Location, checked, finite, located_errors, number
+from ..library.location import Location, check_type, located_errors, read_finite_number, read_number
 from ..library.models import model_class, model_names
 from ..plant.plant import Plant
 from ..plant.units import column_units
-from .inputs import command_from, drivers_from
+from .inputs import build_drivers, build_input_signal
 
-KEYS = ("period", "setpoint")
-"""Keys of the table that are no parameters of the controller."""
+LOOP_KEYS = ("period", "setpoint")
+"""Keys of the table that are not parameters of the controller."""
 
 
-def units_around(plant: Plant, start: Mapping[str, float]) -> dict[str, str]:
-    """The units of the states, outputs and inputs that a run of a plant has in columns; '' where none is known."""
+def signal_units(plant: Plant, start: Mapping[str, float]) -> dict[str, str]:
+    """Units of the states, outputs and inputs of a plant, in the order of the columns of a run; '' if unknown."""
     outputs = list(plant.outputs(start, dict.fromkeys(plant.inputs, 0.0)))
     units = column_units(plant, outputs)
     return {name: units[name] for name in (*(s.name for s in plant.states), *outputs, *plant.inputs)}
 
 
-def loop_from(table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], place: Location) -> ControlLoop:
-    """The loop that the table [command] with a controller describes; `units` are those of `units_around`.
+def build_control_loop(
+    table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], location: Location
+) -> ControlLoop:
+    """The control loop of a table [command] with a controller; `units` are those of `signal_units`.
 
-    Raises ParameterError, UnitError, UnknownName, FileError or ColumnError.
+    Raises ParameterError, UnitError, UnknownNameError, FileError or ColumnError with the location.
     """
-    at, given = place.inside("controller"), table["controller"]
-    if not isinstance(given, Mapping):
-        raise ParameterError(f'{at} is {given!r}; write model = "PID", its parameters, period and setpoint under it.')
-    controller = _controller({k: v for k, v in given.items() if k not in KEYS}, plant.inputs, units, at)
-    for key, example in (("period", 'period = "10 ms"'), ("setpoint", f"[{at.table}.setpoint]")):
-        if key not in given:
-            raise ParameterError(f"{at}: '{key}' is missing; write {example}.")
-    beside = {key: value for key, value in table.items() if key not in ("controller", "drivers")}
-    period = finite(given["period"], "s", f"{at}, period")
-    setpoint = _setpoint(given["setpoint"], controller, units, at.inside("setpoint"))
-    others = command_from(beside, plant.input_variables, place)
-    drivers = drivers_from(table.get("drivers", {}), plant.inputs, place.inside("drivers"))
-    with located_errors(at):
-        loop = ControlLoop(controller, period, setpoint, others, drivers)
+    inner, controller_table = location.inside("controller"), table["controller"]
+    if not isinstance(controller_table, Mapping):
+        raise ParameterError(
+            f'{inner} is {controller_table!r}; it must be a table. Write model = "PID", its parameters, period and '
+            "setpoint in it."
+        )
+    parameter_table = {key: value for key, value in controller_table.items() if key not in LOOP_KEYS}
+    controller = _build_controller(parameter_table, plant.inputs, units, inner)
+    for key, example in (("period", 'period = "10 ms"'), ("setpoint", f"[{inner.table}.setpoint]")):
+        if key not in controller_table:
+            raise ParameterError(f"{inner}: '{key}' is missing; write {example}.")
+    other_inputs = {key: value for key, value in table.items() if key not in ("controller", "drivers")}
+    period = read_finite_number(controller_table["period"], "s", f"{inner}, period")
+    setpoint = _build_setpoint(controller_table["setpoint"], controller, units, inner.inside("setpoint"))
+    other_signal = build_input_signal(other_inputs, plant.input_variables, location)
+    drivers = build_drivers(table.get("drivers", {}), plant.inputs, location.inside("drivers"))
+    with located_errors(inner):
+        loop = ControlLoop(controller, period, setpoint, other_signal, drivers)
         loop.check_columns([name for name in units if name not in plant.inputs], plant.inputs)
     return loop
 
 
-def _controller(
-    table: Mapping[str, Any], inputs: Sequence[str], units: Mapping[str, str], place: Location
+def _build_controller(
+    table: Mapping[str, Any], inputs: Sequence[str], units: Mapping[str, str], location: Location
 ) -> Controller:
-    """The controller. Built twice: what it measures and commands says in which units its other numbers are."""
+    """The controller. It is built twice: the first time to find the signals that determine the units of its gains."""
     relative: dict[str, Parameter] = {}
     if isinstance(table.get("model"), str):
-        cls = model_class(table["model"], f"{place}, model")
+        cls = model_class(table["model"], f"{location}, model")
         if not issubclass(cls, Controller):
             known = [n for n in model_names() if issubclass(model_class(n, ""), Controller)]
-            raise ParameterError(f"{place}: {cls.__name__} is no controller; there are {', '.join(known)}.")
+            raise ParameterError(f"{location}: {cls.__name__} is not a controller; there are {', '.join(known)}.")
         relative = {p.name: p for p in parameters(cls) if p.unit in RELATIVE and p.name in table}
-    draft: Controller = checked(build({**table, **dict.fromkeys(relative, 1.0)}, place), Controller, place)
-    with located_errors(place):
+    draft: Controller = check_type(build({**table, **dict.fromkeys(relative, 1.0)}, location), Controller, location)
+    with located_errors(location):
         check_present(draft, [name for name in units if name not in inputs], inputs)
     if relative and len({units[name] for name in draft.inputs}) > 1:
-        raise ParameterError(f"{place}: {' and '.join(draft.inputs)} have different units; name inputs of one kind.")
+        raise ParameterError(
+            f"{location}: {' and '.join(draft.inputs)} have different units; choose inputs of the same unit."
+        )
     numbers = {
-        name: number(table[name], _unit(p, draft, units), f"{place}, {name}", f" ({p.symbol}, {p.meaning})")
+        name: read_number(table[name], _unit(p, draft, units), f"{location}, {name}", f" ({p.symbol}, {p.meaning})")
         for name, p in relative.items()
     }
-    found: Controller = build({**table, **numbers}, place)
-    return found
+    controller: Controller = build({**table, **numbers}, location)
+    return controller
 
 
 def _unit(declared: Parameter, controller: Controller, units: Mapping[str, str]) -> str:
-    """The unit of a controller's parameter where it stands; "1" takes the place of one that is not known."""
-    y, u = (units.get(names[0]) or "1" for names in (controller.measured_columns, controller.inputs))
-    return relative_unit(declared.unit, y, u)
+    """Unit of a controller parameter for its signals; "1" replaces an unknown unit of a signal."""
+    measured, commanded = (units.get(names[0]) or "1" for names in (controller.measured_columns, controller.inputs))
+    return relative_unit(declared.unit, measured, commanded)
 
 
-def _setpoint(given: Any, controller: Controller, units: Mapping[str, str], place: Location) -> InputSignal:
+def _build_setpoint(table: Any, controller: Controller, units: Mapping[str, str], location: Location) -> InputSignal:
     names: Sequence[str] = controller.setpoints
-    if not isinstance(given, Mapping):
-        raise ParameterError(f'{place} is {given!r}; write {names[0]} = [["0 s", ...]] under it.')
-    if "drivers" in given:
-        raise ParameterError(f"{place}: a set point has no drivers; write [command.drivers] for those of the inputs.")
-    followed = [Input(name, units.get(name) or "1", -math.inf, math.inf) for name in names]
-    return command_from(given, followed, place, "the controller has no set point")
+    if not isinstance(table, Mapping):
+        raise ParameterError(f'{location} is {table!r}; it must be a table. Write {names[0]} = [["0 s", ...]] in it.')
+    if "drivers" in table:
+        raise ParameterError(
+            f"{location}: a set point has no drivers; write [command.drivers] for those of the inputs."
+        )
+    setpoints = [Input(name, units.get(name) or "1", -math.inf, math.inf) for name in names]
+    return build_input_signal(table, setpoints, location, "the controller has no set point")
 
 
-def numbers_of(
+def controller_number_paths(
     table: Mapping[str, Any], loop: ControlLoop, units: Mapping[str, str]
 ) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    """Where in the table [command.controller] numbers stand or may stand, and the unit of each, for studies."""
+    """Key paths of all numbers that the table [command.controller] may contain, with their units, for studies."""
     for p in parameters(loop.controller):
         yield (p.name,), _unit(p, loop.controller, units)
     yield ("period",), "s"

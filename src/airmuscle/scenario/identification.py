@@ -1,30 +1,30 @@
-"""A dynamic fit written down as a file: the plant, the records, and what shall be found.
+"""Dynamic fit as a TOML file: plant, records, and unknown parameters.
 
-[plant]                                     as in a scenario, with the numbers that the search starts from;
-[command]                                   as in a scenario; of every record that states none of its own
+[plant]                                     as in a scenario, with the initial values of the search
+[command]                                   as in a scenario; for each record without a command of its own
 fill = [["0.1 s", 1], ["1 s", 0]]
-[observed]                                  what was measured, each with its sensor's standard deviation
+[observed]                                  measured outputs, each with the standard deviation of its sensor
 pressure = "500 Pa"
-position = { deviation = "50 um", column = "height" }      where the file's column has another name
+position = { deviation = "50 um", column = "height" }      if the column of the file has another name
                                             (in SI, or with its unit, height [mm])
 [fit]
 free = ["muscle.damper.damping", ["circuit.fill.conductance", "circuit.discharge.conductance"]]
-                                            shared by all records; a list in it shares one value
-own = ["circuit.supply.pressure"]           optional: found for every record
-start_time = "50 ms"                        optional: when a run began is unknown within this margin
-start = { pressure = "3 kPa" }              optional: so are values that a start takes as known
-starts = 8                                  optional, and seed: how many starts the search has
+                                            unknowns shared by all records; a nested list has one common value
+own = ["circuit.supply.pressure"]           optional: unknowns that are estimated for each record
+start_time = "50 ms"                        optional: the start time of each run is unknown within ±50 ms
+start = { pressure = "3 kPa" }              optional: initial values are unknown within these limits
+starts = 8                                  optional, with seed: number of starting points of the search
 method = { model = "Rodas4", rtol = 1e-8 }  optional
-[fit.bounds]                                optional, by the first path; those declared otherwise
+[fit.bounds]                                optional, by the first path; otherwise the declared bounds
 "gas.exponent" = [1.01, 1.4]
 [[record]]
-file = "fill1.csv"                          beside this file
-start = { pressure = "0 bar" }              optional: rest at this pressure, or a state with position = "10 mm";
-                                            without it, rest at the pressure of the first rows
-start_time = "0.2 s"                        optional: where the command's zero stands on the record's clock
-first = "0 s"                               optional, and last: the part of the record that is used
-mapping = "rig.toml"                        optional, and resting_length: what the file does not say
-[record.command]                            optional: this record's own
+file = "fill1.csv"                          relative to this file
+start = { pressure = "0 bar" }              optional: equilibrium at this pressure, or a state with position = "10 mm";
+                                            by default equilibrium at the pressure of the first rows
+start_time = "0.2 s"                        optional: time of the record at which the command begins
+first = "0 s"                               optional, and last: the time interval of the record that is used
+mapping = "rig.toml"                        optional, and resting_length: information that the file lacks
+[record.command]                            optional: command of this record
 [record.plant.mechanism]                    optional: parts of the plant that differ in this record
 """
 
@@ -35,270 +35,194 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from ..compile.program import compile_system
 from ..core import tree
 from ..core.errors import ParameterError
-from ..identify.dynamic import DynamicFit, Experiment, InitialConditions, StartTime, StartValue, fit_dynamic
-from ..identify.dynamic.experiment import Own, Shared
+from ..identify.dynamic import DynamicFit, Experiment, InitialValue, StartTime, fit_dynamic
+from ..identify.dynamic.experiment import ParameterPaths, RecordUnknown
 from ..library.build import build
-from ..library.catalogue import parsed
-from ..library.location import Location, check_keys, checked, finite, located_errors, text
+from ..library.files import read_toml
+from ..library.location import Location, check_keys, check_type, read_finite_number, read_text
 from ..library.write import scenario_toml
 from ..plant.plant import Plant
-from ..recording import Recording, read
-from ..recording.columns import quantity_of
 from ..simulation import Integrator
-from ..simulation.problem import check_input_range
-from .inputs import command_from
-from .scenario import plant_from
+from .record import Record, optional_table, signal_unit
+from .scenario import build_plant
 
 _TABLES = ("title", "plant", "command", "observed", "fit", "record")
 _FIT = ("free", "own", "start_time", "start", "starts", "seed", "method", "bounds")
-_RECORD = ("file", "start", "start_time", "first", "last", "mapping", "resting_length", "command", "plant")
-FIRST_ROWS = 3
-"""Rows whose median pressure is the start where none is stated (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class DynamicStudy:
-    """Records, their plant, and what is to be found; all numbers SI."""
+class DynamicFitSetup:
+    """Plant, records and unknowns of a dynamic fit; all numbers SI."""
 
     title: str
     plant: Plant
     experiments: tuple[Experiment, ...]
     commands: tuple[Mapping[str, Any], ...]
-    """The command of every record as its file states it, to be written again."""
+    """The table [command] of each record as written in its file, for the scenarios of the result."""
     observed: Mapping[str, float]
-    free: tuple[Shared, ...]
-    own: tuple[Own, ...] = ()
+    free: tuple[ParameterPaths, ...]
+    own: tuple[RecordUnknown, ...] = ()
     bounds: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     starts: int = 1
     seed: int = 0
     method: Integrator | None = None
 
     def fit(self) -> DynamicFit:
-        """The numbers found; see `identify.dynamic.fit_dynamic`."""
+        """The result of the fit; see `airmuscle.identify.dynamic.fit_dynamic`."""
         return fit_dynamic(
-            self.plant, self.experiments, free=self.free, observed=self.observed, own=self.own, bounds=self.bounds,
+            self.plant, self.experiments, free=self.free, observed=self.observed, per_record=self.own, bounds=self.bounds,
             starts=self.starts, seed=self.seed, method=self.method,
         )  # fmt: skip
 
-    def scenario(self, found: DynamicFit, record: int = 0) -> str:
-        """The text of a scenario: a record's plant with what was found, its command, its start and its length."""
-        plant, origin = found.plant(record), self.experiments[record].recording.origin
-        note = f"{self.title}: numbers found from {', '.join(e.recording.origin for e in self.experiments)}."
+    def scenario(self, fit: DynamicFit, record: int = 0) -> str:
+        """Text of a scenario with the fitted plant, the command, the initial state and the duration of a record."""
+        plant, origin = fit.plant(record), self.experiments[record].recording.origin
+        note = f"{self.title}: parameters estimated from {', '.join(e.recording.origin for e in self.experiments)}."
         assert isinstance(plant, Plant)
-        course = found.problem.courses[record]
-        known = dict(course.experiment.start.known)
-        for k in course.mine:
-            what = course.unknowns[k].what
-            if isinstance(what, StartValue):
-                known[what.name] = float(found.values[k])
+        record_model = fit.problem.record_models[record]
+        known = dict(record_model.experiment.initial_conditions.known)
+        for k in record_model.unknown_indices:
+            what = record_model.unknowns[k].target
+            if isinstance(what, InitialValue):
+                known[what.name] = float(fit.values[k])
         coordinates = plant.mechanism.coordinates
-        held = {name for c in coordinates for name in (c.name, c.speed) if c.name in known}
-        start = {name: value for name, value in known.items() if name == "pressure" or name in held}
-        duration = float(course.times[-1]) - course.start_time(found.values)
+        given = {name for c in coordinates for name in (c.name, c.speed) if c.name in known}
+        start = {name: value for name, value in known.items() if name == "pressure" or name in given}
+        duration = float(record_model.times[-1]) - record_model.start_time(fit.values)
         run = {"duration": duration, "start": start}
         return scenario_toml(f"{self.title}, {origin}", plant, self.commands[record], run, note)
 
 
-def load_study(path: str | Path) -> DynamicStudy:
-    """The study in a file. Raises FileError, ParameterError, UnitError, UnknownName or ColumnError, saying where."""
+def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
+    """The dynamic fit in a file.
+
+    Raises FileError, ParameterError, UnitError, UnknownNameError or ColumnError with the location.
+    """
     file = Path(path)
-    tables = parsed(file)
-    place = Location(str(file), "", file.parent)
-    check_keys(tables, _TABLES, place)
-    plant = plant_from(_table(tables, "plant", place), place.inside("plant"))
-    observed = _observed(_table(tables, "observed", place), plant, place.inside("observed"))
-    records = tables.get("record")
-    if not isinstance(records, list) or not records:
-        raise ParameterError(f'{place}: no record; write [[record]] and file = "fill.csv" under it, once for each.')
-    read_so_far = [
-        _Record(row, place.inside(f"record {i}"), tables, plant).experiment(observed)
-        for i, row in enumerate(records, 1)
+    tables = read_toml(file)
+    location = Location(str(file), "", file.parent)
+    check_keys(tables, _TABLES, location)
+    plant = build_plant(_required_table(tables, "plant", location), location.inside("plant"))
+    observed = _read_observed(_required_table(tables, "observed", location), plant, location.inside("observed"))
+    rows = tables.get("record")
+    if not isinstance(rows, list) or not rows:
+        raise ParameterError(f'{location}: no record is given; write [[record]] with file = "fill.csv" for each.')
+    records = [
+        Record(row, location.inside(f"record {i}"), tables, plant).build_experiment(observed)
+        for i, row in enumerate(rows, 1)
     ]
-    wanted, at = _table(tables, "fit", place), place.inside("fit")
-    check_keys(wanted, _FIT, at)
-    return DynamicStudy(
-        title=text(tables, "title", place, needed=False) or file.stem,
+    fit, in_fit = _required_table(tables, "fit", location), location.inside("fit")
+    check_keys(fit, _FIT, in_fit)
+    return DynamicFitSetup(
+        title=read_text(tables, "title", location, needed=False) or file.stem,
         plant=plant,
-        experiments=tuple(experiment for experiment, _ in read_so_far),
-        commands=tuple(command for _, command in read_so_far),
+        experiments=tuple(experiment for experiment, _ in records),
+        commands=tuple(command for _, command in records),
         observed={name: deviation for name, (deviation, _) in observed.items()},
-        free=tuple(_shared(item, f"{at}, free") for item in _list(wanted, "free", at)),
-        own=_own(wanted, plant, at),
-        bounds=_bounds(_table(wanted, "bounds", at, needed=False), plant, at.inside("bounds")),
-        starts=_whole(wanted, "starts", 1, at),
-        seed=_whole(wanted, "seed", 0, at),
-        method=_method(wanted, at),
+        free=tuple(_read_shared(item, f"{in_fit}, free") for item in _read_list(fit, "free", in_fit)),
+        own=_read_own(fit, plant, in_fit),
+        bounds=_read_bounds(optional_table(fit, "bounds", in_fit), plant, in_fit.inside("bounds")),
+        starts=_read_integer(fit, "starts", 1, in_fit),
+        seed=_read_integer(fit, "seed", 0, in_fit),
+        method=_build_method(fit, in_fit),
     )  # fmt: skip
 
 
-def _table(tables: Mapping[str, Any], key: str, place: Location, *, needed: bool = True) -> Mapping[str, Any]:
-    found = tables.get(key, None if needed else {})
-    if not isinstance(found, Mapping):
-        what = "is missing" if found is None else f"is {found!r}, no table"
-        raise ParameterError(f"{place}: the table [{key}] {what}.")
-    return found
+def _required_table(tables: Mapping[str, Any], key: str, location: Location) -> Mapping[str, Any]:
+    if key not in tables:
+        raise ParameterError(f"{location}: the table [{key}] is missing.")
+    return optional_table(tables, key, location)
 
 
-def _list(table: Mapping[str, Any], key: str, place: Location) -> list[Any]:
-    found = table.get(key, [])
-    if not isinstance(found, list):
-        raise ParameterError(f'{place}, {key} is {found!r}; write a list of paths, ["circuit.fill.conductance"].')
-    return found
+def _read_list(table: Mapping[str, Any], key: str, location: Location) -> list[Any]:
+    items = table.get(key, [])
+    if not isinstance(items, list):
+        raise ParameterError(
+            f'{location}, {key} is {items!r}; it must be a list of paths, such as ["circuit.fill.conductance"].'
+        )
+    return items
 
 
-def _whole(table: Mapping[str, Any], key: str, least: int, place: Location) -> int:
-    found = table.get(key, least)
-    if isinstance(found, bool) or not isinstance(found, int) or found < least:
-        raise ParameterError(f"{place}, {key} is {found!r}; it must be a whole number, {least} or more.")
-    return found
+def _read_integer(table: Mapping[str, Any], key: str, minimum: int, location: Location) -> int:
+    value = table.get(key, minimum)
+    if isinstance(value, bool) or not isinstance(value, int) or value < minimum:
+        raise ParameterError(f"{location}, {key} is {value!r}; it must be an integer of at least {minimum}.")
+    return value
 
 
-def _method(table: Mapping[str, Any], place: Location) -> Integrator | None:
-    given = table.get("method")
-    if given is None:
+def _build_method(table: Mapping[str, Any], location: Location) -> Integrator | None:
+    value = table.get("method")
+    if value is None:
         return None
-    at = place.inside("method")
-    found: Integrator = checked(build({"model": given} if isinstance(given, str) else given, at), Integrator, at)
-    return found
+    inner = location.inside("method")
+    model_table = {"model": value} if isinstance(value, str) else value
+    method: Integrator = check_type(build(model_table, inner), Integrator, inner)
+    return method
 
 
-def _known_unit(name: str, plant: Plant) -> str | None:
-    quantity = quantity_of(name)
-    return quantity.unit if quantity else next((s.unit for s in plant.states if s.name == name), None)
-
-
-def _unit(name: str, plant: Plant) -> str:
-    return _known_unit(name, plant) or "1"
-
-
-def _observed(table: Mapping[str, Any], plant: Plant, place: Location) -> dict[str, tuple[float, str]]:
-    """Standard deviation and column of every output that was measured."""
-    found = {}
-    for name, given in table.items():
-        entry = given if isinstance(given, Mapping) else {"deviation": given}
-        check_keys(entry, ("deviation", "column"), place.inside(name))
-        deviation = finite(entry.get("deviation"), _unit(name, plant), f"{place}, {name}")
+def _read_observed(table: Mapping[str, Any], plant: Plant, location: Location) -> dict[str, tuple[float, str]]:
+    """Standard deviation and column of each measured output."""
+    observed = {}
+    for name, value in table.items():
+        entry = value if isinstance(value, Mapping) else {"deviation": value}
+        check_keys(entry, ("deviation", "column"), location.inside(name))
+        deviation = read_finite_number(entry.get("deviation"), signal_unit(name, plant) or "1", f"{location}, {name}")
         if not deviation > 0:
-            raise ParameterError(f"{place}, {name} is {deviation:g}; a sensor's standard deviation is above zero.")
-        found[name] = deviation, text(entry, "column", place.inside(name), needed=False) or name
-    if not found:
-        raise ParameterError(f'{place}: nothing is observed; write pressure = "500 Pa", its sensor\'s deviation.')
-    return found
-
-
-def _shared(given: Any, where: str) -> Shared:
-    if isinstance(given, str):
-        return given
-    if isinstance(given, list) and given and all(isinstance(path, str) for path in given):
-        return tuple(given)
-    raise ParameterError(f"{where} holds {given!r}; each is a path in quotes, or a list of paths that share a value.")
-
-
-def _own(table: Mapping[str, Any], plant: Plant, place: Location) -> tuple[Own, ...]:
-    found: list[Own] = [_shared(item, f"{place}, own") for item in _list(table, "own", place)]
-    if "start_time" in table:
-        found.append(StartTime(_positive(table["start_time"], "s", f"{place}, start_time")))
-    for name, margin in _table(table, "start", place, needed=False).items():
-        found.append(StartValue(name, _positive(margin, _unit(name, plant), f"{place}, start, {name}")))
-    return tuple(found)
-
-
-def _positive(given: Any, unit: str, where: str) -> float:
-    found = finite(given, unit, where)
-    if not found > 0:
-        raise ParameterError(f"{where} is {given!r}; it must be greater than zero.")
-    return found
-
-
-def _bounds(table: Mapping[str, Any], plant: Plant, place: Location) -> dict[str, tuple[float, float]]:
-    declared = {leaf.path: leaf.declared for leaf in tree.leaves(plant)}
-    found = {}
-    for path, given in table.items():
-        check_keys({path: given}, tuple(declared), place)
-        if not isinstance(given, list) or len(given) != 2:
-            raise ParameterError(f"{place}, {path} is {given!r}; write the least and the greatest value, [1.01, 1.4].")
-        low, high = (finite(end, declared[path].unit, f"{place}, {path}") for end in given)
-        least, greatest = declared[path].bounds
-        if low < least or high > greatest:
-            raise ParameterError(f"{place}, {path} is {given!r}; allowed are {least:g} to {greatest:g}.")
-        if not low < high:
-            raise ParameterError(f"{place}, {path} is {given!r}; the least value must lie below the greatest.")
-        found[path] = low, high
-    return found
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Record:
-    """One [[record]] of a file, and what of the file it shares."""
-
-    row: Any
-    place: Location
-    tables: Mapping[str, Any]
-    shared: Plant
-
-    def experiment(self, observed: Mapping[str, tuple[float, str]]) -> tuple[Experiment, Mapping[str, Any]]:
-        """The record as an experiment, and its command as written."""
-        if not isinstance(self.row, Mapping):
-            raise ParameterError(f"{self.place} is {self.row!r}; write [[record]] and its keys under it.")
-        check_keys(self.row, _RECORD, self.place)
-        plant = self.plant()
-        table = dict(_table({**self.tables, **self.row}, "command", self.place, needed=False))
-        if "file" in table:  # so that it can be written elsewhere
-            table["file"] = str((self.place.folder / str(table["file"])).resolve())
-        recording, at = self.recording(observed), self.place.inside("command")
-        start_time = finite(self.row.get("start_time", 0.0), "s", f"{self.place}, start_time")
-        command = command_from(table, plant.input_variables, at)
-        with located_errors(at):
-            length = max(float(recording["time"][-1]) - start_time, 1e-9)
-            check_input_range(compile_system(plant), command.segments(plant.inputs, 0.0, length), 0.0)
-        return Experiment(recording, command, self.start(plant, recording), start_time, plant), table
-
-    def plant(self) -> Plant:
-        """The shared plant, with the parts that this record states put in their place."""
-        other = _table(self.row, "plant", self.place, needed=False)
-        return plant_from({**self.tables["plant"], **other}, self.place.inside("plant")) if other else self.shared
-
-    def recording(self, observed: Mapping[str, tuple[float, str]]) -> Recording:
-        """The part of the file that is used, with the observed columns under the names of the outputs."""
-        name = text(self.row, "file", self.place, needed=True)
-        told = {key: self.row[key] for key in ("mapping", "resting_length") if key in self.row}
-        if "mapping" in told:
-            told["mapping"] = self.place.folder / told["mapping"]
-        with located_errors(self.place):
-            found = read(self.place.folder / name, **told)
-            if len(found) != 1:
-                raise ParameterError(f"{name} holds {len(found)} runs; give a file for each record.")
-            taken = {name: (column, _known_unit(name, self.shared)) for name, (_, column) in observed.items()}
-            whole = found[0].with_columns(**{name: found[0].in_unit(*column) for name, column in taken.items()})
-            return self.cut(whole)
-
-    def cut(self, recording: Recording) -> Recording:
-        """The rows from `first` to `last`."""
-        ends = [finite(self.row[key], "s", f"{self.place}, {key}") if key in self.row else other
-                for key, other in (("first", -np.inf), ("last", np.inf))]  # fmt: skip
-        rows = (recording["time"] >= ends[0]) & (recording["time"] <= ends[1])
-        if not rows.any():
             raise ParameterError(
-                f"{recording.origin}: no row lies between first and last, {ends[0]:g} and {ends[1]:g} s."
+                f"{location}, {name} is {deviation:g}; the standard deviation of a sensor must be greater than zero."
             )
-        return recording.rows(rows)
+        observed[name] = deviation, read_text(entry, "column", location.inside(name), needed=False) or name
+    if not observed:
+        raise ParameterError(
+            f'{location}: no output is given; write pressure = "500 Pa", the standard deviation of its sensor.'
+        )
+    return observed
 
-    def start(self, plant: Plant, recording: Recording) -> InitialConditions:
-        """Rest at a pressure, or the state that is stated."""
-        at = self.place.inside("start")
-        given = dict(_table(self.row, "start", self.place, needed=False))
-        values = {name: finite(value, _unit(name, plant), f"{at}, {name}") for name, value in given.items()}
-        sensed = [name for name in recording if name.rpartition(".")[2] == "pressure"]
-        usual = float(np.median(recording[sensed[0]][:FIRST_ROWS])) if sensed else 0.0
-        pressure = values.pop("pressure", usual)
-        with located_errors(at):
-            return (
-                InitialConditions.held(plant, pressure, **values)
-                if values
-                else InitialConditions.at_rest(plant, pressure)
+
+def _read_shared(value: Any, where: str) -> ParameterPaths:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, list) and value and all(isinstance(path, str) for path in value):
+        return tuple(value)
+    raise ParameterError(
+        f"{where} contains {value!r}; each item must be a path in quotes, or a list of paths with one common value."
+    )
+
+
+def _read_own(table: Mapping[str, Any], plant: Plant, location: Location) -> tuple[RecordUnknown, ...]:
+    own: list[RecordUnknown] = [_read_shared(item, f"{location}, own") for item in _read_list(table, "own", location)]
+    if "start_time" in table:
+        own.append(StartTime(_read_positive(table["start_time"], "s", f"{location}, start_time")))
+    for name, margin in optional_table(table, "start", location).items():
+        unit = signal_unit(name, plant) or "1"
+        own.append(InitialValue(name, _read_positive(margin, unit, f"{location}, start, {name}")))
+    return tuple(own)
+
+
+def _read_positive(value: Any, unit: str, where: str) -> float:
+    number = read_finite_number(value, unit, where)
+    if not number > 0:
+        raise ParameterError(f"{where} is {value!r}; it must be greater than zero.")
+    return number
+
+
+def _read_bounds(table: Mapping[str, Any], plant: Plant, location: Location) -> dict[str, tuple[float, float]]:
+    declared = {leaf.path: leaf.declared for leaf in tree.leaves(plant)}
+    bounds = {}
+    for path, value in table.items():
+        check_keys({path: value}, tuple(declared), location)
+        where = f"{location}, {path}"
+        if not isinstance(value, list) or len(value) != 2:
+            raise ParameterError(
+                f"{where} is {value!r}; it must be a list of minimum and maximum, such as [1.01, 1.4]."
             )
+        low, high = (read_finite_number(end, declared[path].unit, where) for end in value)
+        lower, upper = declared[path].bounds
+        if low < lower or high > upper:
+            raise ParameterError(f"{where} is {value!r}; allowed range: {lower:g} to {upper:g}.")
+        if not low < high:
+            raise ParameterError(f"{where} is {value!r}; the minimum must be less than the maximum.")
+        bounds[path] = low, high
+    return bounds

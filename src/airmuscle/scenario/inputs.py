@@ -1,13 +1,13 @@
-"""The table [command] of a scenario: schedules and signals, from the file itself or from a recording, and drivers.
+"""Table [command] of a scenario: input signals from the file or from a recording, and drivers.
 
 [command]
-fill = [["5 s", 1], ["15 s", 0]]            an input: instants, and the value from then on
-model = "SampledSignal"                            optional: straight lines between the points; Schedule otherwise
-period = "2 s"                              optional: the first 2 s over and over
-file = "bench.csv"                          optional: columns of a data file, Signal unless model says otherwise
-columns = { fill = "valve [%]" }            optional: which column an input follows, if not the one of its name
+fill = [["5 s", 1], ["15 s", 0]]            an input: instants, and the value from each instant on
+model = "SampledSignal"                     optional: linear interpolation between the points; Schedule by default
+period = "2 s"                              optional: the first 2 s are repeated
+file = "bench.csv"                          optional: columns of a data file; then SampledSignal is the default
+columns = { fill = "valve [%]" }            optional: the column of each input, by default the one of the same name
 [command.drivers]
-fill = { model = "SolenoidDriver", opening_delay = "5 ms" }     optional: one driver, or several in the signal's order
+fill = { model = "SolenoidDriver", opening_delay = "5 ms" }     optional: one driver, or a list in signal order
 """
 
 from __future__ import annotations
@@ -20,126 +20,132 @@ from ..control.inputs import NO_INPUT, InputSignal, Periodic, SampledSignal, Sch
 from ..control.with_drivers import WithDrivers
 from ..core.errors import ColumnError, ParameterError
 from ..core.variables import Input
-from ..library.build import build
-from ..library.location import Location, check_keys, checked, finite, located_errors, text
+from ..library.build import build, load_valve
+from ..library.location import Location, check_keys, check_type, located_errors, read_finite_number, read_text
 from ..library.models import model_class
+from ..recording import read_csv
+from ..recording.heading import split_unit
 
-KEYS = ("model", "period", "file", "columns", "drivers")
-"""Keys of the table that are no inputs."""
+RESERVED_KEYS = ("model", "period", "file", "columns", "drivers")
+"""Keys of the table that are not inputs."""
 Points = tuple[tuple[float, float], ...]
 
 
-def command_from(
-    table: Mapping[str, Any], commands: Sequence[Input], place: Location, lacks: str = NO_INPUT
+def build_input_signal(
+    table: Mapping[str, Any], commands: Sequence[Input], location: Location, unknown_name: str = NO_INPUT
 ) -> InputSignal:
-    """The command that the table describes. Raises ParameterError, UnitError, UnknownName, FileError or ColumnError;
-    `lacks` begins the message about a name that is not among the commands."""
+    """The input signal of a table. `unknown_name` begins the error message on a name that is not among the commands.
+
+    Raises ParameterError, UnitError, UnknownNameError, FileError or ColumnError with the location.
+    """
     if "controller" in table:
         raise ParameterError(
-            f"{place}: a controller stands in a scenario only; give what was commanded, as rows or a file."
+            f"{location}: a controller is allowed only in a scenario; give the commanded inputs as rows or a file."
         )
-    units = {given.name: given.unit for given in commands}
+    units = {command.name: command.unit for command in commands}
     inputs = tuple(units)
-    rows = {key: value for key, value in table.items() if key not in KEYS}
-    with located_errors(place):
-        check_input_names(list(rows), inputs, lacks)
-    points = _recorded(table, units, place)
-    for key, given in rows.items():
+    rows = {key: value for key, value in table.items() if key not in RESERVED_KEYS}
+    with located_errors(location):
+        check_input_names(list(rows), inputs, unknown_name)
+    points = _read_file_points(table, units, location)
+    for key, value in rows.items():
         if key in points:
-            raise ParameterError(f"{place}: '{key}' stands in the file and here too; take it out of one of them.")
-        points[key] = tuple(_point(row, units[key], f"{place}, {key}") for row in _list(given, f"{place}, {key}"))
-    with located_errors(place):
-        command: InputSignal = _kind(table, place)(points)
+            raise ParameterError(f"{location}: '{key}' is given both by the file and by rows; remove one of them.")
+        where = f"{location}, {key}"
+        points[key] = tuple(_read_point(row, units[key], where) for row in _read_rows(value, where))
+    with located_errors(location):
+        signal: InputSignal = _signal_class(table, location)(points)
     if "period" in table:
-        length = finite(table["period"], "s", f"{place}, period")
-        with located_errors(place):
-            command = Periodic(command, length)
-    drivers = drivers_from(table.get("drivers", {}), inputs, place.inside("drivers"))
-    return WithDrivers(command, drivers) if drivers else command
+        period = read_finite_number(table["period"], "s", f"{location}, period")
+        with located_errors(location):
+            signal = Periodic(signal, period)
+    drivers = build_drivers(table.get("drivers", {}), inputs, location.inside("drivers"))
+    return WithDrivers(signal, drivers) if drivers else signal
 
 
-def _kind(table: Mapping[str, Any], place: Location) -> type[Schedule] | type[SampledSignal]:
-    kind = model_class(table.get("model", "SampledSignal" if "file" in table else "Schedule"), f"{place}, model")
-    if not issubclass(kind, Schedule | SampledSignal):
-        raise ParameterError(f"{place}: {kind.__name__} is no command; there are Schedule and Signal.")
-    return kind
+def _signal_class(table: Mapping[str, Any], location: Location) -> type[Schedule] | type[SampledSignal]:
+    cls = model_class(table.get("model", "SampledSignal" if "file" in table else "Schedule"), f"{location}, model")
+    if not issubclass(cls, Schedule | SampledSignal):
+        raise ParameterError(
+            f"{location}: {cls.__name__} is not an input signal; there are Schedule and SampledSignal."
+        )
+    return cls
 
 
-def _list(rows: Any, where: str) -> list[Any]:
+def _read_rows(rows: Any, where: str) -> list[Any]:
     if not isinstance(rows, list):
-        raise ParameterError(f'{where} is {rows!r}; write instants and values, [["5 s", 1], ["15 s", 0]].')
+        raise ParameterError(
+            f'{where} is {rows!r}; it must be a list of instants and values, such as [["5 s", 1], ["15 s", 0]].'
+        )
     return rows
 
 
-def _point(row: Any, unit: str, where: str) -> tuple[float, float]:
+def _read_point(row: Any, unit: str, where: str) -> tuple[float, float]:
     if not (isinstance(row, list) and len(row) == 2):
-        raise ParameterError(f'{where} holds {row!r}; each is an instant and a value, ["5 s", 1].')
-    return finite(row[0], "s", where), finite(row[1], unit, where)
+        raise ParameterError(f'{where} contains {row!r}; each item must be an instant and a value, such as ["5 s", 1].')
+    return read_finite_number(row[0], "s", where), read_finite_number(row[1], unit, where)
 
 
-def _recorded(table: Mapping[str, Any], units: Mapping[str, str], place: Location) -> dict[str, Points]:
-    """The points of the inputs that follow a column of a data file; none where no file is named."""
+def _read_file_points(table: Mapping[str, Any], units: Mapping[str, str], location: Location) -> dict[str, Points]:
+    """Points of the inputs that follow a column of a data file; none if no file is named."""
     columns, inputs = table.get("columns"), tuple(units)
     if "file" not in table:
         if columns is not None:
-            raise ParameterError(f'{place}: columns are named, but no file; write file = "bench.csv" beside them.')
+            raise ParameterError(f'{location}: columns is given without file; write file = "bench.csv" next to it.')
         return {}
-    from ..recording import read_csv  # pandas, which no other command needs
-    from ..recording.heading import stated_unit
-
-    path = text(table, "file", place, needed=True)
-    with located_errors(place):
-        recording = read_csv(place.folder / path)
+    path = read_text(table, "file", location, needed=True)
+    with located_errors(location):
+        recording = read_csv(location.folder / path)
         if columns is None:
-            named = {*recording, *(stated_unit(heading)[0] for heading in recording)}
-            columns = {name: name for name in inputs if name in named}
+            names = {*recording, *(split_unit(heading)[0] for heading in recording)}
+            columns = {name: name for name in inputs if name in names}
             if not columns:
                 raise ColumnError(
-                    f"{path} has no column called like an input ({', '.join(inputs)}); there are "
+                    f"{path} has no column with the name of an input ({', '.join(inputs)}); its columns are "
                     f'{", ".join(recording)}. Write columns = {{ {inputs[0] if inputs else "fill"} = "..." }}.'
                 )
     if not isinstance(columns, Mapping) or not all(isinstance(column, str) for column in columns.values()):
-        raise ParameterError(f'{place}, columns is {columns!r}; write columns = {{ fill = "valve" }}.')
-    with located_errors(place):
+        raise ParameterError(f'{location}, columns is {columns!r}; it must be a table such as {{ fill = "valve" }}.')
+    with located_errors(location):
         check_input_names(list(columns), inputs)
-        taken = {name: recording.in_unit(column, units[name]) for name, column in columns.items()}
-        signal = SampledSignal.recorded(recording.with_columns(**taken), {name: name for name in columns})
+        values = {name: recording.in_unit(column, units[name]) for name, column in columns.items()}
+        signal = SampledSignal.recorded(recording.with_columns(**values), {name: name for name in columns})
         return {name: tuple(points) for name, points in signal.points.items()}
 
 
-def drivers_from(table: Any, inputs: Sequence[str], place: Location) -> dict[str, Driver | tuple[Driver, ...]]:
-    """The drivers of the inputs that the table [command.drivers] names."""
+def build_drivers(table: Any, inputs: Sequence[str], location: Location) -> dict[str, Driver | tuple[Driver, ...]]:
+    """The drivers of a table [command.drivers] by input. Raises ParameterError, UnitError or UnknownNameError."""
     if not isinstance(table, Mapping):
         raise ParameterError(
-            f'{place} is {table!r}; write [{place.table}] and fill = {{ model = "SolenoidDriver" }} under it.'
+            f'{location} is {table!r}; it must be a table. Write fill = {{ model = "SolenoidDriver" }} in '
+            f"[{location.table}]."
         )
-    with located_errors(place):
+    with located_errors(location):
         check_input_names(list(table), inputs)
-    return {name: _chain(given, place.inside(name)) for name, given in table.items()}
+    return {name: _build_chain(value, location.inside(name)) for name, value in table.items()}
 
 
-def _chain(given: Any, place: Location) -> Driver | tuple[Driver, ...]:
-    if isinstance(given, list):
-        return tuple(_driver(each, place.inside(f"[{i}]")) for i, each in enumerate(given))
-    return _driver(given, place)
+def _build_chain(value: Any, location: Location) -> Driver | tuple[Driver, ...]:
+    if isinstance(value, list):
+        return tuple(_build_driver(item, location.inside(f"[{i}]")) for i, item in enumerate(value))
+    return _build_driver(value, location)
 
 
-def _driver(given: Any, place: Location) -> Driver:
-    if isinstance(given, Mapping) and "library" in given and "model" not in given:
-        check_keys(given, ("library",), place)
-        return _of_catalogue(text(given, "library", place, needed=True), place)
-    found: Driver = checked(build({"model": given} if isinstance(given, str) else given, place), Driver, place)
-    return found
+def _build_driver(value: Any, location: Location) -> Driver:
+    if isinstance(value, Mapping) and "library" in value and "model" not in value:
+        check_keys(value, ("library",), location)
+        return _library_driver(read_text(value, "library", location, needed=True), location)
+    table = {"model": value} if isinstance(value, str) else value
+    driver: Driver = check_type(build(table, location), Driver, location)
+    return driver
 
 
-def _of_catalogue(name: str, place: Location) -> SolenoidDriver:
-    """The delays of a valve of the catalogue, or of a file beside the scenario; its motion is part of them."""
-    from ..library.valve_catalogue import load_valve
-
-    with located_errors(place):
-        valve = load_valve(place.folder / name if name.endswith(".toml") else name)
-        if valve.response is None:
+def _library_driver(name: str, location: Location) -> SolenoidDriver:
+    """Driver with the switching times of a valve of the library or of a valve file, relative to the scenario."""
+    with located_errors(location):
+        valve = load_valve(location.folder / name if name.endswith(".toml") else name)
+        if valve.switching_times is None:
             raise ParameterError(
-                f'{valve.name}: no response is published; write model = "SolenoidDriver" and its opening_delay.'
+                f'{valve.name}: no switching times are published; write model = "SolenoidDriver" and its opening_delay.'
             )
-    return SolenoidDriver(valve.response.opening_delay, valve.response.closing_delay)
+    return SolenoidDriver(valve.switching_times.opening_delay, valve.switching_times.closing_delay)

@@ -1,22 +1,22 @@
-"""A simulation written down as a file: [plant], [command], [run] and [output].
+"""Scenario: a simulation as a TOML file with the tables [plant], [command], [run] and [output].
 
     [plant]
     muscle = "dmsp-20-300"                      a library name or a muscle file; or a table [plant.muscle] with
-                                                library = "dmsp-20-300" and what replaces its parts, or all parts
-    gas = "Isothermal"                          optional; polytropic otherwise
+                                                library = "dmsp-20-300" and the parts to replace, or with all parts
+    gas = "Isothermal"                          optional; polytropic by default
     [plant.circuit]                             model = "FillDischarge" with supply, fill and discharge
     [plant.mechanism]                           model = "HangingMass", mass = "5 kg"
-    [command]                                   see command_table.py; with a controller, loop_table.py
-    fill = [["5 s", 1], ["15 s", 0]]            every input of the plant: instants, and the value from then on
+    [command]                                   see inputs.py; with a controller, controller.py
+    fill = [["5 s", 1], ["15 s", 0]]            each input of the plant: instants, and the value from each instant on
     [run]
     duration = "25 s"
     output = "10 ms"                            optional
-    start = { pressure = "0 bar" }              optional: rest at this pressure; or a state, position = "10 mm"
+    start = { pressure = "0 bar" }              optional: equilibrium at this pressure; or a state, position = "10 mm"
     method = { model = "Rodas4", rtol = 1e-8 }  optional
     [output]
-    columns = ["pressure", "force"]             optional: what the file of the run holds beside the time; or all
+    columns = ["pressure", "force"]             optional: columns of the recording besides time; all by default
 
-Components are tables with `model` and their parameters; later components need no new grammar.
+Components are tables with `model` and their parameters; new components need no new grammar.
 """
 
 from __future__ import annotations
@@ -28,34 +28,35 @@ from types import MappingProxyType, NoneType
 from typing import Any
 
 from ..analysis.equilibrium import find_equilibrium
-from ..compile.program import compile_system
 from ..characteristic.base import ForceLaw
+from ..compile.program import compile_system
 from ..control.control_loop import ControlLoop
 from ..control.inputs import InputSignal
 from ..control.with_drivers import WithDrivers
 from ..core.errors import ParameterError, suggestion
 from ..library.build import build
-from ..library.catalogue import load, parsed
+from ..library.catalogue import load_law
 from ..library.entry import Entry
-from ..library.location import Location, check_keys, checked, finite, located_errors, text
+from ..library.files import read_toml
+from ..library.location import Location, check_keys, check_type, located_errors, read_finite_number, read_text
 from ..muscle import Muscle
 from ..plant.plant import Plant
 from ..recording import Recording
 from ..simulation import Integrator, Rodas4, simulate
 from ..simulation.problem import check_input_range
-from .controller import loop_from, units_around
-from .inputs import command_from
+from .controller import build_control_loop, signal_units
+from .inputs import build_input_signal
 
 TABLES = ("title", "plant", "command", "run", "output")
 RUN = ("duration", "start_time", "output", "start", "method")
 OUTPUT = ("columns",)
-AMBIENT: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
-"""A run begins at rest at ambient pressure unless it says otherwise."""
+DEFAULT_START: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
+"""Default initial state of a run: equilibrium at ambient pressure."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Scenario:
-    """A plant, what it is commanded, and how long it runs; all numbers SI."""
+    """Plant, input signal or control loop, and settings of a simulation; all numbers SI."""
 
     title: str
     plant: Plant
@@ -66,10 +67,10 @@ class Scenario:
     output: float | None = None
     method: Integrator = dataclasses.field(default_factory=Rodas4)
     columns: tuple[str, ...] = ()
-    """What the file of the run holds beside the time; empty: everything."""
+    """Columns of the recording besides time; all if empty."""
 
     def simulate(self, *, complete: bool = True) -> Recording:
-        """The run as a Recording; see `airmuscle.simulate`."""
+        """The simulated run as a Recording; see `airmuscle.simulate`."""
         return simulate(
             self.plant,
             self.command,
@@ -81,170 +82,186 @@ class Scenario:
             complete=complete,
         )
 
-    def chosen(self, recording: Recording) -> Recording:
-        """The recording with the columns that the scenario asks for."""
+    def select_columns(self, recording: Recording) -> Recording:
+        """The recording with time and the columns of the scenario."""
         kept = {name: recording[name] for name in recording if not self.columns or name in ("time", *self.columns)}
         return dataclasses.replace(recording, columns=kept)
 
 
 def load_scenario(path: str | Path) -> Scenario:
-    """The scenario in a file. Raises FileError, ParameterError, UnitError or UnknownName, saying where."""
+    """The scenario in a file. Raises FileError, ParameterError, UnitError or UnknownNameError with the location."""
     file = Path(path)
-    return scenario_from(parsed(file), Location(str(file), "", file.parent))
+    return build_scenario(read_toml(file), Location(str(file), "", file.parent))
 
 
-def scenario_from(
-    tables: Mapping[str, Any], place: Location, plant: Plant | None = None, rest: dict[str, float] | None = None
+def build_scenario(
+    tables: Mapping[str, Any],
+    location: Location,
+    plant: Plant | None = None,
+    equilibrium: dict[str, float] | None = None,
 ) -> Scenario:
-    """The scenario that the tables of a file describe; a `plant` that is given stands for the table [plant], and a
-    `rest` for the equilibrium that the run begins at."""
-    check_keys(tables, TABLES, place)
+    """The scenario of the tables of a file.
+
+    `plant` replaces the table [plant], `equilibrium` replaces the computed initial equilibrium. Raises FileError,
+    ParameterError, UnitError or UnknownNameError with the location.
+    """
+    check_keys(tables, TABLES, location)
     for key in ("plant", "run"):
-        _table(tables.get(key), key, place)
-    plant = plant or _plant(tables["plant"], place.inside("plant"))
-    run, at = tables["run"], place.inside("run")
-    check_keys(run, RUN, at)
+        _check_table(tables.get(key), key, location)
+    plant = plant or build_plant(tables["plant"], location.inside("plant"))
+    run, in_run = tables["run"], location.inside("run")
+    check_keys(run, RUN, in_run)
     if "duration" not in run:
-        raise ParameterError(f"{at}: 'duration' is missing; write it like duration = \"25 s\".")
-    duration, start_time = _length(run, "duration", at), finite(run.get("start_time", 0.0), "s", f"{at}, start_time")
-    table = _table(tables.get("command", {}), "command", place)
-    start = _start(run.get("start", AMBIENT), plant, at.inside("start"), rest)
-    command = _command(table, plant, start, duration, place.inside("command"))
-    shown = WithDrivers(command.other_inputs, command.drivers) if isinstance(command, ControlLoop) else command
-    with located_errors(place.inside("command")):
-        check_input_range(compile_system(plant), shown.segments(plant.inputs, start_time, duration), start_time)
-    known = list(units_of_run(plant, start, command))
+        raise ParameterError(f"{in_run}: 'duration' is missing; write it as duration = \"25 s\".")
+    duration = _read_duration(run, "duration", in_run)
+    start_time = read_finite_number(run.get("start_time", 0.0), "s", f"{in_run}, start_time")
+    command_table = _check_table(tables.get("command", {}), "command", location)
+    start = _build_start(run.get("start", DEFAULT_START), plant, in_run.inside("start"), equilibrium)
+    in_command = location.inside("command")
+    command = _build_command(command_table, plant, start, duration, in_command)
+    signal = WithDrivers(command.other_inputs, command.drivers) if isinstance(command, ControlLoop) else command
+    with located_errors(in_command):
+        check_input_range(compile_system(plant), signal.segments(plant.inputs, start_time, duration), start_time)
+    known = list(run_column_units(plant, start, command))
+    output_table = _check_table(tables.get("output", {}), "output", location)
     return Scenario(
-        title=text(tables, "title", place, needed=False) or Path(place.file).stem,
+        title=read_text(tables, "title", location, needed=False) or Path(location.file).stem,
         plant=plant,
         command=command,
         duration=duration,
         start=start,
         start_time=start_time,
-        output=_length(run, "output", at) if "output" in run else None,
-        method=_object(run["method"], Integrator, at.inside("method")) if "method" in run else Rodas4(),
-        columns=_columns(_table(tables.get("output", {}), "output", place), known, place.inside("output")),
+        output=_read_duration(run, "output", in_run) if "output" in run else None,
+        method=_build_model(run["method"], Integrator, in_run.inside("method")) if "method" in run else Rodas4(),
+        columns=_read_columns(output_table, known, location.inside("output")),
     )
 
 
-def _table(given: Any, key: str, place: Location) -> Mapping[str, Any]:
-    if not isinstance(given, Mapping):
-        what = "is missing" if given is None else f"is {given!r}, no table; write [{key}] and its keys under it"
-        raise ParameterError(f"{place}: the table [{key}] {what}.")
-    return given
+def _check_table(value: Any, key: str, location: Location) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        what = "is missing" if value is None else f"is {value!r}; it must be a table"
+        raise ParameterError(f"{location}: the table [{key}] {what}.")
+    return value
 
 
-def _command(
-    table: Mapping[str, Any], plant: Plant, start: Mapping[str, float], duration: float, place: Location
+def _build_command(
+    table: Mapping[str, Any], plant: Plant, start: Mapping[str, float], duration: float, location: Location
 ) -> InputSignal | ControlLoop:
     if "controller" not in table:
-        return command_from(table, plant.input_variables, place)
-    loop = loop_from(table, plant, units_around(plant, start), place)
-    with located_errors(place.inside("controller")):
+        return build_input_signal(table, plant.input_variables, location)
+    loop = build_control_loop(table, plant, signal_units(plant, start), location)
+    with located_errors(location.inside("controller")):
         loop.check_period(duration)
     return loop
 
 
-def units_of_run(plant: Plant, start: Mapping[str, float], command: InputSignal | ControlLoop) -> dict[str, str]:
-    """The units of all columns that a run has; '' where none is known."""
-    units = {"time": "s"} | units_around(plant, start)
+def run_column_units(plant: Plant, start: Mapping[str, float], command: InputSignal | ControlLoop) -> dict[str, str]:
+    """Units of all columns of a run; '' if unknown."""
+    units = {"time": "s"} | signal_units(plant, start)
     return units | (command.units(units) if isinstance(command, ControlLoop) else {})
 
 
-def _length(table: Mapping[str, Any], key: str, place: Location) -> float:
-    """A length of time [s]."""
-    found = finite(table[key], "s", f"{place}, {key}")
-    if not found > 0:
-        raise ParameterError(f"{place}, {key} is {table[key]!r}; it must be greater than zero.")
-    return found
+def _read_duration(table: Mapping[str, Any], key: str, location: Location) -> float:
+    """A positive duration [s]."""
+    duration = read_finite_number(table[key], "s", f"{location}, {key}")
+    if not duration > 0:
+        raise ParameterError(f"{location}, {key} is {table[key]!r}; it must be greater than zero.")
+    return duration
 
 
-def _plant(table: Mapping[str, Any], place: Location) -> Plant:
-    muscles = table.get("muscle")
-    if muscles is None:
-        raise ParameterError(f"{place}: 'muscle' is missing; name a library entry, a file, or write [plant.muscle].")
-    found: Any
-    if isinstance(muscles, list):
-        found = tuple(_muscle(m, place.inside(f"muscle[{i}]")) for i, m in enumerate(muscles))
+def build_plant(table: Mapping[str, Any], location: Location) -> Plant:
+    """The plant of a table [plant]. Raises FileError, ParameterError, UnitError or UnknownNameError."""
+    value = table.get("muscle")
+    if value is None:
+        raise ParameterError(
+            f"{location}: 'muscle' is missing; name a library entry or a muscle file, or write [plant.muscle]."
+        )
+    muscle: Muscle | tuple[Muscle, ...]
+    if isinstance(value, list):
+        muscle = tuple(build_muscle(item, location.inside(f"muscle[{i}]")) for i, item in enumerate(value))
     else:
-        found = _muscle(muscles, place.inside("muscle"))
-    rest = {"model": "Plant", **{key: value for key, value in table.items() if key != "muscle"}}
-    plant: Plant = checked(build(rest, place, {"muscle": found}), Plant, place)
+        muscle = build_muscle(value, location.inside("muscle"))
+    others = {"model": "Plant", **{key: item for key, item in table.items() if key != "muscle"}}
+    plant: Plant = check_type(build(others, location, {"muscle": muscle}), Plant, location)
     return plant
 
 
-def _muscle(given: Any, place: Location) -> Any:
-    if isinstance(given, Mapping):
-        rest = {"model": "Muscle", **given}
-        base = rest.pop("library", None)
-        return build(rest, place, {} if base is None else _parts(_entry(base, place.inside("library")), rest, place))
-    entry = _entry(given, place)
-    with located_errors(place):
+def build_muscle(value: Any, location: Location) -> Muscle:
+    """The muscle of a library name, a file or a table. Raises FileError, ParameterError, UnitError or
+    UnknownNameError."""
+    if isinstance(value, Mapping):
+        table = {"model": "Muscle", **value}
+        name = table.pop("library", None)
+        parts = {} if name is None else _entry_parts(_load_entry(name, location.inside("library")), table, location)
+        muscle: Muscle = build(table, location, parts)
+        return muscle
+    entry = _load_entry(value, location)
+    with located_errors(location):
         return entry.muscle
 
 
-def _entry(given: Any, place: Location) -> Entry:
-    if not isinstance(given, str):
-        raise ParameterError(f"{place} is {given!r}; name a library entry or a muscle file.")
-    with located_errors(place):
-        return load(place.folder / given if given.endswith(".toml") else given)
+def _load_entry(value: Any, location: Location) -> Entry:
+    if not isinstance(value, str):
+        raise ParameterError(f"{location} is {value!r}; name a library entry or a muscle file.")
+    with located_errors(location):
+        return load_law(location.folder / value if value.endswith(".toml") else value)
 
 
-def _parts(entry: Entry, replaced: Mapping[str, Any], place: Location) -> dict[str, Any]:
-    """The parts of an entry that a table leaves as they are; what it lacks, such as a geometry, the table may give."""
+def _entry_parts(entry: Entry, replaced: Mapping[str, Any], location: Location) -> dict[str, Any]:
+    """Parts of an entry that a table does not replace; the table may add missing parts, such as a geometry."""
     names = [f.name for f in dataclasses.fields(Muscle) if f.name not in ("contractile", "name")]
     parts = {"contractile": entry.characteristic, **{name: getattr(entry, name, None) for name in names}}
     if "contractile" in replaced:
-        del parts["validity_range"]  # it tells where the law that is replaced was measured
-    left = {name: part for name, part in parts.items() if part is not None and name not in replaced}
-    if not isinstance(left.get("contractile"), ForceLaw | NoneType):
+        del parts["validity_range"]  # it belongs to the replaced law
+    kept = {name: part for name, part in parts.items() if part is not None and name not in replaced}
+    if not isinstance(kept.get("contractile"), ForceLaw | NoneType):
         raise ParameterError(
-            f"{place}: {entry.name} is {type(entry.characteristic).__name__}, which is not solved for the force; "
+            f"{location}: {entry.name} is {type(entry.characteristic).__name__}, which is not solved for the force; "
             "a plant needs a ForceLaw. In Python, as_force_law(law, validity range) makes one."
         )
-    return left
+    return kept
 
 
-def pressure_of_rest(tables: Mapping[str, Any], place: Location) -> float | None:
-    """Gauge pressure [Pa] in the muscles where a run begins at rest; None where it begins at another state."""
-    given = tables["run"].get("start", AMBIENT)
-    if not isinstance(given, Mapping) or set(given) - {"pressure"}:
+def initial_pressure(tables: Mapping[str, Any], location: Location) -> float | None:
+    """Gauge pressure [Pa] of the initial equilibrium of a run; None if the run starts from another state."""
+    start = tables["run"].get("start", DEFAULT_START)
+    if not isinstance(start, Mapping) or set(start) - {"pressure"}:
         return None
-    return finite(given.get("pressure", 0.0), "Pa", f"{place.inside('run').inside('start')}, pressure")
+    return read_finite_number(start.get("pressure", 0.0), "Pa", f"{location.inside('run').inside('start')}, pressure")
 
 
-def _start(given: Any, plant: Plant, place: Location, rest: dict[str, float] | None) -> dict[str, float]:
-    if not isinstance(given, Mapping):
-        raise ParameterError(f'{place} is {given!r}; write start = {{ pressure = "0 bar" }}.')
+def _build_start(
+    table: Any, plant: Plant, location: Location, equilibrium: dict[str, float] | None
+) -> dict[str, float]:
+    if not isinstance(table, Mapping):
+        raise ParameterError(f'{location} is {table!r}; it must be a table. Write start = {{ pressure = "0 bar" }}.')
     coordinates = {
         name: unit for c in plant.mechanism.coordinates for name, unit in ((c.name, c.unit), (c.speed, f"{c.unit}/s"))
     }
-    kinds = {"pressure": "Pa", **coordinates}
-    check_keys(given, tuple(kinds), place)
-    values = {key: finite(value, kinds[key], f"{place}, {key}") for key, value in given.items()}
+    units = {"pressure": "Pa", **coordinates}
+    check_keys(table, tuple(units), location)
+    values = {key: read_finite_number(value, units[key], f"{location}, {key}") for key, value in table.items()}
     pressure = values.pop("pressure", 0.0)
-    with located_errors(place):
+    with located_errors(location):
         if values:
             return plant.state_at(pressure=pressure, **values)
-        return find_equilibrium(plant, pressure=pressure) if rest is None else rest
+        return find_equilibrium(plant, pressure=pressure) if equilibrium is None else equilibrium
 
 
-def _columns(table: Mapping[str, Any], known: Sequence[str], place: Location) -> tuple[str, ...]:
-    check_keys(table, OUTPUT, place)
-    given = table.get("columns", [])
-    if not isinstance(given, list) or not all(isinstance(name, str) for name in given):
-        raise ParameterError(f'{place}, columns is {given!r}; write columns = ["pressure", "force"].')
-    for name in given:
+def _read_columns(table: Mapping[str, Any], known: Sequence[str], location: Location) -> tuple[str, ...]:
+    check_keys(table, OUTPUT, location)
+    columns = table.get("columns", [])
+    if not isinstance(columns, list) or not all(isinstance(name, str) for name in columns):
+        raise ParameterError(
+            f'{location}, columns is {columns!r}; it must be a list of names, such as ["pressure", "force"].'
+        )
+    for name in columns:
         if name not in known:
             raise ParameterError(
-                f"{place}: the run has no column '{name}'; there are {', '.join(known)}.{suggestion(name, known)}"
+                f"{location}: the run has no column '{name}'; there are {', '.join(known)}.{suggestion(name, known)}"
             )
-    return tuple(given)
+    return tuple(columns)
 
 
-def _object(given: Any, kind: type[Any], place: Location) -> Any:
-    return checked(build({"model": given} if isinstance(given, str) else given, place), kind, place)
-
-
-plant_from, muscle_from = _plant, _muscle
-"""The grammar of a plant and of a muscle, for other files that hold them."""
+def _build_model(value: Any, kind: type[Any], location: Location) -> Any:
+    return check_type(build({"model": value} if isinstance(value, str) else value, location), kind, location)

@@ -193,9 +193,7 @@ def _solution(problem: Problem, run: _Run) -> Solution:
     note = f"controlled by {prepared.loop.describe(units)}"
     remark = Diagnostic(DiagnosticCode.CONTROLLER, type(prepared.loop.controller).__name__, note)
     more = _controller_columns(problem, run, times[: raw.reached])
-    recording, diagnostics = make_recording(
-        compiled, raw, table, times, integrator, problem.end_time, more, (remark,)
-    )
+    recording, diagnostics = make_recording(compiled, raw, table, times, integrator, problem.end_time, more, (remark,))
     final = dict(zip(compiled.description.state_names, run.state.tolist(), strict=True))
     statistics = Statistics(raw.steps, raw.rejected)
     return Solution(problem, recording, raw.status, statistics, diagnostics, run.time, final, run.control_state)

@@ -9,7 +9,7 @@ from ..core import autodiff, ops, tree
 from ..core.declaration import model, parameter
 from ..core.errors import ParameterError, suggestion
 from ..core.ops import Value
-from ..core.system import Differentiated, System
+from ..core.system import SensitivitySystem, System
 from ..core.variables import Input, StateVariable
 
 TOLERANCE_FACTOR = 10.0
@@ -18,7 +18,7 @@ while the states rest, and at 1 the steps double."""
 
 
 @model
-class WithSensitivities(Differentiated):
+class WithSensitivities(SensitivitySystem):
     """A system with s_k = dx/dtheta_k for every column k as further states, and its outputs' derivatives.
 
         s_k' = (df/dx) s_k + df/dtheta_k,    dy/dtheta_k = (dy/dx) s_k + dy/dtheta_k,    y' = (dy/dx) f
@@ -60,7 +60,7 @@ class WithSensitivities(Differentiated):
                 )
 
     @property
-    def places(self) -> tuple[tuple[int, ...], ...]:
+    def parameter_indices(self) -> tuple[tuple[int, ...], ...]:
         """For every column the places of its paths among the inner leaves."""
         place = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.inner))}
         return tuple(tuple(place[path] for path in group) for group in self.columns)

@@ -1,6 +1,6 @@
-"""Many runs of one scenario: what varies, how it is sampled, what is kept, and which input it comes from."""
+"""Parameter studies: varied parameters, designs of experiments, metrics and sensitivities of a scenario."""
 
-from .executors import dask_cluster, processes
+from .executors import dask_cluster, process_pool
 from .result import StudyResult
 from .run import run_study
 from .study import Study, load_study
@@ -10,6 +10,6 @@ __all__ = [
     "StudyResult",
     "dask_cluster",
     "load_study",
-    "processes",
+    "process_pool",
     "run_study",
 ]

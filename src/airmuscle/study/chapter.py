@@ -1,4 +1,4 @@
-"""The chapter of a report that a study fills, and the files beside it."""
+"""Report chapter of a parameter study, and its result files."""
 
 from __future__ import annotations
 
@@ -10,145 +10,148 @@ import numpy as np
 from ..core.reference import cite
 from ..report.chapter import Chapter, Table
 from ..report.output_folder import atomic_folder
-from ..report.write import fill, save_table
+from ..report.write import save_table, write_into
 from .distributions import LevelSet, Variation
-from .plots import plots
+from .plots import study_plots
 from .result import StudyResult
-from .sensitivity import Indices
+from .sensitivity import SobolIndices
 from .study import Study
 
-RESULTS, COURSES = "results.csv", "courses.npz"
-MOST_LEVELS = 6
-"""Levels that are written out; of more, the ends and their number."""
-MOST_REASONS = 20
+RESULTS_FILE, TIME_SERIES_FILE = "results.csv", "time_series.npz"
+MAX_LISTED_LEVELS = 6
+"""Maximum number of levels that are listed; of more levels, only range and number are printed."""
+MAX_LISTED_REASONS = 20
 
 
 def write_study(result: StudyResult, folder: Path | str) -> Path:
-    """Write results.csv, courses.npz where whole columns are kept, and the report; the path of its page.
+    """Write results.csv, time_series.npz (if the study has time series) and the report; return the path of its page.
 
-    All of it appears, or nothing. Raises FileError where the folder cannot be written to.
+    The files are written atomically: all or none. Raises FileError if the folder cannot be written to.
     """
     study = result.study
     with atomic_folder(folder) as place:
-        save_table(result.table(), place / RESULTS)
-        if study.courses:
-            times = {f"{name}_time": course.instants for name, course in study.courses.items()}
-            np.savez(place / COURSES, **times, **result.courses)  # type: ignore[arg-type]
-        fill(place, [study_chapter(result)], title="Parameter study")
+        save_table(result.table(), place / RESULTS_FILE)
+        if study.time_series:
+            times = {f"{name}_time": course.times for name, course in study.time_series.items()}
+            np.savez(place / TIME_SERIES_FILE, **times, **result.time_series)  # type: ignore[arg-type]
+        write_into(place, [study_chapter(result)], title="Parameter study")
     return Path(folder) / "report.html"
 
 
 def study_chapter(result: StudyResult) -> Chapter:
-    """A study's design, statistics, sensitivities and figures."""
+    """The report chapter: design, statistics, sensitivities and figures of a study."""
     study, indices = result.study, result.indices()
-    tables = [varied_table(study)]
+    tables = [variation_table(study)]
     tables += [result.statistics()] if study.scalars else []
     tables += [sensitivity_table(study, indices)] if indices else []
-    tables += [reasons_table(result)] if result.failed.size else []
+    tables += [failure_table(result)] if result.failed.size else []
     return Chapter(
         paper="study",
         title=study.title,
         summary="\n\n".join(summary(result, indices)),
-        plots=plots(result, indices),
+        plots=study_plots(result, indices),
         tables=tuple(tables),
-        references=tuple(cite(study.source.scenario.plant)),
+        references=tuple(cite(study.template.scenario.plant)),
         chosen=_settings(study),
     )
 
 
-def summary(result: StudyResult, indices: dict[str, Indices]) -> list[str]:
-    """What a reader should know before looking at any number."""
+def summary(result: StudyResult, indices: dict[str, SobolIndices]) -> list[str]:
+    """The paragraphs above the tables: number of runs, files, failed runs and excluded base points."""
     study = result.study
-    said = [f"{len(study)} runs, {study.design}. All runs are in {RESULTS}, one a row."]
-    if study.courses:
-        said.append(f"Whole columns ({', '.join(study.courses)}) are in {COURSES}, a row a run, with their instants.")
+    paragraphs = [f"{len(study)} runs, {study.design}. {RESULTS_FILE} contains one row per run."]
+    if study.time_series:
+        names = ", ".join(study.time_series)
+        paragraphs.append(f"{TIME_SERIES_FILE} contains the time series ({names}), one row per run, and their times.")
     if result.failed.size:
-        said.append(f"{result.failed.size} runs failed and are left out of all that follows; the table says why.")
-    left_out = max((found.left_out for found in indices.values()), default=0)
-    if left_out:
-        said.append(f"Of the base points of the sensitivities {left_out} could not be used for some outcome.")
-    return said
+        paragraphs.append(
+            f"Failed runs: {result.failed.size}. They are excluded from the statistics; the table states the reasons."
+        )
+    excluded = max((each.excluded_points for each in indices.values()), default=0)
+    if excluded:
+        paragraphs.append(f"Base points excluded from the sensitivities, because a metric is missing: {excluded}.")
+    return paragraphs
 
 
-def varied_table(study: Study) -> Table:
-    """What varies, and how."""
+def variation_table(study: Study) -> Table:
+    """The varied parameters with their distributions or levels and their sampled range."""
     return Table(
         "varied",
-        "What varies",
+        "Varied parameters",
         {
-            "number": [number.path for number in study.numbers],
-            "unit": [number.unit for number in study.numbers],
-            "values": [in_words(variation) for variation in study.variations],
+            "parameter": [parameter.path for parameter in study.parameters],
+            "unit": [parameter.unit for parameter in study.parameters],
+            "values": [describe_variation(variation) for variation in study.variations],
             "min": study.values.min(axis=0),
             "max": study.values.max(axis=0),
-            "followed by": [_followers(study, i) for i in range(len(study.numbers))],
+            "also applied to": [_follower_paths(study, i) for i in range(len(study.parameters))],
         },
-        "Values are SI.",
+        "Values in SI units.",
     )
 
 
-def _followers(study: Study, place: int) -> str:
-    return ", ".join(number.path for number, leader in study.follow if leader == place)
+def _follower_paths(study: Study, index: int) -> str:
+    return ", ".join(parameter.path for parameter, leader in study.follow if leader == index)
 
 
-def in_words(variation: Variation) -> str:
-    """A variation on one line."""
+def describe_variation(variation: Variation) -> str:
+    """A variation as one line of text."""
     if not isinstance(variation, LevelSet):
         return str(variation)
-    if len(variation.values) > MOST_LEVELS:
-        low, high = variation.ends
-        return f"{len(variation.values)} values from {low:g} to {high:g}"
-    return ", ".join(f"{value:g}" for value in variation.values)
+    if len(variation.values) > MAX_LISTED_LEVELS:
+        low, high = variation.support
+        return f"{len(variation.values)} values from {low:.4g} to {high:.4g}"
+    return ", ".join(f"{value:.4g}" for value in variation.values)
 
 
-def sensitivity_table(study: Study, indices: dict[str, Indices]) -> Table:
-    """The Sobol indices of every outcome by every input, with their intervals."""
-    rows = [(name, number.path, i) for name in indices for i, number in enumerate(study.numbers)]
+def sensitivity_table(study: Study, indices: dict[str, SobolIndices]) -> Table:
+    """The Sobol indices of each metric with respect to each parameter, with their confidence intervals."""
+    rows = [(name, parameter.path, i) for name in indices for i, parameter in enumerate(study.parameters)]
 
-    def column(part: str, row: int | None = None) -> list[float]:
-        found = [getattr(indices[name], part) for name, _, _ in rows]
-        return [float((f if row is None else f[row])[i]) for f, (_, _, i) in zip(found, rows, strict=True)]
+    def column(field: str, bound: int | None = None) -> list[float]:
+        values = [getattr(indices[name], field) for name, _, _ in rows]
+        return [float((v if bound is None else v[bound])[i]) for v, (_, _, i) in zip(values, rows, strict=True)]
 
     return Table(
         "sensitivities",
-        "Variance-based sensitivities",
+        "Variance-based sensitivities (Sobol indices)",
         {
-            "outcome": [name for name, _, _ in rows],
-            "input": [path for _, path, _ in rows],
+            "metric": [name for name, _, _ in rows],
+            "parameter": [path for _, path, _ in rows],
             "first order": column("first"),
-            "from": column("first_interval", 0),
-            "to": column("first_interval", 1),
+            "first order, lower": column("first_interval", 0),
+            "first order, upper": column("first_interval", 1),
             "total": column("total"),
-            "from ": column("total_interval", 0),
-            "to ": column("total_interval", 1),
+            "total, lower": column("total_interval", 0),
+            "total, upper": column("total_interval", 1),
         },
-        "Intervals are 95 %, by bootstrap. First order: the part of the variance that would go if the input were "
-        "known; total: the part that would stay if all others were.",
+        "Bounds of 95 % bootstrap confidence intervals. First order: fraction of the variance removed if the parameter "
+        "were known; total: fraction that remains if all other parameters were known.",
     )
 
 
-def reasons_table(result: StudyResult) -> Table:
-    """Why runs failed, the most frequent reason first."""
-    counted = Counter(result.reasons[i] for i in result.failed).most_common(MOST_REASONS)
+def failure_table(result: StudyResult) -> Table:
+    """The reasons of failed runs, the most frequent first."""
+    counts = Counter(result.failure_reasons[i] for i in result.failed).most_common(MAX_LISTED_REASONS)
     return Table(
         "failed",
-        "RunSplit that failed",
+        "Failed runs",
         {
-            "runs": [count for _, count in counted],
-            "first": [result.reasons.index(reason) for reason, _ in counted],
-            "reason": [reason for reason, _ in counted],
+            "runs": [count for _, count in counts],
+            "first run": [result.failure_reasons.index(reason) for reason, _ in counts],
+            "reason": [reason for reason, _ in counts],
         },
-        f"The {MOST_REASONS} most frequent reasons at most." if len(counted) == MOST_REASONS else "",
+        f"At most {MAX_LISTED_REASONS} reasons are listed." if len(counts) == MAX_LISTED_REASONS else "",
     )
 
 
 def _settings(study: Study) -> tuple[tuple[str, str, str], ...]:
-    scenario = study.source.scenario
-    outcomes = [(f"outcome {name}", str(outcome), "study") for name, outcome in study.outcomes.items()]
+    scenario = study.template.scenario
+    metrics = [(f"metric {name}", str(metric), "study") for name, metric in study.metrics.items()]
     return (
         ("scenario", scenario.title, str(study.path.name)),
         ("design", str(study.design), "study"),
-        *outcomes,
-        ("method", str(scenario.method), "scenario"),
-        ("command", str(scenario.command), "scenario"),
+        *metrics,
+        ("integrator", str(scenario.method), "scenario"),
+        ("input signal", str(scenario.command), "scenario"),
     )

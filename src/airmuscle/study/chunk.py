@@ -1,7 +1,8 @@
-"""A chunk: some runs of a study, what came of them, and the file that keeps it.
+"""Chunks: groups of runs of a study, their results, and the files in which these are stored.
 
-The name of the file is the fingerprint of all that its contents depend on. So a chunk that is there need not be
-computed again, whatever became of the study in between; one whose inputs changed is not found, and computed anew.
+The name of a chunk file is the fingerprint of everything that its content depends on. An existing chunk therefore need
+not be computed again, even if the study was interrupted; if an input has changed, no file matches, and the chunk is
+computed.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from ..core.errors import FileError
 from ..recording import Recording
 from ..scenario.scenario import Scenario
 from .executors import check_running
-from .fingerprint import fingerprint, program
-from .runs import REFUSALS, reason, simulate_all
+from .fingerprint import fingerprint, program_fingerprint
+from .scenario_runs import RUN_ERRORS, failure_reason, simulate_all
 from .study import Study, load_study
 
 _loaded: dict[tuple[str, str], Study] = {}
@@ -30,101 +31,108 @@ _loaded: dict[tuple[str, str], Study] = {}
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Chunk:
-    """Outcomes of n runs: `numbers` (n, k), `courses` by name (n, T), and why a run failed (n,), empty if not."""
+    """Results of n runs.
 
-    numbers: Array
-    courses: Mapping[str, Array]
-    reasons: npt.NDArray[np.str_]
-
-
-def identity(study: Study) -> str:
-    """The fingerprint of a study together with the program that runs it."""
-    return fingerprint(program(), study.fingerprint(), study.values)
-
-
-def name_of(study: Study, index: int) -> str:
-    """The name of the file that keeps a chunk."""
-    rows = study.rows(index)
-    return f"{fingerprint(program(), study.fingerprint(), study.values[rows.start : rows.stop])}.npz"
-
-
-def remember(study: Study) -> str:
-    """Let this process take the study as it is when it runs chunks of it; its identity."""
-    mark = identity(study)
-    _loaded[str(study.path.resolve()), mark] = study
-    return mark
-
-
-def run_chunk(path: str, mark: str, index: int) -> Chunk:
-    """Run one chunk of the study in a file, on whatever machine; the plants are built there.
-
-    Raises FileError where the file describes another study here than `mark` names.
+    scalars          scalar metrics (n, k); NaN if a run failed or does not have the metric
+    time_series      time series by name (n, T)
+    failure_reasons  reason of each failed run (n,); empty for other runs
     """
-    if (path, mark) not in _loaded:
+
+    scalars: Array
+    time_series: Mapping[str, Array]
+    failure_reasons: npt.NDArray[np.str_]
+
+
+def study_fingerprint(study: Study) -> str:
+    """The fingerprint of a study and of the program version that runs it."""
+    return fingerprint(program_fingerprint(), study.fingerprint(), study.values)
+
+
+def chunk_file_name(study: Study, index: int) -> str:
+    """The name of the file of a chunk."""
+    runs = study.chunk_runs(index)
+    values = study.values[runs.start : runs.stop]
+    return f"{fingerprint(program_fingerprint(), study.fingerprint(), values)}.npz"
+
+
+def register_study(study: Study) -> str:
+    """Make this process use the given study in `run_chunk`, without reading its file; return its fingerprint."""
+    identity = study_fingerprint(study)
+    _loaded[str(study.path.resolve()), identity] = study
+    return identity
+
+
+def run_chunk(path: str, identity: str, index: int) -> Chunk:
+    """Run one chunk of the study in a file, in any process; the plants are built in that process.
+
+    Raises FileError if the study in the file does not have the fingerprint `identity`.
+    """
+    if (path, identity) not in _loaded:
         study = load_study(path)
-        if identity(study) != mark:
+        if study_fingerprint(study) != identity:
             raise FileError(
-                f"{path}: a worker reads another study than the one that was started. Either it was edited meanwhile, "
-                "or the worker has another version of airmuscle, of what it needs, or of the files that it names."
+                f"{path}: a worker process has read a different study. Either the file was edited after the start, or "
+                "the worker uses other versions of airmuscle, of its dependencies, or of the files named in the study."
             )
-        _loaded[path, mark] = study
-    return computed(_loaded[path, mark], index)
+        _loaded[path, identity] = study
+    return compute_chunk(_loaded[path, identity], index)
 
 
-def computed(study: Study, index: int) -> Chunk:
-    """The outcomes of one chunk; a run that fails leaves NaN and its reason."""
-    rows = study.rows(index)
-    found = Chunk(
-        np.full((len(rows), len(study.scalars)), np.nan),
-        {name: np.full((len(rows), course.instants.size), np.nan) for name, course in study.courses.items()},
-        np.array([""] * len(rows), dtype=object),
+def compute_chunk(study: Study, index: int) -> Chunk:
+    """The results of one chunk; a failed run is recorded as NaN with its reason."""
+    runs = study.chunk_runs(index)
+    chunk = Chunk(
+        np.full((len(runs), len(study.scalars)), np.nan),
+        {name: np.full((len(runs), series.times.size), np.nan) for name, series in study.time_series.items()},
+        np.array([""] * len(runs), dtype=object),
     )
     scenarios: dict[int, Scenario] = {}
-    for place, (run, rest) in enumerate(zip(rows, study.rests(rows), strict=True)):
+    for row, (run, initial_state) in enumerate(zip(runs, study.initial_states(runs), strict=True)):
         check_running()
         try:
-            scenarios[place] = study.scenario(run, rest)
-        except REFUSALS as error:
-            found.reasons[place] = reason(error)
-    for place, run_or_reason in zip(scenarios, simulate_all(list(scenarios.values()), instants(study)), strict=True):
+            scenarios[row] = study.scenario(run, initial_state)
+        except RUN_ERRORS as error:
+            chunk.failure_reasons[row] = failure_reason(error)
+    outcomes = simulate_all(list(scenarios.values()), metric_times(study))
+    for row, outcome in zip(scenarios, outcomes, strict=True):
         check_running()
-        if isinstance(run_or_reason, str):
-            found.reasons[place] = run_or_reason
+        if isinstance(outcome, str):
+            chunk.failure_reasons[row] = outcome
         else:
-            _keep(study, run_or_reason, found, place)
-    return dataclasses.replace(found, reasons=found.reasons.astype(str))
+            _store(study, outcome, chunk, row)
+    return dataclasses.replace(chunk, failure_reasons=chunk.failure_reasons.astype(str))
 
 
-def instants(study: Study) -> Array:
-    """All instants [s] that the outcomes of a study look at."""
-    return np.unique(np.concatenate([outcome.instants for outcome in study.outcomes.values()]))
+def metric_times(study: Study) -> Array:
+    """All times [s] at which the metrics of a study are evaluated, sorted."""
+    return np.unique(np.concatenate([metric.times for metric in study.metrics.values()]))
 
 
-def _keep(study: Study, recording: Recording, found: Chunk, place: int) -> None:
+def _store(study: Study, recording: Recording, chunk: Chunk, row: int) -> None:
     time = recording["time"]
-    found.numbers[place] = [o.number(time, recording[o.column]) for o in study.scalars.values()]
-    for name, course in study.courses.items():
-        found.courses[name][place] = course.rows(time, recording[course.column])
+    chunk.scalars[row] = [metric.value(time, recording[metric.column]) for metric in study.scalars.values()]
+    for name, series in study.time_series.items():
+        chunk.time_series[name][row] = series.sample(time, recording[series.column])
 
 
-def write(chunk: Chunk, path: Path) -> None:
-    """Write a chunk to its file, which appears whole or not at all."""
-    handle, unfinished = tempfile.mkstemp(dir=path.parent, prefix=".unfinished-")
+def write_chunk(chunk: Chunk, path: Path) -> None:
+    """Write a chunk to its file atomically."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".unfinished-")
     try:
         with os.fdopen(handle, "wb") as file:
-            courses = {f"course:{name}": rows for name, rows in chunk.courses.items()}
-            np.savez(file, numbers=chunk.numbers, reasons=chunk.reasons, **courses)  # type: ignore[arg-type]
-        os.replace(unfinished, path)
+            series = {f"series:{name}": rows for name, rows in chunk.time_series.items()}
+            np.savez(file, scalars=chunk.scalars, failure_reasons=chunk.failure_reasons, **series)  # type: ignore[arg-type]
+        os.replace(temporary, path)
     except BaseException:
-        Path(unfinished).unlink(missing_ok=True)
+        Path(temporary).unlink(missing_ok=True)
         raise
 
 
-def read(path: Path) -> Chunk | None:
-    """The chunk that a file keeps; None where there is none, or the file is damaged."""
+def read_chunk(path: Path) -> Chunk | None:
+    """The chunk in a file; None if the file is missing or damaged."""
     try:
         with np.load(path, allow_pickle=False) as file:
-            courses = {n.removeprefix("course:"): file[n] for n in file.files if n.startswith("course:")}
-            return Chunk(file["numbers"], courses, file["reasons"])
+            series = {n.removeprefix("series:"): file[n] for n in file.files if n.startswith("series:")}
+            return Chunk(file["scalars"], series, file["failure_reasons"])
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None

@@ -1,4 +1,4 @@
-"""What a number of a plant may be: one of several levels, or distributed."""
+"""Parameter distributions and level sets."""
 
 from __future__ import annotations
 
@@ -13,97 +13,98 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ParameterError
-from ..library.location import Location, finite
-from .parse import chosen, difference, key, quantity, ratio, whole
+from ..library.build import build, custom_field
+from ..library.location import Location, read_finite_number
+from .fields import read_count, read_difference, read_quantity, read_ratio
 
-LEAST_SHARE = 1e-6
-"""Part of a distribution that a truncation must leave, so that its ends stay exact to ten digits."""
+MIN_PROBABILITY = 1e-6
+"""Minimum probability of the range of a truncated distribution, so that its bounds are exact to ten digits."""
 
 
 class Variation(abc.ABC):
-    """The values that one number takes, from the least to the greatest."""
+    """The values that one parameter takes in a study."""
 
     @abc.abstractmethod
-    def at(self, shares: Array) -> Array:
-        """The values (N,) that these shares (N,) of all, in (0, 1), lie below."""
+    def ppf(self, probabilities: Array) -> Array:
+        """The quantiles (N,) at probabilities (N,) in (0, 1): the inverse of the cumulative distribution function."""
 
     @property
     @abc.abstractmethod
-    def ends(self) -> tuple[float, float]:
-        """The least and the greatest value; infinite where there is none."""
+    def support(self) -> tuple[float, float]:
+        """The minimum and the maximum value; infinite if unbounded."""
 
 
 @dataclasses.dataclass(frozen=True)
 class LevelSet(Variation):
-    """Given values, each as likely as any other. In a file: a list."""
+    """Discrete values with equal probability. In a study file: a list."""
 
     values: tuple[float, ...]
 
     def __post_init__(self) -> None:
         _check_finite(self, *self.values)
         if not self.values:
-            raise ParameterError("Levels: the list is empty; give at least one value.")
+            raise ParameterError("LevelSet: the list is empty; give at least one value.")
 
-    def at(self, shares: Array) -> Array:
-        index = np.floor(shares * len(self.values)).astype(int)
+    def ppf(self, probabilities: Array) -> Array:
+        index = np.floor(probabilities * len(self.values)).astype(int)
         values: Array = np.array(self.values)[np.minimum(index, len(self.values) - 1)]
         return values
 
     @property
-    def ends(self) -> tuple[float, float]:
+    def support(self) -> tuple[float, float]:
         return min(self.values), max(self.values)
 
 
 @dataclasses.dataclass(frozen=True)
 class Range:
-    """Levels at equal distances, both ends among them."""
+    """Equidistant levels, including both ends."""
 
-    low: float = key(quantity, "first value")
-    high: float = key(quantity, "last value")
-    count: int = key(whole, "number of values")
+    low: float = custom_field(read_quantity, "first value")
+    high: float = custom_field(read_quantity, "last value")
+    count: int = custom_field(read_count, "number of values")
 
     def __post_init__(self) -> None:
         _check_finite(self, self.low, self.high)
         if not 2 <= self.count <= 1_000_000 or self.low == self.high:
             raise ParameterError(
-                f"Range: {self.count} values from {self.low:g} to {self.high:g}; it takes two different ends, and 2 to "
-                "1000000 values."
+                f"Range: {self.count} values from {self.low:g} to {self.high:g}; two different ends and 2 to 1000000 "
+                "values are required."
             )
 
     @property
     def levels(self) -> LevelSet:
-        """The values themselves."""
+        """The values as a LevelSet."""
         return LevelSet(tuple(np.linspace(self.low, self.high, self.count).tolist()))
 
 
 class Distribution(Variation):
-    """A continuous distribution, computed by scipy.stats."""
+    """A continuous probability distribution, evaluated by scipy.stats."""
 
     @abc.abstractmethod
-    def law(self) -> Any:
+    def scipy_distribution(self) -> Any:
         """The frozen distribution of scipy.stats."""
 
-    def at(self, shares: Array) -> Array:
-        return np.asarray(self.law().ppf(shares), dtype=float)
+    def ppf(self, probabilities: Array) -> Array:
+        return np.asarray(self.scipy_distribution().ppf(probabilities), dtype=float)
 
     @property
-    def ends(self) -> tuple[float, float]:
-        low, high = self.law().support()
+    def support(self) -> tuple[float, float]:
+        low, high = self.scipy_distribution().support()
         return float(low), float(high)
 
 
 @dataclasses.dataclass(frozen=True)
 class Uniform(Distribution):
-    """Every value between two ends is as likely as any other."""
+    """Uniform distribution between two bounds."""
 
-    low: float = key(quantity, "least value")
-    high: float = key(quantity, "greatest value")
+    low: float = custom_field(read_quantity, "lower bound")
+    high: float = custom_field(read_quantity, "upper bound")
 
     def __post_init__(self) -> None:
         _check_finite(self, self.low, self.high)
         _check_order(self, ("low", self.low), ("high", self.high))
 
-    def law(self) -> Any:
+    def scipy_distribution(self) -> Any:
         from scipy import stats
 
         return stats.uniform(self.low, self.high - self.low)
@@ -111,129 +112,136 @@ class Uniform(Distribution):
 
 @dataclasses.dataclass(frozen=True)
 class Normal(Distribution):
-    """The normal distribution; it has no ends, so put it in Truncated where values beyond some bound are impossible."""
+    """Normal distribution. It is unbounded: use Truncated if values beyond a bound are impossible."""
 
-    mean: float = key(quantity, "mean")
-    deviation: float = key(difference, "standard deviation")
+    mean: float = custom_field(read_quantity, "mean")
+    std: float = custom_field(read_difference, "standard deviation")
 
     def __post_init__(self) -> None:
-        _check_finite(self, self.mean, self.deviation)
-        _check_positive(self, "deviation", self.deviation)
+        _check_finite(self, self.mean, self.std)
+        _check_positive(self, "std", self.std)
 
-    def law(self) -> Any:
+    def scipy_distribution(self) -> Any:
         from scipy import stats
 
-        return stats.norm(self.mean, self.deviation)
+        return stats.norm(self.mean, self.std)
 
 
 @dataclasses.dataclass(frozen=True)
 class LogNormal(Distribution):
-    """A value whose natural logarithm is normal: half of all lie below the median."""
+    """Log-normal distribution: the natural logarithm of the value is normally distributed."""
 
-    median: float = key(quantity, "median")
-    log_deviation: float = key(ratio, "standard deviation of the natural logarithm; about the relative one")
+    median: float = custom_field(read_quantity, "median")
+    log_std: float = custom_field(
+        read_ratio, "standard deviation of the natural logarithm; approximately the relative standard deviation"
+    )
 
     def __post_init__(self) -> None:
-        _check_finite(self, self.median, self.log_deviation)
+        _check_finite(self, self.median, self.log_std)
         _check_positive(self, "median", self.median)
-        _check_positive(self, "log_deviation", self.log_deviation)
+        _check_positive(self, "log_std", self.log_std)
 
-    def law(self) -> Any:
+    def scipy_distribution(self) -> Any:
         from scipy import stats
 
-        return stats.lognorm(self.log_deviation, scale=self.median)
+        return stats.lognorm(self.log_std, scale=self.median)
 
 
 @dataclasses.dataclass(frozen=True)
 class Triangular(Distribution):
-    """Likeliest at the mode, and ever less so towards the ends."""
+    """Triangular distribution with a mode between two bounds."""
 
-    low: float = key(quantity, "least value")
-    mode: float = key(quantity, "likeliest value")
-    high: float = key(quantity, "greatest value")
+    low: float = custom_field(read_quantity, "lower bound")
+    mode: float = custom_field(read_quantity, "mode")
+    high: float = custom_field(read_quantity, "upper bound")
 
     def __post_init__(self) -> None:
         _check_finite(self, self.low, self.mode, self.high)
         _check_order(self, ("low", self.low), ("high", self.high))
         if not self.low <= self.mode <= self.high:
-            raise ParameterError(f"Triangular: mode {self.mode:g} must lie within {self.low:g} to {self.high:g}.")
+            raise ParameterError(
+                f"Triangular: mode is {self.mode:g}; it must lie between low, {self.low:g}, and high, {self.high:g}."
+            )
 
-    def law(self) -> Any:
+    def scipy_distribution(self) -> Any:
         from scipy import stats
 
         return stats.triang((self.mode - self.low) / (self.high - self.low), self.low, self.high - self.low)
 
 
-def _inner(value: Any, unit: str, where: str) -> Distribution:
-    found: Distribution = chosen(value, DISTRIBUTIONS[:-1], Location(where, "", Path()), unit)
-    return found
+def _read_inner(value: Any, unit: str, where: str) -> Distribution:
+    inner: Distribution = build(value, Location(where, "", Path()), classes=DISTRIBUTIONS, unit=unit)
+    return inner
 
 
 @dataclasses.dataclass(frozen=True)
 class Truncated(Variation):
-    """Another distribution without what lies beyond two ends."""
+    """A distribution truncated to the range between two bounds."""
 
-    inner: Distribution = key(_inner, "the distribution that is cut, a table with a model")
-    low: float = key(quantity, "least value")
-    high: float = key(quantity, "greatest value")
+    inner: Distribution = custom_field(_read_inner, "the distribution to be truncated, a table with a model")
+    low: float = custom_field(read_quantity, "lower bound")
+    high: float = custom_field(read_quantity, "upper bound")
 
     def __post_init__(self) -> None:
         _check_finite(self, self.low, self.high)
         _check_order(self, ("low", self.low), ("high", self.high))
         if not isinstance(self.inner, Distribution):
-            raise ParameterError(f"Truncated: {self.inner!r} is no distribution that can be cut.")
-        below, above = self._shares()
-        if above - below < LEAST_SHARE:
+            raise ParameterError(f"Truncated: {self.inner!r} is not a continuous distribution; only these are allowed.")
+        below, above = self._probability_range()
+        if above - below < MIN_PROBABILITY:
             raise ParameterError(
-                f"Truncated: only {above - below:.2g} of {self.inner} lies within {self.low:g} to {self.high:g}; at "
-                f"least {LEAST_SHARE:g} must."
+                f"Truncated: the probability of {self.low:g} to {self.high:g} in {self.inner} is {above - below:.2g}; "
+                f"it must be at least {MIN_PROBABILITY:g}."
             )
 
-    def _shares(self) -> tuple[float, float]:
-        below, above = self.inner.law().cdf([self.low, self.high])
+    def _probability_range(self) -> tuple[float, float]:
+        below, above = self.inner.scipy_distribution().cdf([self.low, self.high])
         return float(below), float(above)
 
-    def at(self, shares: Array) -> Array:
-        below, above = self._shares()
-        return np.clip(self.inner.at(below + shares * (above - below)), self.low, self.high)
+    def ppf(self, probabilities: Array) -> Array:
+        below, above = self._probability_range()
+        return np.clip(self.inner.ppf(below + probabilities * (above - below)), self.low, self.high)
 
     @property
-    def ends(self) -> tuple[float, float]:
-        low, high = self.inner.ends
+    def support(self) -> tuple[float, float]:
+        low, high = self.inner.support
         return max(low, self.low), min(high, self.high)
 
 
-DISTRIBUTIONS = (Uniform, Normal, LogNormal, Triangular, Truncated)
+DISTRIBUTIONS: dict[str, type[Any]] = {cls.__name__: cls for cls in (Uniform, Normal, LogNormal, Triangular)}
+"""The continuous distributions that may be truncated."""
+VARIATIONS: dict[str, type[Any]] = {"Range": Range, **DISTRIBUTIONS, "Truncated": Truncated}
+"""The variations that a study file may name."""
 
 
-def variation_from(given: Any, unit: str, place: Location) -> Variation:
-    """The variation that a list or a table of a study describes."""
-    if isinstance(given, list):
-        if not given:
-            raise ParameterError(f"{place}: the list is empty; give at least one value.")
-        return LevelSet(tuple(finite(value, unit, f"{place}[{i}]") for i, value in enumerate(given)))
-    if not isinstance(given, Mapping):
+def read_variation(value: Any, unit: str, location: Location) -> Variation:
+    """The variation in a list or table of a study file. Raises ParameterError, UnitError or UnknownNameError."""
+    if isinstance(value, list):
+        if not value:
+            raise ParameterError(f"{location}: the list is empty; give at least one value.")
+        return LevelSet(tuple(read_finite_number(item, unit, f"{location}[{i}]") for i, item in enumerate(value)))
+    if not isinstance(value, Mapping):
         raise ParameterError(
-            f'{place} is {given!r}; write a list of values, or a distribution like {{ model = "Uniform", low = ..., '
-            "high = ... }."
+            f'{location} is {value!r}; write a list of values, or a distribution such as {{ model = "Uniform", '
+            "low = ..., high = ... }."
         )
-    found = chosen(given, (Range, *DISTRIBUTIONS), place, unit)
-    return found.levels if isinstance(found, Range) else found
+    variation = build(value, location, classes=VARIATIONS, unit=unit)
+    return variation.levels if isinstance(variation, Range) else variation
 
 
-def _check_finite(thing: Any, *values: float) -> None:
+def _check_finite(variation: Any, *values: float) -> None:
     if not all(math.isfinite(value) for value in values):
-        raise ParameterError(f"{thing}: every number must be finite.")
+        raise ParameterError(f"{variation}: all values must be finite.")
 
 
-def _check_positive(thing: Any, name: str, value: float) -> None:
+def _check_positive(variation: Any, name: str, value: float) -> None:
     if not value > 0:
-        raise ParameterError(f"{type(thing).__name__}: {name} is {value:g}; it must be greater than zero.")
+        raise ParameterError(f"{type(variation).__name__}: {name} is {value:g}; it must be positive.")
 
 
-def _check_order(thing: Any, first: tuple[str, float], second: tuple[str, float]) -> None:
-    if not first[1] < second[1]:
+def _check_order(variation: Any, lower: tuple[str, float], upper: tuple[str, float]) -> None:
+    if not lower[1] < upper[1]:
         raise ParameterError(
-            f"{type(thing).__name__}: {first[0]} is {first[1]:g} and {second[0]} {second[1]:g}; {first[0]} must be the "
-            "smaller one."
+            f"{type(variation).__name__}: {lower[0]} is {lower[1]:g} and {upper[0]} is {upper[1]:g}; {lower[0]} must "
+            f"be less than {upper[0]}."
         )

@@ -1,4 +1,4 @@
-"""The fingerprint of what results depend on: descriptions of models, and of the program that computes with them."""
+"""Fingerprints of the inputs that results depend on: model descriptions and the version of the program."""
 
 from __future__ import annotations
 
@@ -13,39 +13,44 @@ from typing import Any
 
 import numpy as np
 
-ROOT = Path(__file__).parents[1]
-NOT_COMPUTING = ("cli", "report", "reproduce", "studio", "export", "identify")
-"""Parts of the program on which no run depends."""
-PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "casadi")
+PACKAGE_ROOT = Path(__file__).parents[1]
+EXCLUDED_PACKAGES = ("cli", "report", "reproduce", "identify")
+"""Parts of the program that do not affect a simulation."""
+NUMERICAL_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "casadi")
 
 
-def fingerprint(*things: Any) -> str:
-    """Sixty-four hexadecimal digits that change with anything in the things: numbers, texts, tables, models."""
-    text = json.dumps([_described(thing) for thing in things], ensure_ascii=False, separators=(",", ":"))
+def fingerprint(*objects: Any) -> str:
+    """A SHA-256 digest (64 hexadecimal digits) of numbers, texts, tables and models; any change changes it."""
+    text = json.dumps([_to_json(each) for each in objects], ensure_ascii=False, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _described(thing: Any) -> Any:
-    """A thing in JSON's words, every bit of its numbers kept."""
-    if thing is None or isinstance(thing, bool | str | int):
-        return thing
-    if isinstance(thing, float):
-        return float(thing).hex()
-    if isinstance(thing, np.ndarray):
-        return [str(thing.dtype), thing.shape, hashlib.sha256(np.ascontiguousarray(thing).tobytes()).hexdigest()]
-    if isinstance(thing, Mapping):
-        return {"keys": [[_described(k), _described(v)] for k, v in thing.items()]}
-    if isinstance(thing, list | tuple):
-        return [_described(item) for item in thing]
-    if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
-        fields = {f.name: _described(getattr(thing, f.name)) for f in dataclasses.fields(thing)}
-        return [f"{type(thing).__module__}.{type(thing).__qualname__}", fields]
-    return repr(thing)  # a date of a TOML file; what no part of a scenario should be is told apart by its words
+def _to_json(value: Any) -> Any:
+    """An object as JSON data, with bit-exact numbers."""
+    if value is None or isinstance(value, bool | str | int):
+        return value
+    if isinstance(value, float):
+        return float(value).hex()
+    if isinstance(value, np.ndarray):
+        return [str(value.dtype), value.shape, hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()]
+    if isinstance(value, Mapping):
+        return {"keys": [[_to_json(k), _to_json(v)] for k, v in value.items()]}
+    if isinstance(value, list | tuple):
+        return [_to_json(item) for item in value]
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = {f.name: _to_json(getattr(value, f.name)) for f in dataclasses.fields(value)}
+        return [f"{type(value).__module__}.{type(value).__qualname__}", fields]
+    return repr(value)  # such as a date in a TOML file
 
 
 @functools.cache
-def program() -> str:
-    """The fingerprint of this program: its version and its own files, and the versions of what computes for it."""
-    files = [p for p in sorted(ROOT.rglob("*.py")) if p.relative_to(ROOT).parts[0] not in NOT_COMPUTING]
-    contents = [(p.relative_to(ROOT).as_posix(), hashlib.sha256(p.read_bytes()).hexdigest()) for p in files]
-    return fingerprint(metadata.version("airmuscle"), contents, [(name, metadata.version(name)) for name in PACKAGES])
+def program_fingerprint() -> str:
+    """The fingerprint of the program: its version, its source files, and the versions of the numerical packages."""
+    files = [p for p in sorted(PACKAGE_ROOT.rglob("*.py")) if _is_relevant(p)]
+    contents = [(p.relative_to(PACKAGE_ROOT).as_posix(), hashlib.sha256(p.read_bytes()).hexdigest()) for p in files]
+    versions = [(name, metadata.version(name)) for name in NUMERICAL_PACKAGES]
+    return fingerprint(metadata.version("airmuscle"), contents, versions)
+
+
+def _is_relevant(path: Path) -> bool:
+    return path.relative_to(PACKAGE_ROOT).parts[0] not in EXCLUDED_PACKAGES

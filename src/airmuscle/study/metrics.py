@@ -1,8 +1,8 @@
-"""What is kept of each run: numbers that sum up a column, or the column itself on given instants.
+"""Metrics kept from each run: scalar values of a column, and time series.
 
-Means are over time: the integral by trapezoids between the recorded rows, divided by the length of the window. A level
-is reached where the straight line between two rows crosses it. So the rows of the scenario ([run] output) set how fine
-these numbers are.
+Means are over time: the integral (trapezoidal rule) between the recorded rows, divided by the duration of the window. A
+level is reached where the straight line between two rows crosses it. The output step of the scenario ([run] output)
+therefore determines the accuracy of the metrics.
 """
 
 from __future__ import annotations
@@ -10,17 +10,18 @@ from __future__ import annotations
 import abc
 import dataclasses
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ParameterError
-from .parse import key, quantity, ratio, seconds, word
+from ..library.build import custom_field
+from .fields import read_name, read_quantity, read_ratio, read_time
 
 
 class Window(NamedTuple):
-    """A column (N,) at its instants (N,) [s]."""
+    """A time window of a column: times (N,) [s] and values (N,)."""
 
     time: Array
     values: Array
@@ -28,216 +29,221 @@ class Window(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Metric(abc.ABC):
-    """One thing that is kept of a column of every run, between two instants [s] or over the whole run."""
+    """A metric of one column of each run, within a time window [s] or over the whole run."""
 
-    column: str = key(word, "column of the run that is looked at")
-    begin: float = key(seconds, "instant from which on it is looked at", default=-math.inf, kw_only=True)
-    end: float = key(seconds, "instant until which it is looked at", default=math.inf, kw_only=True)
+    column: str = custom_field(read_name, "column of the run")
+    begin: float = custom_field(read_time, "start of the time window", default=-math.inf, kw_only=True)
+    end: float = custom_field(read_time, "end of the time window", default=math.inf, kw_only=True)
 
     def __post_init__(self) -> None:
         if not self.begin < self.end:
             raise ParameterError(
-                f"{type(self).__name__}: from {self.begin:g} to {self.end:g} s; its end must be later than its begin."
+                f"{type(self).__name__}: the window is {self.begin:g} to {self.end:g} s; its end must be later than "
+                "its begin."
             )
 
     def window(self, time: Array, values: Array) -> Window:
-        """The part of a run (N,) that is looked at; rows at the ends themselves are interpolated."""
+        """The part of a run (N,) within the time window; values at its bounds are interpolated."""
         first, last = max(self.begin, time[0]), min(self.end, time[-1])
         if not first <= last:
             return Window(np.empty(0), np.empty(0))
         inside = (time > first) & (time < last)
-        at = np.unique([first, last])
-        instants = np.concatenate([at[:1], time[inside], at[1:]])
-        return Window(instants, np.interp(instants, time, values))
+        bounds = np.unique([first, last])
+        times = np.concatenate([bounds[:1], time[inside], bounds[1:]])
+        return Window(times, np.interp(times, time, values))
 
     def check_range(self, start: float, duration: float) -> None:
-        """Raise ParameterError where nothing of a run of `duration` from `start` on [s] is looked at."""
+        """Raise ParameterError if the time window does not overlap a run of `duration` [s] from `start` [s]."""
         if not max(self.begin, start) <= min(self.end, start + duration):
             raise ParameterError(
-                f"{type(self).__name__}: from {self.begin:g} to {self.end:g} s there is nothing of a run from "
+                f"{type(self).__name__}: the window {self.begin:g} to {self.end:g} s does not overlap the run, "
                 f"{start:g} to {start + duration:g} s."
             )
 
     @property
-    def instants(self) -> Array:
-        """Instants [s] that must be among the rows of a run."""
+    def times(self) -> Array:
+        """The times [s] that must be among the rows of a run."""
         return np.array([t for t in (self.begin, self.end) if math.isfinite(t)])
 
     @abc.abstractmethod
-    def unit(self, of_column: str) -> str:
-        """The outcome's unit, from the column's."""
+    def unit(self, column_unit: str) -> str:
+        """The unit of the metric, given that of the column."""
 
 
 class Scalar(Metric):
-    """An outcome that is one number; NaN where the run does not have it."""
+    """A metric that is a single number; NaN if it does not exist for a run."""
 
-    def number(self, time: Array, values: Array) -> float:
-        """The outcome of a run with this column (N,) at these instants (N,) [s]."""
+    def value(self, time: Array, values: Array) -> float:
+        """The metric of a run with times (N,) [s] and values (N,) of the column."""
         window = self.window(time, values)
-        return self._of(window) if window.time.size else math.nan
+        return self._evaluate(window) if window.time.size else math.nan
 
     @abc.abstractmethod
-    def _of(self, window: Window) -> float:
-        """The outcome of a window that has one row at least."""
+    def _evaluate(self, window: Window) -> float:
+        """The metric of a window with at least one row."""
 
-    def unit(self, of_column: str) -> str:
-        return of_column
+    def unit(self, column_unit: str) -> str:
+        return column_unit
 
 
 class Final(Scalar):
-    """The last value."""
+    """Final value."""
 
-    def _of(self, window: Window) -> float:
+    def _evaluate(self, window: Window) -> float:
         return float(window.values[-1])
 
 
 class Maximum(Scalar):
-    """The greatest value."""
+    """Maximum value."""
 
-    def _of(self, window: Window) -> float:
+    def _evaluate(self, window: Window) -> float:
         return float(window.values.max())
 
 
 class Minimum(Scalar):
-    """The least value."""
+    """Minimum value."""
 
-    def _of(self, window: Window) -> float:
+    def _evaluate(self, window: Window) -> float:
         return float(window.values.min())
 
 
 class Mean(Scalar):
-    """The mean over time."""
+    """Mean over time."""
 
-    def _of(self, window: Window) -> float:
-        return _mean(window.time, window.values)
+    def _evaluate(self, window: Window) -> float:
+        return _time_mean(window.time, window.values)
 
 
 class RootMeanSquare(Scalar):
-    """The root of the mean square over time."""
+    """Root mean square over time."""
 
-    def _of(self, window: Window) -> float:
-        # squares of a straight line are a parabola, whose integral Simpson's rule gives exactly
+    def _evaluate(self, window: Window) -> float:
+        # the square of a linear function is a parabola, which Simpson's rule integrates exactly
         a, b = window.values[:-1], window.values[1:]
-        lengths = np.diff(window.time)
-        if not lengths.sum() > 0:
+        steps = np.diff(window.time)
+        if not steps.sum() > 0:
             return abs(float(window.values[0]))
-        return math.sqrt(float(lengths @ (a * a + a * b + b * b)) / 3.0 / float(lengths.sum()))
+        return math.sqrt(float(steps @ (a * a + a * b + b * b)) / 3.0 / float(steps.sum()))
 
 
 @dataclasses.dataclass(frozen=True)
 class TimeToReach(Scalar):
-    """Time [s] from the window's begin until the column first reaches a level, from whichever side it comes."""
+    """Time [s] from the start of the window until the column first reaches a level, from above or below."""
 
-    level: float = key(quantity, "value that is reached")
+    level: float = custom_field(read_quantity, "value to be reached")
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not math.isfinite(self.level):
             raise ParameterError(f"TimeToReach: level is {self.level}; it must be finite.")
 
-    def _of(self, window: Window) -> float:
+    def _evaluate(self, window: Window) -> float:
         return _first_crossing(window, self.level) - float(window.time[0])
 
-    def unit(self, of_column: str) -> str:
+    def unit(self, column_unit: str) -> str:
         return "s"
 
 
 class Overshoot(Scalar):
-    """How far the column goes beyond its last value, as a part of its way from the first to the last [1]."""
+    """Overshoot beyond the final value, as a fraction of the difference between final and initial value [1]."""
 
-    def _of(self, window: Window) -> float:
-        way = window.values[-1] - window.values[0]
-        if way == 0.0:
+    def _evaluate(self, window: Window) -> float:
+        change = window.values[-1] - window.values[0]
+        if change == 0.0:
             return math.nan
-        return max(0.0, float(((window.values - window.values[-1]) / way).max()))
+        return max(0.0, float(((window.values - window.values[-1]) / change).max()))
 
-    def unit(self, of_column: str) -> str:
+    def unit(self, column_unit: str) -> str:
         return "1"
 
 
 @dataclasses.dataclass(frozen=True)
 class SettlingTime(Scalar):
-    """Time [s] from the window's begin until the column stays within a band about its last value.
+    """Time [s] from the start of the window until the column remains within a band around its final value.
 
-    The band is a part of the way from the first to the last value, 2 % to either side unless given.
+    Half the width of the band is the fraction `band` of the difference between final and initial value, by default 2 %.
     """
 
-    band: float = key(ratio, "half the width of the band, as a part of the way", default=0.02, kw_only=True)
+    band: float = custom_field(
+        read_ratio, "half-width of the band, relative to the change of the column", default=0.02, kw_only=True
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0 < self.band < 1:
-            raise ParameterError(f"SettlingTime: band is {self.band:g}; it must lie between 0 and 1.")
+            raise ParameterError(f"SettlingTime: band is {self.band:g}; it must be between 0 and 1.")
 
-    def _of(self, window: Window) -> float:
+    def _evaluate(self, window: Window) -> float:
         last, begin = window.values[-1], float(window.time[0])
-        half = self.band * abs(last - window.values[0])
-        outside = np.flatnonzero(np.abs(window.values - last) > half)
-        if half == 0.0:
+        half_width = self.band * abs(last - window.values[0])
+        outside = np.flatnonzero(np.abs(window.values - last) > half_width)
+        if half_width == 0.0:
             return 0.0 if outside.size == 0 else math.nan
         if outside.size == 0:
             return 0.0
-        rest = Window(window.time[outside[-1] :][:2], np.abs(window.values - last)[outside[-1] :][:2])
-        return _first_crossing(rest, half) - begin
+        entry = Window(window.time[outside[-1] :][:2], np.abs(window.values - last)[outside[-1] :][:2])
+        return _first_crossing(entry, half_width) - begin
 
-    def unit(self, of_column: str) -> str:
+    def unit(self, column_unit: str) -> str:
         return "s"
 
 
 @dataclasses.dataclass(frozen=True)
 class TimeSeries(Metric):
-    """The whole column, on instants at equal distances; NaN where a run ended before."""
+    """The column at equidistant times; NaN after the end of a run that was aborted."""
 
-    every: float = key(seconds, "distance of the instants")
+    sample_time: float = custom_field(read_time, "sample time")
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0 < self.every < math.inf:
-            raise ParameterError(f"Course: every is {self.every:g} s; it must be positive and finite.")
+        if not 0 < self.sample_time < math.inf:
+            raise ParameterError(f"TimeSeries: sample_time is {self.sample_time:g} s; it must be positive and finite.")
 
-    def within(self, start: float, duration: float) -> TimeSeries:
-        """The same with its window cut to a run, so that its instants are fixed. Raises ParameterError."""
+    def clip_to_run(self, start: float, duration: float) -> TimeSeries:
+        """A copy whose window is clipped to a run, which fixes its times. Raises ParameterError."""
         begin, end = max(self.begin, start), min(self.end, start + duration)
-        if not begin < end or (end - begin) / self.every > 1_000_000:
+        if not begin < end or (end - begin) / self.sample_time > 1_000_000:
             raise ParameterError(
-                f"Course: from {begin:g} to {end:g} s every {self.every:g} s; 2 to 1000000 instants must lie within "
-                "the run."
+                f"TimeSeries: {begin:g} to {end:g} s with a sample time of {self.sample_time:g} s; 2 to 1000000 "
+                "samples must lie within the run."
             )
         return dataclasses.replace(self, begin=begin, end=end)
 
     @property
-    def instants(self) -> Array:
-        steps = math.floor((self.end - self.begin) / self.every * (1 + 1e-12))
-        return np.asarray(self.begin + self.every * np.arange(steps + 1), dtype=float)
+    def times(self) -> Array:
+        steps = math.floor((self.end - self.begin) / self.sample_time * (1 + 1e-12))
+        return np.asarray(self.begin + self.sample_time * np.arange(steps + 1), dtype=float)
 
-    def unit(self, of_column: str) -> str:
-        return of_column
+    def unit(self, column_unit: str) -> str:
+        return column_unit
 
-    def rows(self, time: Array, values: Array) -> Array:
-        """The column at the instants, from a run whose rows hold them."""
-        slack = 1e-9 * (self.end - self.begin)
-        found = np.interp(self.instants, time, values)
-        return np.where((self.instants >= time[0] - slack) & (self.instants <= time[-1] + slack), found, np.nan)
-
-
-OUTCOMES = (
-    Final, Maximum, Minimum, Mean, RootMeanSquare, TimeToReach, Overshoot, SettlingTime, TimeSeries,
-)  # fmt: skip
+    def sample(self, time: Array, values: Array) -> Array:
+        """The column (T,) at `times`, from a run with times (N,) [s] and values (N,)."""
+        tolerance = 1e-9 * (self.end - self.begin)
+        samples = np.interp(self.times, time, values)
+        return np.where((self.times >= time[0] - tolerance) & (self.times <= time[-1] + tolerance), samples, np.nan)
 
 
-def _mean(time: Array, values: Array) -> float:
-    length = float(time[-1] - time[0])
-    return float(np.trapezoid(values, time)) / length if length > 0 else float(values[0])
+METRICS: dict[str, type[Any]] = {
+    cls.__name__: cls
+    for cls in (Final, Maximum, Minimum, Mean, RootMeanSquare, TimeToReach, Overshoot, SettlingTime, TimeSeries)
+}
+"""The metrics that a study file may name."""
+
+
+def _time_mean(time: Array, values: Array) -> float:
+    duration = float(time[-1] - time[0])
+    return float(np.trapezoid(values, time)) / duration if duration > 0 else float(values[0])
 
 
 def _first_crossing(window: Window, level: float) -> float:
-    """The instant at which the lines between the rows first meet a level; NaN where they do not."""
-    away = window.values - level
-    met = np.flatnonzero(np.append(away[:-1] * away[1:] < 0.0, False) | (away == 0.0))
-    if met.size == 0:
+    """The time at which the lines between the rows first cross a level; NaN if they do not."""
+    distance = window.values - level
+    crossings = np.flatnonzero(np.append(distance[:-1] * distance[1:] < 0.0, False) | (distance == 0.0))
+    if crossings.size == 0:
         return math.nan
-    i = met[0]
-    if away[i] == 0.0:
+    i = crossings[0]
+    if distance[i] == 0.0:
         return float(window.time[i])
-    part = away[i] / (away[i] - away[i + 1])
-    return float(window.time[i] + part * (window.time[i + 1] - window.time[i]))
+    fraction = distance[i] / (distance[i] - distance[i + 1])
+    return float(window.time[i] + fraction * (window.time[i + 1] - window.time[i]))

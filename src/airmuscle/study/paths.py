@@ -1,8 +1,8 @@
-"""The numbers of a scenario that a study may vary, by their paths.
+"""Parameter paths: the numbers of a scenario that a study may vary.
 
-Of the plant every declared parameter, as `airmuscle.tree.leaves` names it: `circuit.fill.conductance`. Of the other
-tables what is a number there: `command.fill[0][1]` (the value of the first point, [0][0] its instant), `run.duration`,
-`run.start.pressure`, `run.method.rtol`.
+All declared parameters of the plant may vary, with the paths of `airmuscle.core.leaves`: `circuit.fill.conductance`. Of
+the other tables, all numbers may vary: `command.fill[0][1]` (value of the first point; `[0][0]` is its time),
+`run.duration`, `run.start.pressure`, `run.method.rtol`.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.equilibrium import find_equilibrium_of_each
+from ..compile.program import compile_system
 from ..control.control_loop import ControlLoop
 from ..core.arrays import Array
 from ..core.declaration import parameters
@@ -25,129 +26,142 @@ from ..core.tree import flatten, leaves, with_parameters
 from ..library.location import Location
 from ..library.models import model_class
 from ..plant.plant import Plant
-from ..scenario.controller import numbers_of
-from ..scenario.scenario import Scenario, pressure_of_rest, scenario_from, units_of_run
+from ..scenario.controller import controller_number_paths
+from ..scenario.scenario import Scenario, build_scenario, initial_pressure, run_column_units
 
 Keys = tuple[str | int, ...]
+"""Nested keys of a number in the tables of a scenario."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ScenarioParameter:
-    """One number of a scenario: its path, its unit, its bounds, and where it stands: a leaf's place, or keys."""
+    """A number of a scenario: path, unit, bounds, and location: the index of a leaf of the plant, or nested keys."""
 
     path: str
     unit: str
     bounds: tuple[float, float]
-    at: int | Keys
+    location: int | Keys
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ScenarioTemplate:
-    """The scenario of a study: its tables, where they stand, and what they describe before anything is varied."""
+    """The nominal scenario of a study, its tables and their location in the file."""
 
     tables: Mapping[str, Any]
-    place: Location
+    location: Location
     scenario: Scenario
 
-    def numbers(self) -> dict[str, ScenarioParameter]:
-        """Everything that can vary, by path."""
-        plant, told = self.scenario.plant, self.tables.get("command", {})
-        found = [
+    def parameters(self) -> dict[str, ScenarioParameter]:
+        """All parameters that may vary, by path."""
+        plant, command = self.scenario.plant, self.tables.get("command", {})
+        available = [
             ScenarioParameter(leaf.path, leaf.declared.unit, leaf.declared.bounds, i)
             for i, leaf in enumerate(leaves(plant))
         ]
-        for keys, unit in (*_of_command(told, self.scenario), *_of_run(self.tables["run"], plant)):
-            found.append(ScenarioParameter(_spelt(keys), unit, (-math.inf, math.inf), keys))
-        return {number.path: number for number in found}
+        for keys, unit in (*_input_parameters(command, self.scenario), *_run_parameters(self.tables["run"], plant)):
+            available.append(ScenarioParameter(_format_path(keys), unit, (-math.inf, math.inf), keys))
+        return {parameter.path: parameter for parameter in available}
 
-    def number(self, path: str, where: str) -> ScenarioParameter:
-        """The number of this path. Raises ParameterError, with the nearest one."""
-        known = self.numbers()
+    def parameter(self, path: str, where: str) -> ScenarioParameter:
+        """The parameter with a path. Raises ParameterError with the closest path."""
+        known = self.parameters()
         if path not in known:
-            near = suggestion(path, known) or f" There are {', '.join(known)}."
-            raise ParameterError(f"{where}: the scenario has no number '{path}'.{near}")
+            near = suggestion(path, known) or f" The parameters are {', '.join(known)}."
+            raise ParameterError(f"{where}: the scenario has no parameter '{path}'.{near}")
         return known[path]
 
-    def rests(self, numbers: Sequence[ScenarioParameter], values: Array) -> list[dict[str, float] | None]:
-        """Where each of several runs with other values (R, d) begins, found for all at once; None for one that is to be
-        asked alone. Values are not checked."""
-        from ..compile.program import compile_system  # CasADi, which reading a study does not need
+    def initial_states(self, varied: Sequence[ScenarioParameter], values: Array) -> list[dict[str, float] | None]:
+        """The initial equilibria of several runs with other parameter values (R, d), computed together.
 
-        plant, alone = self.scenario.plant, [None] * len(values)
-        pressure = pressure_of_rest(self.tables, self.place)
-        if pressure is None or any(not isinstance(n.at, int) and n.at[:2] == ("run", "start") for n in numbers):
-            return list(alone)
-        leaves_of_each = np.repeat(flatten(plant)[None, :], len(values), axis=0)
-        for number, column in zip(numbers, values.T, strict=True):
-            if isinstance(number.at, int):
-                leaves_of_each[:, number.at] = column
+        None for a run whose initial state must be computed individually. The values are not validated.
+        """
+        plant, individually = self.scenario.plant, [None] * len(values)
+        pressure = initial_pressure(self.tables, self.location)
+        if pressure is None or any(
+            not isinstance(p.location, int) and p.location[:2] == ("run", "start") for p in varied
+        ):
+            return list(individually)
+        leaf_values = np.repeat(flatten(plant)[None, :], len(values), axis=0)
+        for parameter, column in zip(varied, values.T, strict=True):
+            if isinstance(parameter.location, int):
+                leaf_values[:, parameter.location] = column
         pressures, inputs = (pressure,) * len(plant.muscles), np.zeros(len(plant.inputs))
-        found = find_equilibrium_of_each(compile_system(plant), leaves_of_each, pressures, inputs)
+        states = find_equilibrium_of_each(compile_system(plant), leaf_values, pressures, inputs)
         names = [s.name for s in plant.states]
-        return [dict(zip(names, x, strict=True)) if np.isfinite(x).all() else None for x in found.tolist()]
+        return [dict(zip(names, x, strict=True)) if np.isfinite(x).all() else None for x in states.tolist()]
 
-    def changed(
-        self, numbers: Sequence[ScenarioParameter], values: Sequence[float], rest: dict[str, float] | None = None
+    def with_values(
+        self,
+        varied: Sequence[ScenarioParameter],
+        values: Sequence[float],
+        initial_state: dict[str, float] | None = None,
     ) -> Scenario:
-        """The scenario with other values, checked as if they stood in its file; the start is found anew unless it is
-        given as `rests` finds it."""
+        """The scenario with other parameter values, validated as if they were in its file.
+
+        The initial state is computed, unless `initial_state` is given. Raises ParameterError or PhysicsError.
+        """
         scenario, tables = self.scenario, self.tables
         leaf_values = flatten(scenario.plant).tolist()
-        for number, value in zip(numbers, values, strict=True):
-            if isinstance(number.at, int):
-                leaf_values[number.at] = float(value)
+        for parameter, value in zip(varied, values, strict=True):
+            if isinstance(parameter.location, int):
+                leaf_values[parameter.location] = float(value)
             else:
-                tables = _with(tables, number.at, float(value))
-        # a reason must read the same on every machine, so it names the file without its folder
-        place = dataclasses.replace(self.place, file=Path(self.place.file).name)
-        return scenario_from(tables, place, with_parameters(scenario.plant, leaf_values), rest)
+                tables = _replace_number(tables, parameter.location, float(value))
+        # the failure reason must be the same on every machine and therefore names the file without its folder
+        location = dataclasses.replace(self.location, file=Path(self.location.file).name)
+        return build_scenario(tables, location, with_parameters(scenario.plant, leaf_values), initial_state)
 
 
-def _of_command(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:
-    units = units_of_run(scenario.plant, scenario.start, scenario.command)
-    for name, given in table.items():
+def _input_parameters(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:
+    """Keys and units of the numbers under [command]."""
+    units = run_column_units(scenario.plant, scenario.start, scenario.command)
+    for name, value in table.items():
         if isinstance(scenario.command, ControlLoop) and name == "controller":
-            yield from ((("command", name, *keys), unit) for keys, unit in numbers_of(given, scenario.command, units))
+            yield from (
+                (("command", name, *keys), unit)
+                for keys, unit in controller_number_paths(value, scenario.command, units)
+            )
         elif name == "period":
             yield ("command", name), "s"
-        elif isinstance(given, list):
-            for i, _ in enumerate(given):
+        elif isinstance(value, list):
+            for i, _ in enumerate(value):
                 yield ("command", name, i, 0), "s"
                 yield ("command", name, i, 1), units[name]
-        elif isinstance(given, Mapping):
-            yield from _of_models(given, ("command", name))
+        elif isinstance(value, Mapping):
+            yield from _model_parameters(value, ("command", name))
 
 
-def _of_run(table: Mapping[str, Any], plant: Plant) -> Iterator[tuple[Keys, str]]:
+def _run_parameters(table: Mapping[str, Any], plant: Plant) -> Iterator[tuple[Keys, str]]:
+    """Keys and units of the numbers under [run]."""
     for name in ("duration", "start_time", "output"):
         if name in table:
             yield ("run", name), "s"
     yield ("run", "start", "pressure"), "Pa"
-    for c in plant.mechanism.coordinates:
-        yield ("run", "start", c.name), c.unit
-        yield ("run", "start", c.speed), f"{c.unit}/s"
-    yield from _of_models(table.get("method"), ("run", "method"))
+    for coordinate in plant.mechanism.coordinates:
+        yield ("run", "start", coordinate.name), coordinate.unit
+        yield ("run", "start", coordinate.speed), f"{coordinate.unit}/s"
+    yield from _model_parameters(table.get("method"), ("run", "method"))
 
 
-def _of_models(given: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
-    """The declared parameters of every model that stands in a table, or in a list or table inside it."""
-    if isinstance(given, list):
-        for i, item in enumerate(given):
-            yield from _of_models(item, (*keys, i))
-    elif isinstance(given, Mapping):
-        if isinstance(given.get("model"), str):
-            for declared in parameters(model_class(given["model"], _spelt(keys))):
+def _model_parameters(value: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
+    """Keys and units of the declared parameters of all models in a table or list, at any depth."""
+    if isinstance(value, list):
+        for i, item in enumerate(value):
+            yield from _model_parameters(item, (*keys, i))
+    elif isinstance(value, Mapping):
+        if isinstance(value.get("model"), str):
+            for declared in parameters(model_class(value["model"], _format_path(keys))):
                 yield (*keys, declared.name), declared.unit
-        for name, item in given.items():
-            yield from _of_models(item, (*keys, name))
+        for name, item in value.items():
+            yield from _model_parameters(item, (*keys, name))
 
 
-def _spelt(keys: Keys) -> str:
+def _format_path(keys: Keys) -> str:
     return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys).lstrip(".")
 
 
-def _with(tables: Mapping[str, Any], keys: Keys, value: float) -> Mapping[str, Any]:
-    """A copy of the tables with one number put in; a table on the way that is missing is made."""
+def _replace_number(tables: Mapping[str, Any], keys: Keys, value: float) -> Mapping[str, Any]:
+    """A copy of the tables with one number replaced; missing tables are created."""
     changed: Any = copy.deepcopy(dict(tables))
     inner = changed
     for key in keys[:-1]:

@@ -1,4 +1,4 @@
-"""The figures of a study: how outcomes are spread, how each goes with each input, and where its variance comes from."""
+"""Plots of a study: histograms and scatter plots of the metrics, sensitivity indices and time series."""
 
 from __future__ import annotations
 
@@ -12,47 +12,46 @@ from ..core.arrays import Array
 from ..core.plotting import BLACK, BLUE, ORANGE, RED, SKY, legend_below, new_figure
 from ..report.chapter import Plot
 from .result import StudyResult
-from .sensitivity import Indices
+from .sensitivity import SobolIndices
 
-ACROSS = 3
-"""Panels beside each other."""
-MOST_POINTS = 2000
-"""Points of a scatter figure; of more runs every so many is drawn."""
-LONG = 28
-"""Letters that fit under a panel."""
-_SHOWN = {
+PANELS_PER_ROW = 3
+MAX_POINTS = 2000
+"""Maximum number of points of a scatter plot; of more runs, an equidistant subset is drawn."""
+MAX_LABEL_LENGTH = 28
+"""Number of letters that fit below a panel."""
+_DISPLAY_UNITS = {
     "Pa": (1e-3, "kPa"), "Pa(a)": (1e-3, "kPa(a)"), "m": (1e3, "mm"), "m3": (1e6, "cm³"), "rad": (180 / math.pi, "deg"),
     "m3/(s Pa)": (1e8, "dm³/(s bar)"), "kg/s": (1e3, "g/s"), "1": (1.0, ""),
 }  # fmt: skip
-"""Units that people read more easily than SI."""
+"""Factor and unit in which quantities with these SI units are displayed."""
 
 
-def plots(result: StudyResult, indices: dict[str, Indices]) -> tuple[Plot, ...]:
-    """All figures of a study."""
-    found = [_histograms(result)] if result.study.scalars else []
-    found += [_scatter(result, name) for name in result.study.scalars]
+def study_plots(result: StudyResult, indices: dict[str, SobolIndices]) -> tuple[Plot, ...]:
+    """All plots of a study."""
+    plots = [_histograms(result)] if result.study.scalars else []
+    plots += [_scatter(result, name) for name in result.study.scalars]
     if indices:
-        found.append(_bars(result, indices))
-    return (*found, *(_course(result, name) for name in result.study.courses))
+        plots.append(_sensitivity_bars(result, indices))
+    return (*plots, *(_time_series_plot(result, name) for name in result.study.time_series))
 
 
-def scale(unit: str) -> tuple[float, str]:
-    """The factor and the unit in which a quantity is shown."""
-    return _SHOWN.get(unit, (1.0, unit))
+def _display_scale(unit: str) -> tuple[float, str]:
+    """Factor and unit in which a quantity with an SI unit is displayed."""
+    return _DISPLAY_UNITS.get(unit, (1.0, unit))
 
 
-def label(name: str, unit: str) -> str:
-    """What stands at an axis: the name and the unit, on two lines where they are long together."""
-    shown = scale(unit)[1]
-    if len(name) > LONG:
+def _axis_label(name: str, unit: str) -> str:
+    """The label of an axis: name and unit, on two lines if they are long."""
+    shown = _display_scale(unit)[1]
+    if len(name) > MAX_LABEL_LENGTH:
         name = f"{name.rpartition('.')[0]}\n.{name.rpartition('.')[2]}"
-    between = "\n" if len(name) + len(shown) > LONG and "\n" not in name else " "
+    between = "\n" if len(name) + len(shown) > MAX_LABEL_LENGTH and "\n" not in name else " "
     return f"{name}{between}[{shown}]" if shown else name
 
 
 def _panels(count: int, height: float = 2.3, **options: Any) -> tuple[Any, Iterator[Any]]:
-    """A figure with as many panels, and these one after the other; places that are left over stay empty."""
-    columns = min(count, ACROSS)
+    """A figure with `count` panels, and an iterator over its axes; unused axes are hidden."""
+    columns = min(count, PANELS_PER_ROW)
     rows = -(-count // columns)
     width = 3.4 if columns == 1 else 2.5 * columns
     figure, axes = new_figure(rows, columns, width=width, height=height * rows, squeeze=False, **options)
@@ -65,85 +64,91 @@ def _histograms(result: StudyResult) -> Plot:
     study = result.study
     figure, panels = _panels(len(study.scalars))
     for name, axis in zip(study.scalars, panels, strict=True):
-        factor, _ = scale(study.units[name])
+        factor, _ = _display_scale(study.units[name])
         values = result[name][np.isfinite(result[name])] * factor
-        axis.set(xlabel=label(name, study.units[name]), ylabel="runs")
+        axis.set(xlabel=_axis_label(name, study.units[name]), ylabel="runs")
         if values.size:
-            axis.hist(values, bins=_bins(values), color=SKY, edgecolor="white", linewidth=0.4)
+            axis.hist(values, bins=_bin_count(values), color=SKY, edgecolor="white", linewidth=0.4)
         else:
-            axis.text(0.5, 0.5, "no run has it", ha="center", transform=axis.transAxes)
+            axis.text(0.5, 0.5, "no values", ha="center", transform=axis.transAxes)
         if math.isfinite(result.nominal[name]):
             axis.axvline(result.nominal[name] * factor, color=RED, linestyle="--", linewidth=1.2)
-    caption = "How the outcomes are spread over all runs; the dashed line is the scenario as it stands."
+    caption = "Histograms of the metrics over all runs; the dashed line is the nominal scenario."
     return Plot("histograms", caption, figure)
 
 
-def _bins(values: Array) -> int:
-    """As many bins as the cube root of the number of runs says, twice over (rule of Rice); one where all are equal."""
-    same = np.ptp(values) <= 1e-12 * np.abs(values).max()
-    return 1 if same else min(60, max(4, math.ceil(2 * values.size ** (1 / 3))))
+def _bin_count(values: Array) -> int:
+    """The number of bins, twice the cube root of the number of values (Rice rule), 4 to 60; one for equal values."""
+    equal = np.ptp(values) <= 1e-12 * np.abs(values).max()
+    return 1 if equal else min(60, max(4, math.ceil(2 * values.size ** (1 / 3))))
 
 
 def _scatter(result: StudyResult, name: str) -> Plot:
     study = result.study
-    figure, panels = _panels(len(study.numbers), sharey=True)
-    factor, _ = scale(study.units[name])
-    there = np.flatnonzero(np.isfinite(result[name]))
-    drawn = there[:: max(1, -(-there.size // MOST_POINTS))]
+    figure, panels = _panels(len(study.parameters), sharey=True)
+    factor, _ = _display_scale(study.units[name])
+    finite = np.flatnonzero(np.isfinite(result[name]))
+    drawn = finite[:: max(1, -(-finite.size // MAX_POINTS))]
     style = {"marker": "o", "linestyle": "none", "markersize": 2.4, "alpha": 0.5, "markeredgewidth": 0, "color": BLUE}
-    for i, (number, axis) in enumerate(zip(study.numbers, panels, strict=True)):
-        across, _ = scale(number.unit)
-        axis.plot(study.values[drawn, i] * across, result[name][drawn] * factor, **style)
-        axis.set_xlabel(label(number.path, number.unit))
+    for i, (parameter, axis) in enumerate(zip(study.parameters, panels, strict=True)):
+        parameter_factor, _ = _display_scale(parameter.unit)
+        axis.plot(study.values[drawn, i] * parameter_factor, result[name][drawn] * factor, **style)
+        axis.set_xlabel(_axis_label(parameter.path, parameter.unit))
         axis.locator_params(axis="x", nbins=5)
-        if i % ACROSS == 0:
-            axis.set_ylabel(label(name, study.units[name]))
-    few = f" Of {there.size} runs {drawn.size} are drawn." if drawn.size < there.size else ""
-    return Plot(f"scatter-{_file(name)}", f"{name} against everything that varies, run by run.{few}", figure)
-
-
-def _bars(result: StudyResult, indices: dict[str, Indices]) -> Plot:
-    study = result.study
-    count, inputs = len(indices), [number.path for number in study.numbers]
-    figure, axes = new_figure(
-        count, 1, width=6.3, height=0.8 + count * (0.7 + 0.42 * len(inputs)), squeeze=False, sharex=True
+        if i % PANELS_PER_ROW == 0:
+            axis.set_ylabel(_axis_label(name, study.units[name]))
+    subset = f" {drawn.size} of {finite.size} runs are drawn." if drawn.size < finite.size else ""
+    return Plot(
+        f"scatter-{_file_stem(name)}", f"{name} against each varied parameter, one point per run.{subset}", figure
     )
-    places = np.arange(len(inputs))
+
+
+def _sensitivity_bars(result: StudyResult, indices: dict[str, SobolIndices]) -> Plot:
+    study = result.study
+    count, paths = len(indices), [parameter.path for parameter in study.parameters]
+    figure, axes = new_figure(
+        count, 1, width=6.3, height=0.8 + count * (0.7 + 0.42 * len(paths)), squeeze=False, sharex=True
+    )
+    rows = np.arange(len(paths))
     bar = {"height": 0.38, "error_kw": {"elinewidth": 0.9, "ecolor": BLACK, "capsize": 2}}
-    for axis, (name, found) in zip(axes[:, 0], indices.items(), strict=True):
-        for values, interval, shift, colour, words in (
-            (found.first, found.first_interval, -0.2, BLUE, "first order"),
-            (found.total, found.total_interval, 0.2, ORANGE, "total"),
+    for axis, (name, index) in zip(axes[:, 0], indices.items(), strict=True):
+        for values, interval, shift, colour, label in (
+            (index.first, index.first_interval, -0.2, BLUE, "first order"),
+            (index.total, index.total_interval, 0.2, ORANGE, "total"),
         ):
             errors = np.abs(np.nan_to_num(interval - values))
-            axis.barh(places + shift, np.nan_to_num(values), xerr=errors, color=colour, label=words, **bar)
-        axis.set_yticks(places, inputs)
+            axis.barh(rows + shift, np.nan_to_num(values), xerr=errors, color=colour, label=label, **bar)
+        axis.set_yticks(rows, paths)
         axis.invert_yaxis()
-        axis.set_title(name if np.isfinite(found.total).any() else f"{name}: does not vary")
+        axis.set_title(name if np.isfinite(index.total).any() else f"{name}: does not vary")
         axis.axvline(0.0, color=BLACK, linewidth=0.8)
         axis.grid(False, axis="y")
-    axes[-1, 0].set_xlabel("part of the variance")
+    axes[-1, 0].set_xlabel("fraction of the variance")
     legend_below(figure, axes[0, 0])
-    caption = "Variance-based sensitivities, with 95 % bootstrap intervals: what an input does alone, and in all."
+    caption = (
+        "Variance-based sensitivities with 95 % bootstrap confidence intervals: first order (the parameter alone) and "
+        "total (with its interactions)."
+    )
     return Plot("sensitivities", caption, figure)
 
 
-def _course(result: StudyResult, name: str) -> Plot:
+def _time_series_plot(result: StudyResult, name: str) -> Plot:
     study = result.study
-    course, rows = study.courses[name], result[name]
-    factor, _ = scale(study.units[name])
-    there = np.isfinite(rows).any(axis=0)
-    low, middle, high = np.full((3, there.size), np.nan)
-    if there.any():
-        low[there], middle[there], high[there] = np.nanquantile(rows[:, there] * factor, [0.05, 0.5, 0.95], axis=0)
+    series, rows = study.time_series[name], result[name]
+    factor, _ = _display_scale(study.units[name])
+    available = np.isfinite(rows).any(axis=0)
+    low, median, high = np.full((3, available.size), np.nan)
+    if available.any():
+        quantiles = np.nanquantile(rows[:, available] * factor, [0.05, 0.5, 0.95], axis=0)
+        low[available], median[available], high[available] = quantiles
     figure, axis = new_figure()
-    axis.fill_between(course.instants, low, high, color=SKY, alpha=0.45, linewidth=0, label="5 % to 95 % of the runs")
-    axis.plot(course.instants, middle, color=BLUE, label="median")
-    axis.set(xlabel="time [s]", ylabel=label(course.column, study.units[name]))
+    axis.fill_between(series.times, low, high, color=SKY, alpha=0.45, linewidth=0, label="5 % to 95 % of the runs")
+    axis.plot(series.times, median, color=BLUE, label="median")
+    axis.set(xlabel="time [s]", ylabel=_axis_label(series.column, study.units[name]))
     legend_below(figure, axis)
-    return Plot(f"course-{_file(name)}", f"{name}: {course.column} over time, over all runs.", figure)
+    return Plot(f"time-series-{_file_stem(name)}", f"{name}: {series.column} over time, over all runs.", figure)
 
 
-def _file(name: str) -> str:
-    """A name that a file can have."""
+def _file_stem(name: str) -> str:
+    """The name with all characters replaced that are not allowed in a file name."""
     return "".join(c if c.isalnum() or c in "-_" else "-" for c in name)

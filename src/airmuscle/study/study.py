@@ -1,19 +1,19 @@
-"""A study written down as a file: a scenario, what varies in it, how it is sampled, and what is kept.
+"""Study files: a scenario, its varied parameters, the design of experiments and the metrics.
 
 title = "Spread of two valves"                     optional
-scenario = "fill_discharge.toml"                   a scenario file beside this one; or the tables [scenario.plant],
-                                                   [scenario.command] and [scenario.run] of one
-chunk = 32                                         optional: runs that are written together
-[vary]                                             numbers by their paths, see varied.py
+scenario = "fill_discharge.toml"                   a scenario file next to this one; or the tables [scenario.plant],
+                                                   [scenario.command] and [scenario.run] of a scenario
+chunk_size = 32                                    optional: number of runs that are saved together
+[vary]                                             varied parameters by their paths, see paths.py
 "mechanism.mass" = ["5 kg", "10 kg"]               levels; also { model = "Range", low = , high = , count = }
-"circuit.fill.conductance" = { model = "Normal", mean = "...", deviation = "..." }       see variation.py
-[follow]                                           optional: numbers that take the value of one that varies
+"circuit.fill.conductance" = { model = "Normal", mean = "...", std = "..." }             see distributions.py
+[follow]                                           optional: parameters that take the value of a varied parameter
 "circuit.discharge.conductance" = "circuit.fill.conductance"
 [design]
 model = "LatinHypercube"                           see design.py
 count = 256
 seed = 1
-[outcome]                                          see outcome.py
+[metrics]                                          see metrics.py
 contraction = { model = "Final", column = "contraction" }
 """
 
@@ -28,198 +28,205 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.errors import ParameterError, suggestion
-from ..library.catalogue import parsed
-from ..library.location import Location, check_keys, located_errors, text
-from ..scenario.scenario import Scenario, load_scenario, scenario_from, units_of_run
+from ..library.build import build
+from ..library.files import read_toml
+from ..library.location import Location, check_keys, located_errors, read_text
+from ..scenario.scenario import Scenario, build_scenario, load_scenario, run_column_units
 from .design import DESIGNS, Design
-from .distributions import Variation, variation_from
+from .distributions import Variation, read_variation
+from .fields import read_count
 from .fingerprint import fingerprint
-from .metrics import OUTCOMES, Metric, Scalar, TimeSeries
-from .parse import chosen, whole
+from .metrics import METRICS, Metric, Scalar, TimeSeries
 from .paths import ScenarioParameter, ScenarioTemplate
 
-TABLES = ("title", "scenario", "chunk", "vary", "follow", "design", "outcome")
-CHUNK = 32
-"""RunSplit that are written together unless the study says otherwise (chosen)."""
+TABLES = ("title", "scenario", "chunk_size", "vary", "follow", "design", "metrics")
+CHUNK_SIZE = 32
+"""Default number of runs that are saved together (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Study:
-    """Many runs of one scenario.
+    """A parameter study: many runs of one scenario.
 
-    `numbers` vary as `variations` say, in the runs that `design` makes of them: `values` (N, d), run by run.
-    `follow` holds further numbers, each with the place (in `numbers`) of the one that it takes its value from.
+    parameters  the d varied parameters
+    variations  their distributions or level sets
+    follow      further parameters, each with the index of the varied parameter whose value it takes
+    design      the design of experiments
+    values      the parameter values (N, d), one row per run
+    metrics     the metrics kept from each run, by name
     """
 
     title: str
     path: Path
-    source: ScenarioTemplate
-    numbers: tuple[ScenarioParameter, ...]
+    template: ScenarioTemplate
+    parameters: tuple[ScenarioParameter, ...]
     variations: tuple[Variation, ...]
     follow: tuple[tuple[ScenarioParameter, int], ...]
     design: Design
     values: npt.NDArray[np.float64]
-    outcomes: Mapping[str, Metric]
-    chunk: int = CHUNK
+    metrics: Mapping[str, Metric]
+    chunk_size: int = CHUNK_SIZE
 
     def __len__(self) -> int:
         return len(self.values)
 
     @property
     def scalars(self) -> dict[str, Scalar]:
-        """The outcomes that are numbers."""
-        return {name: outcome for name, outcome in self.outcomes.items() if isinstance(outcome, Scalar)}
+        """The scalar metrics by name."""
+        return {name: metric for name, metric in self.metrics.items() if isinstance(metric, Scalar)}
 
     @property
-    def courses(self) -> dict[str, TimeSeries]:
-        """The outcomes that are whole columns."""
-        return {name: outcome for name, outcome in self.outcomes.items() if isinstance(outcome, TimeSeries)}
+    def time_series(self) -> dict[str, TimeSeries]:
+        """The time series by name."""
+        return {name: metric for name, metric in self.metrics.items() if isinstance(metric, TimeSeries)}
 
     @property
     def units(self) -> dict[str, str]:
-        """The units of the outcomes."""
-        known = columns_of(self.source.scenario)
-        return {name: outcome.unit(known[outcome.column]) for name, outcome in self.outcomes.items()}
+        """The units of the metrics."""
+        known = columns_of(self.template.scenario)
+        return {name: metric.unit(known[metric.column]) for name, metric in self.metrics.items()}
 
-    def rows(self, chunk: int) -> range:
+    def chunk_runs(self, index: int) -> range:
         """The runs of one chunk."""
-        return range(chunk * self.chunk, min((chunk + 1) * self.chunk, len(self)))
+        return range(index * self.chunk_size, min((index + 1) * self.chunk_size, len(self)))
 
     @property
     def chunks(self) -> range:
-        """The numbers of the chunks."""
-        return range(-(-len(self) // self.chunk))
+        """The indices of the chunks."""
+        return range(-(-len(self) // self.chunk_size))
 
     @property
-    def changing(self) -> tuple[ScenarioParameter, ...]:
-        """All numbers that are not the same in every run."""
-        return (*self.numbers, *(number for number, _ in self.follow))
+    def varying_parameters(self) -> tuple[ScenarioParameter, ...]:
+        """The varied parameters and those that follow them."""
+        return (*self.parameters, *(parameter for parameter, _ in self.follow))
 
-    def changes(self, runs: Sequence[int]) -> npt.NDArray[np.float64]:
-        """The values of these numbers in some runs (R, d)."""
+    def varying_values(self, runs: Sequence[int]) -> npt.NDArray[np.float64]:
+        """The values (R, D) of the D varying parameters in R runs."""
         values = self.values[runs]
         return np.hstack([values, values[:, [i for _, i in self.follow]]])
 
-    def rests(self, runs: Sequence[int]) -> list[dict[str, float] | None]:
-        """Where each of these runs begins, as `scenario` takes it; found for all at once."""
-        return self.source.rests(self.changing, self.changes(runs))
+    def initial_states(self, runs: Sequence[int]) -> list[dict[str, float] | None]:
+        """The initial states of some runs, computed together; None if a run must be computed individually."""
+        return self.template.initial_states(self.varying_parameters, self.varying_values(runs))
 
-    def scenario(self, run: int, rest: dict[str, float] | None = None) -> Scenario:
-        """One of the runs. Raises ParameterError or PhysicsError where its values are not possible together."""
-        return self.source.changed(self.changing, self.changes([run])[0].tolist(), rest)
+    def scenario(self, run: int, initial_state: dict[str, float] | None = None) -> Scenario:
+        """The scenario of one run. Raises ParameterError or PhysicsError if its parameter values are not valid."""
+        return self.template.with_values(self.varying_parameters, self.varying_values([run])[0].tolist(), initial_state)
 
     def fingerprint(self) -> str:
-        """The fingerprint of all that the results depend on, but for the program."""
-        scenario = dataclasses.replace(self.source.scenario, title="")
-        tables = {name: table for name, table in self.source.tables.items() if name != "title"}
-        return fingerprint(scenario, tables, self.numbers, self.follow, self.outcomes)
+        """The fingerprint of everything that the results depend on, except for the program."""
+        scenario = dataclasses.replace(self.template.scenario, title="")
+        tables = {name: table for name, table in self.template.tables.items() if name != "title"}
+        return fingerprint(scenario, tables, self.parameters, self.follow, self.metrics)
 
 
 def columns_of(scenario: Scenario) -> dict[str, str]:
     """The units of all columns that a run has."""
-    return units_of_run(scenario.plant, scenario.start, scenario.command)
+    return run_column_units(scenario.plant, scenario.start, scenario.command)
 
 
 def load_study(path: str | Path) -> Study:
-    """The study in a file. Raises FileError, ParameterError, UnitError or UnknownName, saying where."""
+    """Read a study file. Raises FileError, ParameterError, UnitError or UnknownNameError with the location."""
     file = Path(path)
-    tables = parsed(file)
-    place = Location(str(file), "", file.parent)
-    check_keys(tables, TABLES, place)
-    source = _source(tables.get("scenario"), place)
-    varied = _table(tables, "vary", place)
-    numbers = {key: source.number(key, str(place.inside("vary"))) for key in varied}
-    variations = [_variation(varied[key], number, place) for key, number in numbers.items()]
-    design: Design = chosen(tables.get("design"), DESIGNS, place.inside("design"))
-    with located_errors(place.inside("design")):
+    tables = read_toml(file)
+    location = Location(str(file), "", file.parent)
+    check_keys(tables, TABLES, location)
+    template = _read_scenario(tables.get("scenario"), location)
+    vary = _require_table(tables, "vary", location)
+    parameters = {path: template.parameter(path, str(location.inside("vary"))) for path in vary}
+    variations = [_read_variation(vary[path], parameter, location) for path, parameter in parameters.items()]
+    design: Design = build(_require_table(tables, "design", location), location.inside("design"), classes=DESIGNS)
+    with located_errors(location.inside("design")):
         values = design.values(variations)
+    metrics = _require_table(tables, "metrics", location)
     return Study(
-        title=text(tables, "title", place, needed=False) or source.scenario.title,
+        title=read_text(tables, "title", location, needed=False) or template.scenario.title,
         path=file,
-        source=source,
-        numbers=tuple(numbers.values()),
+        template=template,
+        parameters=tuple(parameters.values()),
         variations=tuple(variations),
-        follow=_follow(tables.get("follow", {}), source, list(numbers), place.inside("follow")),
+        follow=_read_follow(tables.get("follow", {}), template, list(parameters), location.inside("follow")),
         design=design,
         values=values,
-        outcomes=_outcomes(_table(tables, "outcome", place), source.scenario, place.inside("outcome")),
-        chunk=_chunk(tables.get("chunk", CHUNK), f"{place}, chunk"),
+        metrics=_read_metrics(metrics, template.scenario, location.inside("metrics")),
+        chunk_size=_read_chunk_size(tables.get("chunk_size", CHUNK_SIZE), f"{location}, chunk_size"),
     )
 
 
-def _source(given: Any, place: Location) -> ScenarioTemplate:
-    if isinstance(given, str):
-        file = place.folder / given
-        with located_errors(f"{place}, scenario"):
-            return ScenarioTemplate(parsed(file), Location(str(file), "", file.parent), load_scenario(file))
-    if not isinstance(given, Mapping):
+def _read_scenario(value: Any, location: Location) -> ScenarioTemplate:
+    if isinstance(value, str):
+        file = location.folder / value
+        with located_errors(f"{location}, scenario"):
+            return ScenarioTemplate(read_toml(file), Location(str(file), "", file.parent), load_scenario(file))
+    if not isinstance(value, Mapping):
         raise ParameterError(
-            f'{place}: scenario is {given!r}; name a file, scenario = "fill.toml", or write the tables '
+            f'{location}: scenario is {value!r}; name a file, scenario = "fill.toml", or write the tables '
             "[scenario.plant], [scenario.command] and [scenario.run]."
         )
-    return ScenarioTemplate(given, place.inside("scenario"), scenario_from(given, place.inside("scenario")))
+    return ScenarioTemplate(value, location.inside("scenario"), build_scenario(value, location.inside("scenario")))
 
 
-def _table(tables: Mapping[str, Any], key: str, place: Location) -> Mapping[str, Any]:
-    given = tables.get(key)
-    if not isinstance(given, Mapping) or not given:
-        what = "is missing" if given is None else "is empty" if given == {} else f"is {given!r}, no table"
-        raise ParameterError(f"{place}: the table [{key}] {what}; a study needs at least one line under it.")
-    return given
+def _require_table(tables: Mapping[str, Any], key: str, location: Location) -> Mapping[str, Any]:
+    table = tables.get(key)
+    if not isinstance(table, Mapping) or not table:
+        problem = "is missing" if table is None else "is empty" if table == {} else f"is {table!r}, not a table"
+        raise ParameterError(f"{location}: [{key}] {problem}; it must contain at least one entry.")
+    return table
 
 
-def _variation(given: Any, number: ScenarioParameter, place: Location) -> Variation:
-    where = Location(f'{place}, [vary], "{number.path}"', "", place.folder)
-    found = variation_from(given, number.unit, where)
-    low, high = number.bounds
-    unit = "" if number.unit == "1" else f" {number.unit}"
-    beyond = [v for v in found.ends if np.isfinite(v) and not low <= v <= high]
-    if beyond:
-        raise ParameterError(f"{where} goes to {beyond[0]:g}{unit}; allowed are {low:g} to {high:g}{unit}.")
-    return found
+def _read_variation(value: Any, parameter: ScenarioParameter, location: Location) -> Variation:
+    entry = Location(f'{location}, [vary], "{parameter.path}"', "", location.folder)
+    variation = read_variation(value, parameter.unit, entry)
+    low, high = parameter.bounds
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    outside = [v for v in variation.support if np.isfinite(v) and not low <= v <= high]
+    if outside:
+        raise ParameterError(f"{entry} includes {outside[0]:g}{unit}; allowed range: {low:g} to {high:g}{unit}.")
+    return variation
 
 
-def _follow(
-    given: Any, source: ScenarioTemplate, varied: list[str], place: Location
+def _read_follow(
+    table: Any, template: ScenarioTemplate, varied: list[str], location: Location
 ) -> tuple[tuple[ScenarioParameter, int], ...]:
-    if not isinstance(given, Mapping):
-        raise ParameterError(f'{place} is {given!r}; write "path" = "path of a number that varies".')
-    found = []
-    for path, leader in given.items():
-        number = source.number(path, str(place))
+    if not isinstance(table, Mapping):
+        raise ParameterError(f'{location} is {table!r}; write "path" = "path of a varied parameter".')
+    followers = []
+    for path, leader in table.items():
+        parameter = template.parameter(path, str(location))
         if path in varied:
-            raise ParameterError(f"{place}: '{path}' varies by itself; take it out of [vary] or of [follow].")
+            raise ParameterError(f"{location}: '{path}' is also under [vary]; remove it from [vary] or from [follow].")
         if leader not in varied:
             near = suggestion(str(leader), varied)
-            raise ParameterError(f"{place}: '{path}' follows {leader!r}, which is not under [vary].{near}")
-        unit = source.number(leader, str(place)).unit
-        if unit != number.unit:
-            raise ParameterError(f"{place}: '{path}' [{number.unit}] cannot follow '{leader}' [{unit}].")
-        found.append((number, varied.index(leader)))
-    return tuple(found)
+            raise ParameterError(f"{location}: '{path}' follows {leader!r}, which is not under [vary].{near}")
+        unit = template.parameter(leader, str(location)).unit
+        if unit != parameter.unit:
+            raise ParameterError(
+                f"{location}: '{path}' [{parameter.unit}] cannot follow '{leader}' [{unit}]; their units must be equal."
+            )
+        followers.append((parameter, varied.index(leader)))
+    return tuple(followers)
 
 
-def _outcomes(given: Mapping[str, Any], scenario: Scenario, place: Location) -> dict[str, Metric]:
+def _read_metrics(tables: Mapping[str, Any], scenario: Scenario, location: Location) -> dict[str, Metric]:
     known = columns_of(scenario)
-    found: dict[str, Metric] = {}
-    for name, table in given.items():
+    metrics: dict[str, Metric] = {}
+    for name, table in tables.items():
+        inner = location.inside(name)
         column = table.get("column") if isinstance(table, Mapping) else None
         if isinstance(column, str) and column not in known:
             near = suggestion(column, known)
-            raise ParameterError(
-                f"{place.inside(name)}: a run has no column '{column}'; there are {', '.join(known)}.{near}"
-            )
-        outcome = chosen(table, OUTCOMES, place.inside(name), known.get(str(column), "1") or "1")
-        with located_errors(place.inside(name)):
-            outcome.check_range(scenario.start_time, scenario.duration)
-            if isinstance(outcome, TimeSeries):
-                outcome = outcome.within(scenario.start_time, scenario.duration)
-        found[name] = outcome
-    return found
+            raise ParameterError(f"{inner}: a run has no column '{column}'; its columns are {', '.join(known)}.{near}")
+        metric = build(table, inner, classes=METRICS, unit=known.get(str(column), "1") or "1")
+        with located_errors(inner):
+            metric.check_range(scenario.start_time, scenario.duration)
+            if isinstance(metric, TimeSeries):
+                metric = metric.clip_to_run(scenario.start_time, scenario.duration)
+        metrics[name] = metric
+    return metrics
 
 
-def _chunk(given: Any, where: str) -> int:
-    found: int = whole(given, "1", where)
-    if not found:
-        raise ParameterError(f"{where} is 0; at least one run is written at a time.")
-    return found
+def _read_chunk_size(value: Any, where: str) -> int:
+    size = read_count(value, "1", where)
+    if not size:
+        raise ParameterError(f"{where} is 0; it must be at least 1.")
+    return size

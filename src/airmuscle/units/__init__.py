@@ -1,6 +1,6 @@
-"""Unit factors such as `bar` and `mm` (`6 * bar` is 600 000 Pa), and text with a unit, "300 mm", read into SI.
+"""Unit factors such as `bar` and `mm` (`6 * bar` is 600 000 Pa), and conversion of text with a unit ("300 mm") to SI.
 
-Everything inside is SI; a pressure is gauge unless its unit says absolute, "bara" or "kPa(a)".
+All internal values are SI. A pressure is gauge unless its unit states absolute, such as "bara" or "kPa(a)".
 """
 
 from ..core.units import (

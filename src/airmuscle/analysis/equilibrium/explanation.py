@@ -70,9 +70,7 @@ def _line(one: Statics, x: Array) -> str:
     accelerations = one.accelerations(x[None, None])[0, 0]
     if len(x) == 1:
         return f"{pulls}, and the load accelerates at {accelerations[0]:+.4g} {one.coordinates[0].unit}/s2"
-    moving = ", ".join(
-        f"{c.name} {a:+.4g} {c.unit}/s2" for c, a in zip(one.coordinates, accelerations, strict=True)
-    )
+    moving = ", ".join(f"{c.name} {a:+.4g} {c.unit}/s2" for c, a in zip(one.coordinates, accelerations, strict=True))
     return f"{pulls}, and the accelerations are {moving}"
 
 

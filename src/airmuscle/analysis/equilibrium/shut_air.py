@@ -11,7 +11,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...muscle import Muscle
 from ...plant.plant import Plant
-from ...pneumatics.gas import absolute, gauge
+from ...pneumatics.gas import absolute_pressure, gauge_pressure
 
 MAX_PRESSURE = 1e8
 """Greatest absolute pressure [Pa] at which a mass of air is sought."""
@@ -28,18 +28,18 @@ def shut_air_pressure(plant: Plant, muscle: Muscle, air_mass: float, contraction
 
     def excess(x: Array) -> Array:
         """log of the air that the muscle holds at an absolute pressure exp(x), less that of the given air."""
-        p = gauge(np.exp(x), plant.ambient)
-        own = muscle.settled(p, contraction)
+        p = gauge_pressure(np.exp(x), plant.ambient)
+        own = muscle.steady_state(p, contraction)
         volume = muscle.volume(muscle.inner_contraction(contraction, own), own)
         held: Any = np.asarray(plant.gas.state_at(np.exp(x), volume, plant.ambient)["air_mass"])
         return np.where(held > 0, np.log(np.where(held > 0, held, 1.0) / air_mass), -np.inf)
 
     with np.errstate(all="ignore"):
-        start = np.log(np.asarray(absolute(0.0, plant.ambient), dtype=float))
+        start = np.log(np.asarray(absolute_pressure(0.0, plant.ambient), dtype=float))
         x = _secant(excess, start + np.zeros_like(excess(start)))
         if np.isnan(x).any():
             x = np.where(np.isnan(x), _bisection(excess, x.shape), x)
-        return np.asarray(gauge(np.exp(x), plant.ambient))
+        return np.asarray(gauge_pressure(np.exp(x), plant.ambient))
 
 
 def _secant(excess: Callable[[Array], Array], a: Array) -> Array:

@@ -18,7 +18,7 @@ from ...core.ops import Value
 from ...mechanism import Coordinate
 from ...muscle import Muscle
 from ...plant.plant import Plant
-from ...pneumatics.gas import absolute
+from ...pneumatics.gas import absolute_pressure
 from .shut_air import shut_air_pressure
 
 Rows = npt.NDArray[np.intp]
@@ -102,7 +102,7 @@ class Statics:
         for variable, value in zip(self.plants.input_variables, self.inputs, strict=True):
             found &= (variable.minimum <= value) & (value <= variable.maximum)
         for pressure in () if self.shut else self.air:
-            found &= np.asarray(absolute(pressure, self.plants.ambient)) > 0.0
+            found &= np.asarray(absolute_pressure(pressure, self.plants.ambient)) > 0.0
         return found[:, 0]
 
     def contractions(self, x: Array) -> list[Array]:

@@ -81,9 +81,7 @@ def _read(path: pathlib.Path) -> bytes | None:
     try:
         with open(os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)), "rb") as file:
             state = os.fstat(file.fileno())
-            private = not _POSIX or (
-                state.st_uid == os.getuid() and not state.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-            )
+            private = not _POSIX or (state.st_uid == os.getuid() and not state.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
             return file.read() if private and stat.S_ISREG(state.st_mode) else None
     except OSError:
         return None

@@ -1,19 +1,19 @@
-"""Parameters of a plant from records in time: fill, discharge, release; and what such records cannot tell."""
+"""Dynamic identification: plant parameters from transient records (fill, discharge, release)."""
 
-from .experiment import Experiment, StartTime, StartValue
+from ..identifiability import analyse_identifiability
+from .experiment import Experiment, InitialValue, StartTime
 from .fit import fit_dynamic
-from .identifiability import identifiable
 from .initial_conditions import InitialConditions
 from .result import DynamicFit
-from .sensing import where_sensed
+from .sensing import locate_pressure_sensor
 
 __all__ = [
     "DynamicFit",
     "Experiment",
     "InitialConditions",
+    "InitialValue",
     "StartTime",
-    "StartValue",
+    "analyse_identifiability",
     "fit_dynamic",
-    "identifiable",
-    "where_sensed",
+    "locate_pressure_sensor",
 ]

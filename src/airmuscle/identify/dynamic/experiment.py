@@ -1,4 +1,4 @@
-"""What a dynamic fit is asked: records with their commands and starts, and the unknowns, shared or of one record."""
+"""Records, inputs, initial conditions and unknowns of a dynamic fit."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from ...control.inputs import InputSignal, check_input_signal
 from ...core import tree
 from ...core.errors import ParameterError, suggestion
 from ...recording import Recording
-from ...recording.recording import header
+from ...recording.recording import column_heading
 from .initial_conditions import InitialConditions
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Experiment:
-    """One record: what was measured, under which command, from which start.
+    """One record: the recording, the command that was applied, and the initial conditions.
 
-    `command` counts from the beginning of the run, which stands at `start_time` on the record's clock; rows before it
-    are at the start. `plant` replaces the fit's plant where a record was made with another load, say.
+    `command` counts from the start of the run, which is at `start_time` [s] on the clock of the recording; rows before
+    it are at the initial state. `plant` replaces the plant of the fit, for example with another load.
     """
 
     recording: Recording
     command: InputSignal
-    start: InitialConditions
+    initial_conditions: InitialConditions
     start_time: float = 0.0
     plant: System | None = None
 
@@ -36,37 +36,42 @@ class Experiment:
 
 @dataclasses.dataclass(frozen=True)
 class StartTime:
-    """The instant at which a run begins on its record's clock, as an unknown."""
+    """The start time of a run on the clock of its recording, as an unknown."""
 
     margin: float
-    """How far it may lie from where the experiment says [s]."""
+    """Maximum deviation from the start time of the experiment [s]."""
 
     def __str__(self) -> str:
         return "start time"
 
 
 @dataclasses.dataclass(frozen=True)
-class StartValue:
-    """A value that the start takes as known, as an unknown: `StartValue("pressure", 2e3)`."""
+class InitialValue:
+    """A known value of the initial conditions, as an unknown: `InitialValue("pressure", 2e3)`."""
 
     name: str
     margin: float
-    """How far it may lie from where the experiment says, in its own unit."""
+    """Maximum deviation from the value of the experiment [SI]."""
 
     def __str__(self) -> str:
-        return f"start {self.name}"
+        return f"initial {self.name}"
 
 
-Shared = str | tuple[str, ...]
-Own = Shared | StartTime | StartValue
+ParameterPaths = str | tuple[str, ...]
+"""Path of a parameter, or paths of several parameters with one common value."""
+RecordUnknown = ParameterPaths | StartTime | InitialValue
+"""An unknown with its own value in every record."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Unknown:
-    """One number to find: leaves of the plant that share it, or a start's time or value, of one record or of all."""
+    """One unknown number: parameters with a common value, a start time or an initial value.
+
+    `record` is the index of the record it belongs to, None for all records. Value and bounds are SI.
+    """
 
     name: str
-    what: tuple[str, ...] | StartTime | StartValue
+    target: tuple[str, ...] | StartTime | InitialValue
     record: int | None
     value: float
     low: float
@@ -77,77 +82,85 @@ class Unknown:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """The leaves that take this number; none for what acts on the start alone."""
-        return self.what if isinstance(self.what, tuple) else ()
+        """Paths of the parameters with this value; none for a start time or an initial value."""
+        return self.target if isinstance(self.target, tuple) else ()
 
     @property
     def scale(self) -> float:
-        """The size of a change that counts."""
-        if isinstance(self.what, StartTime | StartValue):
-            return self.what.margin
+        """Magnitude by which the unknown is scaled in the search."""
+        if isinstance(self.target, StartTime | InitialValue):
+            return self.target.margin
         span = self.high - self.low
         return abs(self.value) or (span if np.isfinite(span) else 1.0)
 
     @property
-    def search(self) -> tuple[float, float]:
-        """Where starts are spread: within the bounds, and a factor of three either way."""
-        if isinstance(self.what, StartTime | StartValue):
+    def search_range(self) -> tuple[float, float]:
+        """Range of the initial guesses of a multi-start: a factor of three both ways, within the bounds."""
+        if isinstance(self.target, StartTime | InitialValue):
             return self.low, self.high
-        reach = (self.value / 3, self.value * 3) if self.value else (-self.scale, self.scale)
-        return max(self.low, min(reach)), min(self.high, max(reach))
+        ends = (self.value / 3, self.value * 3) if self.value else (-self.scale, self.scale)
+        return max(self.low, min(ends)), min(self.high, max(ends))
 
 
-def unknowns(
+def make_unknowns(
     plant: System,
     experiments: Sequence[Experiment],
-    free: Sequence[Shared],
-    own: Sequence[Own],
+    free: Sequence[ParameterPaths],
+    per_record: Sequence[RecordUnknown],
     bounds: Mapping[str, tuple[float, float]],
 ) -> tuple[Unknown, ...]:
-    """The shared unknowns, then those of each record. Raises ParameterError for what the plant lacks."""
-    found = [_leaf(plant, what, None, bounds) for what in free]
+    """The unknowns common to all records, then those of each record. Raises ParameterError for unknown names."""
+    unknowns = [_plant_unknown(plant, paths, None, bounds) for paths in free]
     for i, experiment in enumerate(experiments):
-        for what in own:
-            if isinstance(what, StartTime | StartValue):
-                found.append(_nuisance(experiment, what, i))
+        for target in per_record:
+            if isinstance(target, StartTime | InitialValue):
+                unknowns.append(_record_unknown(experiment, target, i))
             else:
-                found.append(_leaf(experiment.plant or plant, what, i, bounds))
-    names = [u.name for u in found]
+                unknowns.append(_plant_unknown(experiment.plant or plant, target, i, bounds))
+    names = [u.name for u in unknowns]
     for name in bounds:
-        if name not in {u.name.partition(" of record")[0] for u in found}:
-            raise ParameterError(f"bounds of '{name}', which is not free; free are {', '.join(names)}.")
-    if not found:
-        raise ParameterError("nothing is free: name what to find, free=('circuit.fill.conductance',).")
-    return tuple(found)
+        if name not in {u.name.partition(" of record")[0] for u in unknowns}:
+            raise ParameterError(f"bounds are given for '{name}', which is not free; free are {', '.join(names)}.")
+    if not unknowns:
+        raise ParameterError("no parameter is free. Name at least one: free=('circuit.fill.conductance',).")
+    return tuple(unknowns)
 
 
-def _leaf(plant: System, what: Shared, record: int | None, bounds: Mapping[str, tuple[float, float]]) -> Unknown:
-    paths = (what,) if isinstance(what, str) else what
+def _plant_unknown(
+    plant: System, target: ParameterPaths, record: int | None, bounds: Mapping[str, tuple[float, float]]
+) -> Unknown:
+    paths = (target,) if isinstance(target, str) else target
     leaves = {leaf.path: leaf for leaf in tree.leaves(plant)}
     for path in paths:
         if path not in leaves:
             known = [p for p in leaves if "[" not in p]
             raise ParameterError(
-                f"{type(plant).__name__} has no parameter '{path}'; there are {', '.join(known)}."
+                f"{type(plant).__name__} has no parameter '{path}'; its parameters are {', '.join(known)}."
                 f"{suggestion(path, leaves)}"
             )
     leaf = leaves[paths[0]]
     low, high = bounds.get(paths[0], leaf.declared.bounds)
     name = paths[0] + ("" if record is None else f" of record {record + 1}")
     if not low <= leaf.value <= high:
-        raise ParameterError(f"{name} starts at {leaf.value:g}; its bounds are {low:g} to {high:g}.")
-    d = leaf.declared
-    return Unknown(name, paths, record, leaf.value, low, high, d.unit, d.symbol, d.meaning)
+        raise ParameterError(
+            f"the initial value of {name} is {leaf.value:g}, outside its bounds {low:g} to {high:g}. Change the value "
+            "or the bounds."
+        )
+    declared = leaf.declared
+    return Unknown(name, paths, record, leaf.value, low, high, declared.unit, declared.symbol, declared.meaning)
 
 
-def _nuisance(experiment: Experiment, what: StartTime | StartValue, record: int) -> Unknown:
-    if isinstance(what, StartTime):
+def _record_unknown(experiment: Experiment, target: StartTime | InitialValue, record: int) -> Unknown:
+    if isinstance(target, StartTime):
         value, unit, symbol = experiment.start_time, "s", "t_0"
     else:
-        if what.name not in experiment.start.known:
-            known = ", ".join(experiment.start.known)
-            raise ParameterError(f"the start does not take '{what.name}' as known; it takes {known}.")
-        value, symbol = experiment.start.known[what.name], f"{what.name}_0"
-        unit = header(what.name).partition("[")[2].rstrip("]") or "SI"
-    name = f"{what} of record {record + 1}"
-    return Unknown(name, what, record, value, value - what.margin, value + what.margin, unit, symbol, str(what))
+        known = experiment.initial_conditions.known
+        if target.name not in known:
+            raise ParameterError(
+                f"the initial conditions of record {record + 1} have no known value '{target.name}'; known are "
+                f"{', '.join(known)}."
+            )
+        value, symbol = known[target.name], f"{target.name}_0"
+        unit = column_heading(target.name).partition("[")[2].rstrip("]") or "SI"
+    name, margin = f"{target} of record {record + 1}", target.margin
+    return Unknown(name, target, record, value, value - margin, value + margin, unit, symbol, str(target))

@@ -1,4 +1,4 @@
-"""Parameters of a plant from records of its motion: fill, discharge, release."""
+"""Dynamic fit of plant parameters to transient records: `fit_dynamic`."""
 
 from __future__ import annotations
 
@@ -12,143 +12,149 @@ from ...compile import System
 from ...core.arrays import Array
 from ...core.errors import IdentificationError, ParameterError
 from ...simulation.integrators import Integrator, Rodas4
+from ..identifiability import Identifiability, analyse_identifiability
 from ..result import Estimate
-from .experiment import Experiment, Own, Shared, unknowns
-from .identifiability import Identifiability, identifiable
+from .experiment import Experiment, ParameterPaths, RecordUnknown, make_unknowns
 from .levenberg_marquardt import LevenbergMarquardt
-from .problem import MOST, DynamicFitProblem
-from .record_model import RecordModel, observations
+from .problem import MAX_RUNS, DynamicFitProblem
+from .record_model import RecordModel, count_readings
 from .result import DynamicFit
 
-CORRELATED = 0.3
-"""Correlation of neighbouring residuals from which on they are called model error, not noise; chosen."""
+MAX_AUTOCORRELATION = 0.3
+"""Lag-1 autocorrelation of the residuals above which they are attributed to model error, not noise; chosen."""
 
-FIRST_LOOK, HOPELESS = 20, 1000.0
-"""RunSplit after which a start whose sum of squares is so many times the least of all is left where it stands; chosen.
+SCREENING_RUNS, SCREENING_RATIO = 20, 1000.0
+"""After this many simulations a search whose sum of squares exceeds the lowest one by this factor is abandoned; chosen.
 
-In nine problems of 40 to 100 starts, what came to the best optimum was within that of it after 14 runs at most."""
+In nine problems with 40 to 100 initial guesses, every search that reached the best optimum was within this factor of it
+after 14 simulations or fewer."""
 
 
 def fit_dynamic(
     plant: System,
     experiments: Sequence[Experiment],
     *,
-    free: Sequence[Shared],
+    free: Sequence[ParameterPaths],
     observed: Mapping[str, float],
-    own: Sequence[Own] = (),
+    per_record: Sequence[RecordUnknown] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     starts: int = 1,
     seed: int = 0,
     method: Integrator | None = None,
 ) -> DynamicFit:
-    """Find parameters of a plant by weighted least squares over all records, with exact sensitivities.
+    """Estimate plant parameters by weighted least squares over all records, with exact sensitivities.
 
-    plant     starts the search with its own values; a record may bring its own plant of the same structure
-    free      paths shared by all records, `("circuit.fill.conductance",)`; a tuple of paths shares one value
-    observed  the outputs that were measured, each with the standard deviation of its sensor, in SI
-    own       what every record has for itself: paths (supply pressure), StartTime(margin), StartValue(name, margin)
-    bounds    by first path; those declared otherwise
-    starts    number of starts: the plant's own values, and a Latin hypercube a factor of three around them; one that
-              after 20 runs is a thousand times worse than the best is left where it stands
-    method    Rodas4(rtol=1e-6) unless given
+    plant       structure and initial values; an experiment may replace it by a plant of the same structure
+    free        paths of the parameters common to all records, ("circuit.fill.conductance",); a tuple of paths has one
+                common value
+    observed    the measured outputs, each with the standard deviation of its sensor [SI]
+    per_record  unknowns with a separate value in every record: paths (supply pressure), StartTime(margin) or
+                InitialValue(name, margin)
+    bounds      by the first path; by default those declared
+    starts      number of initial guesses of a multi-start: the values of the plant, and a Latin hypercube within a
+                factor of three. A search whose sum of squares is a thousand times the lowest one after 20 simulations
+                is abandoned
+    seed        of the Latin hypercube
+    method      by default Rodas4(rtol=1e-6)
 
-    Standard deviations are scaled by the scatter of the residuals. What the records cannot tell apart is named in
-    the notes. Raises IdentificationError where no start can be run, or there are fewer readings than unknowns.
+    The standard errors are scaled by the standard deviation of the residuals. Combinations of parameters that the
+    records do not determine are named in the notes. Raises IdentificationError where no initial guess can be simulated,
+    or there are no more observations than unknowns.
     """
     if not experiments or not observed or starts < 1:
         raise ParameterError("fit_dynamic needs at least one record, one observed quantity and one start.")
-    wanted = unknowns(plant, experiments, free, own, bounds or {})
+    unknowns = make_unknowns(plant, experiments, free, per_record, bounds or {})
     method = method or Rodas4()
-    courses = tuple(RecordModel(plant, e, i, wanted, observed, method) for i, e in enumerate(experiments))
-    problem = DynamicFitProblem(courses, wanted, np.array(list(observed.values()), dtype=float))
+    models = tuple(RecordModel(plant, e, i, unknowns, observed, method) for i, e in enumerate(experiments))
+    problem = DynamicFitProblem(models, unknowns, np.array(list(observed.values()), dtype=float))
     _check_row_count(problem)
-    outcomes = sorted(_solved(problem, spread(problem, starts, seed)), key=lambda outcome: outcome[1])
+    outcomes = sorted(_solve_all(problem, initial_guesses(problem, starts, seed)), key=lambda outcome: outcome[1])
     best, cost = outcomes[0]
     if not np.isfinite(cost):
-        problem.residuals(np.array([u.value for u in wanted]) / problem.scales)  # raises the reason, if it is one
-        raise IdentificationError("the plant could not be run from any start; look at the bounds and the start.")
-    return _result(problem, best, np.array([c for _, c in outcomes]))
+        problem.residuals(np.array([u.value for u in unknowns]) / problem.scales)  # raises the cause, if there is one
+        raise IdentificationError(
+            "the plant cannot be simulated from any initial guess. Check the bounds and the initial conditions."
+        )
+    return _build_result(problem, best, np.array([c for _, c in outcomes]))
 
 
-def _solved(problem: DynamicFitProblem, begins: Sequence[Array]) -> list[tuple[Array, float]]:
-    """The least squares from every start, on all cores: the kernels leave Python to the others while they run."""
-    if len(begins) == 1:
-        return [problem.solve(begins[0])]
-    pool = ThreadPoolExecutor(min(len(begins), os.cpu_count() or 1))
+def _solve_all(problem: DynamicFitProblem, guesses: Sequence[Array]) -> list[tuple[Array, float]]:
+    """Least squares from every initial guess, in parallel threads: compiled kernels release the interpreter lock."""
+    if len(guesses) == 1:
+        return [problem.solve(guesses[0])]
+    pool = ThreadPoolExecutor(min(len(guesses), os.cpu_count() or 1))
     try:
-        searches = list(pool.map(lambda z: _searched(problem.search(z), FIRST_LOOK), begins))
-        least = min(one.cost for one in searches)
-        hopeful = [one for one in searches if not one.ended and one.cost <= HOPELESS * least]
-        list(pool.map(lambda one: _searched(one, MOST), hopeful))
-        return [(one.x, one.cost) for one in searches]
+        searches = list(pool.map(lambda guess: _run_search(problem.search(guess), SCREENING_RUNS), guesses))
+        lowest = min(search.cost for search in searches)
+        continued = [s for s in searches if not s.finished and s.cost <= SCREENING_RATIO * lowest]
+        list(pool.map(lambda search: _run_search(search, MAX_RUNS), continued))
+        return [(search.x, search.cost) for search in searches]
     finally:
         pool.shutdown(cancel_futures=True)
 
 
-def _searched(search: LevenbergMarquardt, most: int) -> LevenbergMarquardt:
-    search.run(most)
+def _run_search(search: LevenbergMarquardt, max_runs: int) -> LevenbergMarquardt:
+    search.run(max_runs)
     return search
 
 
 def _check_row_count(problem: DynamicFitProblem) -> None:
-    count = observations(problem.courses)
+    count = count_readings(problem.record_models)
     if count <= len(problem.unknowns):
         raise IdentificationError(
-            f"{count} readings cannot determine {len(problem.unknowns)} unknowns; give more rows or free fewer."
+            f"{count} observations cannot determine {len(problem.unknowns)} unknowns. Give more rows, or free fewer "
+            "parameters."
         )
-    if not (problem.deviations > 0).all():
+    if not (problem.sensor_deviations > 0).all():
         raise ParameterError("the standard deviation of an observed quantity must be positive, in SI.")
 
 
-def spread(problem: DynamicFitProblem, count: int, seed: int) -> list[Array]:
-    """The plant's own values, then a Latin hypercube, even in the logarithm where the range is positive."""
-    own = np.array([u.value for u in problem.unknowns])
+def initial_guesses(problem: DynamicFitProblem, count: int, seed: int) -> list[Array]:
+    """The values of the plant, then a Latin hypercube; logarithmic where the range is positive. Scaled, (P,) each."""
+    values = np.array([u.value for u in problem.unknowns])
     rng, cells = np.random.default_rng(seed), count - 1
     columns = []
     for unknown in problem.unknowns:
-        low, high = unknown.search
-        share = (rng.permutation(cells) + rng.random(cells)) / max(cells, 1)
-        even = low * (high / low) ** share if low > 0 else low + share * (high - low)
-        columns.append(even)
-    return [own / problem.scales, *(np.column_stack(columns) / problem.scales)]
+        low, high = unknown.search_range
+        fraction = (rng.permutation(cells) + rng.random(cells)) / max(cells, 1)
+        columns.append(low * (high / low) ** fraction if low > 0 else low + fraction * (high - low))
+    return [values / problem.scales, *(np.column_stack(columns) / problem.scales)]
 
 
-def _result(problem: DynamicFitProblem, scaled: Array, costs: Array) -> DynamicFit:
-    errors, slopes = problem.residuals(scaled)
+def _build_result(problem: DynamicFitProblem, scaled: Array, costs: Array) -> DynamicFit:
+    residuals, jacobian = problem.residuals(scaled)
     low, high = problem.bounds
-    near = 1e-6 * np.maximum(np.abs(scaled), 1.0)
-    on_bound = (scaled - low <= near) | (high - scaled <= near)
+    margin = 1e-6 * np.maximum(np.abs(scaled), 1.0)
+    on_bound = (scaled - low <= margin) | (high - scaled <= margin)
     inner = np.flatnonzero(~on_bound)
-    scatter = float(np.sqrt(np.sum(errors**2) / (errors.size - inner.size)))
+    residual_std = float(np.sqrt(np.sum(residuals**2) / (residuals.size - inner.size)))
     names = [problem.unknowns[k].name for k in inner]
-    found = identifiable(slopes[:, inner], names, np.ones(inner.size), scatter)
-    inverse = np.full((scaled.size, scaled.size), np.nan)
-    inverse[np.ix_(inner, inner)] = found.inverse() * scatter**2
-    deviations = np.sqrt(np.diag(inverse))
+    analysis = analyse_identifiability(jacobian[:, inner], names, np.ones(inner.size), residual_std)
+    covariance = np.full((scaled.size, scaled.size), np.nan)
+    covariance[np.ix_(inner, inner)] = analysis.inverse() * residual_std**2
+    standard_errors = np.sqrt(np.diag(covariance))
     estimates = tuple(
-        Estimate(u.name, u.symbol, float(v), float(d), u.unit, u.meaning, bool(b))
-        for u, v, d, b in zip(
-            problem.unknowns, scaled * problem.scales, deviations * problem.scales, on_bound, strict=True
+        Estimate(u.name, u.symbol, float(value), float(stderr), u.unit, u.meaning, bool(bound))
+        for u, value, stderr, bound in zip(
+            problem.unknowns, scaled * problem.scales, standard_errors * problem.scales, on_bound, strict=True
         )
     )
-    correlations = inverse / np.outer(deviations, deviations)
-    return DynamicFit(
-        problem, estimates, correlations, found, scatter, costs, _notes(problem, errors, found, estimates)
-    )
+    correlations = covariance / np.outer(standard_errors, standard_errors)
+    notes = _collect_notes(residuals, analysis, estimates)
+    return DynamicFit(problem, estimates, correlations, analysis, residual_std, costs, notes)
 
 
-def _notes(
-    problem: DynamicFitProblem, errors: Array, found: Identifiability, estimates: Sequence[Estimate]
-) -> tuple[str, ...]:
-    notes = [str(open_one) for open_one in found.undetermined]
+def _collect_notes(residuals: Array, analysis: Identifiability, estimates: Sequence[Estimate]) -> tuple[str, ...]:
+    """Undetermined combinations, unknowns on a bound, and signs of model error."""
+    notes = [str(combination) for combination in analysis.undetermined]
     for estimate in estimates:
         if estimate.on_bound:
-            notes.append(f"{estimate.name} stands on its bound, {estimate.value:.4g} {estimate.unit}")
-    together = float(np.sum(errors[1:] * errors[:-1]) / max(np.sum(errors**2), 1e-300))
-    if together > CORRELATED:
-        factor = np.sqrt((1 + together) / (1 - together))
+            notes.append(f"{estimate.name} is on its bound, {estimate.value:.4g} {estimate.display_unit}".rstrip())
+    autocorrelation = float(np.sum(residuals[1:] * residuals[:-1]) / max(np.sum(residuals**2), 1e-300))
+    if autocorrelation > MAX_AUTOCORRELATION:
+        factor = np.sqrt((1 + autocorrelation) / (1 - autocorrelation))
         notes.append(
-            f"neighbouring residuals are alike (correlation {together:.2f}): what is left is model error rather than "
-            f"noise, and the standard deviations are about {factor:.1f} times too small"
+            f"the residuals are autocorrelated (lag 1: {autocorrelation:.2f}), which indicates model error rather than "
+            f"noise; the standard errors are too small by a factor of about {factor:.1f}"
         )
     return tuple(notes)

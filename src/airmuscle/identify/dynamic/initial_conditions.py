@@ -1,15 +1,16 @@
-"""The state that a record begins at, from what is known of it, and how it moves with the parameters."""
+"""Initial state of a record from known values and equilibrium conditions, with its derivatives by the parameters."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...analysis.equilibrium import find_equilibrium
 from ...compile.cache.kernel import newton
+from ...compile.function import Function
 from ...core import autodiff, tree
 from ...core.arrays import Array
 from ...core.errors import IdentificationError, ParameterError, suggestion
@@ -17,19 +18,19 @@ from ...core.status import Status
 from ...core.system import System
 from ...plant.plant import Plant
 
-if TYPE_CHECKING:
-    from ...compile.function import Function
-
-NUDGE = 100.0
-"""A little more gauge pressure [Pa], by which states that settle with it are found."""
-_conditions: dict[Any, Function] = {}
+PRESSURE_STEP = 100.0
+"""Increase of gauge pressure [Pa] by which states that depend on the pressure are detected."""
+_compiled_conditions: dict[Any, Function] = {}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class InitialConditions:
-    """Conditions that fix a state: `known` values of states or outputs, states that stand `still`, `equal` outputs.
+    """Conditions that determine an initial state, one for each state; the inputs are zero.
 
-    Together they must be as many as the states; `guess` is where the search for the state begins. Inputs count as zero.
+    known       values of states or outputs [SI]
+    guess       initial guess of every state for Newton's method [SI]
+    stationary  states whose time derivative is zero
+    equal       pairs of outputs that are equal
     """
 
     known: Mapping[str, float]
@@ -39,104 +40,109 @@ class InitialConditions:
 
     @classmethod
     def at_rest(cls, plant: Plant, pressure: float) -> InitialConditions:
-        """A plant of one muscle in equilibrium at a gauge pressure [Pa], its walls and tubes settled."""
+        """Equilibrium of a plant with one muscle at a gauge pressure [Pa], walls and tubes in steady state."""
         speeds = [c.speed for c in plant.mechanism.coordinates]
-        places = [c.name for c in plant.mechanism.coordinates]
+        coordinates = [c.name for c in plant.mechanism.coordinates]
         state = find_equilibrium(plant, pressure=pressure)
-        known, still, equal = _settled(plant, state, pressure, (*speeds, *places))
+        known, stationary, equal = _steady_conditions(plant, state, pressure, (*speeds, *coordinates))
         known |= dict.fromkeys(speeds, 0.0)
-        return cls({"pressure": pressure, **known}, state, (*still, *speeds), equal)
+        return cls({"pressure": pressure, **known}, state, (*stationary, *speeds), equal)
 
     @classmethod
-    def held(cls, plant: Plant, pressure: float, **coordinates: float) -> InitialConditions:
-        """A plant of one muscle at a gauge pressure [Pa], its coordinates known, at rest unless speeds are given.
+    def at_coordinates(cls, plant: Plant, pressure: float, **coordinates: float) -> InitialConditions:
+        """A plant with one muscle at a gauge pressure [Pa] and given coordinates [SI]; speeds are zero unless given.
 
-        Walls and tubes are settled at this pressure, and go with it where it is an unknown.
+        Walls and tubes are in steady state at this pressure, also where it is an unknown.
         """
         state = plant.state_at(pressure=pressure, **coordinates)
-        known, still, equal = _settled(plant, state, pressure)
-        return cls({"pressure": pressure, **known}, state, still, equal)
+        known, stationary, equal = _steady_conditions(plant, state, pressure)
+        return cls({"pressure": pressure, **known}, state, stationary, equal)
 
     def check_plant(self, system: System, values: Mapping[str, Any]) -> None:
-        """Raise ParameterError for a name that the system lacks, or too few or many conditions."""
+        """Raise ParameterError for a name that the system lacks, or where the number of conditions is wrong."""
         names = [s.name for s in system.states]
         for name in (*self.known, *self.stationary, *(n for pair in self.equal for n in pair)):
             if name not in (names if name in self.stationary else values):
                 raise ParameterError(
-                    f"the start names '{name}'; the system has {', '.join(values)}.{suggestion(name, values)}"
+                    f"the initial conditions name '{name}'; the system has {', '.join(values)}."
+                    f"{suggestion(name, values)}"
                 )
         if len(self.known) + len(self.stationary) + len(self.equal) != len(names) or set(self.guess) != set(names):
             raise ParameterError(
-                f"the start must give as many conditions as there are states ({', '.join(names)}), and a guess "
-                f"of each; known are {', '.join(self.known) or 'none'}, still {', '.join(self.stationary) or 'none'}."
+                f"the initial conditions must give as many conditions as there are states ({', '.join(names)}), and a "
+                f"guess of each state; known are {', '.join(self.known) or 'none'}, stationary are "
+                f"{', '.join(self.stationary) or 'none'}."
             )
 
 
-def _settled(
-    plant: Plant, state: Mapping[str, float], pressure: float, left: Sequence[str] = ()
+def _steady_conditions(
+    plant: Plant, state: Mapping[str, float], pressure: float, excluded: Sequence[str] = ()
 ) -> tuple[dict[str, float], tuple[str, ...], tuple[tuple[str, str], ...]]:
-    """How the states besides the air mass are fixed: those that a little more pressure leaves alone are known.
+    """The conditions for the states other than the air mass: known values, stationary states and equal outputs.
 
-    Of the others a tube has the pressure of the muscle, and the rest stands still.
+    A state that does not depend on the pressure is known. Of the others, a tube has the pressure of the muscle, and the
+    remaining ones are stationary.
     """
-    moving = {c.name: state[c.name] for c in plant.mechanism.coordinates}
-    moving |= {c.speed: state[c.speed] for c in plant.mechanism.coordinates}
-    other = plant.state_at(pressure=pressure + NUDGE, **moving)
-    shown = plant.outputs(state, dict.fromkeys(plant.inputs, 0.0))
-    known, still, equal = {}, [], []
+    motion = {c.name: state[c.name] for c in plant.mechanism.coordinates}
+    motion |= {c.speed: state[c.speed] for c in plant.mechanism.coordinates}
+    other = plant.state_at(pressure=pressure + PRESSURE_STEP, **motion)
+    outputs = plant.outputs(state, dict.fromkeys(plant.inputs, 0.0))
+    known, stationary, equal = {}, [], []
     for name, value in state.items():
-        if name == "air_mass" or name in left:
+        if name == "air_mass" or name in excluded:
             continue
         if other[name] == value:
             known[name] = value
-        elif (of_tube := f"{name.removesuffix('air_mass')}pressure") in shown:
-            equal.append((of_tube, "pressure"))
+        elif (tube_pressure := f"{name.removesuffix('air_mass')}pressure") in outputs:
+            equal.append((tube_pressure, "pressure"))
         else:
-            still.append(name)
-    return known, tuple(still), tuple(equal)
+            stationary.append(name)
+    return known, tuple(stationary), tuple(equal)
 
 
-def conditions(system: System, start: InitialConditions) -> Function:
-    """The function (state, leaves) -> (values known and rates to vanish, their slopes by state, by leaf)."""
+def compile_conditions(system: System, initial: InitialConditions) -> Function:
+    """The compiled function (state, leaves) -> (known values and rates, their derivatives by state and by leaf)."""
     import casadi
 
-    from ...compile.function import Function
-
-    key = (tree.structure(system), tuple(start.known), start.stationary, start.equal)
-    if key not in _conditions:
+    key = (tree.structure(system), tuple(initial.known), initial.stationary, initial.equal)
+    if key not in _compiled_conditions:
         model, p = autodiff.symbolic(system)
         x = casadi.SX.sym("x", len(system.states))
         state = {s.name: x[i] for i, s in enumerate(system.states)}
-        shut = dict.fromkeys(system.inputs, 0.0)
-        values = {**model.outputs(state, shut), **state}
-        start.check_plant(system, values)
-        rates = model.rates(state, shut)
+        inputs = dict.fromkeys(system.inputs, 0.0)
+        values = {**model.outputs(state, inputs), **state}
+        initial.check_plant(system, values)
+        rates = model.rates(state, inputs)
         g = casadi.vertcat(
-            *(casadi.SX(values[n]) for n in start.known),
-            *(casadi.SX(rates[n]) for n in start.stationary),
-            *(casadi.SX(values[a] - values[b]) for a, b in start.equal),
+            *(casadi.SX(values[n]) for n in initial.known),
+            *(casadi.SX(rates[n]) for n in initial.stationary),
+            *(casadi.SX(values[a] - values[b]) for a, b in initial.equal),
         )
         outputs = {"values": g, "by_state": casadi.jacobian(g, x), "by_leaf": casadi.jacobian(g, p)}
-        _conditions[key] = Function({"x": x, "leaves": p}, outputs)
-    return _conditions[key]
+        _compiled_conditions[key] = Function({"x": x, "leaves": p}, outputs)
+    return _compiled_conditions[key]
 
 
-def solved(
-    function: Function, start: InitialConditions, leaves: Array, known: Array, guess: Array, sizes: Array
+def solve_initial_state(
+    function: Function, initial: InitialConditions, leaves: Array, known: Array, guess: Array, nominal: Array
 ) -> tuple[Array, Array, Array]:
-    """The state (n,) with these leaves and known values, and its slopes by known value (n, k) and by leaf (n, p).
+    """The initial state (n,) and its derivatives by the known values (n, k) and by the leaves (n, p).
 
-    `function` is that of `conditions`, made once for a structure.
-    Raises IdentificationError where no state meets the conditions.
+    `function` is that of `compile_conditions`, `nominal` (n,) holds the magnitudes of the states. The derivatives
+    follow from the implicit function theorem. Raises IdentificationError where no state satisfies the conditions.
     """
-    n, x, target = guess.size, guess.copy(), np.concatenate([known, np.zeros(len(start.stationary) + len(start.equal))])
-    values, by_state, by_leaf, a, b = np.empty(n), np.empty((n, n)), np.empty((n, leaves.size)), np.zeros((n, n)), np.zeros(n)
-    status = Status(newton(function.address, leaves, target, sizes, x, values, by_state, by_leaf, a, b))
+    n, x = guess.size, guess.copy()
+    target = np.concatenate([known, np.zeros(len(initial.stationary) + len(initial.equal))])
+    values, by_state, by_leaf = np.empty(n), np.empty((n, n)), np.empty((n, leaves.size))
+    workspace = np.zeros((n, n)), np.zeros(n)
+    status = Status(newton(function.address, leaves, target, nominal, x, values, by_state, by_leaf, *workspace))
     if status != Status.DONE:
+        conditions = [f"{name} = {value:.4g}" for name, value in zip(initial.known, known.tolist(), strict=True)]
+        conditions += [f"{name} stationary" for name in initial.stationary]
+        conditions += [f"{a} = {b}" for a, b in initial.equal]
         raise IdentificationError(
-            f"no state meets the start {dict(zip(start.known, known.tolist(), strict=True))} with "
-            f"{', '.join(start.stationary) or 'nothing'} at rest and "
-            f"{', '.join(f'{a} = {b}' for a, b in start.equal) or 'nothing'} equal: {status.message}."
+            f"no state satisfies the initial conditions ({', '.join(conditions)}; SI): {status.message}. Change "
+            "the conditions or the guess."
         )
-    inverse = sizes[:, None] * np.linalg.inv(by_state * sizes)
+    inverse = nominal[:, None] * np.linalg.inv(by_state * nominal)
     return x, inverse[:, : known.size], -inverse @ by_leaf

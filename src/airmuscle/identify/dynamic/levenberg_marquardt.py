@@ -1,11 +1,11 @@
-"""Levenberg-Marquardt within bounds, for residuals whose slopes come with them at little cost.
+"""Levenberg-Marquardt method with bounds, for residuals that are computed together with their Jacobian.
 
-    (N + lambda D^2) s = -g,   N = J^T J, g = J^T r,   D the greatest norms of J's columns so far
+    (N + lambda D^2) s = -g,   N = J^T J, g = J^T r,   D the maximum norms of the columns of J so far
 
-An unknown on its bound, which the descent would push beyond, is held for that step; one that the step would carry
-beyond goes to its bound, and the others are found anew. So it is with how far an unknown may go in one step: one that
-hardly matters yet, and would go far, does not keep the others from going. The damping follows the ratio of actual to
-promised descent.
+An unknown on its bound, with a gradient that points beyond it, is fixed for that step. An unknown that the step would
+move beyond a bound is set to that bound, and the step of the others is computed again. The same holds for the maximum
+change of an unknown in one step: an unknown with little effect so far, and thus a large step, does not shorten the
+steps of the others. The damping follows the ratio of the actual to the predicted reduction.
 
 Reference: Moré, J. J., The Levenberg-Marquardt algorithm: implementation and theory, Lecture Notes in Mathematics 630,
 Springer 1978 (scaling by D); Nielsen, H. B., Damping parameter in Marquardt's method, IMM-REP-1999-05, DTU 1999.
@@ -21,139 +21,147 @@ import numpy as np
 from ...core.arrays import Array
 
 Residuals = Callable[[Array], tuple[Array, Array] | None]
-"""Residuals (R,) and slopes (R, P) at unknowns (P,); None where they cannot be had."""
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-12, 1e30
-FAR, LEAST_FAR = 0.7, 0.25
-"""How far an unknown may go in one step: by this share of itself, or of its scale or bounds where that is more. Chosen:
-far from the optimum a step that promises much leads to plants that cannot be run, or only in tiny steps of time."""
-ENOUGH = 1e-10
-"""A promised relative descent below which the search ends, and likewise a step."""
-NOISE = 1e-5
-"""Share of a sum of squares by which it may jump, as runs of a stated tolerance change the number of their steps;
-chosen. A step that promises less than a tenth of it, and finds the sum greater by no more than it, is taken: the slopes
-still tell where to go, the sum no longer does. It ends the search unless it promises less than half of the last."""
+"""Residuals (R,) and Jacobian (R, P) at unknowns (P,); None where they cannot be computed."""
+INITIAL_DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-3, 1e-12, 1e30
+RELATIVE_STEP_LIMIT, MIN_STEP_LIMIT = 0.7, 0.25
+"""Maximum change of an unknown in one step: this fraction of its value, or of its scale or bounds if that is larger.
+Chosen: far from the optimum a long step leads to plants that cannot be simulated, or only with tiny time steps."""
+TOLERANCE = 1e-10
+"""Predicted relative reduction below which the search ends, and relative step likewise."""
+COST_NOISE = 1e-5
+"""Relative jump of the sum of squares that is caused by the step-size control of the simulation; chosen. A step with a
+predicted reduction below a tenth of it is accepted if the sum of squares increases by no more than it: the Jacobian
+still gives the direction, the sum no longer does. Such a step ends the search unless its predicted reduction is less
+than half of the last one."""
 
 
-class Descent(NamedTuple):
-    """Where a search stands: unknowns, the sum of squares there, and whether it came to its end."""
+class SearchState(NamedTuple):
+    """State of a search: unknowns (P,), sum of squares there, and whether the search has ended."""
 
     x: Array
     cost: float
-    ended: bool
+    finished: bool
 
 
-class _Squares(NamedTuple):
-    """A sum of squares, the normal matrix and half the gradient."""
+class _NormalEquations(NamedTuple):
+    """Sum of squares, normal matrix (P, P) and half the gradient (P,)."""
 
     cost: float
     normal: Array
     gradient: Array
 
 
-def _squared(found: tuple[Array, Array] | None) -> _Squares | None:
-    """None also where residuals or slopes are not finite, or too large to be squared."""
-    if found is None:
+def _normal_equations(evaluated: tuple[Array, Array] | None) -> _NormalEquations | None:
+    """The normal equations; None where residuals or Jacobian are missing, not finite, or overflow when squared."""
+    if evaluated is None:
         return None
-    r, j = found
+    r, j = evaluated
     with np.errstate(over="ignore", invalid="ignore"):
-        squares = _Squares(float(r @ r), j.T @ j, j.T @ r)
-    return squares if squares.cost < np.inf and np.isfinite(squares.normal).all() else None
+        equations = _NormalEquations(float(r @ r), j.T @ j, j.T @ r)
+    return equations if equations.cost < np.inf and np.isfinite(equations.normal).all() else None
 
 
 class LevenbergMarquardt:
-    """A descent from `begin`, which can be left where it stands and taken up again.
+    """A search from one initial guess, which can be interrupted and continued.
 
-    The sum of squares is infinite where the residuals cannot be had at `begin` itself.
+    The sum of squares is infinite where the residuals cannot be computed at the initial guess.
     """
 
-    def __init__(self, residuals: Residuals, begin: Array, low: Array, high: Array) -> None:
+    def __init__(self, residuals: Residuals, start: Array, low: Array, high: Array) -> None:
         self._residuals, self._low, self._high = residuals, low, high
-        self._scale, self._damping, self._growth = np.zeros(begin.size), FIRST_DAMPING, 2.0
-        self._refused, self._promised, self._asked = np.full(begin.size, np.nan), np.inf, 1
-        self.x = np.clip(begin, low, high)
-        found = _squared(residuals(self.x))
-        self.ended = found is None
-        self._take(self.x, found or _Squares(np.inf, np.zeros((begin.size, begin.size)), np.zeros(begin.size)))
+        self._scale, self._damping, self._growth = np.zeros(start.size), INITIAL_DAMPING, 2.0
+        self._rejected_step, self._predicted, self._evaluations = np.full(start.size, np.nan), np.inf, 1
+        self.x = np.clip(start, low, high)
+        equations = _normal_equations(residuals(self.x))
+        self.finished = equations is None
+        self._accept(
+            self.x, equations or _NormalEquations(np.inf, np.zeros((start.size, start.size)), np.zeros(start.size))
+        )
 
-    def run(self, most: int) -> None:
-        """Search until the end, or until residuals were asked for `most` times in all."""
-        while not self.ended and self._asked < most:
+    def run(self, max_evaluations: int) -> None:
+        """Search until convergence, or until the residuals were evaluated `max_evaluations` times in total."""
+        while not self.finished and self._evaluations < max_evaluations:
             self._step()
 
-    def _take(self, x: Array, found: _Squares) -> None:
-        self.x, (self.cost, self._normal, self._gradient) = x, found
+    def _accept(self, x: Array, equations: _NormalEquations) -> None:
+        self.x, (self.cost, self._normal, self._gradient) = x, equations
         self._scale = np.maximum(self._scale, np.sqrt(self._normal.diagonal()))
 
     def _step(self) -> None:
-        step, promised = self._planned()
-        while not (done := self._done(step, promised)) and (not promised > 0 or (step == self._refused).all()):
-            self._damp(step)
-            step, promised = self._planned()
-        self.ended = done
-        if not done:
-            self._try(step, promised)
+        step, predicted = self._propose_step()
+        while not (converged := self._is_converged(step, predicted)) and (
+            not predicted > 0 or (step == self._rejected_step).all()
+        ):
+            self._reject(step)
+            step, predicted = self._propose_step()
+        self.finished = converged
+        if not converged:
+            self._try_step(step, predicted)
 
-    def _try(self, step: Array, promised: float) -> None:
-        """Take a step, or refuse it."""
-        tried, self._asked = _squared(self._residuals(self.x + step)), self._asked + 1
-        new = np.inf if tried is None else tried.cost
-        near = promised <= NOISE / 10 * self.cost and self._damping < 1 and new <= (1 + NOISE) * self.cost
-        if near and new >= self.cost and promised > self._promised / 2:
-            self.ended = True
-        elif tried is not None and (near or new < self.cost):
-            ratio = (self.cost - new) / promised if new < self.cost else 1.0
-            self._take(self.x + step, tried)
-            self._damping = max(self._damping * max(1 / 3, 1 - (2 * ratio - 1) ** 3), LEAST_DAMPING)
-            self._growth, self._promised = 2.0, promised
+    def _try_step(self, step: Array, predicted: float) -> None:
+        """Evaluate a step, and accept or reject it."""
+        tried, self._evaluations = _normal_equations(self._residuals(self.x + step)), self._evaluations + 1
+        cost = np.inf if tried is None else tried.cost
+        within_noise = (
+            predicted <= COST_NOISE / 10 * self.cost and self._damping < 1 and cost <= (1 + COST_NOISE) * self.cost
+        )
+        if within_noise and cost >= self.cost and predicted > self._predicted / 2:
+            self.finished = True
+        elif tried is not None and (within_noise or cost < self.cost):
+            ratio = (self.cost - cost) / predicted if cost < self.cost else 1.0
+            self._accept(self.x + step, tried)
+            self._damping = max(self._damping * max(1 / 3, 1 - (2 * ratio - 1) ** 3), MIN_DAMPING)
+            self._growth, self._predicted = 2.0, predicted
         else:
-            self._damp(step)
+            self._reject(step)
 
-    def _damp(self, refused: Array) -> None:
-        self._damping, self._growth, self._refused = self._damping * self._growth, 2 * self._growth, refused
+    def _reject(self, step: Array) -> None:
+        """Increase the damping, and remember the rejected step."""
+        self._damping, self._growth, self._rejected_step = self._damping * self._growth, 2 * self._growth, step
 
-    def _planned(self) -> tuple[Array, float]:
-        """A step, and the descent that it promises."""
+    def _propose_step(self) -> tuple[Array, float]:
+        """A step, and the predicted reduction of the sum of squares."""
         x, scale = self.x, self._scale
-        reach = np.maximum(FAR * np.abs(x), LEAST_FAR * np.minimum(self._high - self._low, 1.0))
-        low, high = np.maximum(self._low, x - reach), np.minimum(self._high, x + reach)
+        limit = np.maximum(RELATIVE_STEP_LIMIT * np.abs(x), MIN_STEP_LIMIT * np.minimum(self._high - self._low, 1.0))
+        low, high = np.maximum(self._low, x - limit), np.minimum(self._high, x + limit)
         damping = self._damping * np.where(scale > 0, scale, 1.0) ** 2
-        step = step_within(self._normal, self._gradient, damping, x, low, high)
+        step = bounded_step(self._normal, self._gradient, damping, x, low, high)
         return step, -float(step @ (2 * self._gradient + self._normal @ step))
 
-    def _done(self, step: Array, promised: float) -> bool:
-        """Whether a step is none any more, promises too little, or the damping is beyond all bounds."""
-        if (0 <= promised <= ENOUGH * self.cost and self._damping < 1) or not self._damping < MOST_DAMPING:
+    def _is_converged(self, step: Array, predicted: float) -> bool:
+        """Whether the step or its predicted reduction is negligible, or the damping exceeds its maximum."""
+        if (0 <= predicted <= TOLERANCE * self.cost and self._damping < 1) or not self._damping < MAX_DAMPING:
             return True
-        far, at = self._scale * step, self._scale * self.x
-        return bool(far @ far <= ENOUGH**2 * (at @ at))
+        scaled_step, scaled_x = self._scale * step, self._scale * self.x
+        return bool(scaled_step @ scaled_step <= TOLERANCE**2 * (scaled_x @ scaled_x))
 
     @property
-    def found(self) -> Descent:
-        """Where it stands."""
-        return Descent(self.x, self.cost, self.ended)
+    def state(self) -> SearchState:
+        """The present state of the search."""
+        return SearchState(self.x, self.cost, self.finished)
 
 
-def descended(residuals: Residuals, begin: Array, low: Array, high: Array, most: int) -> Descent:
-    """The search for a least sum of squares near `begin`, with residuals asked for at most `most` times."""
-    search = LevenbergMarquardt(residuals, begin, low, high)
-    search.run(most)
-    return search.found
+def minimise(residuals: Residuals, start: Array, low: Array, high: Array, max_evaluations: int) -> SearchState:
+    """Minimise the sum of squares from `start` (P,) with at most `max_evaluations` evaluations of the residuals."""
+    search = LevenbergMarquardt(residuals, start, low, high)
+    search.run(max_evaluations)
+    return search.state
 
 
-def step_within(normal: Array, gradient: Array, damping: Array, x: Array, low: Array, high: Array) -> Array:
-    """The damped step; unknowns that it would carry beyond a bound go to that bound, and the others are found anew."""
-    loose = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
+def bounded_step(normal: Array, gradient: Array, damping: Array, x: Array, low: Array, high: Array) -> Array:
+    """The damped step (P,) from x; unknowns that it would move beyond a bound are set to it, the others recomputed."""
+    free = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
     step, matrix = np.zeros(x.size), normal + np.diag(damping)
-    while loose.any():
-        if loose.all():
+    while free.any():
+        if free.all():
             step[:] = np.linalg.solve(matrix, -gradient)
         else:
-            right, free = gradient + normal @ np.where(loose, 0.0, step), np.flatnonzero(loose)
-            step[free] = np.linalg.solve(matrix[free[:, None], free], -right[free])
-        ahead = x + step
-        beyond = loose & ((ahead < low) | (ahead > high))
+            right, indices = gradient + normal @ np.where(free, 0.0, step), np.flatnonzero(free)
+            step[indices] = np.linalg.solve(matrix[indices[:, None], indices], -right[indices])
+        target = x + step
+        beyond = free & ((target < low) | (target > high))
         if not beyond.any():
             break
-        step[beyond] = (np.clip(ahead, low, high) - x)[beyond]
-        loose &= ~beyond
+        step[beyond] = (np.clip(target, low, high) - x)[beyond]
+        free &= ~beyond
     return step

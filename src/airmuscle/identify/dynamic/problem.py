@@ -1,4 +1,4 @@
-"""DynamicProblem: residuals of all records over the unknowns, and their least squares."""
+"""DynamicFitProblem: residuals of all records as a function of the unknowns, and their minimisation."""
 
 from __future__ import annotations
 
@@ -11,80 +11,88 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError
 from .experiment import Unknown
-from .levenberg_marquardt import LevenbergMarquardt, descended
-from .record_model import MOST_STEPS, RecordModel, stacked
+from .levenberg_marquardt import LevenbergMarquardt, minimise
+from .record_model import MAX_STEPS, RecordModel, stack_residuals
 
-MOST = 200
-"""RunSplit after which any start is left where it stands."""
-
-
-FEW_STEPS, MANY = 10_000, 20
-"""A run is left after so many steps, or so many times those of its search's best run where that is more; chosen."""
+MAX_RUNS = 200
+"""Maximum number of simulations of all records in one search."""
+MIN_STEP_BUDGET, STEP_BUDGET_FACTOR = 10_000, 20
+"""A simulation is aborted after this many steps, or after this many times the steps of the best simulation of its
+search if that is more; chosen."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class DynamicFitProblem:
-    """Residuals over unknowns in units of their scales."""
+    """Residuals as a function of the scaled unknowns (P,)."""
 
-    courses: tuple[RecordModel, ...]
+    record_models: tuple[RecordModel, ...]
     unknowns: tuple[Unknown, ...]
-    deviations: Array
+    sensor_deviations: Array
+    """Standard deviation of the sensor of every observed quantity [SI]."""
 
     @functools.cached_property
     def scales(self) -> Array:
-        """The size of a change of each unknown."""
+        """Magnitude of every unknown [SI], shape (P,)."""
         return np.array([u.scale for u in self.unknowns])
 
     @functools.cached_property
     def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper bounds in units of the scales."""
+        """Lower and upper bounds of the scaled unknowns, shape (P,) each."""
         low, high = np.array([u.low for u in self.unknowns]), np.array([u.high for u in self.unknowns])
         return low / self.scales, high / self.scales
 
     def residuals(self, scaled: Array) -> tuple[Array, Array]:
-        """Residuals (R,) in sensor deviations and their slopes (R, P) by the scaled unknowns."""
-        errors, slopes, _ = self.run(scaled)
-        return errors, slopes
+        """Residuals (R,) in standard deviations of the sensors, and their Jacobian (R, P) by the scaled unknowns."""
+        residuals, jacobian, _ = self.run(scaled)
+        return residuals, jacobian
 
-    def run(self, scaled: Array, most_steps: int = MOST_STEPS) -> tuple[Array, Array, int]:
-        """The same, and the steps of the longest run, which fails beyond `most_steps`."""
-        return stacked(self.courses, scaled * self.scales, self.deviations, self.scales, most_steps)
+    def run(self, scaled: Array, max_steps: int = MAX_STEPS) -> tuple[Array, Array, int]:
+        """Residuals and Jacobian as in `residuals`, and the steps of the longest simulation.
 
-    def solve(self, scaled: Array, held: Sequence[int] = (), most: int = MOST) -> tuple[Array, float]:
-        """The least squares from a start, some unknowns held: unknowns and sum of squares, infinite where it fails."""
-        loose, whole = [k for k in range(scaled.size) if k not in held], scaled.copy()
-        found = descended(*self._asked(scaled, loose), most)
-        whole[loose] = found.x
-        return whole, found.cost
+        Raises SimulationError or IdentificationError where a simulation fails or exceeds `max_steps`.
+        """
+        return stack_residuals(self.record_models, scaled * self.scales, self.sensor_deviations, self.scales, max_steps)
+
+    def solve(self, scaled: Array, fixed: Sequence[int] = (), max_runs: int = MAX_RUNS) -> tuple[Array, float]:
+        """Least squares from an initial guess (P,) with some unknowns fixed, given by index.
+
+        Returns the scaled unknowns and the sum of squares, which is infinite where the initial guess cannot be
+        simulated.
+        """
+        free, solution = [k for k in range(scaled.size) if k not in fixed], scaled.copy()
+        state = minimise(*self._restrict(scaled, free), max_runs)
+        solution[free] = state.x
+        return solution, state.cost
 
     def search(self, scaled: Array) -> LevenbergMarquardt:
-        """The search from a start, which can be left and taken up again."""
-        return LevenbergMarquardt(*self._asked(scaled, range(scaled.size)))
+        """The search from an initial guess (P,), which can be interrupted and continued."""
+        return LevenbergMarquardt(*self._restrict(scaled, range(scaled.size)))
 
-    def _asked(self, scaled: Array, loose: Sequence[int]) -> tuple[_Guarded, Array, Array, Array]:
-        """Residuals over the loose unknowns, their start and their bounds."""
-        (low, high), places = self.bounds, list(loose)
-        return _Guarded(self, scaled, places), scaled[places], low[places], high[places]
+    def _restrict(self, scaled: Array, free: Sequence[int]) -> tuple[_GuardedResiduals, Array, Array, Array]:
+        """Residuals as a function of the free unknowns, their initial guess and their bounds."""
+        (low, high), indices = self.bounds, list(free)
+        return _GuardedResiduals(self, scaled, indices), scaled[indices], low[indices], high[indices]
 
 
-class _Guarded:
-    """Residuals of a problem over some of its unknowns, None where they cannot be had.
+class _GuardedResiduals:
+    """Residuals of a problem as a function of its free unknowns, None where they cannot be computed.
 
-    Nor where a run takes far more steps than the best one so far, which comes of plants far from anything physical.
+    This includes simulations with far more steps than the best one so far, which occur far from physical parameters.
     """
 
-    def __init__(self, problem: DynamicFitProblem, scaled: Array, loose: Sequence[int]) -> None:
-        self._problem, self._scaled, self._loose = problem, scaled, loose
-        self._least, self._most_steps = np.inf, MOST_STEPS
+    def __init__(self, problem: DynamicFitProblem, scaled: Array, free: Sequence[int]) -> None:
+        self._problem, self._scaled, self._free = problem, scaled, free
+        self._min_cost, self._max_steps = np.inf, MAX_STEPS
 
     def __call__(self, x: Array) -> tuple[Array, Array] | None:
-        problem, at = self._problem, self._scaled.copy()
-        at[self._loose] = x
+        problem, scaled = self._problem, self._scaled.copy()
+        scaled[self._free] = x
         try:
-            errors, slopes, steps = problem.run(at, self._most_steps)
+            residuals, jacobian, steps = problem.run(scaled, self._max_steps)
         except AirmuscleError:
             return None
-        cost = float(errors @ errors)
-        if cost < self._least:
-            self._least, self._most_steps = cost, min(MOST_STEPS, max(FEW_STEPS, MANY * steps))
-        return errors, slopes if len(self._loose) == at.size else slopes[:, self._loose]
+        cost = float(residuals @ residuals)
+        if cost < self._min_cost:
+            self._min_cost = cost
+            self._max_steps = min(MAX_STEPS, max(MIN_STEP_BUDGET, STEP_BUDGET_FACTOR * steps))
+        return residuals, jacobian if len(self._free) == scaled.size else jacobian[:, self._free]

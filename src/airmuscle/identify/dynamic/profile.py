@@ -1,80 +1,94 @@
-"""Profile likelihood: an estimate held at other values, all others found anew, and how much worse that fits."""
+"""Profile likelihood of a dynamic fit: minimum sum of squares with one estimate fixed at other values."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
 from ...core.arrays import Array
-from .result import DynamicFit
+from ..result import Estimate
+from .problem import DynamicFitProblem
 
 NORMAL_95 = 1.96
-"""Root of the growth of the sum of squares, in variances of the residuals, at the ends of a 95 % interval."""
-REACH = 4.0
-"""Standard deviations that a profile looks to either side, at most twice its value."""
+"""Square root of the cost increase, in residual variances, at the limits of a 95 % confidence interval."""
+MAX_STANDARD_ERRORS = 4.0
+"""Range of a profile in standard errors to either side, at most twice the estimate."""
 
-BETTER = 0.1
-"""A sum of squares that is less by this says that the fit had not come to its end; chosen."""
+MIN_IMPROVEMENT = 0.1
+"""Reduction of the sum of squares, in residual variances, that shows that the fit was not converged; chosen."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class DynamicProfile:
-    """One estimate's values, rising, and the growth of the sum of squares there, in variances of the residuals."""
+    """Values of one estimate in increasing order, and the increase of the sum of squares in residual variances."""
 
     name: str
     unit: str
     values: Array
-    growth: Array
-    others: Array
-    """The estimates at every value, (M, P)."""
+    cost_increase: Array
+    estimates: Array
+    """All estimates at every value [SI], shape (M, P)."""
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Where the growth passes 1.96 squared; NaN at an end where it does not within the values looked at."""
-        best = int(np.argmin(self.growth))
-        distance = np.sqrt(np.maximum(self.growth - self.growth[best], 0.0))
-        below = self._crossing(self.values[: best + 1][::-1], distance[: best + 1][::-1])
-        return below, self._crossing(self.values[best:], distance[best:])
+        """Limits of the 95 % interval, where the cost increase is 1.96 squared; NaN where it stays below."""
+        best = int(np.argmin(self.cost_increase))
+        distance = np.sqrt(np.maximum(self.cost_increase - self.cost_increase[best], 0.0))
+        below = self._find_crossing(self.values[: best + 1][::-1], distance[: best + 1][::-1])
+        return below, self._find_crossing(self.values[best:], distance[best:])
 
     @staticmethod
-    def _crossing(values: Array, distance: Array) -> float:
-        over = np.flatnonzero(distance > NORMAL_95)
-        if not over.size:
+    def _find_crossing(values: Array, distance: Array) -> float:
+        above = np.flatnonzero(distance > NORMAL_95)
+        if not above.size:
             return float("nan")
-        i = int(over[0])
-        share = (NORMAL_95 - distance[i - 1]) / (distance[i] - distance[i - 1])
-        return float(values[i - 1] + share * (values[i] - values[i - 1]))
+        i = int(above[0])
+        fraction = (NORMAL_95 - distance[i - 1]) / (distance[i] - distance[i - 1])
+        return float(values[i - 1] + fraction * (values[i] - values[i - 1]))
 
     def __str__(self) -> str:
-        low, high = (f"{end:.4g}" if np.isfinite(end) else "open" for end in self.interval)
-        rows = "".join(f"\n  {v:.5g}: {g:.3g}" for v, g in zip(self.values, self.growth, strict=True))
-        better = "\n  a better fit lies on the way: fit again from there" if self.growth.min() < -BETTER else ""
-        return f"{self.name} [{self.unit}], 95 % from {low} to {high}; growth of the sum of squares:{rows}{better}"
+        low, high = (f"{end:.4g}" if np.isfinite(end) else "unbounded" for end in self.interval)
+        rows = "".join(f"\n  {v:.5g}: {c:.3g}" for v, c in zip(self.values, self.cost_increase, strict=True))
+        better = (
+            "\n  a better fit was found on the profile: fit again from there"
+            if self.cost_increase.min() < -MIN_IMPROVEMENT
+            else ""
+        )
+        unit = "" if self.unit == "1" else f" [{self.unit}]"
+        return (
+            f"{self.name}{unit}, 95 % confidence interval {low} to {high}; increase of the sum of squares in residual "
+            f"variances:{rows}{better}"
+        )
 
 
-def profile(fit: DynamicFit, name: str, points: int) -> DynamicProfile:
-    """The profile of one estimate at `points` values to either side, from the optimum outwards."""
-    problem = fit.problem
-    k = [e.name for e in fit.estimates].index(fit[name].name)
-    best = fit.values / problem.scales
-    (low, high), variance = (bound[k] for bound in problem.bounds), max(fit.residual_std, 1e-300) ** 2
-    deviation = fit.estimates[k].stderr / problem.scales[k]
-    span = min(high - low, 2.0 * abs(best[k]) or 1.0)
-    reach = min(REACH * deviation, span) if np.isfinite(deviation) else span
-    rows = [(best[k], fit.costs[0], best)]
+def compute_profile(
+    problem: DynamicFitProblem, estimates: Sequence[Estimate], index: int, cost: float, variance: float, points: int
+) -> DynamicProfile:
+    """The profile of one estimate at `points` values to either side, from the optimum outwards.
+
+    estimates  of the fit, whose sum of squares is `cost` and whose residual variance is `variance`
+    index      of the profiled estimate
+    """
+    best = np.array([e.value for e in estimates]) / problem.scales
+    low, high = (bound[index] for bound in problem.bounds)
+    stderr = estimates[index].stderr / problem.scales[index]
+    span = min(high - low, 2.0 * abs(best[index]) or 1.0)
+    distance = min(MAX_STANDARD_ERRORS * stderr, span) if np.isfinite(stderr) else span
+    rows = [(best[index], cost, best)]
     for side in (-1.0, 1.0):
-        at = best.copy()
+        scaled = best.copy()
         for step in range(1, points + 1):
-            place = best[k] + side * reach * step / points
-            if not low <= place <= high:
+            value = best[index] + side * distance * step / points
+            if not low <= value <= high:
                 break
-            at = at.copy()
-            at[k] = place
-            at, cost = problem.solve(at, held=(k,))
-            rows.append((place, cost, at))
+            scaled = scaled.copy()
+            scaled[index] = value
+            scaled, constrained_cost = problem.solve(scaled, fixed=(index,))
+            rows.append((value, constrained_cost, scaled))
     rows.sort(key=lambda row: row[0])
-    growth = np.array([(cost - fit.costs[0]) / variance for _, cost, _ in rows])
-    values = np.array([place for place, _, _ in rows]) * problem.scales[k]
-    others = np.array([at for _, _, at in rows]) * problem.scales
-    return DynamicProfile(fit.estimates[k].name, fit.estimates[k].unit, values, growth, others)
+    cost_increase = np.array([(constrained_cost - cost) / variance for _, constrained_cost, _ in rows])
+    values = np.array([value for value, _, _ in rows]) * problem.scales[index]
+    all_estimates = np.array([scaled for _, _, scaled in rows]) * problem.scales
+    return DynamicProfile(estimates[index].name, estimates[index].unit, values, cost_increase, all_estimates)

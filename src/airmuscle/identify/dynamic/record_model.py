@@ -1,9 +1,9 @@
-"""One record of a dynamic fit: what the model gives at its rows, and the derivatives by every unknown."""
+"""RecordModel: modelled outputs of one record, with their derivatives by every unknown."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,15 +18,23 @@ from ...core.status import Status
 from ...core.system import System
 from ...simulation.integrators import Integrator
 from ...simulation.sensitivity import WithSensitivities
-from .experiment import Experiment, StartTime, StartValue, Unknown
-from .initial_conditions import conditions, solved
+from .experiment import Experiment, InitialValue, StartTime, Unknown
+from .initial_conditions import compile_conditions, solve_initial_state
 
-MOST_STEPS = 1_000_000
-"""Steps after which a run is given up."""
+MAX_STEPS = 1_000_000
+"""Maximum number of steps of one simulation."""
 
 
 class RecordModel:
-    """The model of one record, compiled once with its sensitivities; `unknowns` are all of the fit."""
+    """The model of one record, compiled once with its sensitivities.
+
+    names                the observed quantities, Q of them
+    times                of the rows on the clock of the recording [s], shape (N,)
+    measured             their measured values [SI], shape (N, Q)
+    valid                mask of the finite measured values, shape (N, Q)
+    unknown_indices      indices of the unknowns of the fit that affect this record
+    sensitivity_indices  those of them that are integrated as sensitivities; a start time is not
+    """
 
     def __init__(
         self, plant: System, experiment: Experiment, number: int, unknowns: Sequence[Unknown],
@@ -34,167 +42,183 @@ class RecordModel:
     ) -> None:  # fmt: skip
         self.plant, self.experiment, self.method = experiment.plant or plant, experiment, method
         self.unknowns = unknowns
-        self.mine = [k for k, u in enumerate(unknowns) if u.record in (None, number)]
-        self.columns = [k for k in self.mine if not isinstance(unknowns[k].what, StartTime)]
+        self.unknown_indices = [k for k, u in enumerate(unknowns) if u.record in (None, number)]
+        self.sensitivity_indices = [k for k in self.unknown_indices if not isinstance(unknowns[k].target, StartTime)]
         self.names = tuple(observed)
-        self.times = _rising(experiment)
+        self.times = _check_times(experiment)
         self.measured = np.column_stack([experiment.recording[name] for name in self.names])
-        self.kept = np.isfinite(self.measured)
-        self.whole = bool(self.kept.all())
-        groups = tuple(unknowns[k].paths for k in self.columns) or ((),)
-        scales = tuple(unknowns[k].scale for k in self.columns) or (1.0,)
-        self.ready = compile_system(_sensitive(self.plant, groups, scales, self.names, experiment))
-        self._nominal = self.ready.nominal
-        place = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.plant))}
-        moved = [(place[path], k) for k in self.mine for path in unknowns[k].paths]
-        self._moved = np.array([i for i, _ in moved], dtype=int), np.array([k for _, k in moved], dtype=int)
+        self.valid = np.isfinite(self.measured)
+        self.all_valid = bool(self.valid.all())
+        groups = tuple(unknowns[k].paths for k in self.sensitivity_indices) or ((),)
+        scales = tuple(unknowns[k].scale for k in self.sensitivity_indices) or (1.0,)
+        self._system = compile_system(_add_sensitivities(self.plant, groups, scales, self.names, experiment))
+        self._nominal = self._system.nominal
+        leaf_index = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.plant))}
+        changed = [(leaf_index[path], k) for k in self.unknown_indices for path in unknowns[k].paths]
+        self._changed = np.array([i for i, _ in changed], dtype=int), np.array([k for _, k in changed], dtype=int)
         self._leaves = tree.flatten(self.plant)
-        self._conditions = conditions(self.plant, experiment.start)
-        self._known = np.array(list(experiment.start.known.values()), dtype=float)
-        self._own_values = [(j, i) for j, k in enumerate(self.columns) for i in _place_known(unknowns[k], experiment)]
-        self._shares = np.zeros((self._leaves.size, len(self.columns)))
-        for j, k in enumerate(self.columns):
-            self._shares[[place[path] for path in unknowns[k].paths], j] = 1.0
-        self._sizes = np.array([s.nominal for s in self.plant.states])
-        self._guess = np.array([experiment.start.guess[s.name] for s in self.plant.states])
-        self._last_clock: _Clock | None = None
+        self._conditions = compile_conditions(self.plant, experiment.initial_conditions)
+        self._known = np.array(list(experiment.initial_conditions.known.values()), dtype=float)
+        self._initial_values = [
+            (j, i) for j, k in enumerate(self.sensitivity_indices) for i in _known_index(unknowns[k], experiment)
+        ]
+        self._leaf_by_column = np.zeros((self._leaves.size, len(self.sensitivity_indices)))
+        for j, k in enumerate(self.sensitivity_indices):
+            self._leaf_by_column[[leaf_index[path] for path in unknowns[k].paths], j] = 1.0
+        self._state_nominal = np.array([s.nominal for s in self.plant.states])
+        self._guess = np.array([experiment.initial_conditions.guess[s.name] for s in self.plant.states])
+        self._last_grid: _TimeGrid | None = None
 
     def leaves(self, values: Array) -> Array:
-        """The plant's leaves with the unknowns at `values`."""
-        found = self._leaves.copy()
-        places, unknowns = self._moved
-        found[places] = values[unknowns]
-        return found
+        """The leaves of the plant with the unknowns at `values` (P,) [SI]."""
+        leaves = self._leaves.copy()
+        indices, unknowns = self._changed
+        leaves[indices] = values[unknowns]
+        return leaves
 
-    def start(self, values: Array) -> tuple[Array, Array]:
-        """The state at the start (n,) and its derivatives by every column (n, K)."""
+    def initial_state(self, values: Array) -> tuple[Array, Array]:
+        """The initial state (n,) and its derivatives by every sensitivity column (n, K)."""
         known = self._known.copy()
-        for j, i in self._own_values:
-            known[i] = values[self.columns[j]]
-        state, by_known, by_leaf = solved(
-            self._conditions, self.experiment.start, self.leaves(values), known, self._guess, self._sizes
+        for j, i in self._initial_values:
+            known[i] = values[self.sensitivity_indices[j]]
+        state, by_known, by_leaf = solve_initial_state(
+            self._conditions,
+            self.experiment.initial_conditions,
+            self.leaves(values),
+            known,
+            self._guess,
+            self._state_nominal,
         )
-        slopes = by_leaf @ self._shares
-        for j, i in self._own_values:
-            slopes[:, j] = by_known[:, i]
-        return state, slopes
+        derivatives = by_leaf @ self._leaf_by_column
+        for j, i in self._initial_values:
+            derivatives[:, j] = by_known[:, i]
+        return state, derivatives
 
     def start_time(self, values: Array) -> float:
-        """Where the run begins on the record's clock [s]."""
-        shifts = [values[k] for k in self.mine if isinstance(self.unknowns[k].what, StartTime)]
-        return float(shifts[0]) if shifts else self.experiment.start_time
+        """The start of the run on the clock of the recording [s]."""
+        times = [values[k] for k in self.unknown_indices if isinstance(self.unknowns[k].target, StartTime)]
+        return float(times[0]) if times else self.experiment.start_time
 
-    def evaluate(self, values: Array, most_steps: int = MOST_STEPS) -> Modelled:
-        """What the model gives at the record's rows.
+    def evaluate(self, values: Array, max_steps: int = MAX_STEPS) -> ModelOutputs:
+        """The modelled outputs at the rows of the record for unknowns at `values` (P,) [SI].
 
-        Raises IdentificationError where the run fails or its start does not exist.
+        Raises IdentificationError where the simulation fails or no initial state exists.
         """
-        outputs, before, steps = self._outputs(values, most_steps)
-        count, columns = len(self.names), self.ready.sizes.outputs // len(self.names) - 2
+        outputs, before_start, steps = self._outputs(values, max_steps)
+        count, columns = len(self.names), self._system.sizes.outputs // len(self.names) - 2
         by_column = outputs[:, count:-count].reshape(-1, count, columns)
-        if len(self.columns) == len(self.unknowns):
-            return Modelled(outputs[:, :count], by_column, steps)
-        slopes = np.zeros((*self.measured.shape, len(self.unknowns)))
-        slopes[:, :, self.columns] = by_column[:, :, : len(self.columns)]
-        for k in self.mine:
-            if isinstance(self.unknowns[k].what, StartTime):
-                slopes[:, :, k] = np.where(before[:, None], 0.0, -outputs[:, -count:])
-        return Modelled(outputs[:, :count], slopes, steps)
+        if len(self.sensitivity_indices) == len(self.unknowns):
+            return ModelOutputs(outputs[:, :count], by_column, steps)
+        jacobian = np.zeros((*self.measured.shape, len(self.unknowns)))
+        jacobian[:, :, self.sensitivity_indices] = by_column[:, :, : len(self.sensitivity_indices)]
+        for k in self.unknown_indices:
+            if isinstance(self.unknowns[k].target, StartTime):
+                jacobian[:, :, k] = np.where(before_start[:, None], 0.0, -outputs[:, -count:])
+        return ModelOutputs(outputs[:, :count], jacobian, steps)
 
-    def _outputs(self, values: Array, most_steps: int) -> tuple[Array, npt.NDArray[np.bool_], int]:
-        state, slopes = self.start(values)
-        clock = self._clock(self.start_time(values))
-        leaves = self.ready.parameters.copy()
+    def _outputs(self, values: Array, max_steps: int) -> tuple[Array, npt.NDArray[np.bool_], int]:
+        """Outputs of the compiled system at the rows, the mask of the rows before the start, and the steps."""
+        state, derivatives = self.initial_state(values)
+        grid = self._time_grid(self.start_time(values))
+        leaves = self._system.parameters.copy()
         leaves[: self._leaves.size] = self.leaves(values)
-        ready = self.ready.at(leaves, self._nominal)
-        full = np.zeros(self._nominal.size)
-        full[: state.size] = state
-        if self.columns:
-            full[state.size :] = slopes.ravel()
-        course = self.method.run(ready, clock.segments, 0.0, full, clock.times, most_steps)
-        if course.status == Status.INTERRUPTED:
+        system = self._system.at(leaves, self._nominal)
+        full_state = np.zeros(self._nominal.size)
+        full_state[: state.size] = state
+        if self.sensitivity_indices:
+            full_state[state.size :] = derivatives.ravel()
+        solution = self.method.run(system, grid.segments, 0.0, full_state, grid.times, max_steps)
+        if solution.status == Status.INTERRUPTED:
             raise KeyboardInterrupt
-        if course.status != Status.DONE:
+        if solution.status != Status.DONE:
             raise IdentificationError(
-                f"{self.experiment.recording.origin}: the run ended early, at {course.time:.4g} s."
+                f"{self.experiment.recording.origin}: the simulation ended early, at {solution.time:.4g} s."
             )
-        results = np.empty((clock.times.size, ready.sizes.outputs))
-        evaluate(ready.address["outputs"], ready.precomputed, course.rows, clock.inputs, results)
-        return results, clock.before, course.steps
+        results = np.empty((grid.times.size, system.sizes.outputs))
+        evaluate(system.address["outputs"], system.precomputed, solution.rows, grid.inputs, results)
+        return results, grid.before_start, solution.steps
 
-    def _clock(self, begin: float) -> _Clock:
-        """The record seen from where the run begins; the last one is kept, as most fits ask for one alone."""
-        known = self._last_clock
-        if known is None or known.begin != begin:
-            clock = self.times - begin
-            times, inputs = np.maximum(clock, 0.0), self.plant.inputs
-            segments = self.experiment.command.segments(inputs, 0.0, max(float(clock[-1]), 1e-9))
-            under = np.ascontiguousarray(segments.inputs_at(times, 0.0))
-            self._last_clock = known = _Clock(begin, times, clock < 0, segments, under)
-        return known
+    def _time_grid(self, start_time: float) -> _TimeGrid:
+        """The rows relative to the start of the run; the last result is kept, as the start time rarely changes."""
+        grid = self._last_grid
+        if grid is None or grid.start_time != start_time:
+            elapsed = self.times - start_time
+            times, inputs = np.maximum(elapsed, 0.0), self.plant.inputs
+            segments = self.experiment.command.segments(inputs, 0.0, max(float(elapsed[-1]), 1e-9))
+            input_values = np.ascontiguousarray(segments.inputs_at(times, 0.0))
+            self._last_grid = grid = _TimeGrid(start_time, times, elapsed < 0, segments, input_values)
+        return grid
 
 
-class Modelled(NamedTuple):
-    """What the model gives at the rows (N, Q), its derivatives by all unknowns (N, Q, P), and the steps of the run."""
+class ModelOutputs(NamedTuple):
+    """Modelled outputs (N, Q), their derivatives by all unknowns (N, Q, P), and the steps of the simulation."""
 
     values: Array
-    slopes: Array
+    jacobian: Array
     steps: int
 
 
-class _Clock(NamedTuple):
-    """Rows of a record counted from the start of the run, and the command there."""
+class _TimeGrid(NamedTuple):
+    """The rows of a record relative to the start of the run, with the inputs there."""
 
-    begin: float
+    start_time: float
     times: Array
-    before: npt.NDArray[np.bool_]
+    before_start: npt.NDArray[np.bool_]
     segments: PiecewiseLinear
     inputs: Array
 
 
-def _place_known(unknown: Unknown, experiment: Experiment) -> list[int]:
-    """Where among the start's known values an unknown stands, if it is one of them."""
-    known, what = list(experiment.start.known), unknown.what
-    return [known.index(what.name)] if isinstance(what, StartValue) else []
+def _known_index(unknown: Unknown, experiment: Experiment) -> list[int]:
+    """The index of an unknown among the known initial values; empty if it is none of them."""
+    known, target = list(experiment.initial_conditions.known), unknown.target
+    return [known.index(target.name)] if isinstance(target, InitialValue) else []
 
 
-def _rising(experiment: Experiment) -> Array:
-    times = experiment.recording["time"]
+def _check_times(experiment: Experiment) -> Array:
+    """The times of a record [s]. Raises IdentificationError where they decrease or there are none."""
+    times, origin = experiment.recording["time"], experiment.recording.origin
     bad = np.flatnonzero(~(np.diff(times) >= 0))
-    if bad.size or not times.size:
-        where = f"row {bad[0] + 2} stands at {times[bad[0] + 1]:g} s" if bad.size else "it has no rows"
-        raise IdentificationError(f"{experiment.recording.origin}: time must rise; {where}. Mend or cut the record.")
+    if bad.size:
+        raise IdentificationError(
+            f"{origin}: time must not decrease, but row {bad[0] + 2} is at {times[bad[0] + 1]:g} s. Correct the record "
+            "or use a part of it."
+        )
+    if not times.size:
+        raise IdentificationError(f"{origin}: the record has no rows. Give another one, or use a longer part of it.")
     return times
 
 
-def _sensitive(
+def _add_sensitivities(
     plant: System, groups: tuple[tuple[str, ...], ...], scales: tuple[float, ...], names: tuple[str, ...],
     experiment: Experiment,
 ) -> WithSensitivities:  # fmt: skip
+    """The plant with sensitivity states; errors name the recording."""
     try:
         return WithSensitivities(plant, groups, scales, names)
     except ParameterError as error:
         raise ParameterError(f"{experiment.recording.origin}: {error}") from None
 
 
-def stacked(
-    courses: Sequence[RecordModel], values: Array, deviations: Array, scales: Array, most_steps: int = MOST_STEPS
+def stack_residuals(
+    models: Sequence[RecordModel], values: Array, deviations: Array, scales: Array, max_steps: int = MAX_STEPS
 ) -> tuple[Array, Array, int]:
-    """Residuals (R,) in standard deviations, model less measured, rows without a reading left out.
+    """Residuals (model - measured) in standard deviations (R,), missing values omitted, for unknowns at `values` (P,).
 
-    And their slopes (R, P) by the unknowns in units of their scales, and the steps of the longest run.
+    Also the Jacobian (R, P) by the scaled unknowns, and the steps of the longest simulation.
     """
-    errors, slopes, longest = [], [], 0
-    for course in courses:
-        modelled, by, steps = course.evaluate(values, most_steps)
-        error, by = (modelled - course.measured) / deviations, by * (scales / deviations[:, None])
-        whole, longest = course.whole, max(longest, steps)
-        errors.append(error.ravel() if whole else error[course.kept])
-        slopes.append(by.reshape(-1, scales.size) if whole else by[course.kept])
-    joined = (errors[0], slopes[0]) if len(errors) == 1 else (np.concatenate(errors), np.concatenate(slopes))
-    return *joined, longest
+    residuals, jacobians, longest = [], [], 0
+    for model in models:
+        modelled, jacobian, steps = model.evaluate(values, max_steps)
+        residual = (modelled - model.measured) / deviations
+        jacobian = jacobian * (scales / deviations[:, None])
+        longest = max(longest, steps)
+        residuals.append(residual.ravel() if model.all_valid else residual[model.valid])
+        jacobians.append(jacobian.reshape(-1, scales.size) if model.all_valid else jacobian[model.valid])
+    if len(models) == 1:
+        return residuals[0], jacobians[0], longest
+    return np.concatenate(residuals), np.concatenate(jacobians), longest
 
 
-def observations(courses: Sequence[RecordModel]) -> Any:
-    """How many readings take part."""
-    return sum(int(course.kept.sum()) for course in courses)
+def count_readings(models: Sequence[RecordModel]) -> int:
+    """The number of finite measured values."""
+    return sum(int(model.valid.sum()) for model in models)

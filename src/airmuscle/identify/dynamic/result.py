@@ -1,9 +1,8 @@
-"""What a dynamic fit returns: the numbers found, how sure they are, how well the records are met, what stays open."""
+"""DynamicFit: estimates, standard errors, goodness of fit and undetermined combinations of parameters."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,100 +11,96 @@ from ...core import tree
 from ...core.arrays import Array
 from ...core.errors import ParameterError, suggestion
 from ...recording import Recording
-from ..result import Estimate
+from ..identifiability import Identifiability
+from ..result import Estimate, estimate_table
 from .experiment import Unknown
-from .identifiability import Identifiability
-
-if TYPE_CHECKING:
-    from .problem import DynamicFitProblem
-    from .profile import DynamicProfile
+from .problem import DynamicFitProblem
+from .profile import DynamicProfile, compute_profile
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class DynamicFit:
-    """Parameters of a plant found from records of its motion; `print` it."""
+    """Plant parameters estimated from transient records; `print` it."""
 
     problem: DynamicFitProblem
     estimates: tuple[Estimate, ...]
     correlations: Array
-    """Of the estimates, in their order, shape (P, P)."""
+    """Correlation matrix of the estimates, in their order, shape (P, P)."""
     identifiability: Identifiability
     residual_std: float
-    """Standard deviation of the residuals in units of the sensors' deviations, N - P in the denominator."""
+    """Standard deviation of the residuals relative to the sensors, with N - P degrees of freedom."""
     costs: Array
-    """Sum of squared residuals that every start came to, least first; infinite where a start failed."""
+    """Sums of squared residuals of the searches, lowest first; infinite where an initial guess failed."""
     notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
-        """An estimate by its name: `circuit.fill.conductance`, `start time of record 2`."""
+        """An estimate by its name, for example `circuit.fill.conductance` or `start time of record 2`.
+
+        Raises ParameterError.
+        """
         for estimate in self.estimates:
             if estimate.name == name:
                 return estimate
         names = [e.name for e in self.estimates]
-        raise ParameterError(f"the fit has no '{name}'; there are {', '.join(names)}.{suggestion(name, names)}")
+        raise ParameterError(f"the fit has no unknown '{name}'; it has {', '.join(names)}.{suggestion(name, names)}")
 
     @property
     def values(self) -> Array:
+        """Estimated values [SI], shape (P,)."""
         return np.array([e.value for e in self.estimates])
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
+        """The unknowns of the fit, in the order of the estimates."""
         return self.problem.unknowns
 
     @property
-    def reached(self) -> int:
-        """How many starts came to the best sum of squares, within a thousandth."""
+    def starts_at_optimum(self) -> int:
+        """Number of searches that reached the lowest sum of squares, within 0.1 %."""
         return int(np.count_nonzero(self.costs <= 1.001 * self.costs[0] + 1e-9))
 
     def plant(self, record: int = 0) -> System:
-        """The plant of one record with what was found put in."""
-        course = self.problem.courses[record]
-        return tree.with_parameters(course.plant, [float(v) for v in course.leaves(self.values)])
+        """The plant of one record with the estimated parameters."""
+        model = self.problem.record_models[record]
+        return tree.with_parameters(model.plant, [float(v) for v in model.leaves(self.values)])
 
     def modelled(self, record: int = 0) -> Recording:
-        """What the fitted plant gives at the rows of one record."""
-        course = self.problem.courses[record]
-        values = course.evaluate(self.values).values
-        columns = {name: values[:, i] for i, name in enumerate(course.names)}
-        return Recording({"time": course.times, **columns}, f"fit to {course.experiment.recording.origin}")
+        """The observed quantities of the fitted plant at the rows of one record [SI]."""
+        model = self.problem.record_models[record]
+        values = model.evaluate(self.values).values
+        columns = {name: values[:, i] for i, name in enumerate(model.names)}
+        return Recording({"time": model.times, **columns}, f"fit to {model.experiment.recording.origin}")
 
     def residuals(self, record: int = 0) -> Recording:
-        """Model less measured at the rows of one record."""
-        course, model = self.problem.courses[record], self.modelled(record)
-        errors = {name: model[name] - course.experiment.recording[name] for name in course.names}
-        return Recording({"time": course.times, **errors}, f"residuals of {course.experiment.recording.origin}")
+        """Residuals (model - measured) at the rows of one record [SI]."""
+        model, modelled = self.problem.record_models[record], self.modelled(record)
+        measured = model.experiment.recording
+        differences = {name: modelled[name] - measured[name] for name in model.names}
+        return Recording({"time": model.times, **differences}, f"residuals of {measured.origin}")
 
     def rms(self, name: str, record: int = 0) -> float:
-        """Root mean square of an observed quantity's residuals in one record, in its own unit."""
+        """Root mean square residual of an observed quantity in one record [SI]."""
         return float(np.sqrt(np.nanmean(self.residuals(record)[name] ** 2)))
 
     def profile(self, name: str, points: int = 9) -> DynamicProfile:
-        """How the sum of squares grows as one estimate is held at other values and all others are found anew."""
-        from .profile import profile
-
-        return profile(self, name, points)
+        """The profile likelihood of one estimate at `points` values to either side; all others are fitted again."""
+        index = [e.name for e in self.estimates].index(self[name].name)
+        variance = max(self.residual_std, 1e-300) ** 2
+        return compute_profile(self.problem, self.estimates, index, self.costs[0], variance, points)
 
     def __str__(self) -> str:
-        rows = [("parameter", "", "value", "2 sd", "unit", "meaning")]
-        rows += [(e.name, e.label, f"{e.value:.6g}", _twice(e), e.unit, e.meaning) for e in self.estimates]
-        widths = [max(len(row[i]) for row in rows) for i in range(5)]
-        table = ["  ".join([*(c.ljust(w) for c, w in zip(row, widths, strict=False)), row[5]]).rstrip() for row in rows]
-        return "\n".join([*table, "", *self._figures(), *(f"note: {note}" for note in self.notes)])
+        notes = (f"note: {note}" for note in self.notes)
+        return "\n".join([*estimate_table(self.estimates), "", *self._summary_lines(), *notes])
 
-    def _figures(self) -> list[str]:
+    def _summary_lines(self) -> list[str]:
         lines = []
-        for i, course in enumerate(self.problem.courses):
-            parts = ", ".join(f"{name} {self.rms(name, i):.4g}" for name in course.names)
-            lines.append(f"record {i + 1}, {course.experiment.recording.origin}: rms {parts} (SI)")
-        found = self.identifiability
+        for i, model in enumerate(self.problem.record_models):
+            rms = ", ".join(f"{name} {self.rms(name, i):.4g}" for name in model.names)
+            lines.append(f"record {i + 1}, {model.experiment.recording.origin}: rms residual {rms} (SI)")
+        analysis = self.identifiability
         lines.append(
-            f"residuals {self.residual_std:.3g} sensor deviations; rank {found.rank} of {found.singular.size} off bounds"
+            f"residual std {self.residual_std:.3g} times that of the sensors; rank {analysis.rank} of "
+            f"{analysis.singular_values.size} unknowns that are not on a bound"
         )
-        lines.append(f"{self.reached} of {self.costs.size} starts came to the same optimum")
+        lines.append(f"{self.starts_at_optimum} of {self.costs.size} searches reached this optimum")
         return lines
-
-
-def _twice(estimate: Estimate) -> Any:
-    if estimate.on_bound:
-        return "on bound"
-    return f"{2 * estimate.stderr:.3g}" if np.isfinite(estimate.stderr) else "unknown"

@@ -1,4 +1,4 @@
-"""Where the pressure of a fill was sensed: in the muscle or before it, as the residuals of two descriptions say."""
+"""Location of the pressure sensor in a fill, by comparing two models."""
 
 from __future__ import annotations
 
@@ -9,58 +9,63 @@ import numpy as np
 from ...core.errors import IdentificationError
 from .result import DynamicFit
 
-NOTABLE = 0.02
-"""Share of the rise of the pressure beyond which residuals say that a description cannot be right; chosen."""
-BETTER = 2.0
-"""Ratio of residuals at which one description counts as better than another; chosen."""
+MIN_RELATIVE_RESIDUAL = 0.02
+"""Rms residual relative to the pressure rise above which a model is rejected; chosen."""
+MIN_RESIDUAL_RATIO = 2.0
+"""Ratio of rms residuals above which one model is better than another; chosen."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Sensing:
-    """What a fill says about its sensor: residuals of two descriptions [Pa], and how far the pressure rose [Pa]."""
+class SensorLocation:
+    """Rms residuals [Pa] of two models of one fill, and the pressure rise [Pa], from which the location follows."""
 
-    inside: float
-    """Rms that a muscle whose volume grows with its pressure leaves, sensed inside."""
-    before: float
-    """Rms that a line and a muscle leave, sensed in the line."""
-    rise: float
-
-    @property
-    def before_muscle(self) -> bool:
-        """Whether it looks sensed before the muscle: a growing volume fails, and a line explains it."""
-        return self.line_better and self.inside > NOTABLE * self.rise
+    rms_in_muscle: float
+    """Rms residual of a muscle with a growing volume, with the sensor in the muscle."""
+    rms_in_line: float
+    """Rms residual of a line and a muscle, with the sensor in the line."""
+    pressure_rise: float
 
     @property
-    def line_better(self) -> bool:
-        """Whether line and muscle leave less than half of what the growing volume leaves."""
-        return self.before * BETTER < self.inside
+    def is_upstream(self) -> bool:
+        """Whether the sensor is probably upstream of the muscle: the model with the line fits, the other does not."""
+        return self.line_fits_better and self.rms_in_muscle > MIN_RELATIVE_RESIDUAL * self.pressure_rise
+
+    @property
+    def line_fits_better(self) -> bool:
+        """Whether the rms residual with the line is less than half of that with the growing volume."""
+        return self.rms_in_line * MIN_RESIDUAL_RATIO < self.rms_in_muscle
 
     def __str__(self) -> str:
         rms = (
-            f"one growing volume leaves {self.inside / 1e3:.2f} kPa rms ({self.inside / self.rise:.1%} of the rise), "
-            f"line and muscle {self.before / 1e3:.2f} kPa"
+            f"rms residual {self.rms_in_muscle / 1e3:.2f} kPa for a growing volume with the sensor in the muscle "
+            f"({self.rms_in_muscle / self.pressure_rise:.1%} of the pressure rise), "
+            f"{self.rms_in_line / 1e3:.2f} kPa for a line and a muscle"
         )
-        if self.before_muscle:
-            return f"looks sensed before the muscle: {rms}"
-        if self.line_better:
+        if self.is_upstream:
+            return f"the sensor is probably upstream of the muscle: {rms}"
+        if self.line_fits_better:
             return (
-                f"may be sensed before the muscle: {rms}; another law of growth might do as well. Record the length, "
-                "or the pressure at both ends of the line"
+                f"the sensor may be upstream of the muscle: {rms}; another model of the volume may fit as well. Record "
+                "the length, or the pressure at both ends of the line"
             )
-        return f"does not tell where it was sensed: {rms}"
+        return f"the record does not determine the location of the sensor: {rms}"
 
 
-def where_sensed(*, inside: DynamicFit, before: DynamicFit) -> Sensing:
-    """Where the pressure of one fill was sensed, by two fits of it: one sensed in the muscle, one in the line.
+def locate_pressure_sensor(*, in_muscle: DynamicFit, in_line: DynamicFit) -> SensorLocation:
+    """Locate the pressure sensor of one fill by two fits of it: sensor in the muscle, and sensor in the line.
 
-    Both within physical bounds: a valve of b = 0.9 or a muscle that grows tenfold would imitate a line.
-    Raises IdentificationError where a fit is of another number of records than one, or of other rows.
+    Both fits need physical bounds, because a valve with b = 0.9 or a muscle that grows tenfold would imitate a line.
+    Raises IdentificationError where a fit is not of one pressure in one record, or the rows differ.
     """
-    for fit in (inside, before):
-        if len(fit.problem.courses) != 1 or len(fit.problem.courses[0].names) != 1:
-            raise IdentificationError("where_sensed compares two fits of the pressure of one record.")
-    rows, others = (fit.problem.courses[0].measured[:, 0] for fit in (inside, before))
+    for fit in (in_muscle, in_line):
+        if len(fit.problem.record_models) != 1 or len(fit.problem.record_models[0].names) != 1:
+            raise IdentificationError(
+                "locate_pressure_sensor compares two fits of one record with one observed pressure."
+            )
+    rows, others = (fit.problem.record_models[0].measured[:, 0] for fit in (in_muscle, in_line))
     if not np.array_equal(rows, others):
-        raise IdentificationError("where_sensed compares two fits of the same record; these have different rows.")
-    residuals = [fit.rms(fit.problem.courses[0].names[0]) for fit in (inside, before)]
-    return Sensing(residuals[0], residuals[1], float(np.ptp(rows)))
+        raise IdentificationError(
+            "locate_pressure_sensor compares two fits of the same record, but these have different rows."
+        )
+    rms = [fit.rms(fit.problem.record_models[0].names[0]) for fit in (in_muscle, in_line)]
+    return SensorLocation(rms[0], rms[1], float(np.ptp(rows)))

@@ -1,25 +1,32 @@
-"""Friction and creep from loops, with a verdict whether the data justify them."""
+"""Identification of friction and creep from hysteresis loops, with tests whether the data justify them."""
 
 from .creep import Creep, fit_creep
-from .fit import Given, OnContraction, OnPressure, PolynomialCurve, candidates, fit_hysteresis
+from .fit import (
+    ContractionPath,
+    FixedCharacteristic,
+    PolynomialCurve,
+    PressurePath,
+    fit_hysteresis,
+    initial_friction_laws,
+)
 from .holds import Hold, find_holds
 from .loops import HysteresisLoop, LoopFit, find_loops, fit_loop
 from .result import HysteresisFit
 
 __all__ = [
+    "ContractionPath",
     "Creep",
-    "Given",
+    "FixedCharacteristic",
     "Hold",
     "HysteresisFit",
     "HysteresisLoop",
     "LoopFit",
-    "OnContraction",
-    "OnPressure",
     "PolynomialCurve",
-    "candidates",
+    "PressurePath",
     "find_holds",
     "find_loops",
     "fit_creep",
     "fit_hysteresis",
     "fit_loop",
+    "initial_friction_laws",
 ]

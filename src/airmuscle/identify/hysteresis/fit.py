@@ -19,105 +19,113 @@ from ...core.tree import Leaf
 from ...friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, PrandtlIshlinskii
 from ...recording import Recording
 from ...recording.segment import motion_direction
-from .result import MILLIMETRES, Axis, HysteresisFit, LoopSeries, judged
+from .result import HysteresisFit, assess_fit
+from .series import MILLIMETRES, Axis, LoopSeries
 
-Mask = npt.NDArray[np.bool_]
+RowMask = npt.NDArray[np.bool_]
 
 
-class Slide(abc.ABC):
-    """What rubs: how far the friction has slid in each row of a recording."""
+class FrictionPath(abc.ABC):
+    """The displacement along which the friction slides, as a function of the recorded columns."""
 
     @abc.abstractmethod
-    def path(self, recording: Recording) -> Array:
-        """Displacement [m] by row, shape (N,)."""
+    def displacement(self, recording: Recording) -> Array:
+        """Displacement [m] at every row, shape (N,)."""
 
     @property
     def axis(self) -> Axis:
-        """What figures draw instead of metres."""
+        """The axis of figures."""
         return MILLIMETRES
 
 
 @model
-class OnContraction(Slide):
-    """x = eps L0: friction against shortening, which loops at constant pressure or load show."""
+class ContractionPath(FrictionPath):
+    """x = eps L0: friction against shortening, visible in loops at constant pressure or load."""
 
-    def path(self, recording: Recording) -> Array:
+    def displacement(self, recording: Recording) -> Array:
         return np.asarray(recording["contraction"] * _resting_length(recording))
 
 
 @model
-class OnPressure(Slide):
-    """x = c p: friction of threads that shift as the pressure rises, which a muscle held at one length shows.
+class PressurePath(FrictionPath):
+    """x = c p: friction of braid threads that shift with pressure, visible in a muscle at constant length.
 
-    Only k_i c, a force by pressure, is determined; c is chosen, 1 mm for each 100 kPa, so that the laws keep their
-    units. Such a friction describes isometric loops and does not enter a plant.
+    Only k_i c, a force by pressure, is determined; c is chosen as 1 mm for each 100 kPa, so that the friction laws keep
+    their units. Such a friction describes isometric loops only and cannot be part of a plant.
     """
 
-    travel_per_pressure: float = parameter(
+    displacement_per_pressure: float = parameter(
         "m/Pa", "c", "displacement of the threads by pressure", bounds=(1e-12, 1e-3), fitted=False, default=1e-8
     )
 
-    def path(self, recording: Recording) -> Array:
-        return self.travel_per_pressure * recording["pressure"]
+    def displacement(self, recording: Recording) -> Array:
+        return self.displacement_per_pressure * recording["pressure"]
 
     @property
     def axis(self) -> Axis:
-        return Axis("gauge pressure [kPa]", 1e-3 / self.travel_per_pressure)
+        return Axis("gauge pressure [kPa]", 1e-3 / self.displacement_per_pressure)
 
 
 class StaticCurve(abc.ABC):
-    """The force without friction: a known part, and columns whose coefficients are found along with the friction."""
+    """The force without friction: a known part, and columns whose coefficients are fitted with the friction."""
 
     @abc.abstractmethod
-    def known(self, recording: Recording) -> Array:
-        """Force [N] by row that is not fitted."""
+    def known_force(self, recording: Recording) -> Array:
+        """The known part of the force [N] at every row, shape (N,)."""
 
     @abc.abstractmethod
-    def columns(self, recording: Recording) -> Array:
-        """Shape (N, coefficients)."""
+    def design_matrix(self, recording: Recording) -> Array:
+        """The columns whose coefficients are fitted, shape (N, coefficients)."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Given(StaticCurve):
-    """A characteristic that stands, and a constant offset of the force beside it."""
+class FixedCharacteristic(StaticCurve):
+    """A known characteristic with a fitted constant offset of the force."""
 
     characteristic: Characteristic
 
-    def known(self, recording: Recording) -> Array:
+    def known_force(self, recording: Recording) -> Array:
         return np.asarray(self.characteristic.force(recording["pressure"], recording["contraction"]), dtype=float)
 
-    def columns(self, recording: Recording) -> Array:
+    def design_matrix(self, recording: Recording) -> Array:
         return np.ones((len(recording), 1))
 
 
 @dataclasses.dataclass(frozen=True)
 class PolynomialCurve(StaticCurve):
-    """A polynomial in one column, `pressure` in isometric runs and `contraction` in isobaric ones."""
+    """A fitted polynomial in one column: `pressure` in isometric runs, `contraction` in isobaric runs."""
 
     column: str
     degree: int = 3
 
-    def known(self, recording: Recording) -> Array:
+    def known_force(self, recording: Recording) -> Array:
         return np.zeros(len(recording))
 
-    def columns(self, recording: Recording) -> Array:
-        scale = 1e5 if self.column == "pressure" else 0.1  # coefficients of one size, whatever the run
+    def design_matrix(self, recording: Recording) -> Array:
+        scale = 1e5 if self.column == "pressure" else 0.1  # so that the coefficients have similar magnitudes
         return np.vander(recording[self.column] / scale, self.degree + 1)
 
 
-def candidates(path: Array, force: Array, elements: int = 8) -> tuple[Friction, ...]:
-    """A start for every friction law, sized by a path [m] and the forces [N] along it."""
-    reach, size = float(np.ptp(path)), max(float(np.std(force)), 1e-3)
-    if not reach > 0:
-        raise IdentificationError("the path does not move, so that nothing rubs; give a run that goes up and down.")
-    limits = tuple(reach * np.geomspace(0.01, 0.7, elements))
-    stiffness, even = 10 * size / reach, (size / elements / reach,) * elements
+def initial_friction_laws(path: Array, force: Array, elements: int = 8) -> tuple[Friction, ...]:
+    """Every friction law with initial parameters, scaled by a path [m] and the forces [N] along it.
+
+    `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii. Raises IdentificationError for a constant
+    path.
+    """
+    stroke, amplitude = float(np.ptp(path)), max(float(np.std(force)), 1e-3)
+    if not stroke > 0:
+        raise IdentificationError(
+            "the displacement of the friction is constant, so it cannot be identified. Give a run with a rising and a "
+            "falling branch."
+        )
+    limits = tuple(stroke * np.geomspace(0.01, 0.7, elements))
+    stiffness, equal = 10 * amplitude / stroke, (amplitude / elements / stroke,) * elements
     return (
-        Dahl(stiffness, size),
-        LuGre(stiffness, size, 0.2 * size, reach / 5.0),
-        BoucWen(stiffness, size, 1.5, 0.6),
-        MaxwellSlip(even, limits),
-        PrandtlIshlinskii(even, limits, (0.1 * size, -0.1 * size), (0.0, 0.0)),
+        Dahl(stiffness, amplitude),
+        LuGre(stiffness, amplitude, 0.2 * amplitude, stroke / 5.0),
+        BoucWen(stiffness, amplitude, 1.5, 0.6),
+        MaxwellSlip(equal, limits),
+        PrandtlIshlinskii(equal, limits, (0.1 * amplitude, -0.1 * amplitude), (0.0, 0.0)),
     )
 
 
@@ -125,80 +133,88 @@ def fit_hysteresis(
     friction: Friction,
     recording: Recording,
     *,
-    static: StaticCurve,
-    slide: Slide = OnContraction(),
-    chosen: Mask | None = None,
-    repeat: tuple[Recording, Mask | None] | None = None,
+    static_curve: StaticCurve,
+    friction_path: FrictionPath = ContractionPath(),
+    fitted_rows: RowMask | None = None,
+    repeat: tuple[Recording, RowMask | None] | None = None,
 ) -> HysteresisFit:
-    """The friction that explains what a static curve leaves of a loop, and whether the data justify it.
+    """Fit a friction law to the difference between a loop and its static curve, and test whether the data justify it.
 
-    `friction` gives the law and its start; see `candidates`. The path is followed through every row from the first,
-    where the bristles are relaxed; errors count in the `chosen` rows, the quasi-static ones where the muscle pulls.
-    Coefficients of `static` are found together with the friction, and once more without it, for a fair comparison.
-    `repeat` is a second run of the same loop with its chosen rows: it gives the floor of repeatability, and a judge.
-    Raises IdentificationError where there are too few rows or the path does not move.
+    friction       the law with its initial parameters, see `initial_friction_laws`
+    static_curve   the force without friction; its coefficients are fitted with the friction, and once more without it
+                   for a fair comparison
+    friction_path  the displacement along which the friction slides
+    fitted_rows    mask of the rows whose residuals are minimised: quasi-static rows with a positive force. The path
+                   includes all rows from the first, where the bristles are relaxed
+    repeat         a second run of the same loop with its mask, for the repeatability and the error on other data
+
+    Raises IdentificationError where there are too few rows or the path is constant.
     """
-    run = course(recording, static, slide, chosen)
+    run = make_loop_series(recording, static_curve, friction_path, fitted_rows)
     free = [leaf for leaf in tree.leaves(friction) if leaf.declared.fitted]
-    if run.rows.sum() <= len(free) + run.columns.shape[1] + 2 or not np.ptp(run.path) > 0:
+    if run.fitted_rows.sum() <= len(free) + run.design_matrix.shape[1] + 2 or not np.ptp(run.path) > 0:
         raise IdentificationError(
-            f"{recording.origin}: {int(run.rows.sum())} chosen rows along a path of {np.ptp(run.path):.3g} m cannot "
-            f"determine {len(free)} parameters of {type(friction).__name__} and {run.columns.shape[1]} of the static "
-            "curve. Give a run that goes up and down, or choose more rows."
+            f"{recording.origin}: {int(run.fitted_rows.sum())} fitted rows along a path of {np.ptp(run.path):.3g} m "
+            f"cannot determine {len(free)} parameters of {type(friction).__name__} and {run.design_matrix.shape[1]} of "
+            "the static curve. Give a run with a rising and a falling branch, or include more rows."
         )
-    found = _linear(friction, run) if friction.linear_in else _searched(friction, run)
-    other = course(repeat[0], static, slide, repeat[1]) if repeat else None
-    return judged(found, len(free), run, other)
+    fitted = _fit_stiffnesses(friction, run) if friction.linear_in else _fit_iteratively(friction, run)
+    second_run = make_loop_series(repeat[0], static_curve, friction_path, repeat[1]) if repeat else None
+    return assess_fit(fitted, len(free), run, second_run)
 
 
-def course(recording: Recording, static: StaticCurve, slide: Slide, chosen: Mask | None) -> LoopSeries:
-    """A run as a fit of friction sees it."""
-    goal = recording["force"] - static.known(recording)
-    rows = np.isfinite(goal) if chosen is None else np.asarray(chosen, dtype=bool) & np.isfinite(goal)
+def make_loop_series(
+    recording: Recording, static_curve: StaticCurve, friction_path: FrictionPath, fitted_rows: RowMask | None
+) -> LoopSeries:
+    """The arrays of a run for a fit of friction."""
+    target = recording["force"] - static_curve.known_force(recording)
+    finite = np.isfinite(target)
+    rows = finite if fitted_rows is None else np.asarray(fitted_rows, dtype=bool) & finite
     time = recording.columns.get("time")
-    path = slide.path(recording)
-    way = motion_direction(path, time)
-    return LoopSeries(recording.origin, path, time, goal, static.columns(recording), rows, way, slide.axis)
+    path = friction_path.displacement(recording)
+    matrix = static_curve.design_matrix(recording)
+    direction = motion_direction(path, time)
+    return LoopSeries(recording.origin, path, time, target, matrix, rows, direction, friction_path.axis)
 
 
-def _linear(friction: Any, run: LoopSeries) -> Friction:
-    """Stiffnesses of elements with given limits: least squares without a search, none of them negative."""
+def _fit_stiffnesses(friction: Any, run: LoopSeries) -> Friction:
+    """Stiffnesses of elements with given limits, by non-negative linear least squares."""
     from scipy.optimize import lsq_linear
 
-    terms = friction.terms(run.path)[run.rows]
-    weight = np.linalg.norm(terms, axis=0)
-    weight = np.where(weight > 0, weight, 1.0)
-    design = np.hstack([run.columns[run.rows], -terms / weight])
-    lowest = np.concatenate([np.full(run.columns.shape[1], -np.inf), np.zeros(terms.shape[1])])
-    solved = lsq_linear(design, run.goal[run.rows], (lowest, np.inf), method="bvls")
-    stiffnesses = np.maximum(solved.x[run.columns.shape[1] :], 0.0) / weight
-    changed: Friction = dataclasses.replace(friction, **{friction.linear_in: tuple(stiffnesses)})
-    return changed
+    terms = friction.element_deflections(run.path)[run.fitted_rows]
+    norms = np.linalg.norm(terms, axis=0)
+    norms = np.where(norms > 0, norms, 1.0)
+    matrix = np.hstack([run.design_matrix[run.fitted_rows], -terms / norms])
+    lower = np.concatenate([np.full(run.design_matrix.shape[1], -np.inf), np.zeros(terms.shape[1])])
+    result = lsq_linear(matrix, run.target[run.fitted_rows], (lower, np.inf), method="bvls")
+    stiffnesses = np.maximum(result.x[run.design_matrix.shape[1] :], 0.0) / norms
+    fitted: Friction = dataclasses.replace(friction, **{friction.linear_in: tuple(stiffnesses)})
+    return fitted
 
 
-def _searched(friction: Friction, run: LoopSeries) -> Friction:
-    """Least squares over the free parameters; the static curve is solved for at every step."""
+def _fit_iteratively(friction: Friction, run: LoopSeries) -> Friction:
+    """Nonlinear least squares over the free parameters; the static curve is solved for at every evaluation."""
     from scipy.optimize import least_squares
 
     all_leaves = list(tree.leaves(friction))
     free = [i for i, leaf in enumerate(all_leaves) if leaf.declared.fitted]
-    scales = [_Scale.of(all_leaves[i]) for i in free]
+    coordinates = [_SearchCoordinate.from_leaf(all_leaves[i]) for i in free]
 
     def law(x: Sequence[float]) -> Friction:
         values = [leaf.value for leaf in all_leaves]
-        for i, scale, coordinate in zip(free, scales, x, strict=True):
-            values[i] = scale.value(float(coordinate))
+        for i, coordinate, value in zip(free, coordinates, x, strict=True):
+            values[i] = coordinate.parameter_value(float(value))
         return tree.unflatten(friction, values)
 
-    start = [s.start for s in scales]
-    bounds = ([s.low for s in scales], [s.high for s in scales])
-    solved = least_squares(lambda x: run.remainder(law(x)), start, bounds=bounds, x_scale=1.0, max_nfev=60)
-    return tree.with_parameters(friction, [leaf.value for leaf in tree.leaves(law(solved.x))])
+    start = [c.start for c in coordinates]
+    bounds = ([c.low for c in coordinates], [c.high for c in coordinates])
+    result = least_squares(lambda x: run.fitted_residuals(law(x)), start, bounds=bounds, x_scale=1.0, max_nfev=60)
+    return tree.with_parameters(friction, [leaf.value for leaf in tree.leaves(law(result.x))])
 
 
 @dataclasses.dataclass(frozen=True)
-class _Scale:
-    """A parameter as the search sees it: its logarithm where it is positive throughout, else by its size."""
+class _SearchCoordinate:
+    """A parameter as a search coordinate: its logarithm if its lower bound is positive, else scaled by its size."""
 
     start: float
     low: float
@@ -206,15 +222,15 @@ class _Scale:
     size: float
 
     @classmethod
-    def of(cls, leaf: Leaf) -> _Scale:
+    def from_leaf(cls, leaf: Leaf) -> _SearchCoordinate:
         low, high = leaf.declared.bounds
         if low > 0:
             return cls(float(np.log(leaf.value)), float(np.log(low)), float(np.log(high)), 0.0)
         size = abs(leaf.value) or 1.0
         return cls(leaf.value / size, low / size, high / size, size)
 
-    def value(self, coordinate: float) -> float:
-        """The parameter for a coordinate of the search."""
+    def parameter_value(self, coordinate: float) -> float:
+        """The parameter for a value of the coordinate."""
         return coordinate * self.size if self.size else float(np.exp(coordinate))
 
 

@@ -1,4 +1,4 @@
-"""Holds: stretches in which pressure and load, or pressure and length, stay, so that what moves is creep."""
+"""Holds: intervals of constant pressure and load, or constant pressure and length, in which the muscle creeps."""
 
 from __future__ import annotations
 
@@ -10,39 +10,44 @@ import numpy as np
 from ...core.arrays import Array
 from ...recording import Recording
 from ...recording.segment import Interval, find_plateaus
-from ...recording.segment.runs import BAND
-from ...recording.segment.sensor import noise_of
-from ...recording.segment.stretch import level_stretches
+from ...recording.segment.interval import level_intervals
+from ...recording.segment.runs import RELATIVE_BAND
+from ...recording.segment.sensor import estimate_noise
 
-FEWEST = 12
-"""Rows that a fit of creep needs."""
-STILL = 5e-4
-"""Contraction within which a frame holds the length (chosen)."""
+MIN_ROWS = 12
+"""Minimum number of rows for a fit of creep."""
+LENGTH_TOLERANCE = 5e-4
+"""Range of contraction within which the length counts as constant (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Hold:
-    """Rows of a hold, and which quantity creeps in it: the contraction under a load, the force at a length."""
+    """The rows of a hold, and the quantity that creeps: contraction under a load, force at a constant length."""
 
-    stretch: Interval
+    interval: Interval
     quantity: str
 
 
 def find_holds(recording: Recording) -> Iterator[Hold]:
-    """The holds of a recording among its plateaus of pressure; none without time."""
+    """The holds among the pressure plateaus of a recording; none without a time column."""
     force, contraction = recording["force"], recording["contraction"]
     for plateau in find_plateaus(recording):
-        if len(plateau.stretch) >= FEWEST and np.ptp(force[plateau.stretch.rows]) <= BAND * np.abs(force).max():
-            yield Hold(plateau.stretch, "contraction")
+        if (
+            len(plateau.interval) >= MIN_ROWS
+            and np.ptp(force[plateau.interval.rows]) <= RELATIVE_BAND * np.abs(force).max()
+        ):
+            yield Hold(plateau.interval, "contraction")
             continue
-        for level in level_stretches(contraction, STILL, within=plateau.stretch):
-            still = _arrived(contraction, level)
-            if len(still) >= FEWEST:
-                yield Hold(still, "force")
+        for level in level_intervals(contraction, LENGTH_TOLERANCE, within=plateau.interval):
+            interval = _trim_to_level(contraction, level)
+            if len(interval) >= MIN_ROWS:
+                yield Hold(interval, "force")
 
 
-def _arrived(values: Array, level: Interval) -> Interval:
-    """The stretch without the rows on the way to its level and away from it."""
+def _trim_to_level(values: Array, level: Interval) -> Interval:
+    """The interval without the transitions to and from its level."""
     inside = values[level.rows]
-    near = np.flatnonzero(np.abs(inside - np.median(inside)) <= max(STILL / 10.0, 4.0 * noise_of(inside)))
+    near = np.flatnonzero(
+        np.abs(inside - np.median(inside)) <= max(LENGTH_TOLERANCE / 10.0, 4.0 * estimate_noise(inside))
+    )
     return Interval(level.start + int(near[0]), level.start + int(near[-1]) + 1) if near.size else Interval(0, 0)

@@ -1,4 +1,4 @@
-"""Loops in recordings: what kind each is, which rows count, which runs repeat it, and the friction that explains it."""
+"""Hysteresis loops in recordings: kind, fitted rows and repeated runs, and the fit of all friction laws to a loop."""
 
 from __future__ import annotations
 
@@ -20,47 +20,47 @@ from ...recording.segment import (
     motion_direction,
     quasi_static_rows,
 )
-from ...recording.segment.runs import BAND, STROKE
+from ...recording.segment.runs import CONTRACTION_BAND, RELATIVE_BAND
 from .fit import (
-    Given,
-    Mask,
-    OnContraction,
-    OnPressure,
+    ContractionPath,
+    FixedCharacteristic,
+    FrictionPath,
     PolynomialCurve,
-    Slide,
+    PressurePath,
+    RowMask,
     StaticCurve,
-    candidates,
-    course,
     fit_hysteresis,
+    initial_friction_laws,
+    make_loop_series,
 )
 from .result import HysteresisFit
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class HysteresisLoop:
-    """One run that goes up and down: what is held, what rubs, the curve without friction, and the rows that count."""
+    """One run with a rising and a falling branch, the path of the friction, the static curve and the fitted rows."""
 
     recording: Recording
     run: Run
-    slide: Slide
-    static: StaticCurve
-    chosen: Mask
-    repeat: tuple[Recording, Mask] | None = None
-    """Another run of the same kind at the same level, which judges."""
+    friction_path: FrictionPath
+    static_curve: StaticCurve
+    fitted_rows: RowMask
+    repeat: tuple[Recording, RowMask] | None = None
+    """A second run of the same kind at the same level, for validation, and its fitted rows."""
 
     @property
-    def in_words(self) -> str:
-        """`isobaric at 300 kPa`, as the recording shows it."""
-        if self.run.column is None or self.run.value is None:
+    def description(self) -> str:
+        """Kind and level of the run, for example `isobaric at 300 kPa`."""
+        if self.run.constant_column is None or self.run.constant_value is None:
             return self.run.kind.name
-        shown = {"pressure": f"{self.run.value / 1e3:.4g} kPa", "force": f"{self.run.value:.4g} N",
-                 "contraction": f"{self.run.value:.2%}"}  # fmt: skip
-        return f"{self.run.kind.name} at {shown.get(self.run.column, f'{self.run.value:.4g} m')}"
+        levels = {"pressure": f"{self.run.constant_value / 1e3:.4g} kPa", "force": f"{self.run.constant_value:.4g} N",
+                  "contraction": f"{self.run.constant_value:.2%}"}  # fmt: skip
+        return f"{self.run.kind.name} at {levels.get(self.run.constant_column, f'{self.run.constant_value:.4g} m')}"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LoopFit:
-    """All friction laws on one loop, the most telling first, and those that could not be fitted, with the reason."""
+    """The friction laws fitted to one loop, lowest AICc first, and the reasons why others could not be fitted."""
 
     loop: HysteresisLoop
     fits: tuple[HysteresisFit, ...]
@@ -68,13 +68,13 @@ class LoopFit:
 
     @property
     def recommended(self) -> HysteresisFit | None:
-        """The law with the least AICc among those that the data justify; None where they justify none."""
+        """The law with the lowest AICc among those that the data justify, or None."""
         return next((fit for fit in self.fits if fit.justified), None)
 
     @property
-    def enters_a_plant(self) -> bool:
-        """Whether what rubs is the muscle's motion: friction on the pressure describes isometric loops only."""
-        return isinstance(self.loop.slide, OnContraction)
+    def usable_in_plant(self) -> bool:
+        """Whether the friction acts along the contraction; friction along pressure describes isometric loops only."""
+        return isinstance(self.loop.friction_path, ContractionPath)
 
 
 def find_loops(
@@ -84,83 +84,108 @@ def find_loops(
     degree: int = 3,
     all_rows: bool = False,
 ) -> tuple[HysteresisLoop, ...]:
-    """The loops in recordings, one for each kind and level; a second run at a level is the judge of the first.
+    """The loops in recordings, one for each kind and level; a second run at a level validates the first.
 
-    The curve without friction is a polynomial in what is swept, found along with the friction, or the
-    `characteristic` with an offset. Rows count where the muscle pulls, no sensor is cut off and, unless `all_rows`,
-    pressure and length are quiet. Raises IdentificationError for a run that does not come back, or is neither
-    isobaric nor isometric while no characteristic is given.
+    The static curve is a polynomial of `degree` in the swept quantity, fitted with the friction, or `characteristic`
+    with an offset. The fitted rows have a positive force below the limit of the sensor and, unless `all_rows`, are
+    quasi-static. Raises IdentificationError for a run without two branches, or for one that is neither isobaric nor
+    isometric without a characteristic.
     """
-    sensed, found = estimate_sensors(recordings), list[HysteresisLoop]()
+    sensors, loops = estimate_sensors(recordings), list[HysteresisLoop]()
     for recording in recordings:
-        loop = _loop(recording, sensed, characteristic, degree, all_rows)
-        twin = next((i for i, other in enumerate(found) if _same(other.run, loop.run)), None)
-        if twin is None:
-            found.append(loop)
-        elif found[twin].repeat is None:
-            found[twin] = dataclasses.replace(found[twin], repeat=(recording, loop.chosen))
-    return tuple(found)
+        loop = _make_loop(recording, sensors, characteristic, degree, all_rows)
+        same = next((i for i, other in enumerate(loops) if _is_same_level(other.run, loop.run)), None)
+        if same is None:
+            loops.append(loop)
+        elif loops[same].repeat is None:
+            loops[same] = dataclasses.replace(loops[same], repeat=(recording, loop.fitted_rows))
+    return tuple(loops)
 
 
-def _loop(
-    recording: Recording, sensed: Mapping[str, Sensor], law: Characteristic | None, degree: int, all_rows: bool
+def _make_loop(
+    recording: Recording, sensors: Mapping[str, Sensor], law: Characteristic | None, degree: int, all_rows: bool
 ) -> HysteresisLoop:
-    longest = max(find_runs(recording, sensed), key=lambda run: len(run.stretch))
-    slide: Slide = OnPressure() if longest.kind is ISOMETRIC else OnContraction()
+    longest = max(find_runs(recording, sensors), key=lambda run: len(run.interval))
+    friction_path: FrictionPath = PressurePath() if longest.kind is ISOMETRIC else ContractionPath()
     if law is not None:
-        static: StaticCurve = Given(law)
+        static_curve: StaticCurve = FixedCharacteristic(law)
     elif longest.kind in (ISOBARIC, ISOMETRIC):
-        static = PolynomialCurve("contraction" if longest.kind is ISOBARIC else "pressure", degree)
+        static_curve = PolynomialCurve("contraction" if longest.kind is ISOBARIC else "pressure", degree)
     else:
         raise IdentificationError(
-            f"{recording.origin}: the run is {longest.kind.name}, so that pressure and contraction move together and "
-            "no curve in one of them stands for the muscle without friction. Give its characteristic."
+            f"{recording.origin}: the run is {longest.kind.name}, so pressure and contraction change together and the "
+            "static curve cannot be a polynomial in one of them. Give its characteristic."
         )
-    chosen = _counting(recording, sensed, all_rows)
-    _check_two_directions(recording, motion_direction(slide.path(recording), recording.columns.get("time")), chosen)
-    return HysteresisLoop(recording, longest, slide, static, chosen)
+    rows = _select_rows(recording, sensors, all_rows)
+    direction = motion_direction(friction_path.displacement(recording), recording.columns.get("time"))
+    _check_two_directions(recording, direction, rows)
+    return HysteresisLoop(recording, longest, friction_path, static_curve, rows)
 
 
-def _counting(recording: Recording, sensed: Mapping[str, Sensor], all_rows: bool) -> Mask:
+def _select_rows(recording: Recording, sensors: Mapping[str, Sensor], all_rows: bool) -> RowMask:
     force = recording["force"]
-    pulls = (force > 0) & np.isfinite(force)
-    if "force" in sensed:
-        pulls &= sensed["force"].sides(force) == 0
-    return pulls if all_rows else pulls & quasi_static_rows(recording, sensed)
+    rows = (force > 0) & np.isfinite(force)
+    if "force" in sensors:
+        rows &= sensors["force"].censoring(force) == 0
+    return rows if all_rows else rows & quasi_static_rows(recording, sensors)
 
 
-def _check_two_directions(recording: Recording, way: np.ndarray, chosen: Mask) -> None:
-    for direction, word in ((1, "rises"), (-1, "falls")):
-        rows, counting = np.count_nonzero(way == direction), np.count_nonzero((way == direction) & chosen)
-        if not counting:
-            less = f", and of the {rows} rows where it does none counts (quiet, pulling, not cut off)" if rows else ""
+def _check_two_directions(recording: Recording, direction: np.ndarray, fitted_rows: RowMask) -> None:
+    for sign, branch in ((1, "rising"), (-1, "falling")):
+        rows, fitted = np.count_nonzero(direction == sign), np.count_nonzero((direction == sign) & fitted_rows)
+        if not fitted:
+            detail = (
+                f" ({rows} rows of it are excluded, because they are not quasi-static, have no force, or are saturated)"
+                if rows
+                else ""
+            )
             raise IdentificationError(
-                f"{recording.origin}: no branch along which the path {word}{less}: a loop goes up and down. Give a run "
-                "that does, slower where its rows are not quiet, or let all rows count."
+                f"{recording.origin}: the {branch} branch has no rows to fit{detail}, but a loop needs a rising and a "
+                "falling branch. Give such a run, run it more slowly where its rows are not quasi-static, or set "
+                "all_rows=True."
             )
 
 
-def _same(one: Run, other: Run) -> bool:
-    """Whether two runs hold the same quantity at the same level, as closely as one run holds it."""
-    if one.kind is not other.kind or one.column != other.column or one.value is None or other.value is None:
+def _is_same_level(one: Run, other: Run) -> bool:
+    """Whether two runs have the same constant quantity and level, within the tolerance of one run."""
+    if (
+        one.kind is not other.kind
+        or one.constant_column != other.constant_column
+        or one.constant_value is None
+        or other.constant_value is None
+    ):
         return False
-    band = STROKE if one.column == "contraction" else BAND * max(abs(one.value), abs(other.value))
-    return abs(one.value - other.value) <= band
+    band = (
+        CONTRACTION_BAND
+        if one.constant_column == "contraction"
+        else RELATIVE_BAND * max(abs(one.constant_value), abs(other.constant_value))
+    )
+    return abs(one.constant_value - other.constant_value) <= band
 
 
 def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str], None] | None = None) -> LoopFit:
-    """Every friction law fitted to a loop, by AICc. `progress` is called with the name of each law."""
-    plain = course(loop.recording, loop.static, loop.slide, loop.chosen)
+    """Fit every friction law to a loop and sort the fits by AICc.
+
+    `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii; `progress` is called with the name of
+    each law.
+    """
+    series = make_loop_series(loop.recording, loop.static_curve, loop.friction_path, loop.fitted_rows)
     fits, failed = list[HysteresisFit](), dict[str, str]()
-    for start in candidates(plain.path[loop.chosen], plain.remainder(None), elements):
-        name = type(start).__name__
+    for initial in initial_friction_laws(series.path[loop.fitted_rows], series.fitted_residuals(None), elements):
+        name = type(initial).__name__
         if progress is not None:
             progress(name)
         try:
-            fits.append(
-                fit_hysteresis(start, loop.recording, static=loop.static, slide=loop.slide, chosen=loop.chosen,
-                               repeat=loop.repeat)
-            )  # fmt: skip
+            fit = fit_hysteresis(
+                initial,
+                loop.recording,
+                static_curve=loop.static_curve,
+                friction_path=loop.friction_path,
+                fitted_rows=loop.fitted_rows,
+                repeat=loop.repeat,
+            )
         except IdentificationError as error:
             failed[name] = str(error)
-    return LoopFit(loop, tuple(sorted(fits, key=lambda fit: -fit.aicc_gain)), failed)
+        else:
+            fits.append(fit)
+    return LoopFit(loop, tuple(sorted(fits, key=lambda fit: -fit.aicc_reduction)), failed)

@@ -1,66 +1,72 @@
-"""Figures of loops: a friction law with its inner loops, and a fit beside its data."""
+"""Figures of hysteresis: a friction law with its inner loops, and a fit with its residuals."""
 
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...core.arrays import Array
 from ...core.plotting import DASHES, LINES, legend_below, new_figure
 from ...friction import Friction
-from .result import MILLIMETRES, Axis
+from .series import MILLIMETRES, Axis, LoopSeries
 
-if TYPE_CHECKING:
-    from .result import HysteresisFit
-
-TURNS = (2.0, -2.0, -0.6, -1.1, -0.6, 0.5, -0.3, 0.5, 2.0)
-"""Turning points of the path of `plot_loops`, as multiples of the law's travel (chosen)."""
-INNER = ((3, 5), (6, 8))
-"""Which of the ways between them are inner loops."""
-ROWS = 200
-"""Rows of each way."""
+TURNING_POINTS = (2.0, -2.0, -0.6, -1.1, -0.6, 0.5, -0.3, 0.5, 2.0)
+"""Turning points of the path of `plot_loops`, as multiples of the presliding distance of the law (chosen)."""
+INNER_LOOPS = ((3, 5), (6, 8))
+"""Legs of the path that form the inner loops, first and last plus one."""
+ROWS_PER_LEG = 200
+"""Rows between two turning points."""
 
 
-def winding(travel: float) -> Array:
-    """A path [m] from rest around an outer loop, with two inner loops on its way up."""
-    legs = [np.linspace(a, b, ROWS, endpoint=False) for a, b in itertools.pairwise((0.0, *TURNS))]
-    return travel * np.concatenate([*legs, [TURNS[-1]]])
+def loop_path(distance: float) -> Array:
+    """A path [m] from rest around an outer loop with two inner loops, scaled by a distance [m]."""
+    turning_points = itertools.pairwise((0.0, *TURNING_POINTS))
+    legs = [np.linspace(a, b, ROWS_PER_LEG, endpoint=False) for a, b in turning_points]
+    return distance * np.concatenate([*legs, [TURNING_POINTS[-1]]])
 
 
 def plot_loops(friction: Friction, axis: Axis = MILLIMETRES) -> Any:
-    """Force over displacement of a friction law: from rest, around the outer loop, through two inner ones."""
-    path = winding(friction.presliding_distance or 1e-3)
+    """Friction force over displacement: from rest, around the outer loop, through two inner loops.
+
+    Returns a Matplotlib figure.
+    """
+    path = loop_path(friction.presliding_distance or 1e-3)
     force = friction.force_along(path)
-    parts = [("outer loop", ROWS, len(path)), ("from rest", 0, ROWS + 1)]
-    parts += [("inner loops" if i == 0 else "", a * ROWS, b * ROWS + 1) for i, (a, b) in enumerate(INNER)]
+    parts = [("outer loop", ROWS_PER_LEG, len(path)), ("from rest", 0, ROWS_PER_LEG + 1)]
+    parts += [
+        ("inner loops" if i == 0 else "", a * ROWS_PER_LEG, b * ROWS_PER_LEG + 1)
+        for i, (a, b) in enumerate(INNER_LOOPS)
+    ]
     outer = force.copy()
-    for a, b in INNER:
-        outer[a * ROWS + 1 : b * ROWS] = np.nan
+    for a, b in INNER_LOOPS:
+        outer[a * ROWS_PER_LEG + 1 : b * ROWS_PER_LEG] = np.nan
     figure, axes = new_figure(width=5.6, height=3.9)
     for (name, first, last), style in zip(parts, (0, 1, 2, 2), strict=True):
         rows, label = slice(first, last), name or None
-        shown = force if style else outer
-        axes.plot(path[rows] * axis.factor, shown[rows], color=LINES[style], linestyle=DASHES[style], label=label)
+        values = force if style else outer
+        axes.plot(path[rows] * axis.factor, values[rows], color=LINES[style], linestyle=DASHES[style], label=label)
     axes.set(xlabel=axis.label, ylabel="friction [N]", title=type(friction).__name__)
     legend_below(figure, axes, 3)
     return figure
 
 
-def plot_hysteresis(fit: HysteresisFit) -> Any:
-    """What the static curve leaves of the force over the path, with the fitted friction; and the errors."""
-    run = fit.course
-    left = run.goal - run.columns @ fit.coefficients
+def plot_hysteresis(series: LoopSeries, friction: Friction, coefficients: Array, title: str) -> Any:
+    """Measured force minus static curve over the path, with the friction force; and the residuals below.
+
+    `coefficients` are those of the static curve. Returns a Matplotlib figure.
+    """
+    measured = series.target - series.design_matrix @ coefficients
     figure, (upper, lower) = new_figure(2, 1, width=6.0, height=5.6, sharex=True)
-    path = run.path * run.axis.factor
-    force = -fit.friction.force_along(run.path, run.time)
-    upper.plot(path[run.rows], left[run.rows], "o", color=LINES[0], alpha=0.5, label="measured, less static curve")
-    upper.plot(path, force, color=LINES[1], label=f"{type(fit.friction).__name__}, along the whole path")
+    path, rows = series.path * series.axis.factor, series.fitted_rows
+    force = -friction.force_along(series.path, series.time)
+    upper.plot(path[rows], measured[rows], "o", color=LINES[0], alpha=0.5, label="measured - static curve")
+    upper.plot(path, force, color=LINES[1], label=f"{type(friction).__name__}, whole path")
     upper.set_ylabel("force [N]")
-    lower.plot(path[run.rows], (left - force)[run.rows], "o", color=LINES[0], alpha=0.5)
+    lower.plot(path[rows], (measured - force)[rows], "o", color=LINES[0], alpha=0.5)
     lower.axhline(0.0, color=LINES[1])
-    lower.set(xlabel=run.axis.label, ylabel="measured less modelled [N]")
-    upper.set_title(f"{run.origin}: rms {fit.plain_rmse:.3g} N without, {fit.rmse:.3g} N with friction")
+    lower.set(xlabel=series.axis.label, ylabel="residual (measured - model) [N]")
+    upper.set_title(title)
     legend_below(figure, upper, 2)
     return figure

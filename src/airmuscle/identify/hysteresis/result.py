@@ -1,4 +1,4 @@
-"""A fitted friction: how much of a loop it explains, and whether the data justify it."""
+"""HysteresisFit: fitted friction, reduction of the error, and the tests whether the data justify it."""
 
 from __future__ import annotations
 
@@ -6,87 +6,49 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...core.tree import leaves
 from ...friction import Friction
+from ..model_evidence import aicc, effective_sample_size, f_test_p_value, format_p_value
 from . import branches
-from .evidence import aicc, effective_rows, f_test
+from .plot import plot_hysteresis
+from .series import LoopSeries
 
-RARE = 0.01
-"""Probability below which an F test counts (chosen)."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Axis:
-    """How a path [m] is drawn: what the axis says, and its unit in one metre."""
-
-    label: str
-    factor: float
-
-
-MILLIMETRES = Axis("displacement [mm]", 1e3)
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class LoopSeries:
-    """One run as the fit sees it: the path, the force that the static columns and the friction shall explain."""
-
-    origin: str
-    path: Array
-    time: Array | None
-    goal: Array
-    columns: Array
-    rows: npt.NDArray[np.bool_]
-    """Where errors count."""
-    direction: Array
-    """1 where the path rises, -1 where it falls."""
-    axis: Axis = MILLIMETRES
-
-    def coefficients(self, friction: Friction | None) -> Array:
-        """Of the static columns, best beside this friction, or without any."""
-        goal = self.goal if friction is None else self.goal + friction.force_along(self.path, self.time)
-        return np.asarray(np.linalg.lstsq(self.columns[self.rows], goal[self.rows], rcond=None)[0])
-
-    def errors(self, friction: Friction | None, coefficients: Array) -> Array:
-        """Measured less modelled force [N], every row."""
-        missing = self.goal - self.columns @ coefficients
-        return missing if friction is None else missing + friction.force_along(self.path, self.time)
-
-    def remainder(self, friction: Friction | None) -> Array:
-        """Errors of the chosen rows, with the best static coefficients."""
-        return self.errors(friction, self.coefficients(friction))[self.rows]
+SIGNIFICANCE_LEVEL = 0.01
+"""p-value below which an F test is significant (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class HysteresisFit:
-    """A friction law fitted to a loop, against the same static curve without friction; forces in N.
+    """A friction law fitted to a loop, compared with the same static curve without friction; forces in N.
 
-    `gap` is the rms distance of the deflating from the inflating branch, `gap_left` what the friction leaves of it.
-    `repeat_rmse` and `plain_repeat_rmse` are errors on a second run, with this friction and without any, where the
-    static coefficients are found anew (the level of runs may shift); `repeatability` is the scatter of one run about
-    the mean of the two, the floor below which a fit follows chance. All three are NaN without a second run.
+    `gap` is the rms difference of the falling and the rising branch, `residual_gap` the part that the friction does not
+    explain. `repeat_rmse` and `repeat_rmse_without_friction` are the errors on a second run, where only the static
+    coefficients are fitted again, because the level may shift between runs. `repeatability` is the standard deviation
+    of one run about the mean of the two; an error below it means overfitting. These three are NaN without a second run.
     """
 
     friction: Friction
     coefficients: Array
+    """Coefficients of the static curve."""
     rmse: float
-    plain_rmse: float
+    rmse_without_friction: float
     gap: float
-    gap_left: float
-    effective_rows: float
-    aicc_gain: float
-    chance: float
-    """Probability that idle parameters would do as well (F test)."""
+    residual_gap: float
+    effective_sample_size: float
+    aicc_reduction: float
+    """AICc without friction minus AICc with friction; positive where the friction is the better model."""
+    p_value: float
+    """p-value of the F test of the friction parameters."""
     repeat_rmse: float
-    plain_repeat_rmse: float
+    repeat_rmse_without_friction: float
     repeatability: float
-    course: LoopSeries
+    series: LoopSeries
 
     @property
-    def unsettled(self) -> tuple[str, ...]:
-        """Parameters that the search drove to the end of what is allowed: the data do not determine them."""
+    def undetermined(self) -> tuple[str, ...]:
+        """Paths of the parameters that the search moved to a bound: the data do not determine them."""
         free = [leaf for leaf in leaves(self.friction) if leaf.declared.fitted and leaf.declared.bounds[0] > 0]
         return tuple(
             leaf.path
@@ -96,79 +58,79 @@ class HysteresisFit:
 
     @property
     def justified(self) -> bool:
-        """Whether AICc, the F test and, where there is one, the second run agree that there is friction."""
-        carries_over = not self.repeat_rmse >= self.plain_repeat_rmse
-        return self.aicc_gain > 0 and self.chance < RARE and carries_over
+        """Whether AICc, the F test and, if there is one, the second run all favour the friction."""
+        confirmed = not self.repeat_rmse >= self.repeat_rmse_without_friction
+        return self.aicc_reduction > 0 and self.p_value < SIGNIFICANCE_LEVEL and confirmed
 
     @property
     def verdict(self) -> str:
-        """Whether the data justify this friction, in words with the numbers."""
-        name = type(self.friction).__name__
+        """Whether the data justify this friction, as sentences with the numbers."""
         text = (
-            f"{name} lowers the rms error from {self.plain_rmse:.3g} to {self.rmse:.3g} N and {self._gaps}. AICc "
-            f"{'falls' if self.aicc_gain > 0 else 'rises'} by {abs(self.aicc_gain):.4g} over {self.effective_rows:.0f} "
-            f"independent rows; idle parameters would do as well with a probability "
-            f"{'below 1e-300' if self.chance < 1e-300 else f'of {self.chance:.2g}'}."
+            f"{type(self.friction).__name__} reduces the rms error from {self.rmse_without_friction:.3g} to "
+            f"{self.rmse:.3g} N{self._gap_text}. Difference in AICc {-self.aicc_reduction:.4g}, effective sample size "
+            f"{self.effective_sample_size:.0f}; F test {format_p_value(self.p_value)}."
         )
         if np.isfinite(self.repeat_rmse):
             text += (
-                f" On the second run the error goes from {self.plain_repeat_rmse:.3g} to {self.repeat_rmse:.3g} N; the "
-                f"runs themselves scatter by {self.repeatability:.3g} N."
+                f" On the second run the rms error changes from {self.repeat_rmse_without_friction:.3g} to "
+                f"{self.repeat_rmse:.3g} N; the repeatability of the runs is {self.repeatability:.3g} N."
             )
         if self.rmse < self.repeatability:
-            text += " The fit lies below that floor: part of it follows chance."
-        if self.unsettled:
-            text += f" Not determined: {', '.join(self.unsettled)}."
+            text += " The error is below the repeatability, which indicates overfitting."
+        if self.undetermined:
+            text += f" Not determined: {', '.join(self.undetermined)}."
         return f"{text} The data {'justify' if self.justified else 'do not justify'} this friction."
 
     @property
-    def _gaps(self) -> str:
+    def _gap_text(self) -> str:
         if not np.isfinite(self.gap):
-            return "the branches have no place in common where rows count"
-        return f"the gap between the branches from {self.gap:.3g} to {self.gap_left:.3g} N"
+            return "; the branches have no common part of the path in the fitted rows"
+        return f" and the gap between the branches from {self.gap:.3g} to {self.residual_gap:.3g} N"
 
     def plot(self) -> Any:
-        """The loop and what the friction explains of it; a Matplotlib figure."""
-        from .plot import plot_hysteresis
-
-        return plot_hysteresis(self)
+        """The loop, the friction force and the residuals; a Matplotlib figure."""
+        rms = f"{self.rmse_without_friction:.3g} N without, {self.rmse:.3g} N with friction"
+        title = f"{self.series.origin}: rms error {rms}"
+        return plot_hysteresis(self.series, self.friction, self.coefficients, title)
 
     def __str__(self) -> str:
         lines = [
-            f"{leaf.path:<16}{leaf.declared.symbol:<9}{leaf.value:<12.6g}{leaf.declared.unit}"
+            f"{leaf.path:<16}{leaf.declared.symbol:<9}{leaf.value:<12.6g}"
+            f"{'' if leaf.declared.unit == '1' else leaf.declared.unit}".rstrip()
             for leaf in leaves(self.friction)
         ]
-        return "\n".join([f"{type(self.friction).__name__} fitted to {self.course.origin}", *lines, self.verdict])
+        return "\n".join([f"{type(self.friction).__name__} fitted to {self.series.origin}", *lines, self.verdict])
 
 
-def judged(friction: Friction, free: int, run: LoopSeries, repeat: LoopSeries | None) -> HysteresisFit:
-    """A fitted friction, beside the static curve alone."""
-    with_it, without = run.coefficients(friction), run.coefficients(None)
-    errors, plain = run.errors(friction, with_it)[run.rows], run.errors(None, without)[run.rows]
-    square, plain_square = float(np.mean(errors**2)), float(np.mean(plain**2))
-    rows, base = effective_rows(errors), run.columns.shape[1]
-    path, way = run.path[run.rows], run.direction[run.rows]
-    again = plain_again = floor = float("nan")
+def assess_fit(friction: Friction, free: int, run: LoopSeries, repeat: LoopSeries | None) -> HysteresisFit:
+    """The statistics of a fitted friction with `free` fitted parameters, compared with the static curve alone."""
+    coefficients, static = run.coefficients(friction), run.coefficients(None)
+    rows = run.fitted_rows
+    residuals, plain = run.residuals(friction, coefficients)[rows], run.residuals(None, static)[rows]
+    square, plain_square = float(np.mean(residuals**2)), float(np.mean(plain**2))
+    sample_size, base = effective_sample_size(residuals), run.design_matrix.shape[1]
+    path, direction = run.path[rows], run.direction[rows]
+    repeat_rmse = plain_repeat_rmse = repeatability = float("nan")
     if repeat is not None:
-        again = _rms(repeat.remainder(friction))
-        plain_again = _rms(repeat.remainder(None))
-        other = repeat.errors(None, without)[repeat.rows]
-        beside = (repeat.path[repeat.rows], other, repeat.direction[repeat.rows])
-        floor = _rms(branches.repeat_difference(path, plain, way, *beside)) / np.sqrt(2)
+        repeat_rmse = _rms(repeat.fitted_residuals(friction))
+        plain_repeat_rmse = _rms(repeat.fitted_residuals(None))
+        values = repeat.residuals(None, static)[repeat.fitted_rows]
+        second_run = (repeat.path[repeat.fitted_rows], values, repeat.direction[repeat.fitted_rows])
+        repeatability = _rms(branches.repeat_difference(path, plain, direction, *second_run)) / np.sqrt(2)
     return HysteresisFit(
         friction=friction,
-        coefficients=with_it,
+        coefficients=coefficients,
         rmse=float(np.sqrt(square)),
-        plain_rmse=float(np.sqrt(plain_square)),
-        gap=_rms(branches.gap(path, plain, way)),
-        gap_left=_rms(branches.gap(path, errors, way)),
-        effective_rows=rows,
-        aicc_gain=aicc(plain_square, rows, base) - aicc(square, rows, base + free),
-        chance=f_test(plain_square, square, rows, base + free, free),
-        repeat_rmse=again,
-        plain_repeat_rmse=plain_again,
-        repeatability=floor,
-        course=run,
+        rmse_without_friction=float(np.sqrt(plain_square)),
+        gap=_rms(branches.branch_gap(path, plain, direction)),
+        residual_gap=_rms(branches.branch_gap(path, residuals, direction)),
+        effective_sample_size=sample_size,
+        aicc_reduction=aicc(plain_square, sample_size, base) - aicc(square, sample_size, base + free),
+        p_value=f_test_p_value(plain_square, square, sample_size, base + free, free),
+        repeat_rmse=repeat_rmse,
+        repeat_rmse_without_friction=plain_repeat_rmse,
+        repeatability=repeatability,
+        series=run,
     )
 
 

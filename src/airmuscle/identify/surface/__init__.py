@@ -1,1 +1,1 @@
-"""Surfaces that a muscle can have: an exponential one, and conditions on slopes over a whole validity range."""
+"""Surface fits: exponential surface of Borzíková et al., monotone and shape-constrained fits."""

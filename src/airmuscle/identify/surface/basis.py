@@ -1,4 +1,4 @@
-"""Scalings of a polynomial surface in pressure and force, and how well data determine it in each."""
+"""Polynomial bases of a surface in pressure and force, and the conditioning of its design matrix in each."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ...recording import Recording
 
 
 class LoadRange(NamedTuple):
-    """A rectangle of gauge pressure [Pa] and load [N]."""
+    """A rectangular range of gauge pressure [Pa] and load [N]."""
 
     min_pressure: float
     max_pressure: float
@@ -25,72 +25,74 @@ class LoadRange(NamedTuple):
     max_force: float
 
     @classmethod
-    def of_recording(cls, recording: Recording) -> LoadRange:
-        """The smallest validity range that holds every row."""
+    def from_recording(cls, recording: Recording) -> LoadRange:
+        """The smallest range that contains every row."""
         p, f = recording["pressure"], recording["force"]
         return cls(float(p.min()), float(p.max()), float(f.min()), float(f.max()))
 
     @classmethod
-    def of_law(cls, law: Characteristic) -> LoadRange:
-        """The validity range in which a law answers."""
+    def from_law(cls, law: Characteristic) -> LoadRange:
+        """The validity range of a law that gives contraction."""
         return cls(*law.pressure_range, *law.force_range)
 
-    def scaled(self, pressure: Array, force: Array) -> tuple[Array, Array]:
-        """Pressure and force as numbers that run from -1 to 1 on the validity range."""
+    def scale(self, pressure: Array, force: Array) -> tuple[Array, Array]:
+        """Pressure and force scaled to -1..1 on the range."""
         x = 2 * (pressure - self.min_pressure) / (self.max_pressure - self.min_pressure) - 1
         y = 2 * (force - self.min_force) / (self.max_force - self.min_force) - 1
         return x, y
 
     def grid(self, pressures: int, forces: int) -> tuple[Array, Array]:
-        """Even points over the validity range, edges included, as two arrays of shape (pressures, forces)."""
+        """Evenly spaced points over the range, edges included, as two arrays of shape (pressures, forces)."""
         p = np.linspace(self.min_pressure, self.max_pressure, pressures)
         f = np.linspace(self.min_force, self.max_force, forces)
         return np.broadcast_to(p[:, None], (pressures, forces)), np.broadcast_to(f, (pressures, forces))
 
 
 class Basis(abc.ABC):
-    """Functions of pressure and force that a surface is a sum of."""
+    """Basis functions of a surface in pressure and force."""
 
     @abc.abstractmethod
-    def columns(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
-        """Their values at N points [Pa, N], one column each, by degree in pressure and then in force."""
+    def design_matrix(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
+        """Their values at N points [Pa, N], one column each, ordered by degree in pressure, then in force."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Monomials(Basis):
-    """p^i F^j with pressure and force in multiples of stated units [Pa, N]."""
+    """p^i F^j, with pressure and force in multiples of the given units [Pa, N]."""
 
     pressure_unit: float = 1.0
     force_unit: float = 1.0
 
-    def columns(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
+    def design_matrix(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
         degrees = [pressure_degree, force_degree]
         return np.asarray(polynomial.polyvander2d(pressure / self.pressure_unit, force / self.force_unit, degrees))
 
 
 @dataclasses.dataclass(frozen=True)
 class Chebyshev(Basis):
-    """T_i(x) T_j(y), with x and y running from -1 to 1 on a validity range: nearly orthogonal there."""
+    """T_i(x) T_j(y), with x and y scaled to -1..1 on the validity range, where they are nearly orthogonal."""
 
     validity_range: LoadRange
 
-    def columns(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
+    def design_matrix(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
         return np.asarray(
-            chebyshev.chebvander2d(*self.validity_range.scaled(pressure, force), [pressure_degree, force_degree])
+            chebyshev.chebvander2d(*self.validity_range.scale(pressure, force), [pressure_degree, force_degree])
         )
 
-    def in_bar_and_newton(self, coefficients: Array, pressure_degree: int, force_degree: int) -> Array:
-        """The same sum as coefficients of p^i F^j in bar and newton, in the same order."""
+    def to_bar_and_newton(self, coefficients: Array, pressure_degree: int, force_degree: int) -> Array:
+        """The coefficients of p^i F^j in bar and newton of the same surface, in the same order."""
         validity_range = self.validity_range
-        by_pressure = _monomials(validity_range.min_pressure / bar, validity_range.max_pressure / bar, pressure_degree)
-        by_force = _monomials(validity_range.min_force, validity_range.max_force, force_degree)
+        by_pressure = _chebyshev_to_monomials(
+            validity_range.min_pressure / bar, validity_range.max_pressure / bar, pressure_degree
+        )
+        by_force = _chebyshev_to_monomials(validity_range.min_force, validity_range.max_force, force_degree)
         table = coefficients.reshape(pressure_degree + 1, force_degree + 1)
         return (by_pressure @ table @ by_force.T).ravel()
 
 
-@functools.lru_cache(maxsize=64)  # a bootstrap refits one validity range a thousand times
-def _monomials(low: float, high: float, degree: int) -> Array:
-    """Column i holds the coefficients of T_i, scaled to low..high, by the powers of the unscaled variable."""
+@functools.lru_cache(maxsize=64)  # a bootstrap refits the same validity range a thousand times
+def _chebyshev_to_monomials(low: float, high: float, degree: int) -> Array:
+    """Column i holds the coefficients of T_i, scaled to low..high, in powers of the unscaled variable."""
     powers = np.zeros((degree + 1, degree + 1))
     for i in range(degree + 1):
         scaled = chebyshev.Chebyshev.basis(i, domain=[low, high]).convert(kind=polynomial.Polynomial)
@@ -101,32 +103,32 @@ def _monomials(low: float, high: float, degree: int) -> Array:
 
 @dataclasses.dataclass(frozen=True)
 class Conditioning:
-    """How well data determine coefficients: the rank of the design, its size, its condition number."""
+    """Rank, number of coefficients and condition number of a design matrix."""
 
     rank: int
     coefficients: int
     condition: float
-    """Greatest over least singular value; infinite where the rank is short."""
+    """Ratio of the largest to the smallest singular value; infinite for a rank-deficient matrix."""
 
     @classmethod
-    def of(cls, columns: Array) -> Conditioning:
-        """Of a design matrix (N, coefficients), exact beyond the 1e16 at which singular values drown in rounding.
+    def from_design_matrix(cls, matrix: Array) -> Conditioning:
+        """Of a design matrix (N, coefficients), exact also beyond 1e16, where singular values are lost in rounding.
 
-        Columns brought to length 1 have a pseudo-inverse that can be trusted; its rows take the lengths back.
+        The pseudo-inverse is computed with columns of unit norm, and its rows are scaled back by the norms.
         """
-        lengths = np.linalg.norm(columns, axis=0)
-        even = columns / np.where(lengths > 0, lengths, 1.0)
-        rank, size = int(np.linalg.matrix_rank(even)), columns.shape[1]
+        norms = np.linalg.norm(matrix, axis=0)
+        normalised = matrix / np.where(norms > 0, norms, 1.0)
+        rank, size = int(np.linalg.matrix_rank(normalised)), matrix.shape[1]
         if rank < size:
             return cls(rank, size, np.inf)
-        inverse = np.linalg.pinv(even) / lengths[:, None]
-        return cls(rank, size, float(np.linalg.norm(columns, 2) * np.linalg.norm(inverse, 2)))
+        inverse = np.linalg.pinv(normalised) / norms[:, None]
+        return cls(rank, size, float(np.linalg.norm(matrix, 2) * np.linalg.norm(inverse, 2)))
 
     def __str__(self) -> str:
-        return f"rank {self.rank} of {self.coefficients}, condition {self.condition:.2g}"
+        return f"rank {self.rank} of {self.coefficients}, condition number {self.condition:.2g}"
 
 
 def conditioning(recording: Recording, basis: Basis, pressure_degree: int = 4, force_degree: int = 2) -> Conditioning:
-    """How well the points of a recording determine a surface's coefficients in a basis."""
-    columns = basis.columns(recording["pressure"], recording["force"], pressure_degree, force_degree)
-    return Conditioning.of(columns)
+    """The conditioning of the design matrix of a surface at the points of a recording."""
+    matrix = basis.design_matrix(recording["pressure"], recording["force"], pressure_degree, force_degree)
+    return Conditioning.from_design_matrix(matrix)

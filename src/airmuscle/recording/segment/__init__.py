@@ -1,15 +1,15 @@
-"""What a recording consists of: runs, branches, plateaus, transients, glitches, and what its sensors can tell."""
+"""Segmentation of recordings: runs, branches, plateaus, transients, outliers and sensor properties."""
 
-from .branches import Branch, directions, find_branches, motion_direction
+from .branches import Branch, branch_directions, find_branches, motion_direction
 from .findings import Finding, check_swept
 from .inspection import Inspection, inspect, inspect_all
+from .interval import Interval
 from .outliers import Outlier, find_outliers
 from .plateaus import Plateau, find_plateaus, plateau_points
 from .quasi_static import quasi_static_rows
 from .runs import AT_REST, FREE, ISOBARIC, ISOMETRIC, ISOTONIC, Run, find_runs
 from .sampling import Sampling, analyse_sampling
 from .sensor import Sensor, estimate_sensors
-from .stretch import Interval
 
 __all__ = [
     "AT_REST",
@@ -27,8 +27,8 @@ __all__ = [
     "Sampling",
     "Sensor",
     "analyse_sampling",
+    "branch_directions",
     "check_swept",
-    "directions",
     "estimate_sensors",
     "find_branches",
     "find_outliers",

@@ -1,9 +1,9 @@
-"""Inflating and deflating branches, from the pressure's own history.
+"""Branches: inflation and deflation, from the pressure history.
 
-The pressure turns where it has come back from an extreme by more than `swing` of its range; smaller ripples belong
-to the branch that they lie on. A rest at the top belongs to the branch that led there, because friction remembers it:
-the turn is put at the last row before the pressure leaves the level of the rest. A branch column of a file decides
-nothing; `agreement` compares with it.
+A branch ends where the pressure has moved back from an extreme by more than a fraction `reversal` of its range; smaller
+ripples do not end it. A dwell at an extreme belongs to the branch before it, because friction depends on the previous
+motion: the reversal is placed at the last row before the pressure leaves the level of the dwell. A branch column in the
+file is not used; `branch_column_agreement` compares it with the result.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ import numpy as np
 
 from ...core.arrays import Array
 from ..recording import Recording
-from .sampling import row_count
+from .interval import Interval, running_median
+from .sampling import count_rows
 from .sensor import Sensor
-from .stretch import Interval, running_median
 
-SWING = 0.05
-"""The part of the range by which the pressure must come back before it has turned (chosen)."""
-SPIKE = 0.15
-"""Overshoots of a valve's pulse shorter than this [s] are no turn (chosen)."""
-LEAVES = 0.25
-"""The part of a swing after which a rest is over (chosen)."""
+REVERSAL_FRACTION = 0.05
+"""Fraction of the range by which the pressure must move back for a reversal (chosen)."""
+SPIKE_DURATION = 0.15
+"""Overshoots of a valve pulse shorter than this [s] are not reversals (chosen)."""
+EXIT_FRACTION = 0.25
+"""Fraction of the reversal threshold by which the pressure leaves a dwell (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Branch:
-    """Rows on which the muscle is inflating (direction 1) or deflating (-1), with pressures at both ends [Pa]."""
+    """Rows during which the muscle inflates (direction 1) or deflates (-1), and the pressures at both ends [Pa]."""
 
-    stretch: Interval
+    interval: Interval
     direction: int
     start_pressure: float
     end_pressure: float
@@ -43,87 +43,92 @@ class Branch:
         return "inflating" if self.direction > 0 else "deflating"
 
 
-def find_branches(recording: Recording, sensor: Sensor | None = None, *, swing: float = SWING) -> tuple[Branch, ...]:
-    """The branches of a recording in their order; none where the pressure does not move or is not there.
+def find_branches(
+    recording: Recording, sensor: Sensor | None = None, *, reversal: float = REVERSAL_FRACTION
+) -> tuple[Branch, ...]:
+    """The branches of a recording in order; empty if there is no pressure or if it is constant.
 
-    A turn needs `swing` of the pressure's range and ten deviations of the sensor. Without time, the order of the rows
-    is taken for the history.
+    A reversal exceeds the fraction `reversal` of the pressure range and ten standard deviations of the sensor. Without
+    time, the order of the rows is taken as the history.
     """
     if "pressure" not in recording or len(recording) < 3:
         return ()
-    calm = _without_spikes(recording["pressure"], recording.columns.get("time"))
-    found = _ways(calm, max(swing * float(np.ptp(calm)), 10.0 * (sensor.deviation if sensor else 0.0)))
-    return tuple(_branch(calm, stretch, direction) for stretch, direction in found)
+    smooth = _remove_spikes(recording["pressure"], recording.columns.get("time"))
+    threshold = max(reversal * float(np.ptp(smooth)), 10.0 * (sensor.std if sensor else 0.0))
+    return tuple(
+        _make_branch(smooth, interval, direction) for interval, direction in _monotonic_intervals(smooth, threshold)
+    )
 
 
-def motion_direction(values: Array, time: Array | None = None, *, swing: float = SWING) -> Array:
-    """By row of any path: 1 where it rises, -1 where it falls, told as branches are told from the pressure.
+def motion_direction(values: Array, time: Array | None = None, *, reversal: float = REVERSAL_FRACTION) -> Array:
+    """The direction of motion (N,) of any signal (N,): 1 rising, -1 falling, 0 everywhere if the signal is constant.
 
-    0 throughout where it does not move.
+    Reversals are detected as for the branches of the pressure.
     """
-    calm = _without_spikes(values, time)
+    smooth = _remove_spikes(values, time)
     signs = np.zeros(len(values))
-    for stretch, direction in _ways(calm, swing * float(np.ptp(calm)) if len(calm) else 0.0):
-        signs[stretch.rows] = direction
+    threshold = reversal * float(np.ptp(smooth)) if len(smooth) else 0.0
+    for interval, direction in _monotonic_intervals(smooth, threshold):
+        signs[interval.rows] = direction
     return signs
 
 
-def _without_spikes(values: Array, time: Array | None) -> Array:
-    return values if time is None else running_median(values, 2 * row_count(SPIKE / 2.0, time, 1) + 1)
+def _remove_spikes(values: Array, time: Array | None) -> Array:
+    return values if time is None else running_median(values, 2 * count_rows(SPIKE_DURATION / 2.0, time, 1) + 1)
 
 
-def _ways(calm: Array, least: float) -> list[tuple[Interval, int]]:
-    """The stretches between turns, each with its direction; none where all stays within `least`."""
-    if not len(calm) or not float(np.ptp(calm)) > least:
+def _monotonic_intervals(smooth: Array, threshold: float) -> list[tuple[Interval, int]]:
+    """The intervals between reversals, each with its direction; empty if the range does not exceed `threshold`."""
+    if not len(smooth) or not float(np.ptp(smooth)) > threshold:
         return []
-    turns = list(_turns(calm, least))
-    starts = [0, *(row for row, _ in turns[1:]), len(calm)]
-    pairs = zip(itertools.pairwise(starts), turns, strict=True)
+    reversals = list(_find_reversals(smooth, threshold))
+    starts = [0, *(row for row, _ in reversals[1:]), len(smooth)]
+    pairs = zip(itertools.pairwise(starts), reversals, strict=True)
     return [(Interval(a, b), direction) for (a, b), (_, direction) in pairs]
 
 
-def _turns(pressure: Array, least: float) -> Iterator[tuple[int, int]]:
-    """The rows at which branches begin, and their directions; the first is known once the pressure has moved."""
+def _find_reversals(pressure: Array, threshold: float) -> Iterator[tuple[int, int]]:
+    """First row and direction of each branch; the first direction is known once the pressure has moved."""
     direction, extreme = 0, 0
     low = high = 0
     values = pressure.tolist()
     for i, value in enumerate(values):
         if direction == 0:
             low, high = (i if value < values[low] else low), (i if value > values[high] else high)
-            if values[high] - values[low] >= least:
+            if values[high] - values[low] >= threshold:
                 direction, extreme = (1, high) if high > low else (-1, low)
                 yield 0, direction
         elif direction * (value - values[extreme]) >= 0.0:
             extreme = i
-        elif direction * (values[extreme] - value) >= least:
-            yield _leaves(values, extreme, i, direction, least), -direction
+        elif direction * (values[extreme] - value) >= threshold:
+            yield _end_of_dwell(values, extreme, i, direction, threshold), -direction
             direction, extreme = -direction, i
 
 
-def _leaves(values: list[float], extreme: int, here: int, direction: int, least: float) -> int:
-    """The first row that has left the level of the extreme, between it and the row that shows the turn."""
+def _end_of_dwell(values: list[float], extreme: int, current: int, direction: int, threshold: float) -> int:
+    """The first row that has left the level of the extreme, between the extreme and the current row."""
     last = max(
-        (j for j in range(extreme, here) if direction * (values[extreme] - values[j]) < LEAVES * least),
+        (j for j in range(extreme, current) if direction * (values[extreme] - values[j]) < EXIT_FRACTION * threshold),
         default=extreme,
     )
     return last + 1
 
 
-def _branch(pressure: Array, stretch: Interval, direction: int) -> Branch:
-    return Branch(stretch, direction, float(pressure[stretch.start]), float(pressure[stretch.stop - 1]))
+def _make_branch(pressure: Array, interval: Interval, direction: int) -> Branch:
+    return Branch(interval, direction, float(pressure[interval.start]), float(pressure[interval.stop - 1]))
 
 
-def directions(recording: Recording, found: tuple[Branch, ...]) -> Array:
-    """By row: 1 inflating, -1 deflating, 0 where no branch was found."""
+def branch_directions(recording: Recording, branches: tuple[Branch, ...]) -> Array:
+    """The direction (N,) of each row: 1 inflating, -1 deflating, 0 outside the branches."""
     signs = np.zeros(len(recording))
-    for branch in found:
-        signs[branch.stretch.rows] = branch.direction
+    for branch in branches:
+        signs[branch.interval.rows] = branch.direction
     return signs
 
 
-def agreement(recording: Recording, found: tuple[Branch, ...]) -> float | None:
-    """The part of the rows on which a file's own branch column (1 inflating, 2 deflating) says the same."""
+def branch_column_agreement(recording: Recording, branches: tuple[Branch, ...]) -> float | None:
+    """The fraction of rows that agree with the branch column of the file (1 inflating, 2 deflating); None without it."""
     if "branch" not in recording:
         return None
     stated = np.where(recording["branch"] == 1, 1.0, -1.0)
-    return float(np.mean(stated == directions(recording, found)))
+    return float(np.mean(stated == branch_directions(recording, branches)))

@@ -1,4 +1,4 @@
-"""What is wrong, or may be, with a recording, each in words that say what to do."""
+"""Findings: data-quality problems of a recording and their remedies."""
 
 from __future__ import annotations
 
@@ -15,128 +15,133 @@ from .runs import AT_REST, KINDS, Run
 from .sampling import Sampling
 from .sensor import Sensor
 
-SATURATED = 0.5
-"""The part of the rows at an end of a sensor from which on a fit would have little left (chosen)."""
-UNSETTLED = 0.02
-"""A record is short where its last tenth still changes by this part of the range (chosen)."""
-WITHIN_NOISE = 10.0
-"""A pressure whose range is less than this many deviations of its sensor is constant (chosen)."""
-FEW_ROWS = 5
-"""A step seen in fewer rows than this is too fast for its sampling (chosen)."""
+MAX_SATURATED_FRACTION = 0.5
+"""Fraction of saturated rows above which too few rows remain for a fit (chosen)."""
+MAX_FINAL_CHANGE = 0.02
+"""A record is too short if its last tenth changes by more than this fraction of the range (chosen)."""
+NOISE_FACTOR = 10.0
+"""A pressure with a range below this multiple of the sensor's standard deviation is constant (chosen)."""
+MIN_ROWS_PER_STEP = 5
+"""A step sampled by fewer rows than this is undersampled (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Finding:
-    """Something to know. `serious` means that a fit of this recording would mislead or fail."""
+    """A data-quality finding. If it is `serious`, a fit of the recording would fail or mislead."""
 
     text: str
     serious: bool = False
 
 
-def findings(
-    recording: Recording, timing: Sampling | None, sensed: Mapping[str, Sensor], found: tuple[Run, ...]
+def collect_findings(
+    recording: Recording, sampling: Sampling | None, sensors: Mapping[str, Sensor], runs: tuple[Run, ...]
 ) -> tuple[Finding, ...]:
-    """All that stands out in a recording, the serious first."""
-    everything = [
-        *_of_time(recording, timing),
-        *_of_sensors(recording, sensed),
-        *_of_runs(recording, found),
-        *_of_length(recording, timing, sensed),
+    """All findings on a recording, the serious ones first."""
+    findings = [
+        *_time_findings(recording, sampling),
+        *_sensor_findings(recording, sensors),
+        *_run_findings(recording, runs),
+        *_duration_findings(recording, sampling, sensors),
     ]
-    return tuple(sorted(everything, key=lambda finding: not finding.serious))
+    return tuple(sorted(findings, key=lambda finding: not finding.serious))
 
 
-def check_swept(recording: Recording, found: tuple[Run, ...]) -> None:
-    """Raise ColumnError where nothing in a recording is swept, or it is not the run that it is said to be."""
-    for finding in _of_runs(recording, found):
+def check_swept(recording: Recording, runs: tuple[Run, ...]) -> None:
+    """Raise ColumnError if no quantity of a recording varies, or if the run is not of the stated kind."""
+    for finding in _run_findings(recording, runs):
         if finding.serious:
             raise ColumnError(f"{recording.origin}: {finding.text}")
 
 
-def _of_time(recording: Recording, timing: Sampling | None) -> Iterator[Finding]:
-    if timing is None:
-        yield Finding(
-            "there is no time: rows are taken as settled points, and neither rate nor glitches can be judged."
-        )
+def _time_findings(recording: Recording, sampling: Sampling | None) -> Iterator[Finding]:
+    if sampling is None:
+        yield Finding("no time column: rows are taken as steady states; sampling and outliers cannot be assessed.")
         return
-    for rows, said in ((timing.repeats, "repeats"), (timing.backward, "runs backwards")):
+    for rows, verb in ((sampling.repeated_rows, "repeats"), (sampling.backward_rows, "decreases")):
         if rows:
             yield Finding(
-                f"time {said} in {len(rows)} rows, first in row {rows[0] + 1}. Sort the rows, delete what is double, "
-                "or put two runs into two files.",
+                f"time {verb} in {_count(len(rows), 'row')}, first in row {rows[0] + 1}. Sort the rows, delete "
+                "duplicates, or write two runs to two files.",
                 serious=True,
             )
-    if timing.gaps:
-        longest = max(timing.gaps, key=lambda gap: gap.length)
+    if sampling.gaps:
+        longest = max(sampling.gaps, key=lambda gap: gap.duration)
         yield Finding(
-            f"{len(timing.gaps)} gaps in time, the longest of {longest.length:.4g} s behind row {longest.row + 1} "
-            f"(usual step {timing.step:.4g} s). Do not fit dynamics across them."
+            f"{_count(len(sampling.gaps), 'gap')} in time, the longest of {longest.duration:.4g} s after row "
+            f"{longest.row + 1} (sample time {sampling.sample_time:.4g} s). Do not fit dynamics across gaps."
         )
 
 
-def _of_sensors(recording: Recording, sensed: Mapping[str, Sensor]) -> Iterator[Finding]:
-    for name, sensor in sensed.items():
-        for end, word in ((sensor.lower_limit, "lowest"), (sensor.upper_limit, "highest")):
-            if name not in recording.columns or not np.isfinite(end):
+def _sensor_findings(recording: Recording, sensors: Mapping[str, Sensor]) -> Iterator[Finding]:
+    for name, sensor in sensors.items():
+        for limit, adjective in ((sensor.lower_limit, "lower"), (sensor.upper_limit, "upper")):
+            if name not in recording.columns or not np.isfinite(limit):
                 continue
-            count = int(np.count_nonzero(np.abs(recording[name] - end) <= 0.25 * sensor.resolution))
-            part = count / len(recording)
+            count = int(np.count_nonzero(np.abs(recording[name] - limit) <= 0.25 * sensor.resolution))
+            fraction = count / len(recording)
             quantity = quantity_of(name)
+            unit = f" {quantity.unit}" if quantity and quantity.unit != "1" else ""
             if count:
                 yield Finding(
-                    f"the {name} stands still at its {word} reading, {end:.6g} {quantity.unit if quantity else ''}, in "
-                    f"{count} rows ({part:.0%}): the sensor is cut off there. Such rows are bounds, not values.",
-                    serious=part >= SATURATED,
+                    f"the {name} sensor saturates at its {adjective} limit, {limit:.4g}{unit}, in "
+                    f"{_count(count, 'row')} ({fraction:.0%}). These rows are bounds (censored), not values.",
+                    serious=fraction >= MAX_SATURATED_FRACTION,
                 )
 
 
-def _of_runs(recording: Recording, found: tuple[Run, ...]) -> Iterator[Finding]:
+def _run_findings(recording: Recording, runs: tuple[Run, ...]) -> Iterator[Finding]:
     stated = recording.constants.get("run")
-    if any(run.kind is AT_REST for run in found):
-        what = "nothing that was measured changes" if len(recording.columns) > 2 else "the one quantity does not change"
-        held = _steady(recording)
+    if any(run.kind is AT_REST for run in runs):
+        subject = "no measured quantity varies" if len(recording.columns) > 2 else "the only quantity does not vary"
         yield Finding(
-            f"{what}{held}: no characteristic can be found from it. Sweep the pressure of an isometric run, the length "
-            "of an isobaric one, and check that the sensors were connected.",
+            f"{subject}{_pressure_range(recording)}: no characteristic can be identified. Vary the pressure of an "
+            "isometric run or the length of an isobaric run, and check that the sensors were connected.",
             serious=True,
         )
-    elif isinstance(stated, str) and found:
-        kinds = {run.kind.name for run in found}
+    elif isinstance(stated, str) and runs:
+        kinds = {run.kind.name for run in runs}
         if stated not in kinds and stated in {kind.name for kind in KINDS}:
             yield Finding(
-                f"it is said to be {stated}, but what was measured is {' and '.join(sorted(kinds))}"
-                f"{_steady(recording)}. Correct the statement, or take another file.",
+                f"the run is stated to be {stated}, but the data are {' and '.join(sorted(kinds))}"
+                f"{_pressure_range(recording)}. Correct the statement, or use another file.",
                 serious=True,
             )
 
 
-def _steady(recording: Recording) -> str:
-    """`(pressure within 1.2 kPa of 300 kPa)`, to show what was taken as constant."""
+def _pressure_range(recording: Recording) -> str:
+    """The pressure range as ` (pressure 298.8 to 301.2 kPa)`, to show which pressure was taken as constant."""
     if "pressure" not in recording:
         return ""
     low, high = np.quantile(recording["pressure"], [0.01, 0.99])
-    return f" (pressure from {low / 1e3:.4g} to {high / 1e3:.4g} kPa)"
+    return f" (pressure {low / 1e3:.4g} to {high / 1e3:.4g} kPa)"
 
 
-def _of_length(recording: Recording, timing: Sampling | None, sensed: Mapping[str, Sensor]) -> Iterator[Finding]:
+def _duration_findings(
+    recording: Recording, sampling: Sampling | None, sensors: Mapping[str, Sensor]
+) -> Iterator[Finding]:
     """Records that end before the pressure has settled, and steps faster than the sampling."""
-    if timing is None or "pressure" not in recording or timing.rows < 2 * FEW_ROWS:
+    if sampling is None or "pressure" not in recording or sampling.rows < 2 * MIN_ROWS_PER_STEP:
         return
     pressure = recording["pressure"]
-    reach = float(np.ptp(pressure))
-    if reach <= WITHIN_NOISE * (sensed["pressure"].deviation if "pressure" in sensed else 0.0):
+    span = float(np.ptp(pressure))
+    if span <= NOISE_FACTOR * (sensors["pressure"].std if "pressure" in sensors else 0.0):
         return
     last = pressure[-max(len(pressure) // 10, 3) :]
-    calm = quasi_static_rows(recording, sensed)
-    if reach > 0 and not calm[-1] and abs(last[-1] - last[0]) > UNSETTLED * reach:
+    quasi_static = quasi_static_rows(recording, sensors)
+    if span > 0 and not quasi_static[-1] and abs(last[-1] - last[0]) > MAX_FINAL_CHANGE * span:
+        change = f"{abs(last[-1] - last[0]) / 1e3:.4g} kPa"
         yield Finding(
-            f"the record ends while the pressure still changes ({abs(last[-1] - last[0]) / 1e3:.4g} kPa in the last "
-            "tenth): it may be shorter than the dynamics. Record until the pressure has settled.",
+            f"the record ends before the pressure has settled (it changes by {change} in the last tenth) and may be "
+            "shorter than the dynamics. Record until the pressure has settled.",
             serious=True,
         )
-    biggest = float(np.max(np.abs(np.diff(pressure)))) if len(pressure) > 1 else 0.0
-    if biggest > 0.5 * reach > 0:
+    max_step = float(np.max(np.abs(np.diff(pressure)))) if len(pressure) > 1 else 0.0
+    if max_step > 0.5 * span > 0:
         yield Finding(
-            f"the pressure changes by {biggest / 1e3:.4g} kPa, most of its range, from one row to the next: the "
-            f"step is faster than {timing.rate:.4g} rows per second can show."
+            f"the pressure changes by {max_step / 1e3:.4g} kPa between two rows, more than half of its range: the step "
+            f"is undersampled at {sampling.rate:.4g} rows per second."
         )
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

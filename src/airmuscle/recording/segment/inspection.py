@@ -1,4 +1,4 @@
-"""All that can be told of a recording before anything is fitted."""
+"""Inspection: sampling, sensors, runs, branches, plateaus and data quality of a recording, before any fit."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..recording import Recording
-from .branches import Branch, agreement, find_branches
-from .findings import Finding, findings
+from .branches import Branch, branch_column_agreement, find_branches
+from .findings import Finding, collect_findings
 from .outliers import Outlier, find_outliers
 from .plateaus import Plateau, find_plateaus
+from .plot import plot_segments
 from .quasi_static import quasi_static_rows
 from .runs import Run, find_runs
 from .sampling import Sampling, analyse_sampling
@@ -19,7 +20,7 @@ from .sensor import Sensor, estimate_sensors
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Inspection:
-    """What a recording holds: its sampling, sensors, runs, branches, plateaus, suspected glitches, and findings."""
+    """Result of the inspection of a recording: sampling, sensors, segments, suspected outliers and findings."""
 
     recording: Recording
     sampling: Sampling | None
@@ -29,40 +30,39 @@ class Inspection:
     plateaus: tuple[Plateau, ...]
     outliers: tuple[Outlier, ...]
     quasi_static: float
-    """The part of the rows that is quasi-static."""
+    """Fraction of the rows that is quasi-static."""
     branch_agreement: float | None
-    """The part of the rows on which the file's own branch column says the same; None without one."""
+    """Fraction of the rows in which the branch column of the file agrees; None without such a column."""
     findings: tuple[Finding, ...]
 
     def plot(self) -> Any:
-        """Pressure, force and length over time with branches, plateaus, glitches and cut-offs; a Matplotlib figure."""
-        from .plot import plot_inspection
-
-        return plot_inspection(self)
+        """Pressure, force and length over time with branches, plateaus, outliers and limits; a Matplotlib figure."""
+        return plot_segments(self.recording, self.sensors, self.branches, self.plateaus, self.outliers)
 
 
-def inspect(recording: Recording, sensed: Mapping[str, Sensor] | None = None) -> Inspection:
-    """What a recording holds. `sensed` are the sensors of the rig, where several recordings show them better."""
-    known = {**estimate_sensors(recording), **{n: s for n, s in (sensed or {}).items() if n in recording.columns}}
-    timing = analyse_sampling(recording)
-    found = find_runs(recording, known)
-    ordered = timing is None or not (timing.repeats or timing.backward)
-    turned = find_branches(recording, known.get("pressure"))
+def inspect(recording: Recording, shared_sensors: Mapping[str, Sensor] | None = None) -> Inspection:
+    """Inspect a recording. `shared_sensors`, estimated from several recordings of the test rig, take precedence."""
+    shared = {name: sensor for name, sensor in (shared_sensors or {}).items() if name in recording.columns}
+    sensors = {**estimate_sensors(recording), **shared}
+    sampling = analyse_sampling(recording)
+    runs = find_runs(recording, sensors)
+    ordered = sampling is None or not (sampling.repeated_rows or sampling.backward_rows)
+    branches = find_branches(recording, sensors.get("pressure"))
     return Inspection(
         recording,
-        timing,
-        known,
-        found,
-        turned,
-        find_plateaus(recording, known) if ordered else (),
-        find_outliers(recording, known),
-        float(quasi_static_rows(recording, known).mean()) if len(recording) else 0.0,
-        agreement(recording, turned) if turned else None,
-        findings(recording, timing, known, found),
+        sampling,
+        sensors,
+        runs,
+        branches,
+        find_plateaus(recording, sensors) if ordered else (),
+        find_outliers(recording, sensors),
+        float(quasi_static_rows(recording, sensors).mean()) if len(recording) else 0.0,
+        branch_column_agreement(recording, branches) if branches else None,
+        collect_findings(recording, sampling, sensors, runs),
     )
 
 
 def inspect_all(recordings: Sequence[Recording]) -> tuple[Inspection, ...]:
-    """The inspections of recordings from one rig, whose sensors are estimated together."""
-    together = estimate_sensors(recordings)
-    return tuple(inspect(recording, together) for recording in recordings)
+    """Inspect recordings from one test rig, whose sensors are estimated jointly."""
+    sensors = estimate_sensors(recordings)
+    return tuple(inspect(recording, sensors) for recording in recordings)

@@ -1,7 +1,8 @@
-"""Readings that their neighbours contradict: found robustly, listed, never removed.
+"""Outliers: readings that contradict their neighbours, detected robustly, listed and never removed.
 
-A glitch is one or two rows that stand away from the rows before and behind by more than eight deviations of the
-sensor, while those agree with each other. The overshoot of a step is none: there the rows behind stand elsewhere.
+An outlier consists of one or two rows that differ from the rows before and after by more than eight standard deviations
+of the sensor, while those rows agree with each other. The overshoot of a step is not an outlier, because the rows after
+it are at another level.
 """
 
 from __future__ import annotations
@@ -15,17 +16,20 @@ from ...core.arrays import Array
 from ..recording import Recording
 from .sensor import Sensor, estimate_sensors
 
-DEVIATIONS = 8.0
-"""How many deviations make a glitch (chosen: noise with long tails reaches five or six)."""
-AGREE = 0.25
-"""The neighbours agree where they differ by less than this part of the glitch (chosen)."""
-REACH = 3
-"""Rows before and behind that are compared."""
+MIN_DEVIATIONS = 8.0
+"""Minimum distance of an outlier in standard deviations (chosen: noise with heavy tails reaches five or six)."""
+MAX_NEIGHBOUR_DIFFERENCE = 0.25
+"""Maximum difference between the rows before and after, as a fraction of the outlier's distance (chosen)."""
+WINDOW = 3
+"""Number of rows before and after that are compared."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Outlier:
-    """A suspected glitch: its column and row (from 0), the reading, and what the rows around it say [SI]."""
+    """A suspected outlier: column, row (from 0), reading, value expected from its neighbours [SI], and distance.
+
+    `deviations` is the distance from the expected value in standard deviations of the sensor.
+    """
 
     column: str
     row: int
@@ -34,37 +38,37 @@ class Outlier:
     deviations: float
 
 
-def find_outliers(recording: Recording, sensed: Mapping[str, Sensor] | None = None) -> tuple[Outlier, ...]:
-    """The suspected glitches of a recording in time; without time, neighbours say nothing and none is listed."""
-    if "time" not in recording or len(recording) < 2 * REACH + 2:
+def find_outliers(recording: Recording, sensors: Mapping[str, Sensor] | None = None) -> tuple[Outlier, ...]:
+    """The suspected outliers of a recording; empty without time, because rows are then not neighbours in time."""
+    if "time" not in recording or len(recording) < 2 * WINDOW + 2:
         return ()
     return tuple(
-        found
-        for name, sensor in (sensed or estimate_sensors(recording)).items()
+        outlier
+        for name, sensor in (sensors or estimate_sensors(recording)).items()
         if name in recording.columns
-        for found in _glitches(name, recording[name], sensor)
+        for outlier in _column_outliers(name, recording[name], sensor)
     )
 
 
-def _glitches(name: str, values: Array, sensor: Sensor) -> Iterator[Outlier]:
-    scale = sensor.deviation or 1e-9 * float(np.max(np.abs(values)))
+def _column_outliers(name: str, values: Array, sensor: Sensor) -> Iterator[Outlier]:
+    scale = sensor.std or 1e-9 * float(np.max(np.abs(values)))
     if scale == 0.0:
         return
-    before, behind = _medians_around(values)
-    off = values - 0.5 * (before + behind)
-    away = np.abs(off) > DEVIATIONS * scale
-    agree = np.abs(before - behind) < AGREE * np.abs(off)
-    for row in np.flatnonzero(away & agree):
-        expected = float(values[row] - off[row])
-        yield Outlier(name, int(row), float(values[row]), expected, float(abs(off[row]) / scale))
+    before, after = _neighbour_medians(values)
+    distance = values - 0.5 * (before + after)
+    is_far = np.abs(distance) > MIN_DEVIATIONS * scale
+    agree = np.abs(before - after) < MAX_NEIGHBOUR_DIFFERENCE * np.abs(distance)
+    for row in np.flatnonzero(is_far & agree):
+        expected = float(values[row] - distance[row])
+        yield Outlier(name, int(row), float(values[row]), expected, float(abs(distance[row]) / scale))
 
 
-def _medians_around(values: Array) -> tuple[Array, Array]:
-    """The medians of the rows before and behind each; at the ends, where there are too few, the row itself."""
-    medians = np.median(np.lib.stride_tricks.sliding_window_view(values, REACH), axis=1)
-    before, behind = values.copy(), values.copy()
-    before[REACH:] = medians[:-1]
-    behind[:-REACH] = medians[1:]
-    before[-REACH:] = values[-REACH:]
-    behind[:REACH] = values[:REACH]
-    return before, behind
+def _neighbour_medians(values: Array) -> tuple[Array, Array]:
+    """The medians of the rows before and after each row; the row itself near the ends, where there are too few rows."""
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(values, WINDOW), axis=1)
+    before, after = values.copy(), values.copy()
+    before[WINDOW:] = medians[:-1]
+    after[:-WINDOW] = medians[1:]
+    before[-WINDOW:] = values[-WINDOW:]
+    after[:WINDOW] = values[:WINDOW]
+    return before, after

@@ -1,8 +1,8 @@
-"""Which rows show the muscle at rest or moving slowly, and which a transient.
+"""Classification of rows as quasi-static or transient.
 
-A row is quasi-static where the pressure, and the length where it is measured, change within the time `settling` by
-no more than `change` of their range, or than the noise explains. Both numbers are chosen: 0.1 s is what a muscle of
-ordinary size takes to follow its pressure, one in a hundred is what a static fit does not see.
+A row is quasi-static if the pressure, and the length if measured, change within `settling_time` by at most the fraction
+`max_change` of their range, or by no more than the noise explains. Both numbers are chosen: 0.1 s is the time in which
+a muscle of usual size follows its pressure, and a change of 1 % is negligible for a static fit.
 """
 
 from __future__ import annotations
@@ -13,40 +13,40 @@ import numpy as np
 
 from ...core.arrays import Array
 from ..recording import Recording
-from .sampling import row_count
+from .interval import Mask
+from .sampling import count_rows
 from .sensor import Sensor, estimate_sensors
-from .stretch import Mask
 
-SETTLING = 0.1
-CHANGE = 0.01
-_MOVING = ("pressure", "contraction", "length", "position")
+SETTLING_TIME = 0.1
+MAX_CHANGE = 0.01
+_MONITORED = ("pressure", "contraction", "length", "position")
 
 
 def quasi_static_rows(
     recording: Recording,
-    sensed: Mapping[str, Sensor] | None = None,
+    sensors: Mapping[str, Sensor] | None = None,
     *,
-    settling: float = SETTLING,
-    change: float = CHANGE,
+    settling_time: float = SETTLING_TIME,
+    max_change: float = MAX_CHANGE,
 ) -> Mask:
-    """By row, whether it is quasi-static. Without time, every row is taken as a settled point."""
-    calm = np.ones(len(recording), dtype=bool)
+    """Whether each row is quasi-static (N,). Without time, every row is taken as a steady state."""
+    quasi_static = np.ones(len(recording), dtype=bool)
     if "time" not in recording or len(recording) < 3:
-        return calm
+        return quasi_static
     time = recording["time"]
-    width = row_count(settling, time, 1)
-    sensed = sensed or estimate_sensors(recording)
+    width = count_rows(settling_time, time, 1)
+    sensors = sensors or estimate_sensors(recording)
     for name in recording:
-        if name.rpartition(".")[2] in _MOVING and name in sensed:
-            calm &= ~_moves(recording[name], width, change, sensed[name])
-    return calm
+        if name.rpartition(".")[2] in _MONITORED and name in sensors:
+            quasi_static &= ~_is_changing(recording[name], width, max_change, sensors[name])
+    return quasi_static
 
 
-def _moves(values: Array, width: int, change: float, sensor: Sensor) -> Mask:
-    """Whether a value changes too much from `width` rows before, or to as many behind: settled is both."""
-    allowed = max(change * float(np.ptp(values)), 4.0 * sensor.deviation)
+def _is_changing(values: Array, width: int, max_change: float, sensor: Sensor) -> Mask:
+    """Whether a value changes by too much from `width` rows before, or to `width` rows after."""
+    allowed = max(max_change * float(np.ptp(values)), 4.0 * sensor.std)
     step = np.abs(values[width:] - values[:-width]) if width < len(values) else np.empty(0)
-    moves = np.zeros(len(values), dtype=bool)
-    moves[: len(step)] |= step > allowed
-    moves[width:] |= step > allowed
-    return moves
+    changing = np.zeros(len(values), dtype=bool)
+    changing[: len(step)] |= step > allowed
+    changing[width:] |= step > allowed
+    return changing

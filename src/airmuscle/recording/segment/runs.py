@@ -1,9 +1,9 @@
-"""RunSplit: stretches of a recording in which one quantity is held while others sweep.
+"""Runs: intervals of a recording in which one quantity is constant while others are swept.
 
-Held pressure is an isobaric run, held length or contraction an isometric one, held force an isotonic one. Held means
-within `BAND` of the greatest value (within `STROKE` of contraction), or within what the sensor's noise explains. A file
-may hold many runs one behind the other, as tables of static points do: then the quantity whose levels explain most
-rows names them.
+A run with constant pressure is isobaric, with constant length or contraction isometric, with constant force isotonic. A
+quantity is constant if it stays within `RELATIVE_BAND` of its maximum (within `CONTRACTION_BAND` for a contraction), or
+within the noise of its sensor. A file may contain many consecutive runs, as tables of static points do: these are runs
+at the levels of the quantity that explains the most rows.
 """
 
 from __future__ import annotations
@@ -15,119 +15,119 @@ import numpy as np
 
 from ...core.arrays import Array
 from ..recording import Recording
+from .interval import Interval, level_intervals
 from .sensor import Sensor, estimate_sensors
-from .stretch import Interval, level_stretches
 
-BAND = 0.02
-"""Part of its greatest value within which a quantity counts as held (chosen)."""
-STROKE = 0.005
-"""Contraction within which a length counts as held (chosen)."""
-SWEEP = 0.1
-"""Part of its range in the recording that a quantity must change by to be swept (chosen)."""
-FEWEST = 3
-"""The fewest rows of a run (chosen)."""
+RELATIVE_BAND = 0.02
+"""Band of a constant quantity, as a fraction of its maximum (chosen)."""
+CONTRACTION_BAND = 0.005
+"""Band of a constant contraction, and of a constant length as a fraction of its maximum (chosen)."""
+SWEEP_FRACTION = 0.1
+"""Minimum change of a swept quantity, as a fraction of its range in the recording (chosen)."""
+MIN_ROWS = 3
+"""Minimum number of rows of a run (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Kind:
-    """What a run holds: the columns that can show it, the first there being used."""
+class RunKind:
+    """Kind of a run, and the columns that may be constant in it; the first available column is used."""
 
     name: str
-    held: tuple[str, ...]
+    constant_columns: tuple[str, ...]
 
 
-ISOBARIC = Kind("isobaric", ("pressure",))
-ISOMETRIC = Kind("isometric", ("contraction", "length", "position"))
-ISOTONIC = Kind("isotonic", ("force",))
-AT_REST = Kind("at rest", ())
-FREE = Kind("free", ())
+ISOBARIC = RunKind("isobaric", ("pressure",))
+ISOMETRIC = RunKind("isometric", ("contraction", "length", "position"))
+ISOTONIC = RunKind("isotonic", ("force",))
+AT_REST = RunKind("at rest", ())
+FREE = RunKind("free", ())
 KINDS = (ISOBARIC, ISOMETRIC, ISOTONIC)
-"""The kinds of run that hold one quantity; AT_REST holds all that was measured, FREE none."""
+"""The kinds of run with one constant quantity; in AT_REST all measured quantities are constant, in FREE none."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """Rows of one kind; `column` is held at `value` [SI], `swept` are the columns that change."""
+    """Rows of one kind of run: `constant_column` stays at `constant_value` [SI] while `swept_columns` change."""
 
-    stretch: Interval
-    kind: Kind
-    column: str | None
-    value: float | None
-    swept: tuple[str, ...]
+    interval: Interval
+    kind: RunKind
+    constant_column: str | None
+    constant_value: float | None
+    swept_columns: tuple[str, ...]
 
 
-def find_runs(recording: Recording, sensed: Mapping[str, Sensor] | None = None) -> tuple[Run, ...]:
-    """The runs of a recording; one of kind FREE where nothing is held, none of an empty recording."""
+def find_runs(recording: Recording, sensors: Mapping[str, Sensor] | None = None) -> tuple[Run, ...]:
+    """The runs of a recording; one run of kind FREE if no quantity is constant, none for an empty recording."""
     if not len(recording):
         return ()
-    bands = _bands(recording, sensed or estimate_sensors(recording))
-    whole = _run(recording, Interval(0, len(recording)), bands)
+    bands = _constant_bands(recording, sensors or estimate_sensors(recording))
+    whole = _classify(recording, Interval(0, len(recording)), bands)
     if whole.kind is not FREE:
         return (whole,)
-    split = [found for kind in KINDS if (found := _levels(recording, kind, bands))]
-    return max(split, key=lambda found: sum(len(run.stretch) for run in found), default=(whole,))
+    candidates = [runs for kind in KINDS if (runs := _runs_at_levels(recording, kind, bands))]
+    return max(candidates, key=lambda runs: sum(len(run.interval) for run in runs), default=(whole,))
 
 
-def _column(recording: Recording, kind: Kind) -> str | None:
-    return next((name for name in kind.held if name in recording), None)
+def _column(recording: Recording, kind: RunKind) -> str | None:
+    return next((name for name in kind.constant_columns if name in recording), None)
 
 
-def _bands(recording: Recording, sensed: Mapping[str, Sensor]) -> dict[str, float]:
-    """The width within which each measured quantity counts as held."""
-    deviations = {name: sensor.deviation for name, sensor in sensed.items()}
+def _constant_bands(recording: Recording, sensors: Mapping[str, Sensor]) -> dict[str, float]:
+    """The width of the band within which each measured quantity counts as constant [SI]."""
+    stds = {name: sensor.std for name, sensor in sensors.items()}
     return {
-        name: max(_least_band(recording, name), 8.0 * deviations.get(name, 0.0))
+        name: max(_min_band(recording, name), 8.0 * stds.get(name, 0.0))
         for kind in KINDS
         if (name := _column(recording, kind))
     }
 
 
-def _least_band(recording: Recording, name: str) -> float:
+def _min_band(recording: Recording, name: str) -> float:
     if name == "contraction":
-        return STROKE
-    greatest = float(np.max(np.abs(recording[name])))
-    return greatest * (STROKE if name == "length" else BAND)
+        return CONTRACTION_BAND
+    maximum = float(np.max(np.abs(recording[name])))
+    return maximum * (CONTRACTION_BAND if name == "length" else RELATIVE_BAND)
 
 
-def _run(recording: Recording, stretch: Interval, bands: dict[str, float]) -> Run:
-    """The run that a stretch is. Where two quantities are held, the pressure names it before length and force."""
+def _classify(recording: Recording, interval: Interval, bands: dict[str, float]) -> Run:
+    """The run in an interval. Of several constant quantities, pressure takes precedence, then length, then force."""
     names = {kind: name for kind in KINDS if (name := _column(recording, kind))}
-    held = [kind for kind, name in names.items() if _spread(recording[name][stretch.rows]) <= bands[name]]
-    swept = tuple(name for kind, name in names.items() if kind not in held)
-    if not held or (len(names) == 1 and swept):
-        return Run(stretch, FREE, None, None, swept)
+    constant = [kind for kind, name in names.items() if _spread(recording[name][interval.rows]) <= bands[name]]
+    swept = tuple(name for kind, name in names.items() if kind not in constant)
+    if not constant or (len(names) == 1 and swept):
+        return Run(interval, FREE, None, None, swept)
     if not swept:
-        return Run(stretch, AT_REST, None, None, ())
-    return _held(recording, stretch, held[0], names[held[0]], swept)
+        return Run(interval, AT_REST, None, None, ())
+    return _constant_run(recording, interval, constant[0], names[constant[0]], swept)
 
 
-def _held(recording: Recording, stretch: Interval, kind: Kind, name: str, swept: tuple[str, ...]) -> Run:
-    return Run(stretch, kind, name, float(np.median(recording[name][stretch.rows])), swept)
+def _constant_run(recording: Recording, interval: Interval, kind: RunKind, name: str, swept: tuple[str, ...]) -> Run:
+    return Run(interval, kind, name, float(np.median(recording[name][interval.rows])), swept)
 
 
 def _spread(values: Array) -> float:
-    """The width that holds all but one in fifty of the values: a single glitch does not end a run."""
+    """The width of the band that contains 98 % of the values, so that a single outlier does not end a run."""
     low, high = np.quantile(values, [0.01, 0.99])
     return float(high - low)
 
 
-def _levels(recording: Recording, kind: Kind, bands: dict[str, float]) -> tuple[Run, ...]:
-    """The runs in which one kind's quantity stays on a level while another sweeps."""
+def _runs_at_levels(recording: Recording, kind: RunKind, bands: dict[str, float]) -> tuple[Run, ...]:
+    """The runs in which the quantity of one kind stays at a level while another quantity is swept."""
     name = _column(recording, kind)
     if name is None:
         return ()
-    found = []
-    for stretch in level_stretches(recording[name], bands[name]):
+    runs = []
+    for interval in level_intervals(recording[name], bands[name]):
         swept = tuple(
             other
             for other, band in bands.items()
-            if other != name and _spread(recording[other][stretch.rows]) > max(band, _sweep(recording, other))
+            if other != name and _spread(recording[other][interval.rows]) > max(band, _min_sweep(recording, other))
         )
-        if len(stretch) >= FEWEST and swept:
-            found.append(_held(recording, stretch, kind, name, swept))
-    return tuple(found)
+        if len(interval) >= MIN_ROWS and swept:
+            runs.append(_constant_run(recording, interval, kind, name, swept))
+    return tuple(runs)
 
 
-def _sweep(recording: Recording, name: str) -> float:
-    """The change from which on a quantity is swept: a part of its range in the whole recording."""
-    return SWEEP * float(np.ptp(recording[name]))
+def _min_sweep(recording: Recording, name: str) -> float:
+    """The minimum change of a swept quantity [SI], from its range in the whole recording."""
+    return SWEEP_FRACTION * float(np.ptp(recording[name]))

@@ -1,4 +1,4 @@
-"""When the rows of a recording were taken: rate, jitter, gaps, and stamps that repeat or run backwards."""
+"""Sampling of a recording: sample time, jitter, gaps, and times that repeat or decrease."""
 
 from __future__ import annotations
 
@@ -10,64 +10,66 @@ import numpy.typing as npt
 from ...core.arrays import Array
 from ..recording import Recording
 
-LONG = 5.0
-"""A step in time is a gap where it is this many times the usual one (chosen)."""
+GAP_FACTOR = 5.0
+"""A time step longer than this multiple of the sample time is a gap (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Gap:
-    """No rows were taken between row `row` and the next, from `start` [s] for `length` [s]."""
+    """A gap between row `row` and the next row, from `start` [s], of length `duration` [s]."""
 
     row: int
     start: float
-    length: float
+    duration: float
 
 
 @dataclasses.dataclass(frozen=True)
 class Sampling:
-    """Rows, seconds from first to last, usual step [s], jitter as a part of it, and where time goes wrong.
+    """Number of rows, duration [s], sample time (median step) [s], jitter as a fraction of it, and irregularities.
 
-    Rows are counted from 0; `repeats` and `backward` are rows whose time equals, or lies before, the one before.
+    Rows are counted from 0; the time of `repeated_rows` equals, and that of `backward_rows` precedes, the time of the
+    previous row.
     """
 
     rows: int
     duration: float
-    step: float
+    sample_time: float
     jitter: float
     gaps: tuple[Gap, ...] = ()
-    repeats: tuple[int, ...] = ()
-    backward: tuple[int, ...] = ()
+    repeated_rows: tuple[int, ...] = ()
+    backward_rows: tuple[int, ...] = ()
 
     @property
     def rate(self) -> float:
-        """Usual rows per second."""
-        return 1.0 / self.step if self.step > 0 else float("nan")
+        """Sampling rate [1/s]."""
+        return 1.0 / self.sample_time if self.sample_time > 0 else float("nan")
 
 
 def analyse_sampling(recording: Recording) -> Sampling | None:
-    """The sampling of a recording; None where it has no time, or fewer than two rows."""
+    """The sampling of a recording; None without time or with fewer than two rows."""
     if "time" not in recording or len(recording) < 2:
         return None
     time = recording["time"]
     steps = np.diff(time)
     forward = steps[steps > 0]
-    usual = float(np.median(forward)) if forward.size else 0.0
-    spread = 1.4826 * float(np.median(np.abs(forward - usual))) / usual if usual else 0.0
-    gaps = tuple(Gap(int(i), float(time[i]), float(steps[i])) for i in np.flatnonzero(steps > LONG * usual))
+    sample_time = float(np.median(forward)) if forward.size else 0.0
+    jitter = 1.4826 * float(np.median(np.abs(forward - sample_time))) / sample_time if sample_time else 0.0
+    gap_rows = np.flatnonzero(steps > GAP_FACTOR * sample_time)
+    gaps = tuple(Gap(int(i), float(time[i]), float(steps[i])) for i in gap_rows)
     return Sampling(
-        len(recording), float(time.max() - time.min()), usual, spread, gaps if usual else (),
+        len(recording), float(time.max() - time.min()), sample_time, jitter, gaps if sample_time else (),
         _rows(steps == 0), _rows(steps < 0),
     )  # fmt: skip
 
 
-def _rows(wrong: npt.NDArray[np.bool_]) -> tuple[int, ...]:
-    return tuple(int(i) + 1 for i in np.flatnonzero(wrong))
+def _rows(irregular_steps: npt.NDArray[np.bool_]) -> tuple[int, ...]:
+    return tuple(int(i) + 1 for i in np.flatnonzero(irregular_steps))
 
 
-def row_count(seconds: float, time: Array | None, least: int) -> int:
-    """How many rows a span of time holds, `least` where there is no time or the rows are far apart."""
+def count_rows(seconds: float, time: Array | None, min_rows: int) -> int:
+    """The number of rows in a time span; `min_rows` without time or if the rows are far apart."""
     if time is None or len(time) < 2:
-        return least
+        return min_rows
     steps = np.diff(time)
-    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-    return max(least, round(seconds / usual)) if usual else least
+    sample_time = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    return max(min_rows, round(seconds / sample_time)) if sample_time else min_rows

@@ -63,9 +63,7 @@ class BatchJob:
     def run_single(self, index: int) -> None:
         """Simulate one plant alone, exactly as `simulate` would, and write its results."""
         one = self.compiled.at(self.variations.parameters(index), self.nominal[index])
-        raw = self.integrator.run(
-            one, self.segments[index], self.start_time, self.initial_states[index], self.times
-        )
+        raw = self.integrator.run(one, self.segments[index], self.start_time, self.initial_states[index], self.times)
         self._write(index, one, self._truncate(raw))
 
     def _truncate(self, raw: RawSolution) -> RawSolution:

@@ -161,7 +161,9 @@ def variations_of(system: System, given: Mapping[str, npt.ArrayLike], count: int
         raise ParameterError(f"variations: every column needs one value per plant; there are {sizes}{others}.")
     count = next(iter(sizes.values()), count)
     if count is None:
-        raise ParameterError("simulate_batch: nothing varies; give variations, initial states or inputs, or use simulate.")
+        raise ParameterError(
+            "simulate_batch: nothing varies; give variations, initial states or inputs, or use simulate."
+        )
     if count == 0:
         raise ParameterError("simulate_batch: there are no plants; give at least one row.")
     table = np.column_stack(columns) if columns else np.empty((count, 0))
@@ -175,7 +177,9 @@ def _column(leaf: tree.Leaf, given: npt.ArrayLike) -> Array:
     try:
         values = np.array(given, dtype=float)
     except (TypeError, ValueError):
-        raise ParameterError(f"variations: '{leaf.path}' must be numbers, one for each plant; it is {str(given)[:80]}.") from None
+        raise ParameterError(
+            f"variations: '{leaf.path}' must be numbers, one for each plant; it is {str(given)[:80]}."
+        ) from None
     if values.ndim != 1:
         raise ParameterError(
             f"variations: '{leaf.path}' must be a column (N,), one value per plant; its shape is {values.shape}."

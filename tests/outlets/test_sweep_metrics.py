@@ -1,7 +1,7 @@
-"""Outcomes are the numbers that a reader would measure on the curve.
+"""Metrics of a curve, compared with closed forms.
 
-Held against what is known in closed form: straight lines (to rounding), and the step response of a second-order system
-with damping ratio zeta (overshoot exp(-pi zeta / sqrt(1 - zeta^2)), Ogata, Modern Control Engineering, 5.3).
+The references are straight lines (exact up to rounding) and the step response of a second-order system with damping
+ratio zeta (overshoot exp(-pi zeta / sqrt(1 - zeta^2)), Ogata, Modern Control Engineering, 5.3).
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from airmuscle.study.metrics import (
 
 TIME = np.linspace(0.0, 2.0, 21)
 RAMP = 3.0 * TIME - 1.0
-"""From -1 to 5 on a straight line."""
+"""A straight line from -1 to 5."""
 
 
 @pytest.mark.parametrize(
-    ("outcome", "expected"),
+    ("metric", "expected"),
     [
         (Final("x"), 5.0),
         (Final("x", end=1.03), 2.09),
@@ -53,21 +53,21 @@ RAMP = 3.0 * TIME - 1.0
         (SettlingTime("x", band=0.1, begin=1.0), 0.9),
     ],
 )
-def test_on_a_straight_line(outcome, expected):
-    assert outcome.number(TIME, RAMP) == pytest.approx(expected, rel=1e-12, abs=1e-12)
+def test_on_a_straight_line(metric, expected):
+    assert metric.value(TIME, RAMP) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
-def test_what_a_run_does_not_have_is_not_a_number():
-    assert math.isnan(TimeToReach("x", 5.1).number(TIME, RAMP))
-    assert math.isnan(Final("x", begin=2.5).number(TIME, RAMP))
-    assert math.isnan(Overshoot("x").number(TIME, np.ones_like(TIME)))
-    assert SettlingTime("x").number(TIME, np.ones_like(TIME)) == 0.0
-    assert math.isnan(SettlingTime("x").number(TIME, np.sin(np.pi * TIME) * (TIME < 2)))  # it comes back to its start
+def test_a_missing_metric_is_nan():
+    assert math.isnan(TimeToReach("x", 5.1).value(TIME, RAMP))
+    assert math.isnan(Final("x", begin=2.5).value(TIME, RAMP))
+    assert math.isnan(Overshoot("x").value(TIME, np.ones_like(TIME)))
+    assert SettlingTime("x").value(TIME, np.ones_like(TIME)) == 0.0
+    assert math.isnan(SettlingTime("x").value(TIME, np.sin(np.pi * TIME) * (TIME < 2)))  # it comes back to its start
 
 
 def test_a_falling_column_reaches_its_level_too():
-    assert TimeToReach("x", 0.5).number(TIME, -RAMP) == pytest.approx(1 / 6)
-    assert SettlingTime("x").number(TIME, -RAMP) == pytest.approx(1.96)
+    assert TimeToReach("x", 0.5).value(TIME, -RAMP) == pytest.approx(1 / 6)
+    assert SettlingTime("x").value(TIME, -RAMP) == pytest.approx(1.96)
 
 
 @pytest.mark.parametrize("zeta", [0.2, 0.5, 0.7])
@@ -77,8 +77,8 @@ def test_the_step_response_of_second_order(zeta, sign):
     damped = math.sqrt(1 - zeta**2)
     envelope = np.exp(-zeta * t)
     y = sign * (1.0 - envelope * (np.cos(damped * t) + zeta / damped * np.sin(damped * t))) + 7.0
-    assert Overshoot("y").number(t, y) == pytest.approx(math.exp(-math.pi * zeta / damped), rel=1e-4)
-    settled = SettlingTime("y", band=0.05).number(t, y)
+    assert Overshoot("y").value(t, y) == pytest.approx(math.exp(-math.pi * zeta / damped), rel=1e-4)
+    settled = SettlingTime("y", band=0.05).value(t, y)
     away = np.abs(y - y[-1]) / abs(sign)
     assert away[t > settled + 1e-3].max() <= 0.05
     assert away[t < settled].max() > 0.05
@@ -87,29 +87,29 @@ def test_the_step_response_of_second_order(zeta, sign):
 
 @settings(deadline=None)
 @given(arrays(float, 12, elements=st.floats(-1e3, 1e3)), st.floats(0.1, 10), st.floats(-100, 100))
-def test_numbers_turn_with_the_scale_and_shift_of_their_column(values, factor, shift):
+def test_metrics_scale_and_shift_with_their_column(values, factor, shift):
     time = np.linspace(0.0, 1.0, 12)
-    for outcome in (Final("x"), Maximum("x"), Minimum("x"), Mean("x")):
-        expected = factor * outcome.number(time, values) + shift
-        assert outcome.number(time, factor * values + shift) == pytest.approx(expected, rel=1e-9, abs=1e-6)
-    low, mean, high = (o.number(time, values) for o in (Minimum("x"), Mean("x"), Maximum("x")))
+    for metric in (Final("x"), Maximum("x"), Minimum("x"), Mean("x")):
+        expected = factor * metric.value(time, values) + shift
+        assert metric.value(time, factor * values + shift) == pytest.approx(expected, rel=1e-9, abs=1e-6)
+    low, mean, high = (o.value(time, values) for o in (Minimum("x"), Mean("x"), Maximum("x")))
     assert low - 1e-9 <= mean <= high + 1e-9
-    assert abs(mean) - 1e-9 <= RootMeanSquare("x").number(time, values) <= max(-low, high) + 1e-9
+    assert abs(mean) - 1e-9 <= RootMeanSquare("x").value(time, values) <= max(-low, high) + 1e-9
 
 
 @settings(deadline=None)
 @given(st.floats(0.0, 0.95), st.floats(0.01, 1.0))
-def test_a_window_ends_where_it_says_wherever_the_rows_are(begin, length):
+def test_the_window_does_not_depend_on_the_rows(begin, length):
     end = begin + length
-    coarse = Mean("x", begin=begin, end=end).number(TIME, RAMP)
+    coarse = Mean("x", begin=begin, end=end).value(TIME, RAMP)
     assert coarse == pytest.approx(3.0 * (begin + min(end, 2.0)) / 2.0 - 1.0, abs=1e-9)
 
 
-def test_a_course_stands_on_its_instants():
-    course = TimeSeries("x", 0.25, begin=0.5).within(0.0, 2.0)
-    assert course.instants == pytest.approx([0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0])
-    assert course.rows(TIME, RAMP) == pytest.approx(3.0 * course.instants - 1.0)
-    half = course.rows(TIME[:11], RAMP[:11])
+def test_a_time_series_is_sampled_at_its_times():
+    series = TimeSeries("x", 0.25, begin=0.5).clip_to_run(0.0, 2.0)
+    assert series.times == pytest.approx([0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0])
+    assert series.sample(TIME, RAMP) == pytest.approx(3.0 * series.times - 1.0)
+    half = series.sample(TIME[:11], RAMP[:11])
     assert np.isfinite(half[:3]).all()
     assert np.isnan(half[3:]).all()
 
@@ -119,8 +119,8 @@ def test_units_follow_from_the_column():
         (Final("p"), "Pa"), (RootMeanSquare("p"), "Pa"), (TimeToReach("p", 1.0), "s"), (Overshoot("p"), "1"),
         (SettlingTime("p"), "s"), (TimeSeries("p", 0.1), "Pa"),
     ]  # fmt: skip
-    for outcome, unit in found:
-        assert outcome.unit("Pa") == unit
+    for metric, unit in found:
+        assert metric.unit("Pa") == unit
 
 
 @pytest.mark.parametrize(
@@ -129,11 +129,11 @@ def test_units_follow_from_the_column():
         (lambda: Final("x", begin=1.0, end=1.0), "its end must be later than its begin"),
         (lambda: Final("x", begin=math.nan), "its end must be later than its begin"),
         (lambda: TimeToReach("x", math.inf), "it must be finite"),
-        (lambda: SettlingTime("x", band=0.0), "it must lie between 0 and 1"),
+        (lambda: SettlingTime("x", band=0.0), "it must be between 0 and 1"),
         (lambda: TimeSeries("x", 0.0), "it must be positive and finite"),
-        (lambda: TimeSeries("x", 1e-9).within(0.0, 1.0), "2 to 1000000 instants"),
+        (lambda: TimeSeries("x", 1e-9).clip_to_run(0.0, 1.0), "2 to 1000000 samples"),
     ],
 )
-def test_what_cannot_be_is_refused(make, message):
+def test_an_invalid_metric_is_rejected(make, message):
     with pytest.raises(ParameterError, match=message):
         make()

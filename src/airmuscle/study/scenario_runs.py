@@ -1,4 +1,4 @@
-"""The one seam to the dynamics: scenarios are carried through time, and each gives a run or a reason."""
+"""Simulation of scenarios: the interface between studies and the dynamics."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from ..scenario.scenario import Scenario
 from ..simulation import simulate
 from ..simulation.output_times import output_times
 
-REFUSALS = (AirmuscleError, ArithmeticError, ValueError)
-"""What one run of many may end by, from values that nobody foresaw, without ending the others."""
+RUN_ERRORS = (AirmuscleError, ArithmeticError, ValueError)
+"""Exceptions that fail a single run, without ending the study."""
 
 
-def simulate_all(scenarios: Sequence[Scenario], instants: Array) -> Iterator[Recording | str]:
-    """The runs of the scenarios in order, with rows at these instants [s] too; the reason in words where one fails.
+def simulate_all(scenarios: Sequence[Scenario], times: Array) -> Iterator[Recording | str]:
+    """Simulate scenarios in order, with additional rows at `times` [s]; yield the reason (text) of a failed run.
 
-    A run that the user interrupts raises KeyboardInterrupt.
+    Raises KeyboardInterrupt if the user interrupts a run.
     """
     for scenario in scenarios:
         try:
@@ -31,22 +31,22 @@ def simulate_all(scenarios: Sequence[Scenario], instants: Array) -> Iterator[Rec
                 initial_state=scenario.start,
                 start_time=scenario.start_time,
                 integrator=scenario.method,
-                output_times=_rows(scenario, instants),
+                output_times=_output_times(scenario, times),
             )
-        except REFUSALS as error:
+        except RUN_ERRORS as error:
             if isinstance(error, SimulationError) and error.interrupted:
                 raise KeyboardInterrupt from None
-            yield reason(error)
+            yield failure_reason(error)
 
 
-def reason(error: Exception) -> str:
-    """Why a run failed, on one line."""
+def failure_reason(error: Exception) -> str:
+    """The reason of a failed run, on one line."""
     kind = "" if isinstance(error, AirmuscleError) else f"{type(error).__name__}: "
     return f"{kind}{' '.join(str(error).split())}"
 
 
-def _rows(scenario: Scenario, instants: Array) -> Array:
-    """The scenario's own rows, and the instants that lie within the run."""
+def _output_times(scenario: Scenario, times: Array) -> Array:
+    """The output times of the scenario and those of `times` that lie within the run [s]."""
     end = scenario.start_time + scenario.duration
-    within = instants[(instants >= scenario.start_time) & (instants < end)]
+    within = times[(times >= scenario.start_time) & (times < end)]
     return output_times(scenario.output, scenario.start_time, scenario.duration, np.append(within, end))

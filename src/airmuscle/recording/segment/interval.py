@@ -1,4 +1,4 @@
-"""Stretches of rows in which a quantity stays within a band."""
+"""Intervals of consecutive rows in which a quantity stays within a band."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Mask = npt.NDArray[np.bool_]
 
 @dataclasses.dataclass(frozen=True)
 class Interval:
-    """Rows `start` to before `stop`, counted from 0."""
+    """Rows from `start` up to, but not including, `stop`, counted from 0."""
 
     start: int
     stop: int
@@ -25,28 +25,28 @@ class Interval:
 
     @property
     def rows(self) -> slice:
-        """The rows as a slice, to index columns and Recording.rows with."""
+        """The rows as a slice, to index columns or for Recording.rows."""
         return slice(self.start, self.stop)
 
 
-def true_stretches(mask: Mask) -> list[Interval]:
-    """The stretches in which a mask is true."""
+def true_intervals(mask: Mask) -> list[Interval]:
+    """The intervals in which a mask is true."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
     return [Interval(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def level_stretches(values: Array, band: float, *, within: Interval | None = None) -> Iterator[Interval]:
-    """The longest stretches, from the front, whose values all fit into a band of this width."""
+def level_intervals(values: Array, band: float, *, within: Interval | None = None) -> Iterator[Interval]:
+    """Consecutive intervals, each as long as possible, whose values fit into a band of width `band`."""
     whole = within or Interval(0, len(values))
     start = whole.start
     while start < whole.stop:
-        stop = _leaves_band(values[: whole.stop], start, band)
+        stop = _first_row_outside(values[: whole.stop], start, band)
         yield Interval(start, stop)
         start = stop
 
 
-def _leaves_band(values: Array, start: int, band: float) -> int:
-    """The first row from `start` on with which the values no longer fit; looked for in windows that double."""
+def _first_row_outside(values: Array, start: int, band: float) -> int:
+    """The first row after `start` that does not fit into the band, searched in windows of doubling size."""
     size = 64
     while True:
         window = values[start : start + size]
@@ -59,7 +59,7 @@ def _leaves_band(values: Array, start: int, band: float) -> int:
 
 
 def running_median(values: Array, width: int) -> Array:
-    """The median over `width` rows around each, an odd number; the ends see the rows that there are."""
+    """The centred moving median over `width` rows (an odd number); windows are shorter at both ends."""
     if width < 3 or len(values) < 3:
         return values
     import pandas as pd

@@ -1,4 +1,4 @@
-"""What a report shows of a loop: set points beside measurements, and the controller's numbers with their units."""
+"""Closed-loop tracking in a report: set points and measurements, and the parameters of the controller."""
 
 from __future__ import annotations
 
@@ -12,37 +12,37 @@ from ..control.controller import relative_unit
 from ..control.piecewise_linear import PiecewiseLinear
 from ..core.plotting import BLACK, BLUE, legend_below, new_figure
 from ..recording import Recording
-from ..recording.plot import scale
-from ..scenario.scenario import Scenario, units_of_run
+from ..recording.display_units import display_scale
+from ..scenario.scenario import Scenario, run_column_units
 from .chapter import Plot, Table
 from .parameters import parameter_table
 
 
 def loop_plot(scenario: Scenario, loop: ControlLoop, recording: Recording) -> Plot:
-    """Every set point as it was given, with its jumps, and the column that is to follow it."""
+    """Return the plot of the set points, with their steps, and of the controlled variables."""
     names = list(dict.fromkeys((*loop.controller.setpoints, *loop.controller.measured_columns)))
-    units = units_of_run(scenario.plant, scenario.start, loop)
+    units = run_column_units(scenario.plant, scenario.start, loop)
     start, time = scenario.start_time, recording["time"]
     end = float(time[-1]) if time[-1] > start else start + scenario.duration
-    given = loop.setpoint.segments(loop.controller.setpoints, start, end - start)
+    setpoints = loop.setpoint.segments(loop.controller.setpoints, start, end - start)
     figure, axes = new_figure(len(names), 1, height=0.9 + 1.9 * len(names), sharex=True, squeeze=False)
     for name, axis in zip(names, axes[:, 0], strict=True):
-        factor, shown = scale(name)
-        unit = shown or units.get(name, "")
+        factor, display_unit = display_scale(name)
+        unit = display_unit or units.get(name, "")
         if name in recording:
             axis.plot(time, recording[name] * factor, color=BLUE, label="measured")
         if name in loop.controller.setpoints:
-            across, along = corners(given, start, loop.controller.setpoints.index(name))
-            axis.plot(across, along * factor, color=BLACK, linestyle="--", linewidth=0.9, label="set point")
+            instants, values = segment_vertices(setpoints, start, loop.controller.setpoints.index(name))
+            axis.plot(instants, values * factor, color=BLACK, linestyle="--", linewidth=0.9, label="set point")
         axis.set_ylabel(f"{name}\n[{unit}]" if unit else name)
     axes[-1, 0].set_xlabel("time [s]")
     figure.align_ylabels()
     legend_below(figure, axes[0, 0])
-    return Plot("loop", f"Set point and measurement; the controller looks every {loop.period:g} s.", figure)
+    return Plot("loop", f"Set points and measurements; sample time of the controller {loop.period:g} s.", figure)
 
 
-def corners(segments: PiecewiseLinear, start: float, i: int) -> tuple[Any, Any]:
-    """Times and values at both ends of every piece, so that a jump is drawn upright."""
+def segment_vertices(segments: PiecewiseLinear, start: float, i: int) -> tuple[Any, Any]:
+    """Return times [s] and values at both ends of every segment, so that steps are drawn as vertical lines."""
     starts = segments.starts(start)
     first = segments.values[:, i]
     last = first + segments.slopes[:, i] * (segments.ends - starts)
@@ -50,12 +50,12 @@ def corners(segments: PiecewiseLinear, start: float, i: int) -> tuple[Any, Any]:
 
 
 def controller_table(scenario: Scenario, loop: ControlLoop) -> Table:
-    """The numbers of a controller, in the units that follow from what it measures and commands."""
-    units = units_of_run(scenario.plant, scenario.start, loop)
+    """Return the parameters of a controller, in the units that follow from its measurement and manipulated input."""
+    units = run_column_units(scenario.plant, scenario.start, loop)
     y, u = (units.get(names[0]) or "1" for names in (loop.controller.measured_columns, loop.controller.inputs))
     table = parameter_table(
         loop.controller, "controller", f"Parameters of the controller, {type(loop.controller).__name__}"
     )
     resolved = [relative_unit(str(unit), y, u) for unit in table.columns["unit"]]
-    shown: list[Any] = ["" if unit == "1" else unit for unit in resolved]
-    return dataclasses.replace(table, columns={**table.columns, "unit": shown})
+    display_units: list[Any] = ["" if unit == "1" else unit for unit in resolved]
+    return dataclasses.replace(table, columns={**table.columns, "unit": display_units})

@@ -1,4 +1,4 @@
-"""Flow of air through a valve after ISO 6358-1:2013, with subsonic index and cracking pressure."""
+"""Valve flow after ISO 6358-1:2013, with subsonic index and cracking pressure."""
 
 from __future__ import annotations
 
@@ -19,28 +19,29 @@ ISO6358_2013 = Reference(
     "ISO 6358-1",
     2013,
     note="terms: sonic conductance C, critical back-pressure ratio b, subsonic index m, cracking pressure; the formula "
-    "with the cracking pressure is second hand: the text of its clause was not at hand",
+    "with the cracking pressure is from a secondary source, the standard itself was not available",
 )
 
-_TINY = 1e-9
-"""Floor under the base of the power [1]: where the chord rules, the slope of the power must stay finite."""
+_MIN_BASE = 1e-9
+"""Lower bound of the base of the power, which keeps its derivative finite where the chord applies."""
 
 
 @model
-class IndexedValve(Orifice):
-    """A valve with sonic conductance C, critical pressure ratio b, subsonic index m and cracking pressure dp_c.
+class SubsonicIndexValve(Orifice):
+    """Valve with sonic conductance C, critical pressure ratio b, subsonic index m and cracking pressure dp_c.
 
         qm = C rho0 p1 sqrt(T0/T1) phi
         phi = 1                                                       choked, p2/p1 <= b
         phi = (1 - ((p2/p1 - b)/(1 - b - dp_c/p1))^2)^m               subsonic
         phi = k (p1 - p2 - dp_c)/p1                                   within (1 - r) p1 above the cracking pressure
-        phi = 0                                                       shut, p1 - p2 <= dp_c
+        phi = 0                                                       closed, p1 - p2 <= dp_c
 
-    p1 the larger, p2 the smaller absolute pressure; the flow takes the sign of their difference, and the cracking
-    pressure holds in either direction (a CheckValve around it passes one way only). With m = 0.5 and dp_c = 0 this
-    is Valve. Where the cracking pressure takes up all of the subsonic range, 1 - b - dp_c/p1 < 1 - r, the standard's
-    formula would jump: the flow then rises to the choked one within (1 - r) p1. m is at most 1, beyond which the
-    laminar chord would not lie below the curve. Reference: ISO 6358-1:2013, second hand.
+    p1 larger, p2 smaller absolute pressure; the sign of the flow is that of their difference. The cracking pressure
+    applies in both directions (for one direction only, use CheckValve around this valve). With m = 0.5 and dp_c = 0 the
+    law is that of Valve. Where the cracking pressure covers the whole subsonic range, 1 - b - dp_c/p1 < 1 - r, the
+    formula of the standard is discontinuous; here the flow then increases to the choked flow within (1 - r) p1. m is
+    limited to 1, above which the laminar chord would lie above the curve. Reference: ISO 6358-1:2013, from a secondary
+    source.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (ISO6358_2013,)
@@ -58,18 +59,19 @@ class IndexedValve(Orifice):
     def mass_flow(self, upstream: Value, downstream: Value, opening: Value, temperature: Value) -> Value:
         """Mass flow [kg/s] from absolute pressure `upstream` to `downstream` [Pa] of air at `temperature` [K].
 
-        `opening` scales the conductance, 0 shut to 1 fully open; the flow is negative when it reverses.
+        `opening` scales the conductance from 0 (closed) to 1 (fully open). A reversed flow is negative.
         """
         high, low = ops.maximum(upstream, downstream), ops.minimum(upstream, downstream)
         chord_range = (1.0 - self.laminar_ratio) * high
         subsonic_range = ops.maximum((1.0 - self.critical_ratio) * high - self.cracking_pressure, chord_range)
-        # How far open the difference is on its way from cracking (0) to choke (1); the standard's bracket is 1 - this.
-        way = ops.clip((high - low - self.cracking_pressure) / subsonic_range, 0.0, 1.0)
+        # Normalised pressure difference from cracking (0) to choking (1); the bracket of the standard is 1 minus this.
+        difference = ops.clip((high - low - self.cracking_pressure) / subsonic_range, 0.0, 1.0)
         laminar_end = chord_range / subsonic_range
-        flow = high * ops.minimum(self._fraction(way), self._fraction(laminar_end) * (way / laminar_end))
+        chord = self._fraction(laminar_end) * (difference / laminar_end)
+        flow = high * ops.minimum(self._fraction(difference), chord)
         scale = self.conductance * REFERENCE_DENSITY * ops.sqrt(REFERENCE_TEMPERATURE / temperature)
         return opening * scale * ops.where(upstream >= downstream, flow, -flow)
 
-    def _fraction(self, way: Value) -> Value:
-        """Share of the choked flow, (1 - (1 - way)^2)^m."""
-        return ops.maximum(way * (2.0 - way), _TINY) ** self.subsonic_index
+    def _fraction(self, difference: Value) -> Value:
+        """Fraction of the choked flow, (1 - (1 - difference)^2)^m."""
+        return ops.maximum(difference * (2.0 - difference), _MIN_BASE) ** self.subsonic_index

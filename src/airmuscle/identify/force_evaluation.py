@@ -1,0 +1,43 @@
+"""Force of a law in any form: force laws directly, contraction and pressure laws by inversion on a grid of forces."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..characteristic.base import ContractionLaw, ForceLaw
+from ..core.arrays import Array
+
+FORCE_GRID_POINTS = 801
+"""Grid points between zero and the maximum force; the law is interpolated linearly between them."""
+
+
+def evaluate_force(law: Any, pressure: Array, contraction: Array, max_force: float) -> Array:
+    """Forces [N] at N points, shape (N,), defined at every point so that all laws are compared on the same rows.
+
+    `max_force` [N] limits the force of laws that give contraction or pressure. Where such a law needs a higher
+    pressure at zero load than is applied, the muscle is slack and the force is 0.
+    """
+    with np.errstate(all="ignore"):
+        if isinstance(law, ForceLaw):
+            force = np.asarray(law.force(pressure, contraction), dtype=float) + np.zeros(pressure.size)
+        else:
+            force = _invert_on_grid(law, pressure, contraction, max_force)
+    return np.asarray(np.nan_to_num(force, nan=0.0, posinf=max_force, neginf=-max_force))
+
+
+def _invert_on_grid(law: Any, pressure: Array, contraction: Array, max_force: float) -> Array:
+    forces = np.linspace(0.0, max_force, FORCE_GRID_POINTS)
+    if isinstance(law, ContractionLaw):
+        deficit = contraction[:, None] - np.asarray(law.contraction(pressure[:, None], forces))
+    else:
+        deficit = np.asarray(law.pressure(contraction[:, None], forces)) - pressure[:, None]
+    crossed = np.asarray(deficit >= 0)
+    first = np.where(crossed.any(axis=1), crossed.argmax(axis=1), FORCE_GRID_POINTS - 1)
+    rows = np.arange(pressure.size)
+    previous = np.maximum(first - 1, 0)
+    high, low = deficit[rows, first], deficit[rows, previous]
+    with np.errstate(all="ignore"):
+        fraction = np.where((first > 0) & crossed.any(axis=1), -low / (high - low), 1.0)
+    return np.asarray(np.where(first == 0, 0.0, forces[previous] + fraction * (forces[first] - forces[previous])))

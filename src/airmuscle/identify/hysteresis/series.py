@@ -1,0 +1,58 @@
+"""LoopSeries: path, target force and design matrix of one run of a loop."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...friction import Friction
+
+
+@dataclasses.dataclass(frozen=True)
+class Axis:
+    """The axis on which a path [m] is plotted: its label, and the factor from metres to its unit."""
+
+    label: str
+    factor: float
+
+
+MILLIMETRES = Axis("displacement [mm]", 1e3)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LoopSeries:
+    """One run of a loop as a fit of friction uses it; N rows, C coefficients of the static curve."""
+
+    origin: str
+    path: Array
+    """Displacement of the friction [m], shape (N,)."""
+    time: Array | None
+    """Time [s], shape (N,), if the recording has one."""
+    target: Array
+    """Force [N] to be explained by the static curve and the friction, shape (N,)."""
+    design_matrix: Array
+    """Columns of the static curve, shape (N, C)."""
+    fitted_rows: npt.NDArray[np.bool_]
+    """Mask of the rows whose residuals are minimised."""
+    direction: Array
+    """1 where the path rises, -1 where it falls."""
+    axis: Axis = MILLIMETRES
+
+    def coefficients(self, friction: Friction | None) -> Array:
+        """Least-squares coefficients of the static curve with this friction, or without friction; shape (C,)."""
+        target = self.target if friction is None else self.target + friction.force_along(self.path, self.time)
+        return np.asarray(
+            np.linalg.lstsq(self.design_matrix[self.fitted_rows], target[self.fitted_rows], rcond=None)[0]
+        )
+
+    def residuals(self, friction: Friction | None, coefficients: Array) -> Array:
+        """Measured - modelled force [N] at every row, shape (N,)."""
+        difference = self.target - self.design_matrix @ coefficients
+        return difference if friction is None else difference + friction.force_along(self.path, self.time)
+
+    def fitted_residuals(self, friction: Friction | None) -> Array:
+        """Residuals [N] at the fitted rows, with the least-squares coefficients of the static curve."""
+        return self.residuals(friction, self.coefficients(friction))[self.fitted_rows]

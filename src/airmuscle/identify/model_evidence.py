@@ -1,0 +1,53 @@
+"""Model evidence: effective sample size, AICc and F test."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core.arrays import Array
+
+
+def effective_sample_size(residuals: Array) -> float:
+    """Number of independent observations equivalent to N residuals in order of time: N (1 - r)/(1 + r).
+
+    r is the lag-1 autocorrelation, limited to 0 to 0.999. Reference: Bayley and Hammersley (1946), "The 'effective'
+    number of independent observations in an autocorrelated time series", Supplement to the Journal of the Royal
+    Statistical Society 8, 184-197, for a first-order process.
+    """
+    centred = residuals - np.mean(residuals)
+    power = float(centred @ centred)
+    r = min(max(float(centred[1:] @ centred[:-1]) / power, 0.0), 0.999) if power > 0 else 0.0
+    return residuals.size * (1.0 - r) / (1.0 + r)
+
+
+def aicc(mean_square: float, sample_size: float, parameters: int) -> float:
+    """Akaike's information criterion for least squares with the correction for small samples; lower is better.
+
+    n ln(SSE/n) + 2k + 2k(k+1)/(n-k-1), where k is the number of parameters and 1 for the residual variance. Infinite
+    for n - k - 1 <= 0. Reference: Hurvich and Tsai (1989), Biometrika 76(2), 297-307.
+    """
+    k = parameters + 1
+    if sample_size - k - 1 <= 0:
+        return float("inf")
+    logarithm = float(np.log(max(mean_square, 1e-300)))
+    return sample_size * logarithm + 2.0 * k + 2.0 * k * (k + 1) / (sample_size - k - 1)
+
+
+def f_test_p_value(mean_square: float, reduced: float, sample_size: float, parameters: int, added: int) -> float:
+    """p-value of the F test for `added` parameters that lower the mean square residual from `mean_square` to `reduced`.
+
+    `parameters` is the number of parameters of the larger model. 1 without degrees of freedom or without a reduction.
+    """
+    from scipy.special import fdtrc
+
+    degrees_of_freedom = sample_size - parameters
+    if degrees_of_freedom <= 0 or added <= 0 or reduced >= mean_square:
+        return 1.0
+    if reduced <= 0:
+        return 0.0
+    return float(fdtrc(added, degrees_of_freedom, (mean_square - reduced) / added / (reduced / degrees_of_freedom)))
+
+
+def format_p_value(p: float) -> str:
+    """A p-value as text: `p < 0.001`, or two significant digits."""
+    return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"

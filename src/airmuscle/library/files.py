@@ -1,0 +1,72 @@
+"""Files of the library: folders, entry names, and reading of TOML."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import FileError, UnknownNameError, suggestion
+
+LAWS = Path(__file__).parent
+"""Folder of the muscles and laws."""
+VALVES = LAWS / "valves"
+"""Folder of the valves."""
+DATA = LAWS / "data"
+"""Folder of the data sets."""
+
+
+def list_library() -> tuple[str, ...]:
+    """Names of all entries that `load` reads: muscles, laws and valves, sorted."""
+    return tuple(sorted((*list_laws(), *list_valves())))
+
+
+def list_laws() -> tuple[str, ...]:
+    """Names of all muscles and laws, sorted."""
+    return tuple(sorted(path.stem for path in LAWS.glob("*.toml")))
+
+
+def list_valves() -> tuple[str, ...]:
+    """Names of all valves, sorted."""
+    return tuple(sorted(path.stem for path in VALVES.glob("*.toml")))
+
+
+def list_data() -> tuple[str, ...]:
+    """Names of all measured or tabulated data sets, sorted."""
+    return tuple(sorted(path.stem for path in DATA.glob("*.csv")))
+
+
+def complete_name(name: str, known: Iterable[str], kind: str) -> str:
+    """The known name that equals or uniquely begins with `name`. Raises UnknownNameError, listing the known names."""
+    known = tuple(known)
+    if name in known:
+        return name
+    matches = [candidate for candidate in known if name and candidate.startswith(name)]
+    if len(matches) > 1:
+        raise UnknownNameError(f"'{name}' is ambiguous: {', '.join(matches)}. Write more of the name.")
+    if not matches:
+        raise UnknownNameError(f"no {kind} '{name}'; there are {', '.join(known)}.{suggestion(name, known)}")
+    return matches[0]
+
+
+def is_path(name_or_path: str | Path) -> bool:
+    """Whether the argument is a path: a Path, or text with the suffix .toml or a folder separator."""
+    name = str(name_or_path)
+    return isinstance(name_or_path, Path) or name.endswith(".toml") or "/" in name or "\\" in name
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Tables of a TOML file. Raises FileError if the file cannot be read or is not valid TOML."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise FileError(f"{path}: there is no such file.") from None
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read ({error.strerror}).") from None
+    except UnicodeDecodeError as error:
+        raise FileError(f"{path}: is not UTF-8 text (byte {error.start}). Save it as UTF-8.") from None
+    except tomllib.TOMLDecodeError as error:
+        raise FileError(f"{path}: is not valid TOML: {error}.") from None
+    except (ValueError, RecursionError) as error:  # a null byte in the path, or brackets nested too deeply
+        raise FileError(f"{path}: cannot be read ({error}).") from None

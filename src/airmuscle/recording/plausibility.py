@@ -1,0 +1,81 @@
+"""Plausibility checks of a recording: pressures below vacuum, time that does not increase, percent read as a ratio."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..core.arrays import Array
+from ..core.errors import ColumnError
+from .table import RawTable
+
+CONTRACTION_RANGE = (-0.5, 1.0)
+"""Plausible contractions (chosen): a contraction of 1 is impossible, as is a stretch by half of the length."""
+
+
+def check_plausible(
+    table: RawTable,
+    columns: Mapping[str, Array],
+    resting_length: float | None,
+    ambient: float,
+    *,
+    ordered: bool = True,
+) -> None:
+    """Raise ColumnError, with row and value, at the first value that cannot be a measurement."""
+    for name, values in columns.items():
+        quantity = name.rpartition(".")[2]
+        if quantity == "time" and ordered:
+            _check_ordered(table, values)
+        elif quantity == "pressure":
+            _check_above_vacuum(table, values, ambient)
+        elif quantity == "contraction":
+            remedy = "For values in percent, rename the column header to 'contraction [%]'."
+            _check_contraction(table, values, "contraction", remedy)
+        elif quantity == "length":
+            _check_length(table, values, resting_length)
+
+
+def _check_ordered(table: RawTable, time: Array) -> None:
+    not_increasing = np.diff(time) <= 0
+    if not_increasing.any():
+        row = int(np.argmax(not_increasing)) + 1
+        relation = "repeats the time" if time[row] == time[row - 1] else "is less than the time"
+        raise ColumnError(
+            f"{table.location(row)}: time {time[row]:.9g} s {relation} of the previous row ({time[row - 1]:.9g} s). "
+            "Time must increase: sort the rows, delete the repeated one, or write two runs to two files."
+        )
+
+
+def _check_above_vacuum(table: RawTable, pressure: Array, ambient: float) -> None:
+    below = ~(pressure + ambient > 0)
+    if below.any():
+        row = int(np.argmax(below))
+        raise ColumnError(
+            f"{table.location(row)}: a gauge pressure of {pressure[row] / 1e3:.4g} kPa is not above absolute vacuum "
+            f"({-ambient / 1e3:.4g} kPa gauge). Check the unit, and whether the pressure is gauge or absolute."
+        )
+
+
+def _check_contraction(table: RawTable, contraction: Array, label: str, remedy: str) -> None:
+    low, high = CONTRACTION_RANGE
+    outside = ~((contraction > low) & (contraction < high))
+    if outside.any():
+        row = int(np.argmax(outside))
+        raise ColumnError(
+            f"{table.location(row)}: {label} {contraction[row]:.4g} is outside the plausible range {low:g} to "
+            f"{high:g}. {remedy}"
+        )
+
+
+def _check_length(table: RawTable, length: Array, resting_length: float | None) -> None:
+    if not (length > 0).all():
+        row = int(np.argmin(length > 0))
+        raise ColumnError(f"{table.location(row)}: length is {length[row]:.4g} m; it must be positive.")
+    if resting_length is not None:
+        _check_contraction(
+            table,
+            (resting_length - length) / resting_length,
+            f"with a resting length of {resting_length:.4g} m, the contraction",
+            "Check the units of the length and of the resting length.",
+        )

@@ -1,0 +1,118 @@
+"""Text table format: encoding, delimiter, decimal sign, headings and units."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import dataclasses
+from collections.abc import Mapping
+
+from ..core.errors import FileError, ParameterError
+from .header import are_headings, missing_header_error, parse_constant_comment, parse_unit_row
+
+NumberedLines = list[tuple[int, str]]
+"""Lines of a file with their numbers, counted from 1."""
+
+_DELIMITERS = ("\t", ";", ",", "|", " ")
+_DECIMALS = (".", ",")
+
+
+@dataclasses.dataclass(frozen=True)
+class TextFormat:
+    """Format of a text table: `delimiter` and `decimal`; None means automatic detection.
+
+    With `headerless`, the columns of a table without headings are named by their numbers, "1", "2" and so on.
+    """
+
+    delimiter: str | None = None
+    decimal: str | None = None
+    headerless: bool = False
+
+    def __post_init__(self) -> None:
+        if self.delimiter is not None and self.delimiter not in _DELIMITERS:
+            raise ParameterError(
+                f"delimiter is {self.delimiter!r}; it must be a comma, semicolon, tab, blank or '|'. Omit it for "
+                "automatic detection."
+            )
+        if self.decimal is not None and self.decimal not in _DECIMALS:
+            raise ParameterError(
+                f"decimal is {self.decimal!r}; it must be '.' or ','. Omit it for automatic detection."
+            )
+        if self.delimiter == self.decimal == ",":
+            raise ParameterError("delimiter and decimal are both ','; they must differ. Export the table with ';'.")
+
+    def detect_delimiter(self, line: str) -> str:
+        """The given delimiter, otherwise the one detected in the first line of the table."""
+        return self.delimiter or next((d for d in "\t;" if d in line), ",")
+
+
+@dataclasses.dataclass(frozen=True)
+class TextHeader:
+    """Header of a text table: headings, unit row, constants in comments, and the delimiter."""
+
+    headings: tuple[str, ...]
+    units: tuple[str, ...] | None
+    constants: Mapping[str, float | str]
+    delimiter: str
+    header_lines: int
+    """Number of lines of the table, without comments, above the numbers: 0, 1 or 2."""
+
+
+def detect_encoding(content: bytes) -> str:
+    """The encoding of a file from its beginning: UTF-16 if it starts with a BOM, UTF-8 if valid, otherwise Latin-1."""
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-16"
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(content)  # a truncated last character is not an error
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8-sig"
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line with content is a comment."""
+    return line.lstrip().startswith(("#", "%"))
+
+
+def has_content(line: str) -> bool:
+    """Whether a line contains more than delimiters and blanks."""
+    return bool(line.strip(' \t;,"\r\n'))
+
+
+def split_cells(line: str, delimiter: str) -> list[str]:
+    """The cells of a line."""
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
+
+
+def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> TextHeader:
+    """Parse the header of a table from its first non-empty lines. Raises FileError or ColumnError."""
+    comments = [(i, line) for i, line in lines if is_comment(line)]
+    body = [(i, line) for i, line in lines if not is_comment(line)]
+    if not body:
+        raise FileError(
+            f"{origin}: the file contains no table. A table consists of a row of headings and rows of numbers."
+        )
+    delimiter = text_format.detect_delimiter(body[0][1])
+    headings, count = _find_headings(origin, comments, body, delimiter, text_format.headerless)
+    below = split_cells(body[count][1], delimiter) if len(body) > count else []
+    units = parse_unit_row(headings, below)
+    count += 1 if units else 0
+    if len(body) <= count:
+        raise FileError(f"{origin}: no rows of numbers below the headings ({', '.join(headings)}).")
+    constants = dict(constant for _, line in comments if (constant := parse_constant_comment(line)))
+    return TextHeader(tuple(headings), units, constants, delimiter, count)
+
+
+def _find_headings(
+    origin: str, comments: NumberedLines, body: NumberedLines, delimiter: str, headerless: bool
+) -> tuple[list[str], int]:
+    """The headings, and the number of table lines that they occupy: 0 if they are in the last comment above."""
+    first, cells = body[0][0], split_cells(body[0][1], delimiter)
+    if are_headings(cells):
+        return cells, 1
+    above = [split_cells(line.lstrip("#% \t"), delimiter) for i, line in comments if i < first]
+    if above and len(above[-1]) == len(cells) and are_headings(above[-1]):
+        return above[-1], 0
+    if headerless:
+        return [str(i) for i in range(1, len(cells) + 1)], 0
+    raise missing_header_error(f"{origin}, line {first}")

@@ -1,0 +1,118 @@
+"""Record: one [[record]] of a dynamic fit as an experiment."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..compile.program import compile_system
+from ..core.errors import ParameterError
+from ..identify.dynamic import Experiment, InitialConditions
+from ..library.location import Location, check_keys, located_errors, read_finite_number, read_text
+from ..plant.plant import Plant
+from ..recording import Recording, read
+from ..recording.columns import quantity_of
+from ..simulation.problem import check_input_range
+from .inputs import build_input_signal
+from .scenario import build_plant
+
+FIRST_ROWS = 3
+"""Number of first rows whose median is the default initial pressure (chosen)."""
+_KEYS = ("file", "start", "start_time", "first", "last", "mapping", "resting_length", "command", "plant")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Record:
+    """One [[record]] of a file, with the tables and the plant that all records share."""
+
+    row: Any
+    location: Location
+    tables: Mapping[str, Any]
+    shared: Plant
+
+    def build_experiment(self, observed: Mapping[str, tuple[float, str]]) -> tuple[Experiment, Mapping[str, Any]]:
+        """The record as an experiment, and its table [command]; `observed` has the column of each output.
+
+        Raises FileError, ParameterError, UnitError, UnknownNameError or ColumnError with the location.
+        """
+        if not isinstance(self.row, Mapping):
+            raise ParameterError(f"{self.location} is {self.row!r}; write [[record]] and its keys under it.")
+        check_keys(self.row, _KEYS, self.location)
+        plant = self._build_plant()
+        table = dict(optional_table({**self.tables, **self.row}, "command", self.location))
+        if "file" in table:  # absolute, because the table is also written to other folders
+            table["file"] = str((self.location.folder / str(table["file"])).resolve())
+        recording, in_command = self._read_recording(observed), self.location.inside("command")
+        start_time = read_finite_number(self.row.get("start_time", 0.0), "s", f"{self.location}, start_time")
+        command = build_input_signal(table, plant.input_variables, in_command)
+        with located_errors(in_command):
+            duration = max(float(recording["time"][-1]) - start_time, 1e-9)
+            check_input_range(compile_system(plant), command.segments(plant.inputs, 0.0, duration), 0.0)
+        return Experiment(recording, command, self._initial_conditions(plant, recording), start_time, plant), table
+
+    def _build_plant(self) -> Plant:
+        """The shared plant, with the parts that this record replaces."""
+        replaced = optional_table(self.row, "plant", self.location)
+        if not replaced:
+            return self.shared
+        return build_plant({**self.tables["plant"], **replaced}, self.location.inside("plant"))
+
+    def _read_recording(self, observed: Mapping[str, tuple[float, str]]) -> Recording:
+        """The used part of the file, with the observed columns under the names of the outputs."""
+        name = read_text(self.row, "file", self.location, needed=True)
+        options = {key: self.row[key] for key in ("mapping", "resting_length") if key in self.row}
+        if "mapping" in options:
+            options["mapping"] = self.location.folder / options["mapping"]
+        with located_errors(self.location):
+            runs = read(self.location.folder / name, **options)
+            if len(runs) != 1:
+                raise ParameterError(f"{name} contains {len(runs)} runs; give one file for each record.")
+            columns = {name: (column, signal_unit(name, self.shared)) for name, (_, column) in observed.items()}
+            run = runs[0].with_columns(**{name: runs[0].in_unit(*column) for name, column in columns.items()})
+            return self._cut(run)
+
+    def _cut(self, recording: Recording) -> Recording:
+        """The rows from the time `first` to the time `last`."""
+        first, last = (
+            read_finite_number(self.row[key], "s", f"{self.location}, {key}") if key in self.row else default
+            for key, default in (("first", -np.inf), ("last", np.inf))
+        )
+        rows = (recording["time"] >= first) & (recording["time"] <= last)
+        if not rows.any():
+            raise ParameterError(
+                f"{recording.origin}: there is no row between first, {first:g} s, and last, {last:g} s."
+            )
+        return recording.rows(rows)
+
+    def _initial_conditions(self, plant: Plant, recording: Recording) -> InitialConditions:
+        """Equilibrium at a pressure, or the given state."""
+        inner = self.location.inside("start")
+        table = dict(optional_table(self.row, "start", self.location))
+        values = {
+            name: read_finite_number(value, signal_unit(name, plant) or "1", f"{inner}, {name}")
+            for name, value in table.items()
+        }
+        pressures = [name for name in recording if name.rpartition(".")[2] == "pressure"]
+        default = float(np.median(recording[pressures[0]][:FIRST_ROWS])) if pressures else 0.0
+        pressure = values.pop("pressure", default)
+        with located_errors(inner):
+            if values:
+                return InitialConditions.at_coordinates(plant, pressure, **values)
+            return InitialConditions.at_rest(plant, pressure)
+
+
+def optional_table(tables: Mapping[str, Any], key: str, location: Location) -> Mapping[str, Any]:
+    """A table inside tables; empty if it is missing. Raises ParameterError if the value is not a table."""
+    table = tables.get(key, {})
+    if not isinstance(table, Mapping):
+        raise ParameterError(f"{location}: the table [{key}] is {table!r}; it must be a table.")
+    return table
+
+
+def signal_unit(name: str, plant: Plant) -> str | None:
+    """Unit of a quantity or a state of the plant; None if unknown."""
+    quantity = quantity_of(name)
+    return quantity.unit if quantity else next((s.unit for s in plant.states if s.name == name), None)

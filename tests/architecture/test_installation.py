@@ -1,0 +1,124 @@
+"""Installation: the lock pins every requirement and contains no address; `./run` starts quickly if it is installed."""
+
+import importlib.machinery
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+LOCK = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+
+
+# The lock
+
+
+def requirements() -> list[str]:
+    """The requirements of the lock, each with its hashes."""
+    return re.split(r"(?<!\\)\n", LOCK.strip())
+
+
+def test_the_lock_contains_no_address():
+    assert not re.search(r"://|^\s*-(-index|-extra|-find|-trusted|i|f)\b|@ ", LOCK, re.MULTILINE)
+    assert [path.name for path in ROOT.iterdir() if re.fullmatch(r"uv\.lock|pylock.*\.toml", path.name)] == []
+
+
+def test_every_requirement_is_pinned_and_hashed():
+    for entry in requirements():
+        assert re.match(r"[a-z0-9-]+==\S+ ", entry), entry
+        assert re.search(r"--hash=sha256:[0-9a-f]{64}", entry), entry
+
+
+def test_the_lock_contains_all_dependencies_of_the_project():
+    project = PROJECT["project"]
+    required = project["dependencies"] + project["optional-dependencies"]["dev"]
+    locked = {entry.split("==")[0] for entry in requirements()}
+    assert {re.split(r"[^\w.-]", line)[0].lower() for line in required} <= locked
+
+
+def test_the_citation_and_the_package_state_the_same_version():
+    version = PROJECT["project"]["version"]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
+# ./run
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """A copy of `run` and of the files that it reads, with an environment that appears complete."""
+    folder = tmp_path / "a folder with spaces"
+    (folder / ".venv" / "bin").mkdir(parents=True)
+    for name in ("run", "pyproject.toml", "requirements.lock"):
+        (folder / name).write_bytes((ROOT / name).read_bytes())
+    (folder / ".venv" / "bin" / "python").symlink_to(sys.executable)
+    (folder / ".venv" / "airmuscle.stamp").write_bytes(b"".join(load_run(folder).stamp()))
+    return folder
+
+
+def load_run(folder: Path) -> ModuleType:
+    loader = importlib.machinery.SourceFileLoader("run", str(folder / "run"))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("run", loader))
+    loader.exec_module(module)
+    return module
+
+
+needs_posix = pytest.mark.skipif(os.name == "nt", reason="the environment of this test is made of symbolic links")
+
+
+@needs_posix
+def test_a_second_start_adds_less_than_a_fifth_of_a_second(checkout: Path):
+    def seconds() -> float:
+        start = time.perf_counter()
+        subprocess.run([sys.executable, checkout / "run", "true"], check=True)
+        return time.perf_counter() - start
+
+    assert min(seconds() for _ in range(5)) < 0.2
+
+
+@needs_posix
+def test_run_passes_arguments_and_exit_code(checkout: Path):
+    code = "import sys; print(sys.argv[1:]); sys.exit(7)"
+    command = [sys.executable, checkout / "run", "python", "-c", code, "two words", "--help"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (7, "['two words', '--help']\n")
+
+
+@needs_posix
+def test_an_unknown_command_gives_one_line(checkout: Path):
+    done = subprocess.run([sys.executable, checkout / "run", "no-such-thing"], capture_output=True, text=True)
+    assert done.returncode == 127
+    assert done.stderr == "run: no command 'no-such-thing' in the environment or on the path\n"
+
+
+@needs_posix
+@pytest.mark.parametrize("changed", ["pyproject.toml", "requirements.lock"])
+def test_a_changed_project_or_lock_invalidates_the_stamp(checkout: Path, changed: str):
+    with (checkout / changed).open("a") as file:
+        file.write("\n# changed\n")
+    assert load_run(checkout).read(str(checkout / ".venv" / "airmuscle.stamp")) != b"".join(load_run(checkout).stamp())
+
+
+@needs_posix
+def test_an_installation_that_fails_leaves_no_stamp(checkout: Path, monkeypatch: pytest.MonkeyPatch):
+    run = load_run(checkout)
+    (checkout / "requirements.lock").write_text("")
+    monkeypatch.setattr(subprocess, "call", lambda *args, **settings: 1)
+    assert run.install() == "could not install .venv; see the messages above"
+    assert not (checkout / ".venv" / "airmuscle.stamp").exists()
+
+
+@needs_posix
+def test_the_error_of_a_python_without_ensurepip_names_the_missing_package(
+    checkout: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    assert re.search(r"sudo apt install python3\.\d+-venv$", load_run(checkout).install())

@@ -1,0 +1,248 @@
+"""Structure of the package: sizes of files and functions, names, docstrings, imports and faces.
+
+Rules that some packages do not follow yet are listed in known_violations.toml. These lists may only become shorter:
+delete an entry when it is corrected.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import re
+import subprocess
+import sys
+import tomllib
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = ROOT / "src" / "airmuscle"
+FILES = sorted(SOURCE.rglob("*.py"))
+PACKAGES = sorted(path.parent for path in SOURCE.rglob("__init__.py"))
+KNOWN = tomllib.loads(Path(__file__).with_name("known_violations.toml").read_text(encoding="utf-8"))
+PHYSICS = re.compile(r"(?<![a-z])(muscle|pressure|valve|gas|contraction|force)(s|es)?(?![a-z])", re.IGNORECASE)
+# May be imported by other laws: the base, the solver, the validity range, the rubber of a wall.
+SHARED_LAWS = {"base", "solve", "validity_range", "rubber"}
+# Laws made of other laws, and the package itself.
+COMPOSITES = {"__init__", "scaled", "tangent", "polynomial_surrogate"}
+
+
+def name_of(path: Path) -> str:
+    return path.relative_to(SOURCE).as_posix()
+
+
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def assert_only_known(rule: str, violations: set[str]) -> None:
+    assert sorted(violations - set(KNOWN[rule])) == []
+
+
+# Files and functions
+
+
+def test_files_have_300_lines_at_most():
+    lengths = {name_of(path): len(path.read_text(encoding="utf-8").splitlines()) for path in FILES}
+    assert_only_known("long_files", {name for name, n in lengths.items() if n > 300})
+
+
+def body_length(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """Number of lines from `def` to the end without the docstring, which may contain a long formula."""
+    documented = ast.get_docstring(function) is not None
+    docstring = function.body[0].end_lineno - function.body[0].lineno + 1 if documented else 0
+    return function.end_lineno - function.lineno + 1 - docstring
+
+
+def test_functions_have_40_lines_at_most():
+    lengths = {
+        f"{name_of(path)}:{node.lineno} {node.name}": body_length(node)
+        for path in FILES
+        if SOURCE / "compile" / "kernels" not in path.parents  # a kernel is one loop
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+    }
+    assert {name: n for name, n in lengths.items() if n > 40} == {}
+
+
+def test_no_module_has_a_meaningless_name():
+    names = {"util", "utils", "helper", "helpers", "common", "misc"}
+    assert [name_of(p) for p in SOURCE.rglob("*") if p.stem.strip("_") in names] == []
+
+
+def test_the_top_level_has_40_names_at_most():
+    airmuscle = pytest.importorskip("airmuscle")
+    names = getattr(airmuscle, "__all__", ())
+    assert len(names) <= 40
+    assert [name for name in names if not hasattr(airmuscle, name)] == []
+
+
+# Independence of packages and laws
+
+
+@pytest.mark.parametrize("path", sorted((SOURCE / "compile").rglob("*.py")), ids=name_of)
+def test_the_compiler_contains_no_physics(path: Path):
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert [f"{n}: {line}" for n, line in enumerate(lines, 1) if PHYSICS.search(line)] == []
+
+
+def imported(path: Path) -> set[str]:
+    """Full names of the modules that a file of the package imports, with relative imports resolved."""
+    package = ["airmuscle", *path.relative_to(SOURCE).parts[:-1]]
+    modules: set[str] = set()
+    for node in ast.walk(tree_of(path)):
+        if isinstance(node, ast.Import):
+            modules |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            start = package[: len(package) - node.level + 1] if node.level else []
+            module = ".".join([*start, *([node.module] if node.module else [])])
+            modules |= {module} | {f"{module}.{alias.name}" for alias in node.names}
+    return modules
+
+
+def test_laws_do_not_import_each_other():
+    laws = {path.stem: path for path in (SOURCE / "characteristic").glob("*.py")}
+    private = laws.keys() - SHARED_LAWS - COMPOSITES
+    violations = {
+        f"{law} imports {other}"
+        for law in laws.keys() - COMPOSITES
+        for other in private - {law}
+        if f"airmuscle.characteristic.{other}" in imported(laws[law])
+    }
+    assert violations == set()
+
+
+def ruff(code: str, file: str) -> str:
+    """The messages of ruff for this code in that file."""
+    command = [sys.executable, "-m", "ruff", "check", "--no-cache", "--stdin-filename", file, "-"]
+    return subprocess.run(command, input=code, cwd=ROOT, capture_output=True, text=True).stdout
+
+
+@pytest.mark.parametrize("module", ["math", "numpy"])
+@pytest.mark.parametrize("file", ["characteristic/x.py", "pneumatics/x.py", "mechanism/x.py", "muscle/x.py"])
+def test_ruff_rejects_a_law_that_imports_math_or_numpy(file: str, module: str):
+    for code in (f"import {module}\n\n{module}.sqrt(2.0)\n", f"from {module} import sqrt\n\nsqrt(2.0)\n"):
+        assert "TID251" in ruff(code, f"src/airmuscle/{file}")
+
+
+@pytest.mark.parametrize(
+    "file", ["characteristic/tabulated.py", "characteristic/base.py", "core/ops.py", "report/x.py"]
+)
+def test_ruff_accepts_math_and_numpy_elsewhere(file: str):
+    assert "TID251" not in ruff("import math\n\nmath.sqrt(2.0)\n", f"src/airmuscle/{file}")
+
+
+# Names and docstrings
+
+
+def test_module_docstrings_begin_with_a_term():
+    questions = ("What", "How", "Where", "Whether", "Which", "When")
+    first_words = {name_of(path): re.split(r"\W", ast.get_docstring(tree_of(path)) or "")[0] for path in FILES}
+    assert_only_known("module_docstrings", {name for name, word in first_words.items() if word in questions})
+
+
+def test_every_module_has_a_docstring():
+    assert [name_of(path) for path in FILES if not ast.get_docstring(tree_of(path))] == []
+
+
+def test_no_two_public_classes_share_a_name():
+    modules = defaultdict(list)
+    for path in FILES:
+        for node in tree_of(path).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                modules[node.name].append(name_of(path))
+    assert_only_known("class_names", {name for name, paths in modules.items() if len(paths) > 1})
+
+
+def test_no_module_has_the_name_of_a_function_of_its_package():
+    violations = set()
+    for folder in PACKAGES:
+        name = ".".join(["airmuscle", *folder.relative_to(SOURCE).parts])
+        package = importlib.import_module(name)
+        submodules = {path.stem for path in folder.iterdir()}
+        functions = {name for name in getattr(package, "__all__", ()) if inspect.isfunction(getattr(package, name))}
+        violations |= {f"{package.__name__}.{name}" for name in submodules & functions}
+    assert_only_known("module_names", violations)
+
+
+# Imports
+
+
+def is_own(node: ast.AST) -> bool:
+    """Whether a statement imports from airmuscle."""
+    if isinstance(node, ast.ImportFrom):
+        return node.level > 0 or (node.module or "").partition(".")[0] == "airmuscle"
+    return isinstance(node, ast.Import) and any(alias.name.partition(".")[0] == "airmuscle" for alias in node.names)
+
+
+def own_imports_below_the_top(path: Path) -> list[ast.AST]:
+    """Imports from airmuscle inside functions, classes and conditions, such as `if TYPE_CHECKING`."""
+    tree = tree_of(path)
+    return [node for node in ast.walk(tree) if is_own(node) and node not in tree.body]
+
+
+def test_own_imports_are_at_the_top_of_a_file():
+    """The command line imports the module of a command with importlib, from the table in cli/app.py."""
+    assert_only_known("imports", {name_of(path) for path in FILES if own_imports_below_the_top(path)})
+
+
+def test_modules_are_imported_by_name_in_few_files_only():
+    files = {name_of(path) for path in FILES if "import_module(" in path.read_text(encoding="utf-8")}
+    assert files <= {
+        "__init__.py",  # names of the face that are imported on use
+        "cli/app.py",  # the module of a command
+        "cli/entry_point.py",  # the command line, after SIGINT is handled
+        "compile/cache/kernel.py",  # kernels that are not in the cache
+        "library/models.py",  # models named in TOML files
+        "recording/optional_dependency.py",  # readers of laboratory formats
+        "reproduce/run.py",  # papers
+        "study/executors.py",  # Dask
+    }
+
+
+# Code for users
+
+
+def code_for_users() -> Iterator[tuple[str, str]]:
+    """(file, Python code) of the examples and of the code blocks of README.md and docs/."""
+    for path in sorted((ROOT / "examples").glob("*.py")):
+        yield f"examples/{path.name}", path.read_text(encoding="utf-8")
+    for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
+        for block in re.findall(r"```python\n(.*?)```", path.read_text(encoding="utf-8"), flags=re.DOTALL):
+            yield path.relative_to(ROOT).as_posix(), block
+
+
+def face_of(module: str) -> frozenset[str] | None:
+    """The names in `__all__` of a package, and its subpackages; None if the module is not a package."""
+    folder = SOURCE.parent.joinpath(*module.split("."))
+    if not folder.is_dir():
+        return None
+    names = getattr(importlib.import_module(module), "__all__", ())
+    return frozenset(names) | {path.parent.name for path in folder.glob("*/__init__.py")}
+
+
+def names_outside_faces(code: str) -> Iterator[str]:
+    """Imported modules that are not packages, and imported names that are not in `__all__` of their package."""
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.ImportFrom) and is_own(node):
+            face = face_of(node.module)
+            if face is None:
+                yield node.module
+            else:
+                yield from (f"{node.module}.{alias.name}" for alias in node.names if alias.name not in face)
+        elif isinstance(node, ast.Import) and is_own(node):
+            yield from (alias.name for alias in node.names if face_of(alias.name) is None)
+
+
+def test_code_for_users_imports_from_faces_only():
+    violations = {f"{file}: {name}" for file, code in code_for_users() for name in names_outside_faces(code)}
+    assert_only_known("faces", violations)
+
+
+def test_an_import_that_is_not_from_a_face_is_detected():
+    code = "from airmuscle.units import bar, no_unit\nfrom airmuscle.core.errors import FileError\nimport airmuscle.core.ops"
+    assert list(names_outside_faces(code)) == ["airmuscle.units.no_unit", "airmuscle.core.errors", "airmuscle.core.ops"]
