@@ -13,6 +13,7 @@ from airmuscle.characteristic.clamped import Clamped
 from airmuscle.characteristic.virtual_work import VirtualWork
 from airmuscle.core import ops
 from airmuscle.core.declaration import model, parameter
+from airmuscle.core.system import System
 from airmuscle.core.variables import StateVariable
 from airmuscle.geometry.braid import Braid
 from airmuscle.muscle import LinearDamper, LinearSpring, Muscle
@@ -31,7 +32,7 @@ def chosen_muscle() -> Muscle:
 
 
 @model
-class Joint:
+class Joint(System):
     """Six states: angle, angular speed, and the air masses of each muscle and its tube; isothermal."""
 
     muscle: Muscle

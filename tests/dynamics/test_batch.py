@@ -576,7 +576,7 @@ def test_a_bar_is_drawn_on_a_terminal_once_it_takes_long(monkeypatch, capsys):
     with thread_pool.progress("simulating", 10) as advanced:
         advanced(5)
     assert capsys.readouterr().err == ""
-    monkeypatch.setattr(thread_pool, "PATIENCE", -1.0)
+    monkeypatch.setattr(thread_pool, "BAR_DELAY", -1.0)
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     with thread_pool.progress("simulating", 10) as advanced:
         advanced(5)

@@ -75,7 +75,7 @@ def ranges(plant, rng):
             ends = start[s.name] - 4.0 * s.nominal, start[s.name] + 4.0 * s.nominal
         low.append(ends[0])
         high.append(ends[1])
-    for i in plant.commands:
+    for i in plant.input_variables:
         low.append(max(i.minimum, -7e5))
         high.append(min(i.maximum, 7e5))
     low, high = np.array(low), np.array(high)

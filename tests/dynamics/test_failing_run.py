@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from airmuscle.simulation.result import extrapolation_warnings
 from joints import chosen_muscle
 
 from airmuscle.analysis.linear_model import linearise

@@ -15,7 +15,7 @@ from airmuscle.compile.llvm import emit, vector_math
 from airmuscle.compile.llvm.jit import jit_compile
 from airmuscle.compile.llvm.types import LlvmType
 from airmuscle.core.errors import TraceError
-from airmuscle.simulation.batch.lanes import aligned
+from airmuscle.simulation.batch.lanes import aligned_arrays
 
 NUMBERS = {"16 doubles": LlvmType(64, 16), "8 doubles": LlvmType(64, 8), "32 singles": LlvmType(32, 32)}
 WIDE = max(number.lanes for number in NUMBERS.values())
@@ -37,7 +37,7 @@ def run(number, expressions, *columns):
 
 def call(engine, number, columns, results):
     kind = np.float64 if number.bits == 64 else np.float32
-    x, y = aligned((len(columns), results), number.lanes, kind)
+    x, y = aligned_arrays((len(columns), results), number.lanes, kind)
     function = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(engine.get_function_address("f"))
     size, found = len(columns[0]), []
     for at in range(0, size, number.lanes):

@@ -18,7 +18,7 @@ from airmuscle.control.inputs import ZERO_INPUT, Schedule
 from airmuscle.friction import Dahl
 from airmuscle.mechanism import AntagonisticJoint, HangingMass, Isometric, SpringLoad, WithEndStops
 from airmuscle.mechanism.contact import HuntCrossley
-from airmuscle.plant.plant import Plant, total_air
+from airmuscle.plant import Plant, total_air
 from airmuscle.pneumatics import (
     ClosedChamber,
     FillDischarge,

@@ -117,10 +117,10 @@ def test_a_prescribed_motion_is_followed_exactly():
     places = rng.uniform(0.0, 0.03, 12)
     motion = spline_trajectory(times, places)
     plant = Plant(chosen_muscle(), CIRCUIT, PrescribedMotion())
-    start = plant.state_at(pressure=3e5, **motion.start)
+    start = plant.state_at(pressure=3e5, **motion.initial_state)
     run = simulate(
         plant,
-        motion.command,
+        motion.input,
         duration=times[-1] - times[0],
         start_time=times[0],
         initial_state=start,
@@ -138,16 +138,16 @@ def test_a_cubic_that_does_not_begin_at_rest_is_itself(coefficients):
     cubic = np.polynomial.Polynomial(coefficients)
     times = np.array([0.0, 0.2, 0.5, 0.7, 1.0])
     motion = spline_trajectory(times, cubic(times), from_rest=False)
-    assert motion.start["speed"] == pytest.approx(cubic.deriv()(0.0), abs=1e-9)
-    found = [value for _, value in motion.command.points["prescribed_acceleration"]]
+    assert motion.initial_state["speed"] == pytest.approx(cubic.deriv()(0.0), abs=1e-9)
+    found = [value for _, value in motion.input.points["prescribed_acceleration"]]
     assert found == pytest.approx(cubic.deriv(2)(times), abs=1e-8)
 
 
 def test_the_drive_takes_up_what_the_muscle_works():
     plant = WithEnergyMeters(Plant(chosen_muscle(), CIRCUIT, PrescribedMotion(), Isothermal()))
     motion = spline_trajectory([0.0, 0.5, 1.0], [0.0, 0.02, 0.005])
-    command = SampledSignal({**motion.command.points, "fill": ((0.2, 0.0), (0.4, 0.5), (0.6, 0.0))})
-    start = plant.extend_state(plant.plant.state_at(pressure=2e5, **motion.start))
+    command = SampledSignal({**motion.input.points, "fill": ((0.2, 0.0), (0.4, 0.5), (0.6, 0.0))})
+    start = plant.extend_state(plant.plant.state_at(pressure=2e5, **motion.initial_state))
     run = simulate(plant, command, duration=1.0, initial_state=start, integrator=Rodas4(1e-10))
     np.testing.assert_allclose(run["mechanism_loss"], run["work_of_tension"], atol=1e-9)
     assert np.abs(run["work_of_tension"]).max() > 1.0

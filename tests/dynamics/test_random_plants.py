@@ -162,7 +162,7 @@ class Drawer:
 
     def command(self, plant):
         changes = {}
-        for given in plant.commands:
+        for given in plant.input_variables:
             instants = np.cumsum(self.rng.uniform(0.02, 0.3, 5))
             levels = self.rng.uniform(given.minimum, min(given.maximum, 4e5), 5)
             levels = np.round(levels) if given.maximum <= 1.0 and self.rng.random() < 0.7 else levels

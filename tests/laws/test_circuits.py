@@ -102,7 +102,7 @@ def shaken(system, seed):
     for s in system.states:
         swing = rng.uniform(-0.3, 0.3)
         state[s.name] = start[s.name] * (1 + swing) if start[s.name] else s.nominal * 2 * swing
-    inputs = {i.name: rng.uniform(i.minimum, min(i.maximum, 6e5)) for i in system.commands}
+    inputs = {i.name: rng.uniform(i.minimum, min(i.maximum, 6e5)) for i in system.input_variables}
     return state, inputs
 
 

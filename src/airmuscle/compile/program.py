@@ -137,8 +137,13 @@ def describe(system: System) -> Description:
     if stored is not None and stored[0]() is system:
         return stored[1]
     description = Description(system)
-    _descriptions[key] = weakref.ref(system, lambda _: _descriptions.pop(key, None)), description
+    _descriptions[key] = weakref.ref(system, functools.partial(_forget, _descriptions, key)), description
     return description
+
+
+def _forget(descriptions: dict[int, Any], key: int, _: object) -> None:
+    """Remove a description; its dictionary is an argument, because module names are gone while Python exits."""
+    descriptions.pop(key, None)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -52,9 +52,9 @@ def starts(one: Statics) -> Array:
     steps = root ** -np.arange(1.0, low.size + 1)
     targets = low + (high - low) * ((0.5 + np.arange(STARTS)[:, None] * steps) % 1.0)
     x = _place_of(one, targets)
-    inside = one.within_reach(x[None])[0]
-    inside &= np.isfinite(one.accelerations(x[None])[0]).all(axis=1)
-    return x[inside]
+    inside = one.within_reach(x[None])[0] & np.isfinite(one.accelerations(x[None])[0]).all(axis=1)
+    reached: Array = x[inside]
+    return reached
 
 
 def _contractions(one: Statics, x: Array) -> Array:
