@@ -166,7 +166,7 @@ def test_single_precision_keeps_four_digits_and_says_so():
         simulate_batch(plain(), varied, PULSE, duration=0.4, initial_states=start, integrator=FAST, **more)
         for more in ({}, {"precision": Single()})
     )
-    assert "expect about four digits" in single.notes[-1]
+    assert "expect about four correct digits" in single.notes[-1]
     assert len(double.notes) == 1
     for name, column in double.columns.items():
         assert single[name].dtype == np.float32
@@ -253,14 +253,14 @@ def test_a_plant_that_fails_does_not_stop_the_others():
     assert list(found.failed) == [3, 17]
     assert found.status[3] == 3
     assert "because a rate or an output is not finite" in found.reason(17)
-    assert found.reason(4) == "done"
+    assert found.reason(4) == "it is complete"
     assert np.isfinite(found["pressure"][4]).all()
     alone = simulate(found.plant(3), PULSE, duration=0.3, initial_state=start, integrator=FAST, complete=False)
     part = found.recording(3)
     assert 0 < len(part) < found.time.size
     np.testing.assert_array_equal(part["position"], alone["position"])
     assert found.reason(3) in part.notes
-    assert "2 did not get to the end" in repr(found)
+    assert "2 failed" in repr(found)
 
 
 @pytest.mark.parametrize("keep", [None, ("position",)], ids=["all", "not the air"])
@@ -269,15 +269,15 @@ def test_air_below_none_on_the_way_is_seen_in_a_lane_as_alone(keep):
     isothermal = dataclasses.replace(plain(), gas=Isothermal())
     start = isothermal.state_at(pressure=5e5, position=0.002)
     pulse = Schedule({"discharge": ((0.02, 1), (0.022, 0)), "fill": ((0.03, 1),)})
-    given = {"duration": 0.3, "start": start, "method": FAST, "output": 1e-3}
+    given = {"duration": 0.3, "integrator": FAST, "output_times": 1e-3}
     found = simulate_batch(
-        isothermal, {"circuit.discharge.conductance": [1e-6, 2.8e-6, 5e-6]}, pulse, keep=keep, **given
+        isothermal, {"circuit.discharge.conductance": [1e-6, 2.8e-6, 5e-6]}, pulse, keep=keep, initial_states=start, **given
     )
     assert found.status.tolist() == [0, 7, 7]
     for index in (1, 2):
-        alone = simulate(found.plant(index), pulse, complete=False, **given)
-        assert "ended at 0.021 of 0.3 s because there was less air than none" in found.reason(index)
-        assert "ended at 0.021 of 0.3 s because there was less air than none" in alone.notes[-1]
+        alone = simulate(found.plant(index), pulse, complete=False, initial_state=start, **given)
+        assert "ended at 0.021 of 0.3 s because an air mass became negative" in found.reason(index)
+        assert "ended at 0.021 of 0.3 s because an air mass became negative" in alone.notes[-1]
         assert found.reached[index] == len(alone)
         assert np.isnan(found["position"][index, len(alone) :]).all()
     assert keep is None or tuple(found.columns) == keep
@@ -286,7 +286,7 @@ def test_air_below_none_on_the_way_is_seen_in_a_lane_as_alone(keep):
 def test_a_plant_without_an_equilibrium_is_reported():
     found = simulate_batch(plain(), {"mechanism.mass": [4.0, 1e5, 5.0]}, ZERO_INPUT, duration=0.1, integrator=FAST)
     assert list(found.failed) == [1]
-    assert "it has no equilibrium to start from: HangingMass finds no rest" in found.reason(1)
+    assert "it has no equilibrium to start from: HangingMass has no stable equilibrium" in found.reason(1)
     assert np.isnan(found["pressure"][1]).all()
     np.testing.assert_allclose(found["position"][[0, 2]], found["position"][[0, 2], :1] * np.ones(found.time.size))
 
@@ -313,15 +313,15 @@ def test_plants_that_differ_in_their_circuit_alone_share_the_search_for_rest(mon
         ({"mechanism.mas": [1.0]}, r"Plant has no parameter 'mechanism.mas'. Did you mean 'mechanism.mass'\?"),
         (
             {"mechanism.mass": [5.0, np.nan]},
-            r"row 1: 'mechanism.mass' \(m, .*\) is nan kg; allowed range: finite values",
+            r"row 1: 'mechanism.mass' \(m, .*\) is nan kg; it must be within",
         ),
-        ({"mechanism.mass": [5.0, 5.0, -2.0, -3.0]}, r"row 2: .* is -2 kg; .*from 0.* \(1 further rows too\)"),
+        ({"mechanism.mass": [5.0, 5.0, -2.0, -3.0]}, r"row 2: .* is -2 kg; it must be within 0.* \(1 further rows too\)"),
         ({"mechanism.mass": []}, "there are no plants; give at least one row"),
-        ({"mechanism.mass": [[1.0]]}, r"must be a column \(N,\), one value a plant; its shape is \(1, 1\)"),
+        ({"mechanism.mass": [[1.0]]}, r"must be a column \(N,\), one value per plant; its shape is \(1, 1\)"),
         ({"mechanism.mass": 5.0}, r"must be a column \(N,\)"),
-        ({"mechanism.mass": ["heavy"]}, "must be numbers, one a plant"),
-        ({"mechanism.mass": [1.0, 2.0], "mechanism.gravity": [9.8]}, "every column needs one value a plant"),
-        ({}, "nothing varies; give variations, starts or commands, or use simulate"),
+        ({"mechanism.mass": ["heavy"]}, "must be numbers, one for each plant"),
+        ({"mechanism.mass": [1.0, 2.0], "mechanism.gravity": [9.8]}, "every column needs one value per plant"),
+        ({}, "nothing varies; give variations, initial states or inputs, or use simulate"),
     ],
 )
 def test_variations_that_cannot_be_are_refused(varied, message):
@@ -382,7 +382,7 @@ class Growing(System):
 
 
 def test_a_check_whose_answer_differs_from_row_to_row_is_asked_row_by_row():
-    given = {"duration": 0.1, "start": {"x": 1.0}, "method": FAST}
+    given = {"duration": 0.1, "initial_states": {"x": 1.0}, "integrator": FAST}
     with pytest.raises(ParameterError, match=r"variations, row 1: Growing: 2.0 is above 1.0"):
         simulate_batch(Growing(), {"low": [0.0, 2.0, 0.0]}, ZERO_INPUT, **given)
     assert not simulate_batch(Growing(), {"low": [0.0, 2.0], "high": [1.0, 3.0]}, ZERO_INPUT, **given).failed.size
@@ -394,13 +394,13 @@ def test_a_number_too_large_for_single_precision_is_reported():
         Growing(), {}, ZERO_INPUT, duration=1.0, initial_states=start, integrator=FAST, precision=Single()
     )
     assert list(found.failed) == [1]
-    assert found.reason(1) == "a rate or an output is not finite in single precision, though not in double"
+    assert found.reason(1) == "a rate or an output is not finite in single precision, but not in double"
     assert np.isnan(found["x"][1]).all()
 
 
 def refused(message, error=ParameterError, **arguments):
-    given = {"variations": {"mechanism.mass": [9.0, 10.0]}, "command": PULSE, "duration": 0.1, "method": FAST,
-             "start": plain().state_at(pressure=0.0)}  # fmt: skip
+    given = {"variations": {"mechanism.mass": [9.0, 10.0]}, "input": PULSE, "duration": 0.1, "integrator": FAST,
+             "initial_states": plain().state_at(pressure=0.0)}  # fmt: skip
     with pytest.raises(error, match=message):
         simulate_batch(plain(), **{**given, **arguments})
 
@@ -408,39 +408,39 @@ def refused(message, error=ParameterError, **arguments):
 def test_everything_else_that_cannot_be_is_refused(tmp_path):
     start = plain().state_at(pressure=0.0)
     refused("no column 'presure'; there are .* Did you mean 'pressure'", keep=("presure",))
-    refused("there are 3 commands and starts for 2", command=[ZERO_INPUT] * 3, start={**start, "speed": [0.0, 0.1]})
-    refused("every column needs one value a plant; .* and starts or commands for 3", command=[ZERO_INPUT] * 3)
-    refused("commands, row 1: the plant has no input 'fil'", command=[ZERO_INPUT, Schedule({"fil": ((0, 1),)})])
-    refused("commands, row 1: None is no Command", command=[ZERO_INPUT, None])
-    refused("the input 'fill' is 2 before", command=Schedule({"fill": ((0.05, 2.0),)}))
-    refused("start, row 1: 'speed' is nan; it must be finite", start={**start, "speed": [0.0, np.nan]})
-    refused("the plant has no state 'sped'", start={**start, "sped": 0.0})
-    refused("the start lacks speed", start={k: v for k, v in start.items() if k != "speed"})
+    refused("there are 3 inputs and initial states for 2", input=[ZERO_INPUT] * 3, initial_states={**start, "speed": [0.0, 0.1]})
+    refused("one value per plant; .* and initial states or inputs for 3", input=[ZERO_INPUT] * 3)
+    refused("inputs, row 1: the plant has no input 'fil'", input=[ZERO_INPUT, Schedule({"fil": ((0, 1),)})])
+    refused("inputs, row 1 is None; give a Schedule", input=[ZERO_INPUT, None])
+    refused("the input 'fill' is 2 before", input=Schedule({"fill": ((0.05, 2.0),)}))
+    refused("initial_states, row 1: 'speed' is nan; it must be finite", initial_states={**start, "speed": [0.0, np.nan]})
+    refused("the plant has no state 'sped'", initial_states={**start, "sped": 0.0})
+    refused("initial_states lack speed", initial_states={k: v for k, v in start.items() if k != "speed"})
     refused("duration is -1 s", duration=-1)
-    refused(r"1e\+06 s in steps of 0.001 s are 1e\+09 steps .* more steps than allowed, 5e\+07", duration=1e6)
+    refused(r"1e\+06 s in steps of 0.001 s are 1e\+09 steps .* the limit is 5e\+07", duration=1e6)
     refused(
-        "start, row 0: Braid: a contraction of .* is outside its range",
+        "initial_states, row 0: Braid: a contraction of .* is outside its range",
         GeometryLimitError,
-        start={**start, "position": [1.0, 0.0]},
+        initial_states={**start, "position": [1.0, 0.0]},
     )
     refused(
-        "start, row 1: Braid: a contraction of .* is outside its range",
+        "initial_states, row 1: Braid: a contraction of .* is outside its range",
         GeometryLimitError,
-        start={**start, "position": [0.0, -1.0]},
+        initial_states={**start, "position": [0.0, -1.0]},
     )
     lengths = {"mechanism.mass": [9.0, 10.0], "muscle.geometry.resting_length": [0.3, 0.02]}
     refused(
-        "start, row 1: Braid: a contraction of",
+        "initial_states, row 1: Braid: a contraction of",
         GeometryLimitError,
         variations=lengths,
-        start={**start, "position": -0.02},
+        initial_states={**start, "position": -0.02},
     )
-    refused("start: it is 'rest'; give for each state a number", start="rest")
-    refused("keep: it is 3; name columns", keep=3)
+    refused("initial_states is rest; give for each state a number", initial_states="rest")
+    refused("keep is 3; give names of columns", keep=3)
     refused(r"keep: no column '3'", keep=[3])
-    refused("into: it is 5; name a folder", into=5)
-    refused("precision: it is 'single'; give Double", precision="single")
-    refused("precision: it is <class .*Single'>; give Double", precision=Single)
+    refused("into is 5; give the path of a folder", into=5)
+    refused("precision is 'single'; give Double", precision="single")
+    refused("precision is <class .*Single'>; give Double", precision=Single)
     refused("cores is 'all'; it must be a whole number", cores="all")
     with pytest.raises(ParameterError, match=r"simulate_batch: Muscle.* is no plant; give Plant"):
         simulate_batch(chosen_muscle(), {}, PULSE, duration=0.1, initial_states=start)
@@ -449,20 +449,20 @@ def test_everything_else_that_cannot_be_is_refused(tmp_path):
     refused("there: it exists already", FileError, into=tmp_path / "there")
     (tmp_path / "file").write_text("")
     refused("cannot be written", FileError, into=tmp_path / "file" / "inside")
-    with pytest.raises(ParameterError, match="give the start of Functions, a value for each state"):
+    with pytest.raises(ParameterError, match="give the initial_states of Functions, a value for each state"):
         simulate_batch(Functions(), {"power": [0.5]}, ZERO_INPUT, duration=0.1)
 
 
 def test_columns_that_do_not_fit_the_memory_are_refused():
     many = {"mechanism.mass": np.full(1_000_000, 10.0)}
-    refused(r"columns of 1000000 plants at \d+ instants take .* GB of memory; 4 GB are allowed", variations=many)
+    refused(r"columns of 1000000 plants at \d+ output times take .* GB of memory; the limit is 4 GB", variations=many)
 
 
 @pytest.mark.parametrize("method", [FAST, Rodas4()], ids=["RK4", "Rodas4"])
 def test_on_disk_is_what_was_in_memory(tmp_path, method):
     start, varied = plain().state_at(pressure=1e5), thick_and_thin(18, {2} if method is FAST else ())
     varied |= around({"mechanism.mass": 10.0}, 18)
-    given = {"duration": 0.2, "start": start, "method": method, "keep": ("pressure", "position", "fill")}
+    given = {"duration": 0.2, "initial_states": start, "integrator": method, "keep": ("pressure", "position", "fill")}
     memory = simulate_batch(plain(), varied, PULSE, **given)
     disk = simulate_batch(plain(), varied, PULSE, into=tmp_path / "study" / "run", **given)
     folder = tmp_path / "study" / "run"
@@ -527,7 +527,7 @@ def test_an_interruption_keeps_what_is_done(tmp_path, monkeypatch, method, where
         return take(self)
 
     count, start = 64, plain().state_at(pressure=1e5)
-    given = {"duration": 0.05, "start": start, "method": method, "keep": ("pressure",), "cores": 1, "output": 0.01}
+    given = {"duration": 0.05, "initial_states": start, "integrator": method, "keep": ("pressure",), "cores": 1, "output_times": 0.01}
     varied = around({"mechanism.mass": 10.0}, count)
     whole = simulate_batch(plain(), varied, PULSE, **given)
     monkeypatch.setattr(thread_pool.Queue, "_take", interrupting)

@@ -71,13 +71,13 @@ def test_a_function_that_no_lines_follow_is_refused():
 
     for function, error in ((step, 1e-4), (lambda t: math.sin(1 / (t + 1e-3)), 1e-10)):
         with pytest.raises(
-            ParameterError, match=r"'fill' is not followed to .* points: it differs by .* as a Schedule"
+            ParameterError, match=r"'fill' is not approximated to .* points: the error is .* as a Schedule"
         ):
             SampledSignal.sampled({"fill": function}, duration=1.0, error=error)
     with pytest.raises(ParameterError, match=r"'fill' is nan at 0 s; it must be finite"):
         SampledSignal.sampled({"fill": lambda t: math.nan}, duration=1.0)
     for wrong in ({"error": 0.0}, {"duration": 0.0}, {"duration": math.inf}):
-        with pytest.raises(ParameterError, match="an error above 0 is needed, and a duration above 0"):
+        with pytest.raises(ParameterError, match="the error and the duration must be greater than 0"):
             SampledSignal.sampled({"fill": math.sin}, **{"duration": 1.0, **wrong})
 
 

@@ -33,7 +33,7 @@ from airmuscle.control.inputs import SampledSignal, Schedule
 from airmuscle.control.piecewise_linear import PiecewiseLinear
 from airmuscle.control.with_drivers import WithDrivers
 from airmuscle.core.errors import ParameterError
-from airmuscle.simulation import output_times
+from airmuscle.simulation.output_times import output_times
 
 INPUTS = ("other", "fill")
 TICK = 2.0**-10
@@ -313,7 +313,7 @@ def test_an_impossible_driver_is_refused(make, message: str):
 def test_a_driver_refuses_names_and_commands_it_cannot_follow():
     told = SampledSignal({"fill": ((0.0, 0.5), (1.0, 1.5))})
     command = WithDrivers(told, {"fill": PWM(10.0)})
-    with pytest.raises(ParameterError, match=r"the driver of 'fill' is told 1.5 before 1 s; allowed range: 0 to 1"):
+    with pytest.raises(ParameterError, match=r"the command of the driver of 'fill' is 1.5 before 1 s; it must be within 0 to 1"):
         command.segments(INPUTS, 0.0, 1.0)
     assert command.segments(INPUTS, 0.0, 0.5).ends.size > 1, "what is not reached is not refused"
     with pytest.raises(ParameterError, match=r"no input 'fil'; there are other, fill. Did you mean 'fill'\?"):

@@ -13,7 +13,9 @@ from airmuscle.analysis.static_stiffness import stiffness
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import Schedule
 from airmuscle.control.piecewise_linear import PiecewiseLinear
+from airmuscle.core.diagnostics import Columns, DiagnosticCode
 from airmuscle.core.errors import AirmuscleError, SimulationError
+from airmuscle.core.status import Status
 from airmuscle.mechanism import HangingMass, MusclesInSeries, WithEndStops, WithLatch
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import LinearDamper, SeriesSpring
@@ -23,7 +25,7 @@ from airmuscle.pneumatics import FillDischarge, Manifold, SharedSupply, Supply, 
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.simulation import advance, simulate
 from airmuscle.simulation.batch import simulate_batch
-from airmuscle.simulation.integrators import LESS_THAN_NONE, TOO_MANY, Rodas4, RungeKutta4
+from airmuscle.simulation.integrators import Rodas4, RungeKutta4
 
 HUGE = Valve(9e-6, 0.3)
 VALVE = Valve(2.6e-9, 0.4)
@@ -56,7 +58,7 @@ def test_a_load_that_tears_a_muscle_out_of_its_reach_is_named_as_the_cause(mecha
     muscles = tuple(replace(chosen_muscle(), name=name) for name in ("upper", "lower"))[: mechanism.muscle_count or 1]
     plant = Plant(muscles, (FillDischarge(Supply(5e5), VALVE, HUGE),) * len(muscles), mechanism, gas)
     empty = Schedule({name: ((0.0, 1.0),) for name in plant.inputs if name.endswith("discharge")})
-    with pytest.raises(SimulationError, match=r"upper had come to a contraction of -10.*put Stopped around") as caught:
+    with pytest.raises(SimulationError, match=r"upper reached a contraction of -10.*wrap") as caught:
         simulate(plant, empty, duration=2.0, initial_state=plant.state_at(pressure=0.0))
     assert len(caught.value.recording) > 1
     if len(muscles) == 1:
@@ -72,17 +74,17 @@ def test_isothermal_air_of_negative_mass_has_a_pressure_and_yet_ends_the_run():
     """Isothermal air is linear in its mass: numbers stay finite where they have long lost their meaning."""
     plant, discharge, method = isothermal(HUGE), Schedule({"discharge": ((0.02, 1.0),)}), RungeKutta4(0.01)
     start = plant.state_at(pressure=3e5)
-    with pytest.raises(SimulationError, match=r"because there was less air than none.*a fixed step too long") as caught:
+    with pytest.raises(SimulationError, match=r"because an air mass became negative.*a fixed step too long") as caught:
         simulate(plant, discharge, duration=0.2, initial_state=start, integrator=method)
     assert (caught.value.recording["air_mass"] >= 0.0).all()
     assert (caught.value.recording["pressure"] >= -101325.0).all()
-    with pytest.raises(SimulationError, match="less air than none"):
+    with pytest.raises(SimulationError, match="an air mass became negative"):
         advance(plant, start, {"discharge": 1.0}, 0.01, method)
     batch = simulate_batch(
         plant, {"mechanism.mass": [10.0, 11.0]}, discharge, duration=0.05, initial_states=start, integrator=method
     )
-    assert (batch.status == LESS_THAN_NONE).all()
-    assert "less air than none" in batch.reason(1)
+    assert (batch.status == Status.NEGATIVE_AIR_MASS).all()
+    assert "an air mass became negative" in batch.reason(1)
     assert (np.nan_to_num(batch["air_mass"]) >= 0.0).all()
 
 
@@ -97,9 +99,9 @@ REACH = chosen_muscle().geometry.contraction_range
         ({**STATE, "position": "10 mm"}, "position is '10 mm'; it must be one number, in SI"),
         ({**STATE, "position": [0.0, 0.1]}, "it must be one number, in SI"),
         ({**STATE, "sped": 0.0}, "no state 'sped'.*Did you mean 'speed'"),
-        ({"air_mass": 1e-3}, "the start lacks position, speed"),
-        ({**STATE, "air_mass": np.nan}, "the start must be finite"),
-        ([1.0, 2.0, 3.0], "the start is .*; give a value for each name"),
+        ({"air_mass": 1e-3}, "the initial state lacks position, speed"),
+        ({**STATE, "air_mass": np.nan}, "the initial state must be finite"),
+        ([1.0, 2.0, 3.0], "the initial state is .*; give a value for each name"),
         ({**STATE, "position": 10.0}, "a contraction of .* % is outside its range"),
         ({**STATE, "position": -10.0}, "a contraction of .* % is outside its range"),
         (
@@ -146,19 +148,19 @@ def test_segments_of_another_shape_never_reach_a_kernel(segments, message):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"command": {"fill": 1.0}}, "the command is {'fill': 1.0}; give a"),
+        ({"input": {"fill": 1.0}}, "the input is {'fill': 1.0}; give a"),
         ({"duration": "1 s"}, "duration is '1 s'; it must be one number, in SI"),
-        ({"output": "10 ms"}, "output is '10 ms'; it must be one number"),
-        ({"output": [[0.01, 0.02]]}, "give a spacing"),
-        ({"method": "RK4"}, "the method is 'RK4'; give Rodas4"),
+        ({"output_times": "10 ms"}, "output_times is '10 ms'; it must be one number"),
+        ({"output_times": [[0.01, 0.02]]}, "give a spacing"),
+        ({"integrator": "RK4"}, "the integrator is 'RK4'; give Rodas4"),
     ],
 )
 def test_what_a_run_is_told_is_of_its_kind(given, message):
     with pytest.raises(AirmuscleError, match=message):
-        simulate(isothermal(), **{"command": FILL, "duration": 0.1, "start": STATE, **given})
-    with pytest.raises(AirmuscleError, match=message if "command" not in given else "give one Command|is no Command"):
+        simulate(isothermal(), **{"input": FILL, "duration": 0.1, "initial_state": STATE, **given})
+    with pytest.raises(AirmuscleError, match=message if "input" not in given else "give one Command|is no Command"):
         simulate_batch(
-            isothermal(), {}, **{"command": [FILL], "duration": 0.1, "start": STATE, **given}
+            isothermal(), {}, **{"input": [FILL], "duration": 0.1, "initial_states": STATE, **given}
         )  # fmt: skip
 
 
@@ -172,21 +174,21 @@ def test_what_a_step_is_told_is_of_its_kind():
 
 def test_a_batch_has_no_more_plants_than_it_has():
     batch = simulate_batch(isothermal(), {}, [FILL, FILL], duration=0.01, initial_states=STATE, keep=())
-    assert batch.reason(-1) == batch.reason(1) == "done"
+    assert batch.reason(-1) == batch.reason(1) == "it is complete"
     with pytest.raises(AirmuscleError, match="there is no plant 2; there are 0 to 1"):
         batch.reason(2)
     wrong = (
-        ({"start": {**STATE, "speed": "fast"}}, "'speed' is 'fast'"),
-        ({"start": {**STATE, "air_mass": -1.0}}, "row 0"),
+        ({"initial_states": {**STATE, "speed": "fast"}}, "'speed' is fast"),
+        ({"initial_states": {**STATE, "air_mass": -1.0}}, "row 0"),
     )
     for given, message in (
         *wrong,
-        ({"variations": [1, 2]}, "write a column"),
+        ({"variations": [1, 2]}, "give a column of values"),
         ({"variations": {3: [1]}}, "no parameter"),
     ):
         with pytest.raises(AirmuscleError, match=message):
             simulate_batch(isothermal(), input=FILL, duration=0.1,
-                           **{"variations": {"mechanism.mass": [9.0]}, "start": STATE, **given})  # fmt: skip
+                           **{"variations": {"mechanism.mass": [9.0]}, "initial_states": STATE, **given})  # fmt: skip
 
 
 PARTS = [
@@ -241,21 +243,21 @@ def test_the_response_at_a_pole_is_infinite():
 def test_a_run_says_where_no_muscle_can_be():
     """A load thrown up far beyond the muscle's own length is no muscle any more; isothermal numbers would go on."""
     plant = isothermal()
-    thrown = r"because a muscle enclosed nothing.* contraction of 10\d\.\d+%, where its geometry ends"
+    thrown = r"because a muscle volume became zero or negative.* contraction of 10\d\.\d+%, a limit of its geometry"
     with pytest.raises(SimulationError, match=thrown) as caught:
         simulate(plant, Schedule({}), duration=0.1, initial_state={**STATE, "speed": 100.0})
     assert (caught.value.recording["volume"] > 0).all()
     assert 1 < len(caught.value.recording) < 101
     columns = {"time": np.array([0.0, 1.0]), "pressure": np.zeros(2), "contraction": np.array([0.0, -0.2])}
-    (note,) = [
-        note for note in extrapolation_warnings(plant, columns) if "was beyond the reach of its geometry in" in note
-    ]
-    assert note.endswith("by at most 9.664 % at 1 s; no muscle can do this")
+    (found,) = [d for d in plant.diagnose(Columns(columns)) if d.code is DiagnosticCode.GEOMETRY_LIMIT]
+    assert "by at most 9.664 % at 1 s" in found.text
+    assert found.text.endswith("no real muscle can do this")
     series = replace(plant, muscle=replace(plant.muscle, damper=LinearDamper(50.0), series=SeriesSpring(3e4)))
-    (note,) = extrapolation_warnings(series, columns | {"inner_contraction": np.array([-0.2, 0.0])})
-    assert "in inner_contraction" in note
+    columns["inner_contraction"] = np.array([-0.2, 0.0])
+    (found,) = [d for d in series.diagnose(Columns(columns)) if d.code is DiagnosticCode.GEOMETRY_LIMIT]
+    assert "inner contraction" in found.text
     calm = simulate(plant, Schedule({}), duration=0.1, initial_state=STATE)
-    assert not [note for note in calm.notes if "reach" in note]
+    assert not [note for note in calm.notes if "range of its geometry" in note]
 
 
 @pytest.mark.parametrize("method", [Rodas4(), RungeKutta4(1e-4)], ids=str)
@@ -266,6 +268,6 @@ def test_no_more_steps_are_taken_than_allowed(method):
     whole = method.run(compile_system(plant), segments, 0.0, start, times)
     assert whole.status == 0
     left = method.run(compile_system(plant), segments, 0.0, start, times, whole.steps - 1)
-    assert (left.status, left.steps) == (TOO_MANY, whole.steps - 1)
+    assert (left.status, left.steps) == (Status.TOO_MANY_STEPS, whole.steps - 1)
     enough = method.run(compile_system(plant), segments, 0.0, start, times, whole.steps)
     np.testing.assert_array_equal(enough.rows, whole.rows)

@@ -175,7 +175,7 @@ def test_an_own_system_is_linearised_like_a_plant():
     ("change", "message"),
     [
         (lambda s: linearise(HANGING, {**s, "positon": 0.0}), "no state 'positon'.*Did you mean 'position'"),
-        (lambda s: linearise(HANGING, {"position": 0.0}), "the start lacks air_mass, speed"),
+        (lambda s: linearise(HANGING, {"position": 0.0}), "the initial state lacks air_mass, speed"),
         (lambda s: linearise(HANGING, {**s, "speed": float("nan")}), "must be finite"),
         (lambda s: linearise(HANGING, s, {"fil": 1.0}), "no input 'fil'"),
         (lambda s: linearise(HANGING, s, {"fill": 1.5}), "the input 'fill' is 1.5; allowed range: 0 to 1"),

@@ -179,7 +179,7 @@ def test_kernels_compile_once_per_machine_and_say_so(tmp_path):
         "am.FillDischarge(am.Supply(6 * bar), am.Valve(1e-9, 0.4), am.Valve(1e-9, 0.4)), am.Isometric(0.05))\n"
         "am.simulate(plant, am.Schedule({'fill': ((0.0, 1.0),)}), duration=1.0)"
     )
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    environment = {**os.environ, "AIRMUSCLE_CACHE_DIR": str(tmp_path)}
     files, words = [], []
     for _ in range(3):
         done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)

@@ -48,14 +48,15 @@ def _grid(spacing: float, start: float, duration: float) -> Array:
 
 
 def _times(given: Any) -> Array:
-    """Times [s] in rising order, from a list of them."""
+    """Times [s] in rising order, each once, from a list of them."""
     try:
         times = np.array(given, dtype=float)
     except (TypeError, ValueError):
         times = np.empty((0, 0))
     if times.ndim != 1:
         raise ParameterError(f"simulate: output_times is {str(given)[:80]}; give a spacing [s] or a list of times [s].")
-    return np.sort(times)
+    times = np.sort(times)
+    return times[np.diff(times, prepend=-np.inf) > 0]
 
 
 def merge_output_times(grid: Array, instants: Array, duration: float) -> Array:

@@ -114,14 +114,14 @@ def _check_time(duration: float, start_time: float, integrator: Integrator) -> N
 def _check_options(initial_states: object, keep: object, into: object, precision: object, cores: object) -> None:
     if initial_states is not None and not isinstance(initial_states, Mapping):
         raise ParameterError(
-            f"initial_states: {str(initial_states)[:80]}; give for each state a number for all, or a column (N,)."
+            f"initial_states is {str(initial_states)[:80]}; give for each state a number for all, or a column (N,)."
         )
     if keep is not None and not isinstance(keep, Sequence):
-        raise ParameterError(f"keep: {keep!r}; give names of columns, ('pressure', 'position').")
+        raise ParameterError(f"keep is {keep!r}; give names of columns, ('pressure', 'position').")
     if into is not None and not isinstance(into, str | Path):
-        raise ParameterError(f"into: {into!r}; give the path of a folder.")
+        raise ParameterError(f"into is {into!r}; give the path of a folder.")
     if not isinstance(precision, Precision):
-        raise ParameterError(f"precision: {precision!r}; give Double() or Single().")
+        raise ParameterError(f"precision is {precision!r}; give Double() or Single().")
     if cores is not None and (not isinstance(cores, int) or cores < 1):
         raise ParameterError(f"simulate_batch: cores is {cores!r}; it must be a whole number from 1 on.")
 
@@ -152,7 +152,7 @@ def _segments(
         if id(one) in known:
             continue
         if not isinstance(one, InputSignal):
-            raise ParameterError(f"inputs, row {row}: {str(one)[:80]}; give a Schedule or a SampledSignal.")
+            raise ParameterError(f"inputs, row {row} is {str(one)[:80]}; give a Schedule or a SampledSignal.")
         try:
             segments = one.segments(compiled.description.input_names, start, duration)
             segments.check_shape(len(compiled.description.input_names), start)
