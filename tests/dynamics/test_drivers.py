@@ -313,7 +313,9 @@ def test_an_impossible_driver_is_refused(make, message: str):
 def test_a_driver_refuses_names_and_commands_it_cannot_follow():
     told = SampledSignal({"fill": ((0.0, 0.5), (1.0, 1.5))})
     command = WithDrivers(told, {"fill": PWM(10.0)})
-    with pytest.raises(ParameterError, match=r"the command of the driver of 'fill' is 1.5 before 1 s; it must be within 0 to 1"):
+    with pytest.raises(
+        ParameterError, match=r"the command of the driver of 'fill' is 1.5 before 1 s; allowed range: 0 to 1"
+    ):
         command.segments(INPUTS, 0.0, 1.0)
     assert command.segments(INPUTS, 0.0, 0.5).ends.size > 1, "what is not reached is not refused"
     with pytest.raises(ParameterError, match=r"no input 'fil'; there are other, fill. Did you mean 'fill'\?"):

@@ -6,7 +6,6 @@ from __future__ import annotations
 import concurrent.futures
 import math
 
-import llvmlite.binding as llvm
 import numba
 import numpy as np
 import pytest
@@ -90,7 +89,11 @@ def test_made_once_it_is_found_again(empty, without_numba, capsys):
 
 @pytest.mark.parametrize(
     "other",
-    [lambda a: np.repeat(a, 2, axis=1)[:, ::2], np.asfortranarray, lambda a: np.frombuffer(a.tobytes()).reshape(a.shape)],
+    [
+        lambda a: np.repeat(a, 2, axis=1)[:, ::2],
+        np.asfortranarray,
+        lambda a: np.frombuffer(a.tobytes()).reshape(a.shape),
+    ],
     ids=["every second", "by columns", "read-only"],
 )
 def test_an_array_that_is_not_contiguous_and_writeable_is_an_error(other):
@@ -258,4 +261,3 @@ def test_threads_that_ask_at_once_get_one_machine_code(empty, without_numba, mon
     with concurrent.futures.ThreadPoolExecutor(8) as pool:
         assert all(np.array_equal(results, right) for results in pool.map(found, range(64)))
     assert len(looked) == 1
-

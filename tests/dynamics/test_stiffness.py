@@ -43,9 +43,7 @@ def pulled(gas, pressure=3e5, contraction=0.12):
     if "internal_energy" in start:  # put there without heat, as its content in the middle is
         before, after = (BRAID.volume(x / 0.2) for x in (middle, middle + amplitude))
         start["internal_energy"] *= (before / after) ** (HEAT_CAPACITY_RATIO - 1)
-    run = simulate(
-        plant, motion.input, duration=4.0, initial_state=start, integrator=Rodas4(1e-11), output_times=0.01
-    )
+    run = simulate(plant, motion.input, duration=4.0, initial_state=start, integrator=Rodas4(1e-11), output_times=0.01)
     return plant, run
 
 

@@ -96,6 +96,6 @@ def check_command_range(name: str, command: Sequence[Segment], start: float) -> 
         for at in (value, value + slope * (end - begin)):
             if not -_ROUNDING <= at <= 1 + _ROUNDING:
                 raise ParameterError(
-                    f"the command of the driver of '{name}' is {at:g} before {end:g} s; it must be within 0 to 1."
+                    f"the command of the driver of '{name}' is {at:g} before {end:g} s; allowed range: 0 to 1."
                 )
         begin = end

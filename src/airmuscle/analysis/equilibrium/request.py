@@ -47,7 +47,7 @@ def complete_inputs(system: System, inputs: Mapping[str, float] | None) -> dict[
         if not variable.minimum <= value <= variable.maximum:
             unit = "" if variable.unit in ("", "1") else f" {variable.unit}"
             raise ParameterError(
-                f"the input '{variable.name}' is {value:g}{unit}; it must be within {variable.minimum:g} to "
+                f"the input '{variable.name}' is {value:g}{unit}; allowed range: {variable.minimum:g} to "
                 f"{variable.maximum:g}{unit} ({variable.meaning})."
             )
     return {name: float(given.get(name, 0.0)) for name in system.inputs}

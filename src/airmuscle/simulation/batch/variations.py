@@ -193,6 +193,6 @@ def _column(leaf: tree.Leaf, given: npt.ArrayLike) -> Array:
         more = f" ({wrong.size - 1} further rows too)" if wrong.size > 1 else ""
         raise ParameterError(
             f"variations, row {row}: '{leaf.path}' ({declared.symbol}, {declared.meaning}) is {values[row]:g}{unit}; "
-            f"it must be within {low:g} to {high:g}{unit}{more}. Values are in SI units."
+            f"allowed range: {low:g} to {high:g}{unit}{more}. Values are in SI units."
         )
     return values
