@@ -20,7 +20,7 @@ import pandas as pd
 
 from airmuscle.core.errors import IdentificationError
 from airmuscle.identify import BlockSplit, SpecimenSplit, compare, fit
-from airmuscle.identify.candidates import Candidate, standard_candidates
+from airmuscle.identify.candidates import Candidate, blank_surface, standard_candidates
 from airmuscle.identify.model_selection import force_residuals
 from airmuscle.recording import Recording
 

@@ -193,8 +193,8 @@ def _changes(instants: Array, levels: npt.NDArray[Any], before: float) -> tuple[
 class WithDrivers(InputSignal):
     """A command whose inputs, some or all, pass through drivers: one each, or several in the order of the signal.
 
-    `WithDrivers(Signal({"fill": ...}), {"fill": (PWM(50), SolenoidDriver(opening_delay=5e-3))})`. Inputs without a driver do as they
-    are told at once. Raises ParameterError where the command of a driver leaves 0 to 1.
+    `WithDrivers(Signal({"fill": ...}), {"fill": (PWM(50), SolenoidDriver(opening_delay=5e-3))})`. Inputs
+    without a driver follow the command at once. Raises ParameterError where the command of a driver leaves 0 to 1.
     """
 
     inner: InputSignal

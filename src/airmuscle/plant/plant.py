@@ -70,7 +70,8 @@ class Plant:
                 if not part.traceable:
                     raise TraceError(
                         f"{type(part).__name__} of {muscle.name} is not closed-form and cannot enter a plant. Use "
-                        "as_force_law(law, validity range) for a characteristic, as_polynomial(geometry) for a geometry."
+                        "as_force_law(law, validity range) for a characteristic, as_polynomial(geometry) for a "
+                        "geometry."
                     )
 
     def _check_unique_names(self) -> None:

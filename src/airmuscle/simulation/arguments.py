@@ -100,7 +100,7 @@ def check_input_range(plant: System, segments: PiecewiseLinear, start: float) ->
             unit = "" if given.unit == "1" else f" {given.unit}"
             raise ParameterError(
                 f"the input '{given.name}' is {values[row, column]:g}{unit} before {segments.ends[row]:g} s; allowed "
-                f"are {given.minimum:g} to {given.maximum:g}{unit} ({given.meaning})."
+                f"range: {given.minimum:g} to {given.maximum:g}{unit} ({given.meaning})."
             )
 
 

@@ -186,6 +186,6 @@ def _column(leaf: tree.Leaf, given: npt.ArrayLike) -> Array:
         more = f" ({refused.size - 1} further rows too)" if refused.size > 1 else ""
         raise ParameterError(
             f"variations, row {row}: '{leaf.path}' ({declared.symbol}, {declared.meaning}) is {values[row]:g}{unit}; "
-            f"allowed are finite values from {low:g} to {high:g}{unit}{more}. Values are SI."
+            f"allowed range: finite values from {low:g} to {high:g}{unit}{more}. Values are SI."
         )
     return values
