@@ -119,7 +119,7 @@ def test_a_muscle_never_pushes():
 
 @pytest.mark.parametrize(
     ("pressure", "position", "message"),
-    [(-2e5, 0.0, "below absolute zero"), (1e5, 0.25, "a contraction of 125 % is outside its range")],
+    [(-2e5, 0.0, "is not above absolute vacuum"), (1e5, 0.25, "a contraction of 125 % is outside its range")],
 )
 def test_a_state_that_cannot_be_is_refused(pressure, position, message):
     plant = Plant(chosen_muscle(), CIRCUIT, HangingMass(1.0))

@@ -277,7 +277,7 @@ def test_a_plant_beyond_its_reach_or_in_a_vacuum_is_asked_alone_and_its_neighbou
         of_each = found(one, table, -6e4)
         assert of_each.searched.tolist() == [False, True]
         assert np.isnan(of_each.states[0]).all()
-        with pytest.raises(ParameterError, match="below absolute zero"):
+        with pytest.raises(ParameterError, match="is not above absolute vacuum"):
             find_equilibrium(replace(one, ambient=Ambient(5e4)), pressure=-6e4)
 
 
