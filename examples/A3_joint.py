@@ -29,8 +29,8 @@ print(f"equilibrium at {equilibrium['angle'] / degree:.1f} degrees, both muscles
 constant_pressure, closed_valves = stiffnesses.constant_pressure, stiffnesses.shut_valves
 print(f"stiffness {constant_pressure:.0f} N m/rad, with closed valves {closed_valves:.0f} N m/rad")
 
-schedule = am.Schedule({"command": ((0.1, 0.6), (0.3, 0.0)), "held": ((0, 1), (0.1, 0))})
-command = WithDrivers(schedule, {"held": SolenoidDriver(opening_delay=10 * ms, closing_delay=25 * ms)})
+schedule = am.Schedule({"command": ((0.1, 0.6), (0.3, 0.0)), "latched": ((0, 1), (0.1, 0))})
+command = WithDrivers(schedule, {"latched": SolenoidDriver(opening_delay=10 * ms, closing_delay=25 * ms)})
 run = am.simulate(plant, command, duration=2.0, initial_state=equilibrium)
 motion_start = run["time"][abs(run["angle"] - run["angle"][0]) > 0.1 * degree][0]
 print(f"brake released and valve opened at 100 ms; motion starts at {motion_start / ms:.0f} ms")

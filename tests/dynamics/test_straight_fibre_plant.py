@@ -14,7 +14,7 @@ from airmuscle.plant.energy_balance import WithEnergyMeters
 
 @pytest.fixture(scope="module")
 def plant():
-    with pytest.warns(AirmuscleWarning, match="tested to a strain of 3"):
+    with pytest.warns(AirmuscleWarning, match="tested up to a strain of 3, reached at about 19 % contraction"):
         muscle = am.load("saga2007-circle").muscle
     valve = am.Valve(2.6167e-9, 0.433)
     circuit = am.FillDischarge(am.Supply(0.16e6), valve, valve)

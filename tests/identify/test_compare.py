@@ -175,9 +175,9 @@ def test_what_is_left_out_decides_what_the_law_is_for():
     within, beyond = (compare(runs, candidates, leave_out=how) for how in (BlockSplit(), SpecimenSplit()))
     assert (within.recommended.candidate.name, beyond.recommended.candidate.name) == ("rich", "plain")
     assert within.purpose in within.reason
-    assert "muscles and contractions that were measured" in within.reason
+    assert "the measured muscles and contractions, within the measured range" in within.reason
     assert beyond.purpose in str(beyond).splitlines()[0]
-    assert "a muscle of the type that was not measured" in beyond.reason
+    assert "for other muscles of the same type" in beyond.reason
 
 
 @pytest.mark.parametrize(
@@ -213,7 +213,7 @@ def test_the_command_writes_a_muscle_that_loads_back(tmp_path: Path):
     assert {name: loaded[name] for name in fitted} == fitted
     names = {path.stem for path in (out / "figures").glob("*.svg")}
     assert {"isobars", "errors", "residuals", "correlations", "left-out"} <= names
-    assert "Which law to take" in (out / "report.html").read_text(encoding="utf-8")
+    assert "Model selection" in (out / "report.html").read_text(encoding="utf-8")
 
 
 def test_the_command_refuses_what_it_cannot_do(tmp_path: Path):

@@ -637,7 +637,7 @@ def test_a_fit_prints_its_parameters_and_figures():
     twice = 2 * found["end_correction"].stderr
     assert f"{found['end_correction'].value:.6g}" in text
     assert f"{twice:.3g}" in text
-    assert "how much more the middle contracts than the whole muscle" in text
+    assert "contraction of the middle relative to that of the whole muscle" in text
     for said in (
         "rms error",
         " N at ",

@@ -147,7 +147,7 @@ def test_what_cannot_be_drawn_is_refused():
     with pytest.raises(IdentificationError, match="64 rows, but the recordings have 56"):
         bootstrap(found, runs[1:], by=RunSplit())
     few = fit(blank_surface(1, 4000), runs[:2])
-    with pytest.raises(IdentificationError, match="only 2 runs"):
+    with pytest.raises(IdentificationError, match="needs 3 runs or more, but the data have 2"):
         bootstrap(few, runs[:2], by=RunSplit())
     assert bootstrap(few, runs[:2], by=LevelSplit("pressure"), refits=10).group_count == 8
 

@@ -68,11 +68,11 @@ def test_the_default_of_a_fit_is_the_sigma_of_the_sensors():
     sigma = np.repeat(sensor_deviations(runs, "force"), [len(run) for run in runs])
     default, stated = fit(SURFACE, runs), fit(SURFACE, runs, sigma=sigma)
     assert default.values == pytest.approx(stated.values, rel=1e-9)
-    assert any("weigh by standard deviations of 0." in note for note in default.notes)
+    assert any("weighted by standard deviations of 0." in note for note in default.notes)
     alike = fit(SURFACE, runs, sigma=1.0)
-    assert not any("weigh by" in note for note in alike.notes)
+    assert not any("weighted by" in note for note in alike.notes)
     assert np.abs(default.values - alike.values).max() > 0.1
-    assert not any("weigh by" in note for note in fit(SURFACE, runs[:4]).notes)
+    assert not any("weighted by" in note for note in fit(SURFACE, runs[:4]).notes)
 
 
 def test_weights_by_sensor_come_nearer_to_the_truth_in_the_mean():

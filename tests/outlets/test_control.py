@@ -221,7 +221,9 @@ def test_what_is_no_table_of_a_controller_is_refused(tmp_path: Path):
         ):
             load_scenario(written(tmp_path, text=f"{GOOD[:i]}controller = {given}"))
     flat = f'{GOOD[:i]}controller = {{ model = "PID", measured = "pressure", commanded = "fill", gain = 1, period = 1e-3, setpoint = 3 }}'
-    with pytest.raises(ParameterError, match=r'\[command.controller.setpoint\] is 3; write pressure = \[\["0 s"'):
+    with pytest.raises(
+        ParameterError, match=r'\[command.controller.setpoint\] is 3; it must be a table. Write pressure = \[\["0 s"'
+    ):
         load_scenario(written(tmp_path, text=flat))
 
 
@@ -356,7 +358,7 @@ def test_the_program_of_the_example_runs(tmp_path: Path):
         [sys.executable, str(ROOT / "examples" / "A4_control.py")], cwd=tmp_path, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-    assert "it is the same run: True" in done.stdout
+    assert "stopped after 2 s and resumed, the run has the same final state: True" in done.stdout
     assert (tmp_path / "control.png").stat().st_size > 10_000
 
 
@@ -368,7 +370,7 @@ scenario = "scenario.toml"
 "command.controller.setpoint.pressure[1][1]" = ["1.5 bar", "2 bar"]
 [design]
 model = "Grid"
-[outcome]
+[metrics]
 last = { model = "Final", column = "setpoint.pressure" }
 told = { model = "Maximum", column = "command.fill" }
 """

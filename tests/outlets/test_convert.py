@@ -78,13 +78,13 @@ def test_the_table_is_printed(tmp_path):
             ("borzikova-exponential", "ContractileSurface"),
             "has no validity range for the conversion; give --min-pressure, ",
         ),
-        ((MUSCLE, "ContractileSurfac"), "no library entry 'ContractileSurfac'"),
+        ((MUSCLE, "ContractileSurfac"), "no muscle or law 'ContractileSurfac'"),
         ((MUSCLE, "Saga2007"), "MODEL: Saga2007 needs initial values"),
         ((MUSCLE, "hunt"), "has no force at"),
         ((MUSCLE, "ContractileSurface", "--min-pressure", "7 bar"), "must be less than max_pressure"),
         (
             (MUSCLE, "ContractileSurface", "--min-contraction", "25.9 %", "--max-pressure", "1 bar"),
-            "nothing to c",
+            "gives no positive force on the validity range, so it cannot be converted",
         ),
         (
             (MUSCLE, "ContractileSurface", "--min-pressure", "7 mm"),

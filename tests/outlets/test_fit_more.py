@@ -72,8 +72,10 @@ def test_bootstrap_and_profiles_are_those_of_the_library(tmp_path):
     one = profile(found, "coefficients[0]")
     assert said["profiles"]["coefficients[0]"]["low"] == pytest.approx(one.low, rel=1e-6)
     assert set(said["profiles"]) == {"coefficients[0]", *weakly_determined(found)}
-    page = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
-    assert all(word in page for word in ("How sure the parameters are", "50 refits to 6 parts", "2.5 %, profile"))
+    page = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
+    assert all(
+        word in page for word in ("Uncertainty of the parameters", "50 refits, 6 blocks resampled", "2.5 %, profile")
+    )
     assert {"intervals.svg", "bands.svg"} <= {p.name for p in (tmp_path / "fit" / "figures").iterdir()}
 
 
@@ -95,7 +97,7 @@ def test_a_shape_on_request_is_the_one_written(tmp_path):
     loose = airmuscle("fit", tmp_path / "bench.csv", *degree, "--out", tmp_path / "loose")
     assert "note: force" in loose.stdout
     assert "of the validity range), most at" in loose.stdout
-    assert "Where the law behaves as no muscle does" in (tmp_path / "loose" / "report.html").read_text("utf-8")
+    assert "Monotonicity violations" in (tmp_path / "loose" / "report.html").read_text("utf-8")
     result = airmuscle("fit", tmp_path / "bench.csv", *degree, "--shape", "--out", tmp_path / "fit")
     assert "shape: rms" in result.stdout
     law = load(tmp_path / "fit" / "muscle.toml").characteristic
@@ -103,7 +105,7 @@ def test_a_shape_on_request_is_the_one_written(tmp_path):
     assert law.coefficients == pytest.approx(
         fit_shape_constrained(blank_surface(4), recording).model.coefficients, abs=1e-6
     )
-    assert "keeps a muscle&#39;s shape" in (tmp_path / "fit" / "report.html").read_text("utf-8")
+    assert "Shape-constrained surface" in (tmp_path / "fit" / "report.html").read_text("utf-8")
 
 
 def test_the_force_is_zero_where_the_muscle_hangs_free(tmp_path):
@@ -160,11 +162,28 @@ def test_a_law_that_data_can_start_needs_no_entry(tmp_path):
 @pytest.mark.parametrize(
     ("said", "option"),
     [
-        ("or hold one fixed: fixed=('geometry.radius',).", "or hold one fixed: --fix 'geometry.radius'."),
-        ("a lower degree, or hold some with fixed=.", "a lower degree, or hold some with --fix."),
-        ("give the true one with units={'pressure': ...}.", "give the true one with --unit 'pressure=...'."),
-        ("count; censoring=UNCENSORED fits them as they stand.", "count; --uncensored fits them as they stand."),
-        ("or draw by Levels('contraction').", "or use --leave-out contraction."),
+        ("fix one: fixed=('geometry.radius',).", "fix one: --fix 'geometry.radius'."),
+        ("or a lower degree, or fix parameters with fixed=.", "or a lower degree, or fix parameters with --fix."),
+        (
+            "or pass the correct unit with units={'pressure': ...}.",
+            "or pass the correct unit with --unit 'pressure=...'.",
+        ),
+        (
+            "bound; censoring=UNCENSORED treats them as measured values.",
+            "bound; --uncensored treats them as measured values.",
+        ),
+        ("or resample by LevelSplit('contraction').", "or use --leave-out contraction."),
+        (
+            "or leave out LevelSplit('contraction') or LevelSplit('pressure').",
+            "or use --leave-out contraction or --leave-out pressure.",
+        ),
+        ("force, or give the range with censoring=.", "force, or treat the rows as measured values with --uncensored."),
+        ("give censoring=Censoring() if the muscle was slack", "omit --uncensored if the muscle was slack"),
+        ("sigma=1.0 weights all rows equally.", "--equal-weights weights all rows equally."),
+        ("the decimal sign: decimal=','.", 'the decimal sign: decimal = "," in a --mapping file.'),
+        ("resting length; give resting_length.", "resting length; give --resting-length."),
+        ("or set all_rows=True.", "or use --all-rows."),
+        ("Name at least one: free=('a.b',).", 'Name at least one: free = ["a.b"] under [fit].'),
         ("nothing of ours: x=1", "nothing of ours: x=1"),
     ],
 )
@@ -177,7 +196,7 @@ def test_the_report_names_options_too(tmp_path):
     assert (recording["force"] == 0).any()
     airmuscle("fit", tmp_path / "bench.csv", *SURFACE, "--out", tmp_path / "fit")
     page = (tmp_path / "fit" / "report.html").read_text("utf-8")
-    assert "--uncensored fits them as they stand" in page
+    assert "--uncensored treats them as measured values" in page
     assert "censoring=" not in page
 
 

@@ -90,7 +90,7 @@ def test_the_text_output(tmp_path: Path):
         "branches: inflating, rows 1 to 200; deflating, rows 201 to 400",
         "plateaus: 40 with",
         "suspected outliers: 1, not removed: force in row 96",
-        "note: the force stands still at its lowest reading, -5 N",
+        "force sensor saturates at its lower limit, -5 N, in 160 rows (40%)",
     ):
         assert said in text
     assert "PROBLEM" not in text
@@ -162,7 +162,7 @@ def test_options_and_mapping_are_equivalent(tmp_path: Path):
     [
         (("none.csv",), 1, "cannot be read"),
         (("run.csv", "--column", "p"), 2, "--column must be NAME=TEXT"),
-        (("run.csv", "--column", "x=pressure [bar]"), 1, "the mapping names column 'x', but there are t [s]"),
+        (("run.csv", "--column", "x=pressure [bar]"), 1, "the mapping names column 'x', but the columns are t [s]"),
         (("run.csv", "--unit", "pressure=mm"), 1, "cannot be converted to 'Pa'"),
         ((), 2, "Missing argument"),
     ],

@@ -234,7 +234,12 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path):
             r"\[characteristic.inner\], model: no model 'TonduLopez2001'",
         ),
         ("[spring]", "[sprng]", ParameterError, r"unknown key 'sprng'.*Did you mean 'spring'\?"),
-        ('"300 mm"', '"300 mn"', UnitError, r"\[characteristic.inner.geometry\], resting_length: 'mn' is no unit"),
+        (
+            '"300 mm"',
+            '"300 mn"',
+            UnitError,
+            r"\[characteristic.inner.geometry\], resting_length: 'mn' is not a known unit",
+        ),
         (
             'quantity = "force"',
             'quantity = "forc"',

@@ -489,7 +489,7 @@ def test_a_value_outside_its_bounds_fails_only_its_own_run(folder: Path):
     result = run(folder)
     assert np.array_equal(result.failed, np.flatnonzero(result.study.values[:, 0] < 0))
     assert result.failed.size
-    assert "allowed are" in result.failure_reasons[result.failed[0]]
+    assert "allowed range: 0 to 1e-05" in result.failure_reasons[result.failed[0]]
 
 
 def test_an_unexpected_exception_fails_only_its_own_run(folder: Path, monkeypatch: pytest.MonkeyPatch):
@@ -638,13 +638,13 @@ BAD = [
     ('low = "2 %"', "low = -inf", "it must be finite"),
     ('low = "2 %"', 'low = "2 mm"', "cannot be converted to a ratio"),
     ('low = "2 %"', 'low = "20 %"', "low is 0.2 and high is 0.1; low must be less than high"),
-    ('low = "2 %"', 'low = "-95 %"', "allowed are"),
+    ('low = "2 %"', 'low = "-95 %"', "allowed range: "),
     ('low = "2 %", ', "", "Uniform needs 'low' (lower bound)"),
     ('low = "2 %"', 'lo = "2 %"', "Uniform has no parameter 'lo'; its parameters are low, high. Did you mean 'low'?"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[]", "the list is empty"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[0.02, nan]", "it must be finite"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', "0.02", "write a list of values, or a distribution"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[0.02, 0.99]", "includes 0.99; allowed are"),
+    ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[0.02, 0.99]", "includes 0.99; allowed range: "),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Range", low = 0.0, high = 0.1, count = 0 }', "2 to 1000000 values"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Truncated", inner = { model = "Normal", mean = 0.05, std = 0.001 }, low = 0.1, high = 0.2 }', "it must be at least 1e-06"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Truncated", inner = { model = "Truncated" }, low = 0.1, high = 0.2 }', "no model 'Truncated'; there are Uniform, Normal, LogNormal, Triangular."),

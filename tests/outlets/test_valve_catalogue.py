@@ -297,7 +297,9 @@ def test_both_paths_of_a_valve_are_named():
 
 
 def test_a_valve_in_place_of_a_muscle_is_refused(tmp_path: Path):
-    with pytest.raises(UnknownNameError, match="'matrix-821' is a valve; a muscle or a law is required: .*dmsp-20-300"):
+    with pytest.raises(
+        UnknownNameError, match=r"'matrix-821' is a valve; a muscle or a law is required: .*dmsp-20-300"
+    ):
         load_law("matrix-821")
     with pytest.raises(ParameterError, match=r"valve\.toml: the file describes a valve; a muscle or a law is required"):
         load_law(written(tmp_path, GOOD))

@@ -89,8 +89,8 @@ class Characteristic(abc.ABC):
     def _no_force_message(self, pressure: float, contraction: float) -> str:
         limits = describe_range(*self.force_range, "N")
         return (
-            f"{type(self).__name__}: no force in the range {limits} gives a contraction of {100 * contraction:.4g} % at "
-            f"{pressure / 1e3:.4g} kPa. "
+            f"{type(self).__name__}: no force in the range {limits} gives a contraction of {100 * contraction:.4g} % "
+            f"at {pressure / 1e3:.4g} kPa. "
         )
 
 

@@ -120,7 +120,8 @@ def _to_dict(inspection: Inspection) -> dict[str, Any]:
         "sensors": [dataclasses.asdict(sensor) | {"deviation": sensor.std} for sensor in sensors],
         "runs": [
             {"kind": run.kind.name, "first_row": run.interval.start + 1, "last_row": run.interval.stop,
-             "constant": run.constant_column, "value": run.constant_value, "swept": run.swept_columns} for run in inspection.runs
+             "constant": run.constant_column, "value": run.constant_value, "swept": run.swept_columns}
+            for run in inspection.runs
         ],
         "branches": [
             {"branch": b.name, "first_row": b.interval.start + 1, "last_row": b.interval.stop,

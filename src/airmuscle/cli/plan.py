@@ -59,9 +59,8 @@ def plan(
     pressures = [quantity(text, "Pa", where="pressure limits") for text in (min_pressure, max_pressure)]
     contractions = [quantity(text, "1", where="contraction limits") for text in (min_contraction, max_contraction)]
     limits = BenchLimits(ValidityRange(*pressures, *contractions), quantity(max_force, "N", where="--max-force"))
-    design = optimal_design(
-        load_law(name).characteristic, limits, runs=runs, points=points, sigma=sigma, fixed=fix or ()
-    )
+    law = load_law(name).characteristic
+    design = optimal_design(law, limits, runs=runs, points=points, sigma=sigma, fixed=fix or ())
     if out is not None:
         _write(design, out)
     if json:

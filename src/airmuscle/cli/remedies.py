@@ -8,7 +8,7 @@ _LEVELS = r"Level(?:s|Split)\(['\"](\w+)['\"]\)"
 _OPTIONS: tuple[tuple[str, str], ...] = (
     (r"fixed=\('([^']+)',\)", r"--fix '\1'"),
     (r"\bfixed=(?![\w('\"])", "--fix"),
-    (r"give the range with censoring=", "treat the rows as measured values with --uncensored"),
+    (r"\bgive (?:the range with )?censoring=(?=[\s.;,])", "treat the rows as measured values with --uncensored"),
     (r"\bcensoring=UNCENSORED\b", "--uncensored"),
     (r"\b(?:give|set|use) censoring=Censoring\(\)", "omit --uncensored"),
     (r"\bsigma=1(?:\.0)?\b", "--equal-weights"),

@@ -96,6 +96,8 @@ def _progress(title: str) -> Iterator[Callable[[int, int], None]]:
 
         def show(done: int, total: int) -> None:
             check_interrupted()
+            if done and display.tasks[task].total is None:  # first call: runs saved by an earlier command
+                echo(f"resuming: {done} of {total} runs are already saved", err=True)
             display.update(task, completed=done, total=total)
 
         yield show
@@ -139,8 +141,8 @@ def _to_dict(result: StudyResult) -> dict[str, Any]:
         "runs": len(study),
         "failed": int(result.failed.size),
         "varied": [parameter.path for parameter in study.parameters],
-        "outcomes": {
-            name: {key: values[i] for key, values in statistics.items() if key != "outcome"}
+        "metrics": {
+            name: {key: values[i] for key, values in statistics.items() if key != "metric"}
             for i, name in enumerate(study.scalars)
         },
         "sensitivities": {

@@ -1,10 +1,10 @@
 """Models from TOML tables, and valve entries from TOML files.
 
 A table names its class, `model = "Braid"`, and its fields: numbers in the declared unit or text with a unit
-(`"300 mm"`), lists for tuples, tables for nested models. A list may also be a column of a data file, relative to the
-folder of the TOML file: `{ file = "data/map.csv", column = "force" }`. An orifice may also be a valve of the library,
-`{ library = "matrix-821" }`, or of a valve file, `{ library = "my/valve.toml" }`. A valve file contains model tables, so
-that both are read in this module:
+(`"300 mm"`), lists for tuples, tables for nested models. A list may also be a column of a data file, relative to
+the folder of the TOML file: `{ file = "data/map.csv", column = "force" }`. An orifice may also be a valve of the
+library, `{ library = "matrix-821" }`, or of a valve file, `{ library = "my/valve.toml" }`. A valve file contains model
+tables, so that both are read in this module:
 
     title = "..."                   what it is, and which of its paths
     provenance = "data sheet"       origin of the numbers

@@ -24,8 +24,8 @@ def compare_chapter(comparison: Comparison) -> Chapter:
     return Chapter(
         paper="comparison",
         title="Model selection",
-        summary=f"{comparison.reason}\n\nCross-validation: each {comparison.leave_out.group_name} is left out in turn. All "
-        "errors are errors of the force, over the rows with a positive force.",
+        summary=f"{comparison.reason}\n\nCross-validation: each {comparison.leave_out.group_name} is left out in turn. "
+        "All errors are errors of the force, over the rows with a positive force.",
         tables=tuple(table for table in tables if table is not None),
         plots=(
             Plot("left-out", "Cross-validation error of the laws on each fold.", _fold_figure(comparison)),

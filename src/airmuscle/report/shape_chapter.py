@@ -30,8 +30,8 @@ def shape_chapter(shaped: ShapeConstrainedFit, unconstrained: Fit, free: int) ->
         title="Shape-constrained surface",
         summary="The muscle file contains the constrained surface: within its validity range the force does not "
         f"decrease with pressure and does not increase with contraction{zero}. Its rms error is {shaped.rmse:.4g} N, "
-        f"compared with {shaped.unconstrained_rmse:.4g} N of the unconstrained surface, which {verdict}. The uncertainties "
-        "and bands below are those of the unconstrained surface.",
+        f"compared with {shaped.unconstrained_rmse:.4g} N of the unconstrained surface, which {verdict}. The "
+        "uncertainties and bands below are those of the unconstrained surface.",
         tables=(
             violation_table(
                 shaped.unconstrained_violations, "shape-loose", "Monotonicity violations of the unconstrained surface"

@@ -70,7 +70,8 @@ def _describe_bootstrap(bootstrap: Bootstrap) -> str:
     failed = f"; {bootstrap.failed_refits} of them did not determine the parameters" if bootstrap.failed_refits else ""
     if bootstrap.failed_refits > MAX_FAILED_SHARE * len(bootstrap.values):
         failed += ", so the intervals are not reliable: add runs, or use a law with fewer parameters"
-    return f"bootstrap: {len(bootstrap.values)} refits, {bootstrap.group_count} blocks resampled, seed {bootstrap.seed}{failed}"
+    groups = f"{bootstrap.group_count} blocks resampled, seed {bootstrap.seed}"
+    return f"bootstrap: {len(bootstrap.values)} refits, {groups}{failed}"
 
 
 def uncertainty_chapter(uncertainty: Uncertainty) -> Chapter:

@@ -18,7 +18,7 @@ from ..simulation.integrators import Rodas4
 from .hosovsky_plant import FORCE_MAPS, PAPER, UnpublishedParameters, latched_load, plant
 
 RELEASED_AT, DURATION = 0.5, 6.0
-SCHEDULE = Schedule({"held": ((0.0, 1.0), (RELEASED_AT, 0.0))})
+SCHEDULE = Schedule({"latched": ((0.0, 1.0), (RELEASED_AT, 0.0))})
 MAX_DAMPING_DIFFERENCE = 0.30
 """Maximum relative difference of comparable damping, as a fraction of the larger value (chosen)."""
 

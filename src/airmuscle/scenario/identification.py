@@ -72,8 +72,8 @@ class DynamicFitSetup:
     def fit(self) -> DynamicFit:
         """The result of the fit; see `airmuscle.identify.dynamic.fit_dynamic`."""
         return fit_dynamic(
-            self.plant, self.experiments, free=self.free, observed=self.observed, per_record=self.own, bounds=self.bounds,
-            starts=self.starts, seed=self.seed, method=self.method,
+            self.plant, self.experiments, free=self.free, observed=self.observed, per_record=self.own,
+            bounds=self.bounds, starts=self.starts, seed=self.seed, method=self.method,
         )  # fmt: skip
 
     def scenario(self, fit: DynamicFit, record: int = 0) -> str:

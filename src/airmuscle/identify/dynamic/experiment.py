@@ -118,11 +118,11 @@ def make_unknowns(
             else:
                 unknowns.append(_plant_unknown(experiment.plant or plant, target, i, bounds))
     names = [u.name for u in unknowns]
+    if not unknowns:
+        raise ParameterError("no parameter is free. Name at least one: free=('circuit.fill.conductance',).")
     for name in bounds:
         if name not in {u.name.partition(" of record")[0] for u in unknowns}:
             raise ParameterError(f"bounds are given for '{name}', which is not free; free are {', '.join(names)}.")
-    if not unknowns:
-        raise ParameterError("no parameter is free. Name at least one: free=('circuit.fill.conductance',).")
     return tuple(unknowns)
 
 

@@ -127,7 +127,7 @@ def branch_directions(recording: Recording, branches: tuple[Branch, ...]) -> Arr
 
 
 def branch_column_agreement(recording: Recording, branches: tuple[Branch, ...]) -> float | None:
-    """The fraction of rows that agree with the branch column of the file (1 inflating, 2 deflating); None without it."""
+    """Fraction of rows that agree with the branch column of the file (1 inflating, 2 deflating); None without it."""
     if "branch" not in recording:
         return None
     stated = np.where(recording["branch"] == 1, 1.0, -1.0)
