@@ -156,7 +156,8 @@ def run_library(
     """The final states (3, N) of the batch with `simulate_batch`."""
     named = dict(zip((s.name for s in plant.states), start.tolist(), strict=True))
     solution = simulate_batch(
-        plant, parameters, COMMAND, duration=seconds, initial_states=named, integrator=RungeKutta4(STEP), keep=(), cores=cores,
+        plant, parameters, COMMAND, duration=seconds, initial_states=named, integrator=RungeKutta4(STEP), keep=(),
+        cores=cores,
         precision=precision,
     )  # fmt: skip
     return np.array([solution.final[s.name] for s in plant.states])

@@ -328,7 +328,7 @@ def test_a_run_cut_between_two_samples_goes_on_with_what_was_commanded(cut):
     loop, plant, start = ControlLoop(VALVES, TICK, PRESSURE), lifting(), lifting().state_at(pressure=1e5)
     whole = solution(plant, loop, duration=1.0, initial_state=start, integrator=FINE)
     if cut < TICK:
-        with pytest.raises(ParameterError, match="longer than the run of 0.001 s"):
+        with pytest.raises(ParameterError, match=r"longer than the run of 0\.001 s"):
             solution(plant, loop, duration=cut, initial_state=start)
         return
     first = solution(plant, loop, duration=cut, initial_state=start, integrator=FINE)

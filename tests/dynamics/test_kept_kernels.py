@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import math
+import warnings
 
 import numba
 import numpy as np
@@ -181,7 +182,10 @@ def test_a_folder_that_is_not_private_is_not_used_and_one_warning_says_so(place,
     monkeypatch.setenv("AIRMUSCLE_CACHE_DIR", str(folder))
     kept._warn_once.cache_clear()
     with pytest.warns(AirmuscleWarning, match="compiled kernels are not stored: .*AIRMUSCLE_CACHE_DIR") as caught:
-        assert kept.save("evaluate", ("q",), b"code") == b"code"
+        stored = kept.save("evaluate", ("q",), b"code")
+    assert stored == b"code"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
         assert kept.load("evaluate", ("q",)) is None
     assert len(caught) == 1
     given = arguments()

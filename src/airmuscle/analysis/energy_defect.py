@@ -55,7 +55,7 @@ def maxwell_defect(characteristic: Characteristic, geometry: Geometry, validity_
 def virtual_work_defect(
     characteristic: Characteristic, geometry: Geometry, validity_range: ValidityRange
 ) -> EnergyDefect:
-    """The largest |F + p dV/dL| [N] over the validity range, where it pulls: what the wall, the ends or assumptions add.
+    """The largest |F + p dV/dL| [N] over the validity range, where it pulls: the part of wall, ends and assumptions.
 
     Zero for a muscle that is nothing but its volume. A law may keep energy and still differ, by the energy that its
     wall stores; `maxwell_defect` tells the two apart.

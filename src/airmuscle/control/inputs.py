@@ -79,7 +79,8 @@ def _check_points(kind: str, noun: str, name: str, points: Sequence[tuple[float,
     for i, (a, b) in enumerate(itertools.pairwise(time for time, _ in points)):
         if b <= a:
             raise ParameterError(
-                f"the {kind} of '{name}' must list its {noun} in rising order; number {i + 2}, {b:g} s, follows {a:g} s."
+                f"the {kind} of '{name}' must list its {noun} in rising order; number {i + 2}, {b:g} s, follows "
+                f"{a:g} s."
             )
 
 

@@ -6,7 +6,7 @@ import enum
 
 
 class Status(enum.IntEnum):
-    """How a computation ended; `message` says it in words. PAUSED and NOT_STARTED never reach a caller of `simulate`."""
+    """How a computation ended; `message` is the reason in words. `simulate` never returns PAUSED or NOT_STARTED."""
 
     DONE = 0
     PAUSED = 1

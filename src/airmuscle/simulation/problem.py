@@ -34,7 +34,7 @@ class Problem:
     input          an InputSignal such as a Schedule, or a ControlLoop
     initial_state  values by state; by default a Plant's equilibrium at ambient pressure
     start_time     [s]
-    output_times   spacing [s] or times [s] of the rows; by default 1/1000 of the run, but at most 10 ms. The instants of
+    output_times   spacing [s] or times [s] of the rows; by default 1/1000 of the run, at most 10 ms. The instants of
                    the input are always among the rows, with the inputs that begin there
     integrator     Rodas4(rtol=1e-6) by default
     control_state  state of the control loop, to continue a run
@@ -147,6 +147,6 @@ def check_input_range(compiled: CompiledSystem, segments: PiecewiseLinear, start
         variable = compiled.system.input_variables[column]
         unit = "" if variable.unit in ("", "1") else f" {variable.unit}"
         raise ParameterError(
-            f"the input '{variable.name}' is {table[row, column]:g}{unit} before {segments.ends[row]:g} s; it must be "
-            f"within {variable.minimum:g} to {variable.maximum:g}{unit} ({variable.meaning})."
+            f"the input '{variable.name}' is {table[row, column]:g}{unit} before {segments.ends[row]:g} s; allowed "
+            f"range: {variable.minimum:g} to {variable.maximum:g}{unit} ({variable.meaning})."
         )

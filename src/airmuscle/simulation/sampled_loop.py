@@ -106,8 +106,8 @@ def _edges(period: float, state: ControlLoopState, start: float, end: float) -> 
     instants = state.origin + period * (state.sample_count + np.arange(max(math.ceil(count), 0) + 1))
     if abs(start - state.time) > close:
         raise ParameterError(
-            f"the control_state is that of {state.time:.10g} s, and the run begins at {start:.10g} s. Give the time that "
-            "was returned with it."
+            f"the control_state is that of {state.time:.10g} s, and the run begins at {start:.10g} s. Give the time "
+            "that was returned with it."
         )
     within = instants[(instants > start + close) & (instants < end - close)]
     return np.concatenate([[start], within, [end]]), bool(instants[0] <= start + close)

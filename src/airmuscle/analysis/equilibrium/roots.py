@@ -16,7 +16,7 @@ JUMP = 1e-6
 """What may be left at a root, relative to the median of all places; a function that has more there changes its
 sign by a jump (chosen)."""
 CLOSE = 1e-13
-"""Step that ends a search for a root, relative to the interval that it began with: what is left is far less (chosen)."""
+"""Step that ends a search for a root, relative to the initial interval; the remaining error is far less (chosen)."""
 
 
 class SingleDofPlants(Protocol):

@@ -1,7 +1,7 @@
 """Entry point of a compiled kernel, as LLVM text: `i64 entry(i64 *slots)`, a C signature.
 
-Each argument of the kernel takes slots of eight bytes in turn: a whole number or a float its value, an array the address
-of its first element and then its dimensions. The kernel itself was compiled by numba, whose functions take an array as
+Each argument of the kernel takes slots of eight bytes in turn: an integer or a float its value, an array the address of
+its first element and then its dimensions. The kernel itself was compiled by numba, whose functions take an array as
 its owner, its number of items, their size, its data, its shape and its strides; all arrays are C-contiguous.
 """
 

@@ -45,7 +45,7 @@ class Kernel:
         self._entries: dict[tuple[str, ...], Any] = {}
 
     def bind(self, *arguments: Any) -> BoundKernel:
-        """The kernel with whole numbers, floats and C-contiguous arrays of int64, float64 or float32 as its arguments."""
+        """The kernel with its arguments: integers, floats, and C-contiguous arrays of int64, float64 or float32."""
         return BoundKernel(self, arguments)
 
     def __call__(self, *arguments: Any) -> int:

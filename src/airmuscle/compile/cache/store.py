@@ -91,8 +91,8 @@ def _read(path: pathlib.Path) -> bytes | None:
 def _warn_once(reason: str) -> None:
     """Warn that compiled kernels are not stored."""
     warnings.warn(
-        f"compiled kernels are not stored: {reason}. Every process compiles them anew, which takes some seconds. Name a "
-        "private folder in the environment variable AIRMUSCLE_CACHE_DIR.",
+        f"compiled kernels are not stored: {reason}. Every process compiles them anew, which takes some seconds. "
+        "Name a private folder in the environment variable AIRMUSCLE_CACHE_DIR.",
         AirmuscleWarning,
         stacklevel=2,
     )

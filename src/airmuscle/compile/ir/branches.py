@@ -23,9 +23,10 @@ WORTH, WORTH_OF_CHOICES = 8, 30
 """Operations that must be saved for a branch to pay; more where the states decide how often (measured)."""
 _SLOW = {Operation.DIVIDE, Operation.INVERSE, Operation.SQRT}
 _SIMPLE = {
-    Operation.ADD, Operation.SUBTRACT, Operation.MULTIPLY, Operation.NEGATE, Operation.SQUARE, Operation.TWICE, Operation.ABS,
-    Operation.LESS_EQUAL, Operation.LESS, Operation.EQUAL, Operation.NOT_EQUAL, Operation.NOT, Operation.AND, Operation.OR,
-    Operation.MASK, Operation.ASSIGN, Operation.FMIN, Operation.FMAX, Operation.SELECT, Operation.MAXIMUM, Operation.MINIMUM,
+    Operation.ADD, Operation.SUBTRACT, Operation.MULTIPLY, Operation.NEGATE, Operation.SQUARE, Operation.TWICE,
+    Operation.ABS, Operation.LESS_EQUAL, Operation.LESS, Operation.EQUAL, Operation.NOT_EQUAL, Operation.NOT,
+    Operation.AND, Operation.OR, Operation.MASK, Operation.ASSIGN, Operation.FMIN, Operation.FMAX, Operation.SELECT,
+    Operation.MAXIMUM, Operation.MINIMUM,
 }  # fmt: skip
 _KEEP_ZERO = (Operation.NEGATE, Operation.SQUARE, Operation.TWICE, Operation.ABS, Operation.SQRT, Operation.ASSIGN)
 _CHOICES = (Operation.MASK, Operation.SELECT)

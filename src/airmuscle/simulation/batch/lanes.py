@@ -116,7 +116,7 @@ def _run(
 
 
 def _explain(job: BatchJob, index: int, dtype: Any, status: Status) -> None:
-    """Simulate a plant that failed in its lane once more alone, for the rows that it reached, the time and the reason."""
+    """Simulate a plant that failed in its lane again, alone: for its rows, the time of failure and the reason."""
     job.run_single(index)
     if job.status[index] == Status.DONE:
         where = "in single precision, but not in double" if dtype == np.float32 else "in its lane, but not alone"

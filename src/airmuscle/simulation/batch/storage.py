@@ -27,8 +27,9 @@ class InMemory:
         size = len(names) * count * rows * np.dtype(kind).itemsize
         if size > MAX_MEMORY:
             raise ParameterError(
-                f"simulate_batch: {len(names)} columns of {count} plants at {rows} output times take {size / 1e9:.3g} GB "
-                f"of memory; the limit is {MAX_MEMORY / 1e9:g} GB. Choose columns (keep=...), write to disk (into=...), "
+                f"simulate_batch: {len(names)} columns of {count} plants at {rows} output times take "
+                f"{size / 1e9:.3g} GB of memory; the limit is {MAX_MEMORY / 1e9:g} GB. Choose columns (keep=...), write "
+                "to disk (into=...), "
                 "or fewer output times (output_times=...)."
             )
         self.columns: dict[str, npt.NDArray[Any]] = {name: np.empty((count, rows), kind) for name in names}

@@ -111,7 +111,7 @@ def _has_column(thing: Any) -> bool:
 
 
 def _rows_of(thing: Any) -> Callable[[int], Any] | None:
-    """A function from a row to the model with the numbers of that row in place of its columns (N,); None where it has no
+    """A function from a row to the model with the numbers of that row instead of its columns (N,); None where it has no
     column."""
     if isinstance(thing, np.ndarray):
         numbers = thing.tolist()
