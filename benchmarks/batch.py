@@ -24,7 +24,7 @@ from airmuscle.core import tree
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE
 from airmuscle.simulation.batch import Double, Precision, Single, simulate_batch
-from airmuscle.simulation.batch.initial_states import resting_starts
+from airmuscle.simulation.batch.initial_states import default_states
 from airmuscle.simulation.batch.thread_pool import cores_here
 from airmuscle.simulation.batch.variations import variations_of
 from airmuscle.simulation.integrators import RungeKutta4
@@ -209,7 +209,7 @@ def measure_equilibria(count: int, rounds: int) -> tuple[list[tuple[str, ...]], 
     few = range(min(SINGLE_PLANTS, count))
 
     def vectorised() -> Array:
-        return resting_starts(different, lambda done: None)[0]
+        return default_states(different, lambda done: None)[0]
 
     def one_by_one() -> Array:
         return np.array([list(find_equilibrium(different.one(i), pressure=0.0).values()) for i in few])

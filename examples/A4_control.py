@@ -12,7 +12,7 @@ import airmuscle as am
 from airmuscle.control import PID, ControlLoop, OnOffController, SolenoidDriver, SplitRange
 from airmuscle.core.plotting import BLACK, LINES, legend_below, new_figure, save
 from airmuscle.pneumatics import ProportionalValve, SecondOrderLag
-from airmuscle.simulation.closed_loop import simulate_closed_loop
+from airmuscle.simulation import Problem, solve
 from airmuscle.units import bar, mm, ms
 
 muscle = replace(am.load("dmsp-20-300").muscle, damper=am.LinearDamper(300.0))
@@ -54,11 +54,10 @@ save(figure, "control.png")
 
 plant = am.Plant(muscle, proportional_valve, am.HangingMass(10.0))
 start = am.find_equilibrium(plant, pressure=0.8 * bar)
-complete = simulate_closed_loop(plant, pid_loop, duration=3.0, start=start)
-first = simulate_closed_loop(plant, pid_loop, duration=2.0, start=start)
-second = simulate_closed_loop(
-    plant, pid_loop, duration=1.0, start=first.state, start_time=first.time, memory=first.memory
-)
-print(f"stopped after 2 s and resumed, the run has the same final state: {second.state == complete.state}")
+complete = solve(Problem(plant, pid_loop, duration=3.0, initial_state=start))
+first = solve(Problem(plant, pid_loop, duration=2.0, initial_state=start))
+second = solve(first.continuation(duration=1.0))
+same = second.final_state == complete.final_state
+print(f"stopped after 2 s and resumed, the run has the same final state: {same}")
 print(*am.cite(pid), sep="\n")
 print("wrote control.png")

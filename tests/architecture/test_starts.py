@@ -17,7 +17,7 @@ SIMULATION = """
 import airmuscle as am
 valve = am.Valve(conductance=1e-9, critical_ratio=0.4)
 plant = am.Plant(am.load("dmsp-20-300").muscle, am.FillDischarge(am.Supply(6e5), valve, valve), am.HangingMass(10.0))
-am.simulate(plant, am.Schedule({"fill": ((0.5, 1),)}), duration=2.0, method=METHOD)
+am.simulate(plant, am.Schedule({"fill": ((0.5, 1),)}), duration=2.0, integrator=METHOD)
 """
 STARTS = {
     "import airmuscle": ("import airmuscle", {*HEAVY, "casadi", "llvmlite", "numpy.ma", "airmuscle.identify"}),

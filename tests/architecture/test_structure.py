@@ -74,10 +74,10 @@ def test_no_module_has_a_meaningless_name():
     assert [name_of(p) for p in SOURCE.rglob("*") if p.stem.strip("_") in names] == []
 
 
-def test_the_top_level_has_40_names_at_most():
+def test_the_top_level_has_50_names_at_most():
     airmuscle = pytest.importorskip("airmuscle")
     names = getattr(airmuscle, "__all__", ())
-    assert len(names) <= 40
+    assert len(names) <= 50
     assert [name for name in names if not hasattr(airmuscle, name)] == []
 
 

@@ -184,7 +184,7 @@ def test_split_opens_one_side_or_the_other(setpoint):
 
 
 def test_both_sides_of_split_are_not_one_input():
-    with pytest.raises(ParameterError, match="SplitRange: both sides are 'fill'; name two inputs"):
+    with pytest.raises(ParameterError, match="SplitRange: both inputs are 'fill'; name two inputs"):
         SplitRange("fill", "fill")
 
 

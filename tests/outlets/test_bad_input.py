@@ -10,9 +10,7 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,7 +20,7 @@ from typer.testing import CliRunner
 from airmuscle import advance, load, load_data, read_csv, simulate
 from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.cli.app import app
-from airmuscle.compile.cache.kernel import Kernel
+from airmuscle.compile.cache.kernel import BoundKernel, fixed_step
 from airmuscle.control.inputs import SampledSignal, Schedule
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import FileError, ParameterError, SolveError, UnitError
@@ -33,7 +31,6 @@ from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.report.output_folder import atomic_folder, check_writable
 from airmuscle.simulation import integrators
-from airmuscle.simulation.integrators import RungeKutta4
 
 MUSCLE = "dmsp-20-300"
 HEAD = "pressure [bar],length [mm],force [N]"
@@ -288,7 +285,7 @@ def test_a_command_that_is_no_pairs(kind: type, given: object):
 @pytest.mark.parametrize("kind", [Schedule, SampledSignal])
 @pytest.mark.parametrize("given", [None, ((5, 1), (15, 0))])
 def test_a_command_that_names_no_inputs(kind: type, given: object):
-    with pytest.raises(ParameterError, match=r"a (schedule|signal) is .*; name the inputs: {'fill': "):
+    with pytest.raises(ParameterError, match=r"a (schedule|sampled signal) is .*; name the inputs: {'fill': "):
         kind(given)
 
 
@@ -299,7 +296,13 @@ def plant() -> Plant:
 
 
 def test_a_run_that_cannot_be(plant: Plant):
-    wrong = {"duration": -1.0}, {"duration": np.inf}, {"start_time": np.nan}, {"start_time": 1e300}, {"output": np.inf}
+    wrong = (
+        {"duration": -1.0},
+        {"duration": np.inf},
+        {"start_time": np.nan},
+        {"start_time": 1e300},
+        {"output_times": np.inf},
+    )
     for given in wrong:
         (name,) = given
         with pytest.raises(ParameterError, match=f"simulate: .*{name}"):
@@ -410,18 +413,19 @@ def test_a_full_disk_is_one_line(option: tuple[str, ...]):
 
 
 class Interrupted:
-    """A kernel that the user stops while it carries its third packet of steps."""
+    """A kernel that the user stops during its third packet of steps."""
 
-    signatures = ("compiled",)
-
-    def __init__(self, kernel: Callable[..., int]) -> None:
+    def __init__(self, kernel: BoundKernel) -> None:
         self.kernel, self.packets = kernel, 0
 
-    def __call__(self, *arguments: object) -> int:
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.kernel, name)
+
+    def __call__(self) -> int:
         self.packets += 1
         if self.packets > 2:
             raise KeyboardInterrupt
-        return self.kernel(*arguments)
+        return self.kernel()
 
 
 def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -431,26 +435,11 @@ def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch
         '[run]\nduration = "1 s"\nmethod = { model = "RungeKutta4", step = "1 ms" }\n',
         encoding="utf-8",
     )
-    true_kernel = RungeKutta4._kernel
-
-    def kernel(self: RungeKutta4, prepared: Any) -> tuple[Any, ...]:
-        first, *others = true_kernel(self, prepared)
-        return (Interrupted(first), *others)
-
-    monkeypatch.setattr(RungeKutta4, "_kernel", kernel)
+    bind = fixed_step.bind
+    monkeypatch.setattr(fixed_step, "bind", lambda *arguments: Interrupted(bind(*arguments)))
     monkeypatch.setattr(integrators, "INTERRUPT_CHECK_STEPS", 100)
     result = CliRunner().invoke(app, ["simulate", str(tmp_path / "run.toml"), "--out", str(tmp_path / "run")])
     assert result.exit_code == 130
     assert result.stderr == f"partial results were written to {tmp_path / 'run'}\ninterrupted\n"
     kept = read_csv(tmp_path / "run" / "recording.csv")
     assert kept["time"][-1] == pytest.approx(0.2, abs=0.0011)
-
-
-def test_without_a_place_for_compiled_code_the_remedy_is_named(plant: Plant, monkeypatch: pytest.MonkeyPatch):
-    def absent(name: str, package: str) -> Any:
-        raise RuntimeError("cannot cache function 'rodas4': no locator available for file 'rodas4.py'")
-
-    monkeypatch.setattr("airmuscle.compile.cache.kernel.importlib", SimpleNamespace(import_module=absent))
-    monkeypatch.setattr(Kernel, "__call__", lambda kernel, *arguments: kernel._by_numba(arguments))
-    with pytest.raises(FileError, match=r"no folder to keep compiled code in.* environment variable NUMBA_CACHE_DIR"):
-        simulate(plant, Schedule({}), duration=1.0, integrator=RungeKutta4(1e-3))

@@ -175,7 +175,7 @@ PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "SplitRange", positiv
         ('commanded = "fill"', 'commanded = "fil"', ParameterError, r"\[command.controller\]: the plant has no input 'fil'; there are fill, discharge. Did you mean 'fill'\?"),
         ('commanded = "fill"', "commanded = 3", ParameterError, r"commanded is 3; it must be a text or a SplitRange"),
         ('commanded = "fill"', PID_TABLE[1].format("fill", "vent"), ParameterError, r"\[command.controller\]: the plant has no input 'vent'"),
-        ('commanded = "fill"', PID_TABLE[1].format("fill", "fill"), ParameterError, r"SplitRange: both sides are 'fill'"),
+        ('commanded = "fill"', PID_TABLE[1].format("fill", "fill"), ParameterError, r"SplitRange: both inputs are 'fill'"),
         ('"1.5 1/bar"', '"1.5 1/mm"', UnitError, r"\[command.controller\], gain: unit '1/mm' cannot be converted to '1/Pa'"),
         ('"1.5 1/bar"', '"1.5"', UnitError, r"gain: '1.5' has no unit; write it like '1.5 1/Pa'"),
         ('"1.5 1/bar"', "nan", ParameterError, r"\[command.controller\]: PID.gain .* is nan; it must be finite"),

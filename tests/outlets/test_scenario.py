@@ -387,7 +387,7 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             FILL,
             "fill = [[0.2, 1], [0.1, 0]]",
             ParameterError,
-            r"\[command\]: .*'fill' must name its instants in rising",
+            r"\[command\]: .*'fill' must list its instants in rising",
         ),
         (
             FILL,
@@ -612,7 +612,9 @@ def test_a_recording_without_a_column_of_an_input_says_how_to_name_one(tmp_path:
 
 def test_a_plant_that_cannot_rest_names_muscle_and_forces(tmp_path: Path):
     heavy = written(tmp_path, ('"5 kg"', '"500 kg"'), (MUSCLE, 'muscle = { library = "chou-hannaford", name = "arm" }'))
-    with pytest.raises(EquilibriumError, match=r"scenario\.toml, \[run\.start\]: HangingMass finds no rest") as raised:
+    with pytest.raises(
+        EquilibriumError, match=r"scenario\.toml, \[run\.start\]: HangingMass has no stable equilibrium"
+    ) as raised:
         load_scenario(heavy)
     assert re.search(r"arm pulls \d+(\.\d+)? N at 100 kPa and a contraction of", str(raised.value))
     assert re.search(r"needs a pull of 4903\.\d+ N\. Change the load, the pressure or the parallel", str(raised.value))
@@ -626,5 +628,7 @@ def test_a_command_that_is_no_table(tmp_path: Path):
 
 def test_too_many_rows_are_refused_before_they_fill_the_memory(tmp_path: Path):
     scenario = load_scenario(written(tmp_path, (DURATION, f'{DURATION}\noutput = "1e-12 s"')))
-    with pytest.raises(ParameterError, match=r"output spacing of 1e-12 s makes 3e\+11 rows .* 10000000 are allowed"):
+    with pytest.raises(
+        ParameterError, match=r"spacing of output_times of 1e-12 s makes 3e\+11 rows .* 10000000 are allowed"
+    ):
         scenario.simulate()

@@ -26,7 +26,7 @@ _SINGULAR_TOLERANCE = 1e-8
 """Relative singular value below which parameters count as redundant (chosen)."""
 
 
-class Solution(NamedTuple):
+class LeastSquaresSolution(NamedTuple):
     """The optimal free parameters (P,), with the fitted quantity (N,) and its Jacobian (N, P) there."""
 
     values: Array
@@ -34,7 +34,7 @@ class Solution(NamedTuple):
     jacobian: Array
 
 
-def solve(problem: FitProblem, loss: Loss, start: Array | None = None) -> Solution:
+def solve(problem: FitProblem, loss: Loss, start: Array | None = None) -> LeastSquaresSolution:
     """The free parameters that minimise the loss. Raises IdentificationError where the search does not converge.
 
     The search starts at `start`; by default at the initial values found by variable projection.
@@ -51,7 +51,7 @@ def solve(problem: FitProblem, loss: Loss, start: Array | None = None) -> Soluti
     return _solve_linear(_reweight(problem, loss, robust))
 
 
-def _reweight(problem: FitProblem, loss: Loss, solution: Solution) -> FitProblem:
+def _reweight(problem: FitProblem, loss: Loss, solution: LeastSquaresSolution) -> FitProblem:
     """The least-squares problem with the same solution as the robust one: every square is weighted by rho'."""
     derivative = loss.rho((problem.residuals(solution.modelled) / loss.scale) ** 2)[1]
     return dataclasses.replace(problem, weights=problem.weights * np.sqrt(derivative))
@@ -73,13 +73,13 @@ def design_matrix(problem: FitProblem) -> tuple[Array, Array]:
     return matrix, problem.predict(problem.initial_values) - matrix @ problem.initial_values
 
 
-def _solve_linear(problem: FitProblem) -> Solution:
+def _solve_linear(problem: FitProblem) -> LeastSquaresSolution:
     matrix, constant = design_matrix(problem)
     values = solve_censored_least_squares(problem, matrix, constant)
-    return Solution(values, matrix @ values + constant, matrix)
+    return LeastSquaresSolution(values, matrix @ values + constant, matrix)
 
 
-def _solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> Solution:
+def _solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> LeastSquaresSolution:
     """Trust-region least squares within bounds, with parameters and residuals scaled to the order of one."""
     from scipy.optimize import least_squares
 
@@ -98,7 +98,7 @@ def _solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> Solutio
         return np.asarray(problem.jacobian(values) * (active * problem.weights / spread)[:, None] * scale)
 
     if np.abs(residuals(start / scale)).max() < 1e-14:  # an exact fit: the gradient vanishes
-        return Solution(start, problem.predict(start), problem.jacobian(start))
+        return LeastSquaresSolution(start, problem.predict(start), problem.jacobian(start))
     options: dict[str, Any] = {
         "jac": jacobian,
         "bounds": (low / scale, high / scale),
@@ -118,7 +118,7 @@ def _solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> Solutio
     else:
         raise _not_converged(problem)
     values = np.clip(scaled * scale, low, high)
-    return Solution(values, problem.predict(values), problem.jacobian(values))
+    return LeastSquaresSolution(values, problem.predict(values), problem.jacobian(values))
 
 
 def _is_converged(result: Any) -> bool:

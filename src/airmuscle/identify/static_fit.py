@@ -19,7 +19,7 @@ from .correlation_index import correlation_index
 from .loss import LeastSquares, Loss
 from .problem import RESTING_LENGTH, FitProblem, evaluate, fitted_quantity_of, make_problem
 from .result import Estimate, Fit, WorstPoint
-from .solver import Solution, solve
+from .solver import LeastSquaresSolution, solve
 from .statistics import FitStatistics, compute_statistics
 from .weights import sensor_deviations
 
@@ -161,7 +161,12 @@ def _with_validity_range(law: Characteristic, data: Recording) -> Characteristic
 
 
 def _build_result(
-    problem: FitProblem, solution: Solution, statistics: FitStatistics, loss: Loss, dropped: int, notes: tuple[str, ...]
+    problem: FitProblem,
+    solution: LeastSquaresSolution,
+    statistics: FitStatistics,
+    loss: Loss,
+    dropped: int,
+    notes: tuple[str, ...],
 ) -> Fit:
     data, quantity = problem.data, problem.fitted_quantity.name
     model = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
@@ -193,7 +198,9 @@ def _build_result(
     )
 
 
-def _build_estimates(problem: FitProblem, solution: Solution, statistics: FitStatistics) -> tuple[Estimate, ...]:
+def _build_estimates(
+    problem: FitProblem, solution: LeastSquaresSolution, statistics: FitStatistics
+) -> tuple[Estimate, ...]:
     leaves = (problem.leaves[i] for i in problem.free)
     columns = zip(
         leaves,
@@ -246,7 +253,7 @@ def _collect_notes(problem: FitProblem, statistics: FitStatistics, loss: Loss, d
     return tuple(notes)
 
 
-def _loss_scale_notes(problem: FitProblem, solution: Solution, loss: Loss) -> tuple[str, ...]:
+def _loss_scale_notes(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss) -> tuple[str, ...]:
     """A remark where the scale of a robust loss is so small that most rows count as outliers."""
     measured = problem.censoring == 0
     residuals = np.abs(problem.residuals(solution.modelled))[measured]

@@ -12,7 +12,7 @@ from ..core.errors import IdentificationError
 from .censored_least_squares import RANK_TOLERANCE, uncensored_rank
 from .loss import Loss
 from .problem import FitProblem
-from .solver import Solution
+from .solver import LeastSquaresSolution
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class FitStatistics:
     on_bound: npt.NDArray[np.bool_]
 
 
-def compute_statistics(problem: FitProblem, solution: Solution, loss: Loss) -> FitStatistics:
+def compute_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss) -> FitStatistics:
     """Statistics of a solution. Raises IdentificationError where the design matrix is rank-deficient."""
     values, modelled, jacobian = solution
     on_bound = _on_bound(problem, values)

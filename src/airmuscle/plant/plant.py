@@ -19,17 +19,10 @@ from ..muscle import Muscle
 from ..pneumatics import Circuit, CircuitFlows
 from ..pneumatics.gas import Air, Ambient, Flow, Gas, Polytropic, check_above_vacuum
 from ..pneumatics.ports import key_by_muscle, key_by_port
-from .diagnostics import (
-    Enclosure,
-    check_enclosures,
-    describe_friction,
-    enclosures,
-    extrapolation,
-    geometry_limit_hint,
-)  # fmt: skip
+from .diagnostics import Enclosure, check_enclosures, describe_friction, enclosures, extrapolation, geometry_limit_hint
 from .muscle_state import MuscleState, muscle_state
 from .steady_state import fill_muscles, settle_muscles
-from .validation import check_parts, check_unique
+from .validation import check_free, check_parts, check_unique
 
 _AIR_STATES = ("air_mass", "internal_energy")
 _ROUNDING = 1e-3
@@ -231,7 +224,8 @@ class Plant(System):
         values = {name: as_finite_float(f"Plant: the {name} of a state", value) for name, value in values.items()}
         if len(pressures) != len(self.muscles):
             raise ParameterError(f"Plant: {len(pressures)} pressures are given for {len(self.muscles)} muscles.")
-        self._check_free(values)
+        air = {f"{p}{s.name}" for p, m in zip(self.prefixes, self.muscles, strict=True) for s in self._air_states(m)}
+        check_free(values, [s.name for s in self.states if s.name not in air])
         state: dict[str, Value] = {n: 0.0 for c in self.mechanism.coordinates for n in (c.name, c.speed)} | values
         contractions = self.mechanism.contractions(state, self.resting_lengths)
         for muscle, p, contraction in zip(self.muscles, pressures, contractions, strict=True):
@@ -246,14 +240,6 @@ class Plant(System):
                 )
         state = self.fill_muscles(pressures, volumes, state)
         return {s.name: float(state[s.name]) for s in self.states}
-
-    def _check_free(self, values: Mapping[str, float]) -> None:
-        """Raise ParameterError for a name that is no state, or the state of air, which follows from the pressure."""
-        air = {f"{p}{s.name}" for p, m in zip(self.prefixes, self.muscles, strict=True) for s in self._air_states(m)}
-        free = [s.name for s in self.states if s.name not in air]
-        for name in values:
-            if name not in free:
-                raise ParameterError(f"Plant: no coordinate '{name}'; there are {', '.join(free) or 'none'}.")
 
     def settle_muscles(
         self, pressures: Sequence[Value], state: Mapping[str, Value]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from ..core.declaration import check_structure
@@ -69,3 +69,10 @@ def _check_counts(muscles: Sequence[Muscle], circuit: Any, circuits: Sequence[Ci
         raise ParameterError("Plant: give a circuit that feeds several muscles alone, not in a tuple.")
     if len(set(names)) < len(names):
         raise ParameterError(f"Plant: muscles need different names; they are {names}.")
+
+
+def check_free(values: Iterable[str], free: Sequence[str]) -> None:
+    """Raise ParameterError for a name that is not free: no state, or the state of air, which follows from the pressure."""
+    for name in values:
+        if name not in free:
+            raise ParameterError(f"Plant: no coordinate '{name}'; there are {', '.join(free) or 'none'}.")

@@ -42,7 +42,8 @@ class WithSensitivities(SensitivitySystem):
     def check(self) -> None:
         if not self.columns or len(self.scales) != len(self.columns):
             raise ParameterError(
-                f"WithSensitivities: {len(self.columns)} columns need as many scales (1 or more); there are {len(self.scales)}."
+                f"WithSensitivities: {len(self.columns)} columns need as many scales (1 or more); "
+                f"there are {len(self.scales)}."
             )
         known = [leaf.path for leaf in tree.leaves(self.inner)]
         for path in (path for group in self.columns for path in group):

@@ -58,6 +58,21 @@ class Solution:
         """Sources of the models, of the integrator and of the controller."""
         return cite((self.problem.system, self.problem.input, self.problem.integrator))
 
+    def continuation(self, duration: float) -> Problem:
+        """The Problem that continues this run for `duration` [s] from its final state, at the same output spacing.
+
+        After a list of output times the default spacing is used. Raises ParameterError for a duration <= 0.
+        """
+        given = self.problem.output_times
+        return dataclasses.replace(
+            self.problem,
+            duration=duration,
+            initial_state=self.final_state,
+            start_time=self.final_time,
+            output_times=given if isinstance(given, float | int) else None,
+            control_state=self.control_state,
+        )
+
     def raise_if_incomplete(self) -> Solution:
         """The solution itself; raises SimulationError, which carries it, where the run ended early."""
         if self.complete:

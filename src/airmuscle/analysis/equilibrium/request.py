@@ -1,4 +1,4 @@
-"""What is given of a plant whose equilibria are sought: pressures or air masses of its muscles, and its inputs."""
+"""Arguments of the search for equilibria: pressures or air masses of the muscles, and inputs."""
 
 from __future__ import annotations
 

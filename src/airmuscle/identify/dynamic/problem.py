@@ -94,5 +94,5 @@ class _GuardedResiduals:
         cost = float(residuals @ residuals)
         if cost < self._min_cost:
             self._min_cost = cost
-            self._max_steps = min(MAX_STEPS, max(MIN_STEP_BUDGET, STEP_BUDGET_FACTOR * steps))
+            self._max_steps = int(min(MAX_STEPS, max(MIN_STEP_BUDGET, STEP_BUDGET_FACTOR * steps)))
         return residuals, jacobian if len(self._free) == scaled.size else jacobian[:, self._free]
