@@ -25,7 +25,7 @@ from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE
 from airmuscle.simulation.batch import Double, Precision, Single, simulate_batch
 from airmuscle.simulation.batch.initial_states import default_states
-from airmuscle.simulation.batch.thread_pool import cores_here
+from airmuscle.simulation.batch.thread_pool import available_cores
 from airmuscle.simulation.batch.variations import variations_of
 from airmuscle.simulation.integrators import RungeKutta4
 
@@ -178,7 +178,7 @@ def make_variants(folder: pathlib.Path, count: int, seconds: float) -> dict[str,
     table = c_parameters(tree.unflatten(plant, list(parameters.values())), count)
     timed: dict[str, tuple[int, Callable[[], Array]]] = {}
     libraries = compile_libraries(folder)
-    for cores in sorted({1, min(2, cores_here())}):
+    for cores in sorted({1, min(2, available_cores())}):
         suffix = f", {cores} cores" if cores > 1 else ""
         timed[f"simulate_batch{suffix}"] = (cores, lambda n=cores: run_library(plant, parameters, start, seconds, n))
         for name, (library, lanes) in libraries.items():
@@ -194,7 +194,7 @@ def measure_growth() -> list[tuple[str, ...]]:
     plant, start, rows = hanging(), runs()[3].vector, []
     for count in GROWTH:
         parameters, seconds = random_parameters(plant, count), DURATION if count < 100_000 else DURATION / 5
-        for cores in sorted({1, min(2, cores_here())}):
+        for cores in sorted({1, min(2, available_cores())}):
             times = time_variants({"": lambda p=parameters, t=seconds, n=cores: run_library(plant, p, start, t, n)}, 2)[
                 ""
             ]

@@ -18,7 +18,7 @@ TASKS = {
     "a run of 25 s, three states, 2501 rows": """
 from filling import hanging, FILL_DISCHARGE
 from airmuscle import simulate
-run = lambda output: simulate(hanging(), FILL_DISCHARGE, duration=25.0, output=output)
+run = lambda output: simulate(hanging(), FILL_DISCHARGE, duration=25.0, output_times=output)
 run(0.01)""",
     "the same with 1 000 000 rows": "long = run(25e-6)",
     f"a new plant of {MUSCLES} muscles": """

@@ -13,7 +13,7 @@ from filling import Array, hanging
 from measure import Section, Target, format_time, print_section, time_variants
 
 from airmuscle.compile.functions import trace_system
-from airmuscle.compile.ir.instructions import MAXIMUM, MINIMUM, SELECT, Code, Operand, instructions
+from airmuscle.compile.ir.instructions import Code, Operand, Operation, instructions
 from airmuscle.compile.kernels.evaluate import evaluate
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import Schedule
@@ -119,7 +119,7 @@ def evaluate_in_jax(code: Code, inputs: Sequence[Any]) -> list[Any]:
         casadi.OP_SIN: jnp.sin, casadi.OP_COS: jnp.cos, casadi.OP_LE: lambda a, b: jnp.where(a <= b, 1.0, 0.0),
         casadi.OP_LT: lambda a, b: jnp.where(a < b, 1.0, 0.0), casadi.OP_NOT: lambda a: 1.0 - a,
         casadi.OP_IF_ELSE_ZERO: lambda c, a: jnp.where(c != 0, a, 0.0), SELECT: lambda c, a, b: jnp.where(c != 0, a, b),
-        MAXIMUM: jnp.maximum, MINIMUM: jnp.minimum,
+        Operation.MAXIMUM: jnp.maximum, Operation.MINIMUM: jnp.minimum,
     }  # fmt: skip
     known: dict[Operand, Any] = {}
 

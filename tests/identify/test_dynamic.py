@@ -404,7 +404,7 @@ def test_records_that_cannot_be_used_are_refused():
         (
             {"pressure": 0.0, "speed": 0.0},
             ("speed",),
-            "no state satisfies the initial conditions .*the search did not converge",
+            "no state satisfies the initial conditions .*Newton's method did not converge",
         ),
     ],
 )

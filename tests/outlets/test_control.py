@@ -187,7 +187,7 @@ PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "SplitRange", positiv
         ('period = "5 ms"', "period = -1", ParameterError, r"ControlLoop.period is -1.0 s"),
         ('period = "5 ms"', "period = nan", ParameterError, r"\[command.controller\], period is nan; it must be finite"),
         ('period = "5 ms"', 'period = "5 bar"', UnitError, r"period: unit 'bar' cannot be converted to 's'"),
-        ('period = "5 ms"', 'period = "1 s"', ParameterError, r"\[command.controller\]: the controller looks every 1 s, and the run lasts 0.3 s"),
+        ('period = "5 ms"', 'period = "1 s"', ParameterError, r"\[command.controller\]: the sample time of the controller is 1 s, longer than the run of 0.3 s"),
         ('period = "5 ms"\n', "", ParameterError, r"\[command.controller\]: 'period' is missing; write period = \"10 ms\""),
         ("[command.controller.setpoint]", "[plant.setpoint]", ParameterError, r"Plant has no parameter 'setpoint'"),
         (f"[command.controller.setpoint]\n{SETPOINT}", "", ParameterError, r"'setpoint' is missing; write \[command.controller.setpoint\]"),
