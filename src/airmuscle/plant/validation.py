@@ -72,7 +72,7 @@ def _check_counts(muscles: Sequence[Muscle], circuit: Any, circuits: Sequence[Ci
 
 
 def check_free(values: Iterable[str], free: Sequence[str]) -> None:
-    """Raise ParameterError for a name that is not free: no state, or the state of air, which follows from the pressure."""
+    """Raise ParameterError for a name that is no state, or is a state of the air, which follows from the pressure."""
     for name in values:
         if name not in free:
             raise ParameterError(f"Plant: no coordinate '{name}'; there are {', '.join(free) or 'none'}.")

@@ -28,8 +28,8 @@ class InMemory:
         if size > MAX_MEMORY:
             raise ParameterError(
                 f"simulate_batch: {len(names)} columns of {count} plants at {rows} output times take "
-                f"{size / 1e9:.3g} GB of memory; the limit is {MAX_MEMORY / 1e9:g} GB. Choose columns (keep=...), write "
-                "to disk (into=...), or fewer output times (output_times=...)."
+                f"{size / 1e9:.3g} GB of memory; the limit is {MAX_MEMORY / 1e9:g} GB. Choose columns (keep=...), "
+                "write to disk (into=...), or fewer output times (output_times=...)."
             )
         self.columns: dict[str, npt.NDArray[Any]] = {name: np.empty((count, rows), kind) for name in names}
 
