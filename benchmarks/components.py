@@ -182,7 +182,7 @@ def measure(composed: Run, single: Run | None, rounds: int) -> tuple[tuple[tuple
     ready = {name: compile_system(run.system) for name, run in both.items()}
     if single:
         check_rates(ready["single system"], ready["components"], single.start)
-    derivatives = time_variants({n: make_calls(ready[n], run.start) for n, run in both.items()}, rounds)
+    derivatives = time_variants({n: make_calls(ready[n], run.initial_state) for n, run in both.items()}, rounds)
     simulations = time_variants({n: kernel(run, ready[n], Rodas4(RTOL)) for n, run in both.items()}, rounds)
     last = derivatives[list(both)[-1]].minimum
     rows, size = [], len(composed.system.states)

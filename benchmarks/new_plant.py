@@ -36,7 +36,7 @@ import sys
 from filling import runs
 from airmuscle import simulate
 run = runs()[int(sys.argv[1])]
-simulate(run.system, run.command, duration=0.1, initial_state=run.start)
+simulate(run.system, run.command, duration=0.1, initial_state=run.initial_state)
 """
 
 

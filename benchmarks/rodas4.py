@@ -101,7 +101,9 @@ def kernel(run: Run, ready: CompiledSystem, method: Rodas4 | None = None) -> Cal
 
 def make_simulation(run: Run) -> Callable[[], Any]:
     """A function that calls `simulate`, including validation of the initial state, outputs and the Recording."""
-    return lambda: simulate(run.system, run.command, duration=DURATION, initial_state=run.start, output_times=SPACING)
+    return lambda: simulate(
+        run.system, run.command, duration=DURATION, initial_state=run.initial_state, output_times=SPACING
+    )
 
 
 def check_rates(run: Run, ready: CompiledSystem) -> float:

@@ -23,13 +23,15 @@ proportional_valve = ProportionalValve(
     am.Supply(6 * bar), edge, edge, SecondOrderLag(frequency=80.0, damping_ratio=0.7)
 )
 pid = PID("position", "command", gain=60.0, integral_time=1.0, derivative_time=0.05, setpoint_weight=0.8)
-pid_loop = ControlLoop(pid, period=2 * ms, setpoint=setpoint)
+pid_loop = ControlLoop(pid, sample_time=2 * ms, setpoint=setpoint)
 
 small_valve = am.Valve(conductance=3e-10, critical_ratio=0.433)
 solenoid_valves = am.FillDischarge(am.Supply(6 * bar), small_valve, small_valve)
 solenoid = SolenoidDriver(opening_delay=3 * ms, closing_delay=2 * ms)
 on_off = OnOffController("position", SplitRange("fill", "discharge"), hysteresis=1 * mm)
-on_off_loop = ControlLoop(on_off, period=5 * ms, setpoint=setpoint, drivers={"fill": solenoid, "discharge": solenoid})
+on_off_loop = ControlLoop(
+    on_off, sample_time=5 * ms, setpoint=setpoint, drivers={"fill": solenoid, "discharge": solenoid}
+)
 
 figure, (left, right) = new_figure(2, 1, height=4.6, sharex=True)
 cases = (

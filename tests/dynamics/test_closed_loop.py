@@ -502,7 +502,7 @@ def test_the_recording_says_who_commanded_what():
 
 @pytest.mark.parametrize("period", [0.0, -0.1, np.nan, np.inf, True, "1 s"])
 def test_a_period_that_cannot_be_is_refused(period):
-    with pytest.raises(ParameterError, match=r"ControlLoop.period is .*; it must be positive and finite"):
+    with pytest.raises(ParameterError, match=r"ControlLoop.sample_time is .*; it must be positive and finite"):
         ControlLoop(VALVES, period, PRESSURE)
 
 
@@ -523,7 +523,7 @@ def test_a_period_that_cannot_be_is_refused(period):
 )
 def test_a_loop_that_cannot_be_is_refused(changed, message):
     with pytest.raises(ParameterError, match=message):
-        ControlLoop(**{"controller": VALVES, "period": 0.01, "setpoint": PRESSURE, **changed})
+        ControlLoop(**{"controller": VALVES, "sample_time": 0.01, "setpoint": PRESSURE, **changed})
 
 
 @pytest.mark.parametrize(

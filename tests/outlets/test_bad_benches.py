@@ -168,7 +168,7 @@ discharge = { model = "Valve", conductance = 2e-9, critical_ratio = 0.3 }
 [plant.mechanism]
 model = "Isometric"
 contraction = 0.05
-[command]
+[input]
 fill = [[0, 1]]
 [observed]
 pressure = "100 Pa"

@@ -432,7 +432,7 @@ def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch
     (tmp_path / "run.toml").write_text(
         f'[plant]\nmuscle = "{MUSCLE}"\ncircuit = "ClosedChamber"\n'
         'mechanism = { model = "HangingMass", mass = "5 kg" }\n'
-        '[run]\nduration = "1 s"\nmethod = { model = "RungeKutta4", step = "1 ms" }\n',
+        '[run]\nduration = "1 s"\nintegrator = { model = "RungeKutta4", step = "1 ms" }\n',
         encoding="utf-8",
     )
     bind = fixed_step.bind

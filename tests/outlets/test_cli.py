@@ -51,11 +51,11 @@ discharge = { model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }
 [plant.mechanism]
 model = "HangingMass"
 mass = "5 kg"
-[command]
+[input]
 fill = [["0.1 s", 1], ["0.3 s", 0]]
 [run]
 duration = "0.5 s"
-start = { pressure = "1 bar" }
+initial_state = { pressure = "1 bar" }
 """
 
 
@@ -436,7 +436,7 @@ def test_the_report_of_a_run_shows_inputs_parameters_sources_and_notes(scenario:
     named = re.sub(
         r"\[plant.muscle.contractile\](.|\n)*?damper", '[plant.muscle]\nlibrary = "dmsp-20"\ndamper', SCENARIO
     )
-    driver = '[command.drivers]\nfill = [{ model = "PWM", frequency = "50 Hz" }, { model = "SolenoidDriver", opening_delay = "1 ms" }]'
+    driver = '[input.drivers]\nfill = [{ model = "PWM", frequency = "50 Hz" }, { model = "SolenoidDriver", opening_delay = "1 ms" }]'
     named = named.replace('pressure = "1 bar" }', 'pressure = "0 bar" }')
     scenario.write_text(f"{named}\n{driver}\n[output]\ncolumns = ['force']", encoding="utf-8")
     result = airmuscle("simulate", scenario, "--out", tmp_path / "run")

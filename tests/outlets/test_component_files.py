@@ -19,9 +19,9 @@ from airmuscle.scenario.scenario import load_scenario
 
 def text_of(plant):
     places = "".join(f', "{c.name}" = "0.005 {c.unit}"' for c in plant.mechanism.coordinates)
-    start = f'start = {{ pressure = "2 bar"{places} }}' if places else ""
+    start = f'initial_state = {{ pressure = "2 bar"{places} }}' if places else ""
     tables = write.part_toml("plant", plant)
-    return f'{tables}\n[run]\nduration = "20 ms"\noutput = "5 ms"\n{start}\n'
+    return f'{tables}\n[run]\nduration = "20 ms"\noutput_times = "5 ms"\n{start}\n'
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -50,11 +50,11 @@ discharge = { library = "matrix-821" }
 [plant.mechanism]
 model = "HangingMass"
 mass = "10 kg"
-[command]
+[input]
 valve = [["10 ms", 1], ["60 ms", -1]]
 [run]
 duration = "100 ms"
-start = { pressure = "2 bar" }
+initial_state = { pressure = "2 bar" }
 """
 
 

@@ -49,19 +49,19 @@ model = "HangingMass"
 mass = "5 kg"
 [run]
 duration = "300 ms"
-start = {{ pressure = "1 bar" }}
+initial_state = {{ pressure = "1 bar" }}
 """
 SETPOINT = 'pressure = [["0 s", "1 bar"], ["100 ms", "2 bar"]]'
 GOOD = f"""{PLANT}
-[command]
-[command.controller]
+[input]
+[input.controller]
 model = "PID"
 measured = "pressure"
 commanded = "fill"
 gain = "1.5 1/bar"
 integral_time = "300 ms"
-period = "5 ms"
-[command.controller.setpoint]
+sample_time = "5 ms"
+[input.controller.setpoint]
 {SETPOINT}
 """
 
@@ -93,7 +93,9 @@ def test_the_table_of_the_page_is_a_loop(tmp_path: Path):
     scenario = load_scenario(written(tmp_path, text=f"{held}{TABLE}"))
     pid = PID("position", SplitRange("fill", "discharge"), 40.0, 1.0, 0.05)
     wanted, beside = Schedule({"position": ((0.0, 0.0), (0.2, 0.02))}), Schedule({"latched": ((0.0, 1.0), (0.1, 0.0))})
-    assert scenario.command == ControlLoop(pid, 5e-3, wanted, beside, {"fill": PWM(200.0), "discharge": PWM(200.0)})
+    assert scenario.problem.input == ControlLoop(
+        pid, 5e-3, wanted, beside, {"fill": PWM(200.0), "discharge": PWM(200.0)}
+    )
     run = scenario.simulate()
     assert np.ptp(run["position"][run["time"] <= 0.1]) < 1e-12
     assert run["position"][-1] > run["position"][0] + 1e-3
@@ -104,7 +106,7 @@ def test_the_table_of_the_page_is_a_loop(tmp_path: Path):
 )
 def test_a_gain_has_any_unit_that_fits(tmp_path: Path, gain: str, value: float):
     scenario = load_scenario(written(tmp_path, ('"1.5 1/bar"', gain)))
-    assert scenario.command.controller.gain == pytest.approx(value, rel=1e-12)
+    assert scenario.problem.input.controller.gain == pytest.approx(value, rel=1e-12)
 
 
 def regulated(commanded: str = '"setpoint"', gain: str = '"0.5 bar/bar"') -> str:
@@ -114,18 +116,16 @@ def regulated(commanded: str = '"setpoint"', gain: str = '"0.5 bar/bar"') -> str
 
 
 def test_units_follow_from_column_and_input(tmp_path: Path):
-    text = regulated().replace(
-        "[command.controller.setpoint]", 'initial_output = "1.2 bar"\n[command.controller.setpoint]'
-    )
-    controller = load_scenario(written(tmp_path, text=text)).command.controller
+    text = regulated().replace("[input.controller.setpoint]", 'initial_output = "1.2 bar"\n[input.controller.setpoint]')
+    controller = load_scenario(written(tmp_path, text=text)).problem.input.controller
     assert (controller.gain, controller.initial_output) == (0.5, 1.2e5)
     height = ('measured = "pressure"', 'measured = "position"'), (SETPOINT, 'position = [[0, "10 mm"]]')
-    controller = load_scenario(written(tmp_path, *height, text=regulated(gain='"20 kPa/mm"'))).command.controller
+    controller = load_scenario(written(tmp_path, *height, text=regulated(gain='"20 kPa/mm"'))).problem.input.controller
     assert controller.gain == pytest.approx(2e7)
     two = load_scenario(
         written(tmp_path, ('model = "PID"', 'model = "OnOffController"'), ('gain = "1.5 1/bar"\nintegral_time = "300 ms"', 'hysteresis = "20 kPa"'))
     )  # fmt: skip
-    assert two.command.controller == OnOffController("pressure", "fill", 2e4)
+    assert two.problem.input.controller == OnOffController("pressure", "fill", 2e4)
 
 
 def test_a_set_point_is_a_command_of_any_kind(tmp_path: Path):
@@ -134,23 +134,26 @@ def test_a_set_point_is_a_command_of_any_kind(tmp_path: Path):
     for rows, expected in (
         ('model = "SampledSignal"\npressure = [[0, "1 bar"], ["0.2 s", 3e5]]', SampledSignal({"pressure": corners})),
         ('file = "wanted.csv"', SampledSignal({"pressure": corners})),
-        ('file = "wanted.csv"\nmodel = "Schedule"\nperiod = "0.3 s"', Periodic(Schedule({"pressure": corners}), 0.3)),
+        (
+            'file = "wanted.csv"\nmodel = "Schedule"\nperiod = "0.3 s"',
+            Periodic(Schedule({"pressure": corners}), 0.3),
+        ),
         (
             'file = "wanted.csv"\ncolumns = { pressure = "other" }',
             SampledSignal({"pressure": ((0.0, 1e5), (0.2, 2e5))}),
         ),
     ):
-        assert load_scenario(written(tmp_path, (SETPOINT, rows))).command.setpoint == expected
+        assert load_scenario(written(tmp_path, (SETPOINT, rows))).problem.input.setpoint == expected
 
 
 def test_drivers_and_inputs_beside_stand_where_they_always_do(tmp_path: Path):
     beside = (
         'discharge = [["0.1 s", 0.5]]\ndrivers = { fill = [{ model = "PWM", frequency = 100 }, "SolenoidDriver"] }\n'
     )
-    command = load_scenario(written(tmp_path, ("[command]\n", f"[command]\n{beside}"))).command
+    command = load_scenario(written(tmp_path, ("[input]\n", f"[input]\n{beside}"))).problem.input
     assert command.other_inputs == Schedule({"discharge": ((0.1, 0.5),)})
     assert command.drivers == {"fill": (PWM(100.0), SolenoidDriver())}
-    assert load_scenario(written(tmp_path)).command.other_inputs == ZERO_INPUT
+    assert load_scenario(written(tmp_path)).problem.input.other_inputs == ZERO_INPUT
 
 
 def test_the_columns_of_a_loop_may_be_asked_for(tmp_path: Path):
@@ -168,43 +171,43 @@ PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "SplitRange", positiv
 @pytest.mark.parametrize(
     ("was", "becomes", "kind", "message"),
     [
-        ('measured = "pressure"', 'measured = "presure"', ParameterError, r"toml, \[command.controller\]: PID measures 'presure', which .*Did you mean 'pressure'\?"),
+        ('measured = "pressure"', 'measured = "presure"', ParameterError, r"toml, \[input.controller\]: PID measures 'presure', which .*Did you mean 'pressure'\?"),
         ('measured = "pressure"', 'measured = "fill"', ParameterError, r"PID measures 'fill', which the plant does not have; there are"),
-        ('measured = "pressure"', "measured = 3", ParameterError, r"\[command.controller\]: measured is 3; it must be a text"),
-        ('measured = "pressure"\n', "", ParameterError, r"\[command.controller\]: PID needs 'measured' \(a text\); it is missing"),
-        ('commanded = "fill"', 'commanded = "fil"', ParameterError, r"\[command.controller\]: the plant has no input 'fil'; there are fill, discharge. Did you mean 'fill'\?"),
+        ('measured = "pressure"', "measured = 3", ParameterError, r"\[input.controller\]: measured is 3; it must be a text"),
+        ('measured = "pressure"\n', "", ParameterError, r"\[input.controller\]: PID needs 'measured' \(a text\); it is missing"),
+        ('commanded = "fill"', 'commanded = "fil"', ParameterError, r"\[input.controller\]: the plant has no input 'fil'; there are fill, discharge. Did you mean 'fill'\?"),
         ('commanded = "fill"', "commanded = 3", ParameterError, r"commanded is 3; it must be a text or a SplitRange"),
-        ('commanded = "fill"', PID_TABLE[1].format("fill", "vent"), ParameterError, r"\[command.controller\]: the plant has no input 'vent'"),
+        ('commanded = "fill"', PID_TABLE[1].format("fill", "vent"), ParameterError, r"\[input.controller\]: the plant has no input 'vent'"),
         ('commanded = "fill"', PID_TABLE[1].format("fill", "fill"), ParameterError, r"SplitRange: both inputs are 'fill'"),
-        ('"1.5 1/bar"', '"1.5 1/mm"', UnitError, r"\[command.controller\], gain: unit '1/mm' cannot be converted to '1/Pa'"),
+        ('"1.5 1/bar"', '"1.5 1/mm"', UnitError, r"\[input.controller\], gain: unit '1/mm' cannot be converted to '1/Pa'"),
         ('"1.5 1/bar"', '"1.5"', UnitError, r"gain: '1.5' has no unit; write it like '1.5 1/Pa'"),
-        ('"1.5 1/bar"', "nan", ParameterError, r"\[command.controller\]: PID.gain .* is nan; it must be finite"),
+        ('"1.5 1/bar"', "nan", ParameterError, r"\[input.controller\]: PID.gain .* is nan; it must be finite"),
         ('"1.5 1/bar"', "inf", ParameterError, r"PID.gain .* is inf; it must be finite"),
         ('"1.5 1/bar"', "true", ParameterError, r"gain is True; it must be a number in 1/Pa"),
         ("integral_time", "integral_tim", ParameterError, r"PID has no parameter 'integral_tim'; .*mean 'integral_time'\?"),
-        ('"300 ms"\nperiod', '"-3 ms"\nperiod', ParameterError, r"PID.integral_time .* is -0.003 s; allowed range: 0 to"),
-        ('period = "5 ms"', 'period = "0 ms"', ParameterError, r"\[command.controller\]: ControlLoop.period is 0.0 s; it must be positive"),
-        ('period = "5 ms"', "period = -1", ParameterError, r"ControlLoop.period is -1.0 s"),
-        ('period = "5 ms"', "period = nan", ParameterError, r"\[command.controller\], period is nan; it must be finite"),
-        ('period = "5 ms"', 'period = "5 bar"', UnitError, r"period: unit 'bar' cannot be converted to 's'"),
-        ('period = "5 ms"', 'period = "1 s"', ParameterError, r"\[command.controller\]: the sample time of the controller is 1 s, longer than the run of 0.3 s"),
-        ('period = "5 ms"\n', "", ParameterError, r"\[command.controller\]: 'period' is missing; write period = \"10 ms\""),
-        ("[command.controller.setpoint]", "[plant.setpoint]", ParameterError, r"Plant has no parameter 'setpoint'"),
-        (f"[command.controller.setpoint]\n{SETPOINT}", "", ParameterError, r"'setpoint' is missing; write \[command.controller.setpoint\]"),
-        (SETPOINT, "", ParameterError, r"ControlLoop.setpoint names nothing; PID follows pressure"),
-        (SETPOINT, 'presure = [[0, 1]]', ParameterError, r"\[command.controller.setpoint\]: the controller has no set point 'presure'; there are pressure.*Did you mean"),
+        ('"300 ms"\nsample_time', '"-3 ms"\nsample_time', ParameterError, r"PID.integral_time .* is -0.003 s; allowed range: 0 to"),
+        ('sample_time = "5 ms"', 'sample_time = "0 ms"', ParameterError, r"\[input.controller\]: ControlLoop.sample_time is 0.0 s; it must be positive"),
+        ('sample_time = "5 ms"', "sample_time = -1", ParameterError, r"ControlLoop.sample_time is -1.0 s"),
+        ('sample_time = "5 ms"', "sample_time = nan", ParameterError, r"\[input.controller\], sample_time is nan; it must be finite"),
+        ('sample_time = "5 ms"', 'sample_time = "5 bar"', UnitError, r"sample_time: unit 'bar' cannot be converted to 's'"),
+        ('sample_time = "5 ms"', 'sample_time = "1 s"', ParameterError, r"\[input\]: the sample time of the controller is 1 s, longer than the run of 0.3 s"),
+        ('sample_time = "5 ms"\n', "", ParameterError, r"\[input.controller\]: 'sample_time' is missing; write sample_time = \"10 ms\""),
+        ("[input.controller.setpoint]", "[plant.setpoint]", ParameterError, r"Plant has no parameter 'setpoint'"),
+        (f"[input.controller.setpoint]\n{SETPOINT}", "", ParameterError, r"'setpoint' is missing; write \[input.controller.setpoint\]"),
+        (SETPOINT, "", ParameterError, r"ControlLoop.setpoint names nothing; the set points of PID are pressure"),
+        (SETPOINT, 'presure = [[0, 1]]', ParameterError, r"\[input.controller.setpoint\]: the controller has no set point 'presure'; there are pressure.*Did you mean"),
         (SETPOINT, 'pressure = [[0, "1 mm"]]', UnitError, r"setpoint\], pressure: unit 'mm' cannot be converted to 'Pa'"),
         (SETPOINT, 'pressure = [[0, nan]]', ParameterError, r"setpoint\], pressure is nan; it must be finite"),
         (SETPOINT, 'pressure = 3', ParameterError, r"setpoint\], pressure is 3; it must be a list of instants and values"),
-        (SETPOINT, f'{SETPOINT}\ndrivers = {{ pressure = "SolenoidDriver" }}', ParameterError, r"a set point has no drivers; write \[command.drivers\]"),
+        (SETPOINT, f'{SETPOINT}\ndrivers = {{ pressure = "SolenoidDriver" }}', ParameterError, r"a set point has no drivers; write \[input.drivers\]"),
         (SETPOINT, f'{SETPOINT}\ncontroller = 3', ParameterError, r"a controller is allowed only in a scenario"),
         (SETPOINT, 'file = "none.csv"', AirmuscleError, r"none.csv"),
-        ('model = "PID"', 'model = "Valve"', ParameterError, r"\[command.controller\]: Valve is not a controller; there are OnOffController, PID"),
+        ('model = "PID"', 'model = "Valve"', ParameterError, r"\[input.controller\]: Valve is not a controller; there are OnOffController, PID"),
         ('model = "PID"', 'model = "PDI"', UnknownNameError, r"no model 'PDI'"),
-        ('model = "PID"\n', "", ParameterError, r"\[command.controller\]: the model is not named"),
-        ("[command]\n", '[command]\nfill = [["0.1 s", 1]]\n', ParameterError, r"'fill' is commanded by the controller, and beside it too"),
-        ("[command]\n", '[command]\ndischarge = [["0.1 s", 2]]\n', ParameterError, r"\[command\]: the input 'discharge' is 2 before"),
-        ("[command]\n", '[command]\ndrivers = { vent = "SolenoidDriver" }\n', ParameterError, r"\[command.drivers\]: the plant has no input 'vent'"),
+        ('model = "PID"\n', "", ParameterError, r"\[input.controller\]: the model is not named"),
+        ("[input]\n", '[input]\nfill = [["0.1 s", 1]]\n', ParameterError, r"'fill' is commanded by the controller, and beside it too"),
+        ("[input]\n", '[input]\ndischarge = [["0.1 s", 2]]\n', ParameterError, r"\[input\]: the input 'discharge' is 2 before"),
+        ("[input]\n", '[input]\ndrivers = { vent = "SolenoidDriver" }\n', ParameterError, r"\[input.drivers\]: the plant has no input 'vent'"),
     ],
 )  # fmt: skip
 def test_a_loop_that_cannot_be_is_refused(tmp_path: Path, was: str, becomes: str, kind: type, message: str):
@@ -213,16 +216,16 @@ def test_a_loop_that_cannot_be_is_refused(tmp_path: Path, was: str, becomes: str
 
 
 def test_what_is_no_table_of_a_controller_is_refused(tmp_path: Path):
-    i = GOOD.index("[command.controller]")
+    i = GOOD.index("[input.controller]")
     for given in ("3", '"PID"'):
         with pytest.raises(
             ParameterError,
-            match=r'\[command.controller\] is .*; it must be a table. Write model = "PID", its parameters',
+            match=r'\[input.controller\] is .*; it must be a table. Write model = "PID", its parameters',
         ):
             load_scenario(written(tmp_path, text=f"{GOOD[:i]}controller = {given}"))
-    flat = f'{GOOD[:i]}controller = {{ model = "PID", measured = "pressure", commanded = "fill", gain = 1, period = 1e-3, setpoint = 3 }}'
+    flat = f'{GOOD[:i]}controller = {{ model = "PID", measured = "pressure", commanded = "fill", gain = 1, sample_time = 1e-3, setpoint = 3 }}'
     with pytest.raises(
-        ParameterError, match=r'\[command.controller.setpoint\] is 3; it must be a table. Write pressure = \[\["0 s"'
+        ParameterError, match=r'\[input.controller.setpoint\] is 3; it must be a table. Write pressure = \[\["0 s"'
     ):
         load_scenario(written(tmp_path, text=flat))
 
@@ -250,9 +253,9 @@ def test_a_record_has_no_controller(tmp_path: Path):
 
     with pytest.raises(
         ParameterError,
-        match=r"record, \[command\]: a controller is allowed only in a scenario; give the commanded inputs",
+        match=r"record, \[input\]: a controller is allowed only in a scenario; give the commanded inputs",
     ):
-        build_input_signal({"controller": {}}, (), Location("record", "command", tmp_path))
+        build_input_signal({"controller": {}}, (), Location("record", "input", tmp_path))
 
 
 # Schema, report, program, study
@@ -273,16 +276,16 @@ def test_the_schema_takes_what_the_program_takes(text: str):
     ("was", "becomes"),
     [
         ('model = "PID"', 'model = "PDI"'),
-        ('period = "5 ms"\n', ""),
-        ('period = "5 ms"', "period = -1"),
+        ('sample_time = "5 ms"\n', ""),
+        ('sample_time = "5 ms"', "sample_time = -1"),
         ('measured = "pressure"\n', ""),
         ("integral_time", "integral_tim"),
-        ('"300 ms"\nperiod', '"300 ms"\nsetpoint_weight = 3\nperiod'),
+        ('"300 ms"\nsample_time', '"300 ms"\nsetpoint_weight = 3\nsample_time'),
         ('"1.5 1/bar"', '"1,5 1/bar"'),
         ('"1.5 1/bar"', "true"),
         (SETPOINT, "pressure = 3"),
         (SETPOINT, f'{SETPOINT}\ndrivers = {{ pressure = "SolenoidDriver" }}'),
-        (f"[command.controller.setpoint]\n{SETPOINT}", ""),
+        (f"[input.controller.setpoint]\n{SETPOINT}", ""),
     ],
 )
 def test_what_the_schema_refuses_the_program_refuses(tmp_path: Path, was: str, becomes: str):
@@ -293,7 +296,7 @@ def test_what_the_schema_refuses_the_program_refuses(tmp_path: Path, was: str, b
 
 
 def test_the_schema_knows_every_controller():
-    tables = scenario_schema()["properties"]["command"]["properties"]["controller"]["anyOf"]
+    tables = scenario_schema()["properties"]["input"]["properties"]["controller"]["anyOf"]
     assert [table["properties"]["model"]["const"] for table in tables] == ["OnOffController", "PID"]
     assert tables[1]["properties"]["gain"]["description"] == "K [u/y]: proportional gain"
 
@@ -322,20 +325,20 @@ def test_the_report_shows_set_point_and_measurement_with_units():
 
 
 def test_a_loop_without_drivers_is_drawn_to_its_end(tmp_path: Path):
-    scenario = load_scenario(written(tmp_path, ('period = "5 ms"', 'period = "0.5 ms"')))
+    scenario = load_scenario(written(tmp_path, ('sample_time = "5 ms"', 'sample_time = "0.5 ms"')))
     run = scenario.simulate()
     plot = run_chapter(scenario, run).plots[-1]
     (applied,) = [line.get_xydata() for line in plot.figure.axes[0].lines]
     assert plot.caption == "Inputs applied to the plant."
     assert applied[-1, 0] == 0.3
-    assert describe_input(scenario.command).endswith("; other inputs: none")
-    assert not isinstance(scenario.command.as_open_loop(run), WithDrivers)
+    assert describe_input(scenario.problem.input).endswith("; other inputs: none")
+    assert not isinstance(scenario.problem.input.as_open_loop(run), WithDrivers)
 
 
 def test_a_run_that_ends_early_is_reported(tmp_path: Path):
     """RungeKutta4 with steps far too long for the valves."""
     changes = ("3e-9, critical_ratio = 0.3 }\ndischarge", "9e-6, critical_ratio = 0.3 }\ndischarge"), (
-        'duration = "300 ms"', 'duration = "300 ms"\nmethod = { model = "RungeKutta4", step = "5 ms" }')  # fmt: skip
+        'duration = "300 ms"', 'duration = "300 ms"\nintegrator = { model = "RungeKutta4", step = "5 ms" }')  # fmt: skip
     done = CliRunner().invoke(app, ["simulate", str(written(tmp_path, *changes)), "--out", str(tmp_path / "run")])
     assert done.exit_code == 1
     assert "ended early" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
@@ -366,8 +369,8 @@ STUDY = """
 title = "gains"
 scenario = "scenario.toml"
 [vary]
-"command.controller.gain" = ["0.5 1/bar", "2 1/bar"]
-"command.controller.setpoint.pressure[1][1]" = ["1.5 bar", "2 bar"]
+"input.controller.gain" = ["0.5 1/bar", "2 1/bar"]
+"input.controller.setpoint.pressure[1][1]" = ["1.5 bar", "2 bar"]
 [design]
 model = "Grid"
 [metrics]
@@ -381,12 +384,12 @@ def test_a_study_varies_the_numbers_of_a_controller(tmp_path: Path):
     (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
     study = load_study(tmp_path / "study.toml")
     found = [study.scenario(i) for i in range(4)]
-    assert [s.command.controller.gain for s in found] == pytest.approx([5e-6, 5e-6, 2e-5, 2e-5])
-    assert [s.command.setpoint.changes["pressure"][1][1] for s in found] == [1.5e5, 2e5, 1.5e5, 2e5]
+    assert [s.problem.input.controller.gain for s in found] == pytest.approx([5e-6, 5e-6, 2e-5, 2e-5])
+    assert [s.problem.input.setpoint.changes["pressure"][1][1] for s in found] == [1.5e5, 2e5, 1.5e5, 2e5]
     done = CliRunner().invoke(app, ["sweep", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out")])
     assert done.exit_code == 0, done.output
     (tmp_path / "study.toml").write_text(STUDY.replace("controller.gain", "controller.gian"), encoding="utf-8")
-    with pytest.raises(AirmuscleError, match=r"command.controller.gian.*Did you mean 'command.controller.gain'"):
+    with pytest.raises(AirmuscleError, match=r"input.controller.gian.*Did you mean 'input.controller.gain'"):
         load_study(tmp_path / "study.toml")
 
 

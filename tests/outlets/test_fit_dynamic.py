@@ -36,13 +36,13 @@ discharge = {{ model = "Valve", conductance = {conductance}, critical_ratio = 0.
 [plant.mechanism]
 model = "HangingMass"
 mass = "10 kg"
-[command]
+[input]
 fill = [["0.1 s", 1], ["1 s", 0]]
 discharge = [["1.3 s", 1]]
 """
 TRUE = {"exponent": 1.25, "damping": 200.0, "conductance": 3e-9}
 START = {"exponent": 1.1, "damping": 100.0, "conductance": 4e-9}
-RUN = '[run]\nduration = "2 s"\noutput = "10 ms"\nstart = { pressure = "0.6 bar" }\n'
+RUN = '[run]\nduration = "2 s"\noutput_times = "10 ms"\ninitial_state = { pressure = "0.6 bar" }\n'
 VALVES = '["circuit.fill.conductance", "circuit.discharge.conductance"]'
 ASKED = f"""
 [observed]
@@ -56,7 +56,7 @@ starts = 2
 [fit.bounds]
 "gas.exponent" = [1.01, 1.4]
 """
-RECORD = '[[record]]\nfile = "{}"\nstart_time = "0.2 s"\nstart = {{ pressure = "0.6 bar" }}\n'
+RECORD = '[[record]]\nfile = "{}"\nstart_time = "0.2 s"\ninitial_state = {{ pressure = "0.6 bar" }}\n'
 
 
 def airmuscle(*arguments):
@@ -115,7 +115,9 @@ def test_what_the_records_were_made_with_is_found_written_and_simulated(folder, 
     )
     assert {"record-1.svg", "record-2.png", "profiles.svg"} <= {p.name for p in (out / "figures").iterdir()}
     again = load_scenario(out / "scenario-1.toml")
-    assert again.start["position"] == pytest.approx(load_scenario(folder / "truth.toml").start["position"], abs=1e-5)
+    assert again.initial_state["position"] == pytest.approx(
+        load_scenario(folder / "truth.toml").initial_state["position"], abs=1e-5
+    )
     written = {leaf.path: leaf.value for leaf in leaves(again.plant)}
     assert written["circuit.discharge.conductance"] == found["circuit.fill.conductance"][0]
     assert written["circuit.supply.pressure"] == found["circuit.supply.pressure of record 1"][0]
@@ -146,10 +148,10 @@ def test_what_cannot_be_told_apart_is_printed_with_its_experiment(folder, tmp_pa
 
 def test_a_study_says_what_it_was_told(folder):
     path = variant(
-        folder, start=('start_time = "50 ms"', 'start_time = "50 ms"\nstart = { pressure = "2 kPa" }\nseed = 3'),
-        method=("starts = 2", 'starts = 2\nmethod = { model = "Rodas4", rtol = 1e-7 }'),
+        folder, start=('start_time = "50 ms"', 'start_time = "50 ms"\ninitial_state = { pressure = "2 kPa" }\nseed = 3'),
+        method=("starts = 2", 'starts = 2\nintegrator = { model = "Rodas4", rtol = 1e-7 }'),
         load=(RECORD.format("run2.csv"),
-              '[[record]]\nfile = "run2.csv"\nfirst = "0.3 s"\nlast = "1 s"\n[record.command]\nfill = [[0, 1]]\n'
+              '[[record]]\nfile = "run2.csv"\nfirst = "0.3 s"\nlast = "1 s"\n[record.input]\nfill = [[0, 1]]\n'
               '[record.plant.mechanism]\nmodel = "HangingMass"\nmass = "12 kg"\n'),
     )  # fmt: skip
     study = load_dynamic_fit(path)
@@ -187,7 +189,7 @@ orifice = { model = "Valve", conductance = 1.3e-9, critical_ratio = 0.3 }
 [plant.mechanism]
 model = "Isometric"
 contraction = 0.0
-[command]
+[input]
 fill = [[0, 1]]
 [observed]
 "tube.pressure" = { deviation = "500 Pa", column = "pressure" }
@@ -222,7 +224,7 @@ def test_a_command_may_stand_in_a_file_and_is_found_from_the_written_scenario(fo
                    once=(RECORD.format("run2.csv"), ""), few=("starts = 2", "starts = 1"))  # fmt: skip
     result = airmuscle("fit-dynamic", path, "--out", tmp_path / "out")
     assert result.exit_code == 0, result.stderr
-    command = load_scenario(tmp_path / "out" / "scenario.toml").command
+    command = load_scenario(tmp_path / "out" / "scenario.toml").problem.input
     found = command.segments(("fill", "discharge"), 0.0, 2.0).inputs_at(np.array([0.05, 0.5, 1.5]), 0.0)
     assert found[:, 0].tolist() == [0.0, 1.0, 0.0]
 
@@ -309,8 +311,8 @@ def test_the_page_on_dynamic_identification_holds_a_study_that_loads(folder):
 
 def test_a_start_that_was_found_begins_the_written_scenario(folder, tmp_path):
     path = variant(
-        folder, start=('start = { pressure = "0.6 bar" }', 'start = { pressure = "0.62 bar" }'),
-        nuisance=('start_time = "50 ms"', 'start_time = "50 ms"\nstart = { pressure = "5 kPa" }'),
+        folder, start=('initial_state = { pressure = "0.6 bar" }', 'initial_state = { pressure = "0.62 bar" }'),
+        nuisance=('start_time = "50 ms"', 'start_time = "50 ms"\ninitial_state = { pressure = "5 kPa" }'),
         one=(RECORD.format("run2.csv").replace("0.6 bar", "0.62 bar"), ""), quick=("starts = 2", "starts = 1"),
     )  # fmt: skip
     result = airmuscle("fit-dynamic", path, "--out", tmp_path / "out", "--json")
@@ -318,4 +320,4 @@ def test_a_start_that_was_found_begins_the_written_scenario(folder, tmp_path):
     assert found["value"] == pytest.approx(6e4, abs=4 * found["stderr"])
     assert found["stderr"] < 300.0
     text = (tmp_path / "out" / "scenario.toml").read_text(encoding="utf-8")
-    assert float(re.search(r"\[run\.start\]\npressure = (\S+)", text)[1]) == found["value"]
+    assert float(re.search(r"\[run\.initial_state\]\npressure = (\S+)", text)[1]) == found["value"]

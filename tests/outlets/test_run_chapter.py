@@ -33,7 +33,8 @@ def test_an_input_is_described_in_one_sentence(command, words: str):
 
 
 def drawn(command, duration: float):
-    scenario = replace(load_scenario(EXAMPLE), command=command, duration=duration)
+    scenario = load_scenario(EXAMPLE)
+    scenario = replace(scenario, problem=replace(scenario.problem, input=command, duration=duration))
     plot = run_chapter(scenario, scenario.simulate()).plots[-1]
     return plot, {line.get_label(): line.get_xydata() for line in plot.figure.axes[0].lines}
 
@@ -77,10 +78,10 @@ model = "AntagonisticJoint"
 radius = "40 mm"
 inertia = 0.05
 offset = 0.1
-[command]
+[input]
 [run]
 duration = "10 ms"
-start = { pressure = "2 bar" }
+initial_state = { pressure = "2 bar" }
 """
 
 

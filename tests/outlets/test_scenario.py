@@ -56,11 +56,11 @@ fill = {{ model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }}
 discharge = {{ model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }}
 [plant.mechanism]
 {MASS}
-[command]
+[input]
 {FILL}
 [run]
 {DURATION}
-start = {{ pressure = "1 bar" }}
+initial_state = {{ pressure = "1 bar" }}
 """
 
 
@@ -85,8 +85,12 @@ def test_the_page_runs(tmp_path: Path):
     assert scenario.plant.muscle.damper == LinearDamper(200.0)
     assert scenario.plant.gas == Isothermal()
     assert scenario.plant.circuit.supply.pressure == 650e3 - 101_325.0
-    assert scenario.command == Schedule({"fill": ((5.0, 1.0), (15.0, 0.0)), "discharge": ((19.0, 1.0),)})
-    assert (scenario.duration, scenario.output, scenario.method) == (25.0, 0.01, Rodas4(rtol=1e-8))
+    assert scenario.problem.input == Schedule({"fill": ((5.0, 1.0), (15.0, 0.0)), "discharge": ((19.0, 1.0),)})
+    assert (scenario.problem.duration, scenario.problem.output_times, scenario.problem.integrator) == (
+        25.0,
+        0.01,
+        Rodas4(rtol=1e-8),
+    )
     assert scenario.columns == ("pressure", "position")
     run = scenario.simulate()
     assert run["pressure"].max() == pytest.approx(650e3 - 101_325.0, rel=1e-3), "filled up to the supply"
@@ -112,14 +116,16 @@ def test_a_list_holds_tables_or_names_of_its_kind(tmp_path: Path):
 
 
 def test_what_is_optional_has_the_defaults_of_the_page(tmp_path: Path):
-    path = written(tmp_path, ('title = "A small one"\n', ""), ('start = { pressure = "1 bar" }\n', ""), (FILL, ""))
+    path = written(
+        tmp_path, ('title = "A small one"\n', ""), ('initial_state = { pressure = "1 bar" }\n', ""), (FILL, "")
+    )
     path = written(tmp_path, (MUSCLE, 'muscle = "dmsp-20"'), text=path.read_text(encoding="utf-8"))
-    path = written(tmp_path, ("[command]\n", ""), text=path.read_text(encoding="utf-8"))
+    path = written(tmp_path, ("[input]\n", ""), text=path.read_text(encoding="utf-8"))
     scenario = load_scenario(path)
-    assert (scenario.title, scenario.output, scenario.method) == ("scenario", None, Rodas4())
+    assert (scenario.title, scenario.problem.output_times, scenario.problem.integrator) == ("scenario", None, Rodas4())
     assert scenario.plant.gas == Polytropic()
-    assert scenario.command == Schedule({})
-    assert scenario.plant.muscle_states(scenario.start)[0].pressure == pytest.approx(0.0, abs=1e-6)
+    assert scenario.problem.input == Schedule({})
+    assert scenario.plant.muscle_states(scenario.initial_state)[0].pressure == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -149,8 +155,8 @@ def test_components_are_tables_or_names(tmp_path: Path, was: str, becomes: str, 
     ],
 )
 def test_every_method_of_the_page(tmp_path: Path, text: str, method: object):
-    scenario = load_scenario(written(tmp_path, (DURATION, f"{DURATION}\nmethod = {text}")))
-    assert scenario.method == method
+    scenario = load_scenario(written(tmp_path, (DURATION, f"{DURATION}\nintegrator = {text}")))
+    assert scenario.problem.integrator == method
     assert scenario.simulate()["time"][-1] == 0.3
 
 
@@ -177,7 +183,7 @@ def test_a_signal_is_linear_between_its_points(tmp_path: Path):
     scenario = load_scenario(
         written(tmp_path, (FILL, f'model = "SampledSignal"\n{FILL}'), (DURATION, 'duration = "200 ms"'))
     )
-    assert scenario.command == SampledSignal({"fill": ((0.1, 1.0), (0.2, 0.0))})
+    assert scenario.problem.input == SampledSignal({"fill": ((0.1, 1.0), (0.2, 0.0))})
     run = scenario.simulate()
     assert run["fill"][run["time"] == 0.15] == pytest.approx(0.5)
 
@@ -188,7 +194,7 @@ OPENINGS = "time [ms],fill [%],valve\n0,0,0.5\n100,50,0.5\n300,0,0.25\n"
 def driven(folder: Path, *changes: tuple[str, str]) -> Path:
     """The scenario with the command of the page, and its data file beside it."""
     (folder / "openings.csv").write_text(OPENINGS, encoding="utf-8")
-    return written(folder, (f"[command]\n{FILL}", DRIVEN), *changes)
+    return written(folder, (f"[input]\n{FILL}", DRIVEN), *changes)
 
 
 def test_the_command_of_the_page_runs(tmp_path: Path):
@@ -198,7 +204,7 @@ def test_the_command_of_the_page_runs(tmp_path: Path):
         "fill": SolenoidDriver(opening_delay=5e-3, closing_delay=2e-3),
         "discharge": (PWM(50.0, smallest_pulse=1e-3), SolenoidDriver(opening_delay=2e-3)),
     }
-    assert scenario.command == WithDrivers(Periodic(told, 0.4), drivers)
+    assert scenario.problem.input == WithDrivers(Periodic(told, 0.4), drivers)
     run = scenario.simulate()
     assert np.count_nonzero(np.diff(run["discharge"]) > 0) == 15, "a pulse in each period of the carrier"
 
@@ -209,7 +215,7 @@ def test_a_recorded_command_may_be_held_and_rows_may_stand_beside_it(tmp_path: P
     file = 'file = "data/bench.csv"\ndischarge = [["0.1 s", 1]]'
     fill = ((0.0, 0.0), (0.1, 0.5), (0.3, 0.0))
     for model, kind in (("", SampledSignal), ('model = "Schedule"\n', Schedule)):
-        command = load_scenario(written(tmp_path, (FILL, f"{model}{file}"))).command
+        command = load_scenario(written(tmp_path, (FILL, f"{model}{file}"))).problem.input
         assert command == kind({"fill": fill, "discharge": ((0.1, 1.0),)})
 
 
@@ -218,7 +224,7 @@ def test_a_driver_may_have_the_delays_of_a_valve_of_the_catalogue(tmp_path: Path
     response = load_valve("smc-sx91").switching_times
     command = load_scenario(
         written(tmp_path, (FILL, f'{FILL}\ndrivers = {{ fill = {{ library = "smc-sx91" }} }}'))
-    ).command
+    ).problem.input
     assert command.drivers == {"fill": SolenoidDriver(response.opening_delay, response.closing_delay)}
 
 
@@ -233,9 +239,9 @@ lag = {{ model = "SecondOrderLag", frequency = "20 Hz", damping_ratio = 0.7 }}
     i, j = GOOD.index('model = "FillDischarge"'), GOOD.index("[plant.mechanism]")
     text = GOOD[:i] + regulator + GOOD[j:].replace(FILL, 'setpoint = [["0.1 s", "2 bar"], ["0.2 s", 1e5]]')
     scenario = load_scenario(written(tmp_path, text=text))
-    assert scenario.command == Schedule({"setpoint": ((0.1, 2e5), (0.2, 1e5))})
+    assert scenario.problem.input == Schedule({"setpoint": ((0.1, 2e5), (0.2, 1e5))})
     assert "setpoint\n[Pa]" in [axis.get_ylabel() for axis in _input_plot(scenario, scenario.simulate()).figure.axes]
-    with pytest.raises(UnitError, match=r"\[command\], setpoint: unit 'mm' cannot be converted to 'Pa'"):
+    with pytest.raises(UnitError, match=r"\[input\], setpoint: unit 'mm' cannot be converted to 'Pa'"):
         load_scenario(written(tmp_path, ('"2 bar"', '"2 mm"'), text=text))
 
 
@@ -245,7 +251,7 @@ def test_a_column_of_no_known_quantity_has_the_unit_of_its_heading(tmp_path: Pat
     )
     for column in ("valve", "valve [%]"):
         table = f'file = "bench.csv"\ncolumns = {{ fill = "{column}", discharge = "discharge" }}'
-        command = load_scenario(written(tmp_path, (FILL, table))).command
+        command = load_scenario(written(tmp_path, (FILL, table))).problem.input
         assert command == SampledSignal({"fill": ((0, 0.5), (1, 0.2)), "discharge": ((0, 1), (1, 0))})
     with pytest.raises(UnitError, match=r"bench.csv, port \[mm\]: unit 'mm' cannot be converted to a ratio"):
         load_scenario(written(tmp_path, (FILL, 'file = "bench.csv"\ncolumns = { fill = "port" }')))
@@ -253,7 +259,7 @@ def test_a_column_of_no_known_quantity_has_the_unit_of_its_heading(tmp_path: Pat
 
 def test_columns_called_like_inputs_are_taken_unasked(tmp_path: Path):
     (tmp_path / "bench.csv").write_text("time [s],discharge [1],fill [1]\n0,1,0\n1,0.5,0.2\n", encoding="utf-8")
-    command = load_scenario(written(tmp_path, (FILL, 'file = "bench.csv"'))).command
+    command = load_scenario(written(tmp_path, (FILL, 'file = "bench.csv"'))).problem.input
     assert command == SampledSignal({"fill": ((0, 0), (1, 0.2)), "discharge": ((0, 1), (1, 0.5))})
 
 
@@ -279,9 +285,12 @@ def test_a_muscle_of_the_library_keeps_the_box_of_its_law(tmp_path: Path):
 
 def test_the_start_is_rest_at_a_pressure_or_a_state(tmp_path: Path):
     at_rest = load_scenario(written(tmp_path))
-    assert at_rest.plant.muscle_states(at_rest.start)[0].tension == pytest.approx(5 * 9.80665)
-    given = ('start = { pressure = "1 bar" }', 'start = { pressure = "2 bar", position = "10 mm", speed = "5 cm/s" }')
-    state = load_scenario(written(tmp_path, given)).start
+    assert at_rest.plant.muscle_states(at_rest.initial_state)[0].tension == pytest.approx(5 * 9.80665)
+    given = (
+        'initial_state = { pressure = "1 bar" }',
+        'initial_state = { pressure = "2 bar", position = "10 mm", speed = "5 cm/s" }',
+    )
+    state = load_scenario(written(tmp_path, given)).initial_state
     assert (state["position"], state["speed"]) == (0.01, 0.05)
     assert at_rest.plant.muscle_states(state)[0].pressure == pytest.approx(2e5)
 
@@ -300,8 +309,8 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
     ("was", "becomes", "kind", "message"),
     [
         # tables and keys
-        ("[command]", "[commands]", ParameterError, r"toml: unknown key 'commands'; .*Did you mean 'command'\?"),
-        ("[run]\n", "[command.fill2]\n", ParameterError, r"toml: the table \[run\] is missing"),
+        ("[input]", "[inputs]", ParameterError, r"toml: unknown key 'inputs'; .*Did you mean 'input'\?"),
+        ("[run]\n", "[input.fill2]\n", ParameterError, r"toml: the table \[run\] is missing"),
         ('title = "A small one"', "title = 3", ParameterError, r"toml: title is 3; it must be a text in quotes"),
         (DURATION, "", ParameterError, r"\[run\]: 'duration' is missing; write it as duration = \"25 s\""),
         (DURATION, "duratoin = 3", ParameterError, r"\[run\]: unknown key 'duratoin'; .*Did you mean 'duration'\?"),
@@ -371,31 +380,31 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
         ),
         ('"5 kg"', '"5 N"', UnitError, r"\[plant.mechanism\], mass: unit 'N' cannot be converted to 'kg'"),
         # the command
-        (FILL, 'fil = [["0 s", 1]]', ParameterError, r"\[command\]: .* no input 'fil'; .*Did you mean 'fill'\?"),
+        (FILL, 'fil = [["0 s", 1]]', ParameterError, r"\[input\]: .* no input 'fil'; .*Did you mean 'fill'\?"),
         (
             FILL,
             "fill = 1",
             ParameterError,
-            r"\[command\], fill is 1; it must be a list of instants and values, such as \[\[\"5 s\", 1\]",
+            r"\[input\], fill is 1; it must be a list of instants and values, such as \[\[\"5 s\", 1\]",
         ),
-        (FILL, "fill = [1]", ParameterError, r"\[command\], fill contains 1; each item must be an instant and a value"),
-        (FILL, 'fill = [["1 bar", 1]]', UnitError, r"\[command\], fill: unit 'bar' cannot be converted to 's'"),
-        (FILL, 'fill = [["0.1", 1]]', UnitError, r"\[command\], fill: '0.1' has no unit; write it like '0.1 s'"),
-        (FILL, "fill = [[0.1, true]]", ParameterError, r"\[command\], fill is True; it must be a number"),
-        (FILL, "fill = [[0.1, nan]]", ParameterError, r"\[command\], fill is nan; it must be finite"),
+        (FILL, "fill = [1]", ParameterError, r"\[input\], fill contains 1; each item must be an instant and a value"),
+        (FILL, 'fill = [["1 bar", 1]]', UnitError, r"\[input\], fill: unit 'bar' cannot be converted to 's'"),
+        (FILL, 'fill = [["0.1", 1]]', UnitError, r"\[input\], fill: '0.1' has no unit; write it like '0.1 s'"),
+        (FILL, "fill = [[0.1, true]]", ParameterError, r"\[input\], fill is True; it must be a number"),
+        (FILL, "fill = [[0.1, nan]]", ParameterError, r"\[input\], fill is nan; it must be finite"),
         (
             FILL,
             "fill = [[0.2, 1], [0.1, 0]]",
             ParameterError,
-            r"\[command\]: .*'fill' must list its instants in rising",
+            r"\[input\]: .*'fill' must list its instants in rising",
         ),
         (
             FILL,
             "fill = [[0.1, 7]]",
             ParameterError,
-            r"\[command\]: the input 'fill' is 7 before 0.3 s; allowed range: 0",
+            r"\[input\]: the input 'fill' is 7 before 0.3 s; allowed range: 0",
         ),
-        (FILL, "fill = [[0, -0.5]]", ParameterError, r"\[command\]: the input 'fill' is -0.5 before"),
+        (FILL, "fill = [[0, -0.5]]", ParameterError, r"\[input\]: the input 'fill' is -0.5 before"),
         (
             FILL,
             'model = "SampledSignal"\nfill = [[0, 0], [0.3, 2]]',
@@ -406,89 +415,89 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             FILL,
             'model = "SampledSignal"\nfill = []',
             ParameterError,
-            r"\[command\]: the signal of 'fill' must be finite points",
+            r"\[input\]: the sampled signal of 'fill' has no points",
         ),
         (
             FILL,
             'model = "Shedule"',
             UnknownNameError,
-            r"\[command\], model: no model 'Shedule'.*Did you mean 'Schedule'\?",
+            r"\[input\], model: no model 'Shedule'.*Did you mean 'Schedule'\?",
         ),
         (
             FILL,
             'model = "Braid"',
             ParameterError,
-            r"\[command\]: Braid is not an input signal; there are Schedule and SampledSignal",
+            r"\[input\]: Braid is not an input signal; there are Schedule and SampledSignal",
         ),
         (
             FILL,
             f'{FILL}\nperiod = "0 s"',
             ParameterError,
-            r"\[command\]: Periodic.period is 0.0 s; it must be positive",
+            r"\[input\]: Periodic.period is 0.0 s; it must be positive",
         ),
-        (FILL, f"{FILL}\nperiod = nan", ParameterError, r"\[command\], period is nan; it must be finite"),
-        (FILL, f'{FILL}\nperiod = "1 bar"', UnitError, r"\[command\], period: unit 'bar' cannot be converted to 's'"),
-        (FILL, "file = 3", ParameterError, r"\[command\]: file is 3; it must be a text in quotes"),
-        (FILL, 'file = "no.csv"', FileError, r"\[command\]: .*no\.csv"),
+        (FILL, f"{FILL}\nperiod = nan", ParameterError, r"\[input\], period is nan; it must be finite"),
+        (FILL, f'{FILL}\nperiod = "1 bar"', UnitError, r"\[input\], period: unit 'bar' cannot be converted to 's'"),
+        (FILL, "file = 3", ParameterError, r"\[input\]: file is 3; it must be a text in quotes"),
+        (FILL, 'file = "no.csv"', FileError, r"\[input\]: .*no\.csv"),
         (
             FILL,
             'columns = { fill = "x" }',
             ParameterError,
-            r"\[command\]: columns is given without file; write file =",
+            r"\[input\]: columns is given without file; write file =",
         ),
         (
             FILL,
             "drivers = 3",
             ParameterError,
-            r"\[command.drivers\] is 3; it must be a table. Write fill = \{ model",
+            r"\[input.drivers\] is 3; it must be a table. Write fill = \{ model",
         ),
         (
             FILL,
             'drivers = { fil = "SolenoidDriver" }',
             ParameterError,
-            r"\[command.drivers\]: .* no input 'fil'.*mean 'fill'\?",
+            r"\[input.drivers\]: .* no input 'fil'.*mean 'fill'\?",
         ),
         (
             FILL,
             'drivers = { fill = "SolenoidDrive" }',
             UnknownNameError,
-            r"\[command.drivers.fill\], model: .*Did you mean 'SolenoidDriver'\?",
+            r"\[input.drivers.fill\], model: .*Did you mean 'SolenoidDriver'\?",
         ),
         (
             FILL,
             'drivers = { fill = "PWM" }',
             ParameterError,
-            r"\[command.drivers.fill\]: PWM needs 'frequency' \[1/s\]",
+            r"\[input.drivers.fill\]: PWM needs 'frequency' \[1/s\]",
         ),
         (
             FILL,
             'drivers = { fill = ["Rodas4"] }',
             ParameterError,
-            r"\[command.drivers.fill.\[0\]\]: Rodas4 is not allowed here; a Driver is required",
+            r"\[input.drivers.fill.\[0\]\]: Rodas4 is not allowed here; a Driver is required",
         ),
         (
             FILL,
             f'{FILL}\ndrivers = {{ fill = {{ model = "SolenoidDriver", opening_delay = "-1 s" }} }}',
             ParameterError,
-            r"\[command.drivers.fill\]: SolenoidDriver.opening_delay .* is -1 s; allowed range: 0 to 10 s",
+            r"\[input.drivers.fill\]: SolenoidDriver.opening_delay .* is -1 s; allowed range: 0 to 10 s",
         ),
         (
             FILL,
             'fill = [[0, 2]]\ndrivers = { fill = "SolenoidDriver" }',
             ParameterError,
-            r"\[command\]: the driver of 'fill' is told 2 before",
+            r"\[input\]: the command of the driver of 'fill' is 2 before",
         ),
         (
             FILL,
             'drivers = { fill = { library = "ckd-m4ga1-r" } }',
             ParameterError,
-            r"\[command.drivers.fill\]: ckd-m4ga1-r: no switching times are published; write model = ",
+            r"\[input.drivers.fill\]: ckd-m4ga1-r: no switching times are published; write model = ",
         ),
         (
             FILL,
             'drivers = { fill = { library = "matrix-821", path = "valve" } }',
             ParameterError,
-            r"\[command.drivers.fill\]: unknown key 'path'",
+            r"\[input.drivers.fill\]: unknown key 'path'",
         ),
         # what is written
         (
@@ -509,7 +518,7 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             ParameterError,
             r"\[output\]: unknown key 'column'; .*'columns'\?",
         ),
-        (FILL, "model = 3", UnknownNameError, r"\[command\], model is 3; it must be a name in quotes"),
+        (FILL, "model = 3", UnknownNameError, r"\[input\], model is 3; it must be a name in quotes"),
         # the run
         (DURATION, "duration = 0", ParameterError, r"\[run\], duration is 0; it must be greater than zero"),
         (DURATION, 'duration = "-1 s"', ParameterError, r"\[run\], duration is '-1 s'; it must be greater than zero"),
@@ -521,40 +530,50 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             r"\[run\], duration is \[1\]; it must be a number in s, or a text",
         ),
         (DURATION, 'duration = "1 m"', UnitError, r"\[run\], duration: unit 'm' cannot be converted to 's'"),
-        (DURATION, f"{DURATION}\noutput = 0", ParameterError, r"\[run\], output is 0; it must be greater than zero"),
-        (DURATION, f"{DURATION}\nstart_time = nan", ParameterError, r"\[run\], start_time is nan; it must be finite"),
-        (DURATION, f'{DURATION}\nmethod = "Rodas"', UnknownNameError, r"\[run.method\], .*Did you mean 'Rodas4'\?"),
         (
             DURATION,
-            f'{DURATION}\nmethod = "Isothermal"',
+            f"{DURATION}\noutput_times = 0",
             ParameterError,
-            r"\[run.method\]: Isothermal is not allowed here; an Integrator is required",
+            r"\[run\], output_times is 0; it must be greater than zero",
+        ),
+        (DURATION, f"{DURATION}\nstart_time = nan", ParameterError, r"\[run\], start_time is nan; it must be finite"),
+        (
+            DURATION,
+            f'{DURATION}\nintegrator = "Rodas"',
+            UnknownNameError,
+            r"\[run.integrator\], .*Did you mean 'Rodas4'\?",
         ),
         (
             DURATION,
-            f"{DURATION}\nmethod = 3",
+            f'{DURATION}\nintegrator = "Isothermal"',
             ParameterError,
-            r"\[run.method\] is 3; it must be a table. Write model =",
+            r"\[run.integrator\]: Isothermal is not allowed here; an Integrator is required",
+        ),
+        (
+            DURATION,
+            f"{DURATION}\nintegrator = 3",
+            ParameterError,
+            r"\[run.integrator\] is 3; it must be a table. Write model =",
         ),
         (
             '{ pressure = "1 bar" }',
             "3",
             ParameterError,
-            r"\[run.start\] is 3; it must be a table. Write start = \{ pressure = \"0 bar\" \}",
+            r"\[run.initial_state\] is 3; it must be a table. Write start = \{ pressure = \"0 bar\" \}",
         ),
         (
             "{ pressure =",
             "{ presure =",
             ParameterError,
-            r"\[run.start\]: unknown key 'presure'; .*Did you mean 'pressure'\?",
+            r"\[run.initial_state\]: unknown key 'presure'; .*Did you mean 'pressure'\?",
         ),
-        ('"1 bar"', '"-2 bar"', ParameterError, r"\[run.start\]: .*-200 kPa is not above absolute vacuum"),
-        ('"1 bar"', "inf", ParameterError, r"\[run.start\], pressure is inf; it must be finite"),
+        ('"1 bar"', '"-2 bar"', ParameterError, r"\[run.initial_state\]: .*-200 kPa is not above absolute vacuum"),
+        ('"1 bar"', "inf", ParameterError, r"\[run.initial_state\], pressure is inf; it must be finite"),
         (
             'pressure = "1 bar"',
             'position = "1 m"',
             PhysicsError,
-            r"\[run.start\]: Braid: a contraction of .* is outside its range",
+            r"\[run.initial_state\]: Braid: a contraction of .* is outside its range",
         ),
     ],
 )
@@ -574,25 +593,25 @@ def test_a_bad_scenario_is_told_what_is_wrong(
             'fill = "fill"',
             'fill = "fil"',
             ColumnError,
-            r"\[command\]: openings.csv: no column 'fil'; .*Did you mean 'fill'\?",
+            r"\[input\]: openings.csv: no column 'fil'; .*Did you mean 'fill'\?",
         ),
         (
             "{ fill = ",
             "{ fil = ",
             ParameterError,
-            r"\[command\]: the plant has no input 'fil'; .*Did you mean 'fill'\?",
+            r"\[input\]: the plant has no input 'fil'; .*Did you mean 'fill'\?",
         ),
         (
             'fill = "fill"',
             "fill = 3",
             ParameterError,
-            r"\[command\], columns is .*; it must be a table such as \{ fill = \"valve\" \}",
+            r"\[input\], columns is .*; it must be a table such as \{ fill = \"valve\" \}",
         ),
         (
             "period",
             "fill = [[0, 1]]\nperiod",
             ParameterError,
-            r"\[command\]: 'fill' is given both by the file and by rows; remove one",
+            r"\[input\]: 'fill' is given both by the file and by rows; remove one",
         ),
     ],
 )
@@ -613,7 +632,7 @@ def test_a_recording_without_a_column_of_an_input_says_how_to_name_one(tmp_path:
 def test_a_plant_that_cannot_rest_names_muscle_and_forces(tmp_path: Path):
     heavy = written(tmp_path, ('"5 kg"', '"500 kg"'), (MUSCLE, 'muscle = { library = "chou-hannaford", name = "arm" }'))
     with pytest.raises(
-        EquilibriumError, match=r"scenario\.toml, \[run\.start\]: HangingMass has no stable equilibrium"
+        EquilibriumError, match=r"scenario\.toml, \[run\.initial_state\]: HangingMass has no stable equilibrium"
     ) as raised:
         load_scenario(heavy)
     assert re.search(r"arm pulls \d+(\.\d+)? N at 100 kPa and a contraction of", str(raised.value))
@@ -623,13 +642,13 @@ def test_a_plant_that_cannot_rest_names_muscle_and_forces(tmp_path: Path):
 
 
 def test_a_command_that_is_no_table(tmp_path: Path):
-    path = written(tmp_path, (f"[command]\n{FILL}", ""), ('title = "A small one"', "command = [1]"))
-    with pytest.raises(ParameterError, match=r"scenario\.toml: the table \[command\] is \[1\]; it must be a table"):
+    path = written(tmp_path, (f"[input]\n{FILL}", ""), ('title = "A small one"', "input = [1]"))
+    with pytest.raises(ParameterError, match=r"scenario\.toml: the table \[input\] is \[1\]; it must be a table"):
         load_scenario(path)
 
 
 def test_too_many_rows_are_refused_before_they_fill_the_memory(tmp_path: Path):
-    scenario = load_scenario(written(tmp_path, (DURATION, f'{DURATION}\noutput = "1e-12 s"')))
+    scenario = load_scenario(written(tmp_path, (DURATION, f'{DURATION}\noutput_times = "1e-12 s"')))
     with pytest.raises(
         ParameterError, match=r"spacing of output_times of 1e-12 s makes 3e\+11 rows .* 10000000 are allowed"
     ):

@@ -61,12 +61,12 @@ discharge = { model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }
 [plant.mechanism]
 model = "Isometric"
 contraction = 0.05
-[command]
+[input]
 fill = [["0.1 s", 1], ["0.3 s", 0]]
 [run]
 duration = "0.5 s"
-output = "5 ms"
-start = { pressure = "0.5 bar" }
+output_times = "5 ms"
+initial_state = { pressure = "0.5 bar" }
 """
 STUDY = """
 title = "Two valves"
@@ -312,7 +312,9 @@ def test_the_result_does_not_depend_on_the_size_of_a_chunk(folder: Path):
 def test_a_run_is_what_simulate_gives(folder: Path):
     result = run(folder)
     scenario = result.study.scenario(5)
-    alone = simulate(scenario.plant, scenario.command, duration=0.5, initial_state=scenario.start, output_times=0.005)
+    alone = simulate(
+        scenario.plant, scenario.problem.input, duration=0.5, initial_state=scenario.initial_state, output_times=0.005
+    )
     assert result["pressure"][5] == pytest.approx(alone["pressure"][-1], rel=1e-12)
     assert result["course"][5] == pytest.approx(alone["force"][::10], rel=1e-9)
     assert scenario.plant.circuit.fill.conductance == result.study.values[5, 0]
@@ -337,7 +339,9 @@ def test_a_parameter_may_follow_any_varied_parameter(folder: Path):
 
 def test_a_varied_initial_state_is_computed_run_by_run(folder: Path):
     edited(
-        folder, '"mechanism.contraction" =', '"run.start.pressure" = { model = "Uniform", low = 0, high = 1e5 }\n"x" ='
+        folder,
+        '"mechanism.contraction" =',
+        '"run.initial_state.pressure" = { model = "Uniform", low = 0, high = 1e5 }\n"x" =',
     )
     text = (folder / "study.toml").read_text(encoding="utf-8")
     (folder / "study.toml").write_text(re.sub(r'"x" = .*\n', "", text), encoding="utf-8")
@@ -425,10 +429,10 @@ def test_the_fingerprint_depends_on_how_the_initial_state_is_specified(folder: P
         '"mechanism.mass" = [4, 6]',
     )
     at_rest = load_study(folder / "study.toml")
-    place = at_rest.template.scenario.start["position"]
+    place = at_rest.template.scenario.initial_state["position"]
     edited(folder, 'pressure = "0.5 bar"', f'pressure = "0.5 bar", position = {place!r}', "scenario.toml")
     held = load_study(folder / "study.toml")
-    assert held.template.scenario.start == pytest.approx(at_rest.template.scenario.start)
+    assert held.template.scenario.initial_state == pytest.approx(at_rest.template.scenario.initial_state)
     assert held.scenario(0).start != pytest.approx(at_rest.scenario(0).start)
     assert held.fingerprint() != at_rest.fingerprint()
 
@@ -471,7 +475,7 @@ def test_a_dead_worker_is_an_error_that_says_how_to_resume(folder: Path):
 
 
 def test_a_failed_run_is_recorded_with_its_reason_and_stops_no_other(folder: Path):
-    edited(folder, "[design]", '"command.fill[0][1]" = [1, 2]\n[design]')
+    edited(folder, "[design]", '"input.fill[0][1]" = [1, 2]\n[design]')
     result = run(folder)
     opened = result.study.values[:, 2] == 2
     assert 0 < opened.sum() < 22
@@ -507,7 +511,7 @@ def test_an_unexpected_exception_fails_only_its_own_run(folder: Path, monkeypatc
 
 
 def test_a_study_in_which_all_runs_fail_is_an_error(folder: Path):
-    edited(folder, "[design]", '"command.fill[0][1]" = [2]\n[design]')
+    edited(folder, "[design]", '"input.fill[0][1]" = [2]\n[design]')
     done = CliRunner().invoke(
         app, ["sweep", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1"]
     )
@@ -523,16 +527,16 @@ def test_parameters_of_command_and_run_may_vary(folder: Path):
     edited(
         folder,
         "[design]",
-        '"command.fill[1][0]" = { model = "Range", low = "200 ms", high = "0.4 s", count = 3 }\n'
-        '"run.start.pressure" = ["0 bar", "1 bar"]\n"run.duration" = ["0.5 s"]\n[design]',
+        '"input.fill[1][0]" = { model = "Range", low = "200 ms", high = "0.4 s", count = 3 }\n'
+        '"run.initial_state.pressure" = ["0 bar", "1 bar"]\n"run.duration" = ["0.5 s"]\n[design]',
     )
     study = load_study(folder / "study.toml")
     scenario = study.scenario(0)
     closing, pressure, duration = study.values[0, 2:]
-    assert scenario.command.changes["fill"][1][0] == closing
+    assert scenario.problem.input.changes["fill"][1][0] == closing
     assert closing in (0.2, 0.30000000000000004, 0.4)
-    assert scenario.start == pytest.approx(scenario.plant.state_at(pressure=pressure))
-    assert scenario.duration == duration == 0.5
+    assert scenario.initial_state == pytest.approx(scenario.plant.state_at(pressure=pressure))
+    assert scenario.problem.duration == duration == 0.5
 
 
 def test_a_parameter_follows_another(folder: Path):
@@ -545,7 +549,7 @@ def test_the_scenario_may_be_part_of_the_study_file(folder: Path):
     separate = run(folder, "separate")
     inside = (
         SCENARIO.replace("[plant", "[scenario.plant")
-        .replace("[command", "[scenario.command")
+        .replace("[input", "[scenario.problem.input")
         .replace("[run", "[scenario.run")
     )
     edited(folder, 'scenario = "scenario.toml"\n', "")

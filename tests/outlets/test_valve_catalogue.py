@@ -150,7 +150,7 @@ discharge = { library = "ckd-m4ga1-r", path = "exhaust" }
 [plant.mechanism]
 model = "Isometric"
 contraction = 0.0
-[command]
+[input]
 fill = [["0 s", 1]]
 [run]
 duration = "0.2 s"

@@ -20,9 +20,7 @@ from .terminal import echo, print_json, print_table
 
 
 def simulate(
-    scenario: Annotated[
-        Path, typer.Argument(metavar="SCENARIO.toml", help="A file with [plant], [command] and [run].")
-    ],
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="A file with [plant], [input] and [run].")],
     out: Folder = Path("run"),
     json: Json = False,
 ) -> None:
@@ -72,7 +70,7 @@ def _ranges(recording: Recording) -> dict[str, dict[str, float | str]]:
 
 
 def _print(scenario: Scenario, recording: Recording) -> None:
-    echo(f"{scenario.title}: {len(recording)} rows over {scenario.duration:g} s")
+    echo(f"{scenario.title}: {len(recording)} rows over {scenario.problem.duration:g} s")
     rows = [tuple(format_number(value) for value in column.values()) for column in _ranges(recording).values()]
     print_table(("column", "min", "max", "last"), rows, right=("min", "max", "last"))
     for note in recording.notes:

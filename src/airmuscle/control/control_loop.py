@@ -44,7 +44,7 @@ class ControlLoopState(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class ControlLoop:
-    """A sampled control loop: every `period` [s], from the start of a run on, the controller measures and commands.
+    """A sampled control loop: every `sample_time` [s], from the start of a run on, the controller measures and commands.
 
     setpoint      an InputSignal whose names are the controller's set points,
                   `Schedule({"pressure": ((0, 1e5), (2, 3e5))})`
@@ -55,7 +55,7 @@ class ControlLoop:
     """
 
     controller: Controller
-    period: float
+    sample_time: float
     setpoint: InputSignal
     other_inputs: InputSignal = ZERO_INPUT
     drivers: Mapping[str, Driver | tuple[Driver, ...]] = dataclasses.field(default_factory=dict)
@@ -63,9 +63,9 @@ class ControlLoop:
     def __post_init__(self) -> None:
         if not isinstance(self.controller, Controller):
             raise ParameterError(f"ControlLoop.controller is {self.controller!r}; give a PID or another Controller.")
-        period = self.period
-        if isinstance(period, bool) or not isinstance(period, float | int) or not 0 < period < math.inf:
-            raise ParameterError(f"ControlLoop.period is {period!r} s; it must be positive and finite.")
+        sample_time = self.sample_time
+        if isinstance(sample_time, bool) or not isinstance(sample_time, float | int) or not 0 < sample_time < math.inf:
+            raise ParameterError(f"ControlLoop.sample_time is {sample_time!r} s; it must be positive and finite.")
         check_input_signal(self.setpoint)
         check_input_signal(self.other_inputs)
         self._check_names()
@@ -102,11 +102,11 @@ class ControlLoop:
         check_present(self.controller, columns, inputs)
         check_input_names((*(self.other_inputs.names or ()), *self.drivers), inputs)
 
-    def check_period(self, duration: float) -> None:
+    def check_sample_time(self, duration: float) -> None:
         """Raise ParameterError where a run of `duration` [s] ends before the second sample."""
-        if self.period > duration:
+        if self.sample_time > duration:
             raise ParameterError(
-                f"the sample time of the controller is {self.period:g} s, longer than the run of {duration:g} s. "
+                f"the sample time of the controller is {self.sample_time:g} s, longer than the run of {duration:g} s. "
                 "Shorten the sample time, or simulate longer."
             )
 
@@ -127,7 +127,7 @@ class ControlLoop:
             for names in (self.controller.measured_columns, self.controller.inputs)
         )
         return (
-            f"{_describe_controller(self.controller)}, sample time {_milliseconds(self.period)}, measured {measured}, "
+            f"{_describe_controller(self.controller)}, sample time {_milliseconds(self.sample_time)}, measured {measured}, "
             f"commanded {commanded}"
         )
 

@@ -38,13 +38,15 @@ def part_toml(name: str, thing: Any) -> str:
     return _to_text({name: _model_table(thing)})
 
 
-def scenario_toml(title: str, plant: Any, command: Mapping[str, Any], run: Mapping[str, Any], note: str = "") -> str:
+def scenario_toml(
+    title: str, plant: Any, input_table: Mapping[str, Any], run: Mapping[str, Any], note: str = ""
+) -> str:
     """Text of a scenario that `load_scenario` reads: a plant with all parameters, the command and run tables.
 
     Each line of `note` becomes a comment at the beginning.
     """
     comments = "".join(f"# {line}\n" for line in note.splitlines())
-    return comments + _to_text({"title": title, "plant": _model_table(plant), "command": command, "run": run})
+    return comments + _to_text({"title": title, "plant": _model_table(plant), "input": input_table, "run": run})
 
 
 def save(entry: Entry, path: str | Path) -> Path:

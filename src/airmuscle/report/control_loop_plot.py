@@ -21,9 +21,9 @@ from .parameters import parameter_table
 def loop_plot(scenario: Scenario, loop: ControlLoop, recording: Recording) -> Plot:
     """Return the plot of the set points, with their steps, and of the controlled variables."""
     names = list(dict.fromkeys((*loop.controller.setpoints, *loop.controller.measured_columns)))
-    units = run_column_units(scenario.plant, scenario.start, loop)
-    start, time = scenario.start_time, recording["time"]
-    end = float(time[-1]) if time[-1] > start else start + scenario.duration
+    units = run_column_units(scenario.problem)
+    start, time = scenario.problem.start_time, recording["time"]
+    end = float(time[-1]) if time[-1] > start else start + scenario.problem.duration
     setpoints = loop.setpoint.segments(loop.controller.setpoints, start, end - start)
     figure, axes = new_figure(len(names), 1, height=0.9 + 1.9 * len(names), sharex=True, squeeze=False)
     for name, axis in zip(names, axes[:, 0], strict=True):
@@ -38,7 +38,7 @@ def loop_plot(scenario: Scenario, loop: ControlLoop, recording: Recording) -> Pl
     axes[-1, 0].set_xlabel("time [s]")
     figure.align_ylabels()
     legend_below(figure, axes[0, 0])
-    return Plot("loop", f"Set points and measurements; sample time of the controller {loop.period:g} s.", figure)
+    return Plot("loop", f"Set points and measurements; sample time of the controller {loop.sample_time:g} s.", figure)
 
 
 def segment_vertices(segments: PiecewiseLinear, start: float, i: int) -> tuple[Any, Any]:
@@ -51,7 +51,7 @@ def segment_vertices(segments: PiecewiseLinear, start: float, i: int) -> tuple[A
 
 def controller_table(scenario: Scenario, loop: ControlLoop) -> Table:
     """Return the parameters of a controller, in the units that follow from its measurement and manipulated input."""
-    units = run_column_units(scenario.plant, scenario.start, loop)
+    units = run_column_units(scenario.problem)
     y, u = (units.get(names[0]) or "1" for names in (loop.controller.measured_columns, loop.controller.inputs))
     table = parameter_table(
         loop.controller, "controller", f"Parameters of the controller, {type(loop.controller).__name__}"

@@ -29,7 +29,7 @@ MAX_LISTED_CHANGES = 6
 def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
     """Return the chapter of a run, complete or up to its early end."""
     notes = "\n\n".join(_sentence(note) for note in recording.notes)
-    loop = scenario.command if isinstance(scenario.command, ControlLoop) else None
+    loop = scenario.problem.input if isinstance(scenario.problem.input, ControlLoop) else None
     plots = [loop_plot(scenario, loop, recording)] if loop else []
     plots.append(Plot("run", f"{scenario.title}: simulated time series.", recording.plot(*_plotted_columns(recording))))
     if scenario.plant.inputs:
@@ -53,10 +53,10 @@ def _sentence(note: str) -> str:
 
 
 def _describe_duration(scenario: Scenario, recording: Recording) -> str:
-    reached, end = float(recording["time"][-1]), scenario.start_time + scenario.duration
+    reached, end = float(recording["time"][-1]), scenario.problem.start_time + scenario.problem.duration
     if reached < end:
-        return f"Simulation of {scenario.duration:g} s, ended early at {reached:.4g} s; the last note gives the reason."
-    return f"Simulation of {scenario.duration:g} s."
+        return f"Simulation of {scenario.problem.duration:g} s, ended early at {reached:.4g} s; the last note gives the reason."
+    return f"Simulation of {scenario.problem.duration:g} s."
 
 
 def _plotted_columns(recording: Recording) -> list[str]:
@@ -66,12 +66,12 @@ def _plotted_columns(recording: Recording) -> list[str]:
 
 def _input_plot(scenario: Scenario, recording: Recording) -> Plot:
     """Return the plot of the inputs that act on the plant, with their steps, and of the commands of drivers."""
-    command, inputs = scenario.command, scenario.plant.inputs
+    command, inputs = scenario.problem.input, scenario.plant.inputs
     if isinstance(command, ControlLoop):
         command = command.as_open_loop(recording)
     units = {item.name: "" if item.unit == "1" else f"\n[{item.unit}]" for item in scenario.plant.input_variables}
-    start, reached = scenario.start_time, float(recording["time"][-1])
-    end = reached if reached > start else start + scenario.duration
+    start, reached = scenario.problem.start_time, float(recording["time"][-1])
+    end = reached if reached > start else start + scenario.problem.duration
     applied = command.segments(inputs, start, end - start)
     shortened = applied.ends.size > (MAX_DRIVER_SEGMENTS if isinstance(command, WithDrivers) else MAX_SEGMENTS)
     if shortened:
@@ -97,11 +97,11 @@ def _input_plot(scenario: Scenario, recording: Recording) -> Plot:
 
 
 def _settings(scenario: Scenario) -> tuple[tuple[str, str, str], ...]:
-    start = ", ".join(f"{name} {typographic(format_number(value))}" for name, value in scenario.start.items())
+    start = ", ".join(f"{name} {typographic(format_number(value))}" for name, value in scenario.initial_state.items())
     return (
-        ("integrator", str(scenario.method), "scenario"),
+        ("integrator", str(scenario.problem.integrator), "scenario"),
         ("initial state (SI)", start, "scenario"),
-        ("inputs", describe_input(scenario.command), "scenario"),
+        ("inputs", describe_input(scenario.problem.input), "scenario"),
     )
 
 
@@ -112,7 +112,7 @@ def describe_input(command: InputSignal | ControlLoop) -> str:
         name, inputs = type(controller).__name__, ", ".join(controller.inputs)
         others = WithDrivers(command.other_inputs, command.drivers) if command.drivers else command.other_inputs
         return (
-            f"{name}, sample time {command.period:g} s, manipulated inputs {inputs}; set point: "
+            f"{name}, sample time {command.sample_time:g} s, manipulated inputs {inputs}; set point: "
             f"{describe_input(command.setpoint)}; other inputs: {describe_input(others)}"
         )
     if isinstance(command, WithDrivers):

@@ -1,17 +1,17 @@
-"""Table [command.controller] of a scenario: controller, sample time and set point of a closed loop.
+"""Table [input.controller] of a scenario: controller, sample time and set point of a closed loop.
 
-[command]
+[input]
 hold = [["0 s", 1]]                         inputs that the controller does not command, as in an open loop
-[command.controller]
+[input.controller]
 model = "PID"                               a controller and its parameters, in any unit that fits its signals
 measured = "pressure"                       controlled variable: a state or output of the plant
 commanded = "fill"                          an input; or { model = "SplitRange", positive = "fill", negative = "vent" }
 gain = "0.4 1/bar"
 integral_time = "300 ms"
-period = "5 ms"                             sample time
-[command.controller.setpoint]               input signal of the set point: rows, model, file, columns, period
+sample_time = "5 ms"
+[input.controller.setpoint]               input signal of the set point: rows, model, file, columns, period
 pressure = [["0 s", "1 bar"], ["2 s", "3 bar"]]
-[command.drivers]                           as in an open loop
+[input.drivers]                           as in an open loop
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from ..plant.plant import Plant
 from ..plant.units import column_units
 from .inputs import build_drivers, build_input_signal
 
-LOOP_KEYS = ("period", "setpoint")
+LOOP_KEYS = ("sample_time", "setpoint")
 """Keys of the table that are not parameters of the controller."""
 
 
@@ -47,28 +47,28 @@ def signal_units(plant: Plant, start: Mapping[str, float]) -> dict[str, str]:
 def build_control_loop(
     table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], location: Location
 ) -> ControlLoop:
-    """The control loop of a table [command] with a controller; `units` are those of `signal_units`.
+    """The control loop of a table [input] with a controller; `units` are those of `signal_units`.
 
     Raises ParameterError, UnitError, UnknownNameError, FileError or ColumnError with the location.
     """
     inner, controller_table = location.inside("controller"), table["controller"]
     if not isinstance(controller_table, Mapping):
         raise ParameterError(
-            f'{inner} is {controller_table!r}; it must be a table. Write model = "PID", its parameters, period and '
-            "setpoint in it."
+            f'{inner} is {controller_table!r}; it must be a table. Write model = "PID", its parameters, '
+            "sample_time and setpoint in it."
         )
     parameter_table = {key: value for key, value in controller_table.items() if key not in LOOP_KEYS}
     controller = _build_controller(parameter_table, plant.inputs, units, inner)
-    for key, example in (("period", 'period = "10 ms"'), ("setpoint", f"[{inner.table}.setpoint]")):
+    for key, example in (("sample_time", 'sample_time = "10 ms"'), ("setpoint", f"[{inner.table}.setpoint]")):
         if key not in controller_table:
             raise ParameterError(f"{inner}: '{key}' is missing; write {example}.")
     other_inputs = {key: value for key, value in table.items() if key not in ("controller", "drivers")}
-    period = read_finite_number(controller_table["period"], "s", f"{inner}, period")
+    sample_time = read_finite_number(controller_table["sample_time"], "s", f"{inner}, sample_time")
     setpoint = _build_setpoint(controller_table["setpoint"], controller, units, inner.inside("setpoint"))
     other_signal = build_input_signal(other_inputs, plant.input_variables, location)
     drivers = build_drivers(table.get("drivers", {}), plant.inputs, location.inside("drivers"))
     with located_errors(inner):
-        loop = ControlLoop(controller, period, setpoint, other_signal, drivers)
+        loop = ControlLoop(controller, sample_time, setpoint, other_signal, drivers)
         loop.check_columns([name for name in units if name not in plant.inputs], plant.inputs)
     return loop
 
@@ -110,9 +110,7 @@ def _build_setpoint(table: Any, controller: Controller, units: Mapping[str, str]
     if not isinstance(table, Mapping):
         raise ParameterError(f'{location} is {table!r}; it must be a table. Write {names[0]} = [["0 s", ...]] in it.')
     if "drivers" in table:
-        raise ParameterError(
-            f"{location}: a set point has no drivers; write [command.drivers] for those of the inputs."
-        )
+        raise ParameterError(f"{location}: a set point has no drivers; write [input.drivers] for those of the inputs.")
     setpoints = [Input(name, units.get(name) or "1", -math.inf, math.inf) for name in names]
     return build_input_signal(table, setpoints, location, "the controller has no set point")
 
@@ -120,10 +118,10 @@ def _build_setpoint(table: Any, controller: Controller, units: Mapping[str, str]
 def controller_number_paths(
     table: Mapping[str, Any], loop: ControlLoop, units: Mapping[str, str]
 ) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    """Key paths of all numbers that the table [command.controller] may contain, with their units, for studies."""
+    """Key paths of all numbers that the table [input.controller] may contain, with their units, for studies."""
     for p in parameters(loop.controller):
         yield (p.name,), _unit(p, loop.controller, units)
-    yield ("period",), "s"
+    yield ("sample_time",), "s"
     for name, rows in table["setpoint"].items():
         for i in range(len(rows)) if isinstance(rows, list) else ():
             yield ("setpoint", name, i, 0), "s"

@@ -1,7 +1,7 @@
 """Dynamic fit as a TOML file: plant, records, and unknown parameters.
 
 [plant]                                     as in a scenario, with the initial values of the search
-[command]                                   as in a scenario; for each record without a command of its own
+[input]                                     as in a scenario; for each record without an input of its own
 fill = [["0.1 s", 1], ["1 s", 0]]
 [observed]                                  measured outputs, each with the standard deviation of its sensor
 pressure = "500 Pa"
@@ -12,19 +12,19 @@ free = ["muscle.damper.damping", ["circuit.fill.conductance", "circuit.discharge
                                             unknowns shared by all records; a nested list has one common value
 own = ["circuit.supply.pressure"]           optional: unknowns that are estimated for each record
 start_time = "50 ms"                        optional: the start time of each run is unknown within ±50 ms
-start = { pressure = "3 kPa" }              optional: initial values are unknown within these limits
+initial_state = { pressure = "3 kPa" }      optional: initial values are unknown within these limits
 starts = 8                                  optional, with seed: number of starting points of the search
-method = { model = "Rodas4", rtol = 1e-8 }  optional
+integrator = { model = "Rodas4", rtol = 1e-8 }  optional
 [fit.bounds]                                optional, by the first path; otherwise the declared bounds
 "gas.exponent" = [1.01, 1.4]
 [[record]]
 file = "fill1.csv"                          relative to this file
-start = { pressure = "0 bar" }              optional: equilibrium at this pressure, or a state with position = "10 mm";
+initial_state = { pressure = "0 bar" }      optional: equilibrium at this pressure, or a state with position = "10 mm";
                                             by default equilibrium at the pressure of the first rows
-start_time = "0.2 s"                        optional: time of the record at which the command begins
+start_time = "0.2 s"                        optional: time of the record at which the input begins
 first = "0 s"                               optional, and last: the time interval of the record that is used
 mapping = "rig.toml"                        optional, and resting_length: information that the file lacks
-[record.command]                            optional: command of this record
+[record.input]                              optional: input of this record
 [record.plant.mechanism]                    optional: parts of the plant that differ in this record
 """
 
@@ -48,8 +48,8 @@ from ..simulation import Integrator
 from .record import Record, optional_table, signal_unit
 from .scenario import build_plant
 
-_TABLES = ("title", "plant", "command", "observed", "fit", "record")
-_FIT = ("free", "own", "start_time", "start", "starts", "seed", "method", "bounds")
+_TABLES = ("title", "plant", "input", "observed", "fit", "record")
+_FIT = ("free", "own", "start_time", "initial_state", "starts", "seed", "integrator", "bounds")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -59,8 +59,8 @@ class DynamicFitSetup:
     title: str
     plant: Plant
     experiments: tuple[Experiment, ...]
-    commands: tuple[Mapping[str, Any], ...]
-    """The table [command] of each record as written in its file, for the scenarios of the result."""
+    input_tables: tuple[Mapping[str, Any], ...]
+    """The table [input] of each record as written in its file, for the scenarios of the result."""
     observed: Mapping[str, float]
     free: tuple[ParameterPaths, ...]
     own: tuple[RecordUnknown, ...] = ()
@@ -77,7 +77,7 @@ class DynamicFitSetup:
         )  # fmt: skip
 
     def scenario(self, fit: DynamicFit, record: int = 0) -> str:
-        """Text of a scenario with the fitted plant, the command, the initial state and the duration of a record."""
+        """Text of a scenario with the fitted plant, the input, the initial state and the duration of a record."""
         plant, origin = fit.plant(record), self.experiments[record].recording.origin
         note = f"{self.title}: parameters estimated from {', '.join(e.recording.origin for e in self.experiments)}."
         assert isinstance(plant, Plant)
@@ -91,8 +91,8 @@ class DynamicFitSetup:
         given = {name for c in coordinates for name in (c.name, c.speed) if c.name in known}
         start = {name: value for name, value in known.items() if name == "pressure" or name in given}
         duration = float(record_model.times[-1]) - record_model.start_time(fit.values)
-        run = {"duration": duration, "start": start}
-        return scenario_toml(f"{self.title}, {origin}", plant, self.commands[record], run, note)
+        run = {"duration": duration, "initial_state": start}
+        return scenario_toml(f"{self.title}, {origin}", plant, self.input_tables[record], run, note)
 
 
 def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
@@ -119,7 +119,7 @@ def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
         title=read_text(tables, "title", location, needed=False) or file.stem,
         plant=plant,
         experiments=tuple(experiment for experiment, _ in records),
-        commands=tuple(command for _, command in records),
+        input_tables=tuple(table for _, table in records),
         observed={name: deviation for name, (deviation, _) in observed.items()},
         free=tuple(_read_shared(item, f"{in_fit}, free") for item in _read_list(fit, "free", in_fit)),
         own=_read_own(fit, plant, in_fit),
@@ -153,10 +153,10 @@ def _read_integer(table: Mapping[str, Any], key: str, minimum: int, location: Lo
 
 
 def _build_method(table: Mapping[str, Any], location: Location) -> Integrator | None:
-    value = table.get("method")
+    value = table.get("integrator")
     if value is None:
         return None
-    inner = location.inside("method")
+    inner = location.inside("integrator")
     model_table = {"model": value} if isinstance(value, str) else value
     method: Integrator = check_type(build(model_table, inner), Integrator, inner)
     return method
@@ -195,7 +195,7 @@ def _read_own(table: Mapping[str, Any], plant: Plant, location: Location) -> tup
     own: list[RecordUnknown] = [_read_shared(item, f"{location}, own") for item in _read_list(table, "own", location)]
     if "start_time" in table:
         own.append(StartTime(_read_positive(table["start_time"], "s", f"{location}, start_time")))
-    for name, margin in optional_table(table, "start", location).items():
+    for name, margin in optional_table(table, "initial_state", location).items():
         unit = signal_unit(name, plant) or "1"
         own.append(InitialValue(name, _read_positive(margin, unit, f"{location}, start, {name}")))
     return tuple(own)

@@ -1,12 +1,12 @@
-"""Table [command] of a scenario: input signals from the file or from a recording, and drivers.
+"""Table [input] of a scenario: input signals from the file or from a recording, and drivers.
 
-[command]
+[input]
 fill = [["5 s", 1], ["15 s", 0]]            an input: instants, and the value from each instant on
 model = "SampledSignal"                     optional: linear interpolation between the points; Schedule by default
 period = "2 s"                              optional: the first 2 s are repeated
 file = "bench.csv"                          optional: columns of a data file; then SampledSignal is the default
 columns = { fill = "valve [%]" }            optional: the column of each input, by default the one of the same name
-[command.drivers]
+[input.drivers]
 fill = { model = "SolenoidDriver", opening_delay = "5 ms" }     optional: one driver, or a list in signal order
 """
 
@@ -114,7 +114,7 @@ def _read_file_points(table: Mapping[str, Any], units: Mapping[str, str], locati
 
 
 def build_drivers(table: Any, inputs: Sequence[str], location: Location) -> dict[str, Driver | tuple[Driver, ...]]:
-    """The drivers of a table [command.drivers] by input. Raises ParameterError, UnitError or UnknownNameError."""
+    """The drivers of a table [input.drivers] by input. Raises ParameterError, UnitError or UnknownNameError."""
     if not isinstance(table, Mapping):
         raise ParameterError(
             f'{location} is {table!r}; it must be a table. Write fill = {{ model = "SolenoidDriver" }} in '

@@ -21,7 +21,7 @@ from .scenario import build_plant
 
 FIRST_ROWS = 3
 """Number of first rows whose median is the default initial pressure (chosen)."""
-_KEYS = ("file", "start", "start_time", "first", "last", "mapping", "resting_length", "command", "plant")
+_KEYS = ("file", "initial_state", "start_time", "first", "last", "mapping", "resting_length", "input", "plant")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Record:
     shared: Plant
 
     def build_experiment(self, observed: Mapping[str, tuple[float, str]]) -> tuple[Experiment, Mapping[str, Any]]:
-        """The record as an experiment, and its table [command]; `observed` has the column of each output.
+        """The record as an experiment, and its table [input]; `observed` has the column of each output.
 
         Raises FileError, ParameterError, UnitError, UnknownNameError or ColumnError with the location.
         """
@@ -42,16 +42,16 @@ class Record:
             raise ParameterError(f"{self.location} is {self.row!r}; write [[record]] and its keys under it.")
         check_keys(self.row, _KEYS, self.location)
         plant = self._build_plant()
-        table = dict(optional_table({**self.tables, **self.row}, "command", self.location))
+        table = dict(optional_table({**self.tables, **self.row}, "input", self.location))
         if "file" in table:  # absolute, because the table is also written to other folders
             table["file"] = str((self.location.folder / str(table["file"])).resolve())
-        recording, in_command = self._read_recording(observed), self.location.inside("command")
+        recording, in_input = self._read_recording(observed), self.location.inside("input")
         start_time = read_finite_number(self.row.get("start_time", 0.0), "s", f"{self.location}, start_time")
-        command = build_input_signal(table, plant.input_variables, in_command)
-        with located_errors(in_command):
+        signal = build_input_signal(table, plant.input_variables, in_input)
+        with located_errors(in_input):
             duration = max(float(recording["time"][-1]) - start_time, 1e-9)
-            check_input_range(compile_system(plant), command.segments(plant.inputs, 0.0, duration), 0.0)
-        return Experiment(recording, command, self._initial_conditions(plant, recording), start_time, plant), table
+            check_input_range(compile_system(plant), signal.segments(plant.inputs, 0.0, duration), 0.0)
+        return Experiment(recording, signal, self._initial_conditions(plant, recording), start_time, plant), table
 
     def _build_plant(self) -> Plant:
         """The shared plant, with the parts that this record replaces."""
@@ -89,8 +89,8 @@ class Record:
 
     def _initial_conditions(self, plant: Plant, recording: Recording) -> InitialConditions:
         """Equilibrium at a pressure, or the given state."""
-        inner = self.location.inside("start")
-        table = dict(optional_table(self.row, "start", self.location))
+        inner = self.location.inside("initial_state")
+        table = dict(optional_table(self.row, "initial_state", self.location))
         values = {
             name: read_finite_number(value, signal_unit(name, plant) or "1", f"{inner}, {name}")
             for name, value in table.items()

@@ -1,4 +1,4 @@
-"""Scenario: a simulation as a TOML file with the tables [plant], [command], [run] and [output].
+"""Scenario: a simulation as a TOML file with the tables [plant], [input], [run] and [output].
 
     [plant]
     muscle = "dmsp-20-300"                      a library name or a muscle file; or a table [plant.muscle] with
@@ -6,13 +6,13 @@
     gas = "Isothermal"                          optional; polytropic by default
     [plant.circuit]                             model = "FillDischarge" with supply, fill and discharge
     [plant.mechanism]                           model = "HangingMass", mass = "5 kg"
-    [command]                                   see inputs.py; with a controller, controller.py
+    [input]                                     see inputs.py; with a controller, controller.py
     fill = [["5 s", 1], ["15 s", 0]]            each input of the plant: instants, and the value from each instant on
     [run]
     duration = "25 s"
-    output = "10 ms"                            optional
-    start = { pressure = "0 bar" }              optional: equilibrium at this pressure; or a state, position = "10 mm"
-    method = { model = "Rodas4", rtol = 1e-8 }  optional
+    output_times = "10 ms"                      optional
+    initial_state = { pressure = "0 bar" }      optional: equilibrium at this pressure; or a state, position = "10 mm"
+    integrator = { model = "Rodas4", rtol = 1e-8 }  optional
     [output]
     columns = ["pressure", "force"]             optional: columns of the recording besides time; all by default
 
@@ -29,10 +29,8 @@ from typing import Any
 
 from ..analysis.equilibrium import find_equilibrium
 from ..characteristic.base import ForceLaw
-from ..compile.program import compile_system
 from ..control.control_loop import ControlLoop
 from ..control.inputs import InputSignal
-from ..control.with_drivers import WithDrivers
 from ..core.errors import ParameterError, suggestion
 from ..library.build import build
 from ..library.catalogue import load_law
@@ -42,45 +40,41 @@ from ..library.location import Location, check_keys, check_type, located_errors,
 from ..muscle import Muscle
 from ..plant.plant import Plant
 from ..recording import Recording
-from ..simulation import Integrator, Rodas4, simulate
-from ..simulation.problem import check_input_range
+from ..simulation import Integrator, Problem, solve
 from .controller import build_control_loop, signal_units
 from .inputs import build_input_signal
 
-TABLES = ("title", "plant", "command", "run", "output")
-RUN = ("duration", "start_time", "output", "start", "method")
+TABLES = ("title", "plant", "input", "run", "output")
+RUN = ("duration", "start_time", "output_times", "initial_state", "integrator")
 OUTPUT = ("columns",)
-DEFAULT_START: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
+DEFAULT_INITIAL_STATE: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
 """Default initial state of a run: equilibrium at ambient pressure."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Scenario:
-    """Plant, input signal or control loop, and settings of a simulation; all numbers SI."""
+    """A simulation problem with a title and the columns to write; all numbers SI."""
 
     title: str
-    plant: Plant
-    command: InputSignal | ControlLoop
-    duration: float
-    start: dict[str, float]
-    start_time: float = 0.0
-    output: float | None = None
-    method: Integrator = dataclasses.field(default_factory=Rodas4)
+    problem: Problem
     columns: tuple[str, ...] = ()
     """Columns of the recording besides time; all if empty."""
 
+    @property
+    def plant(self) -> Plant:
+        """The plant of the problem."""
+        assert isinstance(self.problem.system, Plant)
+        return self.problem.system
+
+    @property
+    def initial_state(self) -> Mapping[str, float]:
+        """The initial state by name."""
+        return self.problem.initial_state or {}
+
     def simulate(self, *, complete: bool = True) -> Recording:
         """The simulated run as a Recording; see `airmuscle.simulate`."""
-        return simulate(
-            self.plant,
-            self.command,
-            duration=self.duration,
-            initial_state=self.start,
-            start_time=self.start_time,
-            integrator=self.method,
-            output_times=self.output,
-            complete=complete,
-        )
+        solution = solve(self.problem)
+        return (solution.raise_if_incomplete() if complete else solution).recording
 
     def select_columns(self, recording: Recording) -> Recording:
         """The recording with time and the columns of the scenario."""
@@ -114,26 +108,23 @@ def build_scenario(
     if "duration" not in run:
         raise ParameterError(f"{in_run}: 'duration' is missing; write it as duration = \"25 s\".")
     duration = _read_duration(run, "duration", in_run)
+    initial_state = _build_initial_state(
+        run.get("initial_state", DEFAULT_INITIAL_STATE), plant, in_run.inside("initial_state"), equilibrium
+    )
+    in_input, input_table = location.inside("input"), _check_table(tables.get("input", {}), "input", location)
+    integrator = (
+        _build_model(run["integrator"], Integrator, in_run.inside("integrator")) if "integrator" in run else None
+    )
     start_time = read_finite_number(run.get("start_time", 0.0), "s", f"{in_run}, start_time")
-    command_table = _check_table(tables.get("command", {}), "command", location)
-    start = _build_start(run.get("start", DEFAULT_START), plant, in_run.inside("start"), equilibrium)
-    in_command = location.inside("command")
-    command = _build_command(command_table, plant, start, duration, in_command)
-    signal = WithDrivers(command.other_inputs, command.drivers) if isinstance(command, ControlLoop) else command
-    with located_errors(in_command):
-        check_input_range(compile_system(plant), signal.segments(plant.inputs, start_time, duration), start_time)
-    known = list(run_column_units(plant, start, command))
+    output_times = _read_duration(run, "output_times", in_run) if "output_times" in run else None
+    signal = _build_input(input_table, plant, initial_state, in_input)
+    with located_errors(in_input):
+        problem = Problem(plant, signal, duration, initial_state, start_time, output_times, integrator)
     output_table = _check_table(tables.get("output", {}), "output", location)
     return Scenario(
         title=read_text(tables, "title", location, needed=False) or Path(location.file).stem,
-        plant=plant,
-        command=command,
-        duration=duration,
-        start=start,
-        start_time=start_time,
-        output=_read_duration(run, "output", in_run) if "output" in run else None,
-        method=_build_model(run["method"], Integrator, in_run.inside("method")) if "method" in run else Rodas4(),
-        columns=_read_columns(output_table, known, location.inside("output")),
+        problem=problem,
+        columns=_read_columns(output_table, list(run_column_units(problem)), location.inside("output")),
     )
 
 
@@ -144,21 +135,19 @@ def _check_table(value: Any, key: str, location: Location) -> Mapping[str, Any]:
     return value
 
 
-def _build_command(
-    table: Mapping[str, Any], plant: Plant, start: Mapping[str, float], duration: float, location: Location
+def _build_input(
+    table: Mapping[str, Any], plant: Plant, initial_state: Mapping[str, float], location: Location
 ) -> InputSignal | ControlLoop:
     if "controller" not in table:
         return build_input_signal(table, plant.input_variables, location)
-    loop = build_control_loop(table, plant, signal_units(plant, start), location)
-    with located_errors(location.inside("controller")):
-        loop.check_period(duration)
-    return loop
+    return build_control_loop(table, plant, signal_units(plant, initial_state), location)
 
 
-def run_column_units(plant: Plant, start: Mapping[str, float], command: InputSignal | ControlLoop) -> dict[str, str]:
-    """Units of all columns of a run; '' if unknown."""
-    units = {"time": "s"} | signal_units(plant, start)
-    return units | (command.units(units) if isinstance(command, ControlLoop) else {})
+def run_column_units(problem: Problem) -> dict[str, str]:
+    """Units of all columns of a run of a plant; '' if unknown."""
+    assert isinstance(problem.system, Plant)
+    units = {"time": "s"} | signal_units(problem.system, problem.initial_state or {})
+    return units | (problem.input.units(units) if isinstance(problem.input, ControlLoop) else {})
 
 
 def _read_duration(table: Mapping[str, Any], key: str, location: Location) -> float:
@@ -224,17 +213,21 @@ def _entry_parts(entry: Entry, replaced: Mapping[str, Any], location: Location) 
 
 def initial_pressure(tables: Mapping[str, Any], location: Location) -> float | None:
     """Gauge pressure [Pa] of the initial equilibrium of a run; None if the run starts from another state."""
-    start = tables["run"].get("start", DEFAULT_START)
+    start = tables["run"].get("initial_state", DEFAULT_INITIAL_STATE)
     if not isinstance(start, Mapping) or set(start) - {"pressure"}:
         return None
-    return read_finite_number(start.get("pressure", 0.0), "Pa", f"{location.inside('run').inside('start')}, pressure")
+    return read_finite_number(
+        start.get("pressure", 0.0), "Pa", f"{location.inside('run').inside('initial_state')}, pressure"
+    )
 
 
-def _build_start(
+def _build_initial_state(
     table: Any, plant: Plant, location: Location, equilibrium: dict[str, float] | None
 ) -> dict[str, float]:
     if not isinstance(table, Mapping):
-        raise ParameterError(f'{location} is {table!r}; it must be a table. Write start = {{ pressure = "0 bar" }}.')
+        raise ParameterError(
+            f'{location} is {table!r}; it must be a table. Write initial_state = {{ pressure = "0 bar" }}.'
+        )
     coordinates = {
         name: unit for c in plant.mechanism.coordinates for name, unit in ((c.name, c.unit), (c.speed, f"{c.unit}/s"))
     }

@@ -44,7 +44,7 @@ def scenario_schema() -> Schema:
     tables = {
         "title": _TEXT,
         "plant": _plant(models),
-        "command": _command(models),
+        "input": _input(models),
         "run": _run(models),
         "output": _table({"columns": {"type": "array", "items": _TEXT}}),
     }
@@ -182,7 +182,7 @@ def _plant(models: _ModelSchemas) -> Schema:
     return plant
 
 
-def _command(models: _ModelSchemas) -> Schema:
+def _input(models: _ModelSchemas) -> Schema:
     point = {"type": "array", "prefixItems": [_quantity("s"), _quantity("")], "minItems": 2, "maxItems": 2}
     rows = {"description": "instants [s] and values", "type": "array", "items": point}
     driver = models.kind(Driver)
@@ -203,7 +203,7 @@ def _command(models: _ModelSchemas) -> Schema:
 
 def _controller(models: _ModelSchemas, setpoint: Schema) -> Schema:
     """A controller with its parameters, sample time and set point."""
-    keys = {"period": _quantity("s", low=0.0), "setpoint": setpoint}
+    keys = {"sample_time": _quantity("s", low=0.0), "setpoint": setpoint}
     tables = []
     for name in model_names():
         cls = model_class(name, "schema")
@@ -218,8 +218,8 @@ def _run(models: _ModelSchemas) -> Schema:
     keys = {
         "duration": _quantity("s", low=0.0),
         "start_time": _quantity("s"),
-        "output": _quantity("s", low=0.0),
-        "start": {"type": "object", "additionalProperties": _quantity("m")},
-        "method": models.kind(Integrator),
+        "output_times": _quantity("s", low=0.0),
+        "initial_state": {"type": "object", "additionalProperties": _quantity("m")},
+        "integrator": models.kind(Integrator),
     }
     return _table(_select_keys(keys, scenario.RUN), ("duration",))

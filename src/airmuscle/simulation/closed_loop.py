@@ -95,7 +95,7 @@ class _Run:
         if not all(map(math.isfinite, measured)):
             return state, Status.NOT_FINITE
         measurement = Measurement(columns, dict(zip(controller.setpoints, setpoints, strict=True)), prepared.ranges)
-        commands, memory = controller.step(state.controller, measurement, loop.period)
+        commands, memory = controller.step(state.controller, measurement, loop.sample_time)
         try:
             commanded = tuple(
                 [min(max(0.0 + commands[name], low), high) for name, (low, high) in prepared.ranges.items()]
@@ -129,7 +129,7 @@ class _Run:
             ends, values, slopes = merge_columns(columns, begin)
             state = state._replace(drivers=drivers)
             if len(ends) > 1:
-                times = merge_output_times(times, np.array(ends), prepared.loop.period)
+                times = merge_output_times(times, np.array(ends), prepared.loop.sample_time)
         else:
             ends, values, slopes = inputs.ends[first:last], inputs.values[first:last], inputs.slopes[first:last]
         self._append(ends, values, slopes, times, last - first if not self.chains else len(ends))

@@ -14,6 +14,7 @@ from ..compile.program import CompiledSystem, compile_system
 from ..control.control_loop import ControlLoop, ControlLoopState
 from ..control.inputs import InputSignal, check_input_signal
 from ..control.piecewise_linear import PiecewiseLinear
+from ..control.with_drivers import WithDrivers
 from ..core.arrays import Array
 from ..core.declaration import as_float
 from ..core.errors import ParameterError
@@ -62,7 +63,8 @@ class Problem:
             known = self.compiled.description
             self.input.check_columns((*known.state_names, *known.output_names), known.input_names)
             if self.control_state is None:
-                self.input.check_period(self.duration)
+                self.input.check_sample_time(self.duration)
+            check_input_range(self.compiled, self._other_segments(self.input), self.start_time)
         else:
             check_input_signal(self.input)
             check_input_range(self.compiled, self.segments, self.start_time)
@@ -76,6 +78,13 @@ class Problem:
             raise ParameterError(
                 f"simulate: start_time is {self.start_time!r} s; a duration of {self.duration!r} s is lost in rounding."
             )
+
+    def _other_segments(self, loop: ControlLoop) -> PiecewiseLinear:
+        """The signal of the inputs of a control loop that its controller does not command."""
+        inputs = self.compiled.description.input_names
+        segments = WithDrivers(loop.other_inputs, loop.drivers).segments(inputs, self.start_time, self.duration)
+        segments.check_shape(len(inputs), self.start_time)
+        return segments
 
     @property
     def end_time(self) -> float:

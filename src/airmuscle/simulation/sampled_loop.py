@@ -13,11 +13,10 @@ from ..compile.program import CompiledSystem
 from ..control.control_loop import ControlLoop, ControlLoopState
 from ..control.inputs import InputSignal
 from ..control.piecewise_linear import PiecewiseLinear
-from ..control.with_drivers import WithDrivers
 from ..core.arrays import Array
 from ..core.errors import ParameterError
 from .output_times import output_times
-from .problem import Problem, check_input_range
+from .problem import Problem
 
 MAX_SAMPLES = 10_000_000
 """Samples of one run that fit a usual memory."""
@@ -60,10 +59,9 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
     assert isinstance(loop, ControlLoop)
     known, duration = compiled.description, problem.duration
     names = known.input_names
-    edges, sampled = _edges(loop.period, state, start, problem.end_time)
-    close = _CLOSE * loop.period
+    edges, sampled = _edges(loop.sample_time, state, start, problem.end_time)
+    close = _CLOSE * loop.sample_time
     others = _snap(loop.other_inputs, names, edges, close)
-    _check_other_inputs(compiled, loop, start, duration)
     starts = np.unique(np.concatenate([edges[:-1], others.starts(start)]))
     inputs = others.split_at(starts, start)
     commanded = [names.index(name) for name in loop.controller.inputs]
@@ -81,13 +79,6 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
     )  # fmt: skip
 
 
-def _check_other_inputs(compiled: CompiledSystem, loop: ControlLoop, start: float, duration: float) -> None:
-    """Raise ParameterError where an input that the controller does not command is beyond its range."""
-    shown = WithDrivers(loop.other_inputs, loop.drivers).segments(compiled.description.input_names, start, duration)
-    shown.check_shape(len(compiled.description.input_names), start)
-    check_input_range(compiled, shown, start)
-
-
 def _ranges(compiled: CompiledSystem, loop: ControlLoop) -> dict[str, tuple[float, float]]:
     """Minimum and maximum of every commanded input; of one with a driver 0 and 1."""
     declared = {i.name: (i.minimum, i.maximum) for i in compiled.system.input_variables}
@@ -95,15 +86,15 @@ def _ranges(compiled: CompiledSystem, loop: ControlLoop) -> dict[str, tuple[floa
     return {name: ({**declared, **with_driver})[name] for name in loop.controller.inputs}
 
 
-def _edges(period: float, state: ControlLoopState, start: float, end: float) -> tuple[Array, bool]:
+def _edges(sample_time: float, state: ControlLoopState, start: float, end: float) -> tuple[Array, bool]:
     """Start, the sampling instants after it, and end of a run [s]; whether the start is a sampling instant itself."""
-    count, close = (end - state.origin) / period - state.sample_count, _CLOSE * period
+    count, close = (end - state.origin) / sample_time - state.sample_count, _CLOSE * sample_time
     if count > MAX_SAMPLES:
         raise ParameterError(
-            f"a sample time of {period:g} s makes {count:.3g} samples; {MAX_SAMPLES} are allowed. Lengthen it, or "
+            f"a sample time of {sample_time:g} s makes {count:.3g} samples; {MAX_SAMPLES} are allowed. Lengthen it, or "
             "simulate a shorter time."
         )
-    instants = state.origin + period * (state.sample_count + np.arange(max(math.ceil(count), 0) + 1))
+    instants = state.origin + sample_time * (state.sample_count + np.arange(max(math.ceil(count), 0) + 1))
     if abs(start - state.time) > close:
         raise ParameterError(
             f"the control_state is that of {state.time:.10g} s, and the run begins at {start:.10g} s. Give the time "

@@ -152,6 +152,6 @@ def _settings(study: Study) -> tuple[tuple[str, str, str], ...]:
         ("scenario", scenario.title, str(study.path.name)),
         ("design", str(study.design), "study"),
         *metrics,
-        ("integrator", str(scenario.method), "scenario"),
-        ("input signal", str(scenario.command), "scenario"),
+        ("integrator", str(scenario.problem.integrator), "scenario"),
+        ("input signal", str(scenario.problem.input), "scenario"),
     )

@@ -53,12 +53,12 @@ class ScenarioTemplate:
 
     def parameters(self) -> dict[str, ScenarioParameter]:
         """All parameters that may vary, by path."""
-        plant, command = self.scenario.plant, self.tables.get("command", {})
+        plant, input_table = self.scenario.plant, self.tables.get("input", {})
         available = [
             ScenarioParameter(leaf.path, leaf.declared.unit, leaf.declared.bounds, i)
             for i, leaf in enumerate(leaves(plant))
         ]
-        for keys, unit in (*_input_parameters(command, self.scenario), *_run_parameters(self.tables["run"], plant)):
+        for keys, unit in (*_input_parameters(input_table, self.scenario), *_run_parameters(self.tables["run"], plant)):
             available.append(ScenarioParameter(_format_path(keys), unit, (-math.inf, math.inf), keys))
         return {parameter.path: parameter for parameter in available}
 
@@ -78,7 +78,7 @@ class ScenarioTemplate:
         plant, individually = self.scenario.plant, [None] * len(values)
         pressure = initial_pressure(self.tables, self.location)
         if pressure is None or any(
-            not isinstance(p.location, int) and p.location[:2] == ("run", "start") for p in varied
+            not isinstance(p.location, int) and p.location[:2] == ("run", "initial_state") for p in varied
         ):
             return list(individually)
         leaf_values = np.repeat(flatten(plant)[None, :], len(values), axis=0)
@@ -113,34 +113,34 @@ class ScenarioTemplate:
 
 
 def _input_parameters(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:
-    """Keys and units of the numbers under [command]."""
-    units = run_column_units(scenario.plant, scenario.start, scenario.command)
+    """Keys and units of the numbers under [input]."""
+    units = run_column_units(scenario.problem)
     for name, value in table.items():
-        if isinstance(scenario.command, ControlLoop) and name == "controller":
+        if isinstance(scenario.problem.input, ControlLoop) and name == "controller":
             yield from (
-                (("command", name, *keys), unit)
-                for keys, unit in controller_number_paths(value, scenario.command, units)
+                (("input", name, *keys), unit)
+                for keys, unit in controller_number_paths(value, scenario.problem.input, units)
             )
         elif name == "period":
-            yield ("command", name), "s"
+            yield ("input", name), "s"
         elif isinstance(value, list):
             for i, _ in enumerate(value):
-                yield ("command", name, i, 0), "s"
-                yield ("command", name, i, 1), units[name]
+                yield ("input", name, i, 0), "s"
+                yield ("input", name, i, 1), units[name]
         elif isinstance(value, Mapping):
-            yield from _model_parameters(value, ("command", name))
+            yield from _model_parameters(value, ("input", name))
 
 
 def _run_parameters(table: Mapping[str, Any], plant: Plant) -> Iterator[tuple[Keys, str]]:
     """Keys and units of the numbers under [run]."""
-    for name in ("duration", "start_time", "output"):
+    for name in ("duration", "start_time", "output_times"):
         if name in table:
             yield ("run", name), "s"
-    yield ("run", "start", "pressure"), "Pa"
+    yield ("run", "initial_state", "pressure"), "Pa"
     for coordinate in plant.mechanism.coordinates:
-        yield ("run", "start", coordinate.name), coordinate.unit
-        yield ("run", "start", coordinate.speed), f"{coordinate.unit}/s"
-    yield from _model_parameters(table.get("method"), ("run", "method"))
+        yield ("run", "initial_state", coordinate.name), coordinate.unit
+        yield ("run", "initial_state", coordinate.speed), f"{coordinate.unit}/s"
+    yield from _model_parameters(table.get("integrator"), ("run", "integrator"))
 
 
 def _model_parameters(value: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:

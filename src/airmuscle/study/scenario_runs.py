@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -10,7 +11,7 @@ from ..core.arrays import Array
 from ..core.errors import AirmuscleError, SimulationError
 from ..recording import Recording
 from ..scenario.scenario import Scenario
-from ..simulation import simulate
+from ..simulation import Problem, solve
 from ..simulation.output_times import output_times
 
 RUN_ERRORS = (AirmuscleError, ArithmeticError, ValueError)
@@ -24,15 +25,8 @@ def simulate_all(scenarios: Sequence[Scenario], times: Array) -> Iterator[Record
     """
     for scenario in scenarios:
         try:
-            yield simulate(
-                scenario.plant,
-                scenario.command,
-                duration=scenario.duration,
-                initial_state=scenario.start,
-                start_time=scenario.start_time,
-                integrator=scenario.method,
-                output_times=_output_times(scenario, times),
-            )
+            problem = dataclasses.replace(scenario.problem, output_times=_output_times(scenario.problem, times))
+            yield solve(problem).raise_if_incomplete().recording
         except RUN_ERRORS as error:
             if isinstance(error, SimulationError) and error.interrupted:
                 raise KeyboardInterrupt from None
@@ -45,8 +39,8 @@ def failure_reason(error: Exception) -> str:
     return f"{kind}{' '.join(str(error).split())}"
 
 
-def _output_times(scenario: Scenario, times: Array) -> Array:
-    """The output times of the scenario and those of `times` that lie within the run [s]."""
-    end = scenario.start_time + scenario.duration
-    within = times[(times >= scenario.start_time) & (times < end)]
-    return output_times(scenario.output, scenario.start_time, scenario.duration, np.append(within, end))
+def _output_times(problem: Problem, times: Array) -> Array:
+    """The output times of the problem and those of `times` that lie within the run [s]."""
+    within = times[(times >= problem.start_time) & (times < problem.end_time)]
+    instants = np.append(within, problem.end_time)
+    return output_times(problem.output_times, problem.start_time, problem.duration, instants)

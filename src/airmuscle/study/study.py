@@ -2,7 +2,7 @@
 
 title = "Spread of two valves"                     optional
 scenario = "fill_discharge.toml"                   a scenario file next to this one; or the tables [scenario.plant],
-                                                   [scenario.command] and [scenario.run] of a scenario
+                                                   [scenario.input] and [scenario.run] of a scenario
 chunk_size = 32                                    optional: number of runs that are saved together
 [vary]                                             varied parameters by their paths, see paths.py
 "mechanism.mass" = ["5 kg", "10 kg"]               levels; also { model = "Range", low = , high = , count = }
@@ -122,7 +122,7 @@ class Study:
 
 def columns_of(scenario: Scenario) -> dict[str, str]:
     """The units of all columns that a run has."""
-    return run_column_units(scenario.plant, scenario.start, scenario.command)
+    return run_column_units(scenario.problem)
 
 
 def load_study(path: str | Path) -> Study:
@@ -161,7 +161,7 @@ def _read_scenario(value: Any, location: Location) -> ScenarioTemplate:
     if not isinstance(value, Mapping):
         raise ParameterError(
             f'{location}: scenario is {value!r}; name a file, scenario = "fill.toml", or write the tables '
-            "[scenario.plant], [scenario.command] and [scenario.run]."
+            "[scenario.plant], [scenario.input] and [scenario.run]."
         )
     return ScenarioTemplate(value, location.inside("scenario"), build_scenario(value, location.inside("scenario")))
 
@@ -218,9 +218,9 @@ def _read_metrics(tables: Mapping[str, Any], scenario: Scenario, location: Locat
             raise ParameterError(f"{inner}: a run has no column '{column}'; its columns are {', '.join(known)}.{near}")
         metric = build(table, inner, classes=METRICS, unit=known.get(str(column), "1") or "1")
         with located_errors(inner):
-            metric.check_range(scenario.start_time, scenario.duration)
+            metric.check_range(scenario.problem.start_time, scenario.problem.duration)
             if isinstance(metric, TimeSeries):
-                metric = metric.clip_to_run(scenario.start_time, scenario.duration)
+                metric = metric.clip_to_run(scenario.problem.start_time, scenario.problem.duration)
         metrics[name] = metric
     return metrics
 

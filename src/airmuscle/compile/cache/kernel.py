@@ -84,7 +84,7 @@ class BoundKernel:
     Between two runs the contents of arrays may change, and arguments may be replaced by others of their kind.
     """
 
-    __slots__ = ("_address", "_arguments", "_floats", "_kinds", "_numba", "_offsets", "_run", "_slots")
+    __slots__ = ("_address", "_arguments", "_floats", "_kernel", "_kinds", "_numba", "_offsets", "_run", "_slots")
 
     def __init__(self, kernel: Kernel, arguments: tuple[Any, ...]) -> None:
         self._kinds = tuple(map(_kind, arguments))
@@ -96,6 +96,7 @@ class BoundKernel:
         self._arguments = list(arguments)
         for index, argument in enumerate(arguments):
             self.replace(index, argument)
+        self._kernel = kernel  # its machine code must live as long
         entry = kernel.entry(self._kinds)
         self._run: Any = entry
         self._numba: Any = None if entry else kernel.numba
