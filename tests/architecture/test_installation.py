@@ -1,6 +1,7 @@
 """Installation: the lock pins every requirement and contains no address; `./run` starts quickly if it is installed."""
 
 import importlib.machinery
+import importlib.resources
 import importlib.util
 import os
 import re
@@ -47,6 +48,10 @@ def test_the_lock_contains_all_dependencies_of_the_project():
 def test_the_citation_and_the_package_state_the_same_version():
     version = PROJECT["project"]["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
+def test_the_package_contains_the_marker_of_its_type_annotations():
+    assert (importlib.resources.files("airmuscle") / "py.typed").is_file()
 
 
 # ./run

@@ -500,6 +500,21 @@ def test_the_recording_says_who_commanded_what():
     assert np.array_equal(run["setpoint.pressure"], np.where(run["time"] < 0.3, 1e5, 3e5))
 
 
+@pytest.mark.parametrize(
+    ("integrator", "key"),
+    [
+        (Rodas4(), "hairer-wanner-1996"),
+        (DormandPrince8(1e-3), "prince-dormand-1981"),
+        (RungeKutta4(1e-3), "kutta-1901"),
+    ],
+)
+def test_a_problem_and_its_solution_cite_plant_integrator_and_controller(integrator, key):
+    problem = Problem(lifting(), ControlLoop(VALVES, TICK, PRESSURE), duration=0.05, integrator=integrator)
+    sources = {r.key for r in cite(problem)}
+    assert sources >= {key, "astrom-hagglund-1995", *(r.key for r in cite(problem.system))}
+    assert sources == {r.key for r in cite(solve(problem))}
+
+
 @pytest.mark.parametrize("period", [0.0, -0.1, np.nan, np.inf, True, "1 s"])
 def test_a_period_that_cannot_be_is_refused(period):
     with pytest.raises(ParameterError, match=r"ControlLoop.sample_time is .*; it must be positive and finite"):

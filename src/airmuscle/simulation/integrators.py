@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -13,12 +13,39 @@ from ..control.piecewise_linear import PiecewiseLinear
 from ..core.arrays import Array
 from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
+from ..core.reference import Reference
 from ..core.status import Status
 
 INTERRUPT_CHECK_STEPS = 100_000
 """Steps between two checks whether the user wants to stop."""
 MAX_STEPS = 50_000_000
 """Steps of one run, by default."""
+HAIRER_WANNER1996 = Reference(
+    "hairer-wanner-1996",
+    "Hairer, E., Wanner, G.",
+    "Solving Ordinary Differential Equations II: Stiff and Differential-Algebraic Problems",
+    "2nd edition, Springer, Berlin, section VI.4",
+    1996,
+    doi="10.1007/978-3-642-05221-7",
+    note="method RODAS",
+)
+KUTTA1901 = Reference(
+    "kutta-1901",
+    "Kutta, W.",
+    "Beitrag zur näherungsweisen Integration totaler Differentialgleichungen",
+    "Zeitschrift für Mathematik und Physik 46:435-453",
+    1901,
+    note="the classical method of order four",
+)
+PRINCE_DORMAND1981 = Reference(
+    "prince-dormand-1981",
+    "Prince, P. J., Dormand, J. R.",
+    "High order embedded Runge-Kutta formulae",
+    "Journal of Computational and Applied Mathematics 7(1):67-75",
+    1981,
+    doi="10.1016/0771-050X(81)90010-3",
+    note="table 2, RK8(7)13M, the weights of order eight",
+)
 _PAUSED, _TOO_MANY = Status.PAUSED.value, Status.TOO_MANY_STEPS.value
 
 
@@ -162,6 +189,8 @@ class Rodas4(Integrator):
     Reference: Hairer and Wanner, Solving Ordinary Differential Equations II, 1996, section VI.4, method RODAS.
     """
 
+    references: ClassVar[tuple[Reference, ...]] = (HAIRER_WANNER1996,)
+
     rtol: float = parameter("1", "rtol", "relative tolerance of a step", bounds=(1e-13, 0.1), default=1e-6)
 
     def binding(self, compiled: CompiledSystem) -> Binding:
@@ -201,6 +230,8 @@ def default_integrator(integrator: Integrator | None) -> Integrator:
 class RungeKutta4(ExplicitRungeKutta):
     """The classical method of order four (Kutta 1901)."""
 
+    references: ClassVar[tuple[Reference, ...]] = (KUTTA1901,)
+
     step: float = parameter("s", "h", "step size", bounds=(1e-9, 1e3))
 
     def tableau(self) -> Tableau:
@@ -214,6 +245,8 @@ class DormandPrince8(ExplicitRungeKutta):
     Reference: Prince, P. J., Dormand, J. R., High order embedded Runge-Kutta formulae,
     J. Computational and Applied Mathematics 7(1):67-75, 1981, table 2.
     """
+
+    references: ClassVar[tuple[Reference, ...]] = (PRINCE_DORMAND1981,)
 
     step: float = parameter("s", "h", "step size", bounds=(1e-9, 1e3))
 
