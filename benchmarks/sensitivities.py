@@ -118,7 +118,8 @@ def evaluate_in_jax(code: Code, inputs: Sequence[Any]) -> list[Any]:
         casadi.OP_TWICE: lambda a: a + a, casadi.OP_INV: lambda a: 1.0 / a, casadi.OP_SQRT: jnp.sqrt,
         casadi.OP_SIN: jnp.sin, casadi.OP_COS: jnp.cos, casadi.OP_LE: lambda a, b: jnp.where(a <= b, 1.0, 0.0),
         casadi.OP_LT: lambda a, b: jnp.where(a < b, 1.0, 0.0), casadi.OP_NOT: lambda a: 1.0 - a,
-        casadi.OP_IF_ELSE_ZERO: lambda c, a: jnp.where(c != 0, a, 0.0), Operation.SELECT: lambda c, a, b: jnp.where(c != 0, a, b),
+        casadi.OP_IF_ELSE_ZERO: lambda c, a: jnp.where(c != 0, a, 0.0),
+        Operation.SELECT: lambda c, a, b: jnp.where(c != 0, a, b),
         Operation.MAXIMUM: jnp.maximum, Operation.MINIMUM: jnp.minimum,
     }  # fmt: skip
     known: dict[Operand, Any] = {}

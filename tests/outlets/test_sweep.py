@@ -30,7 +30,7 @@ from airmuscle.cli.interruption import check_interrupted, deferred_sigint
 from airmuscle.core.errors import AirmuscleError, ColumnError, FileError, InputError, SimulationError
 from airmuscle.report.write import save_table
 from airmuscle.scenario.scenario import load_scenario
-from airmuscle.simulation import simulate
+from airmuscle.simulation import simulate, solve
 from airmuscle.study import chunk, dask_cluster, fingerprint, load_study, process_pool, run_study
 from airmuscle.study.chapter import study_chapter, write_study
 from airmuscle.study.design import DESIGNS
@@ -324,8 +324,8 @@ def test_a_run_is_what_simulate_gives(folder: Path):
 def test_initial_states_computed_together_equal_those_computed_individually(folder: Path):
     study = load_study(folder / "study.toml")
     states = study.initial_states(range(22))
-    assert [state == study.scenario(run).start for run, state in enumerate(states)] == [True] * 22
-    assert study.scenario(3, states[3]).start == states[3]
+    assert [state == study.scenario(run).initial_state for run, state in enumerate(states)] == [True] * 22
+    assert study.scenario(3, states[3]).initial_state == states[3]
     assert len({state["air_mass"] for state in states}) == 22
 
 
@@ -347,7 +347,7 @@ def test_a_varied_initial_state_is_computed_run_by_run(folder: Path):
     (folder / "study.toml").write_text(re.sub(r'"x" = .*\n', "", text), encoding="utf-8")
     study = load_study(folder / "study.toml")
     assert study.initial_states(range(4)) == [None] * 4
-    assert len({study.scenario(run).start["air_mass"] for run in range(4)}) == 4
+    assert len({study.scenario(run).initial_state["air_mass"] for run in range(4)}) == 4
     assert not run(folder).failed.size
 
 
@@ -433,7 +433,7 @@ def test_the_fingerprint_depends_on_how_the_initial_state_is_specified(folder: P
     edited(folder, 'pressure = "0.5 bar"', f'pressure = "0.5 bar", position = {place!r}', "scenario.toml")
     held = load_study(folder / "study.toml")
     assert held.template.scenario.initial_state == pytest.approx(at_rest.template.scenario.initial_state)
-    assert held.scenario(0).start != pytest.approx(at_rest.scenario(0).start)
+    assert held.scenario(0).initial_state != pytest.approx(at_rest.scenario(0).initial_state)
     assert held.fingerprint() != at_rest.fingerprint()
 
 
@@ -503,9 +503,9 @@ def test_an_unexpected_exception_fails_only_its_own_run(folder: Path, monkeypatc
         calls.append(given)
         if len(calls) == 4:
             raise ZeroDivisionError("by nothing")
-        return simulate(*given, **named)
+        return solve(*given, **named)
 
-    monkeypatch.setattr("airmuscle.study.scenario_runs.simulate", failing)
+    monkeypatch.setattr("airmuscle.study.scenario_runs.solve", failing)
     result = run(folder)
     assert [r for r in result.failure_reasons if r] == ["ZeroDivisionError: by nothing"]
 
@@ -549,7 +549,7 @@ def test_the_scenario_may_be_part_of_the_study_file(folder: Path):
     separate = run(folder, "separate")
     inside = (
         SCENARIO.replace("[plant", "[scenario.plant")
-        .replace("[input", "[scenario.problem.input")
+        .replace("[input", "[scenario.input")
         .replace("[run", "[scenario.run")
     )
     edited(folder, 'scenario = "scenario.toml"\n', "")

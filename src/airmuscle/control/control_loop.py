@@ -44,7 +44,7 @@ class ControlLoopState(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class ControlLoop:
-    """A sampled control loop: every `sample_time` [s], from the start of a run on, the controller measures and commands.
+    """A sampled control loop: every `sample_time` [s], from the start of a run, the controller measures and commands.
 
     setpoint      an InputSignal whose names are the controller's set points,
                   `Schedule({"pressure": ((0, 1e5), (2, 3e5))})`
@@ -127,8 +127,8 @@ class ControlLoop:
             for names in (self.controller.measured_columns, self.controller.inputs)
         )
         return (
-            f"{_describe_controller(self.controller)}, sample time {_milliseconds(self.sample_time)}, measured {measured}, "
-            f"commanded {commanded}"
+            f"{_describe_controller(self.controller)}, sample time {_milliseconds(self.sample_time)}, "
+            f"measured {measured}, commanded {commanded}"
         )
 
     def as_open_loop(self, recording: Recording) -> InputSignal:

@@ -53,10 +53,10 @@ def _sentence(note: str) -> str:
 
 
 def _describe_duration(scenario: Scenario, recording: Recording) -> str:
-    reached, end = float(recording["time"][-1]), scenario.problem.start_time + scenario.problem.duration
-    if reached < end:
-        return f"Simulation of {scenario.problem.duration:g} s, ended early at {reached:.4g} s; the last note gives the reason."
-    return f"Simulation of {scenario.problem.duration:g} s."
+    reached, problem = float(recording["time"][-1]), scenario.problem
+    if reached < problem.end_time:
+        return f"Simulation of {problem.duration:g} s, ended early at {reached:.4g} s; the last note gives the reason."
+    return f"Simulation of {problem.duration:g} s."
 
 
 def _plotted_columns(recording: Recording) -> list[str]:
