@@ -161,7 +161,7 @@ def _spools() -> Schedule:
 
 def _run(plant: Plant, single: Run, command: Schedule = JOINT_PULSES) -> Run:
     """The run of the single system, for a plant of components."""
-    start = {s.name: single.start.get(written_name(s.name), 0.0) for s in plant.states}
+    start = {s.name: single.initial_state.get(written_name(s.name), 0.0) for s in plant.states}
     return Run(plant, start, command, "angle", single.lever)
 
 
@@ -181,7 +181,7 @@ def measure(composed: Run, single: Run | None, rounds: int) -> tuple[tuple[tuple
     both = {"components": composed} | ({"single system": single} if single else {})
     ready = {name: compile_system(run.system) for name, run in both.items()}
     if single:
-        check_rates(ready["single system"], ready["components"], single.start)
+        check_rates(ready["single system"], ready["components"], single.initial_state)
     derivatives = time_variants({n: make_calls(ready[n], run.initial_state) for n, run in both.items()}, rounds)
     simulations = time_variants({n: kernel(run, ready[n], Rodas4(RTOL)) for n, run in both.items()}, rounds)
     last = derivatives[list(both)[-1]].minimum

@@ -96,14 +96,14 @@ class Run:
     """A system with initial state and input signal; `lever` converts its coordinate to a displacement [m]."""
 
     system: System
-    start: dict[str, float]
+    initial_state: dict[str, float]
     command: Schedule
     coordinate: str
     lever: float
 
     @property
     def vector(self) -> Array:
-        return np.array([self.start[s.name] for s in self.system.states])
+        return np.array([self.initial_state[s.name] for s in self.system.states])
 
     @property
     def nominal(self) -> Array:

@@ -119,7 +119,7 @@ def test_a_plant_of_components_has_the_rates_of_the_single_system():
     for composed, single in components.pairs():
         if single:
             both = compile_system(single.system), compile_system(composed.system)
-            assert components.check_rates(*both, single.start) < 1e-12
+            assert components.check_rates(*both, single.initial_state) < 1e-12
 
 
 def test_different_rates_are_detected():
@@ -129,7 +129,7 @@ def test_different_rates_are_detected():
         composed.system, mechanism=dataclasses.replace(composed.system.mechanism, friction=0.201)
     )
     with pytest.raises(AssertionError, match="differ by"):
-        components.check_rates(compile_system(single.system), compile_system(stiffer), single.start)
+        components.check_rates(compile_system(single.system), compile_system(stiffer), single.initial_state)
 
 
 def test_the_joint_with_proportional_valves_has_the_same_motion():

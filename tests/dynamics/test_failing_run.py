@@ -132,7 +132,7 @@ def pieces(ends, values, slopes=None):
         (pieces([0.01], [[1.0]], [[0.0, 0.0]]), "they must be"),
         (pieces([0.01], [[1.0, 0.0]], [[0.0]]), "they must be"),
         (pieces([0.005, 0.01], [[1.0, 0.0]]), "they must be"),
-        (pieces([], np.zeros((0, 2))), "one segment at least"),
+        (pieces([], np.zeros((0, 2))), "with at least one segment"),
         (pieces([0.02, 0.01], [[1.0, 0.0]] * 2), "in rising order after 0 s"),
         (pieces([0.01], [[np.nan, 0.0]]), "not finite"),
         (pieces([np.nan], [[1.0, 0.0]]), "not finite"),

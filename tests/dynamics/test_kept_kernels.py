@@ -70,7 +70,7 @@ def test_a_run_is_bit_for_bit_that_of_numba(method, monkeypatch):
     ramps = Schedule({"fill": ((0.5, 1.0), (1.5, 0.0)), "discharge": ((2.0, 0.7),)})
 
     def run():
-        return simulate(CASE.system, ramps, duration=3.0, initial_state=CASE.start, integrator=method)
+        return simulate(CASE.system, ramps, duration=3.0, initial_state=CASE.initial_state, integrator=method)
 
     by_code = run()
     monkeypatch.setattr(Kernel, "entry", lambda self, kinds: None)

@@ -23,6 +23,8 @@ from .llvm.types import LlvmType
 
 Tableau = tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]
 """Rows of an explicit Runge-Kutta tableau below its first, and its weights."""
+INPUT_TOLERANCE = 1e-9
+"""Part of an input's range by which it may be exceeded through rounding."""
 _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "df_dt", "outputs")
 
 
@@ -109,6 +111,9 @@ class Description:
         self.lower_bounds = np.array(system.state_lower_bounds, dtype=float)
         self.input_minimum = np.array([i.minimum for i in inputs])
         self.input_maximum = np.array([i.maximum for i in inputs])
+        with np.errstate(invalid="ignore"):
+            slack = np.nan_to_num(INPUT_TOLERANCE * (self.input_maximum - self.input_minimum), posinf=0.0)
+        self.input_lower_limits, self.input_upper_limits = self.input_minimum - slack, self.input_maximum + slack
         positive = set(system.positive_outputs)
         self.positive_outputs = np.array([i for i, n in enumerate(self.output_names) if n in positive], dtype=np.intp)
         self.constants = dict(system.constants)
@@ -117,6 +122,13 @@ class Description:
         """The default initial state, once it has been found."""
         self.integrators: dict[Any, list[Any]] = {}
         """Integrators bound to this system that no run uses at present, by their integrator."""
+        self.holders: dict[Any, list[Any]] = {}
+        """The same for steps with held inputs."""
+        self.state_limits = dict(zip(self.state_names, self.lower_bounds.tolist(), strict=True))
+        """The lower bound of each state by its name."""
+        limits = zip(self.input_lower_limits.tolist(), self.input_upper_limits.tolist(), strict=True)
+        self.input_limits = dict(zip(self.input_names, enumerate(limits), strict=True))
+        """The index and the limits, with their tolerance, of each input by its name."""
 
 
 _programs: dict[tree.Structure, Program] = {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import functools
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -75,7 +76,9 @@ class BoundIntegrator:
 
     def __init__(self, integrator: Integrator, compiled: CompiledSystem) -> None:
         binding, sizes = integrator.binding(compiled), compiled.sizes
-        self.state, self._clock, self._count = np.zeros(sizes.states), np.zeros(3), np.zeros(4, dtype=np.int64)
+        self.state, self._progress = np.zeros(sizes.states), np.zeros(7, dtype=np.int64)
+        self._clock, self._count = self._progress[:3].view(np.float64), self._progress[3:]
+        self._duration = 1.0
         self._end, self._inputs, slopes = np.ones(1), np.zeros((1, sizes.inputs)), np.zeros((1, sizes.inputs))
         no_rows = np.zeros(0), np.zeros((0, sizes.states))
         work = np.zeros(max(binding.work, 1))
@@ -100,14 +103,14 @@ class BoundIntegrator:
         """Advance `state` (n,) in place by `duration` [s] with the inputs (m,) held. Not to be mixed with `run`."""
         self.state[:] = state
         self._inputs[0] = inputs
-        self._end[0] = duration
-        self._clock[:] = 0.0
-        self._count[:] = 0
+        if duration != self._duration:
+            self._end[0] = self._duration = duration
+        self._progress.fill(0)
         status = self._kernel()
         if status == _PAUSED:
             status = self._continue(status, MAX_STEPS)
         state[:] = self.state
-        return Status(status)
+        return Status.DONE if status == 0 else Status(status)
 
     def run_part(
         self, begin: float, segments: tuple[int, int, int], count: int, times: int, rows: int, wanted: int
@@ -215,10 +218,15 @@ class ExplicitRungeKutta(Integrator):
         return Binding(fixed_step, (address, precomputed), (self.step,), work)
 
 
+@functools.cache
+def _default() -> Integrator:
+    return Rodas4()
+
+
 def default_integrator(integrator: Integrator | None) -> Integrator:
     """The given integrator, or the default. Raises ParameterError for anything else, such as a name."""
     if integrator is None:
-        return Rodas4()
+        return _default()
     if not isinstance(integrator, Integrator):
         raise ParameterError(
             f"the integrator is {integrator!r}; give Rodas4(), RungeKutta4(step) or DormandPrince8(step)."

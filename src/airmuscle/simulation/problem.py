@@ -23,9 +23,6 @@ from ..plant.state import check_system, state_vector
 from .integrators import Integrator, default_integrator
 from .output_times import output_times
 
-_SLACK = 1e-9
-"""Part of an input's range by which it may be exceeded through rounding."""
-
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Problem:
@@ -141,10 +138,7 @@ def check_input_range(compiled: CompiledSystem, segments: PiecewiseLinear, start
     known = compiled.description
     if not len(known.input_names):
         return
-    minimum, maximum = known.input_minimum, known.input_maximum
-    with np.errstate(invalid="ignore"):
-        slack = np.nan_to_num(_SLACK * (maximum - minimum), posinf=0.0)
-    low, high = minimum - slack, maximum + slack
+    low, high = known.input_lower_limits, known.input_upper_limits
     values, slopes = segments.values, segments.slopes
     tables = [values]
     if slopes.any():

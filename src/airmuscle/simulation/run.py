@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -34,9 +36,10 @@ def _solve_open_loop(problem: Problem) -> Solution:
     compiled, integrator = problem.compiled, problem.integrator
     assert integrator is not None
     segments, times = problem.segments, problem.times
-    bound = borrow(compiled, integrator)
+    pool = compiled.description.integrators
+    bound = borrow(pool, compiled, integrator)
     raw = bound.run(segments, problem.start_time, problem.initial_vector, times)
-    give_back(compiled, integrator, bound)
+    give_back(pool, integrator, bound)
     reached = raw.reached
     table = evaluate_rows(compiled, raw.rows[:reached], times[:reached], segments, problem.start_time)
     raw, table = truncate_at_invalid_row(compiled, raw, table, times)
@@ -46,15 +49,15 @@ def _solve_open_loop(problem: Problem) -> Solution:
     return Solution(problem, recording, raw.status, statistics, diagnostics, raw.time, final)
 
 
-def borrow(compiled: CompiledSystem, integrator: Integrator) -> BoundIntegrator:
-    """An integrator bound to a system: one that no other run uses, or a new one."""
-    idle = compiled.description.integrators.get(integrator)
+def borrow(pool: dict[Any, list[Any]], compiled: CompiledSystem, integrator: Integrator) -> BoundIntegrator:
+    """An integrator bound to a system: one of the pool that no other run uses, or a new one."""
+    idle = pool.get(integrator)
     return idle.pop() if idle else integrator.bind(compiled)
 
 
-def give_back(compiled: CompiledSystem, integrator: Integrator, bound: BoundIntegrator) -> None:
+def give_back(pool: dict[Any, list[Any]], integrator: Integrator, bound: BoundIntegrator) -> None:
     """Keep a bound integrator for the next run."""
-    compiled.description.integrators.setdefault(integrator, []).append(bound)
+    pool.setdefault(integrator, []).append(bound)
 
 
 def simulate(
@@ -107,10 +110,14 @@ def advance(
     if not 0 < dt < float("inf"):
         raise ParameterError(f"advance: dt is {dt!r} s; it must be positive and finite.")
     compiled, integrator = compile_system(plant), default_integrator(integrator)
+    final = _hold(compiled, integrator, state, inputs, dt) if isinstance(inputs, Mapping) else None
+    if final is not None:
+        return dict(zip(compiled.description.state_names, final, strict=True))
     segments = _segments(compiled, inputs, start_time, dt)
-    bound = borrow(compiled, integrator)
+    pool = compiled.description.integrators
+    bound = borrow(pool, compiled, integrator)
     raw = bound.run(segments, start_time, state_vector(plant, state), _NO_TIMES)
-    give_back(compiled, integrator, bound)
+    give_back(pool, integrator, bound)
     if raw.status == Status.DONE and (raw.state < compiled.description.lower_bounds).any():
         raw = raw._replace(status=Status.NEGATIVE_AIR_MASS)
     if raw.status != Status.DONE:
@@ -119,6 +126,45 @@ def advance(
 
 
 _NO_TIMES = np.empty(0)
+
+
+def _hold(
+    compiled: CompiledSystem, integrator: Integrator, state: Mapping[str, float], inputs: Mapping[str, float], dt: float
+) -> list[float] | None:
+    """The state after a step with held inputs; None for what `advance` must check in full, or report as failed."""
+    known = compiled.description
+    x = _floats(state, known.state_limits)
+    if x is None or len(state) != len(x):
+        return None
+    held = [0.0] * len(known.input_names)
+    for name, value in inputs.items():
+        column, (low, high) = known.input_limits.get(name, _NO_INPUT)
+        if type(value) not in _NUMBERS or not low <= value <= high:
+            return None
+        held[column] = value
+    bound = borrow(known.holders, compiled, integrator)
+    vector = np.array(x)
+    status = bound.hold(vector, np.array(held), dt)
+    give_back(known.holders, integrator, bound)
+    final: list[float] = vector.tolist()
+    if status is not Status.DONE or any(map(operator.lt, final, known.state_limits.values())):
+        return None
+    return final
+
+
+_NUMBERS = frozenset({float, int, np.float64})
+_NO_INPUT = -1, (np.inf, -np.inf)
+
+
+def _floats(values: Mapping[str, float], limits: Mapping[str, float]) -> list[float] | None:
+    """The values in the order of their lower limits; None where one is missing, no number, infinite or too small."""
+    numbers: list[float] = []
+    for name, low in limits.items():
+        value: Any = values.get(name)
+        if type(value) not in _NUMBERS or not low <= value or not abs(value) < np.inf:
+            return None
+        numbers.append(value)
+    return numbers
 
 
 def _segments(

@@ -1,0 +1,163 @@
+"""Time of the public calls, with their checks and their Recording, and the kernel beside them."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from filling import DURATION, SPACING, Run, runs
+from measure import Section, Target, format_time, print_section, time_variants
+from rodas4 import hand_written_rates, kernel, lsoda
+
+import airmuscle as am
+from airmuscle.compile.program import compile_system
+from airmuscle.control import PID, PWM, ControlLoop, SplitRange
+from airmuscle.simulation import Rodas4
+
+HEADER = ("call", "median", "minimum", "kernel", "call / kernel")
+STEP = 1e-5
+"""Duration of one `advance` [s]."""
+SAMPLE_TIME = 5e-3
+"""Sample time of the control loops [s]."""
+ADVANCES = 200
+TEXT = (
+    f"One muscle lifting a mass, 3 states, Rodas4(1e-6). `simulate` runs {DURATION:g} s with a row every "
+    f"{SPACING * 1e3:g} ms and returns a Recording of states, outputs and inputs; its kernel is the integration alone. "
+    f"`advance` and `compiled(plant).step` take one step of {STEP * 1e6:g} us; the kernel beside them is "
+    "`compiled(plant).step` of the same length. The rows of the controllers give the time of one sample less that of "
+    "the integration of the same segments."
+)
+
+
+def with_default_state(run: Run) -> Callable[[], Any]:
+    """A function that calls `simulate` without an initial state."""
+    return lambda: am.simulate(run.system, run.command, duration=DURATION, output_times=SPACING)
+
+
+def with_state(run: Run) -> Callable[[], Any]:
+    """A function that calls `simulate` with an initial state."""
+    return lambda: am.simulate(
+        run.system, run.command, duration=DURATION, initial_state=run.initial_state, output_times=SPACING
+    )
+
+
+def simulations(rounds: int) -> tuple[list[tuple[str, ...]], list[Target]]:
+    """`simulate` with and without an initial state, the kernel, and LSODA with the same rows."""
+    run = runs()[3]
+    ready = compile_system(run.system)
+    times = time_variants(
+        {
+            "kernel": kernel(run, ready),
+            "simulate": with_state(run),
+            "simulate, default initial state": with_default_state(run),
+            "solve_ivp LSODA, hand-written rates": lambda: lsoda(run, hand_written_rates(run)),
+        },
+        rounds,
+    )
+    alone = times["kernel"]
+    rows = [
+        (
+            name,
+            *(format_time(t) for t in (time.median, time.minimum, alone.median)),
+            f"{time.median / alone.median:.2f}",
+        )
+        for name, time in times.items()
+        if name != "kernel"
+    ]
+    full, default = times["simulate"], times["simulate, default initial state"]
+    peer = times["solve_ivp LSODA, hand-written rates"]
+    targets = [
+        Target("call: simulate, beyond 1.5 x kernel", (full.minimum - 1.5 * alone.minimum) * 1e6, 60, "us"),
+        Target(
+            "call: the default initial state, beyond 3 x kernel", (default.minimum - 3 * alone.minimum) * 1e6, 100, "us"
+        ),
+        Target(
+            "call: solve_ivp LSODA, hand-written rates / simulate", peer.median / full.median, 40, "x", at_least=True
+        ),
+    ]
+    return rows, targets
+
+
+def steps(rounds: int) -> tuple[list[tuple[str, ...]], list[Target]]:
+    """`advance` by names and the handle on arrays, one step each."""
+    run = runs()[3]
+    plant, state = run.system, dict(run.initial_state)
+    inputs = dict.fromkeys(plant.inputs, 0.5)
+    handle = am.compiled(plant)
+    start, held = handle.state(state), np.full(len(plant.inputs), 0.5)
+
+    def advance() -> None:
+        for _ in range(ADVANCES):
+            am.advance(plant, state, inputs, STEP)
+
+    def step() -> None:
+        x = start.copy()
+        for _ in range(ADVANCES):
+            handle.step(x, held, STEP)
+
+    def integration() -> None:
+        """The same steps inside the kernel, in one run that is interrupted at each."""
+        bound.run(segments, 0.0, start, times)
+
+    times = np.arange(1, ADVANCES + 1) * STEP
+    segments = am.Schedule({name: tuple((t, 0.5) for t in (0.0, *times[:-1])) for name in plant.inputs}).segments(
+        plant.inputs, 0.0, float(times[-1])
+    )
+    bound = Rodas4(1e-6).bind(compile_system(plant))
+    measured = time_variants({"advance": advance, "compiled(plant).step": step, "kernel": integration}, rounds)
+    each = {name: (time.median / ADVANCES, time.minimum / ADVANCES) for name, time in measured.items()}
+    alone = each["kernel"]
+    rows = [
+        (name, *(format_time(t) for t in (*each[name], alone[0])), f"{each[name][0] / alone[0]:.1f}")
+        for name in ("advance", "compiled(plant).step")
+    ]
+    beside = each["compiled(plant).step"][1] - alone[1]
+    targets = [
+        Target("call: advance", each["advance"][1] * 1e6, 40, "us"),
+        Target("call: compiled(plant).step, beside the integration", beside * 1e6, 3, "us"),
+    ]
+    return rows, targets
+
+
+def control_samples(rounds: int) -> tuple[list[tuple[str, ...]], list[Target]]:
+    """One sample of a loop with a PID in Python: inputs held, and two pulsed inputs."""
+    run = runs()[3]
+    plant, duration = run.system, 5.0
+    pid = PID("pressure", SplitRange("fill", "discharge"), gain=1.5e-5, integral_time=0.4)
+    setpoint = am.Schedule({"pressure": ((0.0, 1e5), (1.0, 2e5))})
+    pulses = {"fill": PWM(50.0), "discharge": PWM(50.0)}
+    rows, targets = [], []
+    for name, drivers, limit in (("held", {}, 15), ("two pulsed inputs", pulses, 40)):
+        loop = ControlLoop(pid, SAMPLE_TIME, setpoint, drivers=drivers)
+        problem = am.Problem(plant, loop, duration, run.initial_state, output_times=duration)
+        recorded = am.solve(problem).recording
+        open_loop = am.Problem(plant, loop.as_open_loop(recorded), duration, run.initial_state, output_times=duration)
+        times = time_variants({"loop": lambda p=problem: am.solve(p), "open": lambda p=open_loop: am.solve(p)}, rounds)
+        samples = duration / SAMPLE_TIME
+        whole, alone = times["loop"], times["open"]
+        cost = statistics.median([whole.median - alone.median]) / samples
+        least = (whole.minimum - alone.minimum) / samples
+        rows.append(
+            (
+                f"a sample of a PID, {name}",
+                format_time(cost),
+                format_time(least),
+                format_time(alone.median / samples),
+                "",
+            )
+        )
+        targets.append(Target(f"call: a sample of a PID, {name}", least * 1e6, limit, "us"))
+    return rows, targets
+
+
+def section(rounds: int = 15) -> Section:
+    """The complete benchmark."""
+    parts = [simulations(rounds), steps(rounds), control_samples(max(3, rounds // 3))]
+    rows = tuple(row for part, _ in parts for row in part)
+    return Section("At the call", TEXT, HEADER, rows, tuple(target for _, found in parts for target in found))
+
+
+if __name__ == "__main__":
+    print_section(section())
