@@ -25,8 +25,8 @@ from typer.testing import CliRunner, Result
 from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.cli.app import COMMANDS, app
 from airmuscle.cli.cite import as_bibtex
-from airmuscle.cli.terminal import print_json, print_table, printable
-from airmuscle.core.errors import UnknownNameError
+from airmuscle.cli.terminal import print_json, print_table
+from airmuscle.core.errors import UnknownNameError, printable
 from airmuscle.core.reference import Reference
 from airmuscle.library.catalogue import load
 from airmuscle.library.files import list_laws, list_valves
