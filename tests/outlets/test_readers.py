@@ -595,3 +595,10 @@ def test_a_file_whose_reader_ends_or_takes_too_long_is_damaged(tmp_path: Path, m
     for function, cause in (("end", "its reader ended without a result"), ("wait", "its reading takes more than 1 s")):
         with pytest.raises(FileError, match=rf"run.csv: the file is damaged \({cause}\). Copy it again"):
             call_in_separate_process("bad_reader", function, path)
+
+
+def test_a_value_that_no_measurement_has(tmp_path: Path):
+    (tmp_path / "run.csv").write_text("pressure [bar],force [N]\n1,2\n1e300,3\n")
+    assert "line 3: pressure is 1e+305 in SI units; no measurement exceeds 1e+15" in refusal(
+        ColumnError, tmp_path / "run.csv"
+    )

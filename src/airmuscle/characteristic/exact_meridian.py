@@ -16,7 +16,7 @@ from ..geometry.meridian import SAGA_2007, Profile
 from ..geometry.pleated import DAERDEN_LEFEBER_2001, PleatedTube, unwrap_scalar
 from .base import PressureLaw, Slopes
 from .rubber import RubberLine
-from .solve import check_solution, find_first_root
+from .solve import check_numbers, check_solution, find_first_root
 
 NODES = 120  # Gauss points over half the meridian
 
@@ -127,6 +127,7 @@ class ExactMeridian(PressureLaw):
     def shape_at_force(self, contraction: Value, force: Value) -> MeridianShape:
         """Shape in equilibrium with a tension [N] at a contraction [1]; its pressure is NaN if there is no solution."""
         check_contraction_range(contraction, self.contraction_range, "ExactMeridian")
+        check_numbers(contraction, force)
         c, load = np.broadcast_arrays(np.asarray(contraction, float), np.asarray(force, float))
         radius, area, rubber = self._circle_estimate(c)
         start = np.maximum((load + rubber) / area, 1.05 * self._min_pressure(radius))
@@ -149,6 +150,7 @@ class ExactMeridian(PressureLaw):
     def shape_at_pressure(self, pressure: Value, contraction: Value) -> MeridianShape:
         """Shape at a pressure [Pa] and a contraction [1]; its force is NaN if there is no solution."""
         check_contraction_range(contraction, self.contraction_range, "ExactMeridian")
+        check_numbers(pressure, contraction)
         p, c = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(contraction, float))
         radius, area, rubber = self._circle_estimate(c)
         start = MeridianShape(radius, p, p * area - rubber, None, None)

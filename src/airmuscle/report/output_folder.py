@@ -21,7 +21,8 @@ def atomic_folder(folder: Path | str) -> Iterator[Path]:
     """Yield an empty temporary folder whose files are moved into `folder` when the block ends without an exception.
 
     If the block raises, or the files cannot be written, `folder` remains unchanged, or is not created. Files of the
-    same name are replaced, other files are kept. What a killed process has left in `folder` is removed. Raises FileError.
+    same name are replaced, other files are kept. What a killed process has left in `folder` is removed. Raises
+    FileError.
     """
     target = Path(folder)
     with _raise_file_errors(target):
