@@ -28,6 +28,12 @@ def check_numbers(*values: Any) -> None:
             )
 
 
+def as_arrays(*values: Any) -> tuple[Any, ...]:
+    """The values as arrays of numbers of one shape. Raises TraceError for traced values."""
+    check_numbers(*values)
+    return tuple(np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in values)))
+
+
 def describe_range(low: float, high: float, unit: str) -> str:
     """Return a range as text with four significant digits; rounding residues become 0, missing limits a dash."""
     if np.isnan(low) or np.isnan(high):
@@ -52,8 +58,7 @@ def find_first_root(
     """
     from scipy.optimize import elementwise
 
-    check_numbers(*args)
-    first, second = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in args))
+    first, second = as_arrays(*args)
     a, b = first.reshape(-1), second.reshape(-1)
     grid = np.linspace(*bounds, INTERVALS + 1)
     with np.errstate(over="ignore", invalid="ignore"):  # a model may overflow far from its solutions

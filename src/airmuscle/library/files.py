@@ -60,7 +60,7 @@ def is_path(name_or_path: str | Path) -> bool:
 def read_toml(path: Path) -> dict[str, Any]:
     """Tables of a TOML file. Raises FileError if the file cannot be read or is not valid TOML."""
     try:
-        if not path.exists():
+        if "\0" not in str(path) and not path.exists():
             raise FileError(f"{path}: there is no such file.")
         check_regular_file(path)
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
