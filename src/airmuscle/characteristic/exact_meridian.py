@@ -108,7 +108,7 @@ class ExactMeridian(PressureLaw):
             return self._evaluate_shape(radius, p, load).lengths[0] / tube.fibre_length - 1.0
 
         above_threshold = (self.threshold_pressure, np.inf)
-        check_solution(np.add(pressure, 0.0 * force), above_threshold, (pressure, force), self._below_threshold_message)
+        check_solution(as_arrays(pressure, force)[0], above_threshold, (pressure, force), self._below_threshold_message)
         radii = (tube.end_radius * (1 + 1e-9), float(tube.segment(tube.free_contraction).max_radius))
         radius = find_first_root(
             residual, radii, (pressure, force), lambda p, f, *_: self._no_contraction_message(p, f)
