@@ -199,6 +199,7 @@ def test_modules_are_imported_by_name_in_few_files_only():
         "compile/cache/kernel.py",  # kernels that are not in the cache
         "library/models.py",  # models named in TOML files
         "recording/optional_dependency.py",  # readers of laboratory formats
+        "recording/separate_process.py",  # readers in native code
         "reproduce/run.py",  # papers
         "study/executors.py",  # Dask
     }

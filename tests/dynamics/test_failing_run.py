@@ -203,11 +203,14 @@ PARTS = [
         "gas must be an instance of Gas",
     ),
     (lambda: WithLeak(None, VALVE), "WithLeak: circuit must be an instance of Circuit; it is None"),
-    (lambda: Manifold(Supply(5e5), (3,), ("a",)), "branches is .*; it must be a tuple of Circuit"),
-    (lambda: Manifold(Supply(5e5), FillDischarge(SharedSupply(), VALVE, VALVE), ("a",)), "must be a tuple of Circuit"),
+    (
+        lambda: Manifold(Supply(5e5), (3,), ("a",)),
+        "branches must be a tuple, each element of which is an instance of Circuit",
+    ),
+    (lambda: Manifold(Supply(5e5), FillDischarge(SharedSupply(), VALVE, VALVE), ("a",)), "branches must be a tuple"),
     (
         lambda: Manifold(Supply(5e5), (FillDischarge(SharedSupply(), VALVE, VALVE),), (1,)),
-        "names is .*; it must be a tuple of str",
+        "names must be a tuple, each element of which is a text; it is",
     ),
 ]
 

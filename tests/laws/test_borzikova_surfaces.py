@@ -131,7 +131,9 @@ def test_the_misprinted_surface_loads_with_a_warning():
 
 
 def test_a_wrong_number_of_coefficients_is_an_error():
-    with pytest.raises(ParameterError, match=r"degree 4 in pressure and 2 in force needs 15 coefficients, not 14"):
+    with pytest.raises(
+        ParameterError, match=r"with pressure_degree 4 and force_degree 2 needs 15 coefficients, not 14"
+    ):
         dataclasses.replace(EXPONENTIAL, coefficients=EXPONENTIAL.coefficients[:14])
 
 

@@ -286,7 +286,7 @@ def test_what_cannot_stand_beside_a_series_spring_is_refused():
 
 
 def test_unequal_lists_of_creep_are_refused():
-    with pytest.raises(ParameterError, match="2 stiffnesses and 1 relaxation times are given; give one of each"):
+    with pytest.raises(ParameterError, match="2 stiffnesses and 1 relaxation_times are given; give one of each"):
         CreepElements((1.0, 2.0), (1.0,))
 
 

@@ -54,3 +54,18 @@ def test_a_plain_pressure_unit_is_assumed_to_be_gauge_and_marked():
 def test_a_unit_of_another_quantity_is_an_error(text, target):
     with pytest.raises(UnitError):
         units.quantity(text, target)
+
+
+def test_a_text_of_a_hundred_thousand_characters_is_no_unit():
+    for convert in (lambda: units.quantity("1 " + "m" * 100_000, "m"), lambda: units.conversion("m" * 100_000, "m")):
+        with pytest.raises(UnitError, match=r"characters is not a .*unit; at most 200 are allowed"):
+            convert()
+
+
+@pytest.mark.parametrize(
+    ("text", "target", "example"), [("200", "m", "200 mm"), ("3", "Pa", "3 bar"), ("300", "Pa", "300 kPa"),
+                                    ("5", "kg", "5 kg"), ("20", "s", "20 ms"), ("7", "N", "7 N")]
+)  # fmt: skip
+def test_a_hint_has_the_usual_unit(text: str, target: str, example: str):
+    with pytest.raises(UnitError, match=f"write it like '{example}'"):
+        units.quantity(text, target)

@@ -443,3 +443,15 @@ def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch
     assert result.stderr == f"partial results were written to {tmp_path / 'run'}\ninterrupted\n"
     kept = read_csv(tmp_path / "run" / "recording.csv")
     assert kept["time"][-1] == pytest.approx(0.2, abs=0.0011)
+
+
+def test_what_a_killed_process_has_left_is_removed_by_the_next_one(tmp_path: Path):
+    code = (
+        "import os, signal, sys; from airmuscle.report.output_folder import atomic_folder\n"
+        "with atomic_folder(sys.argv[1]) as folder:\n    (folder / 'a.csv').touch(); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    subprocess.run([sys.executable, "-c", code, str(tmp_path)], check=False)
+    assert len(list(tmp_path.glob(".unfinished-*"))) == 1
+    with atomic_folder(tmp_path) as mine, atomic_folder(tmp_path) as other:
+        assert sorted(tmp_path.iterdir()) == sorted([mine, other]), "the folder of a running process is kept"
+    assert not list(tmp_path.iterdir())

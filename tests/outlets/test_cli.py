@@ -25,8 +25,8 @@ from typer.testing import CliRunner, Result
 from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.cli.app import COMMANDS, app
 from airmuscle.cli.cite import as_bibtex
-from airmuscle.cli.terminal import print_json, print_table, printable
-from airmuscle.core.errors import UnknownNameError
+from airmuscle.cli.terminal import print_json, print_table
+from airmuscle.core.errors import UnknownNameError, printable
 from airmuscle.core.reference import Reference
 from airmuscle.library.catalogue import load
 from airmuscle.library.files import list_laws, list_valves
@@ -294,7 +294,7 @@ def test_a_point_outside_the_data_is_a_warning():
     ("given", "message"),
     [
         (("--pressure=3 kg", "--force=1 N"), "--pressure: unit 'kg' cannot be converted to 'Pa'"),
-        (("--pressure=3", "--force=1 N"), "--pressure: '3' has no unit; write it like '3 Pa'"),
+        (("--pressure=3", "--force=1 N"), "--pressure: '3' has no unit; write it like '3 bar'"),
         (("--pressure=-2 bar", "--contraction=0.1"), "a gauge pressure of -200 kPa is not above absolute vacuum"),
         (
             ("--pressure=3 bar", "--force=9 kN"),

@@ -5,6 +5,8 @@ Rates are compared relative to their size or the size of their state in a second
 
 from __future__ import annotations
 
+import contextlib
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +15,10 @@ from joints import chosen_muscle
 
 from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.core import tree
+from airmuscle.core.errors import AirmuscleWarning, TraceError
 from airmuscle.friction import MaxwellSlip
+from airmuscle.library.catalogue import load
+from airmuscle.library.files import list_laws
 from airmuscle.mechanism import HangingMass
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, EndStop, SeriesSpring, ViscoelasticWall
@@ -86,3 +91,15 @@ def test_a_gradient_by_every_parameter_is_the_difference_quotient():
         quotient = (inflow(leaves + step) - inflow(leaves - step)) / (2e-6 * leaves[i])
         assert gradient[i] == pytest.approx(float(quotient), rel=1e-6), path
         assert gradient[i] != 0.0
+
+
+@pytest.mark.parametrize("direction", ["contraction", "pressure", "force"])
+@pytest.mark.parametrize("name", list_laws())
+def test_a_direction_of_a_law_is_traced_or_refused(name: str, direction: str):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        entry = load(name)
+    law = entry.characteristic
+    arguments = {"contraction": (2e5, 100.0), "pressure": (0.1, 100.0), "force": (2e5, 0.1)}[direction]
+    with contextlib.suppress(TraceError):
+        jax.jit(getattr(law, direction))(*arguments)

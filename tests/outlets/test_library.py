@@ -254,7 +254,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path):
             r"radius is \[0.01\]; it must be one number in m \(r_0, radius of the braid",
         ),
         ('"10 mm"', "true", ParameterError, r"radius is True; it must be a number in m"),
-        ('"10 mm"', '"10"', UnitError, r"radius: '10' has no unit; write it like '10 m'"),
+        ('"10 mm"', '"10"', UnitError, r"radius: '10' has no unit; write it like '10 mm'"),
         ('"10 mm"', '"wide"', UnitError, r"radius: 'wide' is not a number with a unit"),
         ('"10 mm"', '"10 N"', UnitError, r"radius: unit 'N' cannot be converted to 'm'"),
         ('"LinearSpring"', '"Braid"', ParameterError, r"\[spring\]: Braid (needs|has no parameter)"),

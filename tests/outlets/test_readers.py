@@ -6,6 +6,8 @@ name. Very long files are downsampled in bounded memory, with a note.
 
 from __future__ import annotations
 
+import contextlib
+import os
 import re
 import sys
 import tracemalloc
@@ -16,9 +18,10 @@ import numpy as np
 import pytest
 
 from airmuscle.core.errors import AirmuscleWarning, ColumnError, FileError, InputError, ParameterError, UnitError
-from airmuscle.recording import BlockMeans, ColumnMapping, Decimation, Recording, large_csv, read
+from airmuscle.recording import BlockMeans, ColumnMapping, Decimation, Recording, large_csv, read, separate_process
 from airmuscle.recording.clock import seconds_from_clock
 from airmuscle.recording.mapping import read_mapping
+from airmuscle.recording.separate_process import call_in_separate_process
 
 TIME = np.arange(40) * 0.05
 PRESSURE = 100.0 + 5.0 * np.arange(40.0)  # kPa
@@ -241,7 +244,7 @@ def test_a_damaged_file_is_one_error_that_names_it(tmp_path: Path, ending: str):
     path = tmp_path / f"broken{ending}"
     path.write_bytes(b"this is no measurement at all" * 50)
     assert f"broken{ending}: cannot be read as" in refusal(FileError, path)
-    assert "there is no such file" in refusal(FileError, tmp_path / f"none{ending}")
+    assert "No such file or directory" in refusal(FileError, tmp_path / f"none{ending}")
 
 
 @pytest.mark.parametrize(
@@ -256,7 +259,7 @@ def test_a_missing_package_is_an_error_with_the_install_command(tmp_path: Path, 
 
 def test_an_unknown_format(tmp_path: Path):
     (tmp_path / "run.bin").write_bytes(b"\0\1\2")
-    assert "unknown binary format; supported extensions are .csv" in refusal(FileError, tmp_path / "run.bin")
+    assert "run.bin: the file is a binary file, not a table of text. Export" in refusal(FileError, tmp_path / "run.bin")
     assert "Save the file as .xlsx or .csv" in refusal(FileError, tmp_path / "run.xls")
 
 
@@ -524,3 +527,78 @@ def test_other_formats_are_downsampled_as_well(tmp_path: Path):
     assert "one in 4 is kept" in recording.notes[0]
     with pytest.raises(ParameterError, match="max_rows is 0; it must be at least 1"):
         Decimation(0)
+
+
+# Damaged files and files without end
+
+
+@pytest.mark.parametrize("ending", [".csv", ".txt", ".xlsx", ".mat", ".tdms", ".mf4"])
+def test_only_a_regular_file_is_read(tmp_path: Path, ending: str):
+    os.mkfifo(tmp_path / f"pipe{ending}")
+    (tmp_path / f"device{ending}").symlink_to("/dev/zero")
+    (tmp_path / f"empty{ending}").write_bytes(b"")
+    assert "because it is a pipe. Pass a regular file" in refusal(FileError, tmp_path / f"pipe{ending}")
+    assert "because it is a device. Pass a regular file" in refusal(FileError, tmp_path / f"device{ending}")
+    assert refusal(FileError, tmp_path / f"empty{ending}").endswith("the file is empty.")
+    assert "No such file or directory" in refusal(FileError, tmp_path / f"none{ending}")
+
+
+def test_a_mapping_is_read_from_a_regular_file_only(tmp_path: Path):
+    os.mkfifo(tmp_path / "map.toml")
+    with pytest.raises(FileError, match="because it is a pipe"):
+        read_mapping(tmp_path / "map.toml")
+
+
+@pytest.mark.parametrize(
+    ("content", "kind"),
+    [
+        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\x1b[31m", "a PNG image"),
+        (b"%PDF-1.4\n1 0 obj\n", "a PDF document"),
+        (b"PK\x03\x04\x14\0\6\0", "a ZIP archive or an Excel workbook"),
+        (bytes(range(256)), "a binary file"),
+    ],
+)
+def test_a_binary_file_with_the_name_of_a_text_file(tmp_path: Path, content: bytes, kind: str):
+    (tmp_path / "run.csv").write_bytes(content)
+    assert refusal(FileError, tmp_path / "run.csv").startswith(f"run.csv: the file is {kind}, not a table of text.")
+
+
+def test_an_error_escapes_the_control_characters_of_a_file(tmp_path: Path):
+    (tmp_path / "run.csv").write_text("a\x1b[31m,b\n1,2\n")
+    assert "(a\\x1b[31m, b)" in refusal(ColumnError, tmp_path / "run.csv")
+
+
+@pytest.mark.parametrize("save", [save_v5, save_v73])
+def test_a_damaged_matlab_file_does_not_end_the_process(tmp_path: Path, save):
+    pytest.importorskip("pymatreader")
+    content = save(tmp_path / "run.mat", mat_content()).read_bytes()
+    unknown_type = content.index(b"t\0\0\0") + 4  # type of the numbers, for which SciPy has a segmentation fault
+    for position in (unknown_type, 130, len(content) // 2, len(content) - 100):
+        damaged = bytearray(content)
+        damaged[position] ^= 64
+        (tmp_path / "damaged.mat").write_bytes(damaged)
+        with contextlib.suppress(InputError):  # a flipped bit of a number cannot be detected
+            read(tmp_path / "damaged.mat", units={"time": "s"})
+    (tmp_path / "damaged.mat").write_bytes(content[: len(content) // 2])
+    assert "damaged" in refusal(FileError, tmp_path / "damaged.mat")
+    same(only(read(tmp_path / "run.mat", units={"time": "s"})))
+
+
+def test_a_file_whose_reader_ends_or_takes_too_long_is_damaged(tmp_path: Path, monkeypatch):
+    (tmp_path / "bad_reader.py").write_text(
+        "import os, time\ndef end(path): os._exit(1)\ndef wait(path): time.sleep(60)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(separate_process, "TIME_LIMIT", 1.0)
+    separate_process.stop()
+    path = csv(tmp_path / "run.csv")
+    for function, cause in (("end", "its reader ended without a result"), ("wait", "its reading takes more than 1 s")):
+        with pytest.raises(FileError, match=rf"run.csv: the file is damaged \({cause}\). Copy it again"):
+            call_in_separate_process("bad_reader", function, path)
+
+
+def test_a_value_that_no_measurement_has(tmp_path: Path):
+    (tmp_path / "run.csv").write_text("pressure [bar],force [N]\n1,2\n1e300,3\n")
+    assert "line 3: pressure is 1e+305 in SI units; no measurement exceeds 1e+15" in refusal(
+        ColumnError, tmp_path / "run.csv"
+    )

@@ -140,7 +140,7 @@ class _PolynomialSurface(ContractionLaw):
         expected = (self.pressure_degree + 1) * (self.force_degree + 1)
         if len(self.coefficients) != expected:
             raise ParameterError(
-                f"{name} of degree {self.pressure_degree} in pressure and {self.force_degree} in force needs "
+                f"{name} with pressure_degree {self.pressure_degree} and force_degree {self.force_degree} needs "
                 f"{expected} coefficients, not {len(self.coefficients)}."
             )
         for quantity, low, high in (

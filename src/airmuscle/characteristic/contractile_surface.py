@@ -58,7 +58,7 @@ class ContractileSurface(ForceLaw):
     degree: int = 5
 
     def check(self) -> None:
-        expected = len(exponents(self.degree))
+        expected = (self.degree + 1) * (self.degree + 2) // 2 if self.degree >= 0 else 0
         if len(self.coefficients) != expected:
             raise ParameterError(
                 f"ContractileSurface: degree {self.degree} requires {expected} coefficients, not "

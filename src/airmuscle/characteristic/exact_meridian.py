@@ -16,7 +16,7 @@ from ..geometry.meridian import SAGA_2007, Profile
 from ..geometry.pleated import DAERDEN_LEFEBER_2001, PleatedTube, unwrap_scalar
 from .base import PressureLaw, Slopes
 from .rubber import RubberLine
-from .solve import check_solution, find_first_root
+from .solve import as_arrays, check_solution, find_first_root
 
 NODES = 120  # Gauss points over half the meridian
 
@@ -108,7 +108,7 @@ class ExactMeridian(PressureLaw):
             return self._evaluate_shape(radius, p, load).lengths[0] / tube.fibre_length - 1.0
 
         above_threshold = (self.threshold_pressure, np.inf)
-        check_solution(np.add(pressure, 0.0 * force), above_threshold, (pressure, force), self._below_threshold_message)
+        check_solution(as_arrays(pressure, force)[0], above_threshold, (pressure, force), self._below_threshold_message)
         radii = (tube.end_radius * (1 + 1e-9), float(tube.segment(tube.free_contraction).max_radius))
         radius = find_first_root(
             residual, radii, (pressure, force), lambda p, f, *_: self._no_contraction_message(p, f)
@@ -127,7 +127,7 @@ class ExactMeridian(PressureLaw):
     def shape_at_force(self, contraction: Value, force: Value) -> MeridianShape:
         """Shape in equilibrium with a tension [N] at a contraction [1]; its pressure is NaN if there is no solution."""
         check_contraction_range(contraction, self.contraction_range, "ExactMeridian")
-        c, load = np.broadcast_arrays(np.asarray(contraction, float), np.asarray(force, float))
+        c, load = as_arrays(contraction, force)
         radius, area, rubber = self._circle_estimate(c)
         start = np.maximum((load + rubber) / area, 1.05 * self._min_pressure(radius))
         shape = self._solve_shape(c, MeridianShape(radius, start, load, None, None), unknown=1)
@@ -149,7 +149,7 @@ class ExactMeridian(PressureLaw):
     def shape_at_pressure(self, pressure: Value, contraction: Value) -> MeridianShape:
         """Shape at a pressure [Pa] and a contraction [1]; its force is NaN if there is no solution."""
         check_contraction_range(contraction, self.contraction_range, "ExactMeridian")
-        p, c = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(contraction, float))
+        p, c = as_arrays(pressure, contraction)
         radius, area, rubber = self._circle_estimate(c)
         start = MeridianShape(radius, p, p * area - rubber, None, None)
         return MeridianShape(*map(unwrap_scalar, self._solve_shape(c, start, unknown=2)))
@@ -207,7 +207,7 @@ class ExactMeridian(PressureLaw):
 
     def _evaluate_shape(self, radius: Value, pressure: Value, force: Value) -> MeridianShape:
         """Arc and chord length of the shape with these parameters, and their derivatives."""
-        radius, pressure, force = np.broadcast_arrays(*(np.asarray(x, float) for x in (radius, pressure, force)))
+        radius, pressure, force = as_arrays(radius, pressure, force)
         v, weights = (np.reshape(x, (-1,) + (1,) * radius.ndim) for x in _graded_quadrature())
         bulge = radius - self.geometry.end_radius
         curve = self._curve(radius, pressure, force, v)

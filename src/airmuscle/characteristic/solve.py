@@ -2,17 +2,36 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from ..core.errors import SolveError
+from ..core.errors import SolveError, TraceError
 
 INTERVALS = 256
 """Intervals of the search grid; a pair of roots within 1/256 of the search range is not resolved."""
 
 _TOLERANCES = {"xatol": 0.0, "xrtol": 4 * float(np.finfo(float).eps), "fatol": 0.0, "frtol": 0.0}
+
+
+def check_numbers(*values: Any) -> None:
+    """Raise TraceError for values of a traced program: those within `jax.jit`, and symbols of CasADi."""
+    jax = sys.modules.get("jax")
+    for value in values:
+        if type(value).__module__.startswith("casadi") or (jax and isinstance(value, jax.core.Tracer)):
+            raise TraceError(
+                "this direction of the characteristic is not in closed form: its root search needs numbers, but "
+                f"{type(value).__name__} is a value of a traced program. Call it outside of jax.jit, or use a "
+                "direction that the characteristic gives in closed form."
+            )
+
+
+def as_arrays(*values: Any) -> tuple[Any, ...]:
+    """The values as arrays of numbers of one shape. Raises TraceError for traced values."""
+    check_numbers(*values)
+    return tuple(np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in values)))
 
 
 def describe_range(low: float, high: float, unit: str) -> str:
@@ -35,10 +54,11 @@ def find_first_root(
     This is the branch reached from rest as x increases. `args` are the two other quantities a and b, scalars or arrays
     that broadcast; the result has their shape. Raises SolveError for the first pair without a root, with the text of
     `message(a, b, minimum, maximum)`, where minimum and maximum are the extreme values of `function` within `bounds`.
+    Raises TraceError for traced values, which have no numbers.
     """
     from scipy.optimize import elementwise
 
-    first, second = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in args))
+    first, second = as_arrays(*args)
     a, b = first.reshape(-1), second.reshape(-1)
     grid = np.linspace(*bounds, INTERVALS + 1)
     with np.errstate(over="ignore", invalid="ignore"):  # a model may overflow far from its solutions

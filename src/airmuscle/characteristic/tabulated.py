@@ -13,7 +13,7 @@ from ..core.declaration import model, parameter
 from ..core.errors import ParameterError, SolveError
 from ..core.ops import Value
 from .base import Characteristic, Slopes
-from .solve import describe_range
+from .solve import as_arrays, describe_range
 
 _BISECTIONS = 60
 """Number of bisections; 2^-60 of the contraction range is below the rounding of its limits."""
@@ -65,7 +65,7 @@ class Tabulated(Characteristic):
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         table = _isobars(self)
-        c, load = np.broadcast_arrays(np.asarray(contraction, dtype=float), np.asarray(force, dtype=float))
+        c, load = as_arrays(contraction, force)
         forces = table.forces(c)
         between = (forces[:-1] <= load) & (load <= forces[1:])
         solvable = between.any(axis=0)
@@ -82,7 +82,7 @@ class Tabulated(Characteristic):
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         table = _isobars(self)
-        p, load = np.broadcast_arrays(np.asarray(pressure, dtype=float), np.asarray(force, dtype=float))
+        p, load = as_arrays(pressure, force)
         low, high = table.contraction_limits(p)
         ends = np.array([table.evaluate(p, low)[0], table.evaluate(p, high)[0]])
         unsolvable = ~((load <= ends[0]) & (load >= ends[1]))
@@ -122,7 +122,7 @@ class _IsobarTable:
 
     def evaluate(self, pressure: Any, contraction: Any) -> tuple[Array, Array, Array]:
         """Force [N] and its derivatives by pressure and contraction. Raises SolveError outside the table."""
-        p, c = np.broadcast_arrays(np.asarray(pressure, dtype=float), np.asarray(contraction, dtype=float))
+        p, c = as_arrays(pressure, contraction)
         start, end = self.contraction_limits(p)
         outside = ~((c >= start) & (c <= end))
         if outside.any():

@@ -15,10 +15,10 @@ from typing import Annotated, Any, NamedTuple
 import typer
 from typer.core import TyperGroup
 
-from ..core.errors import AirmuscleError, AirmuscleWarning, suggestion
+from ..core.errors import AirmuscleError, AirmuscleWarning, printable, suggestion
 from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
 from .remedies import in_options
-from .terminal import echo, printable
+from .terminal import echo
 
 SETTINGS: dict[str, Any] = {
     "add_completion": False,

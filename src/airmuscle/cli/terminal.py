@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import os
 import sys
-import unicodedata
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import typer
 
+from ..core.errors import printable
 from ..report.write import as_json
 
 WIDE = 160
@@ -22,15 +22,10 @@ def echo(text: str = "", *, err: bool = False) -> None:
     typer.echo(printable(text), err=err)
 
 
-def printable(text: str) -> str:
-    r"""The text with control characters and undecodable bytes replaced by escapes such as \x1b."""
-    return text if text.isprintable() else "".join(c if _is_printable(c) else _escape(c) for c in text)
-
-
 def print_json(content: Any) -> None:
     """Print standard JSON; numbers that are not finite are null."""
     lines = as_json(content).splitlines()
-    typer.echo("\n".join("".join(c if _is_printable(c) else json.dumps(c)[1:-1] for c in line) for line in lines))
+    typer.echo("\n".join("".join(c if printable(c) == c else json.dumps(c)[1:-1] for c in line) for line in lines))
 
 
 def print_table(headers: Sequence[str], rows: Iterable[Sequence[Any]], *, right: Sequence[str] = ()) -> None:
@@ -59,15 +54,3 @@ def without_markup(text: str) -> str:
 def percent(ratio: float) -> str:
     """A ratio as a percentage with four significant digits: `12.5 %`."""
     return f"{100 * ratio:.4g} %"
-
-
-def _is_printable(character: str) -> bool:
-    return character.isprintable() or character in "\n\t" or unicodedata.category(character) == "Zs"
-
-
-def _escape(character: str) -> str:
-    """An escape; a byte that could not be decoded (U+DC80 to U+DCFF, PEP 383) is written as that byte."""
-    code = ord(character)
-    if 0xDC80 <= code <= 0xDCFF:
-        return f"\\x{code - 0xDC00:02x}"
-    return character.encode("unicode_escape").decode("ascii")

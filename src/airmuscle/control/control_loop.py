@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.annotation import abridged
 from ..core.errors import ParameterError, suggestion
 from ..recording.recording import Recording
 from .controller import Controller
@@ -62,10 +64,18 @@ class ControlLoop:
 
     def __post_init__(self) -> None:
         if not isinstance(self.controller, Controller):
-            raise ParameterError(f"ControlLoop.controller is {self.controller!r}; give a PID or another Controller.")
+            raise ParameterError(
+                f"ControlLoop.controller is {abridged(self.controller)}; give a PID or another Controller."
+            )
         sample_time = self.sample_time
-        if isinstance(sample_time, bool) or not isinstance(sample_time, float | int) or not 0 < sample_time < math.inf:
-            raise ParameterError(f"ControlLoop.sample_time is {sample_time!r} s; it must be positive and finite.")
+        if (
+            isinstance(sample_time, bool)
+            or not isinstance(sample_time, float | int)
+            or not 0 < sample_time <= sys.float_info.max
+        ):
+            raise ParameterError(
+                f"ControlLoop.sample_time is {abridged(sample_time)} s; it must be positive and finite."
+            )
         check_input_signal(self.setpoint)
         check_input_signal(self.other_inputs)
         self._check_names()

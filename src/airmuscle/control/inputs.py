@@ -11,6 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from ..core.annotation import abridged
 from ..core.arrays import Array
 from ..core.declaration import as_float
 from ..core.errors import ParameterError, suggestion
@@ -44,7 +45,9 @@ class InputSignal(abc.ABC):
 def check_input_signal(given: object) -> None:
     """Raise ParameterError for anything that is not an InputSignal, such as a dictionary."""
     if not isinstance(given, InputSignal):
-        raise ParameterError(f"the input is {given!r}; give a Schedule, a SampledSignal or another InputSignal.")
+        raise ParameterError(
+            f"the input is {abridged(given)}; give a Schedule, a SampledSignal or another InputSignal."
+        )
 
 
 NO_INPUT = "the plant has no input"
@@ -60,7 +63,7 @@ def check_input_names(given: Sequence[str], inputs: Sequence[str], prefix: str =
 
 def _check_mapping(kind: str, given: object, example: str = "((5, 1), (15, 0))") -> None:
     if not isinstance(given, Mapping):
-        raise ParameterError(f"a {kind} is {given!r}; name the inputs: {{'fill': {example}}}.")
+        raise ParameterError(f"a {kind} is {abridged(given)}; name the inputs: {{'fill': {example}}}.")
 
 
 def _pairs(kind: str, name: str, given: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -7,17 +7,22 @@ Any other field is structure: another model, a tuple of models, an integer or a 
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
-import typing
+import warnings
 from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 
-from .errors import ParameterError, suggestion
+from .annotation import abridged, conforms, describe, type_hints
+from .errors import AirmuscleWarning, ParameterError, suggestion
+from .units import is_known_unit, quantity, usual_unit
 
 T = TypeVar("T")
 INFINITY = math.inf
+_MAX_INTEGER = 1_000_000
+"""Maximum magnitude of an integer in a model, such as a number of segments (chosen)."""
+_MAX_CHARACTERS = 200
+"""Maximum length of a text in a model, such as a name (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,6 +36,7 @@ class Parameter:
     bounds: tuple[float, float]
     fitted: bool
     default: Any
+    plausible: float = 0.0
 
 
 def parameter(
@@ -40,15 +46,24 @@ def parameter(
     *,
     bounds: tuple[float, float] = (-INFINITY, INFINITY),
     fitted: bool = True,
+    plausible: float = 0.0,
     **field: Any,
 ) -> Any:
     """Declare a parameter as a dataclass field; documentation, fits, TOML files and the command line read it from here.
 
     `bounds` are closed and physical. `fitted=False` excludes the parameter from fits by default (a length measured
-    with a ruler, a clamp). Values are in SI units, in `unit`.
+    with a ruler, a clamp). A value other than zero whose magnitude is below `plausible` causes an AirmuscleWarning.
+    Values are in SI units, in `unit`, or texts with a unit, such as "300 mm".
     """
     return dataclasses.field(
-        metadata={"unit": unit, "symbol": symbol, "meaning": meaning, "bounds": bounds, "fitted": fitted},
+        metadata={
+            "unit": unit,
+            "symbol": symbol,
+            "meaning": meaning,
+            "bounds": bounds,
+            "fitted": fitted,
+            "plausible": plausible,
+        },
         **field,
     )
 
@@ -58,7 +73,9 @@ def model(cls: type[T]) -> type[T]:
     """Make a class a frozen dataclass whose declared parameters are validated on construction.
 
     Library and scenario files may name the class unless it declares `from_file: ClassVar[bool] = False`. A model may
-    define `check(self)` for conditions on several parameters together; it raises ParameterError.
+    define `check(self)` for conditions on several parameters together; it raises ParameterError. The values of the
+    other fields must conform to their annotations, unless the class declares `checks_structure: ClassVar[bool] = True`
+    because its `check` does this.
     """
     if "from_file" not in cls.__dict__:
         cls.from_file = True  # type: ignore[attr-defined]
@@ -75,15 +92,17 @@ def parameters(obj: Any) -> tuple[Parameter, ...]:
 
 
 def _validate(obj: Any) -> None:
-    """Check every declared parameter, then the conditions of `check`. Raises ParameterError."""
+    """Check every field, then the conditions of `check`. Raises ParameterError or UnitError."""
+    if not getattr(obj, "checks_structure", False):
+        _check_annotations(obj)
     lists = {f.name for f in dataclasses.fields(obj) if "tuple" in str(f.type)}
     for declared in parameters(obj):
         value = getattr(obj, declared.name)
         if isinstance(value, tuple | list | np.ndarray) != (declared.name in lists):
             expected = "several numbers, such as (1.0, 2.0)" if declared.name in lists else "one number"
             raise ParameterError(
-                f"{type(obj).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is {value!r}; "
-                f"it must be {expected}."
+                f"{type(obj).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is "
+                f"{abridged(value)}; it must be {expected}."
             )
         object.__setattr__(obj, declared.name, _check_value(type(obj).__name__, declared, value))
     if hasattr(obj, "check"):
@@ -91,22 +110,38 @@ def _validate(obj: Any) -> None:
 
 
 def _check_value(owner: str, declared: Parameter, value: Any) -> Any:
-    """Return the value as float or tuple of floats. Raises ParameterError if it is not finite or out of bounds."""
+    """Return the value as float or tuple of floats; a text with a unit is converted to SI units.
+
+    Raises ParameterError if it is not finite or out of bounds, UnitError if the unit has another dimension.
+    """
     if isinstance(value, tuple | list | np.ndarray):
         return tuple(_check_value(owner, declared, v) for v in value)
     low, high = declared.bounds
     unit = "" if declared.unit == "1" else f" {declared.unit}"
     label = f"{owner}.{declared.name} ({declared.symbol}, {declared.meaning})"
+    if isinstance(value, str) and is_known_unit(declared.unit):
+        value = quantity(value, declared.unit, where=label)
     if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
-        raise ParameterError(f"{label} is {value!r}; it must be a number{unit and ' in' + unit}.")
+        raise ParameterError(f"{label} is {abridged(value)}; it must be a number{unit and ' in' + unit}.")
+    try:
+        value = float(value)
+    except OverflowError:
+        raise ParameterError(f"{label} is too large a number; allowed range: {low:g} to {high:g}{unit}.") from None
     if not math.isfinite(value):
         raise ParameterError(f"{label} is {value}; it must be finite.")
     if not low <= value <= high:
         raise ParameterError(
             f"{label} is {value:g}{unit}; allowed range: {low:g} to {high:g}{unit}."
-            f"{' Values are in SI units; check the unit.' if unit else _percent_hint(float(value), high)}"
+            f"{' Values are in SI units; check the unit.' if unit else _percent_hint(value, high)}"
         )
-    return float(value)
+    if 0.0 < abs(value) < declared.plausible:
+        warnings.warn(
+            f"{label} is {value:g}{unit}, which is implausibly small: values without a unit are in SI units. Check the "
+            f"unit, or write it, such as '{value:g} {usual_unit(value, declared.unit)}'.",
+            AirmuscleWarning,
+            stacklevel=5,
+        )
+    return value
 
 
 def _percent_hint(value: float, high: float) -> str:
@@ -118,8 +153,8 @@ def as_float(label: str, value: Any) -> float:
     """Return the value as a float. Raises ParameterError for anything but a number, such as a text with a unit."""
     try:
         return float(0.0 + value)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{label} is {value!r}; it must be one number, in SI units.") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(f"{label} is {abridged(value)}; it must be one number, in SI units.") from None
 
 
 def as_finite_float(label: str, value: Any) -> float:
@@ -130,17 +165,6 @@ def as_finite_float(label: str, value: Any) -> float:
     return number
 
 
-@functools.cache
-def _component_types(cls: type[Any]) -> dict[str, type[Any]]:
-    """Return the model class expected in each structural field, for fields annotated with a single class."""
-    try:
-        hints = typing.get_type_hints(cls)
-    except NameError:  # a user-defined class whose annotations refer to names imported for type checking only
-        return {}
-    structural = {f.name: hints[f.name] for f in dataclasses.fields(cls) if "unit" not in f.metadata}
-    return {n: k for n, k in structural.items() if isinstance(k, type) and k.__module__ not in ("builtins", "types")}
-
-
 def attribute_hint(obj: Any, kind: type[Any]) -> str:
     """Sentence that names the fields of `obj` that hold an object of class `kind`; empty if there are none."""
     if not dataclasses.is_dataclass(obj) or isinstance(obj, type):
@@ -149,19 +173,37 @@ def attribute_hint(obj: Any, kind: type[Any]) -> str:
     return f" It contains one: write {' or '.join(names)} after it." if names else ""
 
 
+def _check_annotations(obj: Any) -> None:
+    """Raise ParameterError if a structural field does not conform to its annotation."""
+    hints = type_hints(type(obj))
+    for field in dataclasses.fields(obj):
+        component, hint = getattr(obj, field.name), hints.get(field.name)
+        if "unit" in field.metadata:
+            continue
+        if isinstance(component, int | str):
+            _check_size(f"{type(obj).__name__}: {field.name}", component)
+        if not conforms(component, hint):
+            raise ParameterError(
+                f"{type(obj).__name__}: {field.name} must be {describe(hint)}; it is {abridged(component)}."
+                f"{attribute_hint(component, hint) if isinstance(hint, type) else ''}"
+            )
+
+
+def _check_size(label: str, value: int | str) -> None:
+    """Raise ParameterError for an integer or a text that is too large for any model."""
+    if isinstance(value, int) and abs(value) > _MAX_INTEGER:
+        raise ParameterError(f"{label} is too large an integer; allowed range: at most {_MAX_INTEGER}.")
+    if isinstance(value, str) and len(value) > _MAX_CHARACTERS:
+        raise ParameterError(f"{label} is a text of {len(value)} characters; at most {_MAX_CHARACTERS} are allowed.")
+
+
 def check_structure(obj: Any) -> None:
     """Raise ParameterError if a component, at any depth of a model, is not an instance of its field's class."""
     if isinstance(obj, tuple):
         for item in obj:
             check_structure(item)
     elif dataclasses.is_dataclass(obj) and not isinstance(obj, type):
-        for name, kind in _component_types(type(obj)).items():
-            component = getattr(obj, name)
-            if not isinstance(component, kind):
-                raise ParameterError(
-                    f"{type(obj).__name__}: {name} must be an instance of {kind.__name__}; it is {str(component)[:80]}."
-                    f"{attribute_hint(component, kind)}"
-                )
+        _check_annotations(obj)
         for field in dataclasses.fields(obj):
             check_structure(getattr(obj, field.name))
 

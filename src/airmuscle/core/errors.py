@@ -21,12 +21,33 @@ AirmuscleWarning             a result that may differ from what the user expects
 from __future__ import annotations
 
 import difflib
+import unicodedata
 from collections.abc import Iterable
 from typing import Any
 
 
+def printable(text: str) -> str:
+    r"""The text with control characters and undecodable bytes replaced by escapes such as \x1b."""
+    return text if text.isprintable() else "".join(c if _is_printable(c) else _escape(c) for c in text)
+
+
+def _is_printable(character: str) -> bool:
+    return character.isprintable() or character in "\n\t" or unicodedata.category(character) == "Zs"
+
+
+def _escape(character: str) -> str:
+    """An escape; a byte that could not be decoded (U+DC80 to U+DCFF, PEP 383) is written as that byte."""
+    code = ord(character)
+    if 0xDC80 <= code <= 0xDCFF:
+        return f"\\x{code - 0xDC00:02x}"
+    return character.encode("unicode_escape").decode("ascii")
+
+
 class AirmuscleError(Exception):
-    """Base class of all exceptions of airmuscle."""
+    """Base class of all exceptions of airmuscle; a message may quote a file, so control characters are escaped."""
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(printable(str(message)))
 
 
 class AirmuscleWarning(UserWarning):

@@ -15,6 +15,7 @@ import math
 import re
 from typing import Any
 
+from .annotation import abridged
 from .errors import UnitError
 
 AMBIENT_PRESSURE = 101_325.0
@@ -42,6 +43,15 @@ _FACTORS: dict[str, tuple[float, str]] = {
     "GPa/m^2": (1e9, "Pa/m^2"), "MPa/m^3": (1e6, "Pa/m^3"),
 }  # fmt: skip
 """Factors of common units, tested against pint, whose registry takes 0.4 s to load."""
+
+_USUAL_UNITS: dict[str, tuple[tuple[float, str], ...]] = {
+    "m": ((1.0, "m"), (math.inf, "mm")), "Pa": ((20.0, "bar"), (1e4, "kPa")), "s": ((10.0, "s"), (math.inf, "ms")),
+    ABSOLUTE: ((20.0, "bara"), (1e4, "kPa(a)")), "m3": ((math.inf, "cm3"),), "rad": ((3.2, "rad"), (math.inf, "deg")),
+    "kg": ((500.0, "kg"), (math.inf, "g")), "m3/(s Pa)": ((1e-5, "m3/(s Pa)"), (math.inf, "dm3/(s bar)")),
+}  # fmt: skip
+"""Units in which a number below a limit is usually written, by SI unit (chosen), for the examples in messages."""
+_MAX_CHARACTERS = 200
+"""Maximum number of characters of a text with a unit (chosen)."""
 
 _GAUGE_OR_ABSOLUTE = re.compile(
     r"^(?P<unit>(?:Pa|hPa|kPa|MPa|bar|mbar|psi|atm|torr))\s*[_ ]?\(?\s*(?P<kind>g|a|gauge|abs|absolute)\s*\)?$",
@@ -115,6 +125,11 @@ def conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, whe
     `ambient` is the absolute ambient pressure [Pa] subtracted from absolute pressures; `where` is the prefix of error
     messages. Raises UnitError for a unit that is unknown or of another dimension.
     """
+    if len(unit) > _MAX_CHARACTERS:
+        raise UnitError(
+            f"{where}{': ' if where else ''}a text of {len(unit)} characters is not a unit; at most {_MAX_CHARACTERS} "
+            "are allowed. Write it like 'mm', 'kPa' or 'N'."
+        )
     if target == ABSOLUTE:
         if (match := _GAUGE_OR_ABSOLUTE.match(unit.strip())) and match["kind"].lower().startswith("g"):
             raise UnitError(f"{where}: unit '{unit}' is gauge, but this pressure is absolute; write kPa(a) or bara.")
@@ -140,6 +155,21 @@ def conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, whe
     return dataclasses.replace(found_by_pint, assumed_gauge=target == "Pa")
 
 
+@functools.cache
+def is_known_unit(unit: str) -> bool:
+    """Whether texts can be converted to a unit; false for a declared unit such as 'u/y' or '1 or N'."""
+    try:
+        return unit in _FACTORS or unit == ABSOLUTE or bool(_convert_with_pint(unit, unit, ""))
+    except UnitError:
+        return False
+
+
+def usual_unit(number: float, target: str) -> str:
+    """The unit that was probably meant by a number without one: 'mm' for 200 where `target` is 'm'."""
+    candidates = _USUAL_UNITS.get(target, ())
+    return next((unit for limit, unit in candidates if abs(number) < limit), target.replace(ABSOLUTE, "Pa(a)"))
+
+
 _NUMBER = re.compile(r"^\s*(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>.*?)\s*$")
 
 
@@ -154,14 +184,20 @@ def quantity(value: float | str, target: str, *, ambient: float = AMBIENT_PRESSU
         with contextlib.suppress(OverflowError):
             return float(value)
         raise UnitError(f"{prefix}the number is too large.")
+    if isinstance(value, str) and len(value) > _MAX_CHARACTERS:
+        raise UnitError(
+            f"{prefix}a text of {len(value)} characters is not a number with a unit; at most {_MAX_CHARACTERS} are "
+            "allowed. Write it like '6 bar' or '300 mm'."
+        )
     match = _NUMBER.match(value) if isinstance(value, str) else None
     if not isinstance(value, str) or not match:
-        raise UnitError(f"{prefix}{value!r} is not a number with a unit; write it like '6 bar' or '300 mm'.")
+        raise UnitError(f"{prefix}{abridged(value)} is not a number with a unit; write it like '6 bar' or '300 mm'.")
     if re.match(r",\s*\d", match["unit"]):
         corrected = value.replace(",", ".", 1)
         raise UnitError(f"{prefix}'{value}' contains a comma; write a decimal point, '{corrected}'.")
     if not match["unit"] and target != "1":
-        raise UnitError(f"{prefix}'{value}' has no unit; write it like '{match['number']} {target}'.")
+        unit = usual_unit(float(match["number"]), target)
+        raise UnitError(f"{prefix}'{value}' has no unit; write it like '{match['number']} {unit}'.")
     number = float(match["number"])
     if not math.isfinite(number):
         raise UnitError(f"{prefix}'{value}' is too large.")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import FileError, UnknownNameError, suggestion
+from ..recording.file_kind import check_regular_file
 
 LAWS = Path(__file__).parent
 """Folder of the muscles and laws."""
@@ -59,9 +60,10 @@ def is_path(name_or_path: str | Path) -> bool:
 def read_toml(path: Path) -> dict[str, Any]:
     """Tables of a TOML file. Raises FileError if the file cannot be read or is not valid TOML."""
     try:
+        if "\0" not in str(path) and not path.exists():
+            raise FileError(f"{path}: there is no such file.")
+        check_regular_file(path)
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise FileError(f"{path}: there is no such file.") from None
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror}).") from None
     except UnicodeDecodeError as error:

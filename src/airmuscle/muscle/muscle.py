@@ -11,6 +11,7 @@ from ..characteristic.contractile_surface import HOSOVSKY_HILL
 from ..characteristic.validity_range import ValidityRange
 from ..characteristic.virtual_work import VirtualWork
 from ..core import autodiff, ops
+from ..core.annotation import abridged
 from ..core.declaration import model
 from ..core.errors import ParameterError
 from ..core.ops import Value
@@ -56,6 +57,7 @@ class Muscle:
     """
 
     references: ClassVar[tuple[Reference, ...]] = (HOSOVSKY_HILL,)
+    checks_structure: ClassVar[bool] = True
 
     contractile: ForceLaw
     geometry: Geometry
@@ -81,12 +83,12 @@ class Muscle:
         for field, kind in kinds.items():
             part = getattr(self, field)
             if not isinstance(part, kind):
-                raise ParameterError(f"Muscle: {field} is {part!r}; it must be a {kind.__name__}.")
+                raise ParameterError(f"Muscle: {field} is {abridged(part)}; it must be a {kind.__name__}.")
         if not isinstance(self.name, str) or not self.name:
-            raise ParameterError(f"Muscle: name is {self.name!r}; it must be a non-empty text, such as 'left'.")
+            raise ParameterError(f"Muscle: name is {abridged(self.name)}; it must be a non-empty text, such as 'left'.")
         if not isinstance(self.validity_range, ValidityRange | None):
             raise ParameterError(
-                f"Muscle: validity_range is {self.validity_range!r}; it must be a ValidityRange or None."
+                f"Muscle: validity_range is {abridged(self.validity_range)}; it must be a ValidityRange or None."
             )
         if isinstance(self.series, SeriesSpring):
             self._check_series_elements()

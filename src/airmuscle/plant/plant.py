@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 from ..core.declaration import as_finite_float, model
 from ..core.diagnostics import Columns, Diagnostic, DiagnosticCode
@@ -39,6 +39,8 @@ class Plant(System):
     With one muscle the names are plain (`air_mass`, `pressure`, `bristle`); with several they carry its name
     (`left.pressure`), as does what belongs to a circuit in a tuple, or to a muscle's tube in a circuit for all.
     """
+
+    checks_structure: ClassVar[bool] = True
 
     muscle: Muscle | tuple[Muscle, ...]
     circuit: Circuit | tuple[Circuit, ...]

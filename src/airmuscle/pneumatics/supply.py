@@ -37,9 +37,12 @@ class AirSource(abc.ABC):
 
 @model
 class Supply(AirSource):
-    """Ideal supply: constant pressure at ambient temperature."""
+    """Ideal supply: constant pressure at ambient temperature.
 
-    pressure: float = parameter("Pa", "p_s", "gauge pressure of the supply", bounds=(-1e5, 5e6))
+    A pressure below 1 kPa (chosen), such as 6 for 6 bar, causes an AirmuscleWarning, except zero.
+    """
+
+    pressure: float = parameter("Pa", "p_s", "gauge pressure of the supply", bounds=(-1e5, 5e6), plausible=1e3)
 
     def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
         return Air(absolute_pressure(self.pressure, ambient), ambient.temperature)
@@ -110,7 +113,7 @@ class RegulatedSupply(AirSource):
 
     supply: AirSource
     valve: Orifice
-    pressure: float = parameter("Pa", "p_set", "set gauge pressure", bounds=(0.0, 2e6))
+    pressure: float = parameter("Pa", "p_set", "set gauge pressure", bounds=(0.0, 2e6), plausible=1e3)
     band: float = parameter(
         "Pa", "B", "proportional band: droop from zero to full flow", bounds=(100.0, 1e6), default=2e4
     )

@@ -23,6 +23,7 @@ from typing import Any
 from ..core.errors import ColumnError, FileError, ParameterError, suggestion
 from .columns import QUANTITIES
 from .constants import parse_constant_name
+from .file_kind import check_regular_file
 from .heading import parse_heading
 from .table import RawTable
 from .text_format import TextFormat
@@ -75,6 +76,7 @@ class ColumnMapping:
 def read_mapping(path: str | Path) -> ColumnMapping:
     """Read a mapping from a TOML file. Raises FileError, ParameterError or ColumnError."""
     path = Path(path)
+    check_regular_file(path)
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as reason:

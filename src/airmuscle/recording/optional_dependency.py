@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
 from ..core.errors import AirmuscleError, FileError
+from .file_kind import check_regular_file
 
 Result = TypeVar("Result")
+
+
+def check_lab_package(name: str, path: Path) -> None:
+    """Raise FileError with the install command if a package is missing; the package is not imported."""
+    if importlib.util.find_spec(name) is None:
+        raise _missing_package(name, path)
 
 
 def import_lab_package(name: str, path: Path) -> Any:
@@ -17,15 +25,18 @@ def import_lab_package(name: str, path: Path) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError:
-        raise FileError(
-            f"{path.name}: reading {path.suffix} files needs the package {name}. Install it: pip install airmuscle[lab]"
-        ) from None
+        raise _missing_package(name, path) from None
+
+
+def _missing_package(name: str, path: Path) -> FileError:
+    return FileError(
+        f"{path.name}: reading {path.suffix} files needs the package {name}. Install it: pip install airmuscle[lab]"
+    )
 
 
 def run_reader(path: Path, format_name: str, read: Callable[[], Result]) -> Result:
     """Call `read` and return its result; any exception of the package becomes a FileError that names the file."""
-    if not path.is_file():
-        raise FileError(f"{path}: cannot be read (there is no such file). Check the name and the folder.")
+    check_regular_file(path)
     try:
         return read()
     except AirmuscleError:
@@ -33,6 +44,6 @@ def run_reader(path: Path, format_name: str, read: Callable[[], Result]) -> Resu
     except Exception as reason:  # each package raises its own exceptions for a damaged file
         detail = " ".join(str(reason).split())[:120] or type(reason).__name__
         raise FileError(
-            f"{path.name}: cannot be read as {format_name} ({detail}). Check that the file is complete and that its "
-            "extension matches its format."
+            f"{path.name}: cannot be read as {format_name} ({detail}); it is damaged or of another format. "
+            "Check that the file is complete and that its extension matches its format."
         ) from None

@@ -13,6 +13,9 @@ from .table import RawTable
 CONTRACTION_RANGE = (-0.5, 1.0)
 """Plausible contractions (chosen): a contraction of 1 is impossible, as is a stretch by half of the length."""
 
+MAX_MAGNITUDE = 1e15
+"""Maximum magnitude of a measured value in SI units (chosen: no measurement, but its powers do not overflow)."""
+
 
 def check_plausible(
     table: RawTable,
@@ -24,6 +27,7 @@ def check_plausible(
 ) -> None:
     """Raise ColumnError, with row and value, at the first value that cannot be a measurement."""
     for name, values in columns.items():
+        _check_magnitude(table, name, values)
         quantity = name.rpartition(".")[2]
         if quantity == "time" and ordered:
             _check_ordered(table, values)
@@ -34,6 +38,16 @@ def check_plausible(
             _check_contraction(table, values, "contraction", remedy)
         elif quantity == "length":
             _check_length(table, values, resting_length)
+
+
+def _check_magnitude(table: RawTable, name: str, values: Array) -> None:
+    excessive = np.abs(values) > MAX_MAGNITUDE
+    if excessive.any():
+        row = int(np.argmax(excessive))
+        raise ColumnError(
+            f"{table.location(row)}: {name} is {values[row]:.4g} in SI units; no measurement exceeds "
+            f"{MAX_MAGNITUDE:g}. Correct the value, or delete the row."
+        )
 
 
 def _check_ordered(table: RawTable, time: Array) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.errors import ColumnError, FileError
+from .file_kind import check_text_file
 from .table import Cells, RawTable
 from .text_format import (
     NumberedLines,
@@ -29,6 +30,7 @@ def read_csv_table(path: str | Path, text_format: TextFormat = TextFormat()) -> 
     if not isinstance(path, str | Path):
         raise FileError(f"read_csv: {path!r} is not a path. Pass the name of a file.")
     path = Path(path)
+    check_text_file(path)
     lines = [(i, line) for i, line in enumerate(re.split(r"\r\n|\n|\r", _read_text(path)), 1) if has_content(line)]
     header = parse_header(path.name, lines, text_format)
     body = [(i, line) for i, line in lines if not is_comment(line)][header.header_lines :]

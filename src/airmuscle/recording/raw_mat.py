@@ -15,14 +15,27 @@ import numpy as np
 
 from ..core.errors import ColumnError, FileError, suggestion
 from .channels import Channel, merge_channels
-from .optional_dependency import import_lab_package, run_reader
+from .file_kind import check_regular_file
+from .optional_dependency import check_lab_package, import_lab_package, run_reader
+from .separate_process import call_in_separate_process
 from .table import RawTable
 
 _INTERNAL_NAMES = ("__header__", "__version__", "__globals__", "#refs#", "#subsystem#")
 
 
 def read_mat_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
-    """Read one table from each struct with vectors, or from the named struct. Raises FileError or ColumnError."""
+    """Read one table from each struct with vectors, or from the named struct. Raises FileError or ColumnError.
+
+    The packages for this format are native code, therefore a separate process reads the file.
+    """
+    check_lab_package("pymatreader", path)
+    check_regular_file(path)
+    tables: tuple[RawTable, ...] = call_in_separate_process(__name__, "read_mat_tables_here", path, group)
+    return tables
+
+
+def read_mat_tables_here(path: Path, group: str | None) -> tuple[RawTable, ...]:
+    """As `read_mat_tables`, in this process."""
     pymatreader = import_lab_package("pymatreader", path)
 
     def read() -> Mapping[str, Any]:

@@ -10,7 +10,9 @@ import numpy as np
 
 from ..core.errors import FileError, suggestion
 from .channels import Channel, merge_channels
-from .optional_dependency import import_lab_package, run_reader
+from .file_kind import check_regular_file
+from .optional_dependency import check_lab_package, import_lab_package, run_reader
+from .separate_process import call_in_separate_process
 from .table import RawTable
 
 _TIME_MASTER = 1
@@ -18,7 +20,18 @@ _TIME_MASTER = 1
 
 
 def read_mdf_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
-    """Read one table from all channels, or from the named channel group. Raises FileError or ColumnError."""
+    """Read one table from all channels, or from the named channel group. Raises FileError or ColumnError.
+
+    The package for this format is native code, therefore a separate process reads the file.
+    """
+    check_lab_package("asammdf", path)
+    check_regular_file(path)
+    tables: tuple[RawTable, ...] = call_in_separate_process(__name__, "read_mdf_tables_here", path, group)
+    return tables
+
+
+def read_mdf_tables_here(path: Path, group: str | None) -> tuple[RawTable, ...]:
+    """As `read_mdf_tables`, in this process."""
     asammdf = import_lab_package("asammdf", path)
 
     def read() -> tuple[RawTable, ...]:

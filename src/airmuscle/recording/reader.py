@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..core.errors import FileError
 from .downsampling import Decimation, Downsampling, downsample
+from .file_kind import check_text_file
 from .interpret import interpret
 from .large_csv import Progress, is_large_file, read_large_csv
 from .mapping import ColumnMapping, apply_mapping, read_mapping
@@ -121,19 +122,7 @@ def read_tables(
         return tuple(downsample(table, downsampling) for table in _BINARY_READERS[suffix](path, mapping))
     if suffix in (".xls", ".ods"):
         raise FileError(f"{path.name}: the format {suffix} is not supported. Save the file as .xlsx or .csv.")
-    if suffix not in TEXT_EXTENSIONS and _is_binary(path):
-        raise FileError(
-            f"{path.name}: unknown binary format; supported extensions are {', '.join(EXTENSIONS)}. Rename or convert "
-            "the file."
-        )
+    check_text_file(path)
     if is_large_file(path):
         return (read_large_csv(path, mapping.text_format, downsampling, progress),)
     return (downsample(read_csv_table(path, mapping.text_format), downsampling),)
-
-
-def _is_binary(path: Path) -> bool:
-    if not path.is_file():
-        return False
-    with path.open("rb") as file:
-        beginning = file.read(4096)
-    return b"\0" in beginning and beginning[:2] not in (b"\xff\xfe", b"\xfe\xff")

@@ -5,11 +5,15 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import socket
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from ..core.errors import FileError
+
+_UNFINISHED = f".unfinished-{socket.gethostname().replace('/', '')}-"
+"""Beginning of the name of a temporary folder, with the machine, because folders may be shared; a process follows."""
 
 
 @contextlib.contextmanager
@@ -17,7 +21,8 @@ def atomic_folder(folder: Path | str) -> Iterator[Path]:
     """Yield an empty temporary folder whose files are moved into `folder` when the block ends without an exception.
 
     If the block raises, or the files cannot be written, `folder` remains unchanged, or is not created. Files of the
-    same name are replaced, other files are kept. Raises FileError.
+    same name are replaced, other files are kept. What a killed process has left in `folder` is removed. Raises
+    FileError.
     """
     target = Path(folder)
     with _raise_file_errors(target):
@@ -25,7 +30,8 @@ def atomic_folder(folder: Path | str) -> Iterator[Path]:
     try:
         with _raise_file_errors(target):
             target.mkdir(parents=True, exist_ok=True)
-            staging = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=target))
+            _remove_abandoned(target)
+            staging = Path(tempfile.mkdtemp(prefix=f"{_UNFINISHED}{os.getpid()}-", dir=target))
         try:
             yield staging
             with _raise_file_errors(target):
@@ -35,6 +41,27 @@ def atomic_folder(folder: Path | str) -> Iterator[Path]:
     except BaseException:
         _remove_empty_folders(created)
         raise
+
+
+def _remove_abandoned(target: Path) -> None:
+    """Remove the temporary folders of processes of this machine that were killed."""
+    for folder in target.glob(f"{_UNFINISHED}*"):
+        process = folder.name.removeprefix(_UNFINISHED).partition("-")[0]
+        if process.isdecimal() and not folder.is_symlink() and not _is_running(int(process)):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _is_running(process: int) -> bool:
+    """Whether a process of this number exists; true where this cannot be determined."""
+    if not hasattr(os, "getuid"):  # on Windows, os.kill would end the process
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):  # the process of another user
+        return True
+    return True
 
 
 def check_writable(folder: Path | str) -> None:

@@ -1,0 +1,118 @@
+"""Every public model refuses what it cannot use when it is constructed, with an error that names class and field.
+
+A value is either accepted, or refused by an AirmuscleError; no other exception occurs, whatever the value.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import math
+import warnings
+from typing import Any
+
+import pytest
+from plants import EXAMPLES
+
+from airmuscle import characteristic, control, friction, geometry, load, mechanism, muscle, pneumatics
+from airmuscle.core.errors import AirmuscleError, AirmuscleWarning, ParameterError, UnitError
+from airmuscle.library.files import list_laws
+from airmuscle.mechanism import HangingMass
+from airmuscle.pneumatics import Supply, Tank, Valve
+
+FACES = (characteristic, control, friction, geometry, mechanism, muscle, pneumatics)
+MODELS = sorted(
+    {
+        thing
+        for face in FACES
+        for thing in (getattr(face, name) for name in face.__all__)
+        if inspect.isclass(thing) and dataclasses.is_dataclass(thing) and not inspect.isabstract(thing)
+    },
+    key=lambda each: each.__name__,
+)
+JUNK: tuple[Any, ...] = (
+    None, "abc", "", "3 furlongs", math.nan, math.inf, -1, -1.0, 10**400, 10**5000, [], (), {}, object(), True, int, ("a", None),
+    (object(),), ([],), [math.nan], b"1", 1j, lambda: 0, "9" * 100_000,
+)  # fmt: skip
+
+
+def instances() -> dict[type[Any], Any]:
+    """One instance of each model within the example plants and the library."""
+    found: dict[type[Any], Any] = {}
+
+    def collect(thing: Any) -> None:
+        if isinstance(thing, tuple | list):
+            for item in thing:
+                collect(item)
+        elif dataclasses.is_dataclass(thing) and not isinstance(thing, type):
+            found.setdefault(type(thing), thing)
+            for field in dataclasses.fields(thing):
+                collect(getattr(thing, field.name))
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        collect([*EXAMPLES.values(), *(load(name) for name in list_laws())])
+    return found
+
+
+INSTANCES = instances()
+
+
+def refusal_of(construct: Any) -> str | None:
+    """The message of the refusal, None if the value is accepted; an exception of another class is raised."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        try:
+            construct()
+        except AirmuscleError as error:
+            return str(error)
+    return None
+
+
+@pytest.mark.parametrize("cls", MODELS, ids=lambda each: each.__name__)
+def test_junk_in_one_field_is_refused_by_class_and_field(cls: type[Any]):
+    if cls not in INSTANCES:
+        pytest.skip("no example")
+    for field in (f for f in dataclasses.fields(cls) if f.init):
+        for junk in JUNK:
+            said = refusal_of(lambda f=field, j=junk: dataclasses.replace(INSTANCES[cls], **{f.name: j}))
+            if said is not None:
+                assert cls.__name__ in said, (field.name, said)
+                assert field.name.replace("_", " ") in said.replace("_", " "), said
+                assert len(said) < 1000, said[:1000]
+
+
+@pytest.mark.parametrize("cls", MODELS, ids=lambda each: each.__name__)
+def test_junk_in_all_fields_is_refused(cls: type[Any]):
+    names = [p.name for p in inspect.signature(cls).parameters.values()]
+    for junk in JUNK:
+        refusal_of(lambda j=junk: cls(**dict.fromkeys(names, j)))
+
+
+def test_structural_fields_are_checked():
+    valve = Valve(2.6e-9, 0.433)
+    with pytest.raises(ParameterError, match="Tank: feed must be an instance of Orifice; it is None"):
+        Tank(Supply(6e5), None, 1e-3)  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="Tank: gas must be an instance of Gas; it is 'isothermal'"):
+        Tank(Supply(6e5), valve, 1e-3, "isothermal")  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="SplitRange: positive must be a text; it is 3"):
+        control.SplitRange(3, "discharge")  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match=r"HangingMass.mass .* is too large a number; allowed range"):
+        HangingMass(10**400)
+
+
+def test_a_parameter_may_be_a_text_with_a_unit():
+    assert HangingMass("10 kg") == HangingMass(10.0)  # type: ignore[arg-type]
+    assert Supply("6 bar") == Supply(6e5)  # type: ignore[arg-type]
+    with pytest.raises(UnitError, match=r"HangingMass.mass \(.*\): unit 'mm' cannot be converted to 'kg'"):
+        HangingMass("10 mm")  # type: ignore[arg-type]
+    with pytest.raises(UnitError, match=r"Supply.pressure \(.*\): '6' has no unit; write it like '6 bar'"):
+        Supply("6")  # type: ignore[arg-type]
+
+
+def test_a_supply_of_some_pascals_is_implausible():
+    with pytest.warns(AirmuscleWarning, match=r"Supply.pressure .* is 6 Pa, .* implausibly small.* such as '6 bar'"):
+        Supply(6.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert Supply(0.0).pressure == 0.0
