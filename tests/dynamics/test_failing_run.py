@@ -95,7 +95,7 @@ REACH = chosen_muscle().geometry.contraction_range
 @pytest.mark.parametrize(
     ("state", "message"),
     [
-        ({**STATE, "air_mass": -1e-3}, "air_mass is -0.001 kg; there is no less air than none"),
+        ({**STATE, "air_mass": -1e-3}, "air_mass is -0.001 kg; it must not be negative"),
         ({**STATE, "position": "10 mm"}, "position is '10 mm'; it must be one number, in SI"),
         ({**STATE, "position": [0.0, 0.1]}, "it must be one number, in SI"),
         ({**STATE, "sped": 0.0}, "no state 'sped'.*Did you mean 'speed'"),
@@ -106,7 +106,7 @@ REACH = chosen_muscle().geometry.contraction_range
         ({**STATE, "position": -10.0}, "a contraction of .* % is outside its range"),
         (
             {**STATE, "position": REACH[1] * chosen_muscle().geometry.resting_length},
-            "encloses 0 m3|is outside its range",
+            "the volume of muscle is 0 m3|is outside its range",
         ),
     ],
 )
@@ -158,7 +158,9 @@ def test_segments_of_another_shape_never_reach_a_kernel(segments, message):
 def test_what_a_run_is_told_is_of_its_kind(given, message):
     with pytest.raises(AirmuscleError, match=message):
         simulate(isothermal(), **{"input": FILL, "duration": 0.1, "initial_state": STATE, **given})
-    with pytest.raises(AirmuscleError, match=message if "input" not in given else "give one Command|is no Command"):
+    with pytest.raises(
+        AirmuscleError, match=message if "input" not in given else "give an InputSignal, or a list of them"
+    ):
         simulate_batch(
             isothermal(), {}, **{"input": [FILL], "duration": 0.1, "initial_states": STATE, **given}
         )  # fmt: skip

@@ -261,7 +261,7 @@ class Tube:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"radius": "1"}, r"Tube.radius \(r, radius\) is '1'; it must be a number in m"),
+        ({"radius": "1"}, r"Tube.radius \(r, radius\): '1' has no unit; write it like"),
         ({"radius": np.nan}, r"is nan; it must be finite"),
         ({"radius": 20.0}, r"is 20 m; allowed range: 0.001 to 0.1 m. Values are in SI units; check the unit"),
         ({"radius": np.array([0.01])}, r"is array\(\[0.01\]\); it must be one number"),
@@ -271,7 +271,7 @@ class Tube:
     ],
 )
 def test_a_parameter_that_cannot_be(given: dict[str, object], message: str):
-    with pytest.raises(ParameterError, match=message):
+    with pytest.raises((ParameterError, UnitError), match=message):
         Tube(**given)  # type: ignore[arg-type]
 
 
@@ -412,6 +412,9 @@ def test_a_full_disk_is_one_line(option: tuple[str, ...]):
     assert done.stderr == "error: output: No space left on device.\n"
 
 
+COMPILING = "compiling fixed_step, once on this machine (some seconds) ...\n"
+
+
 class Interrupted:
     """A kernel that the user stops during its third packet of steps."""
 
@@ -440,7 +443,7 @@ def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch
     monkeypatch.setattr(integrators, "INTERRUPT_CHECK_STEPS", 100)
     result = CliRunner().invoke(app, ["simulate", str(tmp_path / "run.toml"), "--out", str(tmp_path / "run")])
     assert result.exit_code == 130
-    assert result.stderr == f"partial results were written to {tmp_path / 'run'}\ninterrupted\n"
+    assert result.stderr.removeprefix(COMPILING) == f"partial results were written to {tmp_path / 'run'}\ninterrupted\n"
     kept = read_csv(tmp_path / "run" / "recording.csv")
     assert kept["time"][-1] == pytest.approx(0.2, abs=0.0011)
 

@@ -205,7 +205,7 @@ PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "SplitRange", positiv
         ('model = "PID"', 'model = "Valve"', ParameterError, r"\[input.controller\]: Valve is not a controller; there are OnOffController, PID"),
         ('model = "PID"', 'model = "PDI"', UnknownNameError, r"no model 'PDI'"),
         ('model = "PID"\n', "", ParameterError, r"\[input.controller\]: the model is not named"),
-        ("[input]\n", '[input]\nfill = [["0.1 s", 1]]\n', ParameterError, r"'fill' is commanded by the controller, and beside it too"),
+        ("[input]\n", '[input]\nfill = [["0.1 s", 1]]\n', ParameterError, r"'fill' is commanded by the controller and by other_inputs"),
         ("[input]\n", '[input]\ndischarge = [["0.1 s", 2]]\n', ParameterError, r"\[input\]: the input 'discharge' is 2 before"),
         ("[input]\n", '[input]\ndrivers = { vent = "SolenoidDriver" }\n', ParameterError, r"\[input.drivers\]: the plant has no input 'vent'"),
     ],
