@@ -58,6 +58,7 @@ class _Projection:
 
     def __init__(self, problem: FitProblem, linear: npt.NDArray[np.bool_]) -> None:
         self._problem, self._linear = problem, linear
+        self._linear_indices = np.flatnonzero(linear).tolist()
         self._bounds = tuple(bound[~linear] for bound in problem.bounds)
         initial = problem.initial_values[~linear]
         self._scale = np.where(initial != 0, np.abs(initial), 1.0)
@@ -67,7 +68,7 @@ class _Projection:
         values = np.zeros(self._linear.size)
         values[~self._linear] = nonlinear
         constant = self._problem.predict(values)
-        jacobian = self._problem.jacobian(values)[:, self._linear]
+        jacobian = self._problem.partial_jacobian(values, self._linear_indices)
         finite = np.isfinite(jacobian).all() and np.isfinite(constant).all()
         values[self._linear] = solve_censored_least_squares(self._problem, jacobian, constant) if finite else np.nan
         return values
