@@ -128,6 +128,16 @@ class FitProblem:
             leaf_values[i] = float(value)
         return leaf_values
 
+    def rows(self, selection: npt.NDArray[Any]) -> FitProblem:
+        """The problem of these rows, a mask or indices."""
+        return dataclasses.replace(
+            self,
+            data=self.data.rows(selection),
+            target=self.target[selection],
+            censoring=self.censoring[selection],
+            weights=self.weights[selection],
+        )
+
     def predict(self, values: Array) -> Array:
         """The fitted quantity at every row with these parameters [SI]; shape (N,)."""
         law = tree.unflatten(self.law, self.leaf_values(values))

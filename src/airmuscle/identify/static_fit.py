@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ..characteristic.base import Characteristic
 from ..core import tree
 from ..core.arrays import Array
-from ..core.errors import ParameterError
+from ..core.errors import IdentificationError, ParameterError
 from ..recording import Recording
 from .censoring import Censoring
 from .correlation_index import correlation_index
@@ -21,6 +21,7 @@ from .problem import FitProblem, evaluate
 from .result import Estimate, Fit, WorstPoint
 from .solver import LeastSquaresSolution, solve
 from .statistics import FitStatistics, check_determined, compute_statistics
+from .variable_projection import find_initial_values
 
 ILL_CONDITIONED = 1e5
 """Condition number of the scaled design matrix above which a note is added (chosen): half of the digits are lost."""
@@ -68,11 +69,14 @@ def refit(
 ) -> Characteristic:
     """The law that `fit` finds for these points if its search starts at the parameters of `characteristic`.
 
-    No initial values are searched for, and nothing but the rank is computed of the solution. Raises
-    IdentificationError where the points do not determine the parameters.
+    Other initial values are tried only where the search does not converge, and nothing but the rank is computed of the
+    solution. Raises IdentificationError where the points do not determine the parameters.
     """
     problem = points.problem(characteristic, fixed=fixed)
-    solution = solve(problem, loss, problem.initial_values)
+    try:
+        solution = solve(problem, loss, find_initial_values(problem, multi_start=False))
+    except IdentificationError:
+        solution = solve(problem, loss)
     check_determined(problem, solution)
     model: Characteristic = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
     return model
