@@ -16,10 +16,11 @@ from ..recording import Recording
 from .censoring import Censoring
 from .correlation_index import correlation_index
 from .fit_points import POINT_COLUMNS, FitPoints
+from .gauss_newton import gauss_newton
 from .loss import LeastSquares, Loss
 from .problem import FitProblem, evaluate
 from .result import Estimate, Fit, WorstPoint
-from .solver import LeastSquaresSolution, solve
+from .solver import LeastSquaresSolution, is_linear, solve
 from .statistics import FitStatistics, check_determined, compute_statistics
 from .variable_projection import find_initial_values
 
@@ -73,8 +74,13 @@ def refit(
     solution. Raises IdentificationError where the points do not determine the parameters.
     """
     problem = points.problem(characteristic, fixed=fixed)
+    near = None if is_linear(problem) or loss != LeastSquares() else gauss_newton(problem, problem.initial_values)
     try:
-        solution = solve(problem, loss, find_initial_values(problem, multi_start=False))
+        solution = (
+            solve(problem, loss, find_initial_values(problem, multi_start=False))
+            if near is None
+            else LeastSquaresSolution(*near)
+        )
     except IdentificationError:
         solution = solve(problem, loss)
     check_determined(problem, solution)
