@@ -24,7 +24,7 @@ class _Step(NamedTuple):
     sources: tuple[int, ...]
 
 
-class Program(NamedTuple):
+class ArrayProgram(NamedTuple):
     """The instructions for some non-zeros of one output of a traced function."""
 
     size: int
@@ -53,7 +53,7 @@ class Program(NamedTuple):
         return result.T
 
 
-def make_program(function: Any, output: int, columns: Sequence[int]) -> Program | None:
+def make_program(function: Any, output: int, columns: Sequence[int]) -> ArrayProgram | None:
     """The instructions for these columns of one output (a row) of a CasADi function; None where NumPy lacks one.
 
     Column number k of the program is the k-th of `columns`.
@@ -64,7 +64,7 @@ def make_program(function: Any, output: int, columns: Sequence[int]) -> Program 
     return None if program is None else _without_unused(program)
 
 
-def _read(function: Any, output: int, wanted: dict[int, int]) -> Program | None:
+def _read(function: Any, output: int, wanted: dict[int, int]) -> ArrayProgram | None:
     """All instructions, with a new register for every result."""
     import casadi
 
@@ -89,10 +89,10 @@ def _read(function: Any, output: int, wanted: dict[int, int]) -> Program | None:
         else:
             return None
         current[target[0]] = k
-    return Program(function.n_instructions(), tuple(constants), tuple(inputs), tuple(steps), tuple(outputs))
+    return ArrayProgram(function.n_instructions(), tuple(constants), tuple(inputs), tuple(steps), tuple(outputs))
 
 
-def _without_unused(program: Program) -> Program:
+def _without_unused(program: ArrayProgram) -> ArrayProgram:
     used = {register for _, register in program.outputs}
     steps = []
     for step in reversed(program.steps):
