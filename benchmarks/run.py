@@ -22,6 +22,7 @@ import derivative
 import growth
 import identification
 import memory
+import model_comparison
 import mujoco_peer
 import new_plant
 import ode8
@@ -47,6 +48,7 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (identification.section, 3),
     (static_fit.section, 15),
     (bootstrap.section, 5),
+    (model_comparison.section, 3),
     (new_plant.section, 7),
     (startup.section, 7),
 )

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from . import ops, tree
 from .errors import TraceError
+from .vectorised import MIN_POINTS, make_program
 
 _traced_functions: dict[Any, Any] = {}
 
@@ -210,6 +211,20 @@ def jacobian(obj: Any, method: str, *arguments: Any) -> tuple[npt.NDArray[np.flo
     results, _, count = _evaluate_traced(obj, method, arguments)
     size = results[-1].size // max(count, 1)
     return results[0].reshape(-1), results[-1].reshape(count, size)
+
+
+def parameter_derivatives(obj: Any, method: str, arguments: Sequence[Any], leaves: Sequence[int]) -> Any:
+    """Derivatives of `obj.method` with respect to the leaves of these numbers at N points, shape (N, leaves)."""
+    points = np.broadcast_arrays(*(np.asarray(x, dtype=float).reshape(-1) for x in arguments))
+    if points[0].size >= MIN_POINTS:
+        key = (tree.structure(obj), method, len(points), tuple(leaves), "program")
+        if key not in _traced_functions:
+            function = _trace_with_derivatives(obj, method, len(points))
+            _traced_functions[key] = make_program(function, function.n_out() - 1, list(leaves))
+        program = _traced_functions[key]
+        if program is not None:
+            return program.columns(points, tree.flatten(obj).tolist(), len(leaves))
+    return jacobian(obj, method, *points)[1][:, list(leaves)]
 
 
 @functools.cache

@@ -5,6 +5,8 @@ This file works on numbers only, for `Friction.force_along`; it is never traced,
 
 from __future__ import annotations
 
+import bisect
+import functools
 import itertools
 import math  # noqa: TID251  (numbers only, never traced)
 from collections.abc import Callable, Sequence
@@ -46,14 +48,25 @@ def deflection(displacement: Any, sliding_length: Any) -> Array:
 
 
 def stop_operators(displacement: Any, limits: Sequence[float]) -> Array:
-    """Stop operators with these limits r [m] along a path: each follows x within -r..r; shape (N, limits)."""
-    upper = np.asarray(limits, dtype=float)
+    """Stop operators with these limits r [m] along a path: each follows x within -r..r; shape (N, limits).
+
+    The results of the last paths are kept, because a fit evaluates the same path many times; they are read-only.
+    """
     increments = _increments(displacement)
-    outputs, state = np.empty((increments.size, upper.size)), np.zeros(upper.size)
-    for row, increment in zip(outputs, increments, strict=True):
-        np.minimum(state + increment, upper, out=state)
-        np.maximum(state, -upper, out=state)
-        row[:] = state
+    return _stop_operators(increments.tobytes(), tuple(float(limit) for limit in limits))
+
+
+@functools.lru_cache(maxsize=8)
+def _stop_operators(increments: bytes, limits: tuple[float, ...]) -> Array:
+    steps = np.frombuffer(increments, dtype=float).tolist()
+    outputs = np.empty((len(steps), len(limits)))
+    for column, limit in enumerate(limits):
+        states, state = [], 0.0
+        for step in steps:
+            state = max(min(state + step, limit), -limit)
+            states.append(state)
+        outputs[:, column] = states
+    outputs.setflags(write=False)
     return outputs
 
 
@@ -65,50 +78,74 @@ def relative_deflection(rate: Callable[[Any, Any], Any], displacement: Any, slid
     for the sharpest transitions and 1e-8 for usual ones.
     """
     increments = _increments(displacement) / sliding_length
-    curve, inverse = _loading_curve(rate)
-    result, xi, direction = np.zeros(increments.size), inverse(0.0), 1.0
+    curve = _LoadingCurve(rate)
+    positions, directions = np.zeros(increments.size), np.ones(increments.size)
+    distances, xi, direction = np.abs(increments), curve.position(0.0), 1.0
     for interval, sign in _monotone_intervals(increments):
         if sign != direction:
-            xi, direction = inverse(-float(curve(xi))), sign
-        positions = xi + np.cumsum(np.abs(increments[interval]))
-        xi = float(positions[-1])
-        result[interval] = direction * curve(positions)
-    return result
+            xi, direction = curve.position(-curve.deflection(xi)), sign
+        positions[interval] = xi + np.cumsum(distances[interval])
+        directions[interval] = direction
+        xi = float(positions[interval.stop - 1])
+    return np.asarray(directions * curve.deflections(positions))
 
 
 def _monotone_intervals(increments: Array) -> list[tuple[slice, float]]:
     """Split a path at its turning points into intervals with their signs; rests belong to the preceding interval."""
     signs = np.sign(increments)
     moving = np.flatnonzero(signs)
-    turns = [i for previous, i in itertools.pairwise(moving) if signs[i] != signs[previous]]
+    turns = moving[1:][np.diff(signs[moving]) != 0].tolist()
     ends = [0, *turns, increments.size]
-    return [(slice(a, b), float(signs[a:b][signs[a:b] != 0][0]) if signs[a:b].any() else 1.0)
-            for a, b in itertools.pairwise(ends)]  # fmt: skip
+    first = float(signs[moving[0]]) if moving.size else 1.0
+    return [(slice(a, b), first if k % 2 == 0 else -first) for k, (a, b) in enumerate(itertools.pairwise(ends))]
 
 
-def _loading_curve(rate: Callable[[Any, Any], Any]) -> tuple[Callable[[Any], Any], Callable[[float], float]]:
-    """Return w(xi) and its inverse on the curve from w = -1 at xi = 0 towards w = 1.
+class _LoadingCurve:
+    """The curve w(xi) from w = -1 at xi = 0 towards w = 1, and its inverse.
 
     The curve parameter is s = -ln((1 - w)/2), with equidistant nodes, which also resolves the slow approach to 1.
+    Single points, of which a noisy path has one at every reversal, are evaluated without NumPy.
     """
-    from scipy.interpolate import CubicHermiteSpline
 
-    s = np.linspace(0.0, CURVE_END, CURVE_NODES)
-    s[np.searchsorted(s, math.log(2.0))] = math.log(2.0)  # a node at w = 0, where powers of |w| have a kink
-    points, weights = np.polynomial.legendre.leggauss(5)
-    half = np.diff(s) / 2.0
-    inner = s[:-1, None] + half[:, None] * (1.0 + points)
-    xi = np.concatenate([[0.0], np.cumsum((_curve_derivative(rate, inner) @ weights) * half)])
-    slopes = _curve_derivative(rate, s)
-    s_of_xi, xi_of_s = CubicHermiteSpline(xi, s, 1.0 / slopes), CubicHermiteSpline(s, xi, slopes)
+    def __init__(self, rate: Callable[[Any, Any], Any]) -> None:
+        from scipy.interpolate import CubicHermiteSpline
 
-    def curve(position: Any) -> Any:
-        return 1.0 - 2.0 * np.exp(-s_of_xi(np.minimum(position, xi[-1])))
+        s = np.linspace(0.0, CURVE_END, CURVE_NODES)
+        s[np.searchsorted(s, math.log(2.0))] = math.log(2.0)  # a node at w = 0, where powers of |w| have a kink
+        points, weights = np.polynomial.legendre.leggauss(5)
+        half = np.diff(s) / 2.0
+        inner = s[:-1, None] + half[:, None] * (1.0 + points)
+        xi = np.concatenate([[0.0], np.cumsum((_curve_derivative(rate, inner) @ weights) * half)])
+        slopes = _curve_derivative(rate, s)
+        self._end = float(xi[-1])
+        self._s_of_xi, xi_of_s = CubicHermiteSpline(xi, s, 1.0 / slopes), CubicHermiteSpline(s, xi, slopes)
+        self._parameter, self._position = _point_evaluation(self._s_of_xi), _point_evaluation(xi_of_s)
 
-    def inverse(w: float) -> float:
-        return float(xi_of_s(min(-math.log(max((1.0 - w) / 2.0, math.exp(-CURVE_END))), CURVE_END)))
+    def deflections(self, positions: Array) -> Array:
+        """w at positions xi, shape (N,)."""
+        return np.asarray(1.0 - 2.0 * np.exp(-self._s_of_xi(np.minimum(positions, self._end))))
 
-    return curve, inverse
+    def deflection(self, position: float) -> float:
+        """w at one position xi."""
+        return 1.0 - 2.0 * math.exp(-self._parameter(min(position, self._end)))
+
+    def position(self, w: float) -> float:
+        """The position xi of a deflection w."""
+        return self._position(min(-math.log(max((1.0 - w) / 2.0, math.exp(-CURVE_END))), CURVE_END))
+
+
+def _point_evaluation(spline: Any) -> Callable[[float], float]:
+    """A function that evaluates a cubic spline at one point, as the spline itself does at many."""
+    nodes, coefficients = spline.x.tolist(), spline.c.T.tolist()
+    last = len(nodes) - 2
+
+    def evaluate(point: float) -> float:
+        interval = min(max(bisect.bisect_right(nodes, point) - 1, 0), last)
+        cubic, square, slope, value = coefficients[interval]
+        t = point - nodes[interval]
+        return float(value + slope * t + square * (t * t) + cubic * (t * t * t))
+
+    return evaluate
 
 
 def _curve_derivative(rate: Callable[[Any, Any], Any], s: Array) -> Array:

@@ -60,4 +60,5 @@ def uncensored_rank(problem: FitProblem, jacobian: Array) -> int:
     """Rank of the weighted design matrix of the uncensored rows."""
     matrix = (problem.weights[:, None] * jacobian)[problem.censoring == 0]
     norms = np.linalg.norm(matrix, axis=0)
-    return int(np.linalg.matrix_rank(matrix / np.where(norms > 0, norms, 1.0), rtol=RANK_TOLERANCE))
+    triangle = np.linalg.qr(matrix / np.where(norms > 0, norms, 1.0), mode="r")  # with the same singular values
+    return int(np.linalg.matrix_rank(triangle, rtol=RANK_TOLERANCE))

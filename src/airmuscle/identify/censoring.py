@@ -32,6 +32,10 @@ class Censoring:
         """By row: 0 uncensored, 1 censored below (the true force is at most the limit), -1 censored above."""
         return (force <= self.min_force) * 1.0 - (force >= self.max_force) * 1.0
 
+    def within(self, other: Censoring) -> Censoring:
+        """The range that both have in common."""
+        return Censoring(max(self.min_force, other.min_force), min(self.max_force, other.max_force))
+
 
 UNCENSORED = Censoring(-math.inf, math.inf)
 """No censoring: every row is a measured value."""
@@ -48,17 +52,15 @@ def default_censoring(law: Characteristic) -> Censoring:
     return Censoring(getattr(law, "min_force", 0.0), getattr(law, "max_force", math.inf))
 
 
-def narrow_to_sensor(censoring: Censoring, law: Characteristic, runs: Sequence[Recording]) -> Censoring:
-    """The range reduced to that of the force sensor, where the recordings show a limit at which it saturates.
+def force_limits(runs: Sequence[Recording]) -> Censoring:
+    """The range of the force sensor, where the recordings show a limit at which it saturates.
 
-    Applies to force laws only. The limits are estimated only if every recording has a time column and all come from
-    one test rig; otherwise `censoring` is returned unchanged.
+    The limits are estimated only if every recording has a time column and all come from one test rig; otherwise the
+    range is unlimited.
     """
     timed = bool(runs) and all("time" in run.columns and "force" in run.columns and len(run) for run in runs)
-    if not isinstance(law, ForceLaw) or not timed or sensor_deviations(runs, "force") is not None:
-        return censoring
-    sensor = estimate_sensors(runs)["force"]
+    if not timed or sensor_deviations(runs, "force") is not None:
+        return UNCENSORED
+    sensor = estimate_sensors([Recording({"force": run.columns["force"]}, run.origin) for run in runs])["force"]
     margin = 0.25 * sensor.resolution
-    return Censoring(
-        max(censoring.min_force, sensor.lower_limit + margin), min(censoring.max_force, sensor.upper_limit - margin)
-    )
+    return Censoring(sensor.lower_limit + margin, sensor.upper_limit - margin)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from ..characteristic.base import Characteristic
 from ..core.arrays import Array
@@ -14,11 +15,12 @@ from ..core.errors import AirmuscleError, IdentificationError
 from ..recording import Recording
 from .candidates import Candidate, standard_candidates
 from .cross_validation import GroupSplit, Labels, default_split, label_folds
+from .fit_points import FitPoints
 from .force_evaluation import evaluate_force
 from .loss import LeastSquares, Loss
 from .model_evidence import aicc
 from .result import Fit
-from .static_fit import fit
+from .static_fit import fit, refit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -119,12 +121,13 @@ def compare(
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     split = leave_out or default_split(runs)
     labels, names = label_folds(runs, split)
+    points = _ComparedPoints.from_recordings(runs, labels, names)
     ranking, excluded = [], []
     for candidate in candidates if candidates is not None else standard_candidates(runs):
         if progress is not None:
             progress(candidate.name)
         try:
-            ranking.append(_cross_validate(candidate, runs, labels, names, loss))
+            ranking.append(_cross_validate(candidate, points, loss))
         except AirmuscleError as error:
             excluded.append(ExcludedModel(candidate.name, str(error)))
     if not ranking:
@@ -135,23 +138,57 @@ def compare(
     return Comparison(tuple(ranking), tuple(excluded), split, recommended, reason)
 
 
-def _cross_validate(
-    candidate: Candidate, runs: Sequence[Recording], labels: Sequence[Labels], names: Sequence[str], loss: Loss
-) -> RankedModel:
-    full_fit = fit(candidate.law, runs, loss=loss, fixed=candidate.fixed)
-    max_force = 3 * max(float(np.nanmax(run["force"])) for run in runs)
-    in_sample = force_residuals(full_fit.model, runs, max_force)
+class _Fold(NamedTuple):
+    """The points to which a law is fitted, and the recordings that are left out of them."""
+
+    name: str
+    training: FitPoints
+    test: list[Recording]
+
+
+class _ComparedPoints(NamedTuple):
+    """All recordings, their maximum force [N] and the folds; their sensors are estimated once for all candidates."""
+
+    recordings: Sequence[Recording]
+    max_force: float
+    folds: tuple[_Fold, ...]
+
+    @classmethod
+    def from_recordings(
+        cls, runs: Sequence[Recording], labels: Sequence[Labels], names: Sequence[str]
+    ) -> _ComparedPoints:
+        """The points divided into the folds of these names."""
+        folds = []
+        for name in names:
+            training = [_select(run, label != name) for run, label in zip(runs, labels, strict=True)]
+            test = [_select(run, label == name) for run, label in zip(runs, labels, strict=True)]
+            folds.append(
+                _Fold(
+                    name,
+                    FitPoints.from_recordings([run for run in training if len(run)]),
+                    [run for run in test if len(run)],
+                )
+            )
+        return cls(runs, max(float(np.nanmax(run["force"])) for run in runs), tuple(folds))
+
+
+def _select(run: Recording, mask: npt.NDArray[np.bool_]) -> Recording:
+    return run if mask.all() else run.rows(mask)
+
+
+def _cross_validate(candidate: Candidate, points: _ComparedPoints, loss: Loss) -> RankedModel:
+    full_fit = fit(candidate.law, points.recordings, loss=loss, fixed=candidate.fixed)
+    max_force = 3 * points.max_force
+    in_sample = force_residuals(full_fit.model, points.recordings, max_force)
     scores, out_of_sample = [], []
-    for name in names:
-        training = [run.rows(label != name) for run, label in zip(runs, labels, strict=True) if (label != name).any()]
-        test = [run.rows(label == name) for run, label in zip(runs, labels, strict=True) if (label == name).any()]
+    for fold in points.folds:
         try:
-            model = fit(full_fit.model, training, loss=loss, fixed=candidate.fixed).model
+            model = refit(full_fit.model, fold.training, loss=loss, fixed=candidate.fixed)
         except AirmuscleError as error:
-            raise IdentificationError(f"Not determined without {name}: {error}") from None
-        residuals = force_residuals(model, test, max_force)
+            raise IdentificationError(f"Not determined without {fold.name}: {error}") from None
+        residuals = force_residuals(model, fold.test, max_force)
         if residuals.size:
-            scores.append(FoldScore(name, _rms(residuals), residuals.size))
+            scores.append(FoldScore(fold.name, _rms(residuals), residuals.size))
             out_of_sample.append(residuals)
     criterion = aicc(float(np.mean(in_sample**2)), in_sample.size, len(full_fit.estimates))
     return RankedModel(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Collection, Sequence
 from typing import Any
 
@@ -41,19 +42,18 @@ CONTRACTION = FittedQuantity("contraction", ("pressure", "force"), "contraction"
 PRESSURE = FittedQuantity("pressure", ("contraction", "force"), "pressure")
 
 
-def split_by_length(law: Any, data: Recording) -> list[tuple[Any, npt.NDArray[np.intp]]]:
-    """The law of each resting length in the data with the indices of its rows.
-
-    A law that does not depend on the resting length is returned once, with all rows.
-    """
+def rows_by_length(law: Any, data: Recording) -> list[tuple[float | None, npt.NDArray[np.intp]]]:
+    """Each resting length in the data with the indices of its rows; once None, if the law does not depend on it."""
     if RESTING_LENGTH not in data.columns or not hasattr(law, "with_resting_length"):
-        return [(law, np.arange(len(data)))]
+        return [(None, np.arange(len(data)))]
     lengths = data[RESTING_LENGTH]
-    return [(_with_length(law, float(length)), np.flatnonzero(lengths == length)) for length in np.unique(lengths)]
+    return [(float(length), np.flatnonzero(lengths == length)) for length in np.unique(lengths)]
 
 
-def _with_length(law: Any, length: float) -> Any:
+def of_length(law: Any, length: float | None) -> Any:
     """As `law.with_resting_length`, but without validation, because a search may pass through invalid parameters."""
+    if length is None:
+        return law
     leaves = tree.leaves(law)
     return tree.unflatten(law, [length if leaf.path == RESTING_LENGTH else leaf.value for leaf in leaves])
 
@@ -61,8 +61,8 @@ def _with_length(law: Any, length: float) -> Any:
 def evaluate(law: Any, method: str, arguments: tuple[str, str], data: Recording) -> Array:
     """The values of `law.method(*arguments)` at every row, with the law of the row's resting length; shape (N,)."""
     values = np.zeros(len(data))
-    for specimen, rows in split_by_length(law, data):
-        values[rows] = getattr(specimen, method)(*(data[name][rows] for name in arguments))
+    for length, rows in rows_by_length(law, data):
+        values[rows] = getattr(of_length(law, length), method)(*(data[name][rows] for name in arguments))
     return values
 
 
@@ -128,11 +128,37 @@ class FitProblem:
             leaf_values[i] = float(value)
         return leaf_values
 
+    def rows(self, selection: npt.NDArray[Any]) -> FitProblem:
+        """The problem of these rows, a mask or indices."""
+        return dataclasses.replace(
+            self,
+            data=self.data.rows(selection),
+            target=self.target[selection],
+            censoring=self.censoring[selection],
+            weights=self.weights[selection],
+        )
+
     def predict(self, values: Array) -> Array:
         """The fitted quantity at every row with these parameters [SI]; shape (N,)."""
         law = tree.unflatten(self.law, self.leaf_values(values))
         with np.errstate(all="ignore"):  # non-finite values raise an error at the start; later the search backtracks
-            return evaluate(law, self.fitted_quantity.method, self.fitted_quantity.arguments, self.data)
+            return self._join(
+                [getattr(of_length(law, length), self.fitted_quantity.method)(*x) for length, _, x in self._points]
+            )
+
+    @functools.cached_property
+    def _points(self) -> list[tuple[float | None, npt.NDArray[np.intp], tuple[Array, ...]]]:
+        """Each resting length with its rows and their arguments."""
+        groups = rows_by_length(self.law, self.data)
+        return [(length, rows, tuple(x[rows] for x in self.arguments)) for length, rows in groups]
+
+    def _join(self, parts: Sequence[Any]) -> Array:
+        """Values by resting length in the order of the rows, shape (N, ...)."""
+        first = np.asarray(parts[0])
+        values = np.empty((len(self.data), *first.shape[1:]))
+        for (_, rows, _), part in zip(self._points, parts, strict=True):
+            values[rows] = part
+        return values
 
     def residuals(self, modelled: Array) -> Array:
         """Weighted residuals; that of a censored row is 0 unless the law violates its bound; shape (N,)."""
@@ -148,14 +174,20 @@ class FitProblem:
 
         Exact if the law is traceable, otherwise by central differences.
         """
+        return self.partial_jacobian(values, range(len(self.free)))
+
+    def partial_jacobian(self, values: Array, which: Sequence[int]) -> Array:
+        """The columns of `jacobian` of these free parameters, shape (N, len(which))."""
         if _is_traceable(self.law):
-            law = tree.unflatten(self.law, self.leaf_values(values))
-            by_leaf = np.empty((len(self.data), len(self.leaves)))
-            for specimen, rows in split_by_length(law, self.data):
-                arguments = (values[rows] for values in self.arguments)
-                by_leaf[rows] = autodiff.jacobian(specimen, self.fitted_quantity.method, *arguments)[1]
-            return by_leaf[:, list(self.free)]
-        return self._finite_differences(values)
+            law, leaves = tree.unflatten(self.law, self.leaf_values(values)), [self.free[i] for i in which]
+            method = self.fitted_quantity.method
+            return self._join(
+                [
+                    autodiff.parameter_derivatives(of_length(law, length), method, x, leaves)
+                    for length, _, x in self._points
+                ]
+            )
+        return self._finite_differences(values)[:, list(which)]
 
     def _finite_differences(self, values: Array) -> Array:
         low, high = self.bounds

@@ -11,6 +11,7 @@ from ..core.arrays import Array
 from ..core.errors import IdentificationError
 from ..core.tree import Leaf
 from .censored_least_squares import is_determined_without_censored, solve_censored_least_squares
+from .gauss_newton import gauss_newton
 from .loss import LeastSquares, Loss
 from .problem import FitProblem
 from .variable_projection import find_initial_values, is_linear_parameter
@@ -37,9 +38,13 @@ class LeastSquaresSolution(NamedTuple):
 def solve(problem: FitProblem, loss: Loss, start: Array | None = None) -> LeastSquaresSolution:
     """The free parameters that minimise the loss. Raises IdentificationError where the search does not converge.
 
-    The search starts at `start`; by default at the initial values found by variable projection.
+    The search starts at `start`, if possible by Gauss-Newton steps; by default at the initial values found by variable
+    projection.
     """
     if not is_linear(problem):
+        near = gauss_newton(problem, start) if start is not None and isinstance(loss, LeastSquares) else None
+        if near is not None:
+            return LeastSquaresSolution(*near)
         return _solve_iteratively(problem, loss, find_initial_values(problem) if start is None else start)
     linear = _solve_linear(problem)
     if isinstance(loss, LeastSquares):

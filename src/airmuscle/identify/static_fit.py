@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection, Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,16 +13,17 @@ from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
 from ..recording import Recording
-from .censoring import Censoring, default_censoring, narrow_to_sensor
+from .censoring import Censoring
 from .correlation_index import correlation_index
+from .fit_points import POINT_COLUMNS, FitPoints
+from .gauss_newton import gauss_newton
 from .loss import LeastSquares, Loss
-from .problem import RESTING_LENGTH, FitProblem, evaluate, fitted_quantity_of, make_problem
+from .problem import FitProblem, evaluate
 from .result import Estimate, Fit, WorstPoint
-from .solver import LeastSquaresSolution, solve
-from .statistics import FitStatistics, compute_statistics
-from .weights import sensor_deviations
+from .solver import LeastSquaresSolution, is_linear, solve
+from .statistics import FitStatistics, check_determined, compute_statistics
+from .variable_projection import find_initial_values
 
-POINT_COLUMNS = ("pressure", "contraction", "force")
 ILL_CONDITIONED = 1e5
 """Condition number of the scaled design matrix above which a note is added (chosen): half of the digits are lost."""
 
@@ -55,19 +55,37 @@ def fit(
     these.
     """
     _check_types(characteristic, recording)
-    data, dropped = _join_recordings(recording)
-    by_recording = None if sigma is not None else _deviations_by_recording(characteristic, recording)
-    weights = _row_weights(data, dropped, sigma if by_recording is None else _repeat_by_row(by_recording, recording))
-    data, weights = data.rows(~dropped), weights[~dropped]
-    law = _with_validity_range(_with_length(characteristic, data), data)
-    runs = [recording] if isinstance(recording, Recording) else list(recording)
-    problem = make_problem(law, data, censoring or narrow_to_sensor(default_censoring(law), law, runs), weights, fixed)
+    points = FitPoints.from_recordings(recording)
+    problem = points.problem(characteristic, censoring=censoring, sigma=sigma, fixed=fixed)
     solution = solve(problem, loss)
     statistics = compute_statistics(problem, solution, loss)
-    dropped_count = int(np.count_nonzero(dropped))
-    notes = (*_collect_notes(problem, statistics, loss, dropped_count), *_weighting_notes(by_recording, problem))
+    by_recording = None if sigma is not None else points.deviations(problem.fitted_quantity.name)
+    notes = (*_collect_notes(problem, statistics, loss, points.dropped), *_weighting_notes(by_recording, problem))
     notes += _loss_scale_notes(problem, solution, loss)
-    return _build_result(problem, solution, statistics, loss, dropped_count, notes)
+    return _build_result(problem, solution, statistics, loss, points.dropped, notes)
+
+
+def refit(
+    characteristic: Characteristic, points: FitPoints, *, loss: Loss = LeastSquares(), fixed: Collection[str] = ()
+) -> Characteristic:
+    """The law that `fit` finds for these points if its search starts at the parameters of `characteristic`.
+
+    Other initial values are tried only where the search does not converge, and nothing but the rank is computed of the
+    solution. Raises IdentificationError where the points do not determine the parameters.
+    """
+    problem = points.problem(characteristic, fixed=fixed)
+    near = None if is_linear(problem) or loss != LeastSquares() else gauss_newton(problem, problem.initial_values)
+    try:
+        solution = (
+            solve(problem, loss, find_initial_values(problem, multi_start=False))
+            if near is None
+            else LeastSquaresSolution(*near)
+        )
+    except IdentificationError:
+        solution = solve(problem, loss)
+    check_determined(problem, solution)
+    model: Characteristic = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
+    return model
 
 
 def _check_types(characteristic: object, recording: object) -> None:
@@ -83,50 +101,6 @@ def _check_types(characteristic: object, recording: object) -> None:
             )
 
 
-def _join_recordings(recording: Recording | Sequence[Recording]) -> tuple[Recording, npt.NDArray[np.bool_]]:
-    """The points of one or several recordings, and the mask of the rows with a missing value."""
-    runs = [recording] if isinstance(recording, Recording) else list(recording)
-    columns = {name: np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS} if runs else {}
-    origins = list(dict.fromkeys(run.origin for run in runs))
-    few = len(origins) <= 3
-    origin = " + ".join(origins if few else [*origins[:2], f"{len(origins) - 2} more"]) or "no recording"
-    for name, values in columns.items():
-        if np.isinf(values).any():
-            row = int(np.argmax(np.isinf(values)))
-            raise IdentificationError(
-                f"{origin}, row {row + 1}: {name} is {values[row]}. Remove such rows, for example with "
-                f"recording.rows(np.isfinite(recording['{name}']))."
-            )
-    missing = np.isnan(np.stack(list(columns.values()))).any(axis=0) if columns else np.zeros(0, dtype=bool)
-    lengths = {run.constants.get(RESTING_LENGTH) for run in runs} - {None}
-    if len(lengths) > 1 and all(RESTING_LENGTH in run.constants for run in runs):
-        by_row = [np.full(len(run), float(run.constants[RESTING_LENGTH])) for run in runs]
-        columns[RESTING_LENGTH] = np.concatenate(by_row)
-    length = lengths.pop() if len(lengths) == 1 else None
-    return Recording(columns, origin, {} if length is None else {"resting_length": length}), missing
-
-
-def _row_weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLike | None) -> Array:
-    if sigma is None:
-        return np.ones(len(data))
-    deviations = np.broadcast_to(np.asarray(sigma, dtype=float), (len(data),))
-    if not (np.isfinite(deviations) & (deviations > 0))[~dropped].all():
-        raise IdentificationError(f"{data.origin}: every sigma must be finite and positive.")
-    weights = 1.0 / deviations
-    return np.asarray(weights / np.sqrt(np.mean(weights[~dropped] ** 2)))
-
-
-def _deviations_by_recording(law: Characteristic, recording: Recording | Sequence[Recording]) -> Array | None:
-    """The standard deviations of the sensors by recording; None unless they differ."""
-    if isinstance(recording, Recording) or len(recording) < 2:
-        return None
-    return sensor_deviations(recording, fitted_quantity_of(law).name)
-
-
-def _repeat_by_row(by_recording: Array, recording: Any) -> Array:
-    return np.repeat(by_recording, [len(run) for run in recording])
-
-
 def _weighting_notes(by_recording: Array | None, problem: FitProblem) -> list[str]:
     if by_recording is None:
         return []
@@ -135,29 +109,6 @@ def _weighting_notes(by_recording: Array | None, problem: FitProblem) -> list[st
         "The recordings come from test rigs with different sensors: rows are weighted by standard deviations of "
         f"{min(by_recording):.3g} to {max(by_recording):.3g}{unit}; sigma=1.0 weights all rows equally."
     ]
-
-
-def _with_length(law: Any, data: Recording) -> Any:
-    """A law for muscles of any resting length, at the resting length of the data if there is one."""
-    length = data.constants.get(RESTING_LENGTH)
-    return law.with_resting_length(float(length)) if length is not None and hasattr(law, "with_resting_length") else law
-
-
-def _with_validity_range(law: Characteristic, data: Recording) -> Characteristic:
-    """A surface scaled to the validity range of the data; any other law unchanged."""
-    with_validity_range = getattr(law, "with_validity_range", None)
-    if with_validity_range is None or not len(data):
-        return law
-    for name, unit in (("pressure", " Pa"), ("contraction", "")):
-        if np.ptp(data[name]) == 0:
-            raise IdentificationError(
-                f"{data.origin}: {name} is {data[name][0]:g}{unit} in every row, so a surface cannot be fitted. "
-                f"Measure at several levels of {name}."
-            )
-    scaled: Characteristic = with_validity_range(
-        *((float(data[n].min()), float(data[n].max())) for n in ("pressure", "contraction"))
-    )
-    return scaled
 
 
 def _build_result(

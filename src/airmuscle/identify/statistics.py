@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -33,23 +34,10 @@ class FitStatistics:
 
 def compute_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss) -> FitStatistics:
     """Statistics of a solution. Raises IdentificationError where the design matrix is rank-deficient."""
-    values, modelled, jacobian = solution
-    on_bound = _on_bound(problem, values)
-    active = problem.active_rows(modelled)
-    matrix = problem.weights[active, None] * jacobian[np.ix_(active, ~on_bound)]
-    residuals = problem.residuals(modelled)[active]
-    norms = np.linalg.norm(matrix, axis=0)
-    normalised = matrix / np.where(norms > 0, norms, 1.0)
-    # R of the QR factorisation has the singular values and right singular vectors of the tall matrix, at less cost
-    triangle = np.linalg.qr(normalised, mode="r")
-    _, singular, vectors = np.linalg.svd(
-        np.vstack([triangle, np.zeros((normalised.shape[1] - len(triangle), normalised.shape[1]))])
-    )
-    null = singular <= RANK_TOLERANCE * singular[0] if singular.size else np.zeros(0, dtype=bool)
-    if null.any():
-        shares = np.sqrt(np.sum(vectors[null] ** 2, axis=0))
-        raise IdentificationError(_rank_deficiency_message(problem, ~on_bound, shares, int(np.count_nonzero(~null))))
-    sigma = _residual_std(residuals, normalised.shape[1], loss)
+    values, jacobian = solution.values, solution.jacobian
+    on_bound, active, norms, singular, vectors = _decompose(problem, solution)
+    residuals = problem.residuals(solution.modelled)[active]
+    sigma = _residual_std(residuals, singular.size, loss)
     inverse = (vectors.T / singular**2) @ vectors
     lengths = np.sqrt(np.diag(inverse))
     standard_errors, correlations = np.full(values.size, np.nan), np.full((values.size, values.size), np.nan)
@@ -58,6 +46,36 @@ def compute_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss
     condition = float(singular[0] / singular[-1]) if singular.size else 1.0
     measured = uncensored_rank(problem, jacobian[:, ~on_bound]) if problem.censoring.any() else singular.size
     return FitStatistics(singular.size, measured, condition, sigma, standard_errors, correlations, on_bound)
+
+
+def check_determined(problem: FitProblem, solution: LeastSquaresSolution) -> None:
+    """Raise IdentificationError where the design matrix at the solution is rank-deficient."""
+    _decompose(problem, solution)
+
+
+class _Decomposition(NamedTuple):
+    """Parameters on a bound, active rows, and the singular values of the others' columns, scaled to unit norm."""
+
+    on_bound: npt.NDArray[np.bool_]
+    active: npt.NDArray[np.bool_]
+    norms: Array
+    singular_values: Array
+    right_singular_vectors: Array
+
+
+def _decompose(problem: FitProblem, solution: LeastSquaresSolution) -> _Decomposition:
+    on_bound = _on_bound(problem, solution.values)
+    active = problem.active_rows(solution.modelled)
+    matrix = problem.weights[active, None] * solution.jacobian[np.ix_(active, ~on_bound)]
+    norms = np.linalg.norm(matrix, axis=0)
+    # R of the QR factorisation has the singular values and right singular vectors of the tall matrix, at less cost
+    triangle = np.linalg.qr(matrix / np.where(norms > 0, norms, 1.0), mode="r")
+    _, singular, vectors = np.linalg.svd(np.vstack([triangle, np.zeros((norms.size - len(triangle), norms.size))]))
+    null = singular <= RANK_TOLERANCE * singular[0] if singular.size else np.zeros(0, dtype=bool)
+    if null.any():
+        shares = np.sqrt(np.sum(vectors[null] ** 2, axis=0))
+        raise IdentificationError(_rank_deficiency_message(problem, ~on_bound, shares, int(np.count_nonzero(~null))))
+    return _Decomposition(on_bound, active, norms, singular, vectors)
 
 
 def _on_bound(problem: FitProblem, values: Array) -> npt.NDArray[np.bool_]:

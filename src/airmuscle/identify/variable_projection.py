@@ -24,6 +24,8 @@ _SPREAD_FACTOR = 4.0
 """Maximum factor between an initial guess and the given value (chosen)."""
 _RANGE_FRACTION = 0.01
 """Additional shift as a fraction of the range between the bounds, so that a value of zero is varied too (chosen)."""
+_MAX_ROWS = 2000
+"""Rows of the multi-start search, drawn at random of more (chosen): one search over all rows follows."""
 
 
 def linear_fields(law: Any) -> tuple[str, ...]:
@@ -38,19 +40,34 @@ def is_linear_parameter(problem: FitProblem) -> npt.NDArray[np.bool_]:
     return np.array([problem.leaves[i].path.partition("[")[0] in fields for i in problem.free], dtype=bool)
 
 
-def find_initial_values(problem: FitProblem) -> Array:
-    """The best free parameters by variable projection, shape (P,); the given ones where none are better."""
+def find_initial_values(problem: FitProblem, multi_start: bool = True) -> Array:
+    """The best free parameters by variable projection, shape (P,); the given ones where none are better.
+
+    Without `multi_start` there is one search, from the given parameters.
+    """
     linear = is_linear_parameter(problem)
     if linear.all() or not linear.any():
         return problem.initial_values
-    projection = _Projection(problem, linear)
-    guesses = sorted(_initial_guesses(problem, ~linear), key=projection.sum_of_squares)
-    searches = (projection.search(guess) for guess in guesses[:_SEARCH_COUNT])
-    best = min(searches, key=projection.sum_of_squares)
+    projection, thinned = _Projection(problem, linear), _thinned(problem)
+    best = problem.initial_values[~linear]
+    if multi_start:
+        preview = projection if thinned is problem else _Projection(thinned, linear)
+        guesses = sorted(_initial_guesses(problem, ~linear), key=preview.sum_of_squares)[:_SEARCH_COUNT]
+        best = min((preview.search(guess) for guess in guesses), key=preview.sum_of_squares)
+    if not multi_start or thinned is not problem:
+        best = projection.search(best)
     low, high = problem.bounds
     values = np.clip(projection.complete(best), low, high)
     after, before = (_sum_of_squares(problem.residuals(problem.predict(v))) for v in (values, problem.initial_values))
     return values if after < before else problem.initial_values
+
+
+def _thinned(problem: FitProblem) -> FitProblem:
+    """The problem with at most `_MAX_ROWS` rows, drawn with a constant seed, as a regular choice could miss levels."""
+    count = len(problem.data)
+    if count <= _MAX_ROWS:
+        return problem
+    return problem.rows(np.sort(np.random.default_rng(1).permutation(count)[:_MAX_ROWS]))
 
 
 class _Projection:
@@ -58,6 +75,7 @@ class _Projection:
 
     def __init__(self, problem: FitProblem, linear: npt.NDArray[np.bool_]) -> None:
         self._problem, self._linear = problem, linear
+        self._linear_indices = np.flatnonzero(linear).tolist()
         self._bounds = tuple(bound[~linear] for bound in problem.bounds)
         initial = problem.initial_values[~linear]
         self._scale = np.where(initial != 0, np.abs(initial), 1.0)
@@ -67,7 +85,7 @@ class _Projection:
         values = np.zeros(self._linear.size)
         values[~self._linear] = nonlinear
         constant = self._problem.predict(values)
-        jacobian = self._problem.jacobian(values)[:, self._linear]
+        jacobian = self._problem.partial_jacobian(values, self._linear_indices)
         finite = np.isfinite(jacobian).all() and np.isfinite(constant).all()
         values[self._linear] = solve_censored_least_squares(self._problem, jacobian, constant) if finite else np.nan
         return values

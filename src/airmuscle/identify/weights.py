@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,6 +15,8 @@ from ..recording.segment import estimate_sensors
 MIN_SENSOR_RATIO = 2.0
 """Minimum ratio of neighbouring standard deviations of two different sensors (chosen: estimates of the standard
 deviation of one sensor differ less)."""
+_known: weakref.WeakKeyDictionary[Recording, dict[str, tuple[float, float]]] = weakref.WeakKeyDictionary()
+"""Noise and quantisation by recording and column: cross-validation asks for the same recordings in every fold."""
 
 
 def sensor_deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
@@ -47,10 +50,10 @@ def sensor_deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
 
 def _sensor_deviation(run: Recording, quantity: str, timed: bool) -> float:
     """The standard deviation of the sensor of one recording; 0 where it cannot be estimated."""
-    values = run[quantity][np.isfinite(run[quantity])]
-    if not values.size:
-        return 0.0
-    sensor = estimate_sensors(Recording({quantity: values}, run.origin)).get(quantity)
-    if sensor is None:
-        return 0.0
-    return sensor.std if timed else float(sensor.resolution / np.sqrt(12.0))
+    stored = _known.setdefault(run, {})
+    if quantity not in stored:
+        values = run[quantity][np.isfinite(run[quantity])]
+        sensors = estimate_sensors(Recording({quantity: values}, run.origin)) if values.size else {}
+        sensor = sensors.get(quantity)
+        stored[quantity] = (0.0, 0.0) if sensor is None else (sensor.std, float(sensor.resolution / np.sqrt(12.0)))
+    return stored[quantity][0 if timed else 1]

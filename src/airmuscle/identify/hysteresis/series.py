@@ -43,16 +43,26 @@ class LoopSeries:
 
     def coefficients(self, friction: Friction | None) -> Array:
         """Least-squares coefficients of the static curve with this friction, or without friction; shape (C,)."""
-        target = self.target if friction is None else self.target + friction.force_along(self.path, self.time)
-        return np.asarray(
-            np.linalg.lstsq(self.design_matrix[self.fitted_rows], target[self.fitted_rows], rcond=None)[0]
-        )
+        return self._coefficients(self._friction_force(friction))
 
     def residuals(self, friction: Friction | None, coefficients: Array) -> Array:
         """Measured - modelled force [N] at every row, shape (N,)."""
-        difference = self.target - self.design_matrix @ coefficients
-        return difference if friction is None else difference + friction.force_along(self.path, self.time)
+        return self._residuals(self._friction_force(friction), coefficients)
 
     def fitted_residuals(self, friction: Friction | None) -> Array:
         """Residuals [N] at the fitted rows, with the least-squares coefficients of the static curve."""
-        return self.residuals(friction, self.coefficients(friction))[self.fitted_rows]
+        force = self._friction_force(friction)
+        return self._residuals(force, self._coefficients(force))[self.fitted_rows]
+
+    def _friction_force(self, friction: Friction | None) -> Array | None:
+        """Friction force [N] at every row, shape (N,)."""
+        return None if friction is None else np.asarray(friction.force_along(self.path, self.time))
+
+    def _coefficients(self, friction_force: Array | None) -> Array:
+        rows = self.fitted_rows
+        target = self.target if friction_force is None else self.target + friction_force
+        return np.asarray(np.linalg.lstsq(self.design_matrix[rows], target[rows], rcond=None)[0])
+
+    def _residuals(self, friction_force: Array | None, coefficients: Array) -> Array:
+        difference = self.target - self.design_matrix @ coefficients
+        return difference if friction_force is None else difference + friction_force

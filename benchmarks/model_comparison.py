@@ -1,0 +1,141 @@
+"""Model comparison, bootstrap and friction identification on synthetic measurements of a rig."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from measure import Section, Target, format_time, print_section
+
+from airmuscle.characteristic import TonduLopez2000
+from airmuscle.friction import Dahl
+from airmuscle.geometry.braid import Braid
+from airmuscle.identify import Bootstrap, Comparison, RunSplit, bootstrap, compare, fit
+from airmuscle.identify.candidates import blank_surface
+from airmuscle.identify.hysteresis import find_loops, fit_loop
+from airmuscle.recording import Recording
+
+LENGTHS = (0.15, 0.2, 0.3)
+"""Resting lengths [m] of the muscles (chosen)."""
+END_LENGTH = 0.02
+"""Length [m] of the ends of every muscle, which do not contract (chosen)."""
+POINTS = tuple((length, held) for length in (0.2, 0.3) for held in (0.0, 0.06, 0.12, 0.18))
+"""Resting length [m] and held contraction of the runs of the bootstrap (chosen)."""
+MAX_PRESSURE = 6e5
+NOISE = {"pressure": 300.0, "contraction": 2e-4, "force": 2.0}
+"""Standard deviations of the sensors [SI] (chosen)."""
+HEADER = ("task", "time", "CPU time", "result")
+TEXT = (
+    "Synthetic sweeps of pressure, up and down, of braided muscles by Tondu and Lopez (2000) with rigid ends, with "
+    "noise of the sensors (2 N, 300 Pa, 0.02 % contraction). 24 files: three resting lengths, four held contractions, "
+    "two repeats, 500 rows each. Six sweeps: one muscle, 800 rows each. Comparison: all standard candidates, reading "
+    "of the files not included. Hysteresis: three isobaric loops of 2000 rows with Dahl friction, all friction laws. "
+    "Bootstrap: 4000 rows in eight runs, 1000 refits of a surface of degree 5, 100 of a braided muscle, which is "
+    "nonlinear in its parameters. Times are of one process, median of the rounds, the "
+    "first of which includes the tracing of the laws; the CPU time is of all threads."
+)
+
+
+class Timing(NamedTuple):
+    """Median time and CPU time [s] of a call, and its last result."""
+
+    wall: float
+    cpu: float
+    result: Any
+
+
+def muscle(length: float) -> TonduLopez2000:
+    """The law of the active part of a muscle between its ends."""
+    return TonduLopez2000(Braid(0.01, 0.45, length - END_LENGTH), 1.15)
+
+
+def add_noise(columns: dict[str, np.ndarray], seed: int) -> dict[str, np.ndarray]:
+    """The columns as the sensors give them; a force sensor in tension does not read below zero."""
+    random = np.random.default_rng(seed)
+    noisy = {n: x + NOISE[n] * random.standard_normal(x.size) if n in NOISE else x for n, x in columns.items()}
+    noisy["force"] = np.maximum(noisy["force"], 0.0)
+    return noisy
+
+
+def make_sweep(length: float, contraction: float, rows: int, seed: int) -> Recording:
+    """A triangular sweep of pressure at constant length."""
+    seconds = np.linspace(0.0, 60.0, rows)
+    pressure = MAX_PRESSURE * (1 - np.abs(seconds / 30.0 - 1))
+    held = np.full(rows, contraction)
+    force = muscle(length).force(pressure, held * length / (length - END_LENGTH))
+    columns = add_noise({"time": seconds, "pressure": pressure, "contraction": held, "force": force}, seed)
+    return Recording(columns, f"{length * 1e3:.0f} mm, {contraction:.0%}, {seed}", {"resting_length": length})
+
+
+def make_family(rows: int = 500) -> list[Recording]:
+    """24 sweeps: three muscles, four held lengths, two repeats."""
+    points = [(length, held) for length in LENGTHS for held in (0.0, 0.06, 0.12, 0.18)]
+    return [make_sweep(*point, rows, 2 * i + repeat) for i, point in enumerate(points) for repeat in range(2)]
+
+
+def make_sweeps(count: int = 6, rows: int = 800) -> list[Recording]:
+    """Sweeps of one muscle at several held lengths."""
+    return [make_sweep(0.3, held, rows, 100 + i) for i, held in enumerate(np.linspace(0.0, 0.2, count))]
+
+
+def make_loops(rows: int = 2000) -> list[Recording]:
+    """Three isobaric loops with friction against shortening: lengthening and shortening in cycles of two strokes."""
+    loops = []
+    for i, pressure in enumerate((2e5, 3.5e5, 5e5)):
+        seconds = np.linspace(0.0, 120.0, rows)
+        stroke = np.where(seconds < 60.0, 0.06, 0.03)
+        contraction = 0.08 - stroke * np.cos(2 * np.pi * seconds / 30.0) * 0.9
+        held = np.full(rows, pressure)
+        friction = Dahl(2e4, 12.0).force_along(contraction * 0.3, seconds)
+        force = muscle(0.3).force(held, contraction * 0.3 / (0.3 - END_LENGTH)) - friction
+        columns = add_noise({"time": seconds, "pressure": held, "contraction": contraction, "force": force}, 200 + i)
+        loops.append(Recording(columns, f"loop at {pressure / 1e3:.0f} kPa", {"resting_length": 0.3}))
+    return loops
+
+
+def timed(task: Callable[[], Any], rounds: int) -> Timing:
+    """Median times of a task; the first round includes the tracing of the laws."""
+    walls, processors = [], []
+    for _ in range(rounds):
+        wall, processor = time.perf_counter(), time.process_time()
+        result = task()
+        walls.append(time.perf_counter() - wall)
+        processors.append(time.process_time() - processor)
+    return Timing(statistics.median(walls), statistics.median(processors), result)
+
+
+def describe(result: Any) -> str:
+    """The outcome of a task in a few words."""
+    if isinstance(result, Comparison):
+        return f"recommended: {result.recommended.candidate.name}; {len(result.excluded)} excluded"
+    if isinstance(result, Bootstrap):
+        return f"{result.failed_refits} of {len(result.values)} refits not determined"
+    return ", ".join(type(each.recommended.friction).__name__ for each in result if each.recommended is not None)
+
+
+def section(rounds: int = 3) -> Section:
+    """The complete benchmark."""
+    family, sweeps, loops = make_family(), make_sweeps(), find_loops(make_loops())
+    runs = [make_sweep(length, held, 500, 300 + i) for i, (length, held) in enumerate(POINTS)]
+    surface, braid = fit(blank_surface(5), runs), fit(muscle(0.3), runs)
+    tasks: dict[str, tuple[Callable[[], Any], float]] = {
+        "comparison of 24 files, by specimen": (lambda: compare(family), 10.0),
+        "comparison of 24 files, by run": (lambda: compare(family, leave_out=RunSplit()), 10.0),
+        "comparison of six sweeps": (lambda: compare(sweeps), 10.0),
+        "friction of three loops": (lambda: [fit_loop(loop) for loop in loops], 10.0),
+        "bootstrap, surface": (lambda: bootstrap(surface, runs, by=RunSplit()), 3.0),
+        "bootstrap, braid, 100 refits": (lambda: bootstrap(braid, runs, refits=100, by=RunSplit()), 3.0),
+    }
+    rows, targets = [], []
+    for name, (task, limit) in tasks.items():
+        timing = timed(task, rounds)
+        rows.append((name, format_time(timing.wall), format_time(timing.cpu), describe(timing.result)))
+        targets.append(Target(f"{name}, CPU time", timing.cpu, limit, "s"))
+    return Section("Model comparison", TEXT, HEADER, tuple(rows), tuple(targets))
+
+
+if __name__ == "__main__":
+    print_section(section())

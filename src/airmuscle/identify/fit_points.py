@@ -1,0 +1,144 @@
+"""FitPoints: the rows of one or several recordings as the points of static fits."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Collection, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..characteristic.base import Characteristic, ForceLaw
+from ..core.arrays import Array
+from ..core.errors import IdentificationError
+from ..recording import Recording
+from .censoring import Censoring, default_censoring, force_limits
+from .problem import RESTING_LENGTH, FitProblem, fitted_quantity_of, make_problem
+from .weights import sensor_deviations
+
+POINT_COLUMNS = ("pressure", "contraction", "force")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FitPoints:
+    """The points of one or several recordings, for fits of any law; the sensors are estimated once.
+
+    `joined` has all rows of the recordings in order, `missing` is the mask of those that lack a value.
+    """
+
+    recordings: tuple[Recording, ...]
+    single: bool
+    """Whether one recording was given, not a sequence."""
+    joined: Recording
+    missing: npt.NDArray[np.bool_]
+
+    @classmethod
+    def from_recordings(cls, recording: Recording | Sequence[Recording]) -> FitPoints:
+        """The points of one or several recordings. Raises IdentificationError for an infinite value."""
+        single = isinstance(recording, Recording)
+        runs = (recording,) if isinstance(recording, Recording) else tuple(recording)
+        return cls(runs, single, *_join_recordings(runs))
+
+    @functools.cached_property
+    def data(self) -> Recording:
+        """The complete rows."""
+        return self.joined.rows(~self.missing)
+
+    @property
+    def dropped(self) -> int:
+        """Number of rows with a missing value."""
+        return int(np.count_nonzero(self.missing))
+
+    def deviations(self, quantity: str) -> Array | None:
+        """The standard deviations of the sensors by recording; None unless they differ."""
+        if self.single or len(self.recordings) < 2:
+            return None
+        if quantity not in self._deviations:
+            self._deviations[quantity] = sensor_deviations(self.recordings, quantity)
+        return self._deviations[quantity]
+
+    @functools.cached_property
+    def _deviations(self) -> dict[str, Array | None]:
+        return {}
+
+    @functools.cached_property
+    def _force_limits(self) -> Censoring:
+        return force_limits(self.recordings)
+
+    def problem(
+        self,
+        characteristic: Characteristic,
+        *,
+        censoring: Censoring | None = None,
+        sigma: npt.ArrayLike | None = None,
+        fixed: Collection[str] = (),
+    ) -> FitProblem:
+        """The problem of fitting a law to these points; arguments as for `fit`. Raises IdentificationError."""
+        law = _with_validity_range(_with_length(characteristic, self.data), self.data)
+        if sigma is None:
+            by_recording = self.deviations(fitted_quantity_of(characteristic).name)
+            if by_recording is not None:
+                sigma = np.repeat(by_recording, [len(run) for run in self.recordings])
+        weights = _row_weights(self.joined, self.missing, sigma)[~self.missing]
+        return make_problem(law, self.data, censoring or self._censoring(law), weights, fixed)
+
+    def _censoring(self, law: Characteristic) -> Censoring:
+        default = default_censoring(law)
+        return default.within(self._force_limits) if isinstance(law, ForceLaw) else default
+
+
+def _join_recordings(runs: Sequence[Recording]) -> tuple[Recording, npt.NDArray[np.bool_]]:
+    """The points of one or several recordings, and the mask of the rows with a missing value."""
+    columns = {name: np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS} if runs else {}
+    origins = list(dict.fromkeys(run.origin for run in runs))
+    few = len(origins) <= 3
+    origin = " + ".join(origins if few else [*origins[:2], f"{len(origins) - 2} more"]) or "no recording"
+    for name, values in columns.items():
+        if np.isinf(values).any():
+            row = int(np.argmax(np.isinf(values)))
+            raise IdentificationError(
+                f"{origin}, row {row + 1}: {name} is {values[row]}. Remove such rows, for example with "
+                f"recording.rows(np.isfinite(recording['{name}']))."
+            )
+    missing = np.isnan(np.stack(list(columns.values()))).any(axis=0) if columns else np.zeros(0, dtype=bool)
+    lengths = {run.constants.get(RESTING_LENGTH) for run in runs} - {None}
+    if len(lengths) > 1 and all(RESTING_LENGTH in run.constants for run in runs):
+        by_row = [np.full(len(run), float(run.constants[RESTING_LENGTH])) for run in runs]
+        columns[RESTING_LENGTH] = np.concatenate(by_row)
+    length = lengths.pop() if len(lengths) == 1 else None
+    return Recording(columns, origin, {} if length is None else {"resting_length": length}), missing
+
+
+def _row_weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLike | None) -> Array:
+    if sigma is None:
+        return np.ones(len(data))
+    deviations = np.broadcast_to(np.asarray(sigma, dtype=float), (len(data),))
+    if not (np.isfinite(deviations) & (deviations > 0))[~dropped].all():
+        raise IdentificationError(f"{data.origin}: every sigma must be finite and positive.")
+    weights = 1.0 / deviations
+    return np.asarray(weights / np.sqrt(np.mean(weights[~dropped] ** 2)))
+
+
+def _with_length(law: Any, data: Recording) -> Any:
+    """A law for muscles of any resting length, at the resting length of the data if there is one."""
+    length = data.constants.get(RESTING_LENGTH)
+    return law.with_resting_length(float(length)) if length is not None and hasattr(law, "with_resting_length") else law
+
+
+def _with_validity_range(law: Characteristic, data: Recording) -> Characteristic:
+    """A surface scaled to the validity range of the data; any other law unchanged."""
+    with_validity_range = getattr(law, "with_validity_range", None)
+    if with_validity_range is None or not len(data):
+        return law
+    for name, unit in (("pressure", " Pa"), ("contraction", "")):
+        if np.ptp(data[name]) == 0:
+            raise IdentificationError(
+                f"{data.origin}: {name} is {data[name][0]:g}{unit} in every row, so a surface cannot be fitted. "
+                f"Measure at several levels of {name}."
+            )
+    scaled: Characteristic = with_validity_range(
+        *((float(data[n].min()), float(data[n].max())) for n in ("pressure", "contraction"))
+    )
+    return scaled
