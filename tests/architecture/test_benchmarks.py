@@ -64,7 +64,7 @@ def test_the_c_code_computes_the_same_steps(tmp_path):
     """Over 0.2 s from a state beyond the validity range of the surface, with valve openings; equal to rounding."""
     case = runs()[3]
     start = case.system.state_at(pressure=6.5e5, position=0.05)
-    short = dataclasses.replace(case, start=start, command=Schedule({"discharge": ((0.05, 1.0), (0.15, 0.0))}))
+    short = dataclasses.replace(case, initial_state=start, command=Schedule({"discharge": ((0.05, 1.0), (0.15, 0.0))}))
     ready, segments = compile_system(case.system), short.command.segments(case.system.inputs, 0.0, 0.2)
     times = np.linspace(0.0, 0.2, 21)
     expected = DormandPrince8(ode8.STEP).run(ready, segments, 0.0, short.vector, times).rows

@@ -97,7 +97,7 @@ def test_the_c_code_for_several_muscles_computes_the_same_steps(tmp_path, muscle
     run = lifting_run(muscles)
     start = run.system.state_at(pressure=tuple(5e5 + 4e4 * i for i in range(muscles)), position=0.05)
     opened = {f"{p}discharge": ((0.02 + 0.01 * i, 1.0), (0.09, 0.0)) for i, p in enumerate(run.system.prefixes)}
-    run = dataclasses.replace(run, start=start, command=Schedule(opened))
+    run = dataclasses.replace(run, initial_state=start, command=Schedule(opened))
     ready, segments = compile_system(run.system), run.command.segments(run.system.inputs, 0.0, 0.1)
     expected = DormandPrince8(ode8.STEP).run(ready, segments, 0.0, run.vector, np.linspace(0.0, 0.1, 11)).rows
     for library in ode8.compile_libraries(tmp_path, muscles).values():

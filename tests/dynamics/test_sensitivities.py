@@ -364,7 +364,7 @@ def test_unknown_paths_and_missing_scales_are_refused():
         WithSensitivities(hanging(), (("mechanism.mas",),), (1.0,))
     with pytest.raises(ParameterError, match="2 columns need as many scales"):
         WithSensitivities(hanging(), (("mechanism.mass",), ()), (1.0,))
-    with pytest.raises(ParameterError, match="0 columns need as many scales, one at least"):
+    with pytest.raises(ParameterError, match="0 columns need as many scales"):
         WithSensitivities(hanging(), (), ())
 
 

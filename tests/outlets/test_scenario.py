@@ -559,7 +559,7 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             '{ pressure = "1 bar" }',
             "3",
             ParameterError,
-            r"\[run.initial_state\] is 3; it must be a table. Write start = \{ pressure = \"0 bar\" \}",
+            r"\[run.initial_state\] is 3; it must be a table. Write initial_state = \{ pressure = \"0 bar\" \}",
         ),
         (
             "{ pressure =",
