@@ -17,6 +17,7 @@ os.environ.setdefault(
 
 import batch
 import bootstrap
+import calls
 import components
 import derivative
 import growth
@@ -35,6 +36,7 @@ from measure import Section, Target, describe_machine, package_versions, print_s
 
 RESULTS = pathlib.Path(__file__).with_name("RESULTS.md")
 SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
+    (calls.section, 25),
     (rodas4.section, 25),
     (peers.section, 9),
     (ode8.section, 15),
