@@ -159,7 +159,12 @@ def test_where_two_numbers_are_equal_one_is_the_larger_and_the_other_the_smaller
 
 @pytest.mark.parametrize(
     ("value", "message"),
-    [(math.nan, "must be finite"), ((2.0,), "must be one number"), (True, "must be a number"), (1e9, "allowed range: ")],
+    [
+        (math.nan, "must be finite"),
+        ((2.0,), "must be one number"),
+        (True, "must be a number"),
+        (1e9, "allowed range: "),
+    ],
 )
 def test_a_parameter_is_checked_when_a_model_is_made(value, message):
     @model

@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..compile.program import compile_system
 from ..core.errors import ParameterError
 from ..identify.dynamic import Experiment, InitialConditions
 from ..library.location import Location, check_keys, located_errors, read_finite_number, read_text
 from ..plant.plant import Plant
 from ..recording import Recording, read
 from ..recording.columns import quantity_of
-from ..simulation.problem import check_input_range
+from ..simulation.problem import check_signal
 from .inputs import build_input_signal
 from .scenario import build_plant
 
@@ -50,7 +49,7 @@ class Record:
         signal = build_input_signal(table, plant.input_variables, in_input)
         with located_errors(in_input):
             duration = max(float(recording["time"][-1]) - start_time, 1e-9)
-            check_input_range(compile_system(plant), signal.segments(plant.inputs, 0.0, duration), 0.0)
+            check_signal(plant, signal, 0.0, duration)
         return Experiment(recording, signal, self._initial_conditions(plant, recording), start_time, plant), table
 
     def _build_plant(self) -> Plant:

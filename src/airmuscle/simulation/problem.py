@@ -133,6 +133,12 @@ def default_state(compiled: CompiledSystem) -> Array:
     return known.default_state
 
 
+def check_signal(system: System, signal: InputSignal, start: float, duration: float) -> None:
+    """Raise ParameterError where an input signal is beyond its range, from `start` [s] for `duration` [s]."""
+    compiled = compile_system(system)
+    check_input_range(compiled, signal.segments(compiled.description.input_names, start, duration), start)
+
+
 def check_input_range(compiled: CompiledSystem, segments: PiecewiseLinear, start: float) -> None:
     """Raise ParameterError where an input is beyond its range."""
     known = compiled.description

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from ..analysis.equilibrium import find_equilibrium_of_each
-from ..compile.program import compile_system
 from ..control.control_loop import ControlLoop
 from ..core.arrays import Array
 from ..core.declaration import parameters
@@ -25,7 +24,6 @@ from ..core.errors import ParameterError, suggestion
 from ..core.tree import flatten, leaves, with_parameters
 from ..library.location import Location
 from ..library.models import model_class
-from ..plant.plant import Plant
 from ..scenario.controller import controller_number_paths
 from ..scenario.scenario import Scenario, build_scenario, initial_pressure, run_column_units
 
@@ -58,7 +56,10 @@ class ScenarioTemplate:
             ScenarioParameter(leaf.path, leaf.declared.unit, leaf.declared.bounds, i)
             for i, leaf in enumerate(leaves(plant))
         ]
-        for keys, unit in (*_input_parameters(input_table, self.scenario), *_run_parameters(self.tables["run"], plant)):
+        for keys, unit in (
+            *_input_parameters(input_table, self.scenario),
+            *_run_parameters(self.tables["run"], self.scenario),
+        ):
             available.append(ScenarioParameter(_format_path(keys), unit, (-math.inf, math.inf), keys))
         return {parameter.path: parameter for parameter in available}
 
@@ -86,7 +87,7 @@ class ScenarioTemplate:
             if isinstance(parameter.location, int):
                 leaf_values[:, parameter.location] = column
         pressures, inputs = (pressure,) * len(plant.muscles), np.zeros(len(plant.inputs))
-        states = find_equilibrium_of_each(compile_system(plant), leaf_values, pressures, inputs)
+        states = find_equilibrium_of_each(self.scenario.problem.compiled, leaf_values, pressures, inputs)
         names = [s.name for s in plant.states]
         return [dict(zip(names, x, strict=True)) if np.isfinite(x).all() else None for x in states.tolist()]
 
@@ -131,13 +132,13 @@ def _input_parameters(table: Mapping[str, Any], scenario: Scenario) -> Iterator[
             yield from _model_parameters(value, ("input", name))
 
 
-def _run_parameters(table: Mapping[str, Any], plant: Plant) -> Iterator[tuple[Keys, str]]:
+def _run_parameters(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:
     """Keys and units of the numbers under [run]."""
     for name in ("duration", "start_time", "output_times"):
         if name in table:
             yield ("run", name), "s"
     yield ("run", "initial_state", "pressure"), "Pa"
-    for coordinate in plant.mechanism.coordinates:
+    for coordinate in scenario.plant.mechanism.coordinates:
         yield ("run", "initial_state", coordinate.name), coordinate.unit
         yield ("run", "initial_state", coordinate.speed), f"{coordinate.unit}/s"
     yield from _model_parameters(table.get("integrator"), ("run", "integrator"))
