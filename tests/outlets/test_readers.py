@@ -163,6 +163,17 @@ def test_matlab_structs_matrices_and_simulink(tmp_path: Path):
     same(only(read(save_v5(tmp_path / "sim.mat", simulink))))
 
 
+def test_the_function_workspace_of_a_matlab_file_is_no_column(tmp_path: Path):
+    """MATLAB saves it as a matrix of bytes beside the variables of a file that contains an object."""
+    path = tmp_path / "bench.mat"
+    scipy = pytest.importorskip("scipy.io")
+    scipy.savemat(path, {"time_s": np.linspace(0.0, 1.0, 5), "x_function_workspace__": np.ones((1, 11488), np.uint8)})
+    path.write_bytes(path.read_bytes().replace(b"x_function_workspace__", b"__function_workspace__"))
+    (recording,) = read(path)
+    assert list(recording) == ["time"]
+    assert len(recording) == 5
+
+
 def test_matlab_without_a_vector(tmp_path: Path):
     pytest.importorskip("pymatreader")
     said = refusal(FileError, save_v5(tmp_path / "run.mat", {"name": "x", "n": 3.0}))

@@ -20,7 +20,8 @@ from .optional_dependency import check_lab_package, import_lab_package, run_read
 from .separate_process import call_in_separate_process
 from .table import RawTable
 
-_INTERNAL_NAMES = ("__header__", "__version__", "__globals__", "#refs#", "#subsystem#")
+_INTERNAL_PREFIXES = ("__", "#")
+"""Beginnings of names that no MATLAB variable has: header, function workspace, references, subsystem."""
 
 
 def read_mat_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
@@ -44,7 +45,7 @@ def read_mat_tables_here(path: Path, group: str | None) -> tuple[RawTable, ...]:
             return dict(pymatreader.read_mat(str(path)))
 
     contents = run_reader(path, "MATLAB", read)
-    variables = {name: value for name, value in contents.items() if name not in _INTERNAL_NAMES}
+    variables = {name: value for name, value in contents.items() if not name.startswith(_INTERNAL_PREFIXES)}
     groups = dict(_find_groups("", variables))
     if group is not None and group not in groups:
         names = ", ".join(name or "(no struct)" for name in groups)
