@@ -94,6 +94,7 @@ def _to_dict(comparison: Comparison) -> dict[str, Any]:
                 "in_sample": c.in_sample_rmse,
                 "cross_validated": c.cross_validated_rmse,
                 "aicc": c.aicc,
+                "notes": list(c.notes),
                 "groups": {score.fold: score.rmse for score in c.fold_scores},
             }
             for c in comparison.ranking
