@@ -16,12 +16,13 @@ import pytest
 from typer.testing import CliRunner
 
 import airmuscle as am
+from airmuscle import load_data
 from airmuscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.cli.app import app
 from airmuscle.cli.fit_options import parse_split
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.geometry.braid import Braid
-from airmuscle.identify import BlockSplit, Candidate, LevelSplit, RunSplit, SpecimenSplit, compare
+from airmuscle.identify import BlockSplit, Candidate, LevelSplit, RunSplit, SpecimenSplit, compare, standard_candidates
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.cross_validation import ALWAYS_FITTED, default_split
 from airmuscle.identify.force_evaluation import evaluate_force
@@ -225,3 +226,21 @@ def test_the_command_refuses_what_it_cannot_do(tmp_path: Path):
     assert done.exit_code == 2
     assert "contraction" in done.output
     assert not (tmp_path / "a").exists()
+
+
+def test_a_law_without_a_force_at_measured_points_is_not_ranked_in_silence():
+    recording = load_data("festo-tool-dmsp-40")
+    candidates = [c for c in standard_candidates([recording]) if c.name in ("Hunt2017", "surface of degree 2")]
+    (excluded,) = compare(recording, candidates).excluded
+    assert excluded.name == "Hunt2017"
+    assert "It gives no force at a measured point. Hunt2017: no force in the range 0 to 1e+04 N" in excluded.reason
+
+
+def test_a_ranked_law_that_is_slack_at_measured_points_says_so():
+    recording = load_data("festo-tool-dmsp-20")
+    candidates = [c for c in standard_candidates([recording]) if c.name in ("Hunt2017", "surface of degree 2")]
+    comparison = compare(recording, candidates)
+    (note,) = comparison["Hunt2017"].notes
+    assert note.startswith("it is slack at 2 of 54 points with a positive force and is ranked with zero force there")
+    assert f"note: Hunt2017: {note}" in str(comparison)
+    assert comparison["surface of degree 2"].notes == ()

@@ -353,7 +353,7 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             MUSCLE,
             'muscle = { library = "sarosi-dmsp-10" }',
             ParameterError,
-            r"\[plant.muscle\]: Muscle needs 'geometry'",
+            r"\[plant.muscle\]: sarosi-dmsp-10 lacks a \[geometry\]",
         ),
         (MUSCLE, "muscle = {}", ParameterError, r"\[plant.muscle\]: Muscle needs 'contractile'"),
         (MUSCLE, f"{MUSCLE}\ngaz = 1", ParameterError, r"\[plant\]: Plant has no parameter 'gaz'.*mean 'gas'\?"),

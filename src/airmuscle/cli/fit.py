@@ -13,6 +13,7 @@ from ..recording import Recording
 from ..report.output_folder import check_writable
 from .bench_files import AmbientPressure, Files, Length, Units, read_recordings
 from .fit_compare import compare_models
+from .fit_geometry import missing_geometry, parse_braid, with_braid
 from .fit_options import FitOptions, FitRequest, loss_of
 from .fit_output import fit_to_dict, fitted_entry, print_results, write_results
 from .initial_law import find_initial_law
@@ -71,6 +72,15 @@ Shape = Annotated[
         help="Constrain a ContractileSurface: force must not decrease with pressure nor increase with contraction.",
     ),
 ]
+BraidOption = Annotated[
+    str | None,
+    typer.Option(
+        "--braid",
+        metavar="SIZE",
+        help="Braid at rest, such as 'radius=10 mm, angle=24.4 deg' (outer radius; angle between threads and axis): "
+        "the [geometry] of a muscle whose law contains none. Requires the resting length.",
+    ),
+]
 FreeContraction = Annotated[
     list[str] | None,
     typer.Option(
@@ -91,6 +101,7 @@ def fit(
     free_contraction: FreeContraction = None,
     out: Folder = Path("fit"),
     resting_length: Length = None,
+    braid: BraidOption = None,
     ambient: AmbientPressure = None,
     unit: Units = None,
     mapping: Mapping = None,
@@ -110,6 +121,7 @@ def fit(
     \b
     Examples:
       airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out fit
+      airmuscle fit bench.csv --characteristic ContractileSurface --braid "radius=10 mm, angle=24.4 deg"
       airmuscle fit bench.csv --characteristic dmsp-20-300 --unit pressure=bar --fix wall_thickness
       airmuscle fit dmsp-20-300 --characteristic ContractileSurface --degree 4 --robust "10 N"
       airmuscle fit runs/*.csv --characteristic dmsp-20-300 --bootstrap 1000 --profile weak
@@ -120,7 +132,9 @@ def fit(
     if characteristic is None and not compare:
         raise typer.BadParameter("give the characteristic to fit with --characteristic, or rank all with --compare")
     options = FitOptions.parse(bootstrap, profile, leave_out, shape, free_contraction, compare)
-    request = FitRequest(options, tuple(fix or ()), degree, robust, uncensored, equal_weights, out, json)
+    request = FitRequest(
+        options, tuple(fix or ()), degree, robust, uncensored, equal_weights, out, json, parse_braid(braid)
+    )
     recordings = read_recordings(files, unit, mapping=mapping, resting_length=resting_length, ambient=ambient)
     if characteristic is None or compare:
         compare_models(files, recordings, characteristic, request)
@@ -132,7 +146,8 @@ def _fit_one(files: list[Path], recordings: list[Recording], characteristic: str
     """Fit the named characteristic, print the result and write the muscle and the report."""
     initial = find_initial_law(characteristic, recordings, request.degree)
     check_writable(request.out)
-    law = initial.entry.characteristic
+    start = with_braid(initial.entry, request.braid, recordings)
+    law = start.characteristic
     result = fit_model(
         law,
         recordings,
@@ -142,9 +157,10 @@ def _fit_one(files: list[Path], recordings: list[Recording], characteristic: str
         fixed=(*request.fixed, *initial.fixed),
     )
     extras = request.options.evaluate(result, recordings)
-    entry = extras.constrained_entry(fitted_entry(result, initial.entry, files))
+    entry = extras.constrained_entry(fitted_entry(result, start, files))
     write_results(result, entry, recordings, request.out, extras.chapters())
     if request.json:
-        print_json(fit_to_dict(result) | extras.to_dict())
+        data = fit_to_dict(result)
+        print_json(data | {"notes": [*data["notes"], *missing_geometry(entry)]} | extras.to_dict())
         return
-    print_results([str(result), *extras.lines()], request.out)
+    print_results([str(result), *extras.lines(), *(f"note: {note}" for note in missing_geometry(entry))], request.out)

@@ -8,14 +8,16 @@ from typing import Any
 
 import typer
 
+from ..geometry import Geometry
 from ..identify import Candidate, Comparison, compare, standard_candidates
 from ..library.entry import Entry
 from ..recording import Recording
 from ..report.compare_chapter import compare_chapter
 from ..report.output_folder import check_writable
+from .fit_geometry import check_one_length, missing_geometry, with_braid
 from .fit_options import FitRequest
 from .fit_output import fit_to_dict, fitted_entry, print_results, write_results
-from .initial_law import find_initial_law
+from .initial_law import InitialLaw, find_initial_law, resting_lengths
 from .remedies import in_options
 from .terminal import echo, print_json
 
@@ -30,18 +32,24 @@ def compare_models(
             "--uncensored, --robust and --equal-weights do not apply"
         )
     check_writable(request.out)
-    candidates = _candidates(recordings, characteristic, request)
+    if request.braid is not None:
+        check_one_length(resting_lengths(recordings))
+    named = None if characteristic is None else find_initial_law(characteristic, recordings, request.degree)
+    candidates = _candidates(recordings, characteristic, named, request)
     progress = None if request.json else lambda name: echo(f"  {name}", err=True)
     comparison = compare(recordings, candidates, leave_out=request.options.split, progress=progress)
     comparison = _with_option_names(comparison)
     best = comparison.recommended
     extras = request.options.evaluate(best.fit, recordings)
-    entry = fitted_entry(best.fit, _bare_entry(best.candidate), files)
+    geometry = named.entry.geometry if named is not None and best.candidate is candidates[-1] else None
+    initial, notes = _initial_entry(best.candidate, geometry, recordings, request)
+    entry = fitted_entry(best.fit, initial, files)
+    notes += missing_geometry(entry)
     write_results(best.fit, entry, recordings, request.out, [compare_chapter(comparison), *extras.chapters()])
     if request.json:
-        print_json(_to_dict(comparison) | extras.to_dict())
+        print_json(_to_dict(comparison) | {"notes": notes} | extras.to_dict())
         return
-    print_results([str(comparison), *extras.lines()], request.out)
+    print_results([str(comparison), *extras.lines(), *(f"note: {note}" for note in notes)], request.out)
 
 
 def _with_option_names(comparison: Comparison) -> Comparison:
@@ -50,18 +58,26 @@ def _with_option_names(comparison: Comparison) -> Comparison:
     return dataclasses.replace(comparison, excluded=excluded)
 
 
-def _candidates(recordings: list[Recording], characteristic: str | None, request: FitRequest) -> list[Candidate]:
+def _candidates(
+    recordings: list[Recording], characteristic: str | None, named: InitialLaw | None, request: FitRequest
+) -> list[Candidate]:
     """All models whose initial values can be estimated from data, and the one given with --characteristic."""
     candidates = list(standard_candidates(recordings))
-    if characteristic is not None:
-        initial = find_initial_law(characteristic, recordings, request.degree)
-        law = initial.entry.characteristic
-        candidates.append(Candidate(f"{characteristic} (named)", law, (*request.fixed, *initial.fixed)))
+    if named is not None:
+        law = named.entry.characteristic
+        candidates.append(Candidate(f"{characteristic} (named)", law, (*request.fixed, *named.fixed)))
     return candidates
 
 
-def _bare_entry(candidate: Candidate) -> Entry:
-    return Entry(candidate.name, candidate.name, "chosen", candidate.law)
+def _initial_entry(
+    candidate: Candidate, geometry: Geometry | None, recordings: list[Recording], request: FitRequest
+) -> tuple[Entry, list[str]]:
+    """The entry of the recommended candidate, with the braid of --braid if its law contains no geometry, and notes."""
+    entry = Entry(candidate.name, candidate.name, "chosen", candidate.law, geometry)
+    if not isinstance(getattr(candidate.law, "geometry", None), Geometry):
+        return with_braid(entry, request.braid, recordings), []
+    unused = f"--braid is not used: {candidate.name} contains its geometry, which was fitted."
+    return entry, [] if request.braid is None else [unused]
 
 
 def _to_dict(comparison: Comparison) -> dict[str, Any]:
@@ -78,6 +94,7 @@ def _to_dict(comparison: Comparison) -> dict[str, Any]:
                 "in_sample": c.in_sample_rmse,
                 "cross_validated": c.cross_validated_rmse,
                 "aicc": c.aicc,
+                "notes": list(c.notes),
                 "groups": {score.fold: score.rmse for score in c.fold_scores},
             }
             for c in comparison.ranking

@@ -35,6 +35,7 @@ from ..recording import Recording
 from ..report.chapter import Chapter
 from ..report.shape_chapter import shape_chapter
 from ..report.uncertainty_chapter import Uncertainty, uncertainty_chapter
+from .fit_geometry import BraidSize
 from .progress import computation_progress
 
 WEAK = "weak"
@@ -53,6 +54,7 @@ class FitRequest:
     equal_weights: bool
     out: Path
     json: bool
+    braid: BraidSize | None = None
 
 
 @dataclasses.dataclass(frozen=True)

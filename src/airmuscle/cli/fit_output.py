@@ -15,6 +15,7 @@ from ..report.chapter import Chapter
 from ..report.fit_chapter import fit_chapter
 from ..report.output_folder import atomic_folder
 from ..report.write import write_into
+from .fit_geometry import fitted_geometry, missing_geometry
 from .remedies import in_options
 from .terminal import echo
 
@@ -32,11 +33,13 @@ def fitted_entry(result: Fit, initial: Entry, files: list[Path]) -> Entry:
     summary = dict(result.summary())
     names = ", ".join(f.name for f in files)
     note = f"Fitted to {names}: rms error {summary['rms error']}, maximum error {summary['maximum error']}."
+    geometry = fitted_geometry(initial, result.model)
     title = f"{type(result.model).__name__} fitted to {', '.join(f.stem for f in files)}"
-    return dataclasses.replace(
+    entry = dataclasses.replace(
         initial, name="muscle", title=title, provenance="fitted", note=note, warning="", characteristic=result.model,
-        validity_range=result.validity_range, checks=(),
+        geometry=geometry, validity_range=result.validity_range, checks=(),
     )  # fmt: skip
+    return dataclasses.replace(entry, note=" ".join([note, *missing_geometry(entry)]))
 
 
 def fit_to_dict(result: Fit) -> dict[str, Any]:

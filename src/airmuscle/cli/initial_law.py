@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..core.errors import ParameterError
 from ..identify import standard_candidates
+from ..identify.length_scaling import scale_to_length
 from ..library.catalogue import load_law
 from ..library.entry import Entry
 from ..library.models import model_class, model_names
@@ -25,10 +27,11 @@ def find_initial_law(
 ) -> InitialLaw:
     """The library entry or muscle file of that name, or the named model with initial values estimated from the data.
 
-    Raises ParameterError for a model whose initial values cannot be estimated.
+    Law and geometry of an entry are scaled to the resting length of the data. Raises ParameterError for a model whose
+    initial values cannot be estimated, and for an entry that cannot be scaled.
     """
     if name not in model_names():
-        return InitialLaw(load_law(name))
+        return InitialLaw(_at_length_of(load_law(name), recordings, f"{option} {name}"))
     cls = model_class(name, option)
     if hasattr(cls, "blank"):
         # An upper limit of twice the measured force clamps no measured point, and still limits the extrapolation.
@@ -43,3 +46,19 @@ def find_initial_law(
         f"{option}: {name} needs initial values, which cannot be estimated from these data. Give a library entry of "
         f"this model (see airmuscle list) or a muscle file with initial values.{length}"
     )
+
+
+def resting_lengths(recordings: Sequence[Recording]) -> tuple[float, ...]:
+    """The different resting lengths [m] that the recordings state, in ascending order."""
+    stated = (recording.constants.get("resting_length") for recording in recordings)
+    return tuple(sorted({float(length) for length in stated if length is not None}))
+
+
+def _at_length_of(entry: Entry, recordings: Sequence[Recording], where: str) -> Entry:
+    """The entry with law and geometry at the resting length of the data, if these state exactly one."""
+    lengths = resting_lengths(recordings)
+    if len(lengths) != 1:
+        return entry
+    law = scale_to_length(entry.characteristic, lengths[0], where)
+    geometry = None if entry.geometry is None else scale_to_length(entry.geometry, lengths[0], where)
+    return dataclasses.replace(entry, characteristic=law, geometry=geometry)

@@ -20,6 +20,7 @@ _OPTIONS: tuple[tuple[str, str], ...] = (
     (r"\b(give|set|state) resting_length\b(?!=)", r"\1 --resting-length"),
     (r"\blet all rows count\b|\b(?:give|set|use) all_rows=True", "use --all-rows"),
     (r"\bGive its characteristic\.", "Give the muscle with --muscle, and --use-characteristic."),
+    (r"\buse identify\.hysteresis\.fit_hysteresis\b", "run `airmuscle hysteresis`"),
     (r"free=\('([^']+)',\)", r'free = ["\1"] under [fit]'),
 )  # fmt: skip
 """Pattern of a Python argument in a message, and the option or key that replaces it."""

@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ..characteristic.base import ContractionLaw, ForceLaw
 from ..core.arrays import Array
+from ..core.errors import IdentificationError, SolveError
 
 FORCE_GRID_POINTS = 801
 """Grid points between zero and the maximum force; the law is interpolated linearly between them."""
@@ -27,12 +29,39 @@ def evaluate_force(law: Any, pressure: Array, contraction: Array, max_force: flo
     return np.asarray(np.nan_to_num(force, nan=0.0, posinf=max_force, neginf=-max_force))
 
 
+def slack_rows(law: Any, pressure: Array, contraction: Array) -> npt.NDArray[np.bool_]:
+    """Mask (N,) of the points at which a law that is solved for the force is slack: it has no root, even at zero load.
+
+    Always False for force laws. Raises IdentificationError where the law gives no force at a point without being slack.
+    """
+    nowhere = np.zeros(pressure.size, dtype=bool)
+    if isinstance(law, ForceLaw) or _solve_error(law, pressure, contraction) is None:
+        return nowhere
+    slack = np.asarray(_deficit(law, pressure, contraction, np.zeros(pressure.size)) > 0)
+    error = _solve_error(law, pressure[~slack], contraction[~slack])
+    if error is not None:
+        raise IdentificationError(f"It gives no force at a measured point. {error}")
+    return slack
+
+
+def _solve_error(law: Any, pressure: Array, contraction: Array) -> SolveError | None:
+    try:
+        law.force(pressure, contraction)
+    except SolveError as error:
+        return error
+    return None
+
+
+def _deficit(law: Any, pressure: Array, contraction: Array, force: Array) -> Array:
+    """Negative where the muscle pulls more than the force: the contraction or the pressure that it lacks."""
+    if isinstance(law, ContractionLaw):
+        return np.asarray(contraction - law.contraction(pressure, force))
+    return np.asarray(law.pressure(contraction, force) - pressure)
+
+
 def _invert_on_grid(law: Any, pressure: Array, contraction: Array, max_force: float) -> Array:
     forces = np.linspace(0.0, max_force, FORCE_GRID_POINTS)
-    if isinstance(law, ContractionLaw):
-        deficit = contraction[:, None] - np.asarray(law.contraction(pressure[:, None], forces))
-    else:
-        deficit = np.asarray(law.pressure(contraction[:, None], forces)) - pressure[:, None]
+    deficit = _deficit(law, pressure[:, None], contraction[:, None], forces)
     crossed = np.asarray(deficit >= 0)
     first = np.where(crossed.any(axis=1), crossed.argmax(axis=1), FORCE_GRID_POINTS - 1)
     rows = np.arange(pressure.size)

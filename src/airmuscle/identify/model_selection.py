@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..recording import Recording
 from .candidates import Candidate, standard_candidates
 from .cross_validation import GroupSplit, Labels, default_split, label_folds
 from .fit_points import FitPoints
-from .force_evaluation import evaluate_force
+from .force_evaluation import evaluate_force, slack_rows
 from .loss import LeastSquares, Loss
 from .model_evidence import aicc
 from .result import Fit
@@ -46,6 +46,8 @@ class RankedModel:
     aicc: float
     """Akaike's information criterion of the in-sample errors in force, corrected for small samples."""
     fold_scores: tuple[FoldScore, ...]
+    notes: tuple[str, ...] = ()
+    """Remarks on the use of the law at the measured points."""
 
     @property
     def parameter_count(self) -> int:
@@ -55,7 +57,8 @@ class RankedModel:
 
 @dataclasses.dataclass(frozen=True)
 class ExcludedModel:
-    """A candidate whose parameters the data do not determine, with the reason."""
+    """A candidate whose parameters the data do not determine, or that gives no force at measured points, with the
+    reason."""
 
     name: str
     reason: str
@@ -94,8 +97,9 @@ class Comparison:
             f"{m.cross_validated_rmse:>10.4g} N{m.aicc:>12.1f}"
             for m in self.ranking
         ]
+        notes = [f"note: {m.candidate.name}: {note}" for m in self.ranking for note in m.notes]
         excluded = [f"excluded: {e.name}. {e.reason}" for e in self.excluded]
-        return "\n".join([title, "", head, *rows, "", self.reason, *excluded])
+        return "\n".join([title, "", head, *rows, "", self.reason, *notes, *excluded])
 
 
 def compare(
@@ -179,6 +183,7 @@ def _select(run: Recording, mask: npt.NDArray[np.bool_]) -> Recording:
 def _cross_validate(candidate: Candidate, points: _ComparedPoints, loss: Loss) -> RankedModel:
     full_fit = fit(candidate.law, points.recordings, loss=loss, fixed=candidate.fixed)
     max_force = 3 * points.max_force
+    notes = _slack_notes(full_fit.model, points.recordings)
     in_sample = force_residuals(full_fit.model, points.recordings, max_force)
     scores, out_of_sample = [], []
     for fold in points.folds:
@@ -192,7 +197,7 @@ def _cross_validate(candidate: Candidate, points: _ComparedPoints, loss: Loss) -
             out_of_sample.append(residuals)
     criterion = aicc(float(np.mean(in_sample**2)), in_sample.size, len(full_fit.estimates))
     return RankedModel(
-        candidate, full_fit, _rms(in_sample), _rms(np.concatenate(out_of_sample)), criterion, tuple(scores)
+        candidate, full_fit, _rms(in_sample), _rms(np.concatenate(out_of_sample)), criterion, tuple(scores), notes
     )
 
 
@@ -201,15 +206,38 @@ def force_residuals(model: Characteristic, runs: Sequence[Recording], max_force:
 
     `max_force` [N] limits the force of laws that give contraction or pressure.
     """
-    residuals = []
+    return np.concatenate(
+        [
+            evaluate_force(law, rows["pressure"], rows["contraction"], max_force) - rows["force"]
+            for law, rows in _laws_with_rows(model, runs)
+        ]
+    )
+
+
+def _laws_with_rows(model: Characteristic, runs: Sequence[Recording]) -> Iterator[tuple[Any, Recording]]:
+    """The rows of each run with a positive force, with the law of the run's resting length."""
     for run in runs:
         rows = run.rows((run["force"] > 0) & np.isfinite(run["pressure"] + run["contraction"] + run["force"]))
         law: Any = model
         length = run.constants.get("resting_length")
         if length is not None and hasattr(law, "with_resting_length"):
             law = law.with_resting_length(float(length))
-        residuals.append(evaluate_force(law, rows["pressure"], rows["contraction"], max_force) - rows["force"])
-    return np.concatenate(residuals)
+        yield law, rows
+
+
+def _slack_notes(model: Characteristic, runs: Sequence[Recording]) -> tuple[str, ...]:
+    """A remark where the law is slack at points with a positive force.
+
+    Raises IdentificationError where it gives no force although it is not slack.
+    """
+    masks = [slack_rows(law, rows["pressure"], rows["contraction"]) for law, rows in _laws_with_rows(model, runs)]
+    slack = sum(int(np.count_nonzero(mask)) for mask in masks)
+    if not slack:
+        return ()
+    return (
+        f"it is slack at {slack} of {sum(mask.size for mask in masks)} points with a positive force and is ranked "
+        "with zero force there; its method force raises SolveError at these points.",
+    )
 
 
 def _rms(values: Array) -> float:

@@ -13,6 +13,7 @@ from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
 from ..recording import Recording
+from .branch_residuals import branch_notes
 from .censoring import Censoring
 from .correlation_index import correlation_index
 from .fit_points import POINT_COLUMNS, FitPoints
@@ -62,6 +63,7 @@ def fit(
     by_recording = None if sigma is not None else points.deviations(problem.fitted_quantity.name)
     notes = (*_collect_notes(problem, statistics, loss, points.dropped), *_weighting_notes(by_recording, problem))
     notes += _loss_scale_notes(problem, solution, loss)
+    notes += _branch_notes(points, problem, solution)
     return _build_result(problem, solution, statistics, loss, points.dropped, notes)
 
 
@@ -215,6 +217,16 @@ def _loss_scale_notes(problem: FitProblem, solution: LeastSquaresSolution, loss:
         f"Only {inside} of {residuals.size} residuals are within the scale of {loss}, so the standard errors are too "
         "small. Use a scale of about three times the standard deviation of the noise.",
     )
+
+
+def _branch_notes(points: FitPoints, problem: FitProblem, solution: LeastSquaresSolution) -> tuple[str, ...]:
+    """A remark where the residuals of inflating and deflating rows differ."""
+    residuals = np.full(len(points.joined), np.nan)
+    quantity = problem.fitted_quantity.name
+    differences = solution.modelled - problem.data[quantity]
+    residuals[~points.missing] = np.where(problem.censoring == 0, differences, np.nan)
+    ends = np.cumsum([len(run) for run in points.recordings])
+    return tuple(branch_notes(points.recordings, np.split(residuals, ends[:-1]), quantity))
 
 
 def _length_notes(problem: FitProblem) -> list[str]:

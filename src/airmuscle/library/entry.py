@@ -16,6 +16,13 @@ from ..muscle import CreepElements, Damper, Muscle, SeriesElement, Spring, Stop,
 OPTIONAL_PARTS = ("spring", "damper", "friction", "wall", "series", "stop", "creep")
 """Optional elements of a muscle, as fields of an entry and tables of its file."""
 
+MISSING_GEOMETRY = (
+    "a [geometry], from which a plant takes the enclosed volume. Give it to airmuscle fit with --braid "
+    "'radius=10 mm, angle=24.4 deg' and the resting length, or as a table [geometry] of the file or in [plant.muscle]. "
+    "It is measured by the outer diameter at rest and at full contraction, or by the fill of a held muscle"
+)
+"""Geometry that a law needs to be a muscle, and the ways to give and to measure it."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Check:
@@ -60,11 +67,7 @@ class Entry:
         """Muscle with the elements of the entry. Raises UnknownNameError if the entry is a law without a geometry, or
         a law that is not solved for the force."""
         if not isinstance(self.characteristic, ForceLaw) or self.geometry is None:
-            missing = (
-                "a [geometry], which its file or [plant.muscle] can give"
-                if self.geometry is None
-                else "a law solved for the force: see as_force_law"
-            )
+            missing = MISSING_GEOMETRY if self.geometry is None else "a law solved for the force: see as_force_law"
             raise UnknownNameError(f"{self.name} is a characteristic, not a muscle; it lacks {missing}.")
         parts = {part: getattr(self, part) for part in OPTIONAL_PARTS if getattr(self, part) is not None}
         return Muscle(self.characteristic, self.geometry, validity_range=self.validity_range, **parts)

@@ -54,7 +54,7 @@ def _excluded(comparison: Comparison) -> Table | None:
     if not comparison.excluded:
         return None
     columns = {"law": [e.name for e in comparison.excluded], "reason": [e.reason for e in comparison.excluded]}
-    return Table("excluded", "Laws whose parameters the data do not determine", columns)
+    return Table("excluded", "Laws that are not ranked", columns)
 
 
 def _fold_table(comparison: Comparison) -> Table:

@@ -34,7 +34,7 @@ from ..control.inputs import InputSignal
 from ..core.errors import ParameterError, suggestion
 from ..library.build import build
 from ..library.catalogue import load_law
-from ..library.entry import Entry
+from ..library.entry import MISSING_GEOMETRY, Entry
 from ..library.files import read_toml
 from ..library.location import Location, check_keys, check_type, located_errors, read_finite_number, read_text
 from ..muscle import Muscle
@@ -208,6 +208,8 @@ def _entry_parts(entry: Entry, replaced: Mapping[str, Any], location: Location) 
             f"{location}: {entry.name} is {type(entry.characteristic).__name__}, which is not solved for the force; "
             "a plant needs a ForceLaw. In Python, as_force_law(law, validity range) makes one."
         )
+    if "geometry" not in {*kept, *replaced}:
+        raise ParameterError(f"{location}: {entry.name} lacks {MISSING_GEOMETRY}.")
     return kept
 
 

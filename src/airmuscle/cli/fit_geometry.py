@@ -1,0 +1,99 @@
+"""Geometry of a fitted muscle: the braid of --braid, that of the law, or a note that it is missing."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import typer
+
+from ..core import tree
+from ..core.errors import ParameterError
+from ..core.units import quantity
+from ..geometry import Braid, Geometry
+from ..library.entry import MISSING_GEOMETRY, Entry
+from ..recording import Recording
+from .initial_law import resting_lengths
+
+_UNITS = {"radius": "m", "angle": "rad"}
+
+
+class BraidSize(NamedTuple):
+    """Radius [m] and braid angle [rad] at rest."""
+
+    radius: float
+    angle: float
+
+
+def parse_braid(text: str | None) -> BraidSize | None:
+    """The braid that --braid describes; None without it. Raises BadParameter, UnitError or ParameterError."""
+    if text is None:
+        return None
+    parts = [part.partition("=") for part in text.split(",")]
+    names = [name.strip() for name, _, _ in parts]
+    if sorted(names) != sorted(_UNITS):
+        raise typer.BadParameter(
+            f"--braid must give radius and angle once each, such as 'radius=10 mm, angle=24.4 deg', not '{text}'"
+        )
+    values = {
+        name: quantity(value.strip(), _UNITS[name], where=f"--braid, {name}")
+        for name, (_, _, value) in zip(names, parts, strict=True)
+    }
+    size = BraidSize(**values)
+    _braid(size, 1.0)  # the bounds are checked before any file is read
+    return size
+
+
+def with_braid(entry: Entry, size: BraidSize | None, recordings: Sequence[Recording]) -> Entry:
+    """The entry of an initial law with the braid of --braid as its geometry; unchanged without it.
+
+    Raises ParameterError for a law with a geometry of its own, and where the resting length is not known.
+    """
+    if size is None:
+        return entry
+    law = entry.characteristic
+    if isinstance(getattr(law, "geometry", None), Geometry):
+        raise ParameterError(
+            f"--braid: {type(law).__name__} contains its geometry, which is also that of the muscle. Omit --braid, or "
+            "give the geometry in [characteristic.geometry] of a muscle file, with --characteristic."
+        )
+    lengths = resting_lengths(recordings) or _lengths_of(law)
+    check_one_length(lengths)
+    return dataclasses.replace(entry, geometry=_braid(size, lengths[0]))
+
+
+def check_one_length(lengths: Sequence[float]) -> None:
+    """Raise ParameterError unless there is exactly one resting length [m] for the braid of --braid."""
+    if len(lengths) != 1:
+        found = ", ".join(f"{length:.4g} m" for length in lengths) or "none"
+        raise ParameterError(
+            f"--braid: a braid has exactly one resting length; the data state {found}. Give --resting-length, or files "
+            "of one muscle."
+        )
+
+
+def fitted_geometry(initial: Entry, law: object) -> Geometry | None:
+    """The geometry of a muscle after the fit of its law: that inside the law, unless the muscle has one of another
+    kind."""
+    inside = getattr(law, "geometry", None)
+    if isinstance(inside, Geometry) and (initial.geometry is None or type(initial.geometry) is type(inside)):
+        return inside
+    return initial.geometry
+
+
+def missing_geometry(entry: Entry) -> list[str]:
+    """The remark that the muscle has no geometry, how it is given and how it is measured; empty if it has one."""
+    return [] if entry.geometry is not None else [f"The muscle lacks {MISSING_GEOMETRY}."]
+
+
+def _lengths_of(law: object) -> tuple[float, ...]:
+    """The resting lengths [m] inside a law."""
+    return tuple({float(leaf.value) for leaf in tree.leaves(law) if leaf.declared.name == "resting_length"})
+
+
+def _braid(size: BraidSize, resting_length: float) -> Braid:
+    try:
+        return Braid(size.radius, size.angle, resting_length)
+    except ParameterError as error:
+        raise ParameterError(f"--braid: {error}") from None

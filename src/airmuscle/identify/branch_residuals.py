@@ -1,0 +1,72 @@
+"""Difference of the residuals of inflating and deflating rows, which shows hysteresis in a static fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..core.arrays import Array
+from ..recording import Recording
+from ..recording.columns import QUANTITIES
+from ..recording.segment import branch_directions, estimate_sensors, find_branches
+
+MIN_BRANCH_ROWS = 5
+"""Minimum number of rows of a branch (chosen); the jump between two levels of a map is no branch."""
+PRESSURE_BINS = 12
+"""Intervals of pressure in each recording within which the two branches are compared (chosen)."""
+MIN_BINS = 3
+"""Minimum number of intervals with rows of both branches (chosen)."""
+MIN_STANDARD_ERRORS = 3.0
+"""Standard errors above which the mean difference is not random (chosen)."""
+
+
+def branch_notes(runs: Sequence[Recording], residuals: Sequence[Array], quantity: str) -> list[str]:
+    """The remark that the residuals of a fit follow two branches; empty if they do not.
+
+    runs        the recordings of the fit
+    residuals   residual (model - measured) of each row of each recording [SI], NaN for rows that are not measured
+    quantity    name of the fitted quantity
+
+    The means of both branches are compared at equal pressure, so that an error of the law that both share does not
+    count. Their average difference must exceed three standard errors and the standard deviation of the sensor.
+    """
+    differences = np.concatenate([_branch_differences(*pair) for pair in zip(runs, residuals, strict=True)])
+    if differences.size < MIN_BINS:
+        return []
+    mean = abs(float(np.mean(differences)))
+    standard_error = float(np.std(differences, ddof=1) / np.sqrt(differences.size))
+    if mean <= MIN_STANDARD_ERRORS * standard_error or mean <= _sensor_deviation(runs, quantity):
+        return []
+    unit = QUANTITIES[quantity].unit
+    distance = f"{100 * mean:.3g} %" if unit == "1" else f"{mean:.3g} {unit}"
+    return [
+        f"The residuals follow two branches, {distance} apart on average (inflating and deflating): use "
+        "identify.hysteresis.fit_hysteresis."
+    ]
+
+
+def _branch_differences(run: Recording, residuals: Array) -> Array:
+    """Mean residual of the inflating minus that of the deflating rows, by interval of pressure; shape (intervals,)."""
+    known = np.isfinite(run["pressure"])
+    complete = run.rows(known)
+    branches = tuple(each for each in find_branches(complete) if len(each.interval) >= MIN_BRANCH_ROWS)
+    if len({branch.direction for branch in branches}) < 2:
+        return np.zeros(0)
+    direction = branch_directions(complete, branches)
+    values, pressure = residuals[known], complete["pressure"]
+    measured = np.isfinite(values)
+    edges = np.linspace(pressure.min(), pressure.max(), PRESSURE_BINS + 1)[1:-1]
+    bins = np.digitize(pressure, edges)
+    groups = (
+        [values[measured & (bins == number) & (direction == sign)] for sign in (1, -1)]
+        for number in range(PRESSURE_BINS)
+    )
+    return np.array([float(up.mean() - down.mean()) for up, down in groups if up.size and down.size])
+
+
+def _sensor_deviation(runs: Sequence[Recording], quantity: str) -> float:
+    """Standard deviation of one reading of the quantity [SI]; 0 where it cannot be estimated."""
+    columns = [run[quantity][np.isfinite(run[quantity])] for run in runs]
+    sensors = estimate_sensors([Recording({quantity: values}, "fit") for values in columns if values.size])
+    return sensors[quantity].std if quantity in sensors else 0.0

@@ -1,0 +1,64 @@
+"""Scaling of laws and geometries to another resting length, for initial laws of a fit."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, TypeVar
+
+from ..characteristic import MartensBoblan2017
+from ..core import tree
+from ..core.errors import ParameterError
+from ..geometry import Braid, Geometry
+
+T = TypeVar("T")
+LENGTH_TOLERANCE = 1e-6
+"""Difference of two resting lengths [m] up to which they are the same (chosen)."""
+
+
+def scale_to_length(thing: T, resting_length: float, where: str) -> T:
+    """The law or geometry of a muscle of the same type with this resting length [m].
+
+    Radius and braid angle of a Braid do not change, and a modulus that is a polynomial in the length keeps its values
+    at the same contraction. What does not depend on the resting length is returned unchanged. Raises ParameterError,
+    which begins with `where`, for a law or geometry that is not of this length and cannot be scaled.
+    """
+    different = _different_lengths(thing, resting_length)
+    if not different:
+        return thing
+    scaled = _scale(thing, resting_length)
+    remaining = _different_lengths(scaled, resting_length)
+    if remaining:
+        path, length = next(iter(remaining.items()))
+        raise ParameterError(
+            f"{where}: {path} of {type(thing).__name__} is {length:.4g} m, but the resting length of the data is "
+            f"{resting_length:.4g} m, and {type(thing).__name__} cannot be scaled to another length: only laws with a "
+            "Braid, or with a resting length of their own, can. Give a muscle file with the geometry of the measured "
+            "muscle, or correct the resting length."
+        )
+    result: T = scaled
+    return result
+
+
+def _different_lengths(thing: Any, resting_length: float) -> dict[str, float]:
+    """The resting lengths [m] in a model that differ from this one, by path."""
+    return {
+        leaf.path: float(leaf.value)
+        for leaf in tree.leaves(thing)
+        if leaf.declared.name == "resting_length" and abs(leaf.value - resting_length) > LENGTH_TOLERANCE
+    }
+
+
+def _scale(thing: Any, resting_length: float) -> Any:
+    if hasattr(thing, "with_resting_length"):
+        return thing.with_resting_length(resting_length)
+    has_length = "resting_length" in {field.name for field in dataclasses.fields(thing)}
+    if isinstance(thing, Braid) or (has_length and not isinstance(thing, Geometry)):
+        return dataclasses.replace(thing, resting_length=resting_length)
+    geometry = getattr(thing, "geometry", None)
+    if not isinstance(geometry, Braid):
+        return thing
+    changes: dict[str, Any] = {"geometry": dataclasses.replace(geometry, resting_length=resting_length)}
+    if isinstance(thing, MartensBoblan2017):
+        ratio = geometry.resting_length / resting_length
+        changes |= {f"c{power}": getattr(thing, f"c{power}") * ratio**power for power in range(4)}
+    return dataclasses.replace(thing, **changes)
