@@ -19,6 +19,8 @@ from .censoring import Censoring, default_censoring, force_limits
 from .problem import RESTING_LENGTH, FitProblem, fitted_quantity_of, make_problem
 from .weights import sensor_deviations
 
+LEVEL_BAND = 0.1
+"""Maximum range of a pressure that counts as constant in a run, as a fraction of its maximum (chosen)."""
 MIN_ROWS_OF_RUN = 12
 """Minimum number of rows of a run whose constant quantity is replaced by its level (chosen)."""
 POINT_COLUMNS = ("pressure", "contraction", "force")
@@ -131,13 +133,19 @@ def _columns_at_levels(recording: Recording) -> dict[str, Array]:
     finite = np.isfinite(recording["pressure"] + recording["contraction"] + recording["force"]).all()
     if not finite:
         return columns
+    bands = {"pressure": LEVEL_BAND * float(np.max(np.abs(columns["pressure"]), initial=0.0)), "contraction": 0.01}
+    names = {ISOBARIC: "pressure", ISOMETRIC: "contraction"}
     for run in find_runs(recording):
-        if run.kind is ISOBARIC and len(run.interval) >= MIN_ROWS_OF_RUN:
-            columns["pressure"][run.interval.rows] = run.constant_value
-        elif run.kind is ISOMETRIC and len(run.interval) >= MIN_ROWS_OF_RUN:
-            rows = run.interval.rows
-            columns["contraction"][rows] = np.median(columns["contraction"][rows])
+        name, rows = names.get(run.kind), run.interval.rows
+        if name is not None and len(run.interval) >= MIN_ROWS_OF_RUN and _range(columns[name][rows]) <= bands[name]:
+            columns[name][rows] = np.median(columns[name][rows])
     return columns
+
+
+def _range(values: Array) -> float:
+    """The width of the band that contains 98 % of the values."""
+    low, high = np.quantile(values, [0.01, 0.99])
+    return float(high - low)
 
 
 def _row_weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLike | None) -> Array:

@@ -53,7 +53,8 @@ def _bin_means(path: Array, values: Array, edges: Array) -> tuple[Array, Array]:
     inside = (path >= edges[0]) & (path <= edges[-1])
     counts = np.bincount(bins[inside], minlength=edges.size - 1)
     sums = np.bincount(bins[inside], values[inside], minlength=edges.size - 1)
-    return np.divide(sums, counts, out=np.full(counts.size, np.nan), where=counts > 0), counts
+    means = np.divide(sums, counts, out=np.full(counts.size, np.nan), where=counts > 0)
+    return means, np.asarray(counts, dtype=float)
 
 
 def branch_gap(path: Array, values: Array, direction: Array) -> BinnedDifference:
