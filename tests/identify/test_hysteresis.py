@@ -163,8 +163,44 @@ def test_the_gap_between_branches_and_between_runs_is_measured_place_by_place():
     path = np.concatenate([np.linspace(0, 1, 200), np.linspace(1, 0, 200)])
     loop = np.where(np.arange(400) < 200, -2.0, 3.0)
     way = motion_direction(path)
-    assert branch_gap(path, loop, way) == pytest.approx(5.0 * np.ones(24), abs=0.2)
-    assert repeat_difference(path, loop, way, path, loop + 1.5, way) == pytest.approx(1.5 * np.ones(48))
+    assert branch_gap(path, loop, way).values == pytest.approx(5.0 * np.ones(24), abs=0.2)
+    assert repeat_difference(path, loop, way, path, loop + 1.5, way).values == pytest.approx(1.5 * np.ones(48))
+
+
+def test_a_bin_weighs_by_its_rows():
+    """Fifty rows per bin without a gap, and one row of another value in a bin of its own."""
+    rising, falling = np.linspace(0.0, 1.0, 1200), np.linspace(0.95, 0.0, 1140)
+    path = np.concatenate([rising, [1.0], falling])
+    way = np.concatenate([np.ones(1200), [-1.0], -np.ones(1140)])
+    gap = branch_gap(path, np.where(np.arange(len(path)) == 1200, 10.0, 0.0), way)
+    assert gap.values.max() == pytest.approx(10.0)
+    assert gap.rms < 0.5
+
+
+def test_a_verdict_does_not_contradict_its_reservations():
+    good = fit_hysteresis(start_of(SLIP), isobaric(SLIP), static_curve=CURVE)
+    assert good.justified
+    assert good.reservations == ()
+    doubts = [
+        (replace(good, repeatability=2.0 * good.rmse), "below the repeatability"),
+        (replace(good, gap=np.nan), "no common part"),
+        (
+            replace(good, series=replace(good.series, direction=np.ones(len(good.series.path)))),
+            "very few rows",
+        ),
+    ]
+    for fit, reason in doubts:
+        assert not fit.justified
+        assert reason in fit.verdict
+        assert "The data do not justify this friction." in fit.verdict
+
+
+def test_a_speed_of_a_friction_driven_by_pressure_is_in_pascals_per_second():
+    axis = PressurePath(1e-8).axis
+    assert axis.display(1e-3, "m/s") == (pytest.approx(1e5), "Pa/s")
+    assert axis.display(1e4, "N/m") == (pytest.approx(1e-4), "N/Pa")
+    assert axis.display(3.0, "N") == (3.0, "N")
+    assert ContractionPath().axis.display(1e-3, "m/s") == (1e-3, "m/s")
 
 
 def test_an_inner_loop_belongs_to_both_branches():
@@ -172,7 +208,7 @@ def test_an_inner_loop_belongs_to_both_branches():
     path = np.concatenate([np.linspace(a, b, 100) for a, b in ((0, 1), (1, 0.5), (0.5, 1), (1, 0))])
     way = motion_direction(path)
     assert [int(s) for s in way[[50, 150, 250, 350]]] == [1, -1, 1, -1]
-    assert branch_gap(path, np.where(way > 0, -2.0, 3.0), way) == pytest.approx(5.0 * np.ones(24))
+    assert branch_gap(path, np.where(way > 0, -2.0, 3.0), way).values == pytest.approx(5.0 * np.ones(24))
     assert not motion_direction(np.ones(20)).any()
 
 

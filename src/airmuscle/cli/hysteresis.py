@@ -170,6 +170,8 @@ def _to_dict(fit: LoopFit) -> dict[str, Any]:
     return {
         "origin": fit.loop.recording.origin,
         "run": fit.loop.run.kind.name,
+        "first_row": fit.loop.run.interval.start + 1,
+        "last_row": fit.loop.run.interval.stop,
         "constant": fit.loop.run.constant_column,
         "value": fit.loop.run.constant_value,
         "recommended": type(fit.recommended.friction).__name__ if fit.recommended else None,

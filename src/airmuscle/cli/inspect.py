@@ -124,7 +124,7 @@ def _to_dict(inspection: Inspection) -> dict[str, Any]:
             for run in inspection.runs
         ],
         "branches": [
-            {"branch": b.name, "first_row": b.interval.start + 1, "last_row": b.interval.stop,
+            {"branch": b.name, "column": b.column, "first_row": b.interval.start + 1, "last_row": b.interval.stop,
              "start_pressure": b.start_pressure, "end_pressure": b.end_pressure} for b in inspection.branches
         ],
         "branch_agreement": inspection.branch_agreement,

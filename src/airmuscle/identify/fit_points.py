@@ -14,10 +14,15 @@ from ..characteristic.base import Characteristic, ForceLaw
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
 from ..recording import Recording
+from ..recording.segment import ISOBARIC, ISOMETRIC, find_runs
 from .censoring import Censoring, default_censoring, force_limits
 from .problem import RESTING_LENGTH, FitProblem, fitted_quantity_of, make_problem
 from .weights import sensor_deviations
 
+LEVEL_BAND = 0.1
+"""Maximum range of a pressure that counts as constant in a run, as a fraction of its maximum (chosen)."""
+MIN_ROWS_OF_RUN = 12
+"""Minimum number of rows of a run whose constant quantity is replaced by its level (chosen)."""
 POINT_COLUMNS = ("pressure", "contraction", "force")
 
 
@@ -58,6 +63,17 @@ class FitPoints:
         if quantity not in self._deviations:
             self._deviations[quantity] = sensor_deviations(self.recordings, quantity)
         return self._deviations[quantity]
+
+    @functools.cached_property
+    def at_levels(self) -> Recording:
+        """The complete rows of `data`, with every quantity that is constant in a run replaced by its level.
+
+        Its noise and its ripple vary in these rows, but do not show how the muscle depends on it.
+        """
+        columns = [_columns_at_levels(run) for run in self.recordings]
+        joined = {name: np.concatenate([each[name] for each in columns]) for name in ("pressure", "contraction")}
+        levels = {name: values[~self.missing] for name, values in joined.items()}
+        return self.data.with_columns(**levels)
 
     @functools.cached_property
     def _deviations(self) -> dict[str, Array | None]:
@@ -109,6 +125,27 @@ def _join_recordings(runs: Sequence[Recording]) -> tuple[Recording, npt.NDArray[
         columns[RESTING_LENGTH] = np.concatenate(by_row)
     length = lengths.pop() if len(lengths) == 1 else None
     return Recording(columns, origin, {} if length is None else {"resting_length": length}), missing
+
+
+def _columns_at_levels(recording: Recording) -> dict[str, Array]:
+    """Pressure and contraction of the rows; that which is constant in a run is replaced by its level."""
+    columns = {name: np.array(recording[name], dtype=float) for name in ("pressure", "contraction")}
+    finite = np.isfinite(recording["pressure"] + recording["contraction"] + recording["force"]).all()
+    if not finite:
+        return columns
+    bands = {"pressure": LEVEL_BAND * float(np.max(np.abs(columns["pressure"]), initial=0.0)), "contraction": 0.01}
+    names = {ISOBARIC: "pressure", ISOMETRIC: "contraction"}
+    for run in find_runs(recording):
+        name, rows = names.get(run.kind), run.interval.rows
+        if name is not None and len(run.interval) >= MIN_ROWS_OF_RUN and _range(columns[name][rows]) <= bands[name]:
+            columns[name][rows] = np.median(columns[name][rows])
+    return columns
+
+
+def _range(values: Array) -> float:
+    """The width of the band that contains 98 % of the values."""
+    low, high = np.quantile(values, [0.01, 0.99])
+    return float(high - low)
 
 
 def _row_weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLike | None) -> Array:

@@ -22,7 +22,7 @@ from .loss import LeastSquares, Loss
 from .problem import FitProblem, evaluate
 from .result import Estimate, Fit, WorstPoint
 from .solver import LeastSquaresSolution, is_linear, solve
-from .statistics import FitStatistics, check_determined, compute_statistics
+from .statistics import FitStatistics, check_determined, check_determined_by_levels, compute_statistics
 from .variable_projection import find_initial_values
 
 ILL_CONDITIONED = 1e5
@@ -60,6 +60,7 @@ def fit(
     problem = points.problem(characteristic, censoring=censoring, sigma=sigma, fixed=fixed)
     solution = solve(problem, loss)
     statistics = compute_statistics(problem, solution, loss)
+    check_determined_by_levels(problem, solution, points.at_levels)
     by_recording = None if sigma is not None else points.deviations(problem.fitted_quantity.name)
     notes = (*_collect_notes(problem, statistics, loss, points.dropped), *_weighting_notes(by_recording, problem))
     notes += _loss_scale_notes(problem, solution, loss)

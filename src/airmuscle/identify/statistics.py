@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
+from ..recording import Recording
+from ..recording.segment.runs import RELATIVE_BAND
 from .censored_least_squares import RANK_TOLERANCE, uncensored_rank
 from .loss import Loss
 from .problem import FitProblem
@@ -51,6 +53,17 @@ def compute_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss
 def check_determined(problem: FitProblem, solution: LeastSquaresSolution) -> None:
     """Raise IdentificationError where the design matrix at the solution is rank-deficient."""
     _decompose(problem, solution)
+
+
+def check_determined_by_levels(problem: FitProblem, solution: LeastSquaresSolution, at_levels: Recording) -> None:
+    """Raise IdentificationError where only the noise or ripple of a constant quantity determines the parameters.
+
+    `at_levels` are the data of the problem with the constant quantity of each run at its level.
+    """
+    if all(np.array_equal(at_levels[name], problem.data[name]) for name in problem.fitted_quantity.arguments):
+        return
+    levelled = dataclasses.replace(problem, data=at_levels)
+    check_determined(levelled, solution._replace(jacobian=levelled.jacobian(solution.values)))
 
 
 class _Decomposition(NamedTuple):
@@ -116,6 +129,12 @@ def _rank_deficiency_message(problem: FitProblem, free: npt.NDArray[np.bool_], s
 
 
 def count_levels(values: Array) -> int:
-    """The number of different values, with a tolerance of a millionth of their range."""
-    span = float(np.ptp(values)) if values.size else 0.0
-    return int(np.unique(np.round((values - values.min()) / span * 1e6)).size) if span > 0 else 1
+    """The number of levels: of groups of values that differ by at most the band of a constant quantity."""
+    if not values.size:
+        return 0
+    ordered = np.sort(values)
+    band, count, start = RELATIVE_BAND * float(np.max(np.abs(ordered))), 1, float(ordered[0])
+    for value in ordered.tolist():
+        if value - start > band:
+            count, start = count + 1, value
+    return count

@@ -14,7 +14,6 @@ from ..recording.display_units import display_scale
 from ..recording.segment import motion_direction
 from .chapter import Chapter, Plot, Table
 from .formatting import P_VALUE
-from .parameters import parameter_table
 
 
 def hysteresis_chapters(loop_fits: Sequence[LoopFit], creep: Sequence[str] = ()) -> list[Chapter]:
@@ -36,7 +35,7 @@ def _chapter(loop_fit: LoopFit, suffix: str) -> Chapter:
         plots.append(Plot(f"friction{suffix}", f"Loop and hysteresis described by {law}.", shown.plot()))
         caption = f"{law} with the fitted parameters: initial loading, outer loop and two minor loops."
         plots.append(Plot(f"minor-loops{suffix}", caption, plot_loops(shown.friction, loop.friction_path.axis)))
-        tables.append(parameter_table(shown.friction, f"parameters{suffix}", f"Parameters of {law}"))
+        tables.append(_parameter_table(shown, f"parameters{suffix}", f"Parameters of {law}"))
         references = shown.friction.references
     return Chapter(
         paper=f"friction{suffix}",
@@ -46,6 +45,13 @@ def _chapter(loop_fit: LoopFit, suffix: str) -> Chapter:
         plots=tuple(plots),
         references=references,
     )
+
+
+def _parameter_table(fit: HysteresisFit, name: str, title: str) -> Table:
+    """Return the parameters of a friction, in units of the quantity that drives it."""
+    headers = ("parameter", "symbol", "value (SI)", "unit", "meaning")
+    columns = zip(*fit.displayed_parameters, strict=True)
+    return Table(name, title, {header: list(column) for header, column in zip(headers, columns, strict=True)})
 
 
 def _summary(loop_fit: LoopFit, shown: HysteresisFit | None) -> list[str]:

@@ -63,7 +63,9 @@ class PressurePath(FrictionPath):
 
     @property
     def axis(self) -> Axis:
-        return Axis("gauge pressure [kPa]", 1e-3 / self.displacement_per_pressure)
+        return Axis(
+            "gauge pressure [kPa]", 1e-3 / self.displacement_per_pressure, "Pa", 1.0 / self.displacement_per_pressure
+        )
 
 
 class StaticCurve(abc.ABC):

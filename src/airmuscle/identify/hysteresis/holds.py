@@ -31,7 +31,7 @@ class Hold:
 def find_holds(recording: Recording) -> Iterator[Hold]:
     """The holds among the pressure plateaus of a recording; none without a time column."""
     force, contraction = recording["force"], recording["contraction"]
-    for plateau in find_plateaus(recording):
+    for plateau in find_plateaus(recording, columns=("pressure",)):
         if (
             len(plateau.interval) >= MIN_ROWS
             and np.ptp(force[plateau.interval.rows]) <= RELATIVE_BAND * np.abs(force).max()

@@ -84,7 +84,10 @@ def find_loops(
     degree: int = 3,
     all_rows: bool = False,
 ) -> tuple[HysteresisLoop, ...]:
-    """The loops in recordings, one for each kind and level; a second run at a level validates the first.
+    """The loops in the runs of recordings, one for each kind and level; a second run at a level validates the first.
+
+    Each run with a rising and a falling branch gives a loop; if a recording has several runs, the loop is named after
+    the file and the rows of the run, and runs of one direction are left out.
 
     The static curve is a polynomial of `degree` in the swept quantity, fitted with the friction, or `characteristic`
     with an offset. The fitted rows have a positive force below the limit of the sensor and, unless `all_rows`, are
@@ -92,8 +95,9 @@ def find_loops(
     isometric without a characteristic.
     """
     sensors, loops = estimate_sensors(recordings), list[HysteresisLoop]()
-    for recording in recordings:
-        loop = _make_loop(recording, sensors, characteristic, degree, all_rows)
+    each_run = [part for recording in recordings for part in _separate_runs(recording, sensors)]
+    for recording, run in each_run:
+        loop = _make_loop(recording, run, sensors, characteristic, degree, all_rows)
         same = next((i for i, other in enumerate(loops) if _is_same_level(other.run, loop.run)), None)
         if same is None:
             loops.append(loop)
@@ -102,24 +106,56 @@ def find_loops(
     return tuple(loops)
 
 
+def _separate_runs(recording: Recording, sensors: Mapping[str, Sensor]) -> list[tuple[Recording, Run]]:
+    """The runs of a recording with two directions, each with its rows; the longest run if no run has two.
+
+    Runs at one level belong together, and so do all rows of a recording with a single level.
+    """
+    runs = find_runs(recording, sensors)
+    longest = max(runs, key=lambda run: len(run.interval))
+    if all(_is_same_level(longest, run) for run in runs) or longest.kind not in (ISOBARIC, ISOMETRIC):
+        return [(recording, longest)]
+    parts = [(_rows_of_run(recording, run), run) for run in runs]
+    both = [(part, run) for part, run in parts if {1.0, -1.0} <= set(_directions(part, _path_of(run)))]
+    return both or [(_rows_of_run(recording, longest), longest)]
+
+
+def _rows_of_run(recording: Recording, run: Run) -> Recording:
+    """The rows of a run, named after the file and the rows."""
+    origin = f"{recording.origin}, rows {run.interval.start + 1} to {run.interval.stop}"
+    return dataclasses.replace(recording.rows(run.interval.rows), origin=origin)
+
+
+def _path_of(run: Run) -> FrictionPath:
+    return PressurePath() if run.kind is ISOMETRIC else ContractionPath()
+
+
+def _directions(recording: Recording, friction_path: FrictionPath) -> np.ndarray:
+    return motion_direction(friction_path.displacement(recording), recording.columns.get("time"))
+
+
 def _make_loop(
-    recording: Recording, sensors: Mapping[str, Sensor], law: Characteristic | None, degree: int, all_rows: bool
+    recording: Recording,
+    run: Run,
+    sensors: Mapping[str, Sensor],
+    law: Characteristic | None,
+    degree: int,
+    all_rows: bool,
 ) -> HysteresisLoop:
-    longest = max(find_runs(recording, sensors), key=lambda run: len(run.interval))
-    friction_path: FrictionPath = PressurePath() if longest.kind is ISOMETRIC else ContractionPath()
+    friction_path = _path_of(run)
     if law is not None:
         static_curve: StaticCurve = FixedCharacteristic(law)
-    elif longest.kind in (ISOBARIC, ISOMETRIC):
-        static_curve = PolynomialCurve("contraction" if longest.kind is ISOBARIC else "pressure", degree)
+    elif run.kind in (ISOBARIC, ISOMETRIC):
+        static_curve = PolynomialCurve("contraction" if run.kind is ISOBARIC else "pressure", degree)
     else:
         raise IdentificationError(
-            f"{recording.origin}: the run is {longest.kind.name}, so pressure and contraction change together and the "
+            f"{recording.origin}: the run is {run.kind.name}, so pressure and contraction change together and the "
             "static curve cannot be a polynomial in one of them. Give its characteristic."
         )
     rows = _select_rows(recording, sensors, all_rows)
-    direction = motion_direction(friction_path.displacement(recording), recording.columns.get("time"))
+    direction = _directions(recording, friction_path)
     _check_two_directions(recording, direction, rows)
-    return HysteresisLoop(recording, longest, friction_path, static_curve, rows)
+    return HysteresisLoop(recording, run, friction_path, static_curve, rows)
 
 
 def _select_rows(recording: Recording, sensors: Mapping[str, Sensor], all_rows: bool) -> RowMask:

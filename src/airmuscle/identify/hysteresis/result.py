@@ -18,6 +18,9 @@ from .series import LoopSeries
 SIGNIFICANCE_LEVEL = 0.01
 """p-value below which an F test is significant (chosen)."""
 
+MIN_BRANCH_RATIO = 0.1
+"""Minimum ratio of the rows of the two branches for a friction to be justified (chosen)."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class HysteresisFit:
@@ -58,9 +61,24 @@ class HysteresisFit:
 
     @property
     def justified(self) -> bool:
-        """Whether AICc, the F test and, if there is one, the second run all favour the friction."""
+        """Whether AICc, the F test and, if there is one, the second run favour the friction, without reservations."""
         confirmed = not self.repeat_rmse >= self.repeat_rmse_without_friction
-        return self.aicc_reduction > 0 and self.p_value < SIGNIFICANCE_LEVEL and confirmed
+        is_significant = self.aicc_reduction > 0 and self.p_value < SIGNIFICANCE_LEVEL
+        return is_significant and confirmed and not self.reservations
+
+    @property
+    def reservations(self) -> tuple[str, ...]:
+        """The reasons, as sentences, why this loop cannot justify a friction whatever the statistical tests say."""
+        reasons = []
+        direction = self.series.direction[self.series.fitted_rows]
+        up, down = int(np.count_nonzero(direction > 0)), int(np.count_nonzero(direction < 0))
+        if MIN_BRANCH_RATIO * max(up, down) > min(up, down):
+            reasons.append(f"One branch has very few rows ({min(up, down)} against {max(up, down)}).")
+        if not np.isfinite(self.gap):
+            reasons.append("The branches have no common part of the path in the fitted rows.")
+        if self.rmse < self.repeatability:
+            reasons.append("The error is below the repeatability, which indicates overfitting.")
+        return tuple(reasons)
 
     @property
     def verdict(self) -> str:
@@ -75,8 +93,7 @@ class HysteresisFit:
                 f" On the second run the rms error changes from {self.repeat_rmse_without_friction:.3g} to "
                 f"{self.repeat_rmse:.3g} N; the repeatability of the runs is {self.repeatability:.3g} N."
             )
-        if self.rmse < self.repeatability:
-            text += " The error is below the repeatability, which indicates overfitting."
+        text = " ".join([text, *self.reservations])
         if self.undetermined:
             text += f" Not determined: {', '.join(self.undetermined)}."
         return f"{text} The data {'justify' if self.justified else 'do not justify'} this friction."
@@ -84,8 +101,20 @@ class HysteresisFit:
     @property
     def _gap_text(self) -> str:
         if not np.isfinite(self.gap):
-            return "; the branches have no common part of the path in the fitted rows"
+            return ""
         return f" and the gap between the branches from {self.gap:.3g} to {self.residual_gap:.3g} N"
+
+    @property
+    def displayed_parameters(self) -> tuple[tuple[str, str, float, str, str], ...]:
+        """Path, symbol, value, unit and meaning of the parameters, in units of the driving quantity.
+
+        A friction driven by the pressure has Pa instead of m: N/Pa of a stiffness, Pa/s of a speed.
+        """
+        return tuple(
+            (leaf.path, leaf.declared.symbol, *self.series.axis.display(leaf.value, leaf.declared.unit),
+             leaf.declared.meaning)
+            for leaf in leaves(self.friction)
+        )  # fmt: skip
 
     def plot(self) -> Any:
         """The loop, the friction force and the residuals; a Matplotlib figure."""
@@ -95,9 +124,8 @@ class HysteresisFit:
 
     def __str__(self) -> str:
         lines = [
-            f"{leaf.path:<16}{leaf.declared.symbol:<9}{leaf.value:<12.6g}"
-            f"{'' if leaf.declared.unit == '1' else leaf.declared.unit}".rstrip()
-            for leaf in leaves(self.friction)
+            f"{path:<16}{symbol:<9}{value:<12.6g}{unit}".rstrip()
+            for path, symbol, value, unit, _ in self.displayed_parameters
         ]
         return "\n".join([f"{type(self.friction).__name__} fitted to {self.series.origin}", *lines, self.verdict])
 
@@ -116,14 +144,14 @@ def assess_fit(friction: Friction, free: int, run: LoopSeries, repeat: LoopSerie
         plain_repeat_rmse = _rms(repeat.fitted_residuals(None))
         values = repeat.residuals(None, static)[repeat.fitted_rows]
         second_run = (repeat.path[repeat.fitted_rows], values, repeat.direction[repeat.fitted_rows])
-        repeatability = _rms(branches.repeat_difference(path, plain, direction, *second_run)) / np.sqrt(2)
+        repeatability = branches.repeat_difference(path, plain, direction, *second_run).rms / np.sqrt(2)
     return HysteresisFit(
         friction=friction,
         coefficients=coefficients,
         rmse=float(np.sqrt(square)),
         rmse_without_friction=float(np.sqrt(plain_square)),
-        gap=_rms(branches.branch_gap(path, plain, direction)),
-        residual_gap=_rms(branches.branch_gap(path, residuals, direction)),
+        gap=branches.branch_gap(path, plain, direction).rms,
+        residual_gap=branches.branch_gap(path, residuals, direction).rms,
         effective_sample_size=sample_size,
         aicc_reduction=aicc(plain_square, sample_size, base) - aicc(square, sample_size, base + free),
         p_value=f_test_p_value(plain_square, square, sample_size, base + free, free),

@@ -1,8 +1,9 @@
-"""Branches: inflation and deflation, from the pressure history.
+"""Branches: motion of the driven quantity in one direction, such as inflation and deflation.
 
-A branch ends where the pressure has moved back from an extreme by more than a fraction `reversal` of its range; smaller
+The driven quantity of an isobaric run is the contraction, length or position; that of all other runs is the pressure. A
+branch ends where this quantity has moved back from an extreme by more than a fraction `reversal` of its range; smaller
 ripples do not end it. A dwell at an extreme belongs to the branch before it, because friction depends on the previous
-motion: the reversal is placed at the last row before the pressure leaves the level of the dwell. A branch column in the
+motion: the reversal is placed at the last row before the quantity leaves the level of the dwell. A branch column in the
 file is not used; `branch_column_agreement` compares it with the result.
 """
 
@@ -17,8 +18,9 @@ import numpy as np
 from ...core.arrays import Array
 from ..recording import Recording
 from .interval import Interval, running_median
+from .runs import AT_REST, ISOBARIC, Run, find_runs, moved_column
 from .sampling import count_rows
-from .sensor import Sensor
+from .sensor import Sensor, estimate_noise
 
 REVERSAL_FRACTION = 0.05
 """Fraction of the range by which the pressure must move back for a reversal (chosen)."""
@@ -30,34 +32,76 @@ EXIT_FRACTION = 0.25
 
 @dataclasses.dataclass(frozen=True)
 class Branch:
-    """Rows during which the muscle inflates (direction 1) or deflates (-1), and the pressures at both ends [Pa]."""
+    """Rows of one direction of the driven quantity `column`, and the pressures at both ends [Pa].
+
+    `direction` is 1 where the muscle inflates or contracts, -1 where it deflates or extends.
+    """
 
     interval: Interval
     direction: int
     start_pressure: float
     end_pressure: float
+    column: str = "pressure"
 
     @property
     def name(self) -> str:
-        """`inflating` or `deflating`."""
-        return "inflating" if self.direction > 0 else "deflating"
+        """`inflating` or `deflating` where the pressure is driven, otherwise `contracting` or `extending`."""
+        return branch_name(self.column, self.direction)
+
+
+def branch_name(column: str, direction: int) -> str:
+    """The name of a branch of a driven column: inflating, deflating, contracting or extending."""
+    names = ("inflating", "deflating") if column == "pressure" else ("contracting", "extending")
+    return names[0] if direction > 0 else names[1]
 
 
 def find_branches(
-    recording: Recording, sensor: Sensor | None = None, *, reversal: float = REVERSAL_FRACTION
+    recording: Recording,
+    sensor: Sensor | None = None,
+    *,
+    reversal: float = REVERSAL_FRACTION,
+    runs: tuple[Run, ...] | None = None,
 ) -> tuple[Branch, ...]:
-    """The branches of a recording in order; empty if there is no pressure or if it is constant.
+    """The branches of a recording in order; empty if there is no pressure or if the driven quantity is constant.
 
-    A reversal exceeds the fraction `reversal` of the pressure range and ten standard deviations of the sensor. Without
-    time, the order of the rows is taken as the history.
+    A reversal exceeds the fraction `reversal` of the range of the driven quantity and ten standard deviations of its
+    sensor; `sensor` is that of the pressure. `runs` are those of `find_runs`. Without time, the order of the rows is
+    taken as the history.
     """
     if "pressure" not in recording or len(recording) < 3:
         return ()
-    smooth = _remove_spikes(recording["pressure"], recording.columns.get("time"))
+    runs = find_runs(recording) if runs is None else runs
+    isobaric = [run.interval for run in runs if run.kind is ISOBARIC]
+    if any(run.kind is AT_REST for run in runs):
+        return ()
+    if 2 * sum(len(interval) for interval in isobaric) > len(recording):
+        column = moved_column(recording)
+        return tuple(b for each in isobaric for b in _motion_branches(recording, column, each, reversal))
+    return _pressure_branches(recording, sensor, reversal)
+
+
+def _pressure_branches(recording: Recording, sensor: Sensor | None, reversal: float) -> tuple[Branch, ...]:
+    pressure = recording["pressure"]
+    smooth = _remove_spikes(pressure, recording.columns.get("time"))
     threshold = max(reversal * float(np.ptp(smooth)), 10.0 * (sensor.std if sensor else 0.0))
     return tuple(
-        _make_branch(smooth, interval, direction) for interval, direction in _monotonic_intervals(smooth, threshold)
+        Branch(interval, direction, float(smooth[interval.start]), float(smooth[interval.stop - 1]))
+        for interval, direction in _monotonic_intervals(smooth, threshold)
     )
+
+
+def _motion_branches(recording: Recording, column: str | None, run: Interval, reversal: float) -> Iterator[Branch]:
+    """The branches of the motion in one isobaric run; none if the motion is not measured."""
+    if column is None:
+        return
+    shortening = -1 if column == "length" else 1
+    time, pressure = recording.columns.get("time"), recording["pressure"]
+    smooth = _remove_spikes(recording[column][run.rows], None if time is None else time[run.rows])
+    noise = estimate_noise(smooth) if time is not None else 0.0
+    for part, direction in _monotonic_intervals(smooth, max(reversal * float(np.ptp(smooth)), 10.0 * noise)):
+        interval = Interval(run.start + part.start, run.start + part.stop)
+        ends = float(pressure[interval.start]), float(pressure[interval.stop - 1])
+        yield Branch(interval, shortening * direction, *ends, column)
 
 
 def motion_direction(values: Array, time: Array | None = None, *, reversal: float = REVERSAL_FRACTION) -> Array:
@@ -114,12 +158,8 @@ def _end_of_dwell(values: list[float], extreme: int, current: int, direction: in
     return last + 1
 
 
-def _make_branch(pressure: Array, interval: Interval, direction: int) -> Branch:
-    return Branch(interval, direction, float(pressure[interval.start]), float(pressure[interval.stop - 1]))
-
-
 def branch_directions(recording: Recording, branches: tuple[Branch, ...]) -> Array:
-    """The direction (N,) of each row: 1 inflating, -1 deflating, 0 outside the branches."""
+    """The direction (N,) of each row: 1 inflating or contracting, -1 deflating or extending, 0 outside."""
     signs = np.zeros(len(recording))
     for branch in branches:
         signs[branch.interval.rows] = branch.direction
@@ -127,8 +167,11 @@ def branch_directions(recording: Recording, branches: tuple[Branch, ...]) -> Arr
 
 
 def branch_column_agreement(recording: Recording, branches: tuple[Branch, ...]) -> float | None:
-    """Fraction of rows that agree with the branch column of the file (1 inflating, 2 deflating); None without it."""
-    if "branch" not in recording:
+    """Fraction of rows that agree with the branch column of the file (1 inflating, 2 deflating); None without it.
+
+    None also for branches of a motion at constant pressure.
+    """
+    if "branch" not in recording or any(branch.column != "pressure" for branch in branches):
         return None
     stated = np.where(recording["branch"] == 1, 1.0, -1.0)
     return float(np.mean(stated == branch_directions(recording, branches)))

@@ -47,7 +47,7 @@ def inspect(recording: Recording, shared_sensors: Mapping[str, Sensor] | None = 
     sampling = analyse_sampling(recording)
     runs = find_runs(recording, sensors)
     ordered = sampling is None or not (sampling.repeated_rows or sampling.backward_rows)
-    branches = find_branches(recording, sensors.get("pressure"))
+    branches = find_branches(recording, sensors.get("pressure"), runs=runs)
     return Inspection(
         recording,
         sampling,

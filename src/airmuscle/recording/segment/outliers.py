@@ -2,7 +2,7 @@
 
 An outlier consists of one or two rows that differ from the rows before and after by more than eight standard deviations
 of the sensor, while those rows agree with each other. The overshoot of a step is not an outlier, because the rows after
-it are at another level.
+it are at another level. Nor is the turning point of a ramp, because it lies on a line through the rows before or after.
 """
 
 from __future__ import annotations
@@ -20,6 +20,10 @@ MIN_DEVIATIONS = 8.0
 """Minimum distance of an outlier in standard deviations (chosen: noise with heavy tails reaches five or six)."""
 MAX_NEIGHBOUR_DIFFERENCE = 0.25
 """Maximum difference between the rows before and after, as a fraction of the outlier's distance (chosen)."""
+MIN_EXTRAPOLATION_ERROR = 0.5
+"""Minimum distance of an outlier from the extrapolated neighbours, as a fraction of its distance (chosen)."""
+SLOPE_STEPS = 5
+"""Number of steps between rows whose median is the slope before and after a row."""
 WINDOW = 3
 """Number of rows before and after that are compared."""
 
@@ -58,6 +62,7 @@ def _column_outliers(name: str, values: Array, sensor: Sensor) -> Iterator[Outli
     distance = values - 0.5 * (before + after)
     is_far = np.abs(distance) > MIN_DEVIATIONS * scale
     agree = np.abs(before - after) < MAX_NEIGHBOUR_DIFFERENCE * np.abs(distance)
+    is_far &= _distance_from_lines(values, before, after) > MIN_EXTRAPOLATION_ERROR * np.abs(distance)
     for row in np.flatnonzero(is_far & agree):
         expected = float(values[row] - distance[row])
         yield Outlier(name, int(row), float(values[row]), expected, float(abs(distance[row]) / scale))
@@ -72,3 +77,14 @@ def _neighbour_medians(values: Array) -> tuple[Array, Array]:
     before[-WINDOW:] = values[-WINDOW:]
     after[:WINDOW] = values[:WINDOW]
     return before, after
+
+
+def _distance_from_lines(values: Array, before: Array, after: Array) -> Array:
+    """The smaller distance of each row from the lines through the rows before and after it."""
+    back, ahead = np.zeros(len(values)), np.zeros(len(values))
+    if len(values) > SLOPE_STEPS + 1:
+        slopes = np.median(np.lib.stride_tricks.sliding_window_view(np.diff(values), SLOPE_STEPS), axis=1)
+        back[SLOPE_STEPS + 1 :] = slopes[:-1]
+        ahead[: -(SLOPE_STEPS + 1)] = slopes[1:]
+    reach = 0.5 * (WINDOW + 1)
+    return np.asarray(np.minimum(np.abs(values - before - reach * back), np.abs(values - after + reach * ahead)))

@@ -17,7 +17,7 @@ from .plateaus import Plateau
 from .sensor import Sensor
 
 _PLOTTED = ("pressure", "force", "contraction", "length", "position", "temperature")
-_COLOURS = {1: (BLUE, "inflating"), -1: (RED, "deflating")}
+_COLOURS = {1: BLUE, -1: RED}
 
 
 def plot_segments(
@@ -56,7 +56,7 @@ def _draw_branches(axis: Any, branches: Sequence[Branch], abscissa: Array, value
         axis.plot(abscissa, values, color=BLUE, label="measured", **dots)
     for branch in branches:
         rows = branch.interval.rows
-        colour, label = _COLOURS[branch.direction]
+        colour, label = _COLOURS[branch.direction], branch.name
         labels = axis.get_legend_handles_labels()[1]
         axis.plot(abscissa[rows], values[rows], color=colour, label=None if label in labels else label, **dots)
 

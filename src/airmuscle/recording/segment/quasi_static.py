@@ -19,6 +19,9 @@ from .sensor import Sensor, estimate_sensors
 
 SETTLING_TIME = 0.1
 MAX_CHANGE = 0.01
+NOISE_FACTOR = 5.7
+"""A difference of two readings below this multiple of the standard deviation of the sensor is noise: four standard
+deviations of the difference (chosen)."""
 _MONITORED = ("pressure", "contraction", "length", "position")
 
 
@@ -44,7 +47,7 @@ def quasi_static_rows(
 
 def _is_changing(values: Array, width: int, max_change: float, sensor: Sensor) -> Mask:
     """Whether a value changes by too much from `width` rows before, or to `width` rows after."""
-    allowed = max(max_change * float(np.ptp(values)), 4.0 * sensor.std)
+    allowed = max(max_change * float(np.ptp(values)), NOISE_FACTOR * sensor.std)
     step = np.abs(values[width:] - values[:-width]) if width < len(values) else np.empty(0)
     changing = np.zeros(len(values), dtype=bool)
     changing[: len(step)] |= step > allowed

@@ -3,13 +3,14 @@
 A run with constant pressure is isobaric, with constant length or contraction isometric, with constant force isotonic. A
 quantity is constant if it stays within `RELATIVE_BAND` of its maximum (within `CONTRACTION_BAND` for a contraction), or
 within the noise of its sensor. A file may contain many consecutive runs, as tables of static points do: these are runs
-at the levels of the quantity that explains the most rows.
+at the levels of the quantity that explains the most rows. A pressure that oscillates within `RIPPLE_BAND` while the
+muscle is moved is the ripple of its regulator, and counts as constant.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -20,6 +21,12 @@ from .sensor import Sensor, estimate_sensors
 
 RELATIVE_BAND = 0.02
 """Band of a constant quantity, as a fraction of its maximum (chosen)."""
+RIPPLE_BAND = 0.06
+"""Band of a pressure that oscillates while the muscle is moved, as a fraction of its maximum (chosen)."""
+MIN_RIPPLE_REVERSALS = 3
+"""Number of crossings of the mean that makes a fluctuation a ripple, not a step between two levels (chosen)."""
+MOVED_BANDS = 4.0
+"""A muscle is moved if its length changes by more than this number of constant bands (chosen)."""
 CONTRACTION_BAND = 0.005
 """Band of a constant contraction, and of a constant length as a fraction of its maximum (chosen)."""
 SWEEP_FRACTION = 0.1
@@ -92,7 +99,12 @@ def _min_band(recording: Recording, name: str) -> float:
 def _classify(recording: Recording, interval: Interval, bands: dict[str, float]) -> Run:
     """The run in an interval. Of several constant quantities, pressure takes precedence, then length, then force."""
     names = {kind: name for kind in KINDS if (name := _column(recording, kind))}
-    constant = [kind for kind, name in names.items() if _spread(recording[name][interval.rows]) <= bands[name]]
+    constant = [
+        kind
+        for kind, name in names.items()
+        if _spread(recording[name][interval.rows]) <= bands[name]
+        or (kind is ISOBARIC and _has_ripple(recording, interval, bands))
+    ]
     swept = tuple(name for kind, name in names.items() if kind not in constant)
     if not constant or (len(names) == 1 and swept):
         return Run(interval, FREE, None, None, swept)
@@ -117,7 +129,8 @@ def _runs_at_levels(recording: Recording, kind: RunKind, bands: dict[str, float]
     if name is None:
         return ()
     runs = []
-    for interval in level_intervals(recording[name], bands[name]):
+    intervals = list(level_intervals(recording[name], bands[name]))
+    for interval in _join_ripple(recording, intervals, bands) if kind is ISOBARIC else intervals:
         swept = tuple(
             other
             for other, band in bands.items()
@@ -131,3 +144,41 @@ def _runs_at_levels(recording: Recording, kind: RunKind, bands: dict[str, float]
 def _min_sweep(recording: Recording, name: str) -> float:
     """The minimum change of a swept quantity [SI], from its range in the whole recording."""
     return SWEEP_FRACTION * float(np.ptp(recording[name]))
+
+
+def moved_column(recording: Recording) -> str | None:
+    """The measured column of the motion: contraction, length or position; None without any."""
+    return _column(recording, ISOMETRIC)
+
+
+def _has_ripple(recording: Recording, interval: Interval, bands: dict[str, float]) -> bool:
+    """Whether the pressure of an interval only oscillates within the band of a ripple while the muscle is moved."""
+    moved, pressure = moved_column(recording), recording["pressure"][interval.rows]
+    if moved is None or _spread(pressure) > RIPPLE_BAND * float(np.max(np.abs(recording["pressure"]))):
+        return False
+    is_moved = _spread(recording[moved][interval.rows]) > MOVED_BANDS * bands[moved]
+    return is_moved and _count_crossings(pressure) >= MIN_RIPPLE_REVERSALS
+
+
+def _count_crossings(values: Array) -> int:
+    """The number of crossings of the middle of the range, with a dead band of a fifth of the range."""
+    low, high = np.quantile(values, [0.01, 0.99])
+    distance = values - 0.5 * (low + high)
+    side = np.sign(distance[np.abs(distance) > 0.1 * (high - low)])
+    return int(np.count_nonzero(np.diff(side)))
+
+
+def _join_ripple(recording: Recording, intervals: list[Interval], bands: dict[str, float]) -> Iterator[Interval]:
+    """The intervals at pressure levels, those between which the pressure only ripples joined to one."""
+    pressure, i = recording["pressure"], 0
+    band = RIPPLE_BAND * float(np.max(np.abs(pressure)))
+    ranges = [(float(pressure[each.rows].min()), float(pressure[each.rows].max())) for each in intervals]
+    while i < len(intervals):
+        j, (low, high) = i, ranges[i]
+        while j + 1 < len(intervals) and max(high, ranges[j + 1][1]) - min(low, ranges[j + 1][0]) <= band:
+            j += 1
+            low, high = min(low, ranges[j][0]), max(high, ranges[j][1])
+        joined = Interval(intervals[i].start, intervals[j].stop)
+        last = j if j > i and _has_ripple(recording, joined, bands) else i
+        yield Interval(intervals[i].start, intervals[last].stop)
+        i = last + 1

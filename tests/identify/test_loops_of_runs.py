@@ -1,0 +1,51 @@
+"""Hysteresis loops of a file with several runs: one loop for each run with two branches, named after file and rows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from airmuscle.core.errors import IdentificationError
+from airmuscle.friction import MaxwellSlip
+from airmuscle.identify.hysteresis import find_loops, fit_loop
+from airmuscle.recording import Recording
+
+SLIP = MaxwellSlip((2e4, 1e4), (3e-4, 2e-3))
+LEVELS = (1e5, 2e5, 3e5)
+LEG = np.linspace(0.02, 0.14, 200)
+SWEEP = np.concatenate([LEG, LEG[::-1], LEG, LEG[::-1]])
+
+
+def recording(levels, sweep=SWEEP) -> Recording:
+    """Sweeps of the contraction at several pressures, with friction and noise."""
+    rng = np.random.default_rng(7)
+    pressure = np.repeat(levels, len(sweep)) + 50.0 * rng.standard_normal(len(levels) * len(sweep))
+    contraction = np.tile(sweep, len(levels))
+    force = np.repeat(levels, len(sweep)) * 3e-3 * (1.0 - 3.0 * contraction) + 100.0
+    force = force - np.tile(SLIP.force_along((sweep - sweep[0]) * 0.3), len(levels))
+    force += 0.5 * rng.standard_normal(len(force))
+    time = 0.2 * np.arange(len(force))
+    columns = {"time": time, "pressure": pressure, "contraction": contraction, "force": force}
+    return Recording(columns, "three.csv", {"resting_length": 0.3})
+
+
+def test_a_file_with_three_isobaric_runs_has_three_loops_of_which_each_is_justified():
+    loops = find_loops([recording(LEVELS)])
+    assert [loop.recording.origin for loop in loops] == [
+        f"three.csv, rows {1 + 800 * i} to {800 * (i + 1)}" for i in range(3)
+    ]
+    assert [loop.run.constant_value for loop in loops] == pytest.approx(LEVELS, rel=1e-3)
+    fit = fit_loop(loops[0], elements=4)
+    assert fit.recommended is not None
+    assert np.isfinite(fit.recommended.aicc_reduction)
+    assert fit.recommended.series.origin == "three.csv, rows 1 to 800"
+
+
+def test_a_file_with_one_run_is_one_loop_with_the_name_of_the_file():
+    (loop,) = find_loops([recording(LEVELS[:1])])
+    assert (loop.recording.origin, len(loop.recording)) == ("three.csv", 800)
+
+
+def test_sweeps_in_one_direction_at_several_levels_are_no_loop():
+    with pytest.raises(IdentificationError, match=r"three.csv, rows \d+ to \d+: the falling branch has no rows"):
+        find_loops([recording(LEVELS, LEG)])

@@ -1,0 +1,48 @@
+"""The rank of a fit counts what varies beyond the noise and the ripple of a quantity that the test rig keeps constant."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import airmuscle as am
+from airmuscle.characteristic import ContractileSurface
+from airmuscle.core.errors import IdentificationError
+from airmuscle.identify import fit
+from airmuscle.identify.statistics import count_levels
+from airmuscle.library.catalogue import load
+from airmuscle.recording import Recording
+
+ROWS = 600
+SWEEP = np.concatenate([np.linspace(0.0, 0.2, ROWS // 2), np.linspace(0.2, 0.0, ROWS // 2)])
+WHITE = np.random.default_rng(4).normal(0.0, 0.02, ROWS)
+SINE = 0.02 * np.sin(np.linspace(0.0, 60.0, ROWS))
+
+
+def isobar(ripple: np.ndarray, level: float = 3e5) -> Recording:
+    pressure = level * (1.0 + ripple)
+    force = load("dmsp-20-300").characteristic.force(pressure, SWEEP) + 1.0
+    columns = {"time": 0.05 * np.arange(ROWS), "pressure": pressure, "contraction": SWEEP, "force": force}
+    return Recording(columns, "isobar.csv")
+
+
+@pytest.mark.parametrize("ripple", [WHITE, SINE], ids=["noise", "sine"])
+def test_the_ripple_of_one_isobar_does_not_determine_a_surface(ripple: np.ndarray):
+    with pytest.raises(IdentificationError, match=r"isobar.csv: .*cannot separate .*1 of pressure, \d+ of contraction"):
+        fit(ContractileSurface.blank(5), isobar(ripple))
+
+
+def test_isobars_at_six_levels_with_ripple_determine_a_surface():
+    runs = [isobar(SINE, level) for level in np.linspace(1e5, 6e5, 6)]
+    assert fit(ContractileSurface.blank(5), runs).rank == 21
+
+
+def test_the_rank_of_the_library_data_is_complete():
+    entry = load("dmsp-20-300")
+    result = fit(entry.characteristic, am.load_data("dmsp-20-300"))
+    assert result.rank == len(result.estimates)
+
+
+def test_noise_has_one_level_and_a_grid_has_its_own():
+    assert count_levels(3e5 + np.random.default_rng(0).normal(0, 300.0, 244)) == 1
+    assert count_levels(np.repeat([0.0, 1e5, 2e5, 3e5], 7)) == 4
