@@ -30,13 +30,31 @@ def describe_friction(muscles: Sequence[Muscle]) -> str:
     return f"friction: {', '.join(parts)}"
 
 
-def extrapolation(muscles: Sequence[Muscle], prefixes: Sequence[str], columns: Columns) -> list[Diagnostic]:
+class ColumnLimit(NamedTuple):
+    """The lower and upper limit of a column of a run, of one muscle."""
+
+    muscle: str
+    code: DiagnosticCode
+    column: str
+    quantity: str
+    bounds: tuple[float, float]
+
+
+def column_limits(muscles: Sequence[Muscle], prefixes: Sequence[str]) -> tuple[ColumnLimit, ...]:
+    """All limits of the columns of muscles: validity ranges of characteristics and contraction ranges of geometries."""
+    return tuple(
+        ColumnLimit(muscle.name, *limit)
+        for prefix, muscle in zip(prefixes, muscles, strict=True)
+        for limit in _limits(muscle, prefix)
+    )
+
+
+def extrapolation(limits: Sequence[ColumnLimit], columns: Columns) -> list[Diagnostic]:
     """When and how far a run left the validity range of a characteristic, or the contraction range of a geometry."""
     found = []
-    for prefix, muscle in zip(prefixes, muscles, strict=True):
-        for code, column, quantity, bounds in _limits(muscle, prefix):
-            if column in columns and columns["time"].size and _exceeds(columns.limits(column), bounds):
-                found.append(_excess(columns["time"], columns[column], muscle.name, code, quantity, bounds))
+    for muscle, code, column, quantity, bounds in limits:
+        if column in columns and columns["time"].size and _exceeds(columns.limits(column), bounds):
+            found.append(_excess(columns["time"], columns[column], muscle, code, quantity, bounds))
     return found
 
 

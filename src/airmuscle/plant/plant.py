@@ -19,7 +19,7 @@ from ..muscle import Muscle
 from ..pneumatics import Circuit, CircuitFlows
 from ..pneumatics.gas import Air, Ambient, Flow, Gas, Polytropic, check_above_vacuum
 from ..pneumatics.ports import key_by_muscle, key_by_port
-from .diagnostics import Enclosure, check_enclosures, describe_friction, enclosures, extrapolation, geometry_limit_hint
+from . import diagnostics
 from .muscle_state import MuscleState, muscle_state
 from .steady_state import fill_muscles, settle_muscles
 from .validation import check_free, check_parts, check_unique
@@ -263,31 +263,33 @@ class Plant(System):
 
     def check_state(self, state: Mapping[str, float]) -> None:
         """Raise GeometryLimitError for an impossible contraction, ParameterError for a volume that is not positive."""
-        check_enclosures(self._enclosures(state))
+        diagnostics.check_enclosures(self._enclosures(state))
 
-    def _enclosures(self, state: Mapping[str, float]) -> list[Enclosure]:
+    def _enclosures(self, state: Mapping[str, float]) -> list[diagnostics.Enclosure]:
         contractions = self.mechanism.contractions(state, self.resting_lengths)
-        return enclosures(self.muscles, self.prefixes, contractions, state)
+        return diagnostics.enclosures(self.muscles, self.prefixes, contractions, state)
 
     def describe(self) -> tuple[Diagnostic, ...]:
         """The gas and the friction."""
-        texts = (("gas", f"gas: {self.gas}"), ("friction", describe_friction(self.muscles)))
+        texts = (("gas", f"gas: {self.gas}"), ("friction", diagnostics.describe_friction(self.muscles)))
         return tuple(Diagnostic(DiagnosticCode.MODEL, subject, text) for subject, text in texts)
 
     def diagnose(self, columns: Columns) -> list[Diagnostic]:
         """Extrapolation of characteristics, limits of geometries, components beyond the validity of their model."""
         remarks: dict[str, str] = {}
         for prefix, circuit in self._circuits():
-            own = self._within(prefix, columns)
-            remarks |= self._outside(prefix, circuit.validity_warnings(own, self.ambient))
+            remarks |= self._outside(prefix, circuit.validity_warnings(self._within(prefix, columns), self.ambient))
         names = [(name.removesuffix("."), text) for name, text in remarks.items()]
         components = [Diagnostic(DiagnosticCode.COMPONENT, name, f"{name}: {text}") for name, text in names]
-        return [*extrapolation(self.muscles, self.prefixes, columns), *components]
+        return [*diagnostics.extrapolation(self._column_limits, columns), *components]
+
+    @functools.cached_property
+    def _column_limits(self) -> tuple[diagnostics.ColumnLimit, ...]:
+        return diagnostics.column_limits(self.muscles, self.prefixes)
 
     def failure_hint(self, state: Mapping[str, float]) -> str:
         """What to do about the first muscle that is at a limit of its geometry."""
-        hints = map(geometry_limit_hint, self._enclosures(state))
-        return next((hint for hint in hints if hint), "")
+        return next(filter(None, map(diagnostics.geometry_limit_hint, self._enclosures(state))), "")
 
 
 def _states_of_muscle(prefix: str, muscle: Muscle, states: tuple[StateVariable, ...]) -> list[StateVariable]:
