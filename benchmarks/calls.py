@@ -26,7 +26,7 @@ TEXT = (
     f"One muscle lifting a mass, 3 states, Rodas4(1e-6). `simulate` runs {DURATION:g} s with a row every "
     f"{SPACING * 1e3:g} ms and returns a Recording of states, outputs and inputs; its kernel is the integration alone. "
     f"`advance` and `compiled(plant).step` take one step of {STEP * 1e6:g} us; the kernel beside them is "
-    "`compiled(plant).step` of the same length. The rows of the controllers give the time of one sample less that of "
+    "the integration of such steps in one run. The rows of the controllers give the time of one sample less that of "
     "the integration of the same segments."
 )
 
