@@ -600,10 +600,13 @@ def test_a_file_whose_reader_ends_or_takes_too_long_is_damaged(tmp_path: Path, m
         "import os, time\ndef end(path): os._exit(1)\ndef wait(path): time.sleep(60)\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(separate_process, "TIME_LIMIT", 1.0)
     separate_process.stop()
     path = csv(tmp_path / "run.csv")
-    for function, cause in (("end", "its reader ended without a result"), ("wait", "its reading takes more than 1 s")):
+    for function, limit, cause in (
+        ("end", separate_process.TIME_LIMIT, "its reader ended without a result"),
+        ("wait", 1.0, "its reading takes more than 1 s"),
+    ):
+        monkeypatch.setattr(separate_process, "TIME_LIMIT", limit)
         with pytest.raises(FileError, match=rf"run.csv: the file is damaged \({cause}\). Copy it again"):
             call_in_separate_process("bad_reader", function, path)
 

@@ -17,7 +17,7 @@ from ...core.errors import IdentificationError, ParameterError
 from ...core.status import Status
 from ...core.system import System
 from ...simulation.integrators import Integrator
-from ...simulation.sensitivity import WithSensitivities
+from ...simulation.with_sensitivities import WithSensitivities
 from .experiment import Experiment, InitialValue, StartTime, Unknown
 from .initial_conditions import compile_conditions, solve_initial_state
 
