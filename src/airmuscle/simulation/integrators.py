@@ -133,6 +133,31 @@ class BoundIntegrator:
         return Status(status), int(self._count[1]), float(self._clock[0])
 
     @property
+    def entry_address(self) -> int | None:
+        """The address of the kernel's entry point, for a kernel that calls it; None without machine code."""
+        return self._kernel.entry_address
+
+    @property
+    def slots(self) -> Any:
+        """The slots of the kernel's arguments."""
+        return self._kernel.slots
+
+    @property
+    def places(self) -> Any:
+        """The places in the slots of ends, values and slopes of segments, and of times and rows (5,)."""
+        return np.array([self._kernel.slot_of(self._first + i) for i in range(5)], dtype=np.int64)
+
+    @property
+    def clock(self) -> Array:
+        """Time, next step, start of the current segment."""
+        return self._clock
+
+    @property
+    def count(self) -> Any:
+        """Segment, next row, steps, rejected steps."""
+        return self._count
+
+    @property
     def step_counts(self) -> tuple[int, int]:
         """Accepted and rejected steps since the counts were last reset."""
         return int(self._count[2]), int(self._count[3])

@@ -34,6 +34,7 @@ class SampledLoop:
                interval k begin at index segment_offsets[k]
     setpoints  at the start of every interval
     times      output times; those of interval k begin at index row_offsets[k], and drivers add instants
+    input_names    of the plant
     measure    measured columns by name, from the state (n,) and the inputs (m,)
     ranges     minimum and maximum of every commanded input
     """
@@ -48,6 +49,7 @@ class SampledLoop:
     setpoints: list[list[float]]
     times: Array
     row_offsets: list[int]
+    input_names: tuple[str, ...]
     measure: Callable[[Array, Array], dict[str, float]]
     ranges: Mapping[str, tuple[float, float]]
     lower_bounds: list[tuple[int, float]]
@@ -74,6 +76,7 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
     return SampledLoop(
         loop, edges.tolist(), sampled, inputs, segment_offsets.tolist(), commanded, setpoint,
         setpoint.inputs_at(edges[:-1], start).tolist(), times, [0, *row_offsets[1:].tolist()],
+        names,
         _measurement(compiled, loop), _ranges(compiled, loop),
         [(i, bound) for i, bound in enumerate(bounds) if bound > -math.inf],
     )  # fmt: skip
