@@ -20,8 +20,8 @@ from airmuscle.control import (
     PID,
     PWM,
     ControlLaw,
-    ControlLoop,
     Controller,
+    ControlLoop,
     OnOffController,
     SampledSignal,
     Schedule,
@@ -34,7 +34,7 @@ from airmuscle.core.errors import ParameterError, TraceError
 from airmuscle.core.status import Status
 from airmuscle.mechanism import HangingMass, Isometric
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, ProportionalRegulator, Supply, Valve
+from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, compiled_loop, solve
 
 VALVE = Valve(2.6e-9, 0.4)
@@ -82,15 +82,17 @@ def both(problem: Problem):
 
 def assert_identical(one, other):
     assert one.status == other.status
-    assert one.recording.names == other.recording.names
-    for name in one.recording.names:
+    assert list(one.recording) == list(other.recording)
+    for name in one.recording:
         np.testing.assert_array_equal(one.recording[name], other.recording[name], err_msg=name, strict=True)
     assert (one.final_time, one.final_state) == (other.final_time, other.final_state)
     assert one.control_state == other.control_state
     assert one.statistics == other.statistics
 
 
-@pytest.mark.parametrize("integrator", [Rodas4(), RungeKutta4(1e-3), DormandPrince8(2e-3)], ids=lambda i: type(i).__name__)
+@pytest.mark.parametrize(
+    "integrator", [Rodas4(), RungeKutta4(1e-3), DormandPrince8(2e-3)], ids=lambda i: type(i).__name__
+)
 @pytest.mark.parametrize("drivers", DRIVERS.values(), ids=DRIVERS)
 def test_an_on_off_loop_is_the_same_to_the_last_bit(drivers, integrator):
     loop = ControlLoop(ON_OFF, 0.0125, STEPS, drivers=drivers)
@@ -124,7 +126,7 @@ def test_a_run_in_two_parts_is_the_run_in_one():
 
 
 def test_other_inputs_with_ramps_pass_through_drivers():
-    other = SampledSignal({"time": (0.0, 0.3, 0.9, 1.0), "discharge": (0.0, 0.9, 0.1, 0.6)})
+    other = SampledSignal({"discharge": ((0.0, 0.0), (0.3, 0.9), (0.9, 0.1), (1.0, 0.6))})
     on = OnOffController("pressure", "fill", hysteresis=1e4)
     for driver in (PWM(40.0, 1e-3), SOLENOID, (PWM(40.0), SOLENOID)):
         loop = ControlLoop(on, 0.01, STEPS, other, {"discharge": driver})
@@ -132,14 +134,9 @@ def test_other_inputs_with_ramps_pass_through_drivers():
 
 
 def test_a_measured_output_is_measured_before_the_command():
-    on = OnOffController("tension", SPLIT, hysteresis=5.0)
-    loop = ControlLoop(on, 0.01, Schedule({"tension": ((0, 20.0), (0.5, 60.0))}))
-    plant = dataclasses.replace(LIFT, mechanism=Isometric(0.02))
-    name = next(c for c in ("tension", "force") if c in solve(Problem(plant, Schedule({"fill": ((0, 0.5),)}), 0.01)).recording.names)
-    loop = dataclasses.replace(
-        loop, controller=OnOffController(name, SPLIT, hysteresis=5.0), setpoint=Schedule({name: ((0, 20.0), (0.5, 60.0))})
-    )
-    assert_identical(*both(Problem(plant, loop, 1.0)))
+    on = OnOffController("force", SPLIT, hysteresis=5.0)
+    loop = ControlLoop(on, 0.01, Schedule({"force": ((0, 20.0), (0.5, 60.0))}))
+    assert_identical(*both(Problem(dataclasses.replace(LIFT, mechanism=Isometric(0.02)), loop, 1.0)))
 
 
 drivers = st.one_of(
@@ -148,7 +145,11 @@ drivers = st.one_of(
 )
 
 
-@given(st.lists(drivers, min_size=1, max_size=2), st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12), st.floats(2e-3, 0.05))
+@given(
+    st.lists(drivers, min_size=1, max_size=2),
+    st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12),
+    st.floats(2e-3, 0.05),
+)
 @settings(max_examples=60, deadline=None)
 def test_any_driver_is_the_same_to_the_last_bit(chain, commands, sample_time):
     """The set point is the command: what drivers make of it does not depend on the plant."""
@@ -230,12 +231,11 @@ def test_a_command_that_is_not_a_number_ends_the_run():
 
 
 def test_a_run_that_fails_within_an_interval_returns_what_it_has():
-    """A regulator above what a fixed step of 50 ms can follow."""
-    plant = dataclasses.replace(LIFT, circuit=ProportionalRegulator(0.02))
-    on = OnOffController("pressure", plant.inputs[0], hysteresis=1e3)
-    loop = ControlLoop(on, 0.2, STEPS)
-    one, other = both(Problem(plant, loop, 4.0, integrator=RungeKutta4(0.2)))
+    """A fixed step that is far too long for the valves."""
+    loop = ControlLoop(ON_OFF, 0.4, STEPS)
+    one, other = both(Problem(LIFT, loop, 4.0, integrator=RungeKutta4(0.2)))
     assert one.status in (Status.NOT_FINITE, Status.NEGATIVE_AIR_MASS, Status.NON_POSITIVE_VOLUME)
+    assert 0 < len(one.recording) < 200
     assert_identical(one, other)
 
 
@@ -261,7 +261,9 @@ class Forgetful(Root):
 
 
 def test_a_law_that_cannot_be_compiled_is_named_with_what_to_do():
-    with pytest.raises(TraceError, match=r"Branching.step cannot be compiled .*ops.*derive the controller from Controller"):
+    with pytest.raises(
+        TraceError, match=r"Branching.step cannot be compiled .*ops.*derive the controller from Controller"
+    ):
         solve(Problem(LIFT, ControlLoop(Branching(), 0.1, Schedule({})), 1.0))
     with pytest.raises(TraceError, match=r"Forgetful.step does not return 'time'"):
         solve(Problem(LIFT, ControlLoop(Forgetful(), 0.1, Schedule({})), 1.0))

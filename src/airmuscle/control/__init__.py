@@ -1,7 +1,7 @@
 """Control: input signals in time, drivers between command and valve, sampled controllers and their loop."""
 
-from .control_loop import ControlLoop, ControlLoopState
 from .control_law import ControlLaw
+from .control_loop import ControlLoop, ControlLoopState
 from .controller import Controller, Measurement
 from .driver import PWM, Driver, SolenoidDriver
 from .inputs import ZERO_INPUT, InputSignal, Periodic, SampledSignal, Schedule

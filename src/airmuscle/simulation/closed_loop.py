@@ -18,6 +18,7 @@ from ..core.errors import ParameterError
 from ..core.status import Status
 from ..plant.units import column_units
 from .buffers import Buffer
+from .compiled_loop import CompiledLoop, CompiledRun, can_be_compiled
 from .integrators import RawSolution
 from .output_times import merge_output_times
 from .problem import Problem
@@ -36,13 +37,24 @@ def solve_closed_loop(problem: Problem) -> Solution:
     """
     loop = problem.input
     control_state = problem.control_state or loop.init(problem.start_time)  # type: ignore[union-attr]
-    run = _Run(problem, prepare_loop(problem, control_state), control_state)
+    run = start_run(problem, prepare_loop(problem, control_state), control_state)
     run.integrate()
     return _solution(problem, run)
 
 
-class _Run:
-    """A control loop being simulated: rows and segments so far, and the state at the last completed interval."""
+def start_run(problem: Problem, prepared: SampledLoop, control_state: ControlLoopState) -> CompiledRun | CalledRun:
+    """A run of the loop as one program where it can be compiled, else one that calls the controller at each sample."""
+    assert problem.integrator is not None
+    if can_be_compiled(prepared):
+        loop = CompiledLoop(problem.compiled, prepared)
+        run = CompiledRun(loop, problem.compiled, problem.integrator, problem.initial_vector, control_state)
+        if run.can_run:
+            return run
+    return CalledRun(problem, prepared, control_state)
+
+
+class CalledRun:
+    """A run of a loop whose controller is called at each sample."""
 
     def __init__(self, problem: Problem, prepared: SampledLoop, control_state: ControlLoopState) -> None:
         self.problem, self.prepared, self.control_state = problem, prepared, control_state
@@ -53,7 +65,7 @@ class _Run:
         n, m = compiled.sizes.states, compiled.sizes.inputs
         segments = prepared.inputs.ends.size
         self.ends, self.values, self.slopes = Buffer(None, segments), Buffer(m, segments), Buffer(m, segments)
-        self.times, self.rows = Buffer(None, prepared.times.size), Buffer(n, prepared.times.size)
+        self.times, self.states = Buffer(None, prepared.times.size), Buffer(n, prepared.times.size)
         self.samples: list[tuple[tuple[float, ...], tuple[float, ...]]] = []
         self.applied = np.array(control_state.applied_inputs or prepared.inputs.values[0])
         self.status, self.time = Status.DONE, problem.start_time
@@ -63,6 +75,26 @@ class _Run:
         loop = prepared.loop
         self.chains: dict[str, tuple[Driver, ...]] = WithDrivers(loop.other_inputs, loop.drivers).chains
         self.driven = {name: compiled.description.input_names.index(name) for name in self.chains}
+
+    @property
+    def signal(self) -> PiecewiseLinear:
+        """The segments of all inputs of the intervals that have begun."""
+        return PiecewiseLinear(self.ends.rows, self.values.rows, self.slopes.rows)
+
+    @property
+    def rows(self) -> tuple[Array, Array]:
+        """Times (N,) and states (N, n) of the rows that were reached."""
+        return self.times.rows, self.states.rows
+
+    @property
+    def measured(self) -> Array:
+        """Measurements (K, columns) of every interval that has begun."""
+        return np.array([m for m, _ in self.samples], dtype=float).reshape(len(self.samples), -1)
+
+    @property
+    def commanded(self) -> Array:
+        """Commands (K, inputs) of every interval that has begun."""
+        return np.array([c for _, c in self.samples], dtype=float).reshape(len(self.samples), -1)
 
     def integrate(self) -> None:
         """Sample and integrate from edge to edge, until the end or until an interval fails."""
@@ -147,11 +179,11 @@ class _Run:
         self.times.reserve(times.size)
         self.times.array[self.times.size : self.times.size + times.size] = times
         self.times.size += times.size
-        self.rows.reserve(times.size)
+        self.states.reserve(times.size)
 
     def _discard_interval(self) -> None:
         """Forget an interval that was interrupted, so that the run can be continued from its beginning."""
-        self.times.size = self.rows.size
+        self.times.size = self.states.size
         for buffer in (self.ends, self.values, self.slopes):
             buffer.size = min(buffer.size, self.kept_segments)
         self.stopped_at, self.bound.state[:] = self.time, self.state
@@ -162,11 +194,11 @@ class _Run:
         wanted = self.times.size - self.first_row
         s, r = self.first_segment, self.first_row
         addresses = (self.ends.at(s), self.values.at(s), self.slopes.at(s))
-        result = self.bound.run_part(begin, addresses, count, self.times.at(r), self.rows.at(r), wanted)
+        result = self.bound.run_part(begin, addresses, count, self.times.at(r), self.states.at(r), wanted)
         self.status, reached, self.stopped_at = result
-        self.rows.size = r + reached
+        self.states.size = r + reached
         if reached < wanted:
-            self.times.size = self.rows.size
+            self.times.size = self.states.size
         if self.status == Status.DONE:
             state = self.bound.state
             if any(state[i] < bound for i, bound in self.prepared.lower_bounds):
@@ -176,12 +208,11 @@ class _Run:
             self.applied = self.values.array[last] + self.slopes.array[last] * (end - start)
 
 
-def _solution(problem: Problem, run: _Run) -> Solution:
+def _solution(problem: Problem, run: CompiledRun | CalledRun) -> Solution:
     """The rows of all intervals as one solution."""
     compiled, prepared, integrator = problem.compiled, run.prepared, problem.integrator
-    segments = PiecewiseLinear(run.ends.rows, run.values.rows, run.slopes.rows)
-    times, states = run.times.rows, run.rows.rows
-    begun = bool(run.samples)
+    segments, (times, states) = run.signal, run.rows
+    begun = len(run.measured) > 0
     at, state = (run.stopped_at, run.bound.state.copy()) if begun else (run.time, run.state)
     raw = RawSolution(states, times.size, at, state, run.status, *run.bound.step_counts)
     if not segments.ends.size:  # the run ended before its first interval
@@ -190,7 +221,8 @@ def _solution(problem: Problem, run: _Run) -> Solution:
     table = evaluate_rows(compiled, states, times, segments, problem.start_time)
     raw, table = truncate_at_invalid_row(compiled, raw, table, times)
     units = column_units(problem.system, compiled.output_names)
-    note = f"controlled by {prepared.loop.describe(units)}"
+    way = "compiled with the plant" if isinstance(run, CompiledRun) else "called from Python at each sample"
+    note = f"controlled by {prepared.loop.describe(units)}; {way}"
     remark = Diagnostic(DiagnosticCode.CONTROLLER, type(prepared.loop.controller).__name__, note)
     more = _controller_columns(problem, run, times[: raw.reached])
     recording, diagnostics = make_recording(compiled, raw, table, times, integrator, problem.end_time, more, (remark,))
@@ -199,15 +231,14 @@ def _solution(problem: Problem, run: _Run) -> Solution:
     return Solution(problem, recording, raw.status, statistics, diagnostics, run.time, final, run.control_state)
 
 
-def _controller_columns(problem: Problem, run: _Run, times: Array) -> dict[str, Array]:
+def _controller_columns(problem: Problem, run: CompiledRun | CalledRun, times: Array) -> dict[str, Array]:
     """Set points in time; measurements and commands of the last sample at every row."""
     prepared, controller = run.prepared, run.prepared.loop.controller
     intervals = np.searchsorted(np.array(prepared.edges), times, side="right") - 1
-    intervals = np.clip(intervals, 0, max(len(run.samples) - 1, 0))
+    intervals = np.clip(intervals, 0, max(len(run.measured) - 1, 0))
     setpoints = prepared.setpoint_signal.inputs_at(times, problem.start_time)
     columns = {f"{SETPOINT}{name}": setpoints[:, i] for i, name in enumerate(controller.setpoints)}
     kinds = ((MEASURED, controller.measured_columns), (COMMAND, controller.inputs))
-    for kind, (prefix, names) in enumerate(kinds):
-        values = np.array([sample[kind] for sample in run.samples], dtype=float).reshape(-1, len(names))
+    for values, (prefix, names) in zip((run.measured, run.commanded), kinds, strict=True):
         columns |= {f"{prefix}{name}": values[intervals, i] for i, name in enumerate(names)}
     return columns

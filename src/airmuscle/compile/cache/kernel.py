@@ -128,7 +128,7 @@ class BoundKernel:
     @property
     def slots(self) -> Any:
         """The slots of the arguments as an array of int64 that shares their memory."""
-        return np.frombuffer(self._slots, dtype=np.int64)
+        return np.frombuffer(memoryview(self._slots), dtype=np.int64)
 
     def slot_of(self, index: int) -> int:
         """The place in the slots of argument number `index`."""

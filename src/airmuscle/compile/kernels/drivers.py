@@ -29,7 +29,7 @@ def pulse_width_modulation(
     end = signal[0, count - 1]
     frequency = settings[0]
     period = 1.0 / frequency
-    smallest = max(max(settings[1], 1e-9 * period), 4.0 * ulp)
+    smallest = max(settings[1], 1e-9 * period, 4.0 * ulp)
     origin, begun, pulse_end = state[0], state[1], state[2]
     levels = 0  # pulses so far: instants in row 0 of the result, levels in row 1
     on = pulse_end > start

@@ -34,9 +34,7 @@ def apply_drivers(
         if kinds[d, 1] == MODULATOR:
             count = pulse_width_modulation(settings[d], states[d], new[d], columns[i], counts[i], start, ulp, result)
         else:
-            count = delayed_switch(
-                settings[d], states[d], new[d], columns[i], counts[i], start, scratch[1], result
-            )
+            count = delayed_switch(settings[d], states[d], new[d], columns[i], counts[i], start, scratch[1], result)
         for part in range(3):
             for k in range(count):
                 columns[i, part, k] = result[part, k]
@@ -104,7 +102,8 @@ def sampled_loop(
     integrate: Any, slots: Any, places: Any, clock: Any, count: Any, y: Any,
     outputs: Any, c: Any, o: Any, measured_at: Any,
     sample: Any, parameters: Any, period: Any, low: Any, high: Any, commanded_at: Any,
-    edges: Any, ulps: Any, first_sample: Any, setpoints: Any, ends: Any, values: Any, slopes: Any, first: Any, grid: Any, grid_row: Any,
+    edges: Any, ulps: Any, first_sample: Any, setpoints: Any,
+    ends: Any, values: Any, slopes: Any, first: Any, grid: Any, grid_row: Any,
     kinds: Any, settings: Any, states: Any, columns: Any, counts: Any, scratch: Any, begins: Any,
     bounds: Any, applied: Any, memory: Any, measured: Any, command: Any,
     kept: Any, kept_applied: Any, kept_states: Any,
@@ -117,8 +116,8 @@ def sampled_loop(
                   values, slopes, times and rows; its clock, counts and state
     outputs, c, o, measured_at  printed outputs; where each measured column stands among states and outputs
     sample(measured, setpoints, memory, low, high, period, parameters, command, memory)  address of the controller
-    edges (K + 1,), ulps (K + 1,), first_sample, setpoints (K, s), ends .. slopes, first (K + 1,), grid, grid_row (K + 1,)  intervals, and the
-                  segments and output times of each
+    edges (K + 1,), ulps (K + 1,), setpoints (K, s)  intervals; samples begin with number `first_sample`
+    ends .. slopes, first (K + 1,), grid, grid_row (K + 1,)  segments and output times, and the first of each interval
     kinds .. begins  drivers (D, ..) and their workspace
     memory (2, ..)  of the last completed interval, and of the present one
     kept, kept_applied, kept_states  state, inputs and drivers at the end of the last completed interval
@@ -183,9 +182,7 @@ def sampled_loop(
                         columns[i, 0, row] = ends[first[k] + row]
                         columns[i, 1, row] = values[first[k] + row, i]
                         columns[i, 2, row] = slopes[first[k] + row, i]
-                apply_drivers(
-                    kinds, settings, kept_states, states, columns, counts[0], scratch, begin, ulps[k + 1]
-                )
+                apply_drivers(kinds, settings, kept_states, states, columns, counts[0], scratch, begin, ulps[k + 1])
                 at_segment, at_row = progress[SEGMENTS], progress[ROWS]
                 pieces = merge_columns(
                     columns, counts[0], counts[1], begins, begin, new_ends, new_values, new_slopes,
