@@ -114,7 +114,9 @@ def test_anti_windup_never_overshoots_where_its_time_constant_is_less_than_a_per
     memory = pid.init()
     for _ in range(50):
         _, memory = pid.step(memory, Measurement({"y": 0.0}, {"y": 3.0}, {"fill": (0.0, 1.0)}), H)
-    assert 6.0 + memory["integral"] == pytest.approx(1.0 + 2.0 * H / 0.5 * 3.0, rel=1e-9), "at the limit, and one step on"
+    assert 6.0 + memory["integral"] == pytest.approx(1.0 + 2.0 * H / 0.5 * 3.0, rel=1e-9), (
+        "at the limit, and one step on"
+    )
 
 
 def test_a_controller_keeps_nothing_outside_its_memory():

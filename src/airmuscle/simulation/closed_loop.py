@@ -89,12 +89,15 @@ class CalledRun:
     @property
     def measured(self) -> Array:
         """Measurements (K, columns) of every interval that has begun."""
-        return np.array([m for m, _ in self.samples], dtype=float).reshape(len(self.samples), -1)
+        return self._sampled(0, len(self.prepared.loop.controller.measured_columns))
 
     @property
     def commanded(self) -> Array:
         """Commands (K, inputs) of every interval that has begun."""
-        return np.array([c for _, c in self.samples], dtype=float).reshape(len(self.samples), -1)
+        return self._sampled(1, len(self.prepared.loop.controller.inputs))
+
+    def _sampled(self, kind: int, width: int) -> Array:
+        return np.array([sample[kind] for sample in self.samples], dtype=float).reshape(-1, width)
 
     def integrate(self) -> None:
         """Sample and integrate from edge to edge, until the end or until an interval fails."""
