@@ -16,6 +16,11 @@ CONTRACTION_RANGE = (-0.5, 1.0)
 MAX_MAGNITUDE = 1e15
 """Maximum magnitude of a measured value in SI units (chosen: no measurement, but its powers do not overflow)."""
 
+_ROUNDED_TIME = (
+    " If the logger rounded its time stamps, use time_base=UniformTime() (uniform sampling by the number of rows), "
+    "ordered=False (the stamps as they are), or time_base=NoTime()."
+)
+
 
 def check_plausible(
     table: RawTable,
@@ -54,10 +59,11 @@ def _check_ordered(table: RawTable, time: Array) -> None:
     not_increasing = np.diff(time) <= 0
     if not_increasing.any():
         row = int(np.argmax(not_increasing)) + 1
+        rounded = "" if (np.diff(time) < 0).any() else _ROUNDED_TIME
         relation = "repeats the time" if time[row] == time[row - 1] else "is less than the time"
         raise ColumnError(
             f"{table.location(row)}: time {time[row]:.9g} s {relation} of the previous row ({time[row - 1]:.9g} s). "
-            "Time must increase: sort the rows, delete the repeated one, or write two runs to two files."
+            f"Time must increase: sort the rows, delete the repeated one, or write two runs to two files.{rounded}"
         )
 
 

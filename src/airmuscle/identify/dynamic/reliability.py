@@ -37,11 +37,12 @@ MAX_NAMES = 3
 CONSEQUENCES: tuple[tuple[tuple[str, ...], str], ...] = (
     (("critical_ratio",),
      "The flow law does not describe the records near equal pressures, or they do not reach that range; the "
-     "conductance takes up the difference, and the predicted time to the final pressure is biased. Record the fill until the "
-     "pressure is steady, or fix the ratio at the value of the data sheet."),
+     "conductance takes up the difference, and the predicted time to the final pressure is biased. Record the fill "
+     "until the pressure is steady, or fix the ratio at the value of the data sheet."),
     (("volume", "rest_volume", "growth_volume"),
      "Only the ratio of conductance to volume is determined, so the conductance has the relative error of this bound "
-     "and must not be used with another volume. Measure the volume separately, for example by the water that fills it."),
+     "and must not be used with another volume. Measure the volume separately, for example by the water that fills "
+     "it."),
 )  # fmt: skip
 """Consequence of an unknown on its bound, by the last part of its path."""
 _OTHER_CONSEQUENCE = "Extend the bound if it is not physical, or fix the parameter at a measured value."
