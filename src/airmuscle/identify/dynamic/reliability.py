@@ -153,10 +153,10 @@ def describe_bounds(
     """
     inner = np.flatnonzero(~on_bound)
     notes = []
-    for k in np.flatnonzero(on_bound):
+    for k in map(int, np.flatnonzero(on_bound)):
         bound = estimates[k]
         shifts = -inverse @ (jacobian[:, inner].T @ jacobian[:, k]) * scales[inner] / scales[k]
-        moved = _moved([estimates[i] for i in inner], shifts * BOUND_SHIFT * (abs(bound.value) or scales[k]))
+        moved = _moved([estimates[int(i)] for i in inner], shifts * BOUND_SHIFT * (abs(bound.value) or scales[k]))
         effect = f" If the bound were {BOUND_SHIFT:.0%} greater, it would move {', '.join(moved)}." if moved else ""
         value = f"{bound.value:.4g} {bound.display_unit}".rstrip()
         notes.append(
