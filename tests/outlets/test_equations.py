@@ -293,3 +293,12 @@ def test_the_page_of_a_fit_shows_the_equation_as_mathml_and_as_text(tmp_path: Pa
 def test_a_law_without_a_closed_form_shows_its_definition_and_source() -> None:
     exact = load("saga2007-exact").characteristic
     assert law_equation(exact, *quantity_of(exact), RANGES) == ()
+
+
+def test_the_symbol_of_a_shared_part_is_that_of_no_parameter() -> None:
+    law = load("dmsp-20-300").characteristic
+    (equation,) = equations(law)
+    letters = {each.name.partition("_")[0] for each in equation.parameters}
+    assert "c" in letters
+    assert equation.parts
+    assert not letters & {part.name.partition("_")[0] for part, _ in equation.parts}

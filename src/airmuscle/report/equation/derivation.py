@@ -47,8 +47,10 @@ ARGUMENTS = {
 }
 """Arguments and results of laws."""
 PRESSURE_IN_BAR = Symbol("P", "bar", "gauge pressure")
-_PART_NAMES = {("p",): "q", ("eps",): "x", ("F",): "y", (): "c"}
-"""Symbols of shared parts by the arguments that they depend on."""
+_PART_NAMES = {("p",): "qhn", ("eps",): "xyz", ("F",): "ywv", (): "cgsm"}
+"""Symbols of shared parts by the arguments that they depend on: the first that no parameter has."""
+_MIXED_PART_NAMES, _SUM_NAMES = "zwv", "uvs"
+"""Symbols of other shared parts, and of long sums."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -228,9 +230,11 @@ def _named(
 
 def _part_names(parts: Sequence[Node], arguments: Sequence[Node], taken: Collection[str]) -> dict[Node, str]:
     names: dict[Node, str] = {}
+    used = {name.partition("_")[0] for name in taken}
     for node in parts:
-        base = _PART_NAMES.get(tuple(symbol.name for symbol in depends_on(node, arguments)), "z")
-        base = "u" if len(summands(node)) > MAX_INNER_TERMS else base
+        own = tuple(symbol.name for symbol in depends_on(node, arguments))
+        letters = _SUM_NAMES if len(summands(node)) > MAX_INNER_TERMS else _PART_NAMES.get(own, _MIXED_PART_NAMES)
+        base = next((letter for letter in letters if letter not in used), letters[0])
         name, number = base, 1
         while name in taken or name in names.values():
             number += 1
