@@ -50,6 +50,8 @@ ARGUMENTS = {
     "name": "name of an entry, a column or a component",
     "names": "several names",
     "name_or_path": "name of a library entry, or path of a file in the same format",
+    "file_name": "pattern of values in the names of files",
+    "time_base": "meaning of the time column of a file: recorded, uniform or none",
     "path": "path of a file to read or to write",
     "recording": "a measured or simulated run",
     "characteristic": "static relation between pressure, contraction and force",

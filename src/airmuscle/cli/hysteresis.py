@@ -19,7 +19,18 @@ from ..recording import Recording
 from ..report.hysteresis_chapter import describe_row_counts, hysteresis_chapters
 from ..report.output_folder import atomic_folder, check_writable
 from ..report.write import write_into
-from .bench_files import AmbientPressure, Files, Length, Units, read_recordings
+from .bench_files import (
+    AmbientPressure,
+    Columns,
+    Constants,
+    Files,
+    Length,
+    NamePattern,
+    TimeOption,
+    Units,
+    column_mapping,
+    read_recordings,
+)
 from .option_hints import in_options
 from .options import Folder, Json, Mapping
 from .terminal import echo, print_json, print_table
@@ -56,6 +67,10 @@ def hysteresis(
     ambient: AmbientPressure = None,
     unit: Units = None,
     mapping: Mapping = None,
+    column: Columns = None,
+    constant: Constants = None,
+    file_name: NamePattern = None,
+    time: TimeOption = None,
     json: Json = False,
 ) -> None:
     """Fit friction models to hysteresis loops.
@@ -73,7 +88,9 @@ def hysteresis(
     """
     if use_characteristic and muscle is None:
         raise typer.BadParameter("--use-characteristic requires --muscle")
-    recordings = read_recordings(files, unit, mapping=mapping, resting_length=resting_length, ambient=ambient)
+    columns = column_mapping(mapping, column=column, constant=constant, file_name=file_name, time=time,
+                             resting_length=resting_length, ambient=ambient)  # fmt: skip
+    recordings = read_recordings(files, unit, columns)
     entry = None if muscle is None else load_law(muscle)
     law = entry.characteristic if entry is not None and use_characteristic else None
     loops = find_loops(recordings, characteristic=law, degree=degree, all_rows=all_rows)

@@ -120,6 +120,17 @@ class Plot:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class DisplayedEquation:
+    """An equation in LaTeX, one entry of `lines` for each definition, and its source text by language."""
+
+    name: str
+    title: str
+    lines: tuple[str, ...]
+    note: str
+    sources: Mapping[str, str]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class Chapter:
     """A chapter of a report: summary, claims, tables, figures, references and the sources of all values."""
 
@@ -132,3 +143,4 @@ class Chapter:
     references: tuple[Reference, ...] = ()
     chosen: tuple[tuple[str, str, str], ...] = ()
     """Values used for the figures: (meaning, value with unit, source or "chosen")."""
+    equations: tuple[DisplayedEquation, ...] = ()

@@ -23,7 +23,7 @@ from .formatting import (
     table_rows,
     typographic,
 )
-from .formula import symbol_formula, to_mathml, to_plain
+from .formula import symbol_formula, to_display_mathml, to_mathml, to_plain
 from .versions import versions
 
 MAX_SVG_BYTES = 600_000
@@ -47,6 +47,7 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
         cell=lambda value, header="": Markup(render_cell(header, value)),
         header=lambda text: Markup(render_header(text)),
         formulas=lambda text: Markup(to_mathml(text)),
+        equation=lambda latex: Markup(to_display_mathml(latex)),
         plain=to_plain,
         published=lambda claim: typographic(format_published(claim)),
         unit=format_unit,
