@@ -18,7 +18,7 @@ from .fit_geometry import check_one_length, missing_geometry, with_braid
 from .fit_options import FitRequest
 from .fit_output import fit_to_dict, fitted_entry, print_results, write_results
 from .initial_law import InitialLaw, find_initial_law, resting_lengths
-from .remedies import in_options
+from .option_hints import in_options
 from .terminal import echo, print_json
 
 
@@ -54,7 +54,7 @@ def compare_models(
 
 def _with_option_names(comparison: Comparison) -> Comparison:
     """The comparison whose reasons of exclusion name command-line options instead of Python arguments."""
-    excluded = tuple(dataclasses.replace(each, reason=in_options(each.reason)) for each in comparison.excluded)
+    excluded = tuple(dataclasses.replace(each, reason=in_options(each.reason, "fit")) for each in comparison.excluded)
     return dataclasses.replace(comparison, excluded=excluded)
 
 

@@ -133,7 +133,7 @@ class Description:
             len(states) + len(inputs) + i for i, name in enumerate(self.output_names) if name in positive
         ]
         """The columns among `column_names` that must be positive."""
-        self.remark_texts = tuple(str(remark) for remark in self.remarks)
+        self.remark_texts = tuple(remark.message for remark in self.remarks)
         self.state_limits = dict(zip(self.state_names, self.lower_bounds.tolist(), strict=True))
         """The lower bound of each state by its name."""
         limits = zip(self.input_lower_limits.tolist(), self.input_upper_limits.tolist(), strict=True)

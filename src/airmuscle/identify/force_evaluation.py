@@ -10,6 +10,7 @@ import numpy.typing as npt
 from ..characteristic.base import ContractionLaw, ForceLaw
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, SolveError
+from ..core.hints import HintedText
 
 FORCE_GRID_POINTS = 801
 """Grid points between zero and the maximum force; the law is interpolated linearly between them."""
@@ -40,7 +41,7 @@ def slack_rows(law: Any, pressure: Array, contraction: Array) -> npt.NDArray[np.
     slack = np.asarray(_deficit(law, pressure, contraction, np.zeros(pressure.size)) > 0)
     error = _solve_error(law, pressure[~slack], contraction[~slack])
     if error is not None:
-        raise IdentificationError(f"It gives no force at a measured point. {error}")
+        raise IdentificationError(HintedText("It gives no force at a measured point. ", error.message))
     return slack
 
 

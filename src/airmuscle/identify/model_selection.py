@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ..characteristic.base import Characteristic
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError, IdentificationError
+from ..core.hints import HintedText
 from ..recording import Recording
 from .candidates import Candidate, standard_candidates
 from .cross_validation import GroupSplit, Labels, default_split, label_folds
@@ -133,10 +134,10 @@ def compare(
         try:
             ranking.append(_cross_validate(candidate, points, loss))
         except AirmuscleError as error:
-            excluded.append(ExcludedModel(candidate.name, str(error)))
+            excluded.append(ExcludedModel(candidate.name, error.message))
     if not ranking:
-        reasons = "\n".join(f"{e.name}: {e.reason}" for e in excluded)
-        raise IdentificationError(f"the data determine none of the {len(excluded)} candidates.\n{reasons}")
+        reasons = [part for e in excluded for part in (f"\n{e.name}: ", e.reason)]
+        raise IdentificationError(HintedText(f"the data determine none of the {len(excluded)} candidates.", *reasons))
     ranking.sort(key=lambda m: (m.cross_validated_rmse, m.parameter_count))
     recommended, reason = _recommend(ranking, split)
     return Comparison(tuple(ranking), tuple(excluded), split, recommended, reason)
@@ -190,7 +191,7 @@ def _cross_validate(candidate: Candidate, points: _ComparedPoints, loss: Loss) -
         try:
             model = refit(full_fit.model, fold.training, loss=loss, fixed=candidate.fixed)
         except AirmuscleError as error:
-            raise IdentificationError(f"Not determined without {fold.name}: {error}") from None
+            raise IdentificationError(HintedText(f"Not determined without {fold.name}: ", error.message)) from None
         residuals = force_residuals(model, fold.test, max_force)
         if residuals.size:
             scores.append(FoldScore(fold.name, _rms(residuals), residuals.size))

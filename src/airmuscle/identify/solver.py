@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
+from ..core.hints import Hint
 from ..core.tree import Leaf
 from .censored_least_squares import is_determined_without_censored, solve_censored_least_squares
 from .gauss_newton import gauss_newton
@@ -158,6 +159,6 @@ def _not_converged(problem: FitProblem) -> IdentificationError:
     evaluations = sum(count for _, count in SEARCH_STAGES)
     return IdentificationError(
         f"{problem.data.origin}: the fit of {type(problem.law).__name__} did not converge in {evaluations} "
-        "evaluations. Give initial values closer to those of the muscle, fix parameters with fixed=, or choose a law "
-        "with fewer parameters."
+        "evaluations. Give initial values closer to those of the muscle, or choose a law with fewer parameters.",
+        hint=Hint("To fix parameters", "fixed"),
     )

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
+from ..core.hints import Hint, HintedText
 from ..recording import Recording
 from ..recording.segment.runs import RELATIVE_BAND
 from .censored_least_squares import RANK_TOLERANCE, uncensored_rank
@@ -112,7 +113,7 @@ def _residual_std(residuals: Array, parameters: int, loss: Loss) -> float:
     return float(np.sqrt(np.sum((residuals * first) ** 2) / degrees_of_freedom) / np.mean(first + 2 * z * second))
 
 
-def _rank_deficiency_message(problem: FitProblem, free: npt.NDArray[np.bool_], shares: Array, rank: int) -> str:
+def _rank_deficiency_message(problem: FitProblem, free: npt.NDArray[np.bool_], shares: Array, rank: int) -> HintedText:
     """The parameters with a share in the null space, and what to do; `shares` (P,) are their norms in it."""
     labels = [label for label, is_free in zip(problem.labels, free, strict=True) if is_free]
     names = [label for label, share in zip(labels, shares, strict=True) if share > 1e-3 * shares.max()]
@@ -121,10 +122,10 @@ def _rank_deficiency_message(problem: FitProblem, free: npt.NDArray[np.bool_], s
     path = problem.leaves[problem.free[int(np.flatnonzero(free)[int(np.argmax(shares))])]].path
     law = type(problem.law).__name__
     what = f"cannot separate {', '.join(names)}" if len(names) > 1 else f"do not depend on {names[0]}"
-    return (
+    return HintedText(
         f"{problem.data.origin}: the data {what} of {law} (rank {rank} of {len(labels)} parameters). Number of levels: "
-        f"{', '.join(counts)}. Measure at more levels, choose a lower degree or a law with fewer parameters, or fix "
-        f"one: fixed=('{path}',)."
+        f"{', '.join(counts)}. Measure at more levels, or choose a lower degree or a law with fewer parameters.",
+        Hint("To fix one parameter", "fixed", (path,)),
     )
 
 

@@ -128,7 +128,7 @@ def make_recording(
     columns.update(more)
     text = f"simulated by {integrator}: {raw.steps} steps, {raw.rejected} rejected"
     diagnostics = [*before, Diagnostic(DiagnosticCode.INTEGRATOR, "integrator", text)]
-    notes = [*map(str, diagnostics), *known.remark_texts]
+    notes = [*(diagnostic.message for diagnostic in diagnostics), *known.remark_texts]
     diagnostics += known.remarks
     later: list[Diagnostic] = []
     if reached:
@@ -136,7 +136,7 @@ def make_recording(
         later += compiled.system.diagnose(Columns(columns, limits))
     if raw.status != Status.DONE:
         later.append(early_end(compiled, raw, end))
-    notes += map(str, later)
+    notes += [diagnostic.message for diagnostic in later]
     return Recording.from_arrays(columns, "simulation", known.constants, tuple(notes)), (*diagnostics, *later)
 
 
