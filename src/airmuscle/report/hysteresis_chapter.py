@@ -78,10 +78,7 @@ def describe_row_counts(loop: HysteresisLoop) -> str:
     """Return a sentence with the number of rows used from each branch."""
     direction = motion_direction(loop.friction_path.displacement(loop.recording), loop.recording.columns.get("time"))
     up, down = (int(np.count_nonzero((direction == sign) & loop.fitted_rows)) for sign in (1, -1))
-    text = f"{up} rows of the rising branch and {down} of the falling branch are used, of {len(loop.recording)}."
-    if 10 * min(up, down) < max(up, down):
-        text += " One branch has very few rows: use all rows, or measure the loop more slowly."
-    return text
+    return f"{up} rows of the rising branch and {down} of the falling branch are used, of {len(loop.recording)}."
 
 
 def _law_table(loop_fit: LoopFit, suffix: str) -> Table:

@@ -45,6 +45,8 @@ class HysteresisLoop:
     friction_path: FrictionPath
     static_curve: StaticCurve
     fitted_rows: RowMask
+    transient_rows: int = 0
+    """Number of fitted rows in which the pressure changes quickly."""
     repeat: tuple[Recording, RowMask] | None = None
     """A second run of the same kind at the same level, for validation, and its fitted rows."""
 
@@ -155,7 +157,14 @@ def _make_loop(
     rows = _select_rows(recording, sensors, all_rows)
     direction = _directions(recording, friction_path)
     _check_two_directions(recording, direction, rows)
-    return HysteresisLoop(recording, run, friction_path, static_curve, rows)
+    transient = 0 if run.kind is ISOBARIC else int(np.count_nonzero(rows & ~_has_steady_pressure(recording, sensors)))
+    return HysteresisLoop(recording, run, friction_path, static_curve, rows, transient)
+
+
+def _has_steady_pressure(recording: Recording, sensors: Mapping[str, Sensor]) -> RowMask:
+    """Mask of the rows in which the pressure changes slowly, whatever the length does."""
+    columns = {name: recording[name] for name in ("time", "pressure") if name in recording}
+    return quasi_static_rows(dataclasses.replace(recording, columns=columns), sensors)
 
 
 def _select_rows(recording: Recording, sensors: Mapping[str, Sensor], all_rows: bool) -> RowMask:
@@ -177,8 +186,8 @@ def _check_two_directions(recording: Recording, direction: np.ndarray, fitted_ro
             )
             raise IdentificationError(
                 f"{recording.origin}: the {branch} branch has no rows to fit{detail}, but a loop needs a rising and a "
-                "falling branch. Give such a run, run it more slowly where its rows are not quasi-static, or set "
-                "all_rows=True."
+                "falling branch. Give such a run, run it more slowly where its rows are not quasi-static, or, where "
+                "only the length changes quickly, set all_rows=True."
             )
 
 
@@ -223,5 +232,6 @@ def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str
         except IdentificationError as error:
             failed[name] = str(error)
         else:
-            fits.append(fit)
+            marked = dataclasses.replace(fit.series, transient_rows=loop.transient_rows)
+            fits.append(dataclasses.replace(fit, series=marked))
     return LoopFit(loop, tuple(sorted(fits, key=lambda fit: -fit.aicc_reduction)), failed)

@@ -60,7 +60,7 @@ def plot_hysteresis(series: LoopSeries, friction: Friction, coefficients: Array,
     measured = series.target - series.design_matrix @ coefficients
     figure, (upper, lower) = new_figure(2, 1, width=6.0, height=5.6, sharex=True)
     path, rows = series.path * series.axis.factor, series.fitted_rows
-    force = -friction.force_along(series.path, series.time)
+    force = -series.friction_force(friction)
     upper.plot(path[rows], measured[rows], "o", color=LINES[0], alpha=0.5, label="measured - static curve")
     upper.plot(path, force, color=LINES[1], label=f"{type(friction).__name__}, whole path")
     upper.set_ylabel("force [N]")

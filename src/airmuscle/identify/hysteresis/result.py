@@ -10,6 +10,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.tree import leaves
 from ...friction import Friction
+from ..identifiability import UndeterminedCombination
 from ..model_evidence import aicc, effective_sample_size, f_test_p_value, format_p_value
 from . import branches
 from .plot import plot_hysteresis
@@ -17,6 +18,9 @@ from .series import LoopSeries
 
 SIGNIFICANCE_LEVEL = 0.01
 """p-value below which an F test is significant (chosen)."""
+
+MAX_TRANSIENT_RATIO = 0.1
+"""Maximum part of the fitted rows in which the pressure may change quickly for a friction to be justified (chosen)."""
 
 MIN_BRANCH_RATIO = 0.1
 """Minimum ratio of the rows of the two branches for a friction to be justified (chosen)."""
@@ -48,16 +52,23 @@ class HysteresisFit:
     repeat_rmse_without_friction: float
     repeatability: float
     series: LoopSeries
+    weak_combinations: tuple[UndeterminedCombination, ...] = ()
+    """Combinations of parameters that the data determine poorly or not at all."""
+
+    @property
+    def on_bounds(self) -> tuple[str, ...]:
+        """Paths of the parameters that the search moved to a bound, declared or set by the data."""
+        return tuple(
+            leaf.path
+            for leaf, (low, high) in ((leaf, self.series.limits.bounds(leaf)) for leaf in leaves(self.friction))
+            if leaf.declared.fitted and ((low > 0 and leaf.value <= 1.01 * low) or leaf.value >= 0.99 * high)
+        )
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Paths of the parameters that the search moved to a bound: the data do not determine them."""
-        free = [leaf for leaf in leaves(self.friction) if leaf.declared.fitted and leaf.declared.bounds[0] > 0]
-        return tuple(
-            leaf.path
-            for leaf in free
-            if not 1.01 * leaf.declared.bounds[0] < leaf.value < 0.99 * leaf.declared.bounds[1]
-        )
+        """Paths of the parameters that the data do not determine: on a bound, or with a large standard error."""
+        weak = [name for each in self.weak_combinations for name, _ in each.shares]
+        return tuple(dict.fromkeys([*self.on_bounds, *weak]))
 
     @property
     def justified(self) -> bool:
@@ -73,12 +84,48 @@ class HysteresisFit:
         direction = self.series.direction[self.series.fitted_rows]
         up, down = int(np.count_nonzero(direction > 0)), int(np.count_nonzero(direction < 0))
         if MIN_BRANCH_RATIO * max(up, down) > min(up, down):
-            reasons.append(f"One branch has very few rows ({min(up, down)} against {max(up, down)}).")
+            reasons.append(
+                f"One branch has very few rows ({min(up, down)} against {max(up, down)}); measure the loop more slowly."
+            )
         if not np.isfinite(self.gap):
             reasons.append("The branches have no common part of the path in the fitted rows.")
         if self.rmse < self.repeatability:
             reasons.append("The error is below the repeatability, which indicates overfitting.")
-        return tuple(reasons)
+        return (*reasons, *self._reservations_of_transients, *self._reservations_of_limits)
+
+    @property
+    def _reservations_of_transients(self) -> list[str]:
+        transient, rows = self.series.transient_rows, int(np.count_nonzero(self.series.fitted_rows))
+        if transient <= MAX_TRANSIENT_RATIO * rows:
+            return []
+        return [
+            f"The pressure changes quickly in {transient} of {rows} fitted rows; there the pulses of valves and the "
+            "dynamics of the gas appear as friction."
+        ]
+
+    @property
+    def _reservations_of_limits(self) -> list[str]:
+        """Forces on the greatest force of the data, and terms of speed that the speeds of the data do not determine."""
+        limits, declared = self.series.limits, {leaf.path: leaf.declared for leaf in leaves(self.friction)}
+        reasons = [
+            f"{name} is on its limit, the greatest force in the data ({limits.force:.4g} N)."
+            for name in self.on_bounds
+            if declared[name].unit == "N"
+        ]
+        if self.friction.rate_independent:
+            return reasons
+        if not limits.has_speed_variation:
+            speeds = "Without time" if np.isnan(limits.high_speed) else (
+                f"The speed is {self._speed(limits.low_speed)} to {self._speed(limits.high_speed)} in the data, so"
+            )  # fmt: skip
+            return [*reasons, f"{speeds} the terms of speed are not determined; measure loops at different speeds."]
+        if self.undetermined:
+            reasons.append("A law with terms of speed needs all of its parameters determined.")
+        return reasons
+
+    def _speed(self, speed: float) -> str:
+        value, unit = self.series.axis.display(speed, "m/s")
+        return f"{value:.4g} {unit or 'm/s'}"
 
     @property
     def verdict(self) -> str:
@@ -96,6 +143,7 @@ class HysteresisFit:
         text = " ".join([text, *self.reservations])
         if self.undetermined:
             text += f" Not determined: {', '.join(self.undetermined)}."
+        text = " ".join([text, *(str(each) for each in self.weak_combinations)])
         return f"{text} The data {'justify' if self.justified else 'do not justify'} this friction."
 
     @property
@@ -130,8 +178,11 @@ class HysteresisFit:
         return "\n".join([f"{type(self.friction).__name__} fitted to {self.series.origin}", *lines, self.verdict])
 
 
-def assess_fit(friction: Friction, free: int, run: LoopSeries, repeat: LoopSeries | None) -> HysteresisFit:
-    """The statistics of a fitted friction with `free` fitted parameters, compared with the static curve alone."""
+def assess_fit(
+    friction: Friction, weak: tuple[UndeterminedCombination, ...], run: LoopSeries, repeat: LoopSeries | None
+) -> HysteresisFit:
+    """The statistics of a fitted friction with its poorly determined combinations, compared with the static curve."""
+    free = sum(leaf.declared.fitted for leaf in leaves(friction))
     coefficients, static = run.coefficients(friction), run.coefficients(None)
     rows = run.fitted_rows
     residuals, plain = run.residuals(friction, coefficients)[rows], run.residuals(None, static)[rows]
@@ -159,6 +210,7 @@ def assess_fit(friction: Friction, free: int, run: LoopSeries, repeat: LoopSerie
         repeat_rmse_without_friction=plain_repeat_rmse,
         repeatability=repeatability,
         series=run,
+        weak_combinations=weak,
     )
 
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...friction import Friction
+from .limits import DataLimits
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,7 +58,13 @@ class LoopSeries:
     """Mask of the rows whose residuals are minimised."""
     direction: Array
     """1 where the path rises, -1 where it falls."""
+    limits: DataLimits
+    """Greatest force and range of the speed of the fitted rows."""
+    pressure: Array | None = None
+    """Gauge pressure [Pa], shape (N,), of a friction that depends on the pressure; None if it is not recorded."""
     axis: Axis = MILLIMETRES
+    transient_rows: int = 0
+    """Number of fitted rows in which the pressure changes quickly."""
 
     def coefficients(self, friction: Friction | None) -> Array:
         """Least-squares coefficients of the static curve with this friction, or without friction; shape (C,)."""
@@ -72,9 +79,13 @@ class LoopSeries:
         force = self._friction_force(friction)
         return self._residuals(force, self._coefficients(force))[self.fitted_rows]
 
+    def friction_force(self, friction: Friction) -> Array:
+        """Friction force [N] at every row and its pressure, shape (N,)."""
+        force = np.asarray(friction.force_along(self.path, self.time))
+        return force if self.pressure is None else np.asarray(friction.pressure_factor(self.pressure) * force)
+
     def _friction_force(self, friction: Friction | None) -> Array | None:
-        """Friction force [N] at every row, shape (N,)."""
-        return None if friction is None else np.asarray(friction.force_along(self.path, self.time))
+        return None if friction is None else self.friction_force(friction)
 
     def _coefficients(self, friction_force: Array | None) -> Array:
         rows = self.fitted_rows
