@@ -22,7 +22,10 @@ class IdentifiedFriction(FrictionWrapper):
     max_pressure: float = parameter(
         "Pa", "p_high", "upper limit of the gauge pressure in the data", bounds=(-101325.0, 1e7), fitted=False
     )
-    max_speed: float = parameter("m/s", "v_high", "greatest speed in the data", bounds=(1e-9, 100.0), fitted=False)
+    max_speed: float = parameter(
+        "m/s", "v_high", "greatest speed in the data; 100 m/s where it is not known", bounds=(1e-9, 100.0),
+        fitted=False, default=100.0,
+    )  # fmt: skip
 
     def check(self) -> None:
         if not self.min_pressure < self.max_pressure:

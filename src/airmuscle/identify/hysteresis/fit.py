@@ -15,10 +15,11 @@ from ...core.errors import IdentificationError
 from ...friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, PrandtlIshlinskii
 from ...recording import Recording
 from ...recording.segment import motion_direction
+from .axis import MILLIMETRES, Axis
 from .limits import data_limits
 from .result import HysteresisFit, assess_fit
 from .search import free_parameters, search_parameters
-from .series import MILLIMETRES, Axis, LoopSeries
+from .series import LoopSeries
 
 RowMask = npt.NDArray[np.bool_]
 

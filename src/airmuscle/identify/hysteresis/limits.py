@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
-from ...core.tree import Leaf
+from ...core.tree import Leaf, leaves
+from ...friction import Friction
+from ..identifiability import UndeterminedCombination
+from .axis import Axis
 
 SPEED_INTERVALS = 40
 """Intervals of the path over each of which a speed is measured, so that noise of the path has no effect (chosen)."""
@@ -81,4 +85,55 @@ def combine_limits(limits: tuple[DataLimits, ...]) -> DataLimits:
         max(each.force for each in limits),
         float(np.min([each.low_speed for each in limits])),
         float(np.max([each.high_speed for each in limits])),
+    )
+
+
+def parameters_on_bounds(friction: Friction, limits: DataLimits) -> tuple[str, ...]:
+    """Paths of the fitted parameters that are on a bound, declared or set by the data; 0 is no such bound."""
+    on_bounds = []
+    for leaf in leaves(friction):
+        low, high = limits.bounds(leaf)
+        if leaf.declared.fitted and ((low > 0 and leaf.value <= 1.01 * low) or leaf.value >= 0.99 * high):
+            on_bounds.append(leaf.path)
+    return tuple(on_bounds)
+
+
+def undetermined_parameters(
+    friction: Friction, limits: DataLimits, weak: Sequence[UndeterminedCombination]
+) -> tuple[str, ...]:
+    """Paths of the parameters that the data do not determine: on a bound, or in a poorly determined combination."""
+    names = [name for each in weak for name, _ in each.shares]
+    return tuple(dict.fromkeys([*parameters_on_bounds(friction, limits), *names]))
+
+
+def limit_reservations(
+    friction: Friction, limits: DataLimits, weak: Sequence[UndeterminedCombination], axis: Axis
+) -> list[str]:
+    """Reasons, as sentences, against a friction: a force on its limit, or terms of speed that are not determined."""
+    declared = {leaf.path: leaf.declared for leaf in leaves(friction)}
+    reasons = [
+        f"{name} is on its limit, the greatest force in the data ({limits.force:.4g} N)."
+        for name in parameters_on_bounds(friction, limits)
+        if declared[name].unit == "N" and limits.force < declared[name].bounds[1]
+    ]
+    if friction.rate_independent:
+        return reasons
+    too_uniform = speed_reservation(limits, axis)
+    if too_uniform:
+        return [*reasons, too_uniform]
+    if undetermined_parameters(friction, limits, weak):
+        reasons.append("A law with terms of speed is justified only if all of its parameters are determined.")
+    return reasons
+
+
+def speed_reservation(limits: DataLimits, axis: Axis) -> str:
+    """The reason, as a sentence, why the data cannot determine terms of speed; empty if they can."""
+    if limits.has_speed_variation:
+        return ""
+    if math.isnan(limits.high_speed):
+        return "The data have no time, so the terms of speed are not determined."
+    (low, unit), (high, _) = (axis.display(speed, "m/s") for speed in (limits.low_speed, limits.high_speed))
+    return (
+        f"The speed in the data is {low:.3g} to {high:.3g} {unit}, so the terms of speed are not determined; measure "
+        "loops at clearly different speeds."
     )

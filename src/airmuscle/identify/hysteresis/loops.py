@@ -33,6 +33,7 @@ from .fit import (
     initial_friction_laws,
     make_loop_series,
 )
+from .limits import speed_reservation
 from .result import HysteresisFit
 
 
@@ -211,6 +212,8 @@ def _is_same_level(one: Run, other: Run) -> bool:
 def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str], None] | None = None) -> LoopFit:
     """Fit every friction law to a loop and sort the fits by AICc.
 
+    A law with terms of speed is left out if the speed in the loop hardly varies.
+
     `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii; `progress` is called with the name of
     each law.
     """
@@ -218,6 +221,10 @@ def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str
     fits, failed = list[HysteresisFit](), dict[str, str]()
     for initial in initial_friction_laws(series.path[loop.fitted_rows], series.fitted_residuals(None), elements):
         name = type(initial).__name__
+        too_uniform = "" if initial.rate_independent else speed_reservation(series.limits, series.axis)
+        if too_uniform:
+            failed[name] = too_uniform
+            continue
         if progress is not None:
             progress(name)
         try:

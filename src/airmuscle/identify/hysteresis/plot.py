@@ -10,7 +10,8 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.plotting import DASHES, LINES, legend_below, new_figure
 from ...friction import Friction
-from .series import MILLIMETRES, Axis, LoopSeries
+from .axis import MILLIMETRES, Axis
+from .series import LoopSeries
 
 TURNING_POINTS = (2.0, -2.0, -0.6, -1.1, -0.6, 0.5, -0.3, 0.5, 2.0)
 """Turning points of the path of `plot_loops`, as multiples of the presliding distance of the law (chosen)."""

@@ -13,6 +13,7 @@ from ...friction import Friction
 from ..identifiability import UndeterminedCombination
 from ..model_evidence import aicc, effective_sample_size, f_test_p_value, format_p_value
 from . import branches
+from .limits import limit_reservations, parameters_on_bounds, undetermined_parameters
 from .plot import plot_hysteresis
 from .series import LoopSeries
 
@@ -58,17 +59,12 @@ class HysteresisFit:
     @property
     def on_bounds(self) -> tuple[str, ...]:
         """Paths of the parameters that the search moved to a bound, declared or set by the data."""
-        return tuple(
-            leaf.path
-            for leaf, (low, high) in ((leaf, self.series.limits.bounds(leaf)) for leaf in leaves(self.friction))
-            if leaf.declared.fitted and ((low > 0 and leaf.value <= 1.01 * low) or leaf.value >= 0.99 * high)
-        )
+        return parameters_on_bounds(self.friction, self.series.limits)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
         """Paths of the parameters that the data do not determine: on a bound, or with a large standard error."""
-        weak = [name for each in self.weak_combinations for name, _ in each.shares]
-        return tuple(dict.fromkeys([*self.on_bounds, *weak]))
+        return undetermined_parameters(self.friction, self.series.limits, self.weak_combinations)
 
     @property
     def justified(self) -> bool:
@@ -80,6 +76,15 @@ class HysteresisFit:
     @property
     def reservations(self) -> tuple[str, ...]:
         """The reasons, as sentences, why this loop cannot justify a friction whatever the statistical tests say."""
+        reasons = list(self.reservations_of_rows)
+        if self.rmse < self.repeatability:
+            reasons.append("The error is below the repeatability, which indicates overfitting.")
+        series = self.series
+        return (*reasons, *limit_reservations(self.friction, series.limits, self.weak_combinations, series.axis))
+
+    @property
+    def reservations_of_rows(self) -> tuple[str, ...]:
+        """The reasons, as sentences, that follow from the fitted rows of the loop and hold for every law."""
         reasons = []
         direction = self.series.direction[self.series.fitted_rows]
         up, down = int(np.count_nonzero(direction > 0)), int(np.count_nonzero(direction < 0))
@@ -89,43 +94,13 @@ class HysteresisFit:
             )
         if not np.isfinite(self.gap):
             reasons.append("The branches have no common part of the path in the fitted rows.")
-        if self.rmse < self.repeatability:
-            reasons.append("The error is below the repeatability, which indicates overfitting.")
-        return (*reasons, *self._reservations_of_transients, *self._reservations_of_limits)
-
-    @property
-    def _reservations_of_transients(self) -> list[str]:
-        transient, rows = self.series.transient_rows, int(np.count_nonzero(self.series.fitted_rows))
-        if transient <= MAX_TRANSIENT_RATIO * rows:
-            return []
-        return [
-            f"The pressure changes quickly in {transient} of {rows} fitted rows; there the pulses of valves and the "
-            "dynamics of the gas appear as friction."
-        ]
-
-    @property
-    def _reservations_of_limits(self) -> list[str]:
-        """Forces on the greatest force of the data, and terms of speed that the speeds of the data do not determine."""
-        limits, declared = self.series.limits, {leaf.path: leaf.declared for leaf in leaves(self.friction)}
-        reasons = [
-            f"{name} is on its limit, the greatest force in the data ({limits.force:.4g} N)."
-            for name in self.on_bounds
-            if declared[name].unit == "N"
-        ]
-        if self.friction.rate_independent:
-            return reasons
-        if not limits.has_speed_variation:
-            speeds = "Without time" if np.isnan(limits.high_speed) else (
-                f"The speed is {self._speed(limits.low_speed)} to {self._speed(limits.high_speed)} in the data, so"
-            )  # fmt: skip
-            return [*reasons, f"{speeds} the terms of speed are not determined; measure loops at different speeds."]
-        if self.undetermined:
-            reasons.append("A law with terms of speed needs all of its parameters determined.")
-        return reasons
-
-    def _speed(self, speed: float) -> str:
-        value, unit = self.series.axis.display(speed, "m/s")
-        return f"{value:.4g} {unit or 'm/s'}"
+        transient = self.series.transient_rows
+        if transient > MAX_TRANSIENT_RATIO * direction.size:
+            reasons.append(
+                f"The pressure changes quickly in {transient} of {direction.size} fitted rows; there the pulses of "
+                "valves and the dynamics of the gas appear as friction."
+            )
+        return tuple(reasons)
 
     @property
     def verdict(self) -> str:

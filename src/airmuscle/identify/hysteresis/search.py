@@ -17,7 +17,7 @@ from ..model_evidence import effective_sample_size
 from .limits import DataLimits, combine_limits
 from .series import LoopSeries
 
-JACOBIAN_TOLERANCE = 1e-6
+JACOBIAN_TOLERANCE = 1e-4
 """Relative singular value that counts as zero; the derivatives are differences of forward evaluations (chosen)."""
 
 

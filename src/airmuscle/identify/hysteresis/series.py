@@ -3,42 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...friction import Friction
+from .axis import MILLIMETRES, Axis
 from .limits import DataLimits
-
-
-@dataclasses.dataclass(frozen=True)
-class Axis:
-    """The axis on which a path [m] is plotted: its label, and the factor from metres to its unit.
-
-    `si_unit` is the SI unit of the driving quantity, of which `si_factor` correspond to a metre.
-    """
-
-    label: str
-    factor: float
-    si_unit: str = "m"
-    si_factor: float = 1.0
-
-    def display(self, value: float, unit: str) -> tuple[float, str]:
-        """The value and unit of a parameter of the friction with the driving quantity in place of the displacement."""
-        if self.si_unit == "m":
-            return value, "" if unit == "1" else unit
-        conversions = {
-            "m": (value * self.si_factor, self.si_unit),
-            "m/s": (value * self.si_factor, f"{self.si_unit}/s"),
-            "N/m": (value / self.si_factor, f"N/{self.si_unit}"),
-            "N s/m": (value / self.si_factor, f"N s/{self.si_unit}"),
-            "1": (value, ""),
-        }
-        return conversions.get(unit, (value, unit))
-
-
-MILLIMETRES = Axis("displacement [mm]", 1e3)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -90,7 +63,12 @@ class LoopSeries:
     def _coefficients(self, friction_force: Array | None) -> Array:
         rows = self.fitted_rows
         target = self.target if friction_force is None else self.target + friction_force
-        return np.asarray(np.linalg.lstsq(self.design_matrix[rows], target[rows], rcond=None)[0])
+        return np.asarray(self._pseudoinverse @ target[rows])
+
+    @functools.cached_property
+    def _pseudoinverse(self) -> Array:
+        """Pseudoinverse of the design matrix at the fitted rows, shape (C, fitted rows)."""
+        return np.asarray(np.linalg.pinv(self.design_matrix[self.fitted_rows]))
 
     def _residuals(self, friction_force: Array | None, coefficients: Array) -> Array:
         difference = self.target - self.design_matrix @ coefficients
