@@ -90,7 +90,10 @@ def _excess(
     worst, rows = int(np.argmax(excess)), int(np.count_nonzero(excess > 0))
     where, meaning = {
         DiagnosticCode.EXTRAPOLATION: ("the validity range of its characteristic", "values there are extrapolated"),
-        DiagnosticCode.FRICTION_EXTRAPOLATION: ("the range of the data of its friction", "it is extrapolated there"),
+        DiagnosticCode.FRICTION_EXTRAPOLATION: (
+            "the range of the data of its friction",
+            "the friction there is extrapolated",
+        ),
         DiagnosticCode.GEOMETRY_LIMIT: ("the contraction range of its geometry", "no real muscle can do this"),
     }[code]
     text = (

@@ -62,10 +62,11 @@ def plot_hysteresis(series: LoopSeries, friction: Friction, coefficients: Array,
     figure, (upper, lower) = new_figure(2, 1, width=6.0, height=5.6, sharex=True)
     path, rows = series.path * series.axis.factor, series.fitted_rows
     force = -series.friction_force(friction)
-    upper.plot(path[rows], measured[rows], "o", color=LINES[0], alpha=0.5, label="measured - static curve")
+    points: dict[str, Any] = {"marker": "o", "markersize": 3, "linestyle": "none", "color": LINES[0], "alpha": 0.5}
+    upper.plot(path[rows], measured[rows], **points, label="measured - static curve")
     upper.plot(path, force, color=LINES[1], label=f"{type(friction).__name__}, whole path")
     upper.set_ylabel("force [N]")
-    lower.plot(path[rows], (measured - force)[rows], "o", color=LINES[0], alpha=0.5)
+    lower.plot(path[rows], (measured - force)[rows], **points)
     lower.axhline(0.0, color=LINES[1])
     lower.set(xlabel=series.axis.label, ylabel="residual (measured - model) [N]")
     upper.set_title(title)

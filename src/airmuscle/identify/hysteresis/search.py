@@ -44,7 +44,10 @@ def search_parameters(
 def _fit_stiffnesses(
     friction: Any, runs: Sequence[LoopSeries], factors: Sequence[Array | float] | None = None
 ) -> Friction:
-    """Stiffnesses of elements with given limits, by non-negative linear least squares; `factors` scale the forces."""
+    """Stiffnesses of elements with given limits, by bounded linear least squares; `factors` scale the forces.
+
+    No element slides at a greater force than the greatest one of the data.
+    """
     from scipy.linalg import block_diag
     from scipy.optimize import lsq_linear
 
@@ -57,10 +60,13 @@ def _fit_stiffnesses(
     norms = np.where(norms > 0, norms, 1.0)
     curves = block_diag(*(run.design_matrix[run.fitted_rows] for run in runs))
     matrix = np.hstack([curves, -terms / norms])
+    declared = next(leaf.declared for leaf in tree.leaves(friction) if leaf.path.startswith(friction.linear_in))
+    greatest = np.clip(max(run.limits.force for run in runs) / np.asarray(friction.limits), 1e-9, declared.bounds[1])
     lower = np.concatenate([np.full(curves.shape[1], -np.inf), np.zeros(terms.shape[1])])
+    upper = np.concatenate([np.full(curves.shape[1], np.inf), greatest * norms])
     target = np.concatenate([run.target[run.fitted_rows] for run in runs])
-    result = lsq_linear(matrix, target, (lower, np.inf), method="bvls")
-    stiffnesses = np.maximum(result.x[curves.shape[1] :], 0.0) / norms
+    result = lsq_linear(matrix, target, (lower, upper), method="bvls")
+    stiffnesses = np.clip(result.x[curves.shape[1] :] / norms, 0.0, greatest)
     fitted: Friction = dataclasses.replace(friction, **{friction.linear_in: tuple(stiffnesses)})
     return fitted
 
