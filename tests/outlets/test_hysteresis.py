@@ -94,16 +94,16 @@ def test_without_a_muscle_the_friction_stands_in_a_table_that_a_plant_takes(two,
 
 def test_friction_that_grows_with_pressure_is_written_once_for_all_runs_and_runs_in_simulate(tmp_path):
     files = [
-        loop(tmp_path / f"{pressure}.csv", 3, MaxwellSlip((factor * 2e4, factor * 1e4), (3e-4, 1.2e-3)), TURNS[:3], 90,
+        loop(tmp_path / f"{pressure}.csv", 3, MaxwellSlip((factor * 2e4, factor * 1e4), (3e-4, 1.2e-3)), TURNS[:3], 150,
              pressure)
-        for pressure, factor in ((1e5, 0.5), (3e5, 1.0), (5e5, 1.5))
+        for pressure, factor in ((3e5, 1.0), (4e5, 1.25), (5e5, 1.5))
     ]  # fmt: skip
     out = tmp_path / "out"
     result = airmuscle("hysteresis", *files, *LENGTH, "--muscle", MUSCLE, "--elements", 4, "--out", out)
     assert result.exit_code == 0, result.stderr
     assert "The data justify this friction for all runs." in result.stdout
     friction = load(out / "muscle.toml").friction
-    assert friction.pressure_factor(2e5) == pytest.approx(0.75 / 1.5, abs=0.05)
+    assert friction.pressure_factor(3.5e5) == pytest.approx(1.125 / 1.5, abs=0.05)
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "Friction of all runs" in page
     assert "runs that disagree" in page
@@ -117,9 +117,9 @@ def test_friction_that_grows_with_pressure_is_written_once_for_all_runs_and_runs
 
 def test_friction_that_does_not_hold_for_all_runs_is_not_written(tmp_path):
     files = [
-        loop(tmp_path / f"{pressure}.csv", 3, MaxwellSlip((factor * 2e4, factor * 1e4), (3e-4, 1.2e-3)), TURNS[:3], 90,
+        loop(tmp_path / f"{pressure}.csv", 3, MaxwellSlip((factor * 2e4, factor * 1e4), (3e-4, 1.2e-3)), TURNS[:3], 150,
              pressure)
-        for pressure, factor in ((1e5, 0.5), (3e5, 2.0), (5e5, 0.6))
+        for pressure, factor in ((3e5, 0.5), (4e5, 2.0), (5e5, 0.6))
     ]  # fmt: skip
     result = airmuscle("hysteresis", *files, *LENGTH, "--elements", 4, "--out", tmp_path / "out")
     assert "The friction does not hold for all runs" in result.stdout

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
-from .base import IdentifiedRange
+from .base import Friction, IdentifiedRange
 from .wrapper import FrictionWrapper
 
 
@@ -16,6 +16,7 @@ class IdentifiedFriction(FrictionWrapper):
     every motion begins and ends at rest.
     """
 
+    inner: Friction
     min_pressure: float = parameter(
         "Pa", "p_low", "lower limit of the gauge pressure in the data", bounds=(-101325.0, 1e7), fitted=False
     )

@@ -8,6 +8,7 @@ from ..core import ops
 from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
+from .base import Friction
 from .wrapper import FrictionWrapper
 
 TONDU_LOPEZ2000 = Reference(
@@ -43,6 +44,7 @@ class PressureScaledFriction(FrictionWrapper):
 
     references: ClassVar[tuple[Reference, ...]] = (TONDU_LOPEZ2000, DAVIS_CALDWELL2006)
 
+    inner: Friction
     ambient_ratio: float = parameter(
         "1", "a", "friction at ambient pressure relative to that at the reference pressure", bounds=(0.0, 10.0),
         default=0.0,

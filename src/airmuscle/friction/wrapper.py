@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..core.declaration import model
 from ..core.ops import Value
 from ..core.variables import StateVariable
 from .base import Friction, IdentifiedRange
 
 
-@model
 class FrictionWrapper(Friction):
     """Wrapper that forwards everything to the inner friction law; subclasses override single properties."""
 
