@@ -126,6 +126,11 @@ EXAMPLES = {
     # friction
     "Dahl": of(friction=friction.Dahl(5e4, 20.0)),
     "LuGre": of(friction=friction.LuGre(5e4, 15.0, 5.0, 0.01, 50.0, 20.0)),
+    "pressure-scaled friction": of(
+        friction=friction.IdentifiedFriction(
+            friction.PressureScaledFriction(friction.Dahl(5e4, 20.0), 0.3, 3e5), 1e5, 4e5, 0.05
+        )
+    ),
     "Bouc-Wen": of(friction=friction.BoucWen(5e4, 20.0, 1.7, 0.8)),
     "Maxwell slip": of(friction=friction.MaxwellSlip(*SLIPS)),
     "Prandtl-Ishlinskii": of(friction=friction.PrandtlIshlinskii(*SLIPS, (8.0, -8.0), (0.5, -0.5))),

@@ -253,7 +253,7 @@ CASES: dict[str, tuple[Callable[[Path], Path], Callable[[Path], Any], tuple[Any,
         "use resting_length=... of read.", 'To state it, use --resting-length "...".'),
     "one branch": (
         lambda path: sweep(path, (0.0, 0.15), (3e5, 3e5), 0.3), loops, ("hysteresis",),
-        "use all_rows=True.", "To fit all rows, use --all-rows."),
+        "use all_rows=True.", "To fit all rows, if only the length changes quickly, use --all-rows."),
     "pressure and length together": (
         lambda path: sweep(path, RISE_AND_FALL, (1e5, 6e5, 1e5)), loops, ("hysteresis",),
         "use characteristic=....", "use --muscle NAME with --use-characteristic."),

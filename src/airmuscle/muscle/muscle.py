@@ -159,7 +159,7 @@ class Muscle:
         between its fittings.
         """
         if not isinstance(self.series, SeriesSpring):
-            friction = self.friction_force(speed, state)
+            friction = self.friction_force(pressure, speed, state)
             return MuscleForce(self.tension(pressure, contraction, speed, state), friction, speed)
         tension = self.series.force((inner_contraction - contraction) * self.geometry.resting_length)
         imbalance = self.unclamped_tension(pressure, inner_contraction, 0.0, state) - tension
@@ -169,7 +169,7 @@ class Muscle:
             static_force, damping = self.stop.static_force_and_damping(inner_contraction, self.geometry.resting_length)
             stopped_speed = self.damper.speed(pressure, inner_contraction, imbalance - static_force, damping)
             inner_speed = ops.minimum(inner_speed, stopped_speed)
-        return MuscleForce(tension, self.friction_force(inner_speed, state), inner_speed)
+        return MuscleForce(tension, self.friction_force(pressure, inner_speed, state), inner_speed)
 
     def rates(self, state: Mapping[str, Value], pressure: Value, inner_speed: Value) -> dict[str, Value]:
         """Time derivatives of the states at a gauge pressure [Pa] and an inner speed of shortening [m/s]."""
@@ -197,7 +197,7 @@ class Muscle:
             self.contractile.force(pressure, contraction)
             - self.spring.force(pressure, contraction, self.geometry.resting_length)
             - self.damper.force(pressure, contraction, speed)
-            - self.friction_force(speed, state)
+            - self.friction_force(pressure, speed, state)
         )
         return total - self.creep.force({**self._relaxed_creep(), **state}) if self.creep.states else total
 
@@ -206,9 +206,9 @@ class Muscle:
         elements = self.unclamped_tension(pressure, contraction)
         return elements - self.stop.force(contraction, 0.0, self.geometry.resting_length)
 
-    def friction_force(self, speed: Value, state: Mapping[str, Value] = RELAXED) -> Value:
-        """Friction force against shortening [N]."""
-        return self.friction.force(self._bristle_state(state), speed)
+    def friction_force(self, pressure: Value, speed: Value, state: Mapping[str, Value] = RELAXED) -> Value:
+        """Friction force against shortening [N] at a gauge pressure [Pa] and a speed of shortening [m/s]."""
+        return self.friction.pressure_factor(pressure) * self.friction.force(self._bristle_state(state), speed)
 
     def _bristle_state(self, state: Mapping[str, Value]) -> dict[str, Value]:
         return {s.name: state.get(s.name, 0.0) for s in self.friction.states}

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ..core.ops import Value
+from ..friction import NoFriction
 from ..muscle import Muscle
 from ..pneumatics.gas import Air, Ambient, Gas, gauge_pressure
 
@@ -47,3 +48,18 @@ def muscle_state(
         contraction, speed, volume, air, pressure, pull.tension, pull.friction, inner, pull.inner_speed, growth, state,
         rates,
     )  # fmt: skip
+
+
+def muscle_outputs(muscle: Muscle, instant: MuscleState, mass_flow: Value) -> dict[str, Value]:
+    """The outputs of a muscle by their own names: those of every muscle, and those of the elements that it has."""
+    outputs = {
+        "pressure": instant.pressure, "contraction": instant.contraction, "force": instant.tension,
+        "volume": instant.volume, "mass_flow": mass_flow,
+    }  # fmt: skip
+    if not isinstance(muscle.friction, NoFriction):
+        outputs["friction"] = instant.friction
+    if muscle.friction.identified_range is not None:
+        outputs["shortening_speed"] = instant.inner_speed
+    if "internal_energy" in instant.states:
+        outputs["temperature"] = instant.air.temperature
+    return outputs

@@ -13,14 +13,13 @@ from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.system import System
 from ..core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
-from ..friction import NoFriction
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..pneumatics import Circuit, CircuitFlows
 from ..pneumatics.gas import Air, Ambient, Flow, Gas, Polytropic, check_above_vacuum
 from ..pneumatics.ports import key_by_muscle, key_by_port
 from . import diagnostics
-from .muscle_state import MuscleState, muscle_state
+from .muscle_state import MuscleState, muscle_outputs, muscle_state
 from .steady_state import fill_muscles, settle_muscles
 from .validation import check_free, check_parts, check_unique
 
@@ -193,21 +192,13 @@ class Plant(System):
         return self.mechanism.acceleration(state, state, forces, inputs)
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
-        """Gauge pressure, contraction, tension, volume and mass flow of every muscle, with friction and with an energy
-        balance its friction force and temperature; outputs of the circuits; accelerations."""
+        """Gauge pressure, contraction, tension, volume and mass flow of every muscle, with its friction force,
+        shortening speed and temperature where they are modelled; outputs of the circuits; accelerations."""
         muscles = self.muscle_states(state)
         circuits = self.circuit_flows(muscles, state, inputs)
         outputs: dict[str, Value] = {}
         for part, prefix, muscle, flow in zip(self.muscles, self.prefixes, muscles, _flows(circuits), strict=True):
-            own = {
-                "pressure": muscle.pressure, "contraction": muscle.contraction, "force": muscle.tension,
-                "volume": muscle.volume, "mass_flow": flow.mass,
-            }  # fmt: skip
-            if not isinstance(part.friction, NoFriction):
-                own["friction"] = muscle.friction
-            if "internal_energy" in muscle.states:
-                own["temperature"] = muscle.air.temperature
-            outputs |= with_prefix(prefix, own)
+            outputs |= with_prefix(prefix, muscle_outputs(part, muscle, flow.mass))
         for (prefix, _), circuit in zip(self._circuits(), circuits, strict=True):
             outputs |= self._outside(prefix, circuit.outputs)
         accelerations = self._accelerations(state, muscles, inputs)
@@ -271,8 +262,8 @@ class Plant(System):
 
     def describe(self) -> tuple[Diagnostic, ...]:
         """The gas and the friction."""
-        texts = (("gas", f"gas: {self.gas}"), ("friction", diagnostics.describe_friction(self.muscles)))
-        return tuple(Diagnostic(DiagnosticCode.MODEL, subject, text) for subject, text in texts)
+        texts = {"gas": f"gas: {self.gas}", "friction": diagnostics.describe_friction(self.muscles)}
+        return tuple(Diagnostic(DiagnosticCode.MODEL, *item) for item in texts.items())
 
     def diagnose(self, columns: Columns) -> list[Diagnostic]:
         """Extrapolation of characteristics, limits of geometries, components beyond the validity of their model."""
