@@ -75,6 +75,8 @@ def contraction_at(law: Characteristic, pressure: float, force: float) -> float:
     """
     low, high = law.contraction_range
     grid = np.linspace(max(low, 1e-3), high * (1 - 1e-6), 150)
+    if isinstance(law, Saga2007):  # its formula is regular at small contraction
+        grid = np.concatenate([np.geomspace(1e-9, grid[0], 60, endpoint=False), grid])
     reachable = np.flatnonzero(pressure_along(law, grid, force) <= pressure)
     if not reachable.size:
         return 0.0
