@@ -341,8 +341,8 @@ def test_the_previous_model_as_printed_satisfies_both_balances_term_by_term(init
         def radius(t, big=big, phi=phi):
             return r0 + big * (math.cos(t) - math.cos(phi))
 
-        hoop = s * quad(lambda t: line.stress(radius(t) / initial - 1) * big, -phi, phi, epsrel=1e-12)[0]
-        section = quad(lambda t: radius(t) * big * math.cos(t), -phi, phi, epsrel=1e-12)[0]
+        hoop = s * big * quad(lambda t, at=radius: line.stress(at(t) / initial - 1), -phi, phi, epsrel=1e-12)[0]
+        section = big * quad(lambda t, at=radius: at(t) * math.cos(t), -phi, phi, epsrel=1e-12)[0]
         pressure = model.pressure(contraction, force)
         fibre = (force + math.pi * pressure * (r0 + big * (1 - math.cos(phi))) ** 2) / 16
         assert hoop + fibre * math.sin(phi) / math.tan(math.pi / 16) == pytest.approx(pressure * section, rel=1e-11)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..characteristic.base import ContractionLaw
 from ..characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
+from ..core.arrays import Array
 from ..core.constants import STANDARD_GRAVITY
 from ..identify.surface.basis import Chebyshev, LoadRange, conditioning
 from ..identify.surface.exponential import SurfaceFit, SurfaceProblem, fit_linearised, fit_nonlinear
@@ -149,10 +150,12 @@ def fit_gauss_newton(recording: Recording, saturation: float) -> SurfaceFit:
     """
     problem = SurfaceProblem.from_recording(recording, saturation, 4, 2)
     targets, weights = problem.linear_targets()
-    coefficients = np.linalg.lstsq(weights[:, None] * problem.design_matrix, weights * targets, rcond=None)[0]
+    coefficients: Array = np.asarray(
+        np.linalg.lstsq(weights[:, None] * problem.design_matrix, weights * targets, rcond=None)[0], dtype=float
+    )
     for _ in range(MAX_LINEARISATIONS):
         error = problem.contraction - problem.predict(coefficients)
-        step = np.linalg.lstsq(problem.jacobian(coefficients), error, rcond=None)[0]
+        step = np.asarray(np.linalg.lstsq(problem.jacobian(coefficients), error, rcond=None)[0], dtype=float)
         coefficients = coefficients + step
         if np.abs(step).max() <= 1e-12 * np.abs(coefficients).max():
             break

@@ -6,9 +6,10 @@ from ..geometry.circular_arc import FERRARESI_2001
 from ..geometry.meridian import SAGA_2007
 from ..geometry.pleated import DAERDEN_LEFEBER_2001
 from ..report.chapter import Chapter
-from .saga2007_claims import ACCURACY_LIMIT, LOW_PRESSURE, PAPER, all_claims
+from .saga2007_claims import ACCURACY_LIMIT, LOW_PRESSURE, all_claims
 from .saga2007_figures import plots
 from .saga2007_further_claims import FIRST_PERCENT, LITTLE_CHANGE, THIN_WALL, WIDE_DIAMETER
+from .saga2007_muscle import PAPER
 from .saga2007_tables import tables
 
 SUMMARY = r"""The paper gives a closed-form model of a rubber tube with fibres along its axis. The printed equations are
@@ -21,10 +22,9 @@ intercept of the rubber line exchanged (line B).
 Only the interpretation \(w = 2\), \(q = 2\) reaches the claimed 200 N at 35 % and 0.11 MPa, but mechanics limits the
 tension of any muscle of this size to 88.9 N there. Compared with the exact meridian with the same rubber, the only
 interpretation that is exact mechanics for its outline is within 11 % (line A) and 17 % (line B) up to 20 % contraction,
-and 61 and 64 % low at 40 %. The paper's own assessment, accurate below 20 %, concerns measurements that are lost, and is
-not testable. A circular meridian with virtual work is equally simple,
-conserves energy, and is within 0.7 % of the exact meridian at 100 N and more up to 30 %. The force balances are not
-conservative."""
+and 61 and 64 % low at 40 %. The paper's own assessment, accurate below 20 %, concerns measurements that are lost and
+is not testable. A circular meridian with virtual work is equally simple, conserves energy, and is within 0.7 % of the
+exact meridian at 100 N and more up to 30 %. The force balances are not conservative."""
 
 CHOSEN = (
     ("wall thickness, fibres, fibre length, end diameter", "2 mm, 16, 72 mm, 12 mm", "Table 1"),

@@ -20,6 +20,7 @@ from .saga2007_muscle import (
     DEFAULT,
     INTERPRETATIONS,
     LINES,
+    PAPER,
     PRESSURE,
     contraction_at,
     exact_mechanics,
@@ -29,7 +30,7 @@ from .saga2007_muscle import (
     pressure_along,
     with_rings,
 )
-from .saga2007_previous import PAPER, previous_model_claims
+from .saga2007_previous import previous_model_claims
 
 LOW_PRESSURE = 0.04e6
 """Limit of a low pressure [Pa]: a quarter of the pressure axis of Fig. 8 (chosen)."""

@@ -14,6 +14,7 @@ from .saga2007_muscle import (
     DEFAULT,
     DIAMETER,
     LINES,
+    PAPER,
     PRESSURE,
     WALL,
     exact_mechanics,
@@ -24,7 +25,6 @@ from .saga2007_muscle import (
     with_rings,
 )
 from .saga2007_pairs import EVEN_SPREAD
-from .saga2007_previous import PAPER
 
 Law = Saga2007 | ExactMeridian
 
@@ -144,8 +144,11 @@ def dimension_claims() -> tuple[Claim, ...]:
 
 def _pressure_ratio(law: Law, wall: float = WALL, diameter: float = DIAMETER) -> float:
     """Return the pressure for 5 % without load with other dimensions, relative to that of the muscle of Table 1."""
-    geometry = replace(law.geometry, end_diameter=diameter)  # type: ignore[type-var]
-    other = replace(law, geometry=geometry, wall_thickness=wall)
+    other: Law
+    if isinstance(law, Saga2007):
+        other = replace(law, geometry=replace(law.geometry, end_diameter=diameter), wall_thickness=wall)
+    else:
+        other = replace(law, geometry=replace(law.geometry, end_diameter=diameter), wall_thickness=wall)
     return float(pressure_along(other, np.array([0.05]), 0.0)[0] / pressure_along(law, np.array([0.05]), 0.0)[0])
 
 

@@ -18,6 +18,7 @@ from ..geometry.parabola import Parabola
 from ..geometry.pleated import PleatedTube
 from ..geometry.straight_fibre import StraightFibre
 
+PAPER = "saga2007"
 LENGTH, DIAMETER, WALL = 0.072, 0.012, 0.002
 """Fibre length, end diameter and wall thickness [m] of Table 1."""
 PRESSURE = 0.11e6

@@ -14,10 +14,9 @@ from ..core.plotting import BLACK, DASHES, LINES, new_figure
 from ..geometry.circular_arc import CircularArc
 from ..report.chapter import AtLeast, Claim, Plot, Table
 from . import saga2007_pairs as pairs
-from .saga2007_muscle import DIAMETER, LENGTH, PRESSURE, WALL, exact_meridian
+from .saga2007_muscle import DIAMETER, LENGTH, PAPER, PRESSURE, WALL, exact_meridian
 from .saga2007_muscle import LINES as RUBBER
 
-PAPER = "saga2007"
 FIBRES = 16
 """Number of fibres of Table 1."""
 FIG_1 = (PRESSURE, 0.16e6)
