@@ -468,6 +468,15 @@ def test_a_statement_with_several_cases_counts_once(claims: tuple[Claim, ...], v
     assert {key: count for key, count in count_verdicts(claims).items() if count} == {verdict: 1}
 
 
+def test_a_note_that_all_cases_share_stands_once(tmp_path: Path):
+    same = tuple(dataclasses.replace(case, note="Note of all.") for case in cases(2.0, 0.5))
+    page = write_report([Chapter("paper", "t", "s", same)], tmp_path, date=DATE).read_text(encoding="utf-8")
+    assert page.count("Note of all.") == 1
+    other = (dataclasses.replace(same[0], note="Another note."), same[1])
+    page = write_report([Chapter("paper", "t", "s", other)], tmp_path, date=DATE).read_text(encoding="utf-8")
+    assert (page.count("Note of all."), page.count("Another note.")) == (1, 1)
+
+
 def test_checks_and_comparisons_are_listed_and_counted_apart(tmp_path: Path):
     claims = (*cases(2.0, 0.5), *cases(1.0, kind=Kind.CHECK), *cases(0.0, kind=Kind.FINDING))
     assert [sum(count_verdicts(claims, kind).values()) for kind in Kind] == [1, 1, 1]

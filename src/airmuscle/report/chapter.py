@@ -144,6 +144,12 @@ class Statement:
     cases: tuple[Claim, ...]
 
     @property
+    def common_note(self) -> str:
+        """The note of several cases that have the same one; otherwise empty."""
+        notes = {case.note for case in self.cases}
+        return notes.pop() if len(notes) == 1 < len(self.cases) else ""
+
+    @property
     def verdict(self) -> str:
         """The common verdict of the cases; "depends" if the statement holds in some and differs in others."""
         verdicts = [case.verdict for case in self.cases]

@@ -10,7 +10,7 @@ from ..characteristic.contractile_surface import exponents
 from ..core.reference import cite
 from ..geometry.base import Geometry
 from ..library import catalogue
-from ..report.chapter import Chapter, Table
+from ..report.chapter import Chapter, Plot, Table
 from . import hosovsky_effect_ranges as causing_over_ranges
 from . import hosovsky_effects as causing
 from . import hosovsky_fill as filling
@@ -94,17 +94,24 @@ def chapter(
             _extrapolation_table(fill, low, high),
             *_time_series(fill, low, high),
         ),
-        plots=(
-            hill_model(),
-            surface_in_space(),
-            isobars(),
-            filling.valve_figure(MATRIX, fill.plant.ambient.temperature),
-            filling.figure_3(fill),
-            causing.effect_plot(effects),
-            releasing.figure_4(low, high),
-        ),
+        plots=_plots(fill, effects, low, high),
         references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(catalogue.load_law(FORCE_MAPS[0]))),
         chosen=(*parameters.as_rows(), *suspected.as_rows()),
+    )
+
+
+def _plots(
+    fill: filling.FillRun, effects: tuple[causing.Effect, ...], low: releasing.Release, high: releasing.Release
+) -> tuple[Plot, ...]:
+    """Return all figures in the order of the report."""
+    return (
+        hill_model(),
+        surface_in_space(),
+        isobars(),
+        filling.valve_figure(MATRIX, fill.plant.ambient.temperature),
+        filling.figure_3(fill),
+        causing.effect_plot(effects),
+        releasing.figure_4(low, high),
     )
 
 
