@@ -60,11 +60,10 @@ def gas_findings(effects: tuple[Effect, ...]) -> tuple[Claim, ...]:
     """Return the effects of the ideal gas and of the reference density, compared with a negligible change."""
     text = "suspected cause, ideal gas: largest pressure change during filling"
     notes = {
-        "van der Waals": "The virial coefficient is that of the van der Waals equation for nitrogen, whose magnitude "
-        "exceeds the measured one of air.",
-        "volume flow": "Equation (11) multiplies the volume flow by P0 = 100 kPa; the mass flow by ISO 6358 has "
-        f"R T0 rho0 = {100e3 / VOLUME_FLOW_RATIO / 1e3:.5g} kPa in its place, because the reference density of "
-        "1.185 kg/m³ is that of humid air and R that of dry air. The mass flow is the default.",
+        "van der Waals": "The virial coefficient is that of the van der Waals equation for nitrogen (CRC Handbook).",
+        "volume flow": r"Equation (11) multiplies the volume flow by \(P_0\) = 100 kPa; the mass flow by ISO 6358 has "
+        rf"\(R\,T_0\,\rho_0\) = {100e3 / VOLUME_FLOW_RATIO / 1e3:.5g} kPa in its place, because the reference density "
+        r"of 1.185 kg/m³ is that of humid air and \(R\) that of dry air. The mass flow is the default.",
     }
     texts = {"van der Waals": text, "volume flow": "reference density of (11): largest pressure change during filling"}
     bound = AtMost(NEGLIGIBLE, chosen=True)
