@@ -42,6 +42,7 @@ from airmuscle.mechanism import (
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import (
     CreepElements,
+    CubicSeriesSpring,
     CubicSpring,
     DirectionalDamper,
     EndStop,
@@ -122,6 +123,7 @@ EXAMPLES = {
     "series spring with a stop": of(
         series=SeriesSpring(1e5), stop=STOP, damper=DirectionalDamper(300.0, 150.0, 1e-3, 0.0)
     ),
+    "hardening series spring": of(series=CubicSeriesSpring(5e4, 2e-3), damper=DirectionalDamper(300.0, 150.0, 1e-3, 0.0)),
     "swelling wall": of(wall=SwellingWall(4e-5, 2e5, 3e4, 0.05)),
     # friction
     "Dahl": of(friction=friction.Dahl(5e4, 20.0)),
@@ -136,6 +138,7 @@ EXAMPLES = {
     "Prandtl-Ishlinskii": of(friction=friction.PrandtlIshlinskii(*SLIPS, (8.0, -8.0), (0.5, -0.5))),
     # circuits
     "polytropic": fed(TWO_VALVES, gas=Polytropic(1.3)),
+    "real gas": fed(TWO_VALVES, gas=pneumatics.VirialGas()),
     "heat": fed(TWO_VALVES),
     "closed": fed(pneumatics.ClosedChamber()),
     "held and let go": Plant(chosen_muscle(), TWO_VALVES, WithLatch(HangingMass(10.0))),

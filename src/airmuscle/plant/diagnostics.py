@@ -12,7 +12,7 @@ from ..core.diagnostics import Columns, Diagnostic, DiagnosticCode
 from ..core.errors import ParameterError
 from ..core.variables import select_prefix
 from ..friction import NoFriction
-from ..muscle import INNER_CONTRACTION, Muscle, SeriesSpring
+from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle
 
 MARGIN = 1e-3
 """Part of a geometry's contraction range within which a muscle counts as at its limit (chosen)."""
@@ -76,7 +76,7 @@ def _limits(muscle: Muscle, prefix: str) -> Iterator[tuple[DiagnosticCode, str, 
     if identified is not None:
         yield DiagnosticCode.FRICTION_EXTRAPOLATION, f"{prefix}pressure", "pressure", identified.pressure
         yield DiagnosticCode.FRICTION_EXTRAPOLATION, f"{prefix}shortening_speed", "speed", identified.speed
-    own = INNER_CONTRACTION if isinstance(muscle.series, SeriesSpring) else "contraction"
+    own = INNER_CONTRACTION if isinstance(muscle.series, ElasticSeriesElement) else "contraction"
     yield DiagnosticCode.GEOMETRY_LIMIT, f"{prefix}{own}", own, muscle.geometry.contraction_range
 
 

@@ -11,7 +11,7 @@ from ..core.ops import Value
 from ..core.system import System
 from ..core.variables import Input, StateVariable
 from ..friction import NoFriction
-from ..muscle import Muscle, SeriesSpring
+from ..muscle import ElasticSeriesElement, Muscle
 from .muscle_state import MuscleState
 from .plant import Plant
 
@@ -166,7 +166,7 @@ def _muscle_powers(part: Muscle, muscle: MuscleState) -> dict[str, Value]:
     if part.creep.states:
         opposing = opposing + part.creep.force(muscle.states)
     absorbed = opposing * speed
-    if isinstance(part.series, SeriesSpring):
+    if isinstance(part.series, ElasticSeriesElement):
         absorbed = absorbed + muscle.tension * (speed - muscle.speed)
     powers = {
         "work_of_contractile": part.contractile.force(pressure, inner) * speed,

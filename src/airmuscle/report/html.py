@@ -10,7 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from .chapter import Chapter
+from .chapter import Chapter, Kind, statements
 from .formatting import (
     MARKS,
     P_VALUE,
@@ -63,7 +63,9 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
         title=title,
         date=date.isoformat(),
         chapters=chapters,
-        verdicts=count_verdicts(claims),
+        claims=claims,
+        kinds=list(Kind),
+        statements=statements,
         count_verdicts=count_verdicts,
         marks=MARKS,
         versions=versions(),
