@@ -15,6 +15,7 @@ WORDS = Path(__file__).with_name("words.toml")
 
 ARGUMENTS = {
     "air_states": "air states (pressure, temperature) of the muscles of a circuit, or of the segments of a tube",
+    "at": "evaluation of a plant: muscles, circuits, forces and accelerations at one state",
     "air": "air state: absolute pressure and temperature",
     "inlet": "air state at the supply",
     "flow": "inflow: mass flow [kg/s] and enthalpy flow [W]",

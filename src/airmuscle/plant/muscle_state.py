@@ -6,9 +6,13 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ..core.ops import Value
+from ..core.variables import StateVariable
 from ..friction import NoFriction
 from ..muscle import Muscle
 from ..pneumatics.gas import Air, Ambient, Gas, gauge_pressure
+
+_TYPICAL_CONTRACTION = 0.05
+"""Contraction [1] at which a muscle's volume gives the nominal size of its air mass (chosen)."""
 
 
 class MuscleState(NamedTuple):
@@ -63,3 +67,13 @@ def muscle_outputs(muscle: Muscle, instant: MuscleState, mass_flow: Value) -> di
     if "internal_energy" in instant.states:
         outputs["temperature"] = instant.air.temperature
     return outputs
+
+
+def states_of_muscle(prefix: str, muscle: Muscle, states: tuple[StateVariable, ...]) -> list[StateVariable]:
+    """States of a muscle by their names in the plant."""
+    return [StateVariable(f"{prefix}{s.name}", s.unit, s.nominal, f"{s.meaning} of {muscle.name}") for s in states]
+
+
+def air_states(muscle: Muscle, gas: Gas, ambient: Ambient) -> tuple[StateVariable, ...]:
+    """States of the air in a muscle, by their own names."""
+    return gas.states(muscle.geometry.volume(_TYPICAL_CONTRACTION), ambient)
