@@ -45,11 +45,11 @@ def solve(problem: FitProblem, loss: Loss, start: Array | None = None) -> LeastS
         near = gauss_newton(problem, start) if start is not None and isinstance(loss, LeastSquares) else None
         if near is not None:
             return LeastSquaresSolution(*near)
-        return _solve_iteratively(problem, loss, find_initial_values(problem) if start is None else start)
+        return solve_iteratively(problem, loss, find_initial_values(problem) if start is None else start)
     linear = _solve_linear(problem)
     if isinstance(loss, LeastSquares):
         return linear
-    robust = _solve_iteratively(problem, loss, linear.values)
+    robust = solve_iteratively(problem, loss, linear.values)
     if is_determined_without_censored(problem, robust.jacobian):
         return robust
     # The search stops as soon as no bound is violated; parameters that only bounds determine are then arbitrary.
@@ -84,7 +84,7 @@ def _solve_linear(problem: FitProblem) -> LeastSquaresSolution:
     return LeastSquaresSolution(values, matrix @ values + constant, matrix)
 
 
-def _solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> LeastSquaresSolution:
+def solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> LeastSquaresSolution:
     """Trust-region least squares within bounds, with parameters and residuals scaled to the order of one."""
     from scipy.optimize import least_squares
 
