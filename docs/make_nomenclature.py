@@ -133,6 +133,7 @@ ARGUMENTS = {
     "columns": "columns of a recording by name",
     "constants": "constant quantities of a recording",
     "origin": "source of a recording",
+    "location": "place in a file or in arguments that an error message begins with",
     "notes": "remarks on a recording or a fit",
     "selection": "selected rows",
     "specimen": "name of the measured muscle",

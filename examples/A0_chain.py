@@ -6,7 +6,7 @@ python examples/A0_chain.py        writes chain.png to the working directory
 import numpy as np
 
 import airmuscle as am
-from airmuscle.core.plotting import LINES, new_figure, save
+from airmuscle.core import plotting
 from airmuscle.units import bar, kPa
 
 bench = am.load_data("dmsp-20-300")
@@ -22,20 +22,25 @@ print(f"stroke with 10 kg: {run['position'].max() * 1e3:.1f} mm")
 print(*run.notes, sep="\n")
 print(*am.cite(plant), sep="\n")
 
-figure, (left, right) = new_figure(1, 2, width=9.0, height=3.2)
+figure, (left, right) = plotting.new_figure(1, 2, width=9.0, height=3.2)
 contraction = np.linspace(0.0, 0.26, 200)
 for i, pressure in enumerate((600, 450, 312.5, 180)):
     level = np.isclose(bench["pressure"], pressure * kPa)
-    left.plot(contraction * 100, result.model.force(pressure * kPa, contraction), color=LINES[i], label=f"{pressure:g}")
-    left.plot(bench["contraction"][level] * 100, bench["force"][level], "o", color=LINES[i])
+    left.plot(
+        contraction * 100,
+        result.model.force(pressure * kPa, contraction),
+        color=plotting.LINES[i],
+        label=f"{pressure:g}",
+    )
+    left.plot(bench["contraction"][level] * 100, bench["force"][level], "o", color=plotting.LINES[i])
 left.set(xlabel="contraction [%]", ylabel="force [N]", title="measured points and fitted surface")
 left.legend(title="kPa gauge")
-right.plot(run["time"], run["pressure"] / kPa, color=LINES[0])
+right.plot(run["time"], run["pressure"] / kPa, color=plotting.LINES[0])
 right.set(xlabel="time [s]", ylabel="pressure [kPa gauge]", title="simulated filling and discharge, 10 kg")
-right.yaxis.label.set_color(LINES[0])
+right.yaxis.label.set_color(plotting.LINES[0])
 position = right.twinx()
-position.plot(run["time"], run["position"] * 1e3, color=LINES[1], linestyle="--")
-position.set_ylabel("position [mm]", color=LINES[1])
+position.plot(run["time"], run["position"] * 1e3, color=plotting.LINES[1], linestyle="--")
+position.set_ylabel("position [mm]", color=plotting.LINES[1])
 position.grid(False)
-save(figure, "chain.png")
+plotting.save(figure, "chain.png")
 print("wrote chain.png")

@@ -7,7 +7,7 @@ import numpy as np
 
 import airmuscle as am
 from airmuscle.control import PWM, SolenoidDriver, WithDrivers
-from airmuscle.core.plotting import BLACK, LINES, legend_outside, new_figure, save
+from airmuscle.core import plotting
 from airmuscle.units import ms
 
 VALVE = SolenoidDriver(opening_delay=5 * ms, closing_delay=2 * ms, opening_ramp=10 * ms, closing_ramp=4 * ms)  # chosen
@@ -30,13 +30,13 @@ def mean_opening(duty, pwm):
     return float(lengths @ (last.values[:, 0] + last.slopes[:, 0] * lengths / 2)) / period
 
 
-figure, (left, right) = new_figure(1, 2, width=9.0, height=3.4, width_ratios=(1.5, 1))
+figure, (left, right) = plotting.new_figure(1, 2, width=9.0, height=3.4, width_ratios=(1.5, 1))
 signal = am.SampledSignal({"fill": ((0.0, 0.05), (0.4, 0.6))})
 pwm = PWM(frequency=25.0, smallest_pulse=3 * ms)
 for command, style in (
-    (signal, {"color": BLACK, "linestyle": "--", "label": "command"}),
-    (WithDrivers(signal, {"fill": pwm}), {"color": LINES[4], "linewidth": 0.9, "label": "coil current"}),
-    (WithDrivers(signal, {"fill": (pwm, VALVE)}), {"color": LINES[0], "label": "opening"}),
+    (signal, {"color": plotting.BLACK, "linestyle": "--", "label": "command"}),
+    (WithDrivers(signal, {"fill": pwm}), {"color": plotting.LINES[4], "linewidth": 0.9, "label": "coil current"}),
+    (WithDrivers(signal, {"fill": (pwm, VALVE)}), {"color": plotting.LINES[0], "label": "opening"}),
 ):
     times, values = sample_input(command, 0.4)
     left.plot(times / ms, values, **style)
@@ -45,9 +45,11 @@ left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3)
 
 duties = np.linspace(0.0, 1.0, 201)
 for i, frequency in enumerate((5.0, 25.0, 50.0, 100.0)):
-    right.plot(duties, [mean_opening(d, PWM(frequency)) for d in duties], color=LINES[i], label=f"{frequency:g} Hz")
-right.plot((0, 1), (0, 1), color=BLACK, linewidth=0.6)
+    right.plot(
+        duties, [mean_opening(d, PWM(frequency)) for d in duties], color=plotting.LINES[i], label=f"{frequency:g} Hz"
+    )
+right.plot((0, 1), (0, 1), color=plotting.BLACK, linewidth=0.6)
 right.set(xlabel="duty ratio", ylabel="mean opening", title="mean opening over duty ratio")
-legend_outside(right, title="PWM frequency")
-save(figure, "drivers.png")
+plotting.legend_outside(right, title="PWM frequency")
+plotting.save(figure, "drivers.png")
 print("wrote drivers.png")

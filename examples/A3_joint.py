@@ -8,8 +8,7 @@ Dimensions, valve and brake are chosen.
 from dataclasses import replace
 
 import airmuscle as am
-from airmuscle.analysis.linear_model import linearise
-from airmuscle.analysis.static_stiffness import stiffness
+from airmuscle.analysis import linearise, stiffness
 from airmuscle.control import SolenoidDriver, WithDrivers
 from airmuscle.mechanism import AntagonisticJoint
 from airmuscle.pneumatics import ProportionalValve, SecondOrderLag, Tube, WithTubes

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import airmuscle as am
 from airmuscle.control import PID, ControlLoop, OnOffController, SolenoidDriver, SplitRange
-from airmuscle.core.plotting import BLACK, LINES, legend_below, new_figure, save
+from airmuscle.core import plotting
 from airmuscle.pneumatics import ProportionalValve, SecondOrderLag
 from airmuscle.simulation import Problem, solve
 from airmuscle.units import bar, mm, ms
@@ -33,7 +33,7 @@ on_off_loop = ControlLoop(
     on_off, sample_time=5 * ms, setpoint=setpoint, drivers={"fill": solenoid, "discharge": solenoid}
 )
 
-figure, (left, right) = new_figure(2, 1, height=4.6, sharex=True)
+figure, (left, right) = plotting.new_figure(2, 1, height=4.6, sharex=True)
 cases = (
     ("PID, proportional valve", proportional_valve, pid_loop),
     ("on/off control, solenoid valves", solenoid_valves, on_off_loop),
@@ -45,14 +45,16 @@ for i, (name, circuit, loop) in enumerate(cases):
     late = (run["time"] > 5.0) & (run["time"] < 6.0)
     error = abs(run["position"] - run["setpoint.position"])[late].max()
     print(f"{name}: maximum error {error / mm:.2f} mm in the last second")
-    left.plot(run["time"], run["position"] / mm, color=LINES[i], label=name)
+    left.plot(run["time"], run["position"] / mm, color=plotting.LINES[i], label=name)
     column = "command.command" if i == 0 else "command.fill"
-    right.plot(run["time"], run[column], color=LINES[i], drawstyle="steps-post", linewidth=0.9 if i else 1.4)
-left.plot(run["time"], run["setpoint.position"] / mm, color=BLACK, linestyle="--", linewidth=0.9, label="setpoint")
+    right.plot(run["time"], run[column], color=plotting.LINES[i], drawstyle="steps-post", linewidth=0.9 if i else 1.4)
+left.plot(
+    run["time"], run["setpoint.position"] / mm, color=plotting.BLACK, linestyle="--", linewidth=0.9, label="setpoint"
+)
 left.set_ylabel("position [mm]")
 right.set(xlabel="time [s]", ylabel="command")
-legend_below(figure, left, columns=3)
-save(figure, "control.png")
+plotting.legend_below(figure, left, columns=3)
+plotting.save(figure, "control.png")
 
 plant = am.Plant(muscle, proportional_valve, am.HangingMass(10.0))
 start = am.find_equilibrium(plant, pressure=0.8 * bar)

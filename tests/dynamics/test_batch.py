@@ -28,7 +28,7 @@ from airmuscle.reproduce.hosovsky_plant import plant as third_paper
 from airmuscle.simulation import simulate
 from airmuscle.simulation.batch import BatchSolution, Single, simulate_batch, thread_pool, variations
 from airmuscle.simulation.integrators import DormandPrince8, ExplicitRungeKutta, Rodas4, RungeKutta4
-from airmuscle.simulation.sensitivity import WithSensitivities, sensitivity
+from airmuscle.simulation.with_sensitivities import WithSensitivities, sensitivity
 
 PULSE = Schedule({"fill": ((0.0303, 1), (0.2, 0)), "discharge": ((0.31, 1), (0.42, 0))})
 JOINT_PULSE = Schedule({"left.fill": ((0.02, 1), (0.07, 0)), "right.discharge": ((0.0217, 1), (0.07, 0))})

@@ -20,7 +20,7 @@ from airmuscle.core.errors import ParameterError
 from airmuscle.core.system import System
 from airmuscle.core.variables import StateVariable
 from airmuscle.simulation.integrators import Rodas4, RungeKutta4
-from airmuscle.simulation.sensitivity import WithSensitivities, sensitivity
+from airmuscle.simulation.with_sensitivities import WithSensitivities, sensitivity
 
 PATHS = (
     "circuit.fill.conductance",

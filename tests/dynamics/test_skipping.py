@@ -17,7 +17,7 @@ from filling import hanging
 
 from airmuscle.compile.ir.branches import COMMANDED, STEADY, VARYING, skipping
 from airmuscle.compile.ir.instructions import Code, Instruction, Operand, Operation
-from airmuscle.compile.ir.scheduling import Branch
+from airmuscle.compile.ir.scheduling import ConditionalBlock
 from airmuscle.compile.llvm import emit
 from airmuscle.compile.program import Program, compile_system
 from airmuscle.control.inputs import Schedule
@@ -111,15 +111,15 @@ def computed(items: Any, leaves: dict[Operand, float]) -> tuple[Values, int]:
     """The values of the results, and how many instructions were run."""
     values, count = Values(leaves), 0
     for item in items:
-        if isinstance(item, Branch) and not any(values[gate] for gate in item.gates):
+        if isinstance(item, ConditionalBlock) and not any(values[gate] for gate in item.gates):
             values.update({result: values[value] for result, value in item.instead})
             continue
         inner = Values(values)
-        for line in item.body if isinstance(item, Branch) else [item]:
+        for line in item.body if isinstance(item, ConditionalBlock) else [item]:
             number = MEANING[line.operation](*(inner[a] for a in line.arguments))
             inner[line.result] = float(np.clip(number, -1e3, 1e3)) if line.operation == Operation.SQUARE else number
             count += 1
-        seen = [result for result, _ in item.instead] if isinstance(item, Branch) else [item.result]
+        seen = [result for result, _ in item.instead] if isinstance(item, ConditionalBlock) else [item.result]
         values.update({result: inner[result] for result in seen})
     return values, count
 
@@ -137,7 +137,7 @@ def test_random_code_gives_the_same_with_branches(monkeypatch: pytest.MonkeyPatc
                 early.update(line.arguments)
         for ahead in (frozenset[Operand](), frozenset(early)):
             items = skipping(code, level, ahead)
-            pieces = [{line.result for line in item.body} for item in items if isinstance(item, Branch)]
+            pieces = [{line.result for line in item.body} for item in items if isinstance(item, ConditionalBlock)]
             assert all(piece <= ahead or not piece & ahead for piece in pieces)
             for _ in range(3):
                 leaves = {leaf: rng.choice([-2.0, -1.0, 0.0, 0.5, 1.0, 3.0]) for leaf in LEAVES[:4]}
@@ -161,10 +161,10 @@ def test_a_shut_valve_and_a_box_not_left_are_skipped() -> None:
         patch.setattr(emit, "skipping", lambda *a: kept.append((a[0], real(*a))) or kept[-1][1])
         Program(plant(FillDischarge))
     code, items = kept[0]
-    skipped = [len(item.body) for item in items if isinstance(item, Branch)]
+    skipped = [len(item.body) for item in items if isinstance(item, ConditionalBlock)]
     assert len(skipped) >= 3
     assert sum(skipped) > len(code.body) / 3
-    assert {len(item.gates) for item in items if isinstance(item, Branch)} == {1}
+    assert {len(item.gates) for item in items if isinstance(item, ConditionalBlock)} == {1}
 
 
 @pytest.mark.parametrize("circuit", [FillDischarge, ThreePositionValve])

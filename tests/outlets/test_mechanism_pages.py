@@ -14,7 +14,7 @@ from airmuscle.library.build import build
 from airmuscle.library.location import Location
 from airmuscle.library.models import model_names
 from airmuscle.mechanism import AntagonisticJoint, JointWithEndStops, Mechanism
-from airmuscle.simulation.sensitivity import sensitivity
+from airmuscle.simulation.with_sensitivities import sensitivity
 
 DOCS = Path(__file__).parents[2] / "docs"
 

@@ -356,7 +356,9 @@ def test_a_mapping_overrides_the_unit_row(tmp_path: Path):
 
 def test_a_table_without_headings_is_mapped_by_numbers(tmp_path: Path):
     np.savetxt(tmp_path / "run.txt", TABLE, delimiter="\t")
-    assert "map the columns by their numbers" in refusal(ColumnError, tmp_path / "run.txt")
+    assert "To map columns by their numbers, use columns={1: 'pressure [kPa]', 2: 'force [N]'} of read." in refusal(
+        ColumnError, tmp_path / "run.txt"
+    )
     same(only(read(tmp_path / "run.txt", columns=dict(enumerate(HEADINGS, 1)))))
     np.savetxt(tmp_path / "blanks.txt", TABLE)
     same(only(read(tmp_path / "blanks.txt", columns=dict(enumerate(HEADINGS, 1)), delimiter=" ")))
@@ -364,7 +366,7 @@ def test_a_table_without_headings_is_mapped_by_numbers(tmp_path: Path):
 
 def test_a_given_decimal_sign_resolves_thousands_separators(tmp_path: Path):
     (tmp_path / "run.csv").write_text("force [N];length [mm]\n1.234,5;290,5\n2.000;280\n")
-    assert "specify the decimal sign: decimal=','" in refusal(ColumnError, tmp_path / "run.csv")
+    assert "To specify the decimal sign, use decimal=',' of read." in refusal(ColumnError, tmp_path / "run.csv")
     assert only(read(tmp_path / "run.csv", decimal=","))["force"] == pytest.approx([1234.5, 2000.0])
 
 
@@ -600,10 +602,13 @@ def test_a_file_whose_reader_ends_or_takes_too_long_is_damaged(tmp_path: Path, m
         "import os, time\ndef end(path): os._exit(1)\ndef wait(path): time.sleep(60)\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(separate_process, "TIME_LIMIT", 1.0)
     separate_process.stop()
     path = csv(tmp_path / "run.csv")
-    for function, cause in (("end", "its reader ended without a result"), ("wait", "its reading takes more than 1 s")):
+    for function, limit, cause in (
+        ("end", separate_process.TIME_LIMIT, "its reader ended without a result"),
+        ("wait", 1.0, "its reading takes more than 1 s"),
+    ):
+        monkeypatch.setattr(separate_process, "TIME_LIMIT", limit)
         with pytest.raises(FileError, match=rf"run.csv: the file is damaged \({cause}\). Copy it again"):
             call_in_separate_process("bad_reader", function, path)
 

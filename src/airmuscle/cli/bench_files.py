@@ -43,7 +43,8 @@ def read_recordings(files: list[Path], unit: list[str] | None, **options: Any) -
     local = {entry.name for entry in Path().iterdir()}
     names = [f for f in files if not f.suffix and len(f.parts) == 1 and f.name not in local]
     paths = [f for f in files if f not in names]
-    set_options = [name for name, value in options.items() if value]
+    set_options = ["--unit" if name == "units" else f"--{name.replace('_', '-')}"
+                   for name, value in options.items() if value]  # fmt: skip
     if names and set_options:
         raise ParameterError(
             f"{names[0]}: a data set of the library contains its units and constants; omit {', '.join(set_options)}."

@@ -15,7 +15,7 @@ from .bench_files import AmbientPressure, Files, Length, Units, read_recordings
 from .fit_compare import compare_models
 from .fit_geometry import missing_geometry, parse_braid, with_braid
 from .fit_options import FitOptions, FitRequest, loss_of
-from .fit_output import fit_to_dict, fitted_entry, print_results, write_results
+from .fit_output import fit_to_dict, fitted_entry, print_results, with_option_names, write_results
 from .initial_law import find_initial_law
 from .options import Folder, Json, Mapping
 from .terminal import print_json
@@ -163,4 +163,7 @@ def _fit_one(files: list[Path], recordings: list[Recording], characteristic: str
         data = fit_to_dict(result)
         print_json(data | {"notes": [*data["notes"], *missing_geometry(entry)]} | extras.to_dict())
         return
-    print_results([str(result), *extras.lines(), *(f"note: {note}" for note in missing_geometry(entry))], request.out)
+    print_results(
+        [str(with_option_names(result)), *extras.lines(), *(f"note: {note}" for note in missing_geometry(entry))],
+        request.out,
+    )

@@ -16,14 +16,14 @@ from ..report.fit_chapter import fit_chapter
 from ..report.output_folder import atomic_folder
 from ..report.write import write_into
 from .fit_geometry import fitted_geometry, missing_geometry
-from .remedies import in_options
+from .option_hints import in_options
 from .terminal import echo
 
 
 def print_results(lines: Sequence[str], out: Path) -> None:
     """Print the results and the paths of the files that were written."""
     for line in lines:
-        echo(in_options(line))
+        echo(line)
     echo(f"muscle: {out / 'muscle.toml'}")
     echo(f"report: {out / 'report.html'}")
 
@@ -40,6 +40,11 @@ def fitted_entry(result: Fit, initial: Entry, files: list[Path]) -> Entry:
         geometry=geometry, validity_range=result.validity_range, checks=(),
     )  # fmt: skip
     return dataclasses.replace(entry, note=" ".join([note, *missing_geometry(entry)]))
+
+
+def with_option_names(result: Fit) -> Fit:
+    """The fit whose notes name options of `airmuscle fit` instead of Python arguments."""
+    return dataclasses.replace(result, notes=tuple(in_options(note, "fit") for note in result.notes))
 
 
 def fit_to_dict(result: Fit) -> dict[str, Any]:
@@ -60,7 +65,7 @@ def fit_to_dict(result: Fit) -> dict[str, Any]:
         "rows_censored": result.rows_censored,
         "rows_dropped": result.rows_dropped,
         "valid_for": result.data_ranges,
-        "notes": list(result.notes),
+        "notes": list(with_option_names(result).notes),
     }
 
 
@@ -71,5 +76,4 @@ def write_results(
     with atomic_folder(out) as folder:
         save(entry, folder / "muscle.toml")
         notes = tuple(dict.fromkeys(note for recording in recordings for note in recording.notes))
-        shown = dataclasses.replace(result, notes=tuple(in_options(note) for note in result.notes))
-        write_into(folder, [*chapters, fit_chapter(shown, entry, notes)], title="Fit")
+        write_into(folder, [*chapters, fit_chapter(with_option_names(result), entry, notes)], title="Fit")

@@ -20,6 +20,7 @@ from ..report.hysteresis_chapter import describe_row_counts, hysteresis_chapters
 from ..report.output_folder import atomic_folder, check_writable
 from ..report.write import write_into
 from .bench_files import AmbientPressure, Files, Length, Units, read_recordings
+from .option_hints import in_options
 from .options import Folder, Json, Mapping
 from .terminal import echo, print_json, print_table
 
@@ -78,7 +79,7 @@ def hysteresis(
     loops = find_loops(recordings, characteristic=law, degree=degree, all_rows=all_rows)
     check_writable(out)
     progress = None if json else lambda name: echo(f"  {name}", err=True)
-    fits = [fit_loop(loop, elements=elements, progress=progress) for loop in loops]
+    fits = [_with_option_names(fit_loop(loop, elements=elements, progress=progress)) for loop in loops]
     creep_results = _fit_creep(recordings) if creep else []
     path = _write(fits, creep_results, _select(fits), entry, out)
     if json:
@@ -87,6 +88,12 @@ def hysteresis(
     _print(fits, creep_results)
     echo(f"{path.stem}: {path}" if path else "no friction file: no model that a plant can use is justified")
     echo(f"report: {out / 'report.html'}")
+
+
+def _with_option_names(fit: LoopFit) -> LoopFit:
+    """The fits whose reasons of failure name options instead of Python arguments."""
+    failed = {name: in_options(reason, "hysteresis") for name, reason in fit.failed.items()}
+    return dataclasses.replace(fit, failed=failed)
 
 
 def _select(fits: Sequence[LoopFit]) -> HysteresisFit | None:

@@ -1,6 +1,6 @@
 """Foundations: models and parameters, parameter trees, numeric and symbolic operators, errors, references, units."""
 
-from . import ops
+from . import ops, plotting, tree
 from .arrays import Array
 from .declaration import Parameter, model, parameter, parameters
 from .reference import Reference, cite
@@ -24,7 +24,9 @@ __all__ = [
     "ops",
     "parameter",
     "parameters",
+    "plotting",
     "structure",
+    "tree",
     "unflatten",
     "with_parameters",
 ]

@@ -13,8 +13,9 @@ from ..characteristic.base import Characteristic
 from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
+from ..core.hints import Hint
 from ..recording import Recording
-from .cross_validation import GroupSplit, default_split
+from .cross_validation import GroupSplit, LevelSplit, default_split
 from .group_refits import GroupRefits, RowIndices
 from .loss import LeastSquares
 from .problem import FitProblem
@@ -100,7 +101,8 @@ def _assign_groups(fit: Fit, runs: Sequence[Recording], by: GroupSplit) -> tuple
     if names.size < 3:
         raise IdentificationError(
             f"a bootstrap needs 3 {by.group_name}s or more, but the data have {names.size}, so a spread cannot be "
-            "estimated. Give more runs, or resample by LevelSplit('contraction')."
+            "estimated. Give more runs.",
+            hint=Hint("To resample by levels of contraction", "by", LevelSplit("contraction")),
         )
     return group, int(names.size)
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.arrays import Array
+from ..core.hints import Hint, HintedText
 from ..recording import Recording
 from ..recording.columns import QUANTITIES
 from ..recording.segment import branch_directions, estimate_sensors, find_branches
@@ -56,8 +57,10 @@ def branch_notes(runs: Sequence[Recording], residuals: Sequence[Array], quantity
     unit = QUANTITIES[quantity].unit
     distance = f"{100 * mean:.3g} %" if unit == "1" else f"{mean:.3g} {unit}"
     return [
-        f"The residuals follow two branches, {distance} apart on average (inflating and deflating): use "
-        "identify.hysteresis.fit_hysteresis."
+        HintedText(
+            f"The residuals follow two branches, {distance} apart on average (inflating and deflating).",
+            Hint("To identify the friction", function="identify.hysteresis.fit_hysteresis"),
+        )
     ]
 
 

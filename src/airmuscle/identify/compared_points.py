@@ -14,6 +14,7 @@ from ..characteristic.base import Characteristic
 from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError, IdentificationError
+from ..core.hints import HintedText
 from ..recording import Recording
 from .candidates import Candidate
 from .cross_validation import Labels
@@ -74,6 +75,11 @@ def residuals_of_rows(model: Characteristic, parts: Sequence[EvaluatedRows], max
         for i, modelled in zip(same, np.split(forces, ends), strict=True):
             residuals[i] = modelled - parts[i].force
     return np.concatenate(residuals)
+
+
+def cause_of(error: AirmuscleError) -> str:
+    """The cause of an error in one phrase."""
+    return getattr(error, "cause", "") or "the fit fails"
 
 
 class Fold(NamedTuple):
@@ -157,7 +163,9 @@ class ComparedPoints:
             points = FitPoints.from_recordings([run for run in training if len(run)])
             return refit(fit.model, points, loss=loss, fixed=candidate.fixed)
         except AirmuscleError as error:
-            raise IdentificationError(f"Not determined without {fold.name}: {error}") from None
+            cause = f"without {fold.name}, {cause_of(error)}"
+            message = HintedText(f"Not determined without {fold.name}: ", error.message)
+            raise IdentificationError(message, cause=cause) from None
 
 
 class _FoldModels:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.errors import IdentificationError, ParameterError
+from ..core.hints import Hint, HintedText
 from ..recording import Recording
 
 Labels = npt.NDArray[np.str_]
@@ -135,9 +136,11 @@ def label_folds(recordings: Sequence[Recording], leave_out: GroupSplit) -> tuple
     names = [name for name in names if name != ALWAYS_FITTED]
     if len(names) < 2:
         raise IdentificationError(
-            f"{recordings[0].origin if recordings else 'no recording'}: cross-validation needs two groups or more, but "
-            f"all rows belong to one {leave_out.group_name}. Give more runs, or leave out LevelSplit('contraction') or "
-            "LevelSplit('pressure')."
+            HintedText(
+                f"{recordings[0].origin if recordings else 'no recording'}: cross-validation needs two groups or more, "
+                f"but all rows belong to one {leave_out.group_name}. Give more runs.",
+                *(Hint(f"To leave out levels of {n}", "leave_out", LevelSplit(n)) for n in ("contraction", "pressure")),
+            )
         )
     return labels, names
 

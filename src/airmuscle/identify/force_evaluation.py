@@ -10,6 +10,7 @@ import numpy.typing as npt
 from ..characteristic.base import ContractionLaw, ForceLaw
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, SolveError
+from ..core.hints import HintedText
 
 FORCE_GRID_POINTS = 801
 """Grid points between zero and the maximum force; the law is interpolated linearly between them."""
@@ -43,7 +44,10 @@ def slack_rows(law: Any, pressure: Array, contraction: Array) -> npt.NDArray[np.
     slack = np.asarray(_deficit(law, pressure, contraction, np.zeros(pressure.size)) > 0)
     error = _solve_error(law, pressure[~slack], contraction[~slack])
     if error is not None:
-        raise IdentificationError(f"It gives no force at a measured point. {error}")
+        raise IdentificationError(
+            HintedText("It gives no force at a measured point. ", error.message),
+            cause="it gives no force at a measured point",
+        )
     return slack
 
 
@@ -70,7 +74,7 @@ def _invert_on_grid(law: Any, pressure: Array, contraction: Array, max_force: fl
     interval = np.minimum(np.maximum((coarse < 0).sum(axis=1) - 1, 0), coarse.shape[1] - 2)
     index = interval[:, None] * COARSE_STEP + np.arange(COARSE_STEP + 1)
     result = np.zeros(pressure.size)
-    every = np.broadcast_to(np.arange(FORCE_GRID_POINTS), (np.count_nonzero(~rising), FORCE_GRID_POINTS))
+    every = np.broadcast_to(np.arange(FORCE_GRID_POINTS), (int(np.count_nonzero(~rising)), FORCE_GRID_POINTS))
     for rows, grid in ((rising, index[rising]), (~rising, every)):
         result[rows] = _first_crossing(law, pressure[rows], contraction[rows], forces[grid])
     return result

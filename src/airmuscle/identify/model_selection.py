@@ -10,9 +10,10 @@ import numpy as np
 from ..characteristic.base import Characteristic
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError, IdentificationError
+from ..core.hints import HintedText
 from ..recording import Recording
-from .candidates import Candidate, standard_candidates
-from .compared_points import ComparedPoints, residuals_of_rows
+from .candidates import Candidate, standard_candidates, unavailable_candidates
+from .compared_points import ComparedPoints, cause_of, residuals_of_rows
 from .cross_validation import GroupSplit, default_split, label_folds
 from .loss import LeastSquares, Loss
 from .model_evidence import aicc
@@ -59,6 +60,12 @@ class ExcludedModel:
 
     name: str
     reason: str
+    """The complete reason, with what to do."""
+    cause: str
+    """The cause in one phrase."""
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.cause}."
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -70,6 +77,8 @@ class Comparison:
     leave_out: GroupSplit
     recommended: RankedModel
     reason: str
+    unavailable: tuple[ExcludedModel, ...] = ()
+    """Standard candidates whose initial values do not follow from the data; empty if candidates were given."""
 
     @property
     def purpose(self) -> str:
@@ -83,6 +92,9 @@ class Comparison:
             raise IdentificationError(f"the comparison has no model '{name}'; it has {', '.join(models)}.")
         return models[name]
 
+    def _left_out(self) -> tuple[tuple[str, tuple[ExcludedModel, ...]], ...]:
+        return (("excluded", self.excluded), ("not compared", self.unavailable))
+
     def __str__(self) -> str:
         title = (
             f"Leave-one-{self.leave_out.group_name}-out cross-validation, rms errors in force; the ranking is for "
@@ -95,7 +107,7 @@ class Comparison:
             for m in self.ranking
         ]
         notes = [f"note: {m.candidate.name}: {note}" for m in self.ranking for note in m.notes]
-        excluded = [f"excluded: {e.name}. {e.reason}" for e in self.excluded]
+        excluded = [f"{word}: {e}" for word, models in self._left_out() for e in models]
         return "\n".join([title, "", head, *rows, "", self.reason, *notes, *excluded])
 
 
@@ -105,7 +117,7 @@ def compare(
     *,
     leave_out: GroupSplit | None = None,
     loss: Loss = LeastSquares(),
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[str, float], None] | None = None,
 ) -> Comparison:
     """Fit all candidates, rank them by their cross-validated error in force, and recommend one.
 
@@ -113,7 +125,7 @@ def compare(
     leave_out   RunSplit(), LevelSplit("contraction"), LevelSplit("pressure"), SpecimenSplit() or BlockSplit(); it
                 defines the purpose of the ranking: the best law for other muscles is not the best for the measured
                 ones. By default the first of specimens, runs and levels with three groups or more
-    progress    called with the name of each candidate
+    progress    called with the name of each candidate and the completed fraction, at the end with an empty name
 
     The recommended law is the one with the fewest parameters among those whose error is not larger than the lowest one
     by more than one standard error of the difference (Breiman et al., Classification and Regression Trees (1984),
@@ -124,19 +136,24 @@ def compare(
     labels, names = label_folds(runs, split)
     points = ComparedPoints.from_recordings(runs, labels, names)
     ranking, excluded = [], []
-    for candidate in candidates if candidates is not None else standard_candidates(runs):
+    compared = standard_candidates(runs) if candidates is None else candidates
+    for number, candidate in enumerate(compared):
         if progress is not None:
-            progress(candidate.name)
+            progress(candidate.name, number / len(compared))
         try:
             ranking.append(_cross_validate(candidate, points, loss))
         except AirmuscleError as error:
-            excluded.append(ExcludedModel(candidate.name, str(error)))
+            excluded.append(ExcludedModel(candidate.name, error.message, cause_of(error)))
+    if progress is not None:
+        progress("", 1.0)
     if not ranking:
-        reasons = "\n".join(f"{e.name}: {e.reason}" for e in excluded)
-        raise IdentificationError(f"the data determine none of the {len(excluded)} candidates.\n{reasons}")
+        reasons = [part for e in excluded for part in (f"\n{e.name}: ", e.reason)]
+        raise IdentificationError(HintedText(f"the data determine none of the {len(excluded)} candidates.", *reasons))
+    missing = () if candidates is not None else unavailable_candidates(runs)
+    unavailable = tuple(ExcludedModel(name, reason, cause) for name, reason, cause in missing)
     ranking.sort(key=lambda m: (m.cross_validated_rmse, m.parameter_count))
     recommended, reason = _recommend(ranking, split)
-    return Comparison(tuple(ranking), tuple(excluded), split, recommended, reason)
+    return Comparison(tuple(ranking), tuple(excluded), split, recommended, reason, unavailable)
 
 
 def _cross_validate(candidate: Candidate, points: ComparedPoints, loss: Loss) -> RankedModel:

@@ -1,5 +1,6 @@
 """Pneumatic circuits: air supplies, valves and tubes between supply and muscle."""
 
+from . import conversion
 from .check_valve import CheckValve
 from .circuit import Circuit, CircuitFlows
 from .combination import in_parallel, in_series
@@ -49,6 +50,7 @@ __all__ = [
     "WithLeak",
     "WithTubes",
     "absolute_pressure",
+    "conversion",
     "gauge_pressure",
     "in_parallel",
     "in_series",

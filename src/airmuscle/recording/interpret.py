@@ -13,6 +13,7 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.constants import STANDARD_GRAVITY
 from ..core.errors import ColumnError, UnitError, suggestion
+from ..core.hints import Hint, HintedText
 from ..core.units import AMBIENT_PRESSURE, UnitConversion, conversion
 from .clock import seconds_from_clock
 from .columns import QUANTITIES
@@ -135,8 +136,8 @@ def _conversion(table: RawTable, heading: Heading, ambient: float) -> UnitConver
             return UnitConversion(1.0)
         example = f"{heading.name} [{UNIT_SPELLINGS[target][1 % len(UNIT_SPELLINGS[target])]}]"
         raise UnitError(
-            f"{where}: no unit is stated. Rename the column header to '{example}', or pass "
-            f"units={{'{heading.name}': ...}}; usual units are {usual}."
+            f"{where}: no unit is stated. Rename the column header to '{example}'; usual units are {usual}.",
+            hint=Hint("To state the unit", "units", {heading.name: ...}),
         )
     try:
         if target == "N" and _is_mass(heading.unit):
@@ -146,7 +147,7 @@ def _conversion(table: RawTable, heading: Heading, ambient: float) -> UnitConver
         cases = {spelling.lower(): spelling for spelling in UNIT_SPELLINGS[target]}
         near = difflib.get_close_matches(heading.unit.lower(), cases, n=1)
         hint = f" Did you mean '{cases[near[0]]}'?" if near else f" Usual units of the {heading.name} are {usual}."
-        raise UnitError(f"{reason}{hint}") from None
+        raise UnitError(HintedText(reason.message, hint)) from None
 
 
 def _is_mass(unit: str) -> bool:

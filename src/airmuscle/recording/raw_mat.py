@@ -15,9 +15,8 @@ import numpy as np
 
 from ..core.errors import ColumnError, FileError, suggestion
 from .channels import Channel, merge_channels
-from .file_kind import check_regular_file
-from .optional_dependency import check_lab_package, import_lab_package, run_reader
-from .separate_process import call_in_separate_process
+from .optional_dependency import import_lab_package, run_reader
+from .separate_process import read_in_separate_process
 from .table import RawTable
 
 _INTERNAL_PREFIXES = ("__", "#")
@@ -29,9 +28,9 @@ def read_mat_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...
 
     The packages for this format are native code, therefore a separate process reads the file.
     """
-    check_lab_package("pymatreader", path)
-    check_regular_file(path)
-    tables: tuple[RawTable, ...] = call_in_separate_process(__name__, "read_mat_tables_here", path, group)
+    tables: tuple[RawTable, ...] = read_in_separate_process(
+        "pymatreader", __name__, "read_mat_tables_here", path, group
+    )
     return tables
 
 

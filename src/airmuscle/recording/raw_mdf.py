@@ -10,9 +10,8 @@ import numpy as np
 
 from ..core.errors import FileError, suggestion
 from .channels import Channel, merge_channels
-from .file_kind import check_regular_file
-from .optional_dependency import check_lab_package, import_lab_package, run_reader
-from .separate_process import call_in_separate_process
+from .optional_dependency import import_lab_package, run_reader
+from .separate_process import read_in_separate_process
 from .table import RawTable
 
 _TIME_MASTER = 1
@@ -24,9 +23,7 @@ def read_mdf_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...
 
     The package for this format is native code, therefore a separate process reads the file.
     """
-    check_lab_package("asammdf", path)
-    check_regular_file(path)
-    tables: tuple[RawTable, ...] = call_in_separate_process(__name__, "read_mdf_tables_here", path, group)
+    tables: tuple[RawTable, ...] = read_in_separate_process("asammdf", __name__, "read_mdf_tables_here", path, group)
     return tables
 
 

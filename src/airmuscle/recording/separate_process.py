@@ -19,11 +19,23 @@ from pathlib import Path
 from typing import IO, Any
 
 from ..core.errors import FileError
+from .file_kind import check_regular_file
+from .optional_dependency import check_lab_package
 
 TIME_LIMIT = 60.0
 """Time limit [s] of a file, and of every further 100 MB (chosen: 20 MB take less than one second)."""
 _START = f"import sys; sys.path[:] = sys.argv[1:]; from {__name__} import serve; serve()"
 _lock = threading.Lock()
+
+
+def read_in_separate_process(package: str, module: str, function: str, path: Path, *arguments: Any) -> Any:
+    """Return what a reader in a module of this package reads, as `call_in_separate_process`, from a regular file.
+
+    Raises FileError if the package that the reader needs is not installed, or if the file is not regular.
+    """
+    check_lab_package(package, path)
+    check_regular_file(path)
+    return call_in_separate_process(module, function, path, *arguments)
 
 
 def call_in_separate_process(module: str, function: str, path: Path, *arguments: Any) -> Any:

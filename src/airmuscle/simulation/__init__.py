@@ -3,8 +3,8 @@
 from .integrators import DormandPrince8, ExplicitRungeKutta, Integrator, Rodas4, RungeKutta4
 from .problem import Problem
 from .run import CompiledPlant, advance, compiled, simulate, solve
-from .sensitivity import WithSensitivities, sensitivity
 from .solution import Solution, Statistics
+from .with_sensitivities import WithSensitivities, sensitivity
 
 __all__ = [
     "CompiledPlant",

@@ -100,7 +100,7 @@ def make_recording(
         diagnostics += compiled.system.diagnose(Columns(columns, _limits(compiled, table)))
     if raw.status != Status.DONE:
         diagnostics.append(early_end(compiled, raw, end))
-    notes = tuple(str(diagnostic) for diagnostic in diagnostics)
+    notes = tuple(diagnostic.message for diagnostic in diagnostics)
     return Recording.from_arrays(columns, "simulation", known.constants, notes), tuple(diagnostics)
 
 

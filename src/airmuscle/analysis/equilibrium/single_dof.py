@@ -1,4 +1,4 @@
-"""Where plants with one coordinate are in balance, sought over the whole reach of their muscles."""
+"""Equilibria of plants with one coordinate, over the whole permitted range of their muscles."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ from .roots import balances
 from .statics import Rows, Statics
 
 GRID_POINTS = 101
-"""Places that are evaluated between the ends of the reach."""
+"""Number of points that are evaluated between the ends of the range."""
 
 
 def equilibria_of_one_coordinate(statics: Statics) -> tuple[Rows, Array]:
-    """The row of its plant and the place (1,) of every balance, by row and place; plants in balance anywhere or
-    without any place have none."""
+    """Row of the plant and coordinate (1,) of every equilibrium, sorted by row and coordinate.
+
+    Plants in equilibrium at every point of the grid, or without a permitted point, have none.
+    """
     x = grid(statics)
     line = Line(statics)
     f = line.accelerations(x)
@@ -30,7 +32,7 @@ def equilibria_of_one_coordinate(statics: Statics) -> tuple[Rows, Array]:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Line:
-    """Plants as functions of their one coordinate, at one place each (N,) or at several (N, K)."""
+    """Plants as functions of their one coordinate, at one point each (N,) or at several (N, K)."""
 
     statics: Statics
 
@@ -43,48 +45,48 @@ class Line:
         return self.statics.accelerations(x.reshape(len(x), -1, 1)).reshape(x.shape)
 
     def contractions(self, x: Array) -> list[Array]:
-        """Contraction [1] of every muscle (N, K) at places (N, K)."""
+        """Contraction of every muscle (N, K) at coordinates (N, K)."""
         return self.statics.contractions(x[..., None])
 
     def within_reach(self, x: Array) -> npt.NDArray[np.bool_]:
-        """Whether every muscle can take its contraction at places (N, K)."""
+        """Whether the contraction of every muscle is permitted at coordinates (N, K)."""
         return self.statics.within_reach(x[..., None])
 
 
 def grid(statics: Statics) -> Array:
-    """Coordinates (N, K) that every muscle can take, rising; NaN at the end of a row that has fewer."""
+    """Permitted coordinates (N, K) in ascending order; rows with fewer than K end with NaN."""
     line = Line(statics)
-    low, high, straight = _ends_where_straight(line)
+    low, high, linear = _ends_if_linear(line)
     x = np.linspace(low, high, GRID_POINTS, axis=1)
     x[~(low < high)] = np.nan
-    if straight.all():
+    if linear.all():
         return x
-    curved = np.flatnonzero(~straight)
-    part = _inside(line.of(curved))
+    nonlinear = np.flatnonzero(~linear)
+    part = _inside(line.of(nonlinear))
     rows = np.full((len(x), max(part.shape[1], GRID_POINTS)), np.nan)
     rows[:, :GRID_POINTS] = x
-    rows[curved] = np.nan
-    rows[curved, : part.shape[1]] = part
+    rows[nonlinear] = np.nan
+    rows[nonlinear, : part.shape[1]] = part
     return rows
 
 
-def _ends_where_straight(line: Line) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
-    """Both ends of the reach (N,), and whether contractions are linear functions of the coordinate."""
+def _ends_if_linear(line: Line) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+    """Both ends of the range (N,), and whether the contractions are linear functions of the coordinate."""
     size, low, high = line.statics.limits(0)
-    straight = np.ones(size.shape, dtype=bool)
+    linear = np.ones(size.shape, dtype=bool)
     at = [line.contractions(k * size) for k in (0.0, 1.0, -3.0)]
     for zero, one, other, reach in zip(*at, line.statics.contraction_limits, strict=True):
         rate = (one - zero) / size
-        straight &= np.abs(other - (zero - 3.0 * size * rate)) <= 1e-12
+        linear &= np.abs(other - (zero - 3.0 * size * rate)) <= 1e-12
         with np.errstate(divide="ignore", invalid="ignore"):
             ends = [(end - zero) / rate for end in reach]
         low = np.where(rate == 0.0, low, np.maximum(low, np.minimum(*ends)))
         high = np.where(rate == 0.0, high, np.minimum(high, np.maximum(*ends)))
-    return low[:, 0], high[:, 0], straight[:, 0]
+    return low[:, 0], high[:, 0], linear[:, 0]
 
 
 def _inside(line: Line) -> Array:
-    """Of evenly spread places those within reach, and both ends of every stretch of them; then NaN."""
+    """Permitted points of an even grid, and both ends of every interval of them; then NaN."""
     _, low, high = line.statics.limits(0)
     with np.errstate(invalid="ignore"):
         x = np.linspace(low[:, 0], high[:, 0], GRID_POINTS, axis=1)
@@ -100,7 +102,7 @@ def _inside(line: Line) -> Array:
 
 
 def _edges(line: Line, inside: Array, outside: Array) -> Array:
-    """The last place (R,) within reach between one that is and one that is not."""
+    """Last permitted coordinate (R,) between a permitted one and one that is not, by bisection."""
     for _ in range(60 if inside.size else 0):
         middle = 0.5 * (inside + outside)
         there = line.within_reach(middle[:, None])[:, 0]

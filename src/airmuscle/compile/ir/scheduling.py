@@ -14,7 +14,7 @@ ZERO = ("c", 0.0)
 
 
 @dataclasses.dataclass(frozen=True)
-class Branch:
+class ConditionalBlock:
     """Instructions that need not run where all gates are zero; what those results that others use are then."""
 
     gates: Gates
@@ -22,7 +22,7 @@ class Branch:
     instead: tuple[tuple[Operand, Operand], ...]
 
 
-Item = Instruction | Branch
+Item = Instruction | ConditionalBlock
 _Piece = tuple[Gates, bool]
 
 
@@ -114,7 +114,7 @@ class _Pieces:
             if left and not ready:
                 raise TraceError("instructions wait for each other; this is a fault of the program, please report it.")
             for (gates, _), body in ready.items():
-                items.append(Branch(gates, tuple(body), self._seen(body)))
+                items.append(ConditionalBlock(gates, tuple(body), self._seen(body)))
                 self._done.update(line.result for line in body)
             left = [line for line in left if line.result not in self._done]
         return items

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from ...core.errors import TraceError
 from ..ir.branches import COMMANDED, STEADY, VARYING, skipping
 from ..ir.instructions import Code, Instruction, Operand, Operation
-from ..ir.scheduling import Branch, Item
+from ..ir.scheduling import ConditionalBlock, Item
 from .types import DOUBLE, LlvmType
 
 FLAGS = "nsz arcp contract reassoc afn"
@@ -225,7 +225,7 @@ def append(
     block: FunctionBody, line: Item, inputs: Sequence[str], held: Mapping[Operand, int], values: dict[Operand, str]
 ) -> None:
     """Append one instruction, or some that may be skipped, and add the names of results to `values`."""
-    if isinstance(line, Branch):
+    if isinstance(line, ConditionalBlock):
         instead = {operand: value_of(block, value, inputs, held, values) for operand, value in line.instead}
         gates = [value_of(block, gate, inputs, held, values) for gate in line.gates]
         values |= block.unless_zero(gates, lambda: run(block, line.body, inputs, held, values), instead)

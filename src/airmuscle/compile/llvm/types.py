@@ -1,4 +1,4 @@
-"""What a printed value is: one number, or a row of them side by side, one for each of many plants (lanes)."""
+"""LLVM types of printed values: one number, or a vector of lanes with one number for each of many plants."""
 
 from __future__ import annotations
 

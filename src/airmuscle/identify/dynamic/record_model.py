@@ -17,7 +17,7 @@ from ...core.errors import IdentificationError, ParameterError
 from ...core.status import Status
 from ...core.system import System
 from ...simulation.integrators import Integrator
-from ...simulation.sensitivity import WithSensitivities
+from ...simulation.with_sensitivities import WithSensitivities
 from .experiment import Experiment, InitialValue, StartTime, Unknown
 from .initial_conditions import compile_conditions, solve_initial_state
 
@@ -196,7 +196,7 @@ def _add_sensitivities(
     try:
         return WithSensitivities(plant, groups, scales, names)
     except ParameterError as error:
-        raise ParameterError(f"{experiment.recording.origin}: {error}") from None
+        raise error.located(experiment.recording.origin) from None
 
 
 def stack_residuals(

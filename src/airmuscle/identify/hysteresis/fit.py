@@ -15,6 +15,7 @@ from ...core import tree
 from ...core.arrays import Array
 from ...core.declaration import model, parameter
 from ...core.errors import IdentificationError
+from ...core.hints import Hint
 from ...core.tree import Leaf
 from ...friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, PrandtlIshlinskii
 from ...recording import Recording
@@ -240,6 +241,7 @@ def _resting_length(recording: Recording) -> float:
     length = recording.constants.get("resting_length")
     if not isinstance(length, float | int):
         raise IdentificationError(
-            f"{recording.origin}: friction against shortening needs the resting length; give resting_length."
+            f"{recording.origin}: friction against shortening needs the resting length.",
+            hint=Hint("To state it", "resting_length", function="read"),
         )
     return float(length)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...characteristic.base import Characteristic
 from ...core.errors import IdentificationError
+from ...core.hints import Hint, HintedText
 from ...recording import Recording
 from ...recording.segment import (
     ISOBARIC,
@@ -150,7 +151,8 @@ def _make_loop(
     else:
         raise IdentificationError(
             f"{recording.origin}: the run is {run.kind.name}, so pressure and contraction change together and the "
-            "static curve cannot be a polynomial in one of them. Give its characteristic."
+            "static curve cannot be a polynomial in one of them.",
+            hint=Hint("To take the muscle's characteristic as the static curve", "characteristic"),
         )
     rows = _select_rows(recording, sensors, all_rows)
     direction = _directions(recording, friction_path)
@@ -177,8 +179,8 @@ def _check_two_directions(recording: Recording, direction: np.ndarray, fitted_ro
             )
             raise IdentificationError(
                 f"{recording.origin}: the {branch} branch has no rows to fit{detail}, but a loop needs a rising and a "
-                "falling branch. Give such a run, run it more slowly where its rows are not quasi-static, or set "
-                "all_rows=True."
+                "falling branch. Give such a run, or run it more slowly where its rows are not quasi-static.",
+                hint=Hint("To fit all rows", "all_rows", True),
             )
 
 
@@ -206,7 +208,7 @@ def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str
     each law.
     """
     series = make_loop_series(loop.recording, loop.static_curve, loop.friction_path, loop.fitted_rows)
-    fits, failed = list[HysteresisFit](), dict[str, str]()
+    fits, failed = list[HysteresisFit](), dict[str, HintedText]()
     for initial in initial_friction_laws(series.path[loop.fitted_rows], series.fitted_residuals(None), elements):
         name = type(initial).__name__
         if progress is not None:
@@ -221,7 +223,7 @@ def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str
                 repeat=loop.repeat,
             )
         except IdentificationError as error:
-            failed[name] = str(error)
+            failed[name] = error.message
         else:
             fits.append(fit)
     return LoopFit(loop, tuple(sorted(fits, key=lambda fit: -fit.aicc_reduction)), failed)
