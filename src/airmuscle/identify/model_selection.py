@@ -15,6 +15,7 @@ from ..recording import Recording
 from .candidates import Candidate, standard_candidates, unavailable_candidates
 from .compared_points import ComparedPoints, cause_of, residuals_of_rows
 from .cross_validation import GroupSplit, default_split, label_folds
+from .length_errors import find_length_errors, length_notes
 from .loss import LeastSquares, Loss
 from .model_evidence import aicc
 from .result import Fit
@@ -80,6 +81,9 @@ class Comparison:
     unavailable: tuple[ExcludedModel, ...] = ()
     """Standard candidates whose initial values do not follow from the data; empty if candidates were given."""
 
+    notes: tuple[str, ...] = ()
+    """Remarks on the data, such as a resting length that is probably recorded wrongly."""
+
     @property
     def purpose(self) -> str:
         """The use for which the recommended law is best; it follows from the groups that were left out."""
@@ -106,7 +110,8 @@ class Comparison:
             f"{m.cross_validated_rmse:>10.4g} N{m.aicc:>12.1f}"
             for m in self.ranking
         ]
-        notes = [f"note: {m.candidate.name}: {note}" for m in self.ranking for note in m.notes]
+        notes = [f"note: {note}" for note in self.notes]
+        notes += [f"note: {m.candidate.name}: {note}" for m in self.ranking for note in m.notes]
         excluded = [f"{word}: {e}" for word, models in self._left_out() for e in models]
         return "\n".join([title, "", head, *rows, "", self.reason, *notes, *excluded])
 
@@ -153,7 +158,8 @@ def compare(
     unavailable = tuple(ExcludedModel(name, reason, cause) for name, reason, cause in missing)
     ranking.sort(key=lambda m: (m.cross_validated_rmse, m.parameter_count))
     recommended, reason = _recommend(ranking, split)
-    return Comparison(tuple(ranking), tuple(excluded), split, recommended, reason, unavailable)
+    remarks = length_notes(find_length_errors(recommended.fit.model, runs))
+    return Comparison(tuple(ranking), tuple(excluded), split, recommended, reason, unavailable, remarks)
 
 
 def _cross_validate(candidate: Candidate, points: ComparedPoints, loss: Loss) -> RankedModel:

@@ -132,7 +132,7 @@ def _rank_deficiency(problem: FitProblem, free: npt.NDArray[np.bool_], shares: A
         f"{problem.data.origin}: the data {what} of {law} {ranks}. Number of levels: {', '.join(counts)}. Measure at "
         "more levels, or choose a lower degree or a law with fewer parameters.",
         hint=Hint("To fix one parameter", "fixed", (path,)),
-        cause=f"the data {cause} {ranks}",
+        cause=f"the data {cause} (rank {rank} of {len(labels)})",
     )
 
 
