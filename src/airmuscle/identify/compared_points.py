@@ -82,7 +82,7 @@ def cause_of(error: AirmuscleError) -> str:
     return getattr(error, "cause", "") or "the fit fails"
 
 
-class Fold(NamedTuple):
+class LeftOutGroup(NamedTuple):
     """A group of rows that is left out: its name, and the mask of its rows in each recording."""
 
     name: str
@@ -95,14 +95,14 @@ class ComparedPoints:
 
     recordings: Sequence[Recording]
     labels: Sequence[Labels]
-    folds: tuple[Fold, ...]
+    folds: tuple[LeftOutGroup, ...]
 
     @classmethod
     def from_recordings(
         cls, runs: Sequence[Recording], labels: Sequence[Labels], names: Sequence[str]
     ) -> ComparedPoints:
         """The points divided into the folds of these names."""
-        return cls(runs, labels, tuple(Fold(name, [label == name for label in labels]) for name in names))
+        return cls(runs, labels, tuple(LeftOutGroup(name, [label == name for label in labels]) for name in names))
 
     @functools.cached_property
     def points(self) -> FitPoints:
@@ -154,7 +154,7 @@ class ComparedPoints:
                 model = self._refit_exactly(candidate, fit, fold, loss)
             yield fold.name, residuals_of_rows(model, rows, self.max_force)
 
-    def _refit_exactly(self, candidate: Candidate, fit: Fit, fold: Fold, loss: Loss) -> Characteristic:
+    def _refit_exactly(self, candidate: Candidate, fit: Fit, fold: LeftOutGroup, loss: Loss) -> Characteristic:
         """The refit by a search of its own."""
         training = [
             run if not mask.any() else run.rows(~mask) for run, mask in zip(self.recordings, fold.masks, strict=True)

@@ -34,17 +34,17 @@ _MAX_BEND = 0.75
 """Maximum ratio of twice the acceleration to the step (reference: 0.75)."""
 
 
-class Basis(NamedTuple):
+class StepBasis(NamedTuple):
     """The free parameters, mask (P,), and the matrix (P, F) from an orthonormal basis to steps of all parameters."""
 
     free: BoolArray
     directions: Array
 
 
-class Start(NamedTuple):
+class FirstStep(NamedTuple):
     """Known quantities at the start of an iteration: the basis, the first step in it (F,) and the sum of squares."""
 
-    basis: Basis
+    basis: StepBasis
     step: Array
     sum_of_squares: float
 
@@ -64,14 +64,14 @@ class _Point(NamedTuple):
 class _Linearisation(NamedTuple):
     """The basis, the weighted Jacobian in it (N, F), the normal matrix (F, F) and the gradient (F,)."""
 
-    basis: Basis
+    basis: StepBasis
     columns: Array
     normal: Array
     gradient: Array
 
 
 def gauss_newton(
-    problem: FitProblem, start: Array, known: Start | None = None, relative_step: float = RELATIVE_STEP
+    problem: FitProblem, start: Array, known: FirstStep | None = None, relative_step: float = RELATIVE_STEP
 ) -> tuple[Array, Array, Array] | None:
     """The parameters (P,) of least squares near `start`, with the fitted quantity (N,) and its Jacobian (N, P) there.
 
@@ -113,7 +113,7 @@ def _evaluate(problem: FitProblem, values: Array) -> _Point:
     return _Point(inside, modelled, problem.residuals(modelled))
 
 
-def _linearise(problem: FitProblem, point: _Point, jacobian: Array, basis: Basis | None) -> _Linearisation | None:
+def _linearise(problem: FitProblem, point: _Point, jacobian: Array, basis: StepBasis | None) -> _Linearisation | None:
     """The normal equations in the given basis, or in a new one where other parameters are free or the normal matrix is
     nearly singular; None for redundant parameters."""
     matrix = (problem.weights * problem.active_rows(point.modelled))[:, None] * jacobian
@@ -156,7 +156,7 @@ def _damped_step(
     return None
 
 
-def _bounded_step(step: Array, inverse: Array, basis: Basis, low: Array, high: Array) -> tuple[Array, Array]:
+def _bounded_step(step: Array, inverse: Array, basis: StepBasis, low: Array, high: Array) -> tuple[Array, Array]:
     """The step (F,) with the least square of which no parameter leaves its bounds, and the projection (F, F) onto the
     steps that keep the parameters on a bound there."""
     projection, fixed = np.eye(step.size), np.zeros(low.size, dtype=bool)
@@ -187,7 +187,7 @@ def held_on_bounds(problem: FitProblem, values: Array, gradient: Array) -> BoolA
         return np.asarray(((values - low <= margin) & (gradient >= 0)) | ((high - values <= margin) & (gradient <= 0)))
 
 
-def orthonormal_basis(matrix: Array, free: BoolArray) -> Basis | None:
+def orthonormal_basis(matrix: Array, free: BoolArray) -> StepBasis | None:
     """The basis in which the free columns of a matrix (N, P) are orthonormal; None for redundant columns."""
     norms = np.linalg.norm(matrix[:, free], axis=0)
     if matrix.shape[0] < norms.size or not norms.size or not (norms > 0).all():
@@ -197,7 +197,7 @@ def orthonormal_basis(matrix: Array, free: BoolArray) -> Basis | None:
         return None
     directions = np.zeros((free.size, norms.size))
     directions[free] = np.linalg.inv(triangle) / norms[:, None]
-    return Basis(free, directions)
+    return StepBasis(free, directions)
 
 
 def normal_equations(matrix: Array, residuals: Array) -> tuple[Array, Array]:

@@ -16,8 +16,8 @@ from ..core.arrays import Array
 from .censored_least_squares import RANK_TOLERANCE
 from .gauss_newton import (
     MIN_EIGENVALUE,
-    Basis,
-    Start,
+    StepBasis,
+    FirstStep,
     gauss_newton,
     held_on_bounds,
     normal_equations,
@@ -91,7 +91,7 @@ class GroupRefits:
         lowest = float(np.linalg.eigvalsh(np.tensordot(counts, self._sums.uncensored, 1))[0])
         return lowest > MIN_EIGENVALUE and np.sqrt(lowest) * self._smallest > _RANK_MARGIN * RANK_TOLERANCE
 
-    def _solve_linear(self, counts: Array, step: Array, basis: Basis) -> Array | None:
+    def _solve_linear(self, counts: Array, step: Array, basis: StepBasis) -> Array | None:
         """Newton steps of the one-sided squares: the rows whose bound is violated are those of the previous step."""
         problem, solution = self._problem, self._solution
         if not problem.censoring.any():
@@ -117,7 +117,7 @@ class GroupRefits:
         drawn = repeats > 0
         problem = self._problem.rows(drawn)
         problem = dataclasses.replace(problem, weights=problem.weights * np.sqrt(repeats[drawn]))
-        start = Start(self._basis, step, float(counts @ self._sums.squares))
+        start = FirstStep(self._basis, step, float(counts @ self._sums.squares))
         found = gauss_newton(problem, self._solution.values, start, RELATIVE_STEP)
         return None if found is None else found[0]
 
