@@ -16,8 +16,8 @@ from ..core.arrays import Array
 from .censored_least_squares import RANK_TOLERANCE
 from .gauss_newton import (
     MIN_EIGENVALUE,
-    StepBasis,
     FirstStep,
+    StepBasis,
     gauss_newton,
     held_on_bounds,
     normal_equations,
