@@ -9,9 +9,11 @@ Each name is imported from its package when it is first used (PEP 562), so that 
 from __future__ import annotations
 
 import importlib as _importlib
-import typing as _typing
 
-if _typing.TYPE_CHECKING:
+TYPE_CHECKING = False  # known to type checkers; `typing` takes longer to import than the rest of this file
+if TYPE_CHECKING:
+    import typing as _typing
+
     from . import (
         analysis as analysis,
     )

@@ -101,5 +101,6 @@ def test_the_command_line_weighs_by_sensor_unless_told(tmp_path):
         for more in ((), ("--equal-weights",))
     ]
     assert [any("test rigs with different sensors" in note for note in each) for each in notes] == [True, False]
+    assert any(note.endswith("To weight all rows equally, use --equal-weights.") for note in notes[0])
     page = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
     assert "sigma=1.0" not in page

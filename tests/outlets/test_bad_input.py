@@ -151,7 +151,7 @@ def test_a_data_set_is_known_by_a_unique_beginning_and_brings_its_units(tmp_path
     result = CliRunner().invoke(app, ["fit", "dmsp-20", *surface, "--out", str(tmp_path / "fit"), "--json"])
     assert json.loads(result.stdout)["rows_used"] == len(load_data(MUSCLE))
     said = refused(tmp_path, "fit", MUSCLE, *surface, "--unit", "pressure=psi", "--out", tmp_path / "other")
-    assert said == f"{MUSCLE}: a data set of the library contains its units and constants; omit units."
+    assert said == f"{MUSCLE}: a data set of the library contains its units and constants; omit --unit."
     said = refused(tmp_path, "fit", "dmps-20-300", *surface, "--out", tmp_path / "other")
     assert re.fullmatch(rf"no data set 'dmps-20-300'; there are .* Did you mean '{MUSCLE}'\?", said)
 
@@ -354,7 +354,7 @@ BOX = "min_pressure = 0\nmax_pressure = 6e5\nmin_contraction = 0\nmax_contractio
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("validity_range = 3", r"\[validity_range\] is 3; it must be a table"),
+        ("validity_range = 3", r"\[validity_range\] is 3; it must be a table. Write its limits in it: min_pressure, max_pressure, min_contraction, max_contraction\.$"),
         (f"[validity_range]\n{BOX.replace('0.25', '25')}", r"\[validity_range\]: ValidityRange.max_contraction .* is 25; allowed range: -0.5 to 1"),
         (f"[validity_range]\n{BOX.replace('min_pressure = 0', 'min_pressure = -3e5', 1)}", r"\[validity_range\]: .* is -300000 Pa"),
         (f'[validity_range]\nmodel = "Braid"\n{BOX}', r"\[validity_range\]: Braid has no parameter 'min_pressure'"),

@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
+import airmuscle as airmuscle_package
 from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.cli.app import COMMANDS, app
 from airmuscle.cli.cite import as_bibtex
@@ -504,7 +505,7 @@ def test_reproduce_prints_the_claims_and_names_the_report_last(tmp_path: Path):
     assert result.exit_code == 0, "a claim that differs is a result, not a failure"
     assert result.stdout.splitlines()[-1] == f"report: {tmp_path / 'report' / 'report.html'}"
     assert re.search(r"Saga 2007 +rings +4 +5 +✗ differs", result.stdout)
-    assert "2 claims: 0 holds, 1 differs, 1 not printed" in result.stdout
+    assert "\n2 claims: 1 differs, 1 not printed\n" in result.stdout
     assert [c["verdict"] for c in json.loads((tmp_path / "report" / "claims.json").read_text())] == [
         "differs",
         "not printed",
@@ -566,14 +567,22 @@ def test_every_example_of_the_help_is_valid_toml_where_it_names_a_file():
 
 # Interruptions
 
+PATHS = {**os.environ, "PYTHONPATH": str(Path(airmuscle_package.__file__).parents[1])}
+
 SLOW_IMPORT = """
 import importlib.abc, signal, sys, time
-from airmuscle.cli import main
+from airmuscle.__main__ import main
+
+class Destroyed:
+    def __del__(self):
+        time.sleep(60)
 
 class SlowFinder(importlib.abc.MetaPathFinder):
     def find_spec(self, name, path, target=None):
         if name == MODULE:
             print("importing", flush=True)
+            if KIND == "discarded by a destructor":
+                return Destroyed() and None
             try:
                 time.sleep(60)
             except KeyboardInterrupt:
@@ -591,9 +600,33 @@ main()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="SIGINT cannot be sent to one process")
-@pytest.mark.parametrize("kind", ["module", "extension", "exception discarded"])
+@pytest.mark.parametrize("kind", ["module", "extension", "exception discarded", "discarded by a destructor"])
 @pytest.mark.parametrize("module", ["typer", "airmuscle.cli.app", "airmuscle.cli.solve", "rich.table"])
 def test_an_interrupted_import_is_one_line_and_exit_code_130(module: str, kind: str):
+    assert_interrupted(module, kind)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="SIGINT cannot be sent to one process")
+@pytest.mark.parametrize("module", ["airmuscle.cli", "airmuscle.cli.entry_point", "airmuscle.cli.interruption"])
+def test_an_interruption_before_the_handler_is_installed_is_no_traceback(module: str):
+    assert_interrupted(module, "module")
+
+
+def test_the_entry_point_imports_nothing_before_interruptions_are_handled():
+    code = "import sys; before = set(sys.modules); import airmuscle.__main__; print(*(set(sys.modules) - before))"
+    done = subprocess.run([sys.executable, "-S", "-c", code], capture_output=True, text=True, timeout=60, env=PATHS)
+    assert done.returncode == 0, done.stderr
+    loaded = set(done.stdout.split())
+    assert {name for name in loaded if name.startswith("airmuscle")} == {"airmuscle", "airmuscle.__main__"}
+    assert not loaded & {"typing", "re", "signal", "enum", "contextlib", "threading"}
+
+
+def test_the_console_script_calls_this_entry_point():
+    project = tomllib.loads((Path(__file__).resolve().parents[2] / "pyproject.toml").read_text(encoding="utf-8"))
+    assert project["project"]["scripts"] == {"airmuscle": "airmuscle.__main__:main"}
+
+
+def assert_interrupted(module: str, kind: str) -> None:
     command = [sys.executable, "-c", SLOW_IMPORT, module, kind]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert "importing\n" in iter(process.stdout.readline, "")

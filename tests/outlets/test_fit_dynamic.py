@@ -274,7 +274,7 @@ REFUSED = {
         f'free = [{VALVES}, "gas.exponent", "muscle.damper.damping"]\nown = ["circuit.supply.pressure"]\n'
         'start_time = "50 ms"\n',
         "",
-        'no parameter is free. Name at least one: free = ["circuit.fill.conductance"] under [fit]',
+        'no parameter is free; at least one is required. To name one, for example, write free = ["circuit.fill.conductance"] under [fit].',
     ),
 }
 

@@ -16,7 +16,6 @@ from airmuscle import load_data
 from airmuscle.characteristic import ContractileSurface, Sarosi2012
 from airmuscle.characteristic.validity_range import ValidityRange
 from airmuscle.cli.app import app
-from airmuscle.cli.remedies import in_options
 from airmuscle.identify import (
     LevelSplit,
     bootstrap,
@@ -156,39 +155,7 @@ def test_a_law_that_data_can_start_needs_no_entry(tmp_path):
     assert json.loads(result.stdout)["rmse"] == pytest.approx(0.5, rel=0.2)
 
 
-# Remedies
-
-
-@pytest.mark.parametrize(
-    ("said", "option"),
-    [
-        ("fix one: fixed=('geometry.radius',).", "fix one: --fix 'geometry.radius'."),
-        ("or a lower degree, or fix parameters with fixed=.", "or a lower degree, or fix parameters with --fix."),
-        (
-            "or pass the correct unit with units={'pressure': ...}.",
-            "or pass the correct unit with --unit 'pressure=...'.",
-        ),
-        (
-            "bound; censoring=UNCENSORED treats them as measured values.",
-            "bound; --uncensored treats them as measured values.",
-        ),
-        ("or resample by LevelSplit('contraction').", "or use --leave-out contraction."),
-        (
-            "or leave out LevelSplit('contraction') or LevelSplit('pressure').",
-            "or use --leave-out contraction or --leave-out pressure.",
-        ),
-        ("force, or give the range with censoring=.", "force, or treat the rows as measured values with --uncensored."),
-        ("give censoring=Censoring() if the muscle was slack", "omit --uncensored if the muscle was slack"),
-        ("sigma=1.0 weights all rows equally.", "--equal-weights weights all rows equally."),
-        ("the decimal sign: decimal=','.", 'the decimal sign: decimal = "," in a --mapping file.'),
-        ("resting length; give resting_length.", "resting length; give --resting-length."),
-        ("or set all_rows=True.", "or use --all-rows."),
-        ("Name at least one: free=('a.b',).", 'Name at least one: free = ["a.b"] under [fit].'),
-        ("nothing of ours: x=1", "nothing of ours: x=1"),
-    ],
-)
-def test_a_remedy_is_in_the_words_of_the_command_line(said, option):
-    assert in_options(said) == option
+# Hints
 
 
 def test_the_report_names_options_too(tmp_path):
@@ -196,7 +163,7 @@ def test_the_report_names_options_too(tmp_path):
     assert (recording["force"] == 0).any()
     airmuscle("fit", tmp_path / "bench.csv", *SURFACE, "--out", tmp_path / "fit")
     page = (tmp_path / "fit" / "report.html").read_text("utf-8")
-    assert "--uncensored treats them as measured values" in page
+    assert "To treat them as measured values, use --uncensored." in page
     assert "censoring=" not in page
 
 

@@ -356,7 +356,9 @@ def test_a_mapping_overrides_the_unit_row(tmp_path: Path):
 
 def test_a_table_without_headings_is_mapped_by_numbers(tmp_path: Path):
     np.savetxt(tmp_path / "run.txt", TABLE, delimiter="\t")
-    assert "map the columns by their numbers" in refusal(ColumnError, tmp_path / "run.txt")
+    assert "To map columns by their numbers, use columns={1: 'pressure [kPa]', 2: 'force [N]'} of read." in refusal(
+        ColumnError, tmp_path / "run.txt"
+    )
     same(only(read(tmp_path / "run.txt", columns=dict(enumerate(HEADINGS, 1)))))
     np.savetxt(tmp_path / "blanks.txt", TABLE)
     same(only(read(tmp_path / "blanks.txt", columns=dict(enumerate(HEADINGS, 1)), delimiter=" ")))
@@ -364,7 +366,7 @@ def test_a_table_without_headings_is_mapped_by_numbers(tmp_path: Path):
 
 def test_a_given_decimal_sign_resolves_thousands_separators(tmp_path: Path):
     (tmp_path / "run.csv").write_text("force [N];length [mm]\n1.234,5;290,5\n2.000;280\n")
-    assert "specify the decimal sign: decimal=','" in refusal(ColumnError, tmp_path / "run.csv")
+    assert "To specify the decimal sign, use decimal=',' of read." in refusal(ColumnError, tmp_path / "run.csv")
     assert only(read(tmp_path / "run.csv", decimal=","))["force"] == pytest.approx([1234.5, 2000.0])
 
 

@@ -17,7 +17,7 @@ from typer.core import TyperGroup
 
 from ..core.errors import AirmuscleError, AirmuscleWarning, printable, suggestion
 from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
-from .remedies import in_options
+from .option_hints import in_options
 from .terminal import echo
 
 SETTINGS: dict[str, Any] = {
@@ -90,18 +90,18 @@ class LazyCommands(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         with warnings.catch_warnings():
             warnings.simplefilter("always", AirmuscleWarning)
-            warnings.showwarning = functools.partial(_show_warning, warnings.showwarning)
-            with _exit_codes(), _printable_usage_errors(), deferred_sigint():
+            warnings.showwarning = functools.partial(_show_warning, ctx, warnings.showwarning)
+            with _exit_codes(ctx), _printable_usage_errors(), deferred_sigint():
                 return super().invoke(ctx)
 
 
 @contextlib.contextmanager
-def _exit_codes() -> Iterator[None]:
+def _exit_codes(ctx: Any) -> Iterator[None]:
     """Turn errors into one line on stderr and an exit code."""
     try:
         yield
     except AirmuscleError as error:
-        echo(f"error: {in_options(str(error))}", err=True)
+        echo(f"error: {in_options(error.message, ctx.invoked_subcommand)}", err=True)
         raise typer.Exit(1) from None
     except BrokenPipeError:
         raise
@@ -124,11 +124,12 @@ def _printable_usage_errors() -> Iterator[None]:
 
 
 def _show_warning(
-    show_other: Any, message: Warning | str, category: type[Warning], *location: Any, **options: Any
+    ctx: Any, show_other: Any, message: Warning | str, category: type[Warning], *location: Any, **options: Any
 ) -> None:
     """Print one line for a warning of airmuscle; other warnings are shown with their location in the code."""
     if issubclass(category, AirmuscleWarning):
-        echo(f"warning: {in_options(str(message))}", err=True)
+        text = message.args[0] if isinstance(message, Warning) else message
+        echo(f"warning: {in_options(text, ctx.invoked_subcommand)}", err=True)
     else:
         show_other(message, category, *location, **options)
 

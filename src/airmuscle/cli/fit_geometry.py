@@ -96,4 +96,4 @@ def _braid(size: BraidSize, resting_length: float) -> Braid:
     try:
         return Braid(size.radius, size.angle, resting_length)
     except ParameterError as error:
-        raise ParameterError(f"--braid: {error}") from None
+        raise error.located("--braid") from None

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import signal
+import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 INTERRUPTED = 130
@@ -27,9 +29,10 @@ def deferred_sigint() -> Iterator[None]:
     if handler not in (signal.default_int_handler, _receive):
         yield
         return
-    outermost = handler is not _receive
+    outermost, report_unraisable = handler is not _receive, sys.unraisablehook
     if outermost:
         _received.clear()
+        sys.unraisablehook = functools.partial(_report_unraisable, report_unraisable)
         signal.signal(signal.SIGINT, _receive)
     try:
         yield
@@ -40,6 +43,7 @@ def deferred_sigint() -> Iterator[None]:
     finally:
         if outermost:
             signal.signal(signal.SIGINT, signal.default_int_handler)
+            sys.unraisablehook = report_unraisable
             _received.clear()
 
 
@@ -47,6 +51,12 @@ def check_interrupted() -> None:
     """Raise KeyboardInterrupt if SIGINT was received within a block; long computations call this repeatedly."""
     if _received.is_set():
         raise KeyboardInterrupt
+
+
+def _report_unraisable(report: Callable[[Any], Any], discarded: Any) -> None:
+    """Report an exception that Python discards, unless it is an interruption, which the end of the block raises."""
+    if not issubclass(discarded.exc_type, KeyboardInterrupt):
+        report(discarded)
 
 
 def _receive(number: int, frame: Any) -> None:

@@ -7,6 +7,7 @@ import enum
 from collections.abc import Iterator, Mapping
 
 from .arrays import Array
+from .hints import Hint, HintedText
 
 
 class DiagnosticCode(enum.StrEnum):
@@ -16,6 +17,7 @@ class DiagnosticCode(enum.StrEnum):
     MODEL = "model"
     CONTROLLER = "controller"
     EXTRAPOLATION = "extrapolation"
+    FRICTION_EXTRAPOLATION = "friction extrapolation"
     GEOMETRY_LIMIT = "geometry limit"
     COMPONENT = "component"
     INCOMPLETE = "incomplete"
@@ -29,17 +31,24 @@ class Diagnostic:
     subject  what it is about: a muscle, a component, the run
     text     the remark, a sentence without its full stop
     rows     how many rows of the recording it concerns; 0 where it concerns the result as a whole
-    hint     what to do about it; empty where there is nothing to do
+    hint     what to do about it, a Hint if it is an argument of a function; empty where there is nothing to do
     """
 
     code: DiagnosticCode
     subject: str
     text: str
     rows: int = 0
-    hint: str = ""
+    hint: str | Hint = ""
+
+    @property
+    def message(self) -> str:
+        """The remark, and the hint as a sentence after it; a HintedText if the hint is a Hint."""
+        if isinstance(self.hint, Hint):
+            return HintedText(f"{self.text}.", self.hint)
+        return f"{self.text}. {self.hint}" if self.hint else self.text
 
     def __str__(self) -> str:
-        return f"{self.text}. {self.hint}" if self.hint else self.text
+        return str(self.message)
 
 
 class Columns(Mapping[str, Array]):

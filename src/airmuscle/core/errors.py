@@ -23,7 +23,9 @@ from __future__ import annotations
 import difflib
 import unicodedata
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, Self
+
+from .hints import Hint, HintedText
 
 
 def printable(text: str) -> str:
@@ -44,10 +46,32 @@ def _escape(character: str) -> str:
 
 
 class AirmuscleError(Exception):
-    """Base class of all exceptions of airmuscle; a message may quote a file, so control characters are escaped."""
+    """Base class of all exceptions of airmuscle; a message may quote a file, so control characters are escaped.
 
-    def __init__(self, message: str = "") -> None:
-        super().__init__(printable(str(message)))
+    message  location, cause and allowed values; a HintedText keeps its hints
+    hint     the remedy, if it is an argument of a public function; it becomes the last sentence of the message
+    """
+
+    def __init__(self, message: str = "", *, hint: Hint | None = None) -> None:
+        text = message if isinstance(message, HintedText) else HintedText(str(message))
+        super().__init__(HintedText(text, *([] if hint is None else [hint])).changed(printable))
+
+    @property
+    def message(self) -> HintedText:
+        """The message with its hints."""
+        text = self.args[0]
+        return text if isinstance(text, HintedText) else HintedText(str(text))
+
+    @property
+    def hint(self) -> Hint | None:
+        """The first hint of the message, or None."""
+        return next(iter(self.message.hints), None)
+
+    def located(self, location: object) -> Self:
+        """The same error, with hints and partial results, whose message begins with a location."""
+        error = type(self)(HintedText(f"{location}: ", self.message))
+        error.__dict__.update(self.__dict__)
+        return error
 
 
 class AirmuscleWarning(UserWarning):
@@ -99,7 +123,14 @@ class TraceError(AirmuscleError):
 
 
 class IdentificationError(AirmuscleError):
-    """The data cannot determine the requested quantities."""
+    """The data cannot determine the requested quantities.
+
+    cause  the cause alone, in one phrase for tables; empty if there is none
+    """
+
+    def __init__(self, message: str = "", *, hint: Hint | None = None, cause: str = "") -> None:
+        super().__init__(message, hint=hint)
+        self.cause = printable(cause)
 
 
 class SimulationError(AirmuscleError):

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.errors import IdentificationError, ParameterError
+from ..core.hints import Hint, HintedText
 from ..recording import Recording
 
 Labels = npt.NDArray[np.str_]
@@ -58,13 +59,15 @@ class SpecimenSplit(GroupSplit):
     purpose: ClassVar[str] = "other muscles of the same type"
 
     def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
-        return [np.full(len(run), self._specimen_name(run)) for run in recordings]
+        return [np.full(len(run), specimen_name(run)) for run in recordings]
 
-    def _specimen_name(self, run: Recording) -> str:
-        if "specimen" in run.constants:
-            return str(run.constants["specimen"])
-        length = run.constants.get("resting_length")
-        return run.origin if length is None else f"{float(length) * 1e3:.6g} mm"
+
+def specimen_name(run: Recording) -> str:
+    """The constant `specimen`, or else the resting length in mm, or the origin of the recording."""
+    if "specimen" in run.constants:
+        return str(run.constants["specimen"])
+    length = run.constants.get("resting_length")
+    return run.origin if length is None else f"{float(length) * 1e3:.6g} mm"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -135,9 +138,11 @@ def label_folds(recordings: Sequence[Recording], leave_out: GroupSplit) -> tuple
     names = [name for name in names if name != ALWAYS_FITTED]
     if len(names) < 2:
         raise IdentificationError(
-            f"{recordings[0].origin if recordings else 'no recording'}: cross-validation needs two groups or more, but "
-            f"all rows belong to one {leave_out.group_name}. Give more runs, or leave out LevelSplit('contraction') or "
-            "LevelSplit('pressure')."
+            HintedText(
+                f"{recordings[0].origin if recordings else 'no recording'}: cross-validation needs two groups or more, "
+                f"but all rows belong to one {leave_out.group_name}. Give more runs.",
+                *(Hint(f"To leave out levels of {n}", "leave_out", LevelSplit(n)) for n in ("contraction", "pressure")),
+            )
         )
     return labels, names
 

@@ -14,10 +14,11 @@ from ..characteristic.base import Characteristic, ContractionLaw, ForceLaw, Pres
 from ..core import autodiff, tree
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError, suggestion
+from ..core.hints import Hint
 from ..core.tree import Leaf
 from ..recording import Recording
 from ..recording.columns import QUANTITIES
-from .censoring import Censoring
+from .censoring import UNCENSORED, Censoring
 
 RESTING_LENGTH = "resting_length"
 """Column with the resting length [m] of every row, in data of several specimens."""
@@ -256,11 +257,14 @@ def _check_row_count(law: Characteristic, data: Recording, free: int, measured: 
     if len(data) and not measured:
         raise IdentificationError(
             f"{name}: all {censored} rows are censored (at zero force, or at the limit of the force range), so there "
-            "is no measured value. Give rows with a positive force, or give the range with censoring=."
+            "is no measured value. Give rows with a positive force.",
+            hint=Hint("To treat them as measured values", "censoring", UNCENSORED, constant="UNCENSORED"),
         )
     if measured < free:
         also = f" ({censored} further rows are censored and give bounds only)" if censored else ""
         raise IdentificationError(
             f"{name} has {free} free parameters, but only {measured} rows are measured values{also}. Measure more "
-            "points, choose a law with fewer parameters or a lower degree, or fix parameters with fixed=."
+            "points, or choose a law with fewer parameters or a lower degree.",
+            hint=Hint("To fix parameters", "fixed"),
+            cause=f"{free} parameters, but {measured} measured values",
         )

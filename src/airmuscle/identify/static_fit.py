@@ -12,9 +12,10 @@ from ..characteristic.base import Characteristic
 from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
+from ..core.hints import Hint, HintedText
 from ..recording import Recording
 from .branch_residuals import branch_notes
-from .censoring import Censoring
+from .censoring import UNCENSORED, Censoring, default_censoring
 from .correlation_index import correlation_index
 from .fit_points import POINT_COLUMNS, FitPoints
 from .gauss_newton import gauss_newton
@@ -57,6 +58,19 @@ def fit(
     """
     _check_types(characteristic, recording)
     points = FitPoints.from_recordings(recording)
+    return fit_to_points(characteristic, points, loss=loss, censoring=censoring, sigma=sigma, fixed=fixed)
+
+
+def fit_to_points(
+    characteristic: Characteristic,
+    points: FitPoints,
+    *,
+    loss: Loss = LeastSquares(),
+    censoring: Censoring | None = None,
+    sigma: npt.ArrayLike | None = None,
+    fixed: Collection[str] = (),
+) -> Fit:
+    """As `fit`, for points whose sensors and runs are estimated once for several laws."""
     problem = points.problem(characteristic, censoring=censoring, sigma=sigma, fixed=fixed)
     solution = solve(problem, loss)
     statistics = compute_statistics(problem, solution, loss)
@@ -109,8 +123,11 @@ def _weighting_notes(by_recording: Array | None, problem: FitProblem) -> list[st
         return []
     unit = "" if problem.fitted_quantity.unit == "1" else f" {problem.fitted_quantity.unit}"
     return [
-        "The recordings come from test rigs with different sensors: rows are weighted by standard deviations of "
-        f"{min(by_recording):.3g} to {max(by_recording):.3g}{unit}; sigma=1.0 weights all rows equally."
+        HintedText(
+            "The recordings come from test rigs with different sensors: rows are weighted by standard deviations of "
+            f"{min(by_recording):.3g} to {max(by_recording):.3g}{unit}.",
+            Hint("To weight all rows equally", "sigma", 1.0),
+        )
     ]
 
 
@@ -170,17 +187,20 @@ def _build_estimates(
     )
 
 
-def _collect_notes(problem: FitProblem, statistics: FitStatistics, loss: Loss, dropped: int) -> tuple[str, ...]:
-    """Remarks on the data and the fit that affect its interpretation, as sentences."""
-    notes = []
+def _row_notes(problem: FitProblem, statistics: FitStatistics, dropped: int) -> list[str]:
+    """Remarks on rows that are dropped, censored, or at zero force without being censored."""
+    notes: list[str] = []
     censored = int(np.count_nonzero(problem.censoring))
     at_zero = int(np.count_nonzero((problem.data["force"] <= 0) & (problem.censoring == 0)))
     if dropped:
         notes.append(f"{dropped} rows with a missing value (NaN) were dropped.")
     if censored:
         notes.append(
-            f"{censored} rows are censored (at zero force, or at the limit of the force range) and contribute only "
-            "where the law violates their bound; censoring=UNCENSORED treats them as measured values."
+            HintedText(
+                f"{censored} rows are censored (at zero force, or at the limit of the force range) and contribute only "
+                "where the law violates their bound.",
+                Hint("To treat them as measured values", "censoring", UNCENSORED, constant="UNCENSORED"),
+            )
         )
     if statistics.uncensored_rank < statistics.rank:
         notes.append(
@@ -188,10 +208,16 @@ def _collect_notes(problem: FitProblem, statistics: FitStatistics, loss: Loss, d
             "are limited only by the bounds of the censored rows, and the law is as close to these as possible."
         )
     if at_zero:
-        notes.append(
-            f"{at_zero} rows at zero force or below are treated as measured values; give censoring=Censoring() if the "
-            "muscle was slack there."
-        )
+        slack = Hint("To treat them as censored, if the muscle was slack there", "censoring", Censoring())
+        can_be_slack = default_censoring(problem.law) != UNCENSORED
+        text = f"{at_zero} rows at zero force or below are treated as measured values."
+        notes.append(HintedText(text, *([slack] if can_be_slack else [])))
+    return notes
+
+
+def _collect_notes(problem: FitProblem, statistics: FitStatistics, loss: Loss, dropped: int) -> tuple[str, ...]:
+    """Remarks on the data and the fit that affect its interpretation, as sentences."""
+    notes = _row_notes(problem, statistics, dropped)
     notes += _length_notes(problem)
     notes += [
         f"{name} is on its bound; its value is not determined by the data."

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..characteristic.base import Characteristic
 from ..characteristic.validity_range import ValidityRange
+from ..core.declaration import parameters
 from ..core.errors import ParameterError, suggestion
 from ..friction.base import Friction
 from ..geometry.base import Geometry
@@ -69,8 +70,10 @@ def build_entry(tables: Mapping[str, Any], name: str, file: Path, folder: Path) 
 
 
 def _build_validity_range(table: Any, location: Location) -> Any:
-    named = {"model": "ValidityRange", **table} if isinstance(table, Mapping) else table
-    return check_type(build(named, location), ValidityRange, location)
+    if not isinstance(table, Mapping):
+        keys = ", ".join(declared.name for declared in parameters(ValidityRange))
+        raise ParameterError(f"{location} is {table!r}; it must be a table. Write its limits in it: {keys}.")
+    return check_type(build({"model": "ValidityRange", **table}, location), ValidityRange, location)
 
 
 def _read_check(table: Mapping[str, Any], location: Location) -> Check:

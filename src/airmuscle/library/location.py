@@ -35,7 +35,7 @@ def located_errors(location: Location | str) -> Iterator[None]:
     try:
         yield
     except AirmuscleError as error:
-        raise type(error)(f"{location}: {error}") from None
+        raise error.located(location) from None
 
 
 def check_keys(table: Mapping[str, Any], known: Sequence[str], location: Location) -> None:

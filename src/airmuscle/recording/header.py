@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 
 from ..core.errors import ColumnError, UnitError
+from ..core.hints import Hint
 from ..core.units import conversion
 from .heading import parse_heading
 
@@ -32,8 +33,8 @@ def missing_header_error(location: str) -> ColumnError:
     """The error for numbers in the place of the heading row."""
     return ColumnError(
         f"{location}: the heading row is missing. Insert a row above the numbers with name and unit of each column, "
-        "such as 'pressure [kPa], contraction [%], force [N]', or map the columns by their numbers: "
-        "columns={1: 'pressure [kPa]', 2: 'force [N]'}."
+        "such as 'pressure [kPa], contraction [%], force [N]'.",
+        hint=Hint("To map columns by their numbers", "columns", {1: "pressure [kPa]", 2: "force [N]"}, "read"),
     )
 
 

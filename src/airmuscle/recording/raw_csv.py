@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.errors import ColumnError, FileError
+from ..core.hints import Hint
 from .file_kind import check_text_file
 from .table import Cells, RawTable
 from .text_format import (
@@ -109,6 +110,6 @@ def _check_decimal_sign(origin: str, body: NumberedLines, rows: list[list[str]])
         (line, cell), (other, example) = first_use[","], first_use["."]
         raise ColumnError(
             f"{origin}, line {line}: the comma in '{cell}' is ambiguous, because line {other} contains a decimal point "
-            f"('{example}'). Write all numbers with the same decimal sign and without thousands separators, or specify "
-            "the decimal sign: decimal=','."
+            f"('{example}'). Write all numbers with the same decimal sign and without thousands separators.",
+            hint=Hint("To specify the decimal sign", "decimal", ",", function="read"),
         )

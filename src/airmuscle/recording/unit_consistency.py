@@ -13,6 +13,7 @@ import numpy as np
 
 from ..core.constants import STANDARD_GRAVITY
 from ..core.errors import AirmuscleWarning, UnitError
+from ..core.hints import Hint
 from ..core.units import conversion
 from .columns import quantity_of
 from .recording import Recording
@@ -63,7 +64,8 @@ def _compare(name: str, first: Recording, second: Recording) -> None:
         raise UnitError(
             f"{first.origin} states the {name} in {unit} and {second.origin} in {other_unit}, but the numbers have the "
             f"same magnitude (up to {written:.4g} and {other_written:.4g}): one of the two units is wrong. Correct it "
-            f"in the file, or pass the correct unit with units={{'{name}': ...}}."
+            "in the file.",
+            hint=Hint("To state the unit", "units", {name: ...}),
         )
     both = f"{first.origin} (up to {written:.4g} {unit}) and {second.origin} (up to {other_written:.4g} {other_unit})"
     comparable = name.rpartition(".")[2] in ("pressure", "length")

@@ -77,8 +77,7 @@ class Solution:
         """The solution itself; raises SimulationError, which carries it, where the run ended early."""
         if self.complete:
             return self
-        message = str(self.diagnostics[-1])
-        raise SimulationError(message, self, interrupted=self.status == Status.INTERRUPTED)
+        raise SimulationError(self.diagnostics[-1].message, self, interrupted=self.status == Status.INTERRUPTED)
 
     def to_pandas(self) -> pd.DataFrame:
         """The recording as a data frame."""

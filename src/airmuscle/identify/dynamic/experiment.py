@@ -11,6 +11,7 @@ from ...compile import System
 from ...control.inputs import InputSignal, check_input_signal
 from ...core import tree
 from ...core.errors import ParameterError, suggestion
+from ...core.hints import Hint
 from ...recording import Recording
 from ...recording.recording import column_heading
 from .initial_conditions import InitialConditions
@@ -119,7 +120,8 @@ def make_unknowns(
                 unknowns.append(_plant_unknown(experiment.plant or plant, target, i, bounds))
     names = [u.name for u in unknowns]
     if not unknowns:
-        raise ParameterError("no parameter is free. Name at least one: free=('circuit.fill.conductance',).")
+        example = Hint("To name one, for example", "free", ("circuit.fill.conductance",))
+        raise ParameterError("no parameter is free; at least one is required.", hint=example)
     for name in bounds:
         if name not in {u.name.partition(" of record")[0] for u in unknowns}:
             raise ParameterError(f"bounds are given for '{name}', which is not free; free are {', '.join(names)}.")

@@ -196,7 +196,7 @@ def _add_sensitivities(
     try:
         return WithSensitivities(plant, groups, scales, names)
     except ParameterError as error:
-        raise ParameterError(f"{experiment.recording.origin}: {error}") from None
+        raise error.located(experiment.recording.origin) from None
 
 
 def stack_residuals(

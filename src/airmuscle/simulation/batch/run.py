@@ -166,8 +166,7 @@ def _segments(
             segments.check_shape(len(compiled.description.input_names), start)
             check_input_range(compiled, segments, start)
         except ParameterError as error:
-            where = "" if isinstance(input, InputSignal) else f"inputs, row {row}: "
-            raise ParameterError(f"{where}{error}") from None
+            raise (error if isinstance(input, InputSignal) else error.located(f"inputs, row {row}")) from None
         known[id(one)] = segments
     each = tuple(known[id(one)] for one in signals)
     return each * count if isinstance(input, InputSignal) else each

@@ -86,7 +86,7 @@ def _check_row(row: int, part: Any) -> None:
     try:
         part.check()
     except ParameterError as error:
-        raise ParameterError(f"variations, row {row}: {error}") from None
+        raise error.located(f"variations, row {row}") from None
 
 
 def _checking(thing: Any) -> Iterator[Any]:
