@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from called_controller import Called
 from plants import chosen_muscle
 
 from airmuscle.control import (
     PID,
     PWM,
-    Controller,
     ControlLoop,
     OnOffController,
     Periodic,
@@ -95,25 +95,8 @@ def test_disturbances_differ():
         assert_rows_are(batch, row, alone(LIFT, loop), ["pressure", "discharge"])
 
 
-@dataclasses.dataclass(frozen=True)
-class Called(Controller):
-    """A controller that is no control law."""
-
-    inner: Controller = PI
-
-    measured_columns = property(lambda self: self.inner.measured_columns)
-    setpoints = property(lambda self: self.inner.setpoints)
-    inputs = property(lambda self: self.inner.inputs)
-
-    def init(self) -> Any:
-        return self.inner.init()
-
-    def step(self, memory: Any, measurement: Any, dt: float) -> Any:
-        return self.inner.step(memory, measurement, dt)
-
-
 def test_a_controller_that_is_called_from_python():
-    loop = ControlLoop(Called(), 0.0125, STEPS, drivers=PULSES)
+    loop = ControlLoop(Called(PI), 0.0125, STEPS, drivers=PULSES)
     masses = np.array([1.0, 2.0])
     batch = simulate_batch(LIFT, {"mechanism.mass": masses}, loop, duration=0.75, output_times=TIMES)
     for row, mass in enumerate(masses):

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from called_controller import Called
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plants import chosen_muscle
@@ -20,7 +21,6 @@ from airmuscle.control import (
     PID,
     PWM,
     ControlLaw,
-    Controller,
     ControlLoop,
     OnOffController,
     SampledSignal,
@@ -51,23 +51,6 @@ DRIVERS = {
     "pulsed and delayed": {"fill": (PULSES, SOLENOID), "discharge": (PWM(31.0), SOLENOID)},
     "one of two": {"discharge": (PULSES, SOLENOID)},
 }
-
-
-@dataclasses.dataclass(frozen=True)
-class Called(Controller):
-    """A controller that calls another one, and is therefore no control law."""
-
-    inner: Controller
-
-    measured_columns = property(lambda self: self.inner.measured_columns)
-    setpoints = property(lambda self: self.inner.setpoints)
-    inputs = property(lambda self: self.inner.inputs)
-
-    def init(self) -> Any:
-        return self.inner.init()
-
-    def step(self, memory: Any, measurement: Any, dt: float) -> Any:
-        return self.inner.step(memory, measurement, dt)
 
 
 def both(problem: Problem):

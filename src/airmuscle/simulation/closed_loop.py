@@ -99,7 +99,7 @@ class CalledRun:
         return self._sampled(1, len(self._ranges))
 
     def _sampled(self, kind: int, width: int) -> Array:
-        return np.array([sample[kind] for sample in self.samples], dtype=float).reshape(-1, width)
+        return np.array([sample[kind] for sample in self.samples], dtype=float).reshape(len(self.samples), width)
 
     def integrate(self) -> None:
         """Sample and integrate from edge to edge, until the end or until an interval fails."""
