@@ -13,8 +13,8 @@ from ..pneumatics.gas import Air, Ambient, Gas, gauge_pressure
 class MuscleState(NamedTuple):
     """One muscle at one instant: contraction [1], shortening speed [m/s], volume [m3], pressures [Pa], forces [N].
 
-    `inner_contraction` and `inner_speed` are those of the contractile part, which behind a series spring differ from
-    the fittings'. `states` are the muscle's own and those of its air, by their own names; `rates` those of the former.
+    `inner_contraction` and `inner_speed` belong to the contractile part; with a series spring they differ from those of
+    the fittings. `states` are the states of the muscle and of its air, without prefix; `rates` the rates of the former.
     """
 
     contraction: Value
