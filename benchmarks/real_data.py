@@ -21,7 +21,7 @@ import pandas as pd
 from airmuscle.core.errors import IdentificationError
 from airmuscle.identify import BlockSplit, SpecimenSplit, compare, fit
 from airmuscle.identify.candidates import Candidate, blank_surface, standard_candidates
-from airmuscle.identify.model_selection import force_residuals
+from airmuscle.identify.compared_points import force_residuals
 from airmuscle.recording import Recording
 
 NAME = re.compile(r"_cut(\d+)cm_held([\d.]+)cm_test(\d+)\.csv$")

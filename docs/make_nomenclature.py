@@ -15,6 +15,7 @@ WORDS = Path(__file__).with_name("words.toml")
 
 ARGUMENTS = {
     "air_states": "air states (pressure, temperature) of the muscles of a circuit, or of the segments of a tube",
+    "at": "evaluation of a plant: muscles, circuits, forces and accelerations at one state",
     "air": "air state: absolute pressure and temperature",
     "inlet": "air state at the supply",
     "flow": "inflow: mass flow [kg/s] and enthalpy flow [W]",
@@ -50,6 +51,8 @@ ARGUMENTS = {
     "name": "name of an entry, a column or a component",
     "names": "several names",
     "name_or_path": "name of a library entry, or path of a file in the same format",
+    "file_name": "pattern of values in the names of files",
+    "time_base": "meaning of the time column of a file: recorded, uniform or none",
     "path": "path of a file to read or to write",
     "recording": "a measured or simulated run",
     "characteristic": "static relation between pressure, contraction and force",

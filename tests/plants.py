@@ -42,6 +42,7 @@ from airmuscle.mechanism import (
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import (
     CreepElements,
+    CubicSeriesSpring,
     CubicSpring,
     DirectionalDamper,
     EndStop,
@@ -122,15 +123,22 @@ EXAMPLES = {
     "series spring with a stop": of(
         series=SeriesSpring(1e5), stop=STOP, damper=DirectionalDamper(300.0, 150.0, 1e-3, 0.0)
     ),
+    "hardening series spring": of(series=CubicSeriesSpring(5e4, 2e-3), damper=DirectionalDamper(300.0, 150.0, 1e-3, 0.0)),
     "swelling wall": of(wall=SwellingWall(4e-5, 2e5, 3e4, 0.05)),
     # friction
     "Dahl": of(friction=friction.Dahl(5e4, 20.0)),
     "LuGre": of(friction=friction.LuGre(5e4, 15.0, 5.0, 0.01, 50.0, 20.0)),
+    "pressure-scaled friction": of(
+        friction=friction.IdentifiedFriction(
+            friction.PressureScaledFriction(friction.Dahl(5e4, 20.0), 0.3, 3e5), 1e5, 4e5, 0.05
+        )
+    ),
     "Bouc-Wen": of(friction=friction.BoucWen(5e4, 20.0, 1.7, 0.8)),
     "Maxwell slip": of(friction=friction.MaxwellSlip(*SLIPS)),
     "Prandtl-Ishlinskii": of(friction=friction.PrandtlIshlinskii(*SLIPS, (8.0, -8.0), (0.5, -0.5))),
     # circuits
     "polytropic": fed(TWO_VALVES, gas=Polytropic(1.3)),
+    "real gas": fed(TWO_VALVES, gas=pneumatics.VirialGas()),
     "heat": fed(TWO_VALVES),
     "closed": fed(pneumatics.ClosedChamber()),
     "held and let go": Plant(chosen_muscle(), TWO_VALVES, WithLatch(HangingMass(10.0))),

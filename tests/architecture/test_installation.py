@@ -16,33 +16,43 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-LOCK = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+LOCKS = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("requirements.lock", "requirements-dev.lock")}
+both = pytest.mark.parametrize("lock", LOCKS.values(), ids=LOCKS)
 
 
 # The lock
 
 
-def requirements() -> list[str]:
-    """The requirements of the lock, each with its hashes."""
-    return re.split(r"(?<!\\)\n", LOCK.strip())
+def requirements(lock: str) -> list[str]:
+    """The requirements of a lock, each with its hashes."""
+    return re.split(r"(?<!\\)\n", lock.strip())
 
 
-def test_the_lock_contains_no_address():
-    assert not re.search(r"://|^\s*-(-index|-extra|-find|-trusted|i|f)\b|@ ", LOCK, re.MULTILINE)
+@both
+def test_the_lock_contains_no_address(lock: str):
+    assert not re.search(r"://|^\s*-(-index|-extra|-find|-trusted|i|f)\b|@ ", lock, re.MULTILINE)
     assert [path.name for path in ROOT.iterdir() if re.fullmatch(r"uv\.lock|pylock.*\.toml", path.name)] == []
 
 
-def test_every_requirement_is_pinned_and_hashed():
-    for entry in requirements():
+@both
+def test_every_requirement_is_pinned_and_hashed(lock: str):
+    for entry in requirements(lock):
         assert re.match(r"[a-z0-9-]+==\S+ ", entry), entry
         assert re.search(r"--hash=sha256:[0-9a-f]{64}", entry), entry
 
 
-def test_the_lock_contains_all_dependencies_of_the_project():
+@pytest.mark.parametrize(("lock", "extra"), [("requirements.lock", "build"), ("requirements-dev.lock", "dev")])
+def test_the_lock_contains_all_dependencies_of_the_project(lock: str, extra: str):
     project = PROJECT["project"]
-    required = project["dependencies"] + project["optional-dependencies"]["dev"]
-    locked = {entry.split("==")[0] for entry in requirements()}
+    required = project["dependencies"] + project["optional-dependencies"][extra]
+    locked = {entry.split("==")[0] for entry in requirements(LOCKS[lock])}
     assert {re.split(r"[^\w.-]", line)[0].lower() for line in required} <= locked
+
+
+def test_the_program_is_installed_without_the_packages_of_the_checks():
+    program, everything = (set(requirements(lock)) for lock in LOCKS.values())
+    assert program < everything
+    assert not {"pytest", "mypy", "ruff", "hypothesis", "dask"} & {entry.split("==")[0] for entry in program}
 
 
 def test_the_citation_and_the_package_state_the_same_version():
@@ -62,7 +72,7 @@ def checkout(tmp_path: Path) -> Path:
     """A copy of `run` and of the files that it reads, with an environment that appears complete."""
     folder = tmp_path / "a folder with spaces"
     (folder / ".venv" / "bin").mkdir(parents=True)
-    for name in ("run", "pyproject.toml", "requirements.lock"):
+    for name in ("run", "pyproject.toml", *LOCKS):
         (folder / name).write_bytes((ROOT / name).read_bytes())
     (folder / ".venv" / "bin" / "python").symlink_to(sys.executable)
     (folder / ".venv" / "airmuscle.stamp").write_bytes(b"".join(load_run(folder).stamp()))
@@ -105,11 +115,35 @@ def test_an_unknown_command_gives_one_line(checkout: Path):
 
 
 @needs_posix
-@pytest.mark.parametrize("changed", ["pyproject.toml", "requirements.lock"])
+@pytest.mark.parametrize("changed", ["pyproject.toml", *LOCKS])
 def test_a_changed_project_or_lock_invalidates_the_stamp(checkout: Path, changed: str):
     with (checkout / changed).open("a") as file:
         file.write("\n# changed\n")
     assert load_run(checkout).read(str(checkout / ".venv" / "airmuscle.stamp")) != b"".join(load_run(checkout).stamp())
+
+
+@needs_posix
+def test_a_demo_and_the_program_do_not_need_the_packages_of_the_checks(checkout: Path):
+    run, stamp = load_run(checkout), checkout / ".venv" / "airmuscle.stamp"
+    stamp.write_bytes(b"".join(run.stamp()[:2]))
+    assert run.installed(everything=False)
+    assert not run.installed(everything=True)
+    stamp.write_bytes(b"".join(run.stamp()))
+    assert run.installed(everything=False)
+
+
+@needs_posix
+@pytest.mark.parametrize("everything", [False, True])
+def test_an_installation_uses_the_locks_that_the_command_needs(
+    checkout: Path, monkeypatch: pytest.MonkeyPatch, everything: bool
+):
+    run, called = load_run(checkout), []
+    (checkout / ".venv" / "airmuscle.stamp").write_bytes(b"old")
+    monkeypatch.setattr(subprocess, "call", lambda command, **settings: called.append(command[-1]))
+    assert run.install(everything) is None
+    locks = ["requirements.lock", "requirements-dev.lock"] if everything else ["requirements.lock"]
+    assert [Path(name).name for name in called[1:-1]] == locks
+    assert run.installed(everything)
 
 
 @needs_posix

@@ -17,7 +17,16 @@ from airmuscle.compile.functions import trace_system
 from airmuscle.control.inputs import Schedule
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import ParameterError
-from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
+from airmuscle.friction import (
+    BoucWen,
+    Dahl,
+    IdentifiedFriction,
+    LuGre,
+    MaxwellSlip,
+    NoFriction,
+    PrandtlIshlinskii,
+    PressureScaledFriction,
+)
 from airmuscle.mechanism import HangingMass
 from airmuscle.mechanism.base import Coordinate, Mechanism
 from airmuscle.plant.energy_balance import WithEnergyMeters
@@ -178,3 +187,25 @@ def test_friction_acts_against_the_tension_and_a_muscle_still_never_pushes():
     assert muscle.tension(3e5, 0.05) == bare
     assert muscle.tension(3e5, 0.05, 0.0, {"bristle": 4e-4}) == pytest.approx(bare - 20.0)
     assert muscle.tension(0.0, 0.05, 0.0, {"bristle": 4e-4}) == 0.0
+
+
+def test_the_friction_of_a_plant_is_the_law_s_own_times_the_scale_at_its_pressure():
+    law = Dahl(5e4, 20.0)
+    scaled = PressureScaledFriction(law, 0.2, 3e5)
+    run = loops_of(scaled)
+    replayed = law.force_along(run["position"])
+    expected = (0.2 + 0.8 * run["pressure"] / 3e5) * replayed
+    assert np.ptp(run["pressure"]) > 1e5
+    assert np.abs(run["friction"] - expected).max() < 0.02 * np.abs(expected).max()
+
+
+def test_a_run_says_that_it_left_the_pressure_and_the_speed_of_the_data_of_its_friction():
+    run = loops_of(IdentifiedFriction(Dahl(5e4, 20.0), 1.6e5, 1.7e5, 1e-4), 4.0)
+    notes = [note for note in run.notes if "the range of the data of its friction" in note]
+    assert len(notes) == 2
+    assert "in pressure (160 to 170 kPa)" in notes[0]
+    assert "in speed (-0.0001 to 0.0001 m/s)" in notes[1]
+    np.testing.assert_allclose(run["shortening_speed"], run["speed"], atol=1e-12)
+    inside = loops_of(IdentifiedFriction(Dahl(5e4, 20.0), 0.0, 1e6, 10.0), 4.0)
+    assert not any("its friction" in note for note in inside.notes)
+    assert "shortening_speed" not in loops_of(Dahl(5e4, 20.0), 0.1).columns

@@ -117,11 +117,22 @@ def test_a_view_of_a_live_array_is_pointed_at(without_numba):
     given = arguments()
     bound = Kernel("evaluate").bind(*given)
     width = given[2].shape[1]
-    bound.point(2, given[2].ctypes.data + 8 * width * 2, 3)
-    bound.point(3, given[3].ctypes.data + 8 * given[3].shape[1] * 2, 3)
+    bound.point(2, (given[2].ctypes.data + 8 * width * 2, given[3].ctypes.data + 8 * given[3].shape[1] * 2), 3)
     bound()
     assert np.array_equal(given[-1][:3], expected()[2:5])
     assert not given[-1][3:].any()
+
+
+def test_a_view_of_a_live_array_is_pointed_at_by_numba_too(monkeypatch):
+    monkeypatch.setattr(Kernel, "entry", lambda self, kinds: None)
+    given = arguments()
+    bound = Kernel("evaluate").bind(*given)
+    items = [8 * table.shape[1] for table in given[2:5]]
+    bound.point(2, [table.ctypes.data + 2 * size for table, size in zip(given[2:5], items, strict=True)], 3)
+    bound()
+    assert np.array_equal(given[-1][2:5], expected()[2:5])
+    assert not given[-1][:2].any()
+    assert not given[-1][5:].any()
 
 
 def test_no_row_is_no_work(without_numba):

@@ -124,12 +124,13 @@ def computed(items: Any, leaves: dict[Operand, float]) -> tuple[Values, int]:
     return values, count
 
 
-def test_random_code_gives_the_same_with_branches(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("graphs", [GRAPHS // 5, pytest.param(GRAPHS, marks=pytest.mark.slow)])
+def test_random_code_gives_the_same_with_branches(monkeypatch: pytest.MonkeyPatch, graphs: int) -> None:
     """However little a branch saves; with part of the results early, as the rates of a stage are, or none."""
     monkeypatch.setattr("airmuscle.compile.ir.branches.WORTH", 1)
     monkeypatch.setattr("airmuscle.compile.ir.branches.WORTH_OF_CHOICES", 1)
     rng, skipped = random.Random(1), 0
-    for _ in range(GRAPHS):
+    for _ in range(graphs):
         code = drawn(rng)
         early = {rng.choice(code.body).result}  # with all that they need
         for line in reversed(code.body):
@@ -145,7 +146,7 @@ def test_random_code_gives_the_same_with_branches(monkeypatch: pytest.MonkeyPatc
                 found, fewer = computed(items, leaves)
                 skipped += count - fewer
                 assert [found[o] for _, _, o in code.outputs] == [expected[o] for _, _, o in code.outputs]
-    assert skipped > GRAPHS
+    assert skipped > graphs
 
 
 def plant(circuit: Any) -> Plant:

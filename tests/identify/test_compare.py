@@ -8,6 +8,7 @@ back to the same numbers.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -244,3 +245,26 @@ def test_a_ranked_law_that_is_slack_at_measured_points_says_so():
     assert note.startswith("it is slack at 2 of 54 points with a positive force and is ranked with zero force there")
     assert f"note: Hunt2017: {note}" in str(comparison)
     assert comparison["surface of degree 2"].notes == ()
+
+
+def test_the_progress_of_a_comparison_has_an_end():
+    steps = []
+    compare(bench(), CANDIDATES, leave_out=RunSplit(), progress=lambda name, fraction: steps.append((name, fraction)))
+    assert steps == [(c.name, i / 4) for i, c in enumerate(CANDIDATES)] + [("", 1.0)]
+
+
+def test_each_law_that_is_left_out_has_one_line_with_its_cause():
+    text = str(compare(bench(), CANDIDATES, leave_out=RunSplit()))
+    (line,) = [each for each in text.splitlines() if each.startswith("excluded")]
+    assert line.startswith("excluded: surface of degree 6: without run 0.000, the data cannot separate ")
+    assert line.endswith("(rank 27 of 28).")
+    assert len(line) <= 120
+
+
+def test_laws_that_need_a_length_are_named_where_none_is_stated():
+    runs = [dataclasses.replace(run, constants={}) for run in bench()]
+    found = compare(runs, leave_out=RunSplit())
+    causes = {each.name: each.cause for each in found.unavailable}
+    assert causes["TonduLopez2000"] == "not every recording states its resting length"
+    assert "not compared: TonduLopez2000: not every recording states its resting length." in str(found).splitlines()
+    assert compare(runs, CANDIDATES[1:2], leave_out=RunSplit()).unavailable == ()

@@ -6,6 +6,8 @@ minimum is that of a fit with its own search. Derivatives on whole arrays are th
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,9 @@ from airmuscle.identify import Candidate, RunSplit, bootstrap, compare
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.fit_points import FitPoints
 from airmuscle.identify.gauss_newton import gauss_newton
+from airmuscle.identify.group_refits import GroupRefits
 from airmuscle.identify.problem import fitted_quantity_of
+from airmuscle.identify.solver import LeastSquaresSolution, solve, solve_iteratively
 from airmuscle.identify.static_fit import refit
 from airmuscle.identify.variable_projection import find_initial_values
 from airmuscle.recording import Recording
@@ -111,3 +115,57 @@ def test_a_comparison_states_the_errors_of_plain_fits():
     error = model.force(runs[0]["pressure"], runs[0]["contraction"]) - runs[0]["force"]
     rows = runs[0]["force"] > 0
     assert found.fold_scores[0].rmse == pytest.approx(float(np.sqrt(np.mean(error[rows] ** 2))), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_refits_without_a_group_are_searches_on_the_other_rows(name):
+    """All folds from one Jacobian: the minimum of each is that of a search of its own."""
+    runs = bench()
+    fit = am.fit(LAWS[name], runs)
+    problem, values = fit.problem, fit.values
+    solution = LeastSquaresSolution(values, problem.predict(values), problem.jacobian(values))
+    group = np.repeat(np.arange(8), [len(each) for each in runs])
+    refits = GroupRefits(problem, solution, group, 8)
+    for left_out in (1, 6):
+        found = refits.refit(1.0 - np.eye(8)[left_out])
+        training = problem.rows(group != left_out)
+        plain = solve(training, fit.loss).values
+        assert found is not None
+        assert training.predict(found) == pytest.approx(
+            training.predict(plain), rel=1e-5, abs=1e-5 * problem.target.max()
+        )
+
+
+def test_a_group_that_alone_determines_a_parameter_has_no_certain_refit():
+    runs = [each for each in bench() if each.constants["resting_length"] == 0.3][:2]
+    fit = am.fit(blank_surface(1), runs)
+    solution = LeastSquaresSolution(fit.values, fit.modelled, fit.problem.jacobian(fit.values))
+    held = dataclasses.replace(fit.problem, data=fit.problem.data.with_columns(contraction=np.repeat([0.0, 0.06], 60)))
+    exact = LeastSquaresSolution(fit.values, held.predict(fit.values), held.jacobian(fit.values))
+    assert GroupRefits(fit.problem, solution, np.repeat([0, 1], 60), 2).refit(np.ones(2)) is not None
+    assert GroupRefits(held, exact, np.repeat([0, 1], 60), 2).refit(np.array([1.0, 0.0])) is None
+
+
+def test_a_curved_valley_with_a_bound_is_followed_to_its_minimum():
+    """Two lengths and a law of one: radius, angle and end correction change together, until k reaches 1."""
+    runs = bench(rows=200)
+    fit = am.fit(LAWS["braid"], runs)
+    chosen = fit.problem.rows(np.repeat(np.array([1, 1, 0, 1, 0, 1, 0, 1], dtype=bool), 200))
+    plain = solve_iteratively(chosen, fit.loss, fit.values)
+    found = gauss_newton(chosen, fit.values)
+    assert found is not None
+    assert float(np.sum(chosen.residuals(found[1]) ** 2)) == pytest.approx(
+        float(np.sum(chosen.residuals(plain.modelled) ** 2)), rel=1e-6
+    )
+
+
+@pytest.mark.parametrize("name", ["surface", "family", "effective length"])
+def test_a_rescaled_surface_is_the_same_law_on_another_validity_range(name):
+    law = am.fit(LAWS[name], bench()).model
+    smaller = law.rescaled((1e5, 5e5), (0.03, 0.15))
+    pressure, contraction = np.meshgrid(np.linspace(1e5, 5e5, 7), np.linspace(0.04, 0.14, 7))
+    expected = law.unclamped_force(pressure, contraction)
+    assert smaller.unclamped_force(pressure, contraction) == pytest.approx(
+        expected, rel=1e-9, abs=1e-9 * expected.max()
+    )
+    assert smaller.unclamped_force(8e5, 0.0) != pytest.approx(float(law.unclamped_force(8e5, 0.0)))

@@ -16,7 +16,7 @@ from airmuscle.control.inputs import Schedule
 from airmuscle.core import autodiff
 from airmuscle.mechanism import Isometric
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.pneumatics import FillDischarge, Supply, Valve, VirialGas
 from airmuscle.pneumatics.gas import (
     GAS_CONSTANT,
     SPECIFIC_HEAT_CONSTANT_PRESSURE,
@@ -36,7 +36,7 @@ WARM, SUPPLY = AMBIENT.temperature, 650e3
 VALVE = Valve(1e-8, 0.3)
 CONTRACTION = 0.05
 VOLUME = chosen_muscle().geometry.volume(CONTRACTION)
-PROCESSES = [Isothermal(), Polytropic(1.2), Polytropic(1.4)]
+PROCESSES = [Isothermal(), Polytropic(1.2), Polytropic(1.4), VirialGas(), VirialGas(2e-3)]
 
 
 def vessel(gas, ambient=AMBIENT):
@@ -183,3 +183,25 @@ def test_the_slope_of_the_stored_energy_is_the_pressure(gas):
     mass, volume = 2e-4, 9e-5
     (by_volume,) = autodiff.jvp(lambda x: [gas.energy(mass, x[0], AMBIENT)], [volume], [1.0])
     assert -by_volume == pytest.approx(gas.pressure(mass, volume, AMBIENT), rel=1e-12)
+
+
+def test_the_virial_gas_follows_the_van_der_waals_equation_and_without_coefficient_the_ideal_gas():
+    """p = rho R T/(1 - b rho) - a rho^2 per unit mass of nitrogen; the third virial coefficient b^2 is left out."""
+    a, b = 0.1370 / 0.028013**2, 3.87e-5 / 0.028013
+    for absolute in (1e5, 6.5e5):
+        density = VirialGas().air_mass(absolute, 1.0, AMBIENT)
+        nitrogen = 8.314463 / 0.028013  # the relation to the ideal gas is compared, whose constant is that of air
+        waals = density * nitrogen * WARM / (1 - b * density) - a * density**2
+        ideal = density * nitrogen * WARM
+        assert VirialGas().pressure(density, 1.0, AMBIENT) == pytest.approx(absolute, rel=1e-14)
+        assert absolute / (density * GAS_CONSTANT * WARM) - 1 == pytest.approx(
+            waals / ideal - 1, abs=(b * density) ** 2 * 1.1
+        )
+        assert VirialGas(0.0).air_mass(absolute, 1.0, AMBIENT) == Isothermal().air_mass(absolute, 1.0, AMBIENT)
+
+
+def test_the_speed_of_sound_of_the_virial_gas_is_the_slope_of_its_pressure():
+    gas = VirialGas(2e-3)
+    slope = (gas.pressure(8.001, 1.0, AMBIENT) - gas.pressure(7.999, 1.0, AMBIENT)) / 0.002
+    air = Air(gas.pressure(8.0, 1.0, AMBIENT), WARM)
+    assert gas.sound_speed(air) == pytest.approx(np.sqrt(slope), rel=1e-8)

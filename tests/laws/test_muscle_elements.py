@@ -23,6 +23,7 @@ from airmuscle.mechanism import HangingMass, Isometric
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import (
     CreepElements,
+    CubicSeriesSpring,
     DirectionalDamper,
     EndStop,
     LinearDamper,
@@ -209,11 +210,12 @@ def in_series(stiffness=2e5, **parts):
     return replace(chosen_muscle(), series=SeriesSpring(stiffness), **parts)
 
 
+@pytest.mark.parametrize("series", [SeriesSpring(2e5), CubicSeriesSpring(5e4, 1e-3)])
 @pytest.mark.parametrize("contraction", [-0.02, 0.0, 0.1, 0.2])
 @pytest.mark.parametrize("p", [-2e4, 0.0, 2e5, 5e5])
 @pytest.mark.parametrize("stop", [None, STOP])
-def test_a_series_spring_at_rest_holds_what_the_contractile_part_pulls(contraction, p, stop):
-    muscle = in_series(**({"stop": stop} if stop else {}))
+def test_a_series_spring_at_rest_holds_what_the_contractile_part_pulls(contraction, p, stop, series):
+    muscle = replace(in_series(**({"stop": stop} if stop else {})), series=series)
     inner = muscle.steady_state(p, contraction)["inner_contraction"]
     stretch = (inner - contraction) * 0.2
     assert muscle.series.force(stretch) == pytest.approx(muscle.static_force(p, inner), abs=1e-6)
@@ -242,6 +244,15 @@ def test_a_stiff_series_spring_tends_to_the_rigid_muscle():
     apart = [np.abs(course - courses[0]).max() for course in courses[1:]]
     assert apart[0] > 1e-4
     assert apart[1] / apart[0] == pytest.approx(0.1, rel=0.15)
+
+
+def test_a_cubic_series_spring_doubles_its_force_at_the_hardening_stretch_and_never_pushes():
+    spring = CubicSeriesSpring(5e4, 2e-3)
+    assert [spring.force(s) for s in (-1e-3, 0.0, 2e-3)] == [0.0, 0.0, 200.0]
+    for stretch in (1e-4, 2e-3, 5e-3):
+        slope = (spring.force(stretch + 1e-8) - spring.force(stretch - 1e-8)) / 2e-8
+        assert spring.tangent_stiffness(stretch) == pytest.approx(slope, rel=1e-6)
+    assert CubicSeriesSpring(5e4, 10.0).force(1e-3) == pytest.approx(SeriesSpring(5e4).force(1e-3), rel=1e-7)
 
 
 def test_a_slack_series_spring_pulls_nothing_and_pushes_nothing():

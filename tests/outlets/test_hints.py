@@ -34,6 +34,7 @@ from airmuscle.identify.hysteresis import find_loops, fit_loop
 from airmuscle.library.location import located_errors
 from airmuscle.recording import Recording, read, read_csv
 from airmuscle.recording.csv_writer import write_csv
+from airmuscle.recording.time_base import NoTime
 
 SOURCE = Path(am.__file__).parent
 SAROSI = Sarosi2012(1.2e-4, 420.0, -57.0, -8.7e-3, 2.7e-3, -310.0)
@@ -41,6 +42,7 @@ SURFACE = ("--characteristic", "ContractileSurface", "--degree")
 VALUES = {
     "fixed": ("wall_thickness",), "sigma": 1.0, "by": LevelSplit("contraction"), "leave_out": LevelSplit("pressure"),
     "units": {"pressure": ...}, "columns": {1: "pressure [kPa]"}, "decimal": ",", "resting_length": ...,
+    "constants": {"length": "73.2 mm"}, "file_name": "held{length [mm]}", "time_base": NoTime(), "ordered": False,
     "all_rows": True, "characteristic": ..., "censoring": ..., "free": ("circuit.fill.conductance",), "": ...,
 }  # fmt: skip
 """A value of every argument that a hint of the source names."""
@@ -238,7 +240,7 @@ CASES: dict[str, tuple[Callable[[Path], Path], Callable[[Path], Any], tuple[Any,
     "no headings": (
         lambda path: text_file(path, NO_HEADINGS), read, ("hysteresis",),
         "use columns={1: 'pressure [kPa]', 2: 'force [N]'} of read.",
-        'write columns = { 1 = "pressure [kPa]", 2 = "force [N]" } in a --mapping file.'),
+        'use --column "1=pressure [kPa]" --column "2=force [N]".'),
     "no headings, inspected": (
         lambda path: text_file(path, NO_HEADINGS), read, ("inspect",),
         "use columns={1: 'pressure [kPa]', 2: 'force [N]'} of read.",
@@ -251,7 +253,7 @@ CASES: dict[str, tuple[Callable[[Path], Path], Callable[[Path], Any], tuple[Any,
         "use resting_length=... of read.", 'To state it, use --resting-length "...".'),
     "one branch": (
         lambda path: sweep(path, (0.0, 0.15), (3e5, 3e5), 0.3), loops, ("hysteresis",),
-        "use all_rows=True.", "To fit all rows, use --all-rows."),
+        "use all_rows=True.", "To fit all rows, if only the length changes quickly, use --all-rows."),
     "pressure and length together": (
         lambda path: sweep(path, RISE_AND_FALL, (1e5, 6e5, 1e5)), loops, ("hysteresis",),
         "use characteristic=....", "use --muscle NAME with --use-characteristic."),
@@ -283,14 +285,13 @@ def test_two_files_that_disagree_name_the_option_for_the_unit(tmp_path: Path):
     assert "To state the unit, use --unit 'pressure=...'." in in_one_line(result.stderr)
 
 
-def test_a_mapping_that_is_written_as_the_message_says_is_read(tmp_path: Path):
+def test_options_that_are_given_as_the_message_says_are_taken(tmp_path: Path):
     file = text_file(tmp_path / "bench.csv", NO_HEADINGS)
-    said = in_one_line(airmuscle("hysteresis", file, "--out", tmp_path / "out").stderr)
-    written = re.search(r"write (columns = .*) in a --mapping file", said)
-    assert written is not None
-    mapping = text_file(tmp_path / "rig.toml", written[1].replace("}", ', 3 = "contraction [%]" }'))
-    (recording,) = read(file, mapping=mapping)
-    assert recording["pressure"] == pytest.approx([1e3, 2e3])
+    said = in_one_line(airmuscle("inspect", file).stderr)
+    columns = re.findall(r'--column "(.*?)"', said)
+    assert columns == ["1=pressure [kPa]", "2=force [N]"]
+    given = [part for column in (*columns, "3=contraction [%]") for part in ("--column", column)]
+    assert airmuscle("inspect", file, *given).exit_code == 0
 
 
 def test_notes_of_a_fit_name_options_in_text_and_json_and_arguments_in_python(tmp_path: Path):

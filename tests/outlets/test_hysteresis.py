@@ -6,6 +6,7 @@ where only the pressure moved, nothing is written. A run that does not come back
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import json
 from pathlib import Path
@@ -16,17 +17,20 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.friction import MaxwellSlip
-from airmuscle.identify.hysteresis import PressurePath, find_holds, find_loops
+from airmuscle.identify.hysteresis import PressurePath, find_holds, find_loops, fit_loop
 from airmuscle.identify.hysteresis.plot import plot_loops
 from airmuscle.library.catalogue import load
 from airmuscle.library.location import Location
 from airmuscle.recording import Recording, read
 from airmuscle.recording.csv_writer import write_csv
+from airmuscle.recording.segment import motion_direction
+from airmuscle.report.hysteresis_chapter import hysteresis_chapters
 from airmuscle.scenario.scenario import build_muscle
 
 SLIP = MaxwellSlip((2e4, 1e4, 3e3), (3e-4, 1.2e-3, 5e-3))
 TURNS = (0.02, 0.14, 0.08, 0.12, 0.05, 0.14, 0.02)
 MUSCLE = "dmsp-20-300"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 LENGTH = ("--resting-length", "300 mm")
 
 
@@ -34,16 +38,16 @@ def airmuscle(*arguments):
     return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
 
 
-def loop(path: Path, seed: int, friction: MaxwellSlip | None = SLIP, turns=TURNS, rows=150) -> Path:
-    """A loop of contraction at 300 kPa with minor loops, held at its end, as the muscle of the library would pull."""
+def loop(path: Path, seed: int, friction: MaxwellSlip | None = SLIP, turns=TURNS, rows=150, pressure=3e5) -> Path:
+    """A loop of contraction at constant pressure with minor loops, held at its end, as the muscle of the library would pull."""
     moving = [np.linspace(a, b, rows) for a, b in itertools.pairwise(turns)]
     contraction = np.concatenate([*moving, np.full(40, turns[-1])])
     rng, count = np.random.default_rng(seed), contraction.size
-    force = load(MUSCLE).characteristic.force(3e5, contraction) + 0.5 * rng.standard_normal(count)
+    force = load(MUSCLE).characteristic.force(pressure, contraction) + 0.5 * rng.standard_normal(count)
     if friction is not None:
         force = force - friction.force_along((contraction - contraction[0]) * 0.3)
     columns = {
-        "time": 0.2 * np.arange(count), "pressure": 3e5 + 50.0 * rng.standard_normal(count),
+        "time": 0.2 * np.arange(count), "pressure": pressure + 50.0 * rng.standard_normal(count),
         "contraction": contraction, "force": force,
     }  # fmt: skip
     write_csv(Recording(columns, path.name), path)
@@ -70,8 +74,8 @@ def test_the_friction_of_two_loops_enters_the_muscle_file(two, tmp_path):
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert all(word in page for word in ("minor loops", "Friction laws", "MaxwellSlip", "second run at the same level"))
     shown = airmuscle("show", tmp_path / "out" / "muscle.toml")
-    assert "friction MaxwellSlip" in shown.stdout
-    assert "friction.stiffnesses[0]" in shown.stdout
+    assert "friction IdentifiedFriction" in shown.stdout
+    assert "friction.inner.stiffnesses[0]" in shown.stdout
 
 
 def test_without_a_muscle_the_friction_stands_in_a_table_that_a_plant_takes(two, tmp_path):
@@ -85,7 +89,56 @@ def test_without_a_muscle_the_friction_stands_in_a_table_that_a_plant_takes(two,
     assert found["models"][0]["repeat_rmse"] is None, "one run has no second"
     table = tomllib.loads((tmp_path / "friction.toml").read_text(encoding="utf-8"))
     muscle = build_muscle({"library": MUSCLE, **table}, Location("scenario.toml", "plant.muscle", tmp_path))
-    assert type(muscle.friction).__name__ == found["recommended"]
+    assert type(muscle.friction.inner).__name__ == found["recommended"]
+
+
+def test_friction_that_grows_with_pressure_is_written_once_for_all_runs_and_runs_in_simulate(tmp_path):
+    files = [
+        loop(tmp_path / f"{pressure}.csv", 3, MaxwellSlip((factor * 2e4, factor * 1e4), (3e-4, 1.2e-3)), TURNS[:3], 150,
+             pressure)
+        for pressure, factor in ((3e5, 1.0), (4e5, 1.25), (5e5, 1.5))
+    ]  # fmt: skip
+    out = tmp_path / "out"
+    result = airmuscle("hysteresis", *files, *LENGTH, "--muscle", MUSCLE, "--elements", 4, "--out", out)
+    assert result.exit_code == 0, result.stderr
+    assert "The data justify this friction for all runs." in result.stdout
+    friction = load(out / "muscle.toml").friction
+    assert friction.pressure_factor(3.5e5) == pytest.approx(1.125 / 1.5, abs=0.05)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "Friction of all runs" in page
+    assert "runs that disagree" in page
+    scenario = (EXAMPLES / "fill_discharge.toml").read_text(encoding="utf-8")
+    scenario = scenario.replace('library = "dmsp-20-300"', 'library = "out/muscle.toml"')
+    (tmp_path / "scenario.toml").write_text(scenario, encoding="utf-8")
+    run = airmuscle("simulate", tmp_path / "scenario.toml", "--out", tmp_path / "run")
+    assert run.exit_code == 0, run.stderr
+    assert "outside the range of the data of its friction in speed" in run.stdout
+
+
+def test_friction_that_does_not_hold_for_all_runs_is_not_written(tmp_path):
+    files = [
+        loop(tmp_path / f"{pressure}.csv", 3, MaxwellSlip((factor * 2e4, factor * 1e4), (3e-4, 1.2e-3)), TURNS[:3], 150,
+             pressure)
+        for pressure, factor in ((3e5, 0.5), (4e5, 2.0), (5e5, 0.6))
+    ]  # fmt: skip
+    result = airmuscle("hysteresis", *files, *LENGTH, "--elements", 4, "--out", tmp_path / "out")
+    assert "The friction does not hold for all runs" in result.stdout
+    assert "no friction file: no model that a plant can use is justified for all runs together" in result.stdout
+    assert not list((tmp_path / "out").glob("*.toml"))
+
+
+def test_a_branch_with_very_few_rows_is_remarked_once(tmp_path):
+    found = find_loops([read(loop(tmp_path / "loop.csv", 1), resting_length=0.3)[0]])[0]
+    few = (
+        np.where(
+            motion_direction(found.recording["contraction"]) < 0, np.arange(len(found.fitted_rows)) % 60 == 0, True
+        )
+        & found.fitted_rows
+    )
+    fit = fit_loop(dataclasses.replace(found, fitted_rows=few), elements=3)
+    (chapter,) = hysteresis_chapters([fit])
+    assert chapter.summary.count("very few rows") == 1
+    assert "use all rows" not in chapter.summary
 
 
 def test_a_loop_without_friction_writes_none(tmp_path):

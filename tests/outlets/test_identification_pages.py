@@ -90,10 +90,12 @@ def test_the_code_on_hysteresis_runs(capsys):
         muscle=load("dmsp-20-300").muscle,
         run=first,
         second_run=second,
+        recordings=[first, second.with_columns(pressure=np.full(len(second), 4.5e5))],
         quiet=everywhere,
         quiet_there=everywhere,
     )
     assert isinstance(found["muscle"].friction, MaxwellSlip)
+    assert len(found["joint"][0].agreement) == 2
     assert "justify" in capsys.readouterr().out
 
 

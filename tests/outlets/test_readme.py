@@ -9,6 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
+
+from airmuscle.cli.app import app
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -34,11 +37,12 @@ def commands():
 
 
 @pytest.mark.parametrize("command", commands())
-def test_the_commands_run(command, tmp_path):
+def test_the_commands_run(command, tmp_path, monkeypatch):
     words = shlex.split(command)[2:]
     words = [str(ROOT / word) if word.startswith("examples/") else word for word in words]
-    done = subprocess.run([sys.executable, "-m", "airmuscle", *words], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.stderr
 
 
 def test_the_files_it_points_to_are_there():

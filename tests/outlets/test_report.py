@@ -25,8 +25,8 @@ import pytest
 from airmuscle.core import plotting
 from airmuscle.core.errors import FileError, SolveError, UnknownNameError
 from airmuscle.core.reference import Reference
-from airmuscle.report.chapter import AtLeast, AtMost, Chapter, Claim, Equal, Plot, Table
-from airmuscle.report.formatting import format_number, format_published
+from airmuscle.report.chapter import AtLeast, AtMost, Chapter, Claim, Equal, Kind, Plot, Table, statements
+from airmuscle.report.formatting import count_verdicts, format_number, format_published
 from airmuscle.report.formula import to_mathtext, to_plain
 from airmuscle.report.html import MAX_SVG_BYTES, render_cell, render_header
 from airmuscle.report.output_folder import atomic_folder, check_writable
@@ -34,7 +34,10 @@ from airmuscle.report.write import as_json, write_report
 from airmuscle.reproduce import run
 
 DATE = datetime.date(2024, 5, 17)
-KEYS = {"paper", "claim", "published", "reproduced", "unit", "tolerance", "verdict", "note"}
+KEYS = {
+    "paper", "kind", "claim", "statement", "case", "published", "expected", "reproduced", "unit", "tolerance", "verdict",
+    "note",
+}  # fmt: skip
 
 
 def a_plot(name: str, points: int = 20) -> Plot:
@@ -110,8 +113,12 @@ def test_claims_come_back_from_json_as_they_went_in(report: Path):
     assert [set(claim) for claim in claims] == [KEYS] * 10
     assert claims[1] == {
         "paper": "Saga 2007",
+        "kind": "claim",
         "claim": "force",
+        "statement": "force",
+        "case": "",
         "published": 480.0,
+        "expected": None,
         "reproduced": 480.0,
         "unit": "N",
         "tolerance": 1.0,
@@ -423,3 +430,63 @@ def test_a_chosen_bound_is_never_given_out_as_published():
     assert claim.as_dict()["published"] is None
     assert claim.as_dict()["tolerance"] == 0.04
     assert format_published(claim) == "≤ 0.04 (chosen)"
+
+
+def test_a_derived_value_is_never_given_out_as_published():
+    claim = Claim("paper", "conductance", Equal(15.7, 0.005, derived=True), 15.7002, "NL/(min bar)")
+    record = claim.as_dict()
+    assert (record["verdict"], record["published"], record["expected"], record["tolerance"]) == (
+        "holds",
+        None,
+        15.7,
+        0.005,
+    )
+    assert format_published(claim) == "15.7 ± 0.005 (derived)"
+
+
+def cases(*values: float | None, kind: Kind = Kind.CLAIM, **more: bool) -> tuple[Claim, ...]:
+    return tuple(
+        Claim("paper", "strong", AtLeast(1.0), value, "1", case=f"line {i}", kind=kind, **more)
+        for i, value in enumerate(values)
+    )
+
+
+@pytest.mark.parametrize(
+    ("claims", "verdict"),
+    [
+        (cases(2.0, 3.0), "holds"),
+        (cases(0.0, 0.5), "differs"),
+        (cases(2.0, 0.5), "depends"),
+        (cases(2.0, None), "holds"),
+        (cases(None), "not printed"),
+        (cases(2.0, 0.5, lost=True), "not testable"),
+    ],
+)
+def test_a_statement_with_several_cases_counts_once(claims: tuple[Claim, ...], verdict: str):
+    (statement,) = statements(claims)
+    assert statement.verdict == verdict
+    assert {key: count for key, count in count_verdicts(claims).items() if count} == {verdict: 1}
+
+
+def test_a_note_that_all_cases_share_stands_once(tmp_path: Path):
+    same = tuple(dataclasses.replace(case, note="Note of all.") for case in cases(2.0, 0.5))
+    page = write_report([Chapter("paper", "t", "s", same)], tmp_path, date=DATE).read_text(encoding="utf-8")
+    assert page.count("Note of all.") == 1
+    other = (dataclasses.replace(same[0], note="Another note."), same[1])
+    page = write_report([Chapter("paper", "t", "s", other)], tmp_path, date=DATE).read_text(encoding="utf-8")
+    assert (page.count("Note of all."), page.count("Another note.")) == (1, 1)
+
+
+def test_checks_and_comparisons_are_listed_and_counted_apart(tmp_path: Path):
+    claims = (*cases(2.0, 0.5), *cases(1.0, kind=Kind.CHECK), *cases(0.0, kind=Kind.FINDING))
+    assert [sum(count_verdicts(claims, kind).values()) for kind in Kind] == [1, 1, 1]
+    assert count_verdicts(claims, Kind.CHECK)["holds"] == 1
+    page = write_report([Chapter("paper", "t", "s", claims)], tmp_path, date=DATE).read_text(encoding="utf-8")
+    headings = re.findall(r"<h3>(.*?)</h3>", page)
+    assert headings == [
+        "Overview of the claims", "Claims of the paper", "Comparisons of this report, which the paper does not make",
+        "Checks of the computation",
+    ]  # fmt: skip
+    assert ">± depends</span>" in page.partition("Claims of the paper")[2].partition("Comparisons of this")[0]
+    kinds = [record["kind"] for record in json.loads((tmp_path / "claims.json").read_text(encoding="utf-8"))]
+    assert kinds == ["claim", "claim", "check", "comparison"]

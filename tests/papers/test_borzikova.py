@@ -11,8 +11,9 @@ import pytest
 
 from airmuscle.characteristic.borzikova import SAM_30X290
 from airmuscle.identify.surface.basis import LoadRange
-from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_PRINTED
+from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_TESTABLE, Kind
 from airmuscle.reproduce import borzikova
+from airmuscle.reproduce import borzikova_muscle_claims as muscle_claims
 from airmuscle.reproduce.borzikova_surfaces import (
     AS_EXPONENT,
     CORRECTED,
@@ -49,9 +50,9 @@ def rms(law, force, least=0.25e5):
 def test_the_printed_indices_cannot_be_confirmed():
     found = borzikova.curve_claims(CURVES)
     assert [(c.printed.value, c.reproduced, c.verdict) for c in found] == [
-        (0.998, None, NOT_PRINTED),
-        (0.999, None, NOT_PRINTED),
-        (0.999, None, NOT_PRINTED),
+        (0.998, None, NOT_TESTABLE),
+        (0.999, None, NOT_TESTABLE),
+        (0.999, None, NOT_TESTABLE),
     ]
 
 
@@ -153,16 +154,41 @@ def test_two_loads_change_the_verdict_on_the_coefficients():
 
 def test_on_rounded_curves_the_linearised_fit_is_not_least_squares():
     data = round_contraction(CURVES.sample())
-    claim = borzikova.procedure_claim(data, 0.40)
+    claim, _ = borzikova.procedure_claims(data, 0.40)
     assert claim.reproduced == pytest.approx(0.11175 / 0.10763, abs=1e-4)
     assert claim.verdict == DIFFERS
 
 
+def test_linearised_as_gauss_newton_the_fit_is_least_squares():
+    data = round_contraction(CURVES.sample())
+    _, claim = borzikova.procedure_claims(data, 0.40)
+    assert claim.reproduced == pytest.approx(1.0, abs=1e-9)
+    assert claim.verdict == HOLDS
+    law = borzikova.fit_gauss_newton(data, 0.40).model
+    errors = np.asarray(law.contraction(data["pressure"], data["force"])) - data["contraction"]
+    assert np.sqrt(np.mean(errors**2)) == pytest.approx(0.0010763, abs=1e-7)
+
+
 def test_the_catalogue_contradicts_itself_and_the_measurements():
-    lifted, contracted = borzikova.catalogue_claims(CURVES)
+    lifted, smaller, diameter, *contracted = muscle_claims.catalogue_claims(CURVES)
     assert (lifted.printed.value, lifted.reproduced, lifted.verdict) == (35.0, 30.0, DIFFERS)
+    assert (smaller.printed.value, smaller.reproduced, smaller.verdict) == (12.0, 12.0, HOLDS)
+    assert (diameter.printed.value, diameter.reproduced, diameter.verdict) == (6.0, 12.0, DIFFERS)
+    assert [c.case.split(",")[0] for c in contracted] == ["3 kg", "12 kg", "30 kg", "75 kg"]
+    assert [c.verdict for c in contracted] == [NOT_TESTABLE, NOT_TESTABLE, DIFFERS, NOT_TESTABLE]
+    contracted = contracted[2]
     assert contracted.reproduced == pytest.approx(19.734, abs=5e-4)
     assert contracted.verdict == DIFFERS
+
+
+def test_the_saturation_is_not_reached_within_the_pressure_range():
+    saturation, initial_load, branches = muscle_claims.characteristic_claims(CURVES)
+    assert saturation.reproduced == pytest.approx(37.5, abs=0.05)
+    assert saturation.verdict == DIFFERS
+    other = dataclasses.replace(CURVES, max_pressure=5e5)
+    assert muscle_claims.characteristic_claims(other)[0].reproduced > saturation.reproduced
+    assert [initial_load.verdict, branches.verdict] == [NOT_TESTABLE, NOT_TESTABLE]
+    assert "begins at −3.57 %" in initial_load.note
 
 
 def test_the_library_holds_the_monotone_fit_of_the_chapter(laws):
@@ -179,7 +205,8 @@ def test_the_library_holds_the_monotone_fit_of_the_chapter(laws):
 def test_the_chapter_is_complete():
     chapter = borzikova.chapter()
     assert chapter.paper == "borzikova"
-    assert {c.verdict for c in chapter.claims} == {HOLDS, DIFFERS, NOT_PRINTED}
+    assert {c.verdict for c in chapter.claims} == {HOLDS, DIFFERS, NOT_TESTABLE}
+    assert [c.reproduced for c in chapter.claims if c.kind is Kind.CHECK] == [15.0]
     assert {p.name for p in chapter.plots} >= {
         "borzikova_dead_zone",
         "borzikova_points",

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from ..core import autodiff
 from ..core.ops import Value
-from ..muscle import Muscle, SeriesSpring
+from ..muscle import ElasticSeriesElement, Muscle
 from ..plant.muscle_state import MuscleState
 from ..plant.plant import Plant
 from ..plant.state import state_vector
@@ -69,10 +69,11 @@ def _of_muscle(plant: Plant, muscle: Muscle, port: MuscleState) -> StiffnessPair
     by_pressure, by_contraction = _slopes(muscle, port)
     squeezed = _pressure_slope(plant, muscle, port)
     inside = (0.0 - by_contraction, 0.0 - by_contraction - by_pressure * squeezed)
-    if not isinstance(muscle.series, SeriesSpring):
+    if not isinstance(muscle.series, ElasticSeriesElement):
         return StiffnessPair(*inside)
-    stretched = float(port.inner_contraction) > float(port.contraction)
-    spring = muscle.series.stiffness * muscle.geometry.resting_length if stretched else 0.0
+    length = float(muscle.geometry.resting_length)
+    stretch = (float(port.inner_contraction) - float(port.contraction)) * length
+    spring = muscle.series.tangent_stiffness(stretch) * length if stretch > 0.0 else 0.0
     return StiffnessPair(*(k * spring / (k + spring) if spring else 0.0 for k in inside))
 
 

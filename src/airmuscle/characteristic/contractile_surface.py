@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import ClassVar
 
 from ..core import ops
@@ -86,6 +87,16 @@ class ContractileSurface(ForceLaw):
             self.coefficients, *pressure, *contraction, self.min_force, self.max_force, self.degree
         )
 
+    def rescaled(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> ContractileSurface:
+        """Return the same polynomial on another validity range, outside which it is extrapolated linearly."""
+        new = self.with_validity_range(pressure, contraction)
+        (x0, q0), (new_x0, new_q0) = self._scale(0.0, 0.0), new._scale(0.0, 0.0)
+        factor_x = (new.max_contraction - new.min_contraction) / (self.max_contraction - self.min_contraction)
+        factor_q = (new.max_pressure - new.min_pressure) / (self.max_pressure - self.min_pressure)
+        powers_x = _powers_of_linear(x0 - factor_x * new_x0, factor_x, self.degree)
+        powers_q = _powers_of_linear(q0 - factor_q * new_q0, factor_q, self.degree)
+        return dataclasses.replace(new, coefficients=tuple(self._expand(powers_x, powers_q).values()))
+
     @property
     def validity_range(self) -> ValidityRange:
         """Range of the data; outside, the surface is extrapolated linearly."""
@@ -151,11 +162,15 @@ class ContractileSurface(ForceLaw):
         scale_p = 2 / (self.max_pressure - self.min_pressure)
         powers_c = _powers_of_linear(-1 - scale_c * self.min_contraction, scale_c, self.degree)
         powers_p = _powers_of_linear(-1 - scale_p * self.min_pressure, scale_p * pressure_unit, self.degree)
+        return self._expand(powers_c, powers_p)
+
+    def _expand(self, powers_x: list[list[float]], powers_q: list[list[float]]) -> dict[tuple[int, int], float]:
+        """Coefficients of the polynomial in the variables in which the powers of x and q are given."""
         monomial = dict.fromkeys(exponents(self.degree), 0.0)
         for (i, j), a in zip(exponents(self.degree), self.coefficients, strict=True):
-            for m, by_c in enumerate(powers_c[i]):
-                for n, by_p in enumerate(powers_p[j]):
-                    monomial[m, n] += a * by_c * by_p
+            for m, by_x in enumerate(powers_x[i]):
+                for n, by_q in enumerate(powers_q[j]):
+                    monomial[m, n] += a * by_x * by_q
         return monomial
 
 

@@ -61,9 +61,14 @@ class EffectiveLength(ForceLaw):
         inner: Any = self.inner
         if not hasattr(inner, "with_validity_range"):
             return self
-        low, high = contraction
-        margin = (_RANGE_FACTOR - 1) * (high - low) / 2
-        return dataclasses.replace(self, inner=inner.with_validity_range(pressure, (low - margin, high + margin)))
+        return dataclasses.replace(self, inner=inner.with_validity_range(pressure, _widen(contraction)))
+
+    def rescaled(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> EffectiveLength:
+        """Return the same force law on another validity range; that of the inner surface is wider in contraction."""
+        inner: Any = self.inner
+        if not hasattr(inner, "rescaled"):
+            return self
+        return dataclasses.replace(self, inner=inner.rescaled(pressure, _widen(contraction)))
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         return self.inner.force(pressure, self._active_contraction(contraction))
@@ -75,3 +80,10 @@ class EffectiveLength(ForceLaw):
         """Contraction [1] of the active length."""
         shortening = contraction * self.resting_length + self.end_shift
         return shortening / (self.resting_length - self.dead_length)
+
+
+def _widen(contraction: tuple[float, float]) -> tuple[float, float]:
+    """The validity range of the inner surface for this range of the whole muscle."""
+    low, high = contraction
+    margin = (_RANGE_FACTOR - 1) * (high - low) / 2
+    return low - margin, high + margin

@@ -46,11 +46,16 @@ class LengthFamily(ForceLaw):
 
     def with_validity_range(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> Self:
         """Return the model with its surfaces on another validity range."""
+        return self._on_range("with_validity_range", pressure, contraction)
+
+    def rescaled(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> Self:
+        """Return the same force law with its surfaces on another validity range."""
+        return self._on_range("rescaled", pressure, contraction)
+
+    def _on_range(self, method: str, pressure: tuple[float, float], contraction: tuple[float, float]) -> Self:
         models: dict[str, Any] = {"inner": self.inner, "change": self.change}
         surfaces = {
-            name: law.with_validity_range(pressure, contraction)
-            for name, law in models.items()
-            if hasattr(law, "with_validity_range")
+            name: getattr(law, method)(pressure, contraction) for name, law in models.items() if hasattr(law, method)
         }
         return dataclasses.replace(self, **surfaces)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,7 +11,8 @@ import typer
 
 from ..core.errors import ParameterError
 from ..library.catalogue import load_data
-from ..recording import Recording, read
+from ..recording import ColumnMapping, Recording, read
+from ..recording.mapping import read_mapping
 from ..recording.segment import AT_REST, check_swept, estimate_sensors, find_runs
 from .progress import reading_progress
 
@@ -31,26 +33,71 @@ AmbientPressure = Annotated[
     str | None,
     typer.Option(metavar="QUANTITY", help="Ambient pressure, subtracted from absolute pressures, such as '98 kPa'."),
 ]
+_SINGULAR = {"units": "unit", "columns": "column", "constants": "constant"}
+"""Options that may be repeated, by the names of their fields."""
+Columns = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--column",
+        metavar="COLUMN=HEADER",
+        help="Header of a column, by name or number: 'Channel 1=pressure [bara]', '3=length [mm]'. Repeatable.",
+    ),
+]
+Constants = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--constant",
+        metavar="NAME=QUANTITY",
+        help="Quantity that was held and not recorded, 'length=73.2 mm', or specimen, run. Repeatable.",
+    ),
+]
+NamePattern = Annotated[
+    str | None,
+    typer.Option(
+        "--file-name",
+        metavar="PATTERN",
+        help="Values in the names of the files: 'cut{specimen}_held{length [cm]}cm'; {} is any text.",
+    ),
+]
+TimeOption = Annotated[
+    str | None,
+    typer.Option(
+        "--time",
+        metavar="BASE",
+        help="Time base: recorded, uniform (by the number of rows, for rounded stamps), unordered or none.",
+    ),
+]
 
 
-def read_recordings(files: list[Path], unit: list[str] | None, **options: Any) -> list[Recording]:
+def column_mapping(
+    path: Path | None, *, column: list[str] | None = None, constant: list[str] | None = None, **options: Any
+) -> ColumnMapping:
+    """The mapping of the file at `path`, if any, with the options taking precedence. Raises BadParameter."""
+    base = read_mapping(path) if path else ColumnMapping()
+    columns, constants = parse_pairs("--column", column), parse_pairs("--constant", constant)
+    return base.with_overrides(columns=columns, constants=constants, **options)
+
+
+def read_recordings(files: list[Path], unit: list[str] | None, mapping: ColumnMapping) -> list[Recording]:
     """The recordings of the files, read together so that their units can be compared, then library data sets.
 
-    A name without suffix and folder that is not in the working directory is a data set of the library. `options` are
-    those of `recording.read`. Raises ParameterError for options that a data set does not take.
+    A name without suffix and folder that is not in the working directory is a data set of the library. Raises
+    ParameterError for options that a data set does not take.
     """
-    options = {"units": parse_pairs("--unit", unit), **options}
+    units = parse_pairs("--unit", unit)
     local = {entry.name for entry in Path().iterdir()}
     names = [f for f in files if not f.suffix and len(f.parts) == 1 and f.name not in local]
     paths = [f for f in files if f not in names]
-    set_options = ["--unit" if name == "units" else f"--{name.replace('_', '-')}"
-                   for name, value in options.items() if value]  # fmt: skip
+    default = ColumnMapping()
+    fields = [f.name for f in dataclasses.fields(mapping) if getattr(mapping, f.name) != getattr(default, f.name)]
+    named = dict.fromkeys([*(["unit"] if units else []), *fields, *mapping.constants])
+    set_options = [f"--{_SINGULAR.get(name, name).replace('_', '-')}" for name in named]
     if names and set_options:
         raise ParameterError(
             f"{names[0]}: a data set of the library contains its units and constants; omit {', '.join(set_options)}."
         )
     with reading_progress() as progress:
-        recordings = read(paths, progress=progress, **options) if paths else ()
+        recordings = read(paths, mapping=mapping, units=units, progress=progress) if paths else ()
     _check_content(recordings)
     return [*recordings, *(load_data(str(name)) for name in names)]
 

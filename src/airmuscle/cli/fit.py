@@ -11,7 +11,18 @@ from ..identify import UNCENSORED
 from ..identify import fit as fit_model
 from ..recording import Recording
 from ..report.output_folder import check_writable
-from .bench_files import AmbientPressure, Files, Length, Units, read_recordings
+from .bench_files import (
+    AmbientPressure,
+    Columns,
+    Constants,
+    Files,
+    Length,
+    NamePattern,
+    TimeOption,
+    Units,
+    column_mapping,
+    read_recordings,
+)
 from .fit_compare import compare_models
 from .fit_geometry import missing_geometry, parse_braid, with_braid
 from .fit_options import FitOptions, FitRequest, loss_of
@@ -105,6 +116,10 @@ def fit(
     ambient: AmbientPressure = None,
     unit: Units = None,
     mapping: Mapping = None,
+    column: Columns = None,
+    constant: Constants = None,
+    file_name: NamePattern = None,
+    time: TimeOption = None,
     degree: Annotated[int, typer.Option(min=1, max=9, metavar="N", help="Total degree of a ContractileSurface.")] = 5,
     fix: Fixed = None,
     robust: Robust = None,
@@ -127,6 +142,7 @@ def fit(
       airmuscle fit runs/*.csv --characteristic dmsp-20-300 --bootstrap 1000 --profile weak
       airmuscle fit bench.csv --characteristic ContractileSurface --shape --free-contraction "3 bar=18 %"
       airmuscle fit runs/*.xlsx --mapping rig.toml --compare --leave-out run
+      airmuscle fit log_held*.csv --file-name "held{length [mm]}mm" --time uniform --resting-length "200 mm" --compare
       airmuscle solve fit/muscle.toml --pressure "3 bar" --force "100 N"
     """
     if characteristic is None and not compare:
@@ -135,7 +151,9 @@ def fit(
     request = FitRequest(
         options, tuple(fix or ()), degree, robust, uncensored, equal_weights, out, json, parse_braid(braid)
     )
-    recordings = read_recordings(files, unit, mapping=mapping, resting_length=resting_length, ambient=ambient)
+    columns = column_mapping(mapping, column=column, constant=constant, file_name=file_name, time=time,
+                             resting_length=resting_length, ambient=ambient)  # fmt: skip
+    recordings = read_recordings(files, unit, columns)
     if characteristic is None or compare:
         compare_models(files, recordings, characteristic, request)
     else:

@@ -19,7 +19,8 @@ from .fit_options import FitRequest
 from .fit_output import fit_to_dict, fitted_entry, print_results, write_results
 from .initial_law import InitialLaw, find_initial_law, resting_lengths
 from .option_hints import in_options
-from .terminal import echo, print_json
+from .progress import computation_progress
+from .terminal import print_json
 
 
 def compare_models(
@@ -36,8 +37,11 @@ def compare_models(
         check_one_length(resting_lengths(recordings))
     named = None if characteristic is None else find_initial_law(characteristic, recordings, request.degree)
     candidates = _candidates(recordings, characteristic, named, request)
-    progress = None if request.json else lambda name: echo(f"  {name}", err=True)
-    comparison = compare(recordings, candidates, leave_out=request.options.split, progress=progress)
+    given = None if named is None else candidates
+    with computation_progress("comparison") as show:
+        comparison = compare(
+            recordings, given, leave_out=request.options.split, progress=lambda name, fraction: show(fraction)
+        )
     comparison = _with_option_names(comparison)
     best = comparison.recommended
     extras = request.options.evaluate(best.fit, recordings)
@@ -100,5 +104,6 @@ def _to_dict(comparison: Comparison) -> dict[str, Any]:
             for c in comparison.ranking
         ],
         "excluded": {each.name: each.reason for each in comparison.excluded},
+        "causes": {each.name: each.cause for each in (*comparison.excluded, *comparison.unavailable)},
         "fit": fit_to_dict(comparison.recommended.fit),
     }

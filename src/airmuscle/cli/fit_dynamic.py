@@ -127,6 +127,7 @@ def _to_dict(fit: DynamicFit, profiles: Sequence[DynamicProfile], findings: Sequ
         "residual_std": fit.residual_std,
         "rank": fit.identifiability.rank,
         "starts_at_optimum": fit.starts_at_optimum,
+        "optima": [{"searches": o.searches, "cost": o.cost, "values": o.values} for o in fit.optima],
         "undetermined": [
             {"shares": dict(each.shares), "deviation": each.relative_stderr, "experiment": each.remedy}
             for each in fit.identifiability.undetermined

@@ -19,6 +19,9 @@ from .fit_geometry import fitted_geometry, missing_geometry
 from .option_hints import in_options
 from .terminal import echo
 
+MAX_NAMES, MAX_NAME = 3, 60
+"""Maximum number of file names in a title, and of characters of each (chosen)."""
+
 
 def print_results(lines: Sequence[str], out: Path) -> None:
     """Print the results and the paths of the files that were written."""
@@ -31,10 +34,10 @@ def print_results(lines: Sequence[str], out: Path) -> None:
 def fitted_entry(result: Fit, initial: Entry, files: list[Path]) -> Entry:
     """The initial entry with the fitted characteristic and a new provenance, without its checks."""
     summary = dict(result.summary())
-    names = ", ".join(f.name for f in files)
+    names = list_files([f.name for f in files])
     note = f"Fitted to {names}: rms error {summary['rms error']}, maximum error {summary['maximum error']}."
     geometry = fitted_geometry(initial, result.model)
-    title = f"{type(result.model).__name__} fitted to {', '.join(f.stem for f in files)}"
+    title = f"{type(result.model).__name__} fitted to {list_files([f.stem for f in files])}"
     entry = dataclasses.replace(
         initial, name="muscle", title=title, provenance="fitted", note=note, warning="", characteristic=result.model,
         geometry=geometry, validity_range=result.validity_range, checks=(),
@@ -45,6 +48,14 @@ def fitted_entry(result: Fit, initial: Entry, files: list[Path]) -> Entry:
 def with_option_names(result: Fit) -> Fit:
     """The fit whose notes name options of `airmuscle fit` instead of Python arguments."""
     return dataclasses.replace(result, notes=tuple(in_options(note, "fit") for note in result.notes))
+
+
+def list_files(names: Sequence[str]) -> str:
+    """The names of files for a title: up to three of them, else their number with the first and the last."""
+    short = [name if len(name) <= MAX_NAME else f"{name[: MAX_NAME // 2]}…{name[-MAX_NAME // 2 :]}" for name in names]
+    if len(short) <= MAX_NAMES:
+        return ", ".join(short)
+    return f"{len(short)} files, {short[0]} to {short[-1]}"
 
 
 def fit_to_dict(result: Fit) -> dict[str, Any]:

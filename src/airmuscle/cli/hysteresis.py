@@ -6,20 +6,43 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
 from ..core import leaves
-from ..identify.hysteresis import HysteresisFit, LoopFit, find_holds, find_loops, fit_creep, fit_loop
+from ..friction import Friction
+from ..identify.hysteresis import (
+    HysteresisFit,
+    JointFit,
+    LoopFit,
+    find_holds,
+    find_loops,
+    fit_creep,
+    fit_jointly,
+    fit_loop,
+    identified_friction,
+)
 from ..library.catalogue import load_law
 from ..library.entry import Entry
 from ..library.write import part_toml, save
 from ..recording import Recording
+from ..report.chapter import Chapter
 from ..report.hysteresis_chapter import describe_row_counts, hysteresis_chapters
 from ..report.output_folder import atomic_folder, check_writable
 from ..report.write import write_into
-from .bench_files import AmbientPressure, Files, Length, Units, read_recordings
+from .bench_files import (
+    AmbientPressure,
+    Columns,
+    Constants,
+    Files,
+    Length,
+    NamePattern,
+    TimeOption,
+    Units,
+    column_mapping,
+    read_recordings,
+)
 from .option_hints import in_options
 from .options import Folder, Json, Mapping
 from .terminal import echo, print_json, print_table
@@ -56,15 +79,20 @@ def hysteresis(
     ambient: AmbientPressure = None,
     unit: Units = None,
     mapping: Mapping = None,
+    column: Columns = None,
+    constant: Constants = None,
+    file_name: NamePattern = None,
+    time: TimeOption = None,
     json: Json = False,
 ) -> None:
     """Fit friction models to hysteresis loops.
 
     \b
     The type of a run (isobaric, isometric) is detected; a second run at the same level validates the first.
-    Statistical tests decide whether the data justify a friction model.
+    Statistical tests decide whether the data justify a friction model. Runs at several pressures are also fitted
+    together, with a friction that depends on the pressure; a model that does not hold for all of them is not written.
     Writes DIR/report.html. If a model that a plant can use is justified, it is written to DIR/muscle.toml (with
-    --muscle) or to DIR/friction.toml.
+    --muscle) or to DIR/friction.toml, with the range of pressure and speed of the data.
 
     \b
     Examples:
@@ -73,20 +101,30 @@ def hysteresis(
     """
     if use_characteristic and muscle is None:
         raise typer.BadParameter("--use-characteristic requires --muscle")
-    recordings = read_recordings(files, unit, mapping=mapping, resting_length=resting_length, ambient=ambient)
+    columns = column_mapping(mapping, column=column, constant=constant, file_name=file_name, time=time,
+                             resting_length=resting_length, ambient=ambient)  # fmt: skip
+    recordings = read_recordings(files, unit, columns)
     entry = None if muscle is None else load_law(muscle)
     law = entry.characteristic if entry is not None and use_characteristic else None
     loops = find_loops(recordings, characteristic=law, degree=degree, all_rows=all_rows)
     check_writable(out)
     progress = None if json else lambda name: echo(f"  {name}", err=True)
     fits = [_with_option_names(fit_loop(loop, elements=elements, progress=progress)) for loop in loops]
+    joint = fit_jointly(fits, progress=progress)
     creep_results = _fit_creep(recordings) if creep else []
-    path = _write(fits, creep_results, _select(fits), entry, out)
+    path = _write(hysteresis_chapters(fits, creep_results, joint), _select(fits, joint), entry, out)
     if json:
-        print_json({"loops": [_to_dict(fit) for fit in fits], "creep": creep_results, "written": str(path or "")})
+        data = {"loops": [_to_dict(fit) for fit in fits], "joint": [_joint_to_dict(fit) for fit in joint]}
+        print_json({**data, "creep": creep_results, "written": str(path or "")})
         return
     _print(fits, creep_results)
-    echo(f"{path.stem}: {path}" if path else "no friction file: no model that a plant can use is justified")
+    _print_joint(joint)
+    _print_files(path, out, of_all_runs=bool(joint))
+
+
+def _print_files(path: Path | None, out: Path, *, of_all_runs: bool) -> None:
+    of_all = " for all runs together" if of_all_runs else ""
+    echo(f"{path.stem}: {path}" if path else f"no friction file: no model that a plant can use is justified{of_all}")
     echo(f"report: {out / 'report.html'}")
 
 
@@ -96,10 +134,27 @@ def _with_option_names(fit: LoopFit) -> LoopFit:
     return dataclasses.replace(fit, failed=failed)
 
 
-def _select(fits: Sequence[LoopFit]) -> HysteresisFit | None:
-    """The friction to write: of the loop with the largest effective number of rows, among those a plant can use."""
+class _Selected(NamedTuple):
+    """The friction to write, with the range of its data, the file or files it is from, and its verdict."""
+
+    friction: Friction
+    origin: str
+    verdict: str
+
+
+def _select(fits: Sequence[LoopFit], joint: Sequence[JointFit]) -> _Selected | None:
+    """The friction to write: of all runs together or, if they are not several, of the only run a plant can use."""
+    if joint:
+        best = next((fit for fit in joint if fit.justified), None)
+        if best is None:
+            return None
+        origin = f"{len(best.series)} runs"
+        return _Selected(identified_friction(best.friction, best.series), origin, best.verdict)
     usable = [fit.recommended for fit in fits if fit.recommended is not None and fit.usable_in_plant]
-    return max(usable, key=lambda fit: fit.effective_sample_size, default=None)
+    if not usable:
+        return None
+    only = max(usable, key=lambda fit: fit.effective_sample_size)
+    return _Selected(identified_friction(only.friction, (only.series,)), only.series.origin, only.verdict)
 
 
 def _fit_creep(recordings: Sequence[Recording]) -> list[str]:
@@ -119,13 +174,11 @@ def _fit_creep(recordings: Sequence[Recording]) -> list[str]:
     return results
 
 
-def _write(
-    fits: Sequence[LoopFit], creep: Sequence[str], selected: HysteresisFit | None, entry: Entry | None, out: Path
-) -> Path | None:
+def _write(chapters: Sequence[Chapter], selected: _Selected | None, entry: Entry | None, out: Path) -> Path | None:
     """Write the report and, for a selected friction, the muscle or friction file; returns the path of that file."""
     name = None if selected is None else "friction.toml" if entry is None else "muscle.toml"
     with atomic_folder(out) as folder:
-        write_into(folder, hysteresis_chapters(fits, creep), title="Friction")
+        write_into(folder, chapters, title="Friction")
         if selected is not None and entry is not None:
             save(_with_friction(entry, selected), folder / "muscle.toml")
         elif selected is not None:
@@ -134,10 +187,10 @@ def _write(
     return out / name if name else None
 
 
-def _with_friction(entry: Entry, fit: HysteresisFit) -> Entry:
+def _with_friction(entry: Entry, selected: _Selected) -> Entry:
     """The muscle with the friction; its checks are kept, because they apply to the characteristic alone."""
-    note = f"{entry.note} Friction from {fit.series.origin}: {fit.verdict}".strip()
-    return dataclasses.replace(entry, name="muscle", friction=fit.friction, note=note)
+    note = f"{entry.note} Friction from {selected.origin}: {selected.verdict}".strip()
+    return dataclasses.replace(entry, name="muscle", friction=selected.friction, note=note)
 
 
 def _print(fits: Sequence[LoopFit], creep: Sequence[str]) -> None:
@@ -159,6 +212,25 @@ def _print(fits: Sequence[LoopFit], creep: Sequence[str]) -> None:
         echo()
     for text in creep:
         echo(f"creep: {text}")
+
+
+def _print_joint(joint: Sequence[JointFit]) -> None:
+    if not joint:
+        return
+    echo("All runs together, each with its own static curve:")
+    rows = [
+        (fit.name, "no" if fit.law is fit.friction else "yes", f"{fit.rmse_without_friction:.3g} to {fit.rmse:.3g} N",
+         f"{0.0 - fit.aicc_reduction:.4g}", str(sum(run.disagrees for run in fit.agreement)),
+         "yes" if fit.justified else "no")
+        for fit in joint
+    ]  # fmt: skip
+    headers = ("model", "depends on pressure", "rms error", "difference in AICc", "runs that disagree", "justified")
+    print_table(headers, rows, right=headers[3:5])
+    best = next((fit for fit in joint if fit.justified), joint[0])
+    for run in best.agreement:
+        echo(str(run))
+    echo(str(best))
+    echo()
 
 
 def _p_value(probability: float) -> str:
@@ -194,4 +266,16 @@ def _to_dict(fit: LoopFit) -> dict[str, Any]:
             for f in fit.fits
         ],
         "failed": dict(fit.failed),
+    }  # fmt: skip
+
+
+def _joint_to_dict(fit: JointFit) -> dict[str, Any]:
+    """A joint fit as plain data, all numbers SI."""
+    return {
+        "model": fit.name, "parameters": {p.path: p.value for p in leaves(fit.friction)}, "rmse": fit.rmse,
+        "rmse_without": fit.rmse_without_friction, "aicc_difference": 0.0 - fit.aicc_reduction, "p_value": fit.p_value,
+        "pressure_p_value": fit.scale_p_value, "repeat_rmse": fit.repeat_rmse,
+        "repeat_rmse_without": fit.repeat_rmse_without_friction, "justified": fit.justified,
+        "undetermined": list(fit.undetermined), "reservations": list(fit.reservations),
+        "runs": [{**dataclasses.asdict(run), "disagrees": run.disagrees} for run in fit.agreement],
     }  # fmt: skip

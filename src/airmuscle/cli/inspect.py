@@ -12,10 +12,19 @@ import typer
 from ..core.plotting import save
 from ..recording import ColumnMapping, Recording, read
 from ..recording.columns import quantity_of
-from ..recording.mapping import read_mapping
 from ..recording.segment import Inspection, Sampling, inspect_all
 from ..report.output_folder import atomic_folder
-from .bench_files import AmbientPressure, Length, Units, parse_pairs
+from .bench_files import (
+    AmbientPressure,
+    Columns,
+    Constants,
+    Length,
+    NamePattern,
+    TimeOption,
+    Units,
+    column_mapping,
+    parse_pairs,
+)
 from .inspection_text import COLUMNS, column_rows, summary
 from .options import Json, Mapping, OptionalFolder
 from .progress import reading_progress
@@ -24,14 +33,6 @@ from .terminal import echo, print_json, print_table
 Files = Annotated[
     list[str],
     typer.Argument(metavar="FILES", help="Files, folders or glob patterns: CSV, Excel, MAT, TDMS, MDF."),
-]
-Columns = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--column",
-        metavar="COLUMN=HEADER",
-        help="Header of a column, by name or number: 'Channel 1=pressure [bara]', '3=length [mm]'. Repeatable.",
-    ),
 ]
 Delimiter = Annotated[
     str | None, typer.Option(metavar="CHARACTER", help="Column delimiter of text files; default: detected.")
@@ -49,6 +50,9 @@ def inspect(
     files: Files,
     mapping: Mapping = None,
     column: Columns = None,
+    constant: Constants = None,
+    file_name: NamePattern = None,
+    time: TimeOption = None,
     unit: Units = None,
     resting_length: Length = None,
     ambient: AmbientPressure = None,
@@ -73,8 +77,9 @@ def inspect(
       airmuscle inspect log.mat --column "data(:,1)=time [s]" --column "data(:,2)=pressure [bara]"
       airmuscle inspect runs/*.tdms --mapping rig.toml --json
     """
-    columns = _column_mapping(mapping, column=column, resting_length=resting_length, ambient=ambient,
-                              delimiter=delimiter, decimal=decimal, sheet=sheet, group=group)  # fmt: skip
+    columns = column_mapping(mapping, column=column, constant=constant, file_name=file_name, time=time,
+                             resting_length=resting_length, ambient=ambient, delimiter=delimiter, decimal=decimal,
+                             sheet=sheet, group=group)  # fmt: skip
     inspections = inspect_all(_read(files, columns, parse_pairs("--unit", unit)))
     if out:
         _save_figures(inspections, out)
@@ -85,12 +90,6 @@ def inspect(
         _print(each)
     if out:
         echo(f"figures: {out}")
-
-
-def _column_mapping(path: Path | None, *, column: list[str] | None, **options: Any) -> ColumnMapping:
-    """The mapping of the file at `path`, if any, with the options taking precedence."""
-    base = read_mapping(path) if path else ColumnMapping()
-    return base.with_overrides(columns=parse_pairs("--column", column), **options)
 
 
 def _read(files: list[str], mapping: ColumnMapping, units: dict[str, str]) -> tuple[Recording, ...]:

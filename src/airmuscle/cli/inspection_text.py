@@ -9,6 +9,7 @@ import numpy as np
 
 from ..recording.display_units import display_scale
 from ..recording.segment import Inspection, Outlier, Run, Sampling
+from .option_hints import in_options
 
 COLUMNS = ("column", "unit in file", "min", "max", "unit", "resolution", "noise", "saturated at")
 MAX_ITEMS = 8
@@ -55,7 +56,9 @@ def summary(inspection: Inspection) -> Iterator[str]:
         outliers = _shorten([_describe_outlier(outlier) for outlier in inspection.outliers])
         yield f"suspected outliers: {len(inspection.outliers)}, not removed: {outliers}"
     yield from (f"note: {note}" for note in inspection.recording.notes)
-    yield from (f"{'PROBLEM' if finding.serious else 'note'}: {finding.text}" for finding in inspection.findings)
+    for finding in inspection.findings:
+        label = "PROBLEM" if finding.serious else "note"
+        yield f"{label}: {in_options(finding.text, 'inspect')}"
 
 
 def _shorten(items: list[str]) -> str:

@@ -6,7 +6,10 @@ import json
 from collections.abc import Callable, Mapping
 
 from ..core.hints import Hint, HintedText
+from ..recording.time_base import TIME_BASES
 
+TIME_BASE_NAMES = {base: name for name, base in TIME_BASES.items()}
+"""Names of the time bases of the option --time."""
 Instruction = Callable[[Hint], str]
 """The end of a sentence that states what to do on the command line."""
 
@@ -37,9 +40,23 @@ def _censoring(hint: Hint) -> str:
     return "use --uncensored" if hint.constant == "UNCENSORED" else "omit --uncensored"
 
 
+def _constant(hint: Hint) -> str:
+    return "use " + " ".join(f"--constant '{name}={value}'" for name, value in hint.value.items())
+
+
+def _time(hint: Hint) -> str:
+    """The name of a time base; the argument `ordered` stands for the stamps as they are."""
+    name = "unordered" if hint.argument == "ordered" else TIME_BASE_NAMES[hint.value]
+    return f"use --time {name}"
+
+
 _FILES: Mapping[str, Instruction] = {
     "units": _unit,
-    "columns": lambda hint: f"write {_toml_table(hint)} in a --mapping file",
+    "columns": _column,
+    "constants": _constant,
+    "file_name": lambda hint: f"use --file-name '{hint.value}'",
+    "time_base": _time,
+    "ordered": _time,
     "decimal": lambda hint: f"write decimal = {json.dumps(hint.value)} in a --mapping file",
     "resting_length": lambda hint: 'use --resting-length "..."',
 }
@@ -50,7 +67,7 @@ _RECORDS: Mapping[str, Instruction] = {
     "resting_length": lambda hint: 'write resting_length = "..." under [[record]]',
 }
 INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
-    "inspect": {**_FILES, "columns": _column},
+    "inspect": _FILES,
     "fit": {
         **_FILES,
         "fixed": _fix,

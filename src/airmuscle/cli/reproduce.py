@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..core.errors import AirmuscleError
-from ..report.chapter import DIFFERS, HOLDS, NOT_PRINTED, Chapter, Claim
+from ..report.chapter import DEPENDS, DIFFERS, HOLDS, NOT_PRINTED, NOT_TESTABLE, Chapter, Claim, Kind
 from ..report.formatting import MARKS, count_verdicts, format_number, format_published
+from ..report.formula import to_plain
 from ..reproduce import reproduce as reproduce_papers
 from .options import Folder
 from .terminal import echo, print_table
@@ -20,7 +21,7 @@ from .terminal import echo, print_table
 if TYPE_CHECKING:
     from rich.text import Text
 
-COLOURS = {HOLDS: "green", DIFFERS: "bold red", NOT_PRINTED: "dim"}
+COLOURS = {HOLDS: "green", DIFFERS: "bold red", DEPENDS: "yellow", NOT_TESTABLE: "dim", NOT_PRINTED: "dim"}
 
 
 def reproduce(
@@ -64,14 +65,23 @@ def _show_stage(paper: str) -> Iterator[None]:
 
 
 def _print_claims(claims: list[Claim]) -> None:
-    rows = [
-        (c.paper, c.claim, format_published(c), format_number(c.reproduced), _unit(c), _verdict(c.verdict))
-        for c in claims
-    ]
-    headers = ("paper", "claim", "published", "reproduced", "unit", "verdict")
-    print_table(headers, rows, right=("published", "reproduced"))
-    counts = count_verdicts(tuple(claims))
-    echo(f"{len(claims)} claims: " + ", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
+    """Print one table for each kind, and the number of statements by verdict, in which cases count once."""
+    headers = ("paper", "{}", "expected", "reproduced", "unit", "verdict")
+    for kind in Kind:
+        rows = [
+            (c.paper, to_plain(c.text), format_published(c), format_number(c.reproduced), _unit(c), _verdict(c.verdict))
+            for c in claims
+            if c.kind is kind
+        ]
+        if rows:
+            echo(f"\n{kind.description}")
+            print_table([h.format(kind.value) for h in headers], rows, right=("expected", "reproduced"))
+    for kind in Kind:
+        counts = {verdict: count for verdict, count in count_verdicts(claims, kind).items() if count}
+        total = sum(counts.values())
+        listed = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
+        if total:
+            echo(f"{total} {kind.value}{'s' if total > 1 else ''}: {listed}")
 
 
 def _unit(claim: Claim) -> str:

@@ -42,13 +42,14 @@ def trace_system(system: System) -> TracedSystem:
     w = casadi.SX.sym("w", len(system.inputs))
     state = {name: x[i] for i, name in enumerate(names)}
     inputs = {name: u[i] for i, name in enumerate(system.inputs)}
-    rates, outputs = model.rates(state, inputs), model.outputs(state, inputs)
+    rates, outputs = model.rates_and_outputs(state, inputs)
     if set(rates) != set(names):
         raise TraceError(f"{type(system).__name__}: states are {names}, but rates are given for {list(rates)}.")
     # Dense, because a printed function writes non-zeros one after the other.
     f = casadi.densify(casadi.vertcat(*(rates[name] for name in names)))
     o = casadi.densify(casadi.vertcat(*outputs.values())) if outputs else casadi.SX(0, 1)
     autodiff.check_finite(casadi.vertcat(f, o), type(system).__name__)
+    f, o = casadi.cse([f, o])  # once, so that the same need not be found again for every printed function
     return TracedSystem(x, u, w, p, f, o, tuple(outputs))
 
 
@@ -146,13 +147,14 @@ def implicit_module(t: TracedSystem) -> tuple[str, ArraySizes]:
     import casadi
 
     size = t.x.shape[0]
-    slopes, places, slots = _rates_and_slopes(t)
+    code = recorded([t.x, t.u, t.p], [t.f])
+    slopes, places, slots = _rates_and_slopes(t, code)
     lu = Factors(places, slots, size)
     a, g, b = (casadi.SX.sym(n, k) for n, k in (("A", lu.values.numel()), ("g", size), ("b", size)))
     stage, solve = lu.solved(a, [t.f[i] + g[i] for i in range(size)]), lu.solved(a, [b[i] for i in range(size)])
     point = {"x": t.x, "u": t.u, PARAMETERS: t.p}
     printer = Printer()
-    printer.add("rhs", point, {"f": t.f})
+    printer.add_code("rhs", list(point), finished(code), ["f"])
     printer.add_code("jac", list(point), slopes, ["f", "J"])
     printer.add("factor", {"J": lu.j, "d": lu.d}, {"A": lu.values}, ["d"])
     printer.add("solve", {"A": a, "b": b}, {"y": casadi.vertcat(*solve)})
@@ -164,9 +166,8 @@ def implicit_module(t: TracedSystem) -> tuple[str, ArraySizes]:
     return printer.module(), sizes
 
 
-def _rates_and_slopes(t: TracedSystem) -> tuple[Code, tuple[tuple[int, int], ...], tuple[int, ...]]:
+def _rates_and_slopes(t: TracedSystem, code: Code) -> tuple[Code, tuple[tuple[int, int], ...], tuple[int, ...]]:
     """The rates and the distinct non-zeros of their Jacobian; its places, and which non-zero stands in each."""
-    code = recorded([t.x, t.u, t.p], [t.f])
     tape, found = Tape(code.body), {index: operand for _, index, operand in code.outputs}
     rates = [found.get(i, ZERO) for i in range(t.x.numel())]
     rows = derivatives(tape, rates, [("in", 0, j) for j in range(t.x.numel())])

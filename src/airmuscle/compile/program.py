@@ -120,10 +120,20 @@ class Description:
         self.remarks = system.describe()
         self.default_state: Array | None = None
         """The default initial state, once it has been found."""
+        self.checked_state: list[float] | None = None
+        """The last initial state that was checked and found possible."""
         self.integrators: dict[Any, list[Any]] = {}
         """Integrators bound to this system that no run uses at present, by their integrator."""
         self.holders: dict[Any, list[Any]] = {}
         """The same for steps with held inputs."""
+        self.recorders: list[Any] = []
+        """Kernels of the rows bound to this system that no run uses at present."""
+        self.column_names = (*self.state_names, *self.input_names, *self.output_names)
+        self.positive_columns = [
+            len(states) + len(inputs) + i for i, name in enumerate(self.output_names) if name in positive
+        ]
+        """The columns among `column_names` that must be positive."""
+        self.remark_texts = tuple(remark.message for remark in self.remarks)
         self.state_limits = dict(zip(self.state_names, self.lower_bounds.tolist(), strict=True))
         """The lower bound of each state by its name."""
         limits = zip(self.input_lower_limits.tolist(), self.input_upper_limits.tolist(), strict=True)

@@ -134,6 +134,8 @@ class PWM(Driver):
 
     def step(self, state: PwmState, command: Sequence[Segment], start: float) -> tuple[list[Segment], PwmState]:
         end, period = command[-1][0], 1.0 / self.frequency
+        if state.origin + state.begun / self.frequency >= _last_begin(end):  # no period begins
+            return _rest_of_pulse(start, state.pulse_end, end), state
         smallest = max(self.smallest_pulse, 1e-9 * period, 4 * math.ulp(end))
         levels: list[tuple[float, float]] = []  # instant, level from then on
         pulse_end, count = state.pulse_end, 0
@@ -158,12 +160,26 @@ class PWM(Driver):
                 f"a carrier of {self.frequency:g} Hz has {count:.3g} periods in {end - start:g} s; {MAX_PERIODS} are "
                 "allowed. Simulate a shorter time, or the mean of the pulses."
             )
-        # a period that begins where rounding alone keeps it before the end belongs to the command from there on
-        last = end - 4 * math.ulp(abs(end))
+        last = _last_begin(end)
         for i in range(max(math.ceil(count) + 1, 0)):
             begin = state.origin + (state.begun + i) / self.frequency
             if begin < last:
                 yield max(begin, start)
+
+
+def _last_begin(end: float) -> float:
+    """The instant [s] before which a period begins that belongs to a command until `end` [s].
+
+    One that begins where rounding alone keeps it before the end belongs to the command from there on.
+    """
+    return end - 4 * math.ulp(abs(end))
+
+
+def _rest_of_pulse(start: float, pulse_end: float, end: float) -> list[Segment]:
+    """The opening from `start` to `end` [s] in which no period begins."""
+    if not pulse_end > start:
+        return [(end, 0.0, 0.0)]
+    return [(pulse_end, 1.0, 0.0), (end, 0.0, 0.0)] if pulse_end < end else [(end, 1.0, 0.0)]
 
 
 def _add_pulse(levels: list[tuple[float, float]], begin: float, pulse_end: float, end: float) -> None:

@@ -6,7 +6,7 @@ import abc
 import bisect
 import dataclasses
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -53,7 +53,7 @@ def check_input_signal(given: object) -> None:
 NO_INPUT = "the plant has no input"
 
 
-def check_input_names(given: Sequence[str], inputs: Sequence[str], prefix: str = NO_INPUT) -> None:
+def check_input_names(given: Iterable[str], inputs: Sequence[str], prefix: str = NO_INPUT) -> None:
     """Raise ParameterError, with the nearest name, for a name that is no input of the plant."""
     for name in given:
         if name not in inputs:
@@ -100,9 +100,11 @@ class Schedule(InputSignal):
 
     def __post_init__(self) -> None:
         _check_mapping("schedule", self.changes)
-        changes = {name: _pairs("schedule", name, given) for name, given in self.changes.items()}
-        for name, pairs in changes.items():
+        changes = {}
+        for name, given in self.changes.items():
+            pairs = _pairs("schedule", name, given)
             _check_points("schedule", "instants", name, pairs)
+            changes[name] = [t for t, _ in pairs], [0.0, *(v for _, v in pairs)]
         object.__setattr__(self, "_changes", changes)
 
     @property
@@ -110,17 +112,14 @@ class Schedule(InputSignal):
         return tuple(self.changes)
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        changes: dict[str, list[tuple[float, float]]] = self._changes  # type: ignore[attr-defined]
-        if any(name not in inputs for name in changes):
-            check_input_names(list(changes), inputs)
+        changes: dict[str, tuple[list[float], list[float]]] = self._changes  # type: ignore[attr-defined]
+        check_input_names(changes, inputs)
         end = start + duration
-        starts = [start, *sorted({t for pairs in changes.values() for t, _ in pairs if start < t < end})]
+        starts = [start, *sorted({t for times, _ in changes.values() for t in times if start < t < end})]
         values = np.zeros((len(starts), len(inputs)))
         for i, name in enumerate(inputs):
-            pairs = changes.get(name)
-            if pairs:
-                times = [t for t, _ in pairs]
-                levels = [0.0, *(v for _, v in pairs)]
+            if name in changes:
+                times, levels = changes[name]
                 values[:, i] = [levels[bisect.bisect_right(times, t)] for t in starts]
         return PiecewiseLinear(np.array([*starts[1:], end]), values, np.zeros(values.shape))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import ClassVar, NamedTuple
 
@@ -72,25 +73,27 @@ class PID(SisoController):
         return PIDMemory(started=False, integral=0.0, derivative=0.0, weighted=0.0)
 
     def step(self, memory: PIDMemory, measurement: Measurement, dt: float) -> tuple[dict[str, float], PIDMemory]:
-        setpoint, measured = measurement.setpoints[self.measured], measurement.columns[self.measured]
-        proportional = self.gain * (self.setpoint_weight * setpoint - measured)
+        columns, setpoints, ranges = measurement
+        setpoint, measured, gain = setpoints[self.measured], columns[self.measured], self.gain
+        proportional = gain * (self.setpoint_weight * setpoint - measured)
         weighted = self.derivative_weight * setpoint - measured
         if memory.started:
             integral = memory.integral
             filtered = self.derivative_time + self.derivative_filter * dt
-            increment = self.gain * self.derivative_filter * (weighted - memory.weighted)
+            increment = gain * self.derivative_filter * (weighted - memory.weighted)
             derivative = self.derivative_time / filtered * (memory.derivative + increment)
         else:
             integral = self.initial_output - proportional if self.integral_time > 0 else self.initial_output
             derivative = 0.0
         wanted = proportional + integral + derivative
-        minimum, maximum = range_of(self.commanded, measurement.ranges)
-        limited = min(max(wanted, minimum), maximum)
+        minimum, maximum = range_of(self.commanded, ranges)
+        limited = minimum if minimum > wanted else maximum if maximum < wanted else wanted
         if self.integral_time > 0:
-            integral += self.gain * dt / self.integral_time * (setpoint - measured)
-            integral += min(dt / self._tracking(), 1.0) * (limited - wanted)
+            integral += gain * dt / self.integral_time * (setpoint - measured)
+            integral += min(dt / self._tracking, 1.0) * (limited - wanted)
         return commands(self.commanded, limited), PIDMemory(True, integral, derivative, weighted)
 
+    @functools.cached_property
     def _tracking(self) -> float:
         """The time constant [s] of the anti-windup."""
         return self.tracking_time or math.sqrt(self.integral_time * self.derivative_time) or self.integral_time

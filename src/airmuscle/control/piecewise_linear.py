@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import operator
 from collections.abc import Sequence
 
 import numpy as np
 
-from ..core.arrays import Array
+from ..core.arrays import FEW, Array, all_finite
 from ..core.errors import ParameterError
 
 Segment = tuple[float, float, float]
@@ -49,10 +50,17 @@ class PiecewiseLinear:
                 f"segments have ends {ends.shape}, values {values.shape} and slopes {slopes.shape}; for {inputs} "
                 f"inputs they must be (S,), (S, {inputs}) and (S, {inputs}), with at least one segment."
             )
-        if not (np.isfinite(ends).all() and np.isfinite(values).all() and np.isfinite(slopes).all()):
+        if not (all_finite(ends) and all_finite(values) and all_finite(slopes)):
             raise ParameterError("segments hold a number that is not finite.")
-        if ends[0] <= start or (ends.size > 1 and not (ends[1:] > ends[:-1]).all()):
+        if ends[0] <= start or not _rising(ends):
             raise ParameterError(f"segments must end in rising order after {start:g} s; they end at {ends.tolist()} s.")
+
+    def as_floats(self) -> PiecewiseLinear:
+        """The same inputs as arrays that a kernel can read: contiguous, writeable, of float64."""
+        tables = (self.ends, self.values, self.slopes)
+        if all(t.dtype == np.float64 and t.flags.carray for t in tables):
+            return self
+        return PiecewiseLinear(*(np.array(t, dtype=float, order="C") for t in tables))
 
     def split_at(self, starts: Array, start: float) -> PiecewiseLinear:
         """The same inputs with segments that start at other instants (R,), in rising order, the first not before
@@ -62,8 +70,19 @@ class PiecewiseLinear:
         return PiecewiseLinear(ends, self.inputs_at(starts, start), self.slopes[index])
 
 
+def _rising(times: Array) -> bool:
+    """Whether every time is later than the one before."""
+    if times.size > FEW:
+        return bool((times[1:] > times[:-1]).all())
+    listed = times.tolist()
+    return all(map(operator.lt, listed, listed[1:]))
+
+
 def merge_columns(columns: Sequence[Sequence[Segment]], start: float) -> tuple[list[float], list[float], list[float]]:
     """One list of segments for several inputs, split wherever one of them is: ends, values and slopes row by row."""
+    if max(map(len, columns)) == 1:
+        single = [column[0] for column in columns]
+        return [single[0][0]], [value + 0.0 * slope for _, value, slope in single], [slope for _, _, slope in single]
     breaks = {start}
     for column in columns:
         breaks.update(end for end, _, _ in column[:-1])

@@ -40,4 +40,8 @@ def commands(commanded: Commanded, output: float) -> dict[str, float]:
     """The values of the inputs for a controller output."""
     if isinstance(commanded, str):
         return {commanded: output}
-    return {commanded.positive: max(output, 0.0), commanded.negative: max(-output, 0.0)}
+    opposite = -output
+    return {
+        commanded.positive: 0.0 if output < 0.0 else output,
+        commanded.negative: 0.0 if opposite < 0.0 else opposite,
+    }

@@ -15,6 +15,7 @@ from .piecewise_linear import PiecewiseLinear, Segment, merge_columns
 
 _ROUNDING = 1e-9
 """How far a command may exceed 0 to 1 through rounding."""
+_FULL = 1 + _ROUNDING
 
 
 @dataclasses.dataclass(frozen=True)
@@ -80,12 +81,14 @@ def apply_drivers(
     """
     later = {}
     for name, chain in chains.items():
-        signal, new = columns[indices[name]], []
+        column, before = indices[name], states[name]
+        signal = columns[column]
         check_command_range(name, signal, start)
-        for driver, state in zip(chain, states[name], strict=True):
-            signal, after = driver.step(state, signal, start)
-            new.append(after)
-        columns[indices[name]], later[name] = signal, tuple(new)
+        after = []
+        for i, driver in enumerate(chain):
+            signal, state = driver.step(before[i], signal, start)
+            after.append(state)
+        columns[column], later[name] = signal, tuple(after)
     return later
 
 
@@ -93,8 +96,8 @@ def check_command_range(name: str, command: Sequence[Segment], start: float) -> 
     """Raise ParameterError where the command of a driver leaves 0 to 1."""
     begin = start
     for end, value, slope in command:
-        for at in (value, value + slope * (end - begin)):
-            if not -_ROUNDING <= at <= 1 + _ROUNDING:
+        for at in (value, value + slope * (end - begin)) if slope else (value,):
+            if not -_ROUNDING <= at <= _FULL:
                 raise ParameterError(
                     f"the command of the driver of '{name}' is {at:g} before {end:g} s; allowed range: 0 to 1."
                 )

@@ -2,8 +2,26 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 """A NumPy array of float64."""
+FEW = 64
+"""Numbers up to which a Python loop is faster than NumPy (measured)."""
+
+
+def all_finite(values: Array) -> bool:
+    """Whether all numbers of an array are finite."""
+    if values.size > FEW:
+        return bool(np.isfinite(values).all())
+    return all(map(math.isfinite, values.ravel().tolist()))
+
+
+def flat_view(array: npt.NDArray[Any]) -> Any:
+    """A view of a C-contiguous array whose items are read and written as plain numbers, faster than those of NumPy."""
+    items: Any = array.reshape(-1)
+    return memoryview(items)

@@ -17,6 +17,7 @@ class DiagnosticCode(enum.StrEnum):
     MODEL = "model"
     CONTROLLER = "controller"
     EXTRAPOLATION = "extrapolation"
+    FRICTION_EXTRAPOLATION = "friction extrapolation"
     GEOMETRY_LIMIT = "geometry limit"
     COMPONENT = "component"
     INCOMPLETE = "incomplete"

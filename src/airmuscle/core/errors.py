@@ -123,7 +123,14 @@ class TraceError(AirmuscleError):
 
 
 class IdentificationError(AirmuscleError):
-    """The data cannot determine the requested quantities."""
+    """The data cannot determine the requested quantities.
+
+    cause  the cause alone, in one phrase for tables; empty if there is none
+    """
+
+    def __init__(self, message: str = "", *, hint: Hint | None = None, cause: str = "") -> None:
+        super().__init__(message, hint=hint)
+        self.cause = printable(cause)
 
 
 class SimulationError(AirmuscleError):

@@ -36,6 +36,12 @@ class System(abc.ABC):
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> Mapping[str, Value]:
         """Output quantities at a state."""
 
+    def rates_and_outputs(
+        self, state: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> tuple[Mapping[str, Value], Mapping[str, Value]]:
+        """The rates and the outputs; a system in which they share quantities computes these once."""
+        return self.rates(state, inputs), self.outputs(state, inputs)
+
     @property
     def input_variables(self) -> tuple[Input, ...]:
         """The inputs with their units and ranges; without bounds by default."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from ..core.declaration import model
 from ..core.ops import Value
@@ -12,12 +12,20 @@ from ..core.reference import Reference
 from ..core.variables import StateVariable
 
 
+class IdentifiedRange(NamedTuple):
+    """Lower and upper limits of the gauge pressure [Pa] and of the speed [m/s] in the data of a friction law."""
+
+    pressure: tuple[float, float]
+    speed: tuple[float, float]
+
+
 class Friction(abc.ABC):
     """Friction force that depends on the history of the displacement.
 
     Bristle deflections are mappings keyed by the names of `states`. `speed` [m/s] and force [N] are positive in the
     direction of shortening, and the force is subtracted from the tension of the muscle. No model uses the sign of the
-    speed, so that the rates are continuous and can be integrated with large steps.
+    speed, so that the rates are continuous and can be integrated with large steps. The friction of a muscle is `force`
+    times `pressure_factor`.
     """
 
     references: ClassVar[tuple[Reference, ...]] = ()
@@ -51,6 +59,15 @@ class Friction(abc.ABC):
     @abc.abstractmethod
     def presliding_distance(self) -> float:
         """Characteristic displacement of presliding [m], used for plots and nominal sizes."""
+
+    @property
+    def identified_range(self) -> IdentifiedRange | None:
+        """The range of the data to which the parameters were fitted; None if it is not known."""
+        return None
+
+    def pressure_factor(self, pressure: Value) -> Value:
+        """Factor of the force at a gauge pressure [Pa]; 1 unless the friction depends on the pressure."""
+        return 1.0
 
     def initial_state(self) -> dict[str, Value]:
         """Bristle deflections of the relaxed state, all zero."""

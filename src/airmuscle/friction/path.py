@@ -136,12 +136,12 @@ class _LoadingCurve:
 
 def _point_evaluation(spline: Any) -> Callable[[float], float]:
     """A function that evaluates a cubic spline at one point, as the spline itself does at many."""
-    nodes, coefficients = spline.x.tolist(), spline.c.T.tolist()
+    nodes, coefficients = spline.x.tolist(), spline.c
     last = len(nodes) - 2
 
     def evaluate(point: float) -> float:
         interval = min(max(bisect.bisect_right(nodes, point) - 1, 0), last)
-        cubic, square, slope, value = coefficients[interval]
+        cubic, square, slope, value = coefficients[:, interval].tolist()
         t = point - nodes[interval]
         return float(value + slope * t + square * (t * t) + cubic * (t * t * t))
 

@@ -6,6 +6,8 @@ from .censoring import UNCENSORED, Censoring
 from .confidence_bands import Band, confidence_band
 from .conversion import ModelConversion, convert
 from .cross_validation import BlockSplit, GroupSplit, LevelSplit, RunSplit, SpecimenSplit
+from .joint_selection import JointSelection, select_for_both
+from .length_errors import LengthError, estimate_length_error, find_length_errors
 from .loss import Huber, LeastSquares, Loss, SoftL1
 from .model_selection import Comparison, compare
 from .profile_likelihood import ProfileLikelihood, profile, weakly_determined
@@ -25,7 +27,9 @@ __all__ = [
     "Fit",
     "GroupSplit",
     "Huber",
+    "JointSelection",
     "LeastSquares",
+    "LengthError",
     "LevelSplit",
     "Loss",
     "ModelConversion",
@@ -38,10 +42,13 @@ __all__ = [
     "compare",
     "confidence_band",
     "convert",
+    "estimate_length_error",
+    "find_length_errors",
     "find_shape_violations",
     "fit",
     "fit_shape_constrained",
     "profile",
+    "select_for_both",
     "standard_candidates",
     "weakly_determined",
 ]

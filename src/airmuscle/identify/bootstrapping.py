@@ -16,12 +16,12 @@ from ..core.errors import IdentificationError
 from ..core.hints import Hint
 from ..recording import Recording
 from .cross_validation import GroupSplit, LevelSplit, default_split
+from .group_refits import GroupRefits, RowIndices
 from .loss import LeastSquares
 from .problem import FitProblem
 from .result import Fit
-from .solver import design_matrix, is_linear, solve
+from .solver import LeastSquaresSolution, design_matrix, is_linear, solve, solve_iteratively
 
-RowIndices = npt.NDArray[np.intp]
 _MIN_EIGENVALUE = 1e-10
 """Minimum eigenvalue of the normal matrix of a refit, in the basis in which that of all rows is 1 (chosen)."""
 
@@ -145,20 +145,28 @@ def _refit_iteratively(
 ) -> Array:
     """Refits one by one, each started at the parameters of the original fit."""
     values = np.full((draws.shape[0], len(fit.estimates)), np.nan)
+    problem = fit.problem
+    near = None
+    if isinstance(fit.loss, LeastSquares) and not is_linear(problem):
+        solution = LeastSquaresSolution(fit.values, problem.predict(fit.values), problem.jacobian(fit.values))
+        near = GroupRefits(problem, solution, group, draws.shape[1])
     for i, counts in enumerate(draws):
         if progress is not None:
             progress(i / len(draws))
-        repeats = counts[group]
-        drawn = repeats > 0
-        problem = dataclasses.replace(
-            fit.problem,
-            data=fit.problem.data.rows(drawn),
-            target=fit.problem.target[drawn],
-            censoring=fit.problem.censoring[drawn],
-            weights=fit.problem.weights[drawn] * np.sqrt(repeats[drawn]),
-        )
-        try:
-            values[i] = solve(problem, fit.loss, fit.values).values
-        except (IdentificationError, np.linalg.LinAlgError):
-            continue
+        found = None if near is None else near.refit(counts)
+        values[i] = _search(fit, counts[group], near is not None) if found is None else found
     return values
+
+
+def _search(fit: Fit, repeats: Array, tried: bool = False) -> Array:
+    """The parameters for these multiplicities of the rows (N,) by a search of its own; NaN where it fails.
+
+    `tried`: whether Gauss-Newton steps have failed.
+    """
+    drawn = repeats > 0
+    problem = fit.problem.rows(drawn)
+    problem = dataclasses.replace(problem, weights=problem.weights * np.sqrt(repeats[drawn]))
+    try:
+        return (solve_iteratively if tried else solve)(problem, fit.loss, fit.values).values
+    except (IdentificationError, np.linalg.LinAlgError):
+        return np.full(len(fit.estimates), np.nan)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from ..core.arrays import Array
 from ..core.hints import Hint, HintedText
@@ -20,6 +23,18 @@ MIN_BINS = 3
 """Minimum number of intervals with rows of both branches (chosen)."""
 MIN_STANDARD_ERRORS = 3.0
 """Standard errors above which the mean difference is not random (chosen)."""
+
+
+class _BranchBins(NamedTuple):
+    """Mask of the rows with a pressure; of these the direction (1 inflating, -1 deflating) and the interval."""
+
+    known: npt.NDArray[np.bool_]
+    direction: Array
+    bins: npt.NDArray[np.intp]
+
+
+_known: weakref.WeakKeyDictionary[Recording, _BranchBins] = weakref.WeakKeyDictionary()
+"""Branches by recording: a comparison asks for the same recordings for every law."""
 
 
 def branch_notes(runs: Sequence[Recording], residuals: Sequence[Array], quantity: str) -> list[str]:
@@ -51,21 +66,29 @@ def branch_notes(runs: Sequence[Recording], residuals: Sequence[Array], quantity
 
 def _branch_differences(run: Recording, residuals: Array) -> Array:
     """Mean residual of the inflating minus that of the deflating rows, by interval of pressure; shape (intervals,)."""
-    known = np.isfinite(run["pressure"])
-    complete = run.rows(known)
-    branches = tuple(each for each in find_branches(complete) if len(each.interval) >= MIN_BRANCH_ROWS)
-    if len({branch.direction for branch in branches}) < 2:
+    if run not in _known:
+        _known[run] = _branch_bins(run)
+    known, direction, bins = _known[run]
+    if not direction.any():
         return np.zeros(0)
-    direction = branch_directions(complete, branches)
-    values, pressure = residuals[known], complete["pressure"]
+    values = residuals[known]
     measured = np.isfinite(values)
-    edges = np.linspace(pressure.min(), pressure.max(), PRESSURE_BINS + 1)[1:-1]
-    bins = np.digitize(pressure, edges)
     groups = (
         [values[measured & (bins == number) & (direction == sign)] for sign in (1, -1)]
         for number in range(PRESSURE_BINS)
     )
     return np.array([float(up.mean() - down.mean()) for up, down in groups if up.size and down.size])
+
+
+def _branch_bins(run: Recording) -> _BranchBins:
+    known = np.isfinite(run["pressure"])
+    complete = run.rows(known)
+    branches = tuple(each for each in find_branches(complete) if len(each.interval) >= MIN_BRANCH_ROWS)
+    if len({branch.direction for branch in branches}) < 2:
+        return _BranchBins(known, np.zeros(0), np.zeros(0, dtype=np.intp))
+    pressure = complete["pressure"]
+    edges = np.linspace(pressure.min(), pressure.max(), PRESSURE_BINS + 1)[1:-1]
+    return _BranchBins(known, branch_directions(complete, branches), np.digitize(pressure, edges))
 
 
 def _sensor_deviation(runs: Sequence[Recording], quantity: str) -> float:

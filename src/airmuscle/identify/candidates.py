@@ -83,6 +83,19 @@ def standard_candidates(recordings: Sequence[Recording]) -> tuple[Candidate, ...
     return tuple(candidates)
 
 
+def unavailable_candidates(recordings: Sequence[Recording]) -> tuple[tuple[str, str, str], ...]:
+    """The standard candidates whose initial values do not follow from the data: name, reason and cause."""
+    scales, missing = DataScales.from_recordings(recordings), []
+    if scales.max_length is None:
+        names = [candidate.name for candidate in _laws_with_length(scales, 0.2)]
+        cause = "not every recording states its resting length"
+        missing += [(name, f"{cause[0].upper()}{cause[1:]}. State the resting length.", cause) for name in names]
+    if scales.length_count < 2:
+        cause = "they need recordings of two resting lengths or more"
+        missing.append(("laws for muscles of any length", f"{cause[0].upper()}{cause[1:]}.", cause))
+    return tuple(missing)
+
+
 def blank_surface(degree: int, max_force: float = _UNREACHED_FORCE) -> ContractileSurface:
     """A surface with coefficients of zero, clamped above all measured forces."""
     return ContractileSurface.blank(degree, max_force=max(max_force, 1.0))

@@ -59,13 +59,15 @@ class SpecimenSplit(GroupSplit):
     purpose: ClassVar[str] = "other muscles of the same type"
 
     def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
-        return [np.full(len(run), self._specimen_name(run)) for run in recordings]
+        return [np.full(len(run), specimen_name(run)) for run in recordings]
 
-    def _specimen_name(self, run: Recording) -> str:
-        if "specimen" in run.constants:
-            return str(run.constants["specimen"])
-        length = run.constants.get("resting_length")
-        return run.origin if length is None else f"{float(length) * 1e3:.6g} mm"
+
+def specimen_name(run: Recording) -> str:
+    """The constant `specimen`, or else the resting length in mm, or the origin of the recording."""
+    if "specimen" in run.constants:
+        return str(run.constants["specimen"])
+    length = run.constants.get("resting_length")
+    return run.origin if length is None else f"{float(length) * 1e3:.6g} mm"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -173,7 +173,8 @@ def _with_validity_range(law: Characteristic, data: Recording) -> Characteristic
         if np.ptp(data[name]) == 0:
             raise IdentificationError(
                 f"{data.origin}: {name} is {data[name][0]:g}{unit} in every row, so a surface cannot be fitted. "
-                f"Measure at several levels of {name}."
+                f"Measure at several levels of {name}.",
+                cause=f"{name} does not vary",
             )
     scaled: Characteristic = with_validity_range(
         *((float(data[n].min()), float(data[n].max())) for n in ("pressure", "contraction"))

@@ -37,6 +37,8 @@ REMEDIES: tuple[tuple[tuple[str, ...], tuple[str, ...], str], ...] = (
      "fill once fast and once through a throttle, slowly enough to stay at room temperature"),
     (("start time",), ("conductance", *VOLUMES), "record the valve command together with the pressure"),
     (("damping",), ("growth",), "release at two clearly different pressures"),
+    (("stribeck_force", "stribeck_speed", "bristle_damping"), ("coulomb_force", "stribeck_force", "damping"),
+     "measure loops at clearly different speeds"),
 )  # fmt: skip
 """Two groups of parameters that are often confounded, by the last part of their paths, and the remedy."""
 

@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from ..characteristic.base import Characteristic
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError, IdentificationError
 from ..core.hints import HintedText
 from ..recording import Recording
-from .candidates import Candidate, standard_candidates
-from .cross_validation import GroupSplit, Labels, default_split, label_folds
-from .fit_points import FitPoints
-from .force_evaluation import evaluate_force, slack_rows
+from .candidates import Candidate, standard_candidates, unavailable_candidates
+from .compared_points import ComparedPoints, cause_of, residuals_of_rows
+from .cross_validation import GroupSplit, default_split, label_folds
+from .length_errors import find_length_errors, length_notes
 from .loss import LeastSquares, Loss
 from .model_evidence import aicc
 from .result import Fit
-from .static_fit import fit, refit
+from .static_fit import fit_to_points
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,6 +61,12 @@ class ExcludedModel:
 
     name: str
     reason: str
+    """The complete reason, with what to do."""
+    cause: str
+    """The cause in one phrase."""
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.cause}."
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -74,6 +78,11 @@ class Comparison:
     leave_out: GroupSplit
     recommended: RankedModel
     reason: str
+    unavailable: tuple[ExcludedModel, ...] = ()
+    """Standard candidates whose initial values do not follow from the data; empty if candidates were given."""
+
+    notes: tuple[str, ...] = ()
+    """Remarks on the data, such as a resting length that is probably recorded wrongly."""
 
     @property
     def purpose(self) -> str:
@@ -87,6 +96,9 @@ class Comparison:
             raise IdentificationError(f"the comparison has no model '{name}'; it has {', '.join(models)}.")
         return models[name]
 
+    def _left_out(self) -> tuple[tuple[str, tuple[ExcludedModel, ...]], ...]:
+        return (("excluded", self.excluded), ("not compared", self.unavailable))
+
     def __str__(self) -> str:
         title = (
             f"Leave-one-{self.leave_out.group_name}-out cross-validation, rms errors in force; the ranking is for "
@@ -98,8 +110,9 @@ class Comparison:
             f"{m.cross_validated_rmse:>10.4g} N{m.aicc:>12.1f}"
             for m in self.ranking
         ]
-        notes = [f"note: {m.candidate.name}: {note}" for m in self.ranking for note in m.notes]
-        excluded = [f"excluded: {e.name}. {e.reason}" for e in self.excluded]
+        notes = [f"note: {note}" for note in self.notes]
+        notes += [f"note: {m.candidate.name}: {note}" for m in self.ranking for note in m.notes]
+        excluded = [f"{word}: {e}" for word, models in self._left_out() for e in models]
         return "\n".join([title, "", head, *rows, "", self.reason, *notes, *excluded])
 
 
@@ -109,7 +122,7 @@ def compare(
     *,
     leave_out: GroupSplit | None = None,
     loss: Loss = LeastSquares(),
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[str, float], None] | None = None,
 ) -> Comparison:
     """Fit all candidates, rank them by their cross-validated error in force, and recommend one.
 
@@ -117,7 +130,7 @@ def compare(
     leave_out   RunSplit(), LevelSplit("contraction"), LevelSplit("pressure"), SpecimenSplit() or BlockSplit(); it
                 defines the purpose of the ranking: the best law for other muscles is not the best for the measured
                 ones. By default the first of specimens, runs and levels with three groups or more
-    progress    called with the name of each candidate
+    progress    called with the name of each candidate and the completed fraction, at the end with an empty name
 
     The recommended law is the one with the fewest parameters among those whose error is not larger than the lowest one
     by more than one standard error of the difference (Breiman et al., Classification and Regression Trees (1984),
@@ -126,118 +139,51 @@ def compare(
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     split = leave_out or default_split(runs)
     labels, names = label_folds(runs, split)
-    points = _ComparedPoints.from_recordings(runs, labels, names)
+    points = ComparedPoints.from_recordings(runs, labels, names)
     ranking, excluded = [], []
-    for candidate in candidates if candidates is not None else standard_candidates(runs):
+    compared = standard_candidates(runs) if candidates is None else candidates
+    for number, candidate in enumerate(compared):
         if progress is not None:
-            progress(candidate.name)
+            progress(candidate.name, number / len(compared))
         try:
             ranking.append(_cross_validate(candidate, points, loss))
         except AirmuscleError as error:
-            excluded.append(ExcludedModel(candidate.name, error.message))
+            excluded.append(ExcludedModel(candidate.name, error.message, cause_of(error)))
+    if progress is not None:
+        progress("", 1.0)
     if not ranking:
         reasons = [part for e in excluded for part in (f"\n{e.name}: ", e.reason)]
         raise IdentificationError(HintedText(f"the data determine none of the {len(excluded)} candidates.", *reasons))
+    missing = () if candidates is not None else unavailable_candidates(runs)
+    unavailable = tuple(ExcludedModel(name, reason, cause) for name, reason, cause in missing)
     ranking.sort(key=lambda m: (m.cross_validated_rmse, m.parameter_count))
     recommended, reason = _recommend(ranking, split)
-    return Comparison(tuple(ranking), tuple(excluded), split, recommended, reason)
+    remarks = length_notes(find_length_errors(recommended.fit.model, runs))
+    return Comparison(tuple(ranking), tuple(excluded), split, recommended, reason, unavailable, remarks)
 
 
-class _Fold(NamedTuple):
-    """The points to which a law is fitted, and the recordings that are left out of them."""
-
-    name: str
-    training: FitPoints
-    test: list[Recording]
-
-
-class _ComparedPoints(NamedTuple):
-    """All recordings, their maximum force [N] and the folds; their sensors are estimated once for all candidates."""
-
-    recordings: Sequence[Recording]
-    max_force: float
-    folds: tuple[_Fold, ...]
-
-    @classmethod
-    def from_recordings(
-        cls, runs: Sequence[Recording], labels: Sequence[Labels], names: Sequence[str]
-    ) -> _ComparedPoints:
-        """The points divided into the folds of these names."""
-        folds = []
-        for name in names:
-            training = [_select(run, label != name) for run, label in zip(runs, labels, strict=True)]
-            test = [_select(run, label == name) for run, label in zip(runs, labels, strict=True)]
-            folds.append(
-                _Fold(
-                    name,
-                    FitPoints.from_recordings([run for run in training if len(run)]),
-                    [run for run in test if len(run)],
-                )
-            )
-        return cls(runs, max(float(np.nanmax(run["force"])) for run in runs), tuple(folds))
-
-
-def _select(run: Recording, mask: npt.NDArray[np.bool_]) -> Recording:
-    return run if mask.all() else run.rows(mask)
-
-
-def _cross_validate(candidate: Candidate, points: _ComparedPoints, loss: Loss) -> RankedModel:
-    full_fit = fit(candidate.law, points.recordings, loss=loss, fixed=candidate.fixed)
-    max_force = 3 * points.max_force
-    notes = _slack_notes(full_fit.model, points.recordings)
-    in_sample = force_residuals(full_fit.model, points.recordings, max_force)
-    scores, out_of_sample = [], []
-    for fold in points.folds:
-        try:
-            model = refit(full_fit.model, fold.training, loss=loss, fixed=candidate.fixed)
-        except AirmuscleError as error:
-            raise IdentificationError(HintedText(f"Not determined without {fold.name}: ", error.message)) from None
-        residuals = force_residuals(model, fold.test, max_force)
-        if residuals.size:
-            scores.append(FoldScore(fold.name, _rms(residuals), residuals.size))
-            out_of_sample.append(residuals)
+def _cross_validate(candidate: Candidate, points: ComparedPoints, loss: Loss) -> RankedModel:
+    full_fit = fit_to_points(candidate.law, points.points, loss=loss, fixed=candidate.fixed)
+    notes = _slack_notes(full_fit.model, points)
+    in_sample = residuals_of_rows(full_fit.model, points.rows, points.max_force)
+    left_out = [each for each in points.left_out_residuals(candidate, full_fit, loss) if each[1].size]
+    scores = tuple(FoldScore(name, _rms(residuals), residuals.size) for name, residuals in left_out)
+    out_of_sample = np.concatenate([residuals for _, residuals in left_out])
     criterion = aicc(float(np.mean(in_sample**2)), in_sample.size, len(full_fit.estimates))
-    return RankedModel(
-        candidate, full_fit, _rms(in_sample), _rms(np.concatenate(out_of_sample)), criterion, tuple(scores), notes
-    )
+    return RankedModel(candidate, full_fit, _rms(in_sample), _rms(out_of_sample), criterion, scores, notes)
 
 
-def force_residuals(model: Characteristic, runs: Sequence[Recording], max_force: float) -> Array:
-    """Residuals (model - measured) in force [N] at the rows with a positive force, with the law of each run's length.
-
-    `max_force` [N] limits the force of laws that give contraction or pressure.
-    """
-    return np.concatenate(
-        [
-            evaluate_force(law, rows["pressure"], rows["contraction"], max_force) - rows["force"]
-            for law, rows in _laws_with_rows(model, runs)
-        ]
-    )
-
-
-def _laws_with_rows(model: Characteristic, runs: Sequence[Recording]) -> Iterator[tuple[Any, Recording]]:
-    """The rows of each run with a positive force, with the law of the run's resting length."""
-    for run in runs:
-        rows = run.rows((run["force"] > 0) & np.isfinite(run["pressure"] + run["contraction"] + run["force"]))
-        law: Any = model
-        length = run.constants.get("resting_length")
-        if length is not None and hasattr(law, "with_resting_length"):
-            law = law.with_resting_length(float(length))
-        yield law, rows
-
-
-def _slack_notes(model: Characteristic, runs: Sequence[Recording]) -> tuple[str, ...]:
+def _slack_notes(model: Characteristic, points: ComparedPoints) -> tuple[str, ...]:
     """A remark where the law is slack at points with a positive force.
 
     Raises IdentificationError where it gives no force although it is not slack.
     """
-    masks = [slack_rows(law, rows["pressure"], rows["contraction"]) for law, rows in _laws_with_rows(model, runs)]
-    slack = sum(int(np.count_nonzero(mask)) for mask in masks)
+    slack, count = points.slack_count(model)
     if not slack:
         return ()
     return (
-        f"it is slack at {slack} of {sum(mask.size for mask in masks)} points with a positive force and is ranked "
-        "with zero force there; its method force raises SolveError at these points.",
+        f"it is slack at {slack} of {count} points with a positive force and is ranked with zero force there; its "
+        "method force raises SolveError at these points.",
     )
 
 

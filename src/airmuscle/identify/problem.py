@@ -266,4 +266,5 @@ def _check_row_count(law: Characteristic, data: Recording, free: int, measured: 
             f"{name} has {free} free parameters, but only {measured} rows are measured values{also}. Measure more "
             "points, or choose a law with fewer parameters or a lower degree.",
             hint=Hint("To fix parameters", "fixed"),
+            cause=f"{free} parameters, but {measured} measured values",
         )

@@ -46,11 +46,11 @@ def solve(problem: FitProblem, loss: Loss, start: Array | None = None) -> LeastS
         near = gauss_newton(problem, start) if start is not None and isinstance(loss, LeastSquares) else None
         if near is not None:
             return LeastSquaresSolution(*near)
-        return _solve_iteratively(problem, loss, find_initial_values(problem) if start is None else start)
+        return solve_iteratively(problem, loss, find_initial_values(problem) if start is None else start)
     linear = _solve_linear(problem)
     if isinstance(loss, LeastSquares):
         return linear
-    robust = _solve_iteratively(problem, loss, linear.values)
+    robust = solve_iteratively(problem, loss, linear.values)
     if is_determined_without_censored(problem, robust.jacobian):
         return robust
     # The search stops as soon as no bound is violated; parameters that only bounds determine are then arbitrary.
@@ -85,7 +85,7 @@ def _solve_linear(problem: FitProblem) -> LeastSquaresSolution:
     return LeastSquaresSolution(values, matrix @ values + constant, matrix)
 
 
-def _solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> LeastSquaresSolution:
+def solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> LeastSquaresSolution:
     """Trust-region least squares within bounds, with parameters and residuals scaled to the order of one."""
     from scipy.optimize import least_squares
 
@@ -151,7 +151,8 @@ def _check_finite(problem: FitProblem, start: Array) -> None:
             f"{problem.data.origin}: with its initial values {type(problem.law).__name__} gives no finite "
             f"{problem.fitted_quantity.name} at {np.count_nonzero(bad)} of {len(values)} points, the first at {first} "
             f"{a:.4g} and {second} {b:.4g} (SI). Give other initial values, or remove points outside the range of the "
-            "law."
+            "law.",
+            cause=f"it gives no finite {problem.fitted_quantity.name} with its initial values",
         )
 
 
@@ -161,4 +162,5 @@ def _not_converged(problem: FitProblem) -> IdentificationError:
         f"{problem.data.origin}: the fit of {type(problem.law).__name__} did not converge in {evaluations} "
         "evaluations. Give initial values closer to those of the muscle, or choose a law with fewer parameters.",
         hint=Hint("To fix parameters", "fixed"),
+        cause="the fit does not converge",
     )

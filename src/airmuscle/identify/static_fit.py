@@ -58,6 +58,19 @@ def fit(
     """
     _check_types(characteristic, recording)
     points = FitPoints.from_recordings(recording)
+    return fit_to_points(characteristic, points, loss=loss, censoring=censoring, sigma=sigma, fixed=fixed)
+
+
+def fit_to_points(
+    characteristic: Characteristic,
+    points: FitPoints,
+    *,
+    loss: Loss = LeastSquares(),
+    censoring: Censoring | None = None,
+    sigma: npt.ArrayLike | None = None,
+    fixed: Collection[str] = (),
+) -> Fit:
+    """As `fit`, for points whose sensors and runs are estimated once for several laws."""
     problem = points.problem(characteristic, censoring=censoring, sigma=sigma, fixed=fixed)
     solution = solve(problem, loss)
     statistics = compute_statistics(problem, solution, loss)

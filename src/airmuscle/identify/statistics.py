@@ -10,13 +10,16 @@ import numpy.typing as npt
 
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
-from ..core.hints import Hint, HintedText
+from ..core.hints import Hint
 from ..recording import Recording
 from ..recording.segment.runs import RELATIVE_BAND
 from .censored_least_squares import RANK_TOLERANCE, uncensored_rank
 from .loss import Loss
 from .problem import FitProblem
 from .solver import LeastSquaresSolution
+
+_MAX_NAMES = 3
+"""Maximum number of parameters that the cause of a rank deficiency lists (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -88,7 +91,7 @@ def _decompose(problem: FitProblem, solution: LeastSquaresSolution) -> _Decompos
     null = singular <= RANK_TOLERANCE * singular[0] if singular.size else np.zeros(0, dtype=bool)
     if null.any():
         shares = np.sqrt(np.sum(vectors[null] ** 2, axis=0))
-        raise IdentificationError(_rank_deficiency_message(problem, ~on_bound, shares, int(np.count_nonzero(~null))))
+        raise _rank_deficiency(problem, ~on_bound, shares, int(np.count_nonzero(~null)))
     return _Decomposition(on_bound, active, norms, singular, vectors)
 
 
@@ -113,7 +116,7 @@ def _residual_std(residuals: Array, parameters: int, loss: Loss) -> float:
     return float(np.sqrt(np.sum((residuals * first) ** 2) / degrees_of_freedom) / np.mean(first + 2 * z * second))
 
 
-def _rank_deficiency_message(problem: FitProblem, free: npt.NDArray[np.bool_], shares: Array, rank: int) -> HintedText:
+def _rank_deficiency(problem: FitProblem, free: npt.NDArray[np.bool_], shares: Array, rank: int) -> IdentificationError:
     """The parameters with a share in the null space, and what to do; `shares` (P,) are their norms in it."""
     labels = [label for label, is_free in zip(problem.labels, free, strict=True) if is_free]
     names = [label for label, share in zip(labels, shares, strict=True) if share > 1e-3 * shares.max()]
@@ -122,10 +125,14 @@ def _rank_deficiency_message(problem: FitProblem, free: npt.NDArray[np.bool_], s
     path = problem.leaves[problem.free[int(np.flatnonzero(free)[int(np.argmax(shares))])]].path
     law = type(problem.law).__name__
     what = f"cannot separate {', '.join(names)}" if len(names) > 1 else f"do not depend on {names[0]}"
-    return HintedText(
-        f"{problem.data.origin}: the data {what} of {law} (rank {rank} of {len(labels)} parameters). Number of levels: "
-        f"{', '.join(counts)}. Measure at more levels, or choose a lower degree or a law with fewer parameters.",
-        Hint("To fix one parameter", "fixed", (path,)),
+    ranks = f"(rank {rank} of {len(labels)} parameters)"
+    few = [names[0], f"{len(names) - 1} other parameters"] if len(names) > _MAX_NAMES else names
+    cause = what if len(names) == 1 else f"cannot separate {' and '.join(few)}"
+    return IdentificationError(
+        f"{problem.data.origin}: the data {what} of {law} {ranks}. Number of levels: {', '.join(counts)}. Measure at "
+        "more levels, or choose a lower degree or a law with fewer parameters.",
+        hint=Hint("To fix one parameter", "fixed", (path,)),
+        cause=f"the data {cause} (rank {rank} of {len(labels)})",
     )
 
 

@@ -4,7 +4,7 @@ from .creep import CreepElements
 from .damper import Damper, DirectionalDamper, LinearDamper, PressureDamper
 from .muscle import INNER_CONTRACTION, Muscle
 from .reynolds2003 import Reynolds2003Damper, Reynolds2003Spring
-from .series import RigidSeriesElement, SeriesElement, SeriesSpring
+from .series import CubicSeriesSpring, ElasticSeriesElement, RigidSeriesElement, SeriesElement, SeriesSpring
 from .serres2009 import Serres2009Damper, Serres2009Spring
 from .spring import CubicSpring, LinearSpring, Spring
 from .stop import EndStop, NoStop, Stop
@@ -13,9 +13,11 @@ from .wall import RigidWall, SwellingWall, ViscoelasticWall, Wall
 __all__ = [
     "INNER_CONTRACTION",
     "CreepElements",
+    "CubicSeriesSpring",
     "CubicSpring",
     "Damper",
     "DirectionalDamper",
+    "ElasticSeriesElement",
     "EndStop",
     "LinearDamper",
     "LinearSpring",

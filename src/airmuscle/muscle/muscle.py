@@ -21,7 +21,7 @@ from ..friction.base import Friction, NoFriction
 from ..geometry.base import Geometry
 from .creep import CreepElements
 from .damper import Damper, LinearDamper
-from .series import RigidSeriesElement, SeriesElement, SeriesSpring
+from .series import ElasticSeriesElement, RigidSeriesElement, SeriesElement
 from .series_equilibrium import solve_inner_contraction, without_derivative
 from .spring import LinearSpring, Spring
 from .stop import NoStop, Stop
@@ -90,7 +90,7 @@ class Muscle:
             raise ParameterError(
                 f"Muscle: validity_range is {abridged(self.validity_range)}; it must be a ValidityRange or None."
             )
-        if isinstance(self.series, SeriesSpring):
+        if isinstance(self.series, ElasticSeriesElement):
             self._check_series_elements()
 
     def _check_series_elements(self) -> None:
@@ -111,14 +111,14 @@ class Muscle:
     def states(self) -> tuple[StateVariable, ...]:
         """State variables: friction bristles, creep elements, wall, contraction of the contractile element."""
         inner = StateVariable(INNER_CONTRACTION, "1", 0.05, "contraction of the contractile element")
-        compliant = (inner,) if isinstance(self.series, SeriesSpring) else ()
+        compliant = (inner,) if isinstance(self.series, ElasticSeriesElement) else ()
         return (*self.friction.states, *self.creep.states, *self.wall.states, *compliant)
 
     def steady_state(self, pressure: Value, contraction: Value) -> dict[str, Value]:
         """Steady state at a gauge pressure [Pa] and a contraction, with relaxed friction and creep elements."""
         state: dict[str, Value] = {variable.name: 0.0 for variable in (*self.friction.states, *self.creep.states)}
         state |= self.wall.steady_state(pressure)
-        if isinstance(self.series, SeriesSpring):
+        if isinstance(self.series, ElasticSeriesElement):
             length, limits = self.geometry.resting_length, self.geometry.contraction_range
             state[INNER_CONTRACTION] = solve_inner_contraction(
                 autodiff.value_and_derivative(self, "internal_imbalance", 3, wrt=1)
@@ -136,13 +136,13 @@ class Muscle:
 
         It decreases with the inner contraction.
         """
-        assert isinstance(self.series, SeriesSpring)
+        assert isinstance(self.series, ElasticSeriesElement)
         stretch = (inner_contraction - contraction) * self.geometry.resting_length
         return self.static_force(pressure, inner_contraction) - self.series.force(stretch)
 
     def inner_contraction(self, contraction: Value, state: Mapping[str, Value] = RELAXED) -> Value:
         """Contraction of the contractile element for a contraction of the muscle between its fittings."""
-        return state[INNER_CONTRACTION] if isinstance(self.series, SeriesSpring) else contraction
+        return state[INNER_CONTRACTION] if isinstance(self.series, ElasticSeriesElement) else contraction
 
     def volume(self, inner_contraction: Value, state: Mapping[str, Value] = RELAXED) -> Value:
         """Enclosed volume [m3] at a contraction of the contractile element."""
@@ -158,8 +158,8 @@ class Muscle:
         `inner_contraction` is that of the contractile element; `contraction` and `speed` are those of the muscle
         between its fittings.
         """
-        if not isinstance(self.series, SeriesSpring):
-            friction = self.friction_force(speed, state)
+        if not isinstance(self.series, ElasticSeriesElement):
+            friction = self.friction_force(pressure, speed, state)
             return MuscleForce(self.tension(pressure, contraction, speed, state), friction, speed)
         tension = self.series.force((inner_contraction - contraction) * self.geometry.resting_length)
         imbalance = self.unclamped_tension(pressure, inner_contraction, 0.0, state) - tension
@@ -169,14 +169,14 @@ class Muscle:
             static_force, damping = self.stop.static_force_and_damping(inner_contraction, self.geometry.resting_length)
             stopped_speed = self.damper.speed(pressure, inner_contraction, imbalance - static_force, damping)
             inner_speed = ops.minimum(inner_speed, stopped_speed)
-        return MuscleForce(tension, self.friction_force(inner_speed, state), inner_speed)
+        return MuscleForce(tension, self.friction_force(pressure, inner_speed, state), inner_speed)
 
     def rates(self, state: Mapping[str, Value], pressure: Value, inner_speed: Value) -> dict[str, Value]:
         """Time derivatives of the states at a gauge pressure [Pa] and an inner speed of shortening [m/s]."""
         rates = self.friction.rates(self._bristle_state(state), inner_speed)
         rates |= self.creep.rates(state, inner_speed)
         rates |= self.wall.rates(state, pressure)
-        if isinstance(self.series, SeriesSpring):
+        if isinstance(self.series, ElasticSeriesElement):
             rates[INNER_CONTRACTION] = inner_speed / self.geometry.resting_length
         return rates
 
@@ -197,7 +197,7 @@ class Muscle:
             self.contractile.force(pressure, contraction)
             - self.spring.force(pressure, contraction, self.geometry.resting_length)
             - self.damper.force(pressure, contraction, speed)
-            - self.friction_force(speed, state)
+            - self.friction_force(pressure, speed, state)
         )
         return total - self.creep.force({**self._relaxed_creep(), **state}) if self.creep.states else total
 
@@ -206,9 +206,9 @@ class Muscle:
         elements = self.unclamped_tension(pressure, contraction)
         return elements - self.stop.force(contraction, 0.0, self.geometry.resting_length)
 
-    def friction_force(self, speed: Value, state: Mapping[str, Value] = RELAXED) -> Value:
-        """Friction force against shortening [N]."""
-        return self.friction.force(self._bristle_state(state), speed)
+    def friction_force(self, pressure: Value, speed: Value, state: Mapping[str, Value] = RELAXED) -> Value:
+        """Friction force against shortening [N] at a gauge pressure [Pa] and a speed of shortening [m/s]."""
+        return self.friction.pressure_factor(pressure) * self.friction.force(self._bristle_state(state), speed)
 
     def _bristle_state(self, state: Mapping[str, Value]) -> dict[str, Value]:
         return {s.name: state.get(s.name, 0.0) for s in self.friction.states}

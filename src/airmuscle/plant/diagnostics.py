@@ -12,7 +12,7 @@ from ..core.diagnostics import Columns, Diagnostic, DiagnosticCode
 from ..core.errors import ParameterError
 from ..core.variables import select_prefix
 from ..friction import NoFriction
-from ..muscle import INNER_CONTRACTION, Muscle, SeriesSpring
+from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle
 
 MARGIN = 1e-3
 """Fraction of the contraction range of a geometry within which a muscle is at its limit (chosen)."""
@@ -41,7 +41,8 @@ class ColumnLimit(NamedTuple):
 
 
 def column_limits(muscles: Sequence[Muscle], prefixes: Sequence[str]) -> tuple[ColumnLimit, ...]:
-    """All limits of the columns of muscles: validity ranges of characteristics and contraction ranges of geometries."""
+    """All limits of the columns of muscles: validity ranges of characteristics, ranges of the data of frictions, and
+    contraction ranges of geometries."""
     return tuple(
         ColumnLimit(muscle.name, *limit)
         for prefix, muscle in zip(prefixes, muscles, strict=True)
@@ -50,7 +51,8 @@ def column_limits(muscles: Sequence[Muscle], prefixes: Sequence[str]) -> tuple[C
 
 
 def extrapolation(limits: Sequence[ColumnLimit], columns: Columns) -> list[Diagnostic]:
-    """Diagnostics of a run that exceeds the validity range of a characteristic or the range of a geometry."""
+    """Diagnostics of a run that left the validity range of a characteristic, the range of the data of a friction, or
+    the contraction range of a geometry."""
     diagnostics = []
     for muscle, code, column, quantity, bounds in limits:
         if column in columns and columns["time"].size and _exceeds(columns.limits(column), bounds):
@@ -70,20 +72,28 @@ def _limits(muscle: Muscle, prefix: str) -> Iterator[tuple[DiagnosticCode, str, 
     if stated is not None:
         yield DiagnosticCode.EXTRAPOLATION, f"{prefix}pressure", "pressure", stated.pressure
         yield DiagnosticCode.EXTRAPOLATION, f"{prefix}contraction", "contraction", stated.contraction
-    own = INNER_CONTRACTION if isinstance(muscle.series, SeriesSpring) else "contraction"
+    identified = muscle.friction.identified_range
+    if identified is not None:
+        yield DiagnosticCode.FRICTION_EXTRAPOLATION, f"{prefix}pressure", "pressure", identified.pressure
+        yield DiagnosticCode.FRICTION_EXTRAPOLATION, f"{prefix}shortening_speed", "speed", identified.speed
+    own = INNER_CONTRACTION if isinstance(muscle.series, ElasticSeriesElement) else "contraction"
     yield DiagnosticCode.GEOMETRY_LIMIT, f"{prefix}{own}", own, muscle.geometry.contraction_range
 
 
 def _excess(
     time: Array, values: Array, subject: str, code: DiagnosticCode, quantity: str, bounds: tuple[float, float]
 ) -> Diagnostic:
-    """The diagnostic of a column of pressure or contraction that exceeds its limits."""
+    """The diagnostic of a column of pressure, speed or contraction that exceeds its limits."""
     low, high = bounds
     excess = np.maximum(low - values, values - high)
-    scale, unit = (1e3, "kPa") if quantity == "pressure" else (0.01, "%")
+    scale, unit = {"pressure": (1e3, "kPa"), "speed": (1.0, "m/s")}.get(quantity, (0.01, "%"))
     worst, rows = int(np.argmax(excess)), int(np.count_nonzero(excess > 0))
     where, meaning = {
         DiagnosticCode.EXTRAPOLATION: ("the validity range of its characteristic", "values there are extrapolated"),
+        DiagnosticCode.FRICTION_EXTRAPOLATION: (
+            "the range of the data of its friction",
+            "the friction there is extrapolated",
+        ),
         DiagnosticCode.GEOMETRY_LIMIT: ("the contraction range of its geometry", "such contractions are not physical"),
     }[code]
     text = (

@@ -11,7 +11,8 @@ from ..core.ops import Value
 from ..core.system import System
 from ..core.variables import Input, StateVariable
 from ..friction import NoFriction
-from ..muscle import Muscle, SeriesSpring
+from ..muscle import ElasticSeriesElement, Muscle
+from .evaluation import PlantEvaluation
 from .muscle_state import MuscleState
 from .plant import Plant
 
@@ -114,35 +115,45 @@ class WithEnergyMeters(System):
 
     def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
         """The plant's rates, and the power that each meter integrates."""
+        return self._rates_of(self.plant.evaluate(state, inputs), state, inputs)
+
+    def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Any]:
+        """The plant's outputs; kinetic, potential and the muscles' air energy [J]; mass of all air [kg]."""
+        return self._outputs_of(self.plant.evaluate(state, inputs), state)
+
+    def rates_and_outputs(
+        self, state: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> tuple[dict[str, Value], dict[str, Any]]:
+        """Both from one evaluation of the plant."""
+        at = self.plant.evaluate(state, inputs)
+        return self._rates_of(at, state, inputs), self._outputs_of(at, state)
+
+    def _rates_of(
+        self, at: PlantEvaluation, state: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> dict[str, Value]:
         plant = self.plant
-        muscles = plant.muscle_states(state)
         powers: dict[str, Value] = dict.fromkeys((meter.name for meter in self.meters), 0.0)
-        circuits = plant.circuit_flows(muscles, state, inputs)
-        flows = [flow for circuit in circuits for flow in circuit.flows]
-        for part, muscle, flow in zip(plant.muscles, muscles, flows, strict=True):
+        for part, muscle, flow in zip(plant.muscles, at.muscles, at.flows, strict=True):
             powers["work_of_tension"] += muscle.tension * muscle.speed
             powers["work_of_air"] += muscle.air.pressure * muscle.volume_rate
             powers["energy_of_flow"] += plant.gas.energy_flow(muscle.states, flow, muscle.volume, plant.ambient)
             powers["heat_to_air"] += plant.gas.heat_flow(muscle.air, plant.ambient)
             for name, power in _muscle_powers(part, muscle).items():
                 powers[name] += power
-        tensions = [muscle.tension for muscle in muscles]
-        forces = plant.mechanism.generalised_forces(state, tensions, plant.resting_lengths)
-        powers["mechanism_loss"] += plant.mechanism.dissipated_power(state, state, forces, inputs)
-        for circuit in circuits:
+        powers["mechanism_loss"] += plant.mechanism.dissipated_power(state, state, at.forces, inputs)
+        for circuit in at.circuits:
             powers["air_supplied"] += circuit.drawn.mass
             powers["air_exhausted"] += circuit.exhausted.mass
-        return {**plant.rates(state, inputs), **powers}
+        return {**plant.rates_of(at, state), **powers}
 
-    def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Any]:
-        """The plant's outputs; kinetic, potential and the muscles' air energy [J]; mass of all air [kg]."""
+    def _outputs_of(self, at: PlantEvaluation, state: Mapping[str, Value]) -> dict[str, Any]:
         plant = self.plant
         own = {s.name: state[s.name] for s in plant.states}
         return {
-            **plant.outputs(state, inputs),
+            **plant.outputs_of(at),
             "kinetic_energy": plant.mechanism.kinetic_energy(state, state),
             "potential_energy": plant.mechanism.potential_energy(state),
-            "air_energy": sum(self._available_energy(muscle) for muscle in plant.muscle_states(state)),
+            "air_energy": sum(self._available_energy(muscle) for muscle in at.muscles),
             "air_total": total_air(own),
         }
 
@@ -167,7 +178,7 @@ def _muscle_powers(part: Muscle, muscle: MuscleState) -> dict[str, Value]:
     if part.creep.states:
         opposing = opposing + part.creep.force(muscle.states)
     absorbed = opposing * speed
-    if isinstance(part.series, SeriesSpring):
+    if isinstance(part.series, ElasticSeriesElement):
         absorbed = absorbed + muscle.tension * (speed - muscle.speed)
     powers = {
         "work_of_contractile": part.contractile.force(pressure, inner) * speed,

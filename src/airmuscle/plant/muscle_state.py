@@ -6,8 +6,13 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from ..core.ops import Value
+from ..core.variables import StateVariable
+from ..friction import NoFriction
 from ..muscle import Muscle
 from ..pneumatics.gas import Air, Ambient, Gas, gauge_pressure
+
+_TYPICAL_CONTRACTION = 0.05
+"""Contraction whose muscle volume defines the nominal value of the air mass (chosen)."""
 
 
 class MuscleState(NamedTuple):
@@ -47,3 +52,28 @@ def muscle_state(
         contraction, speed, volume, air, pressure, pull.tension, pull.friction, inner, pull.inner_speed, growth, state,
         rates,
     )  # fmt: skip
+
+
+def muscle_outputs(muscle: Muscle, instant: MuscleState, mass_flow: Value) -> dict[str, Value]:
+    """The outputs of a muscle by their own names: those of every muscle, and those of the elements that it has."""
+    outputs = {
+        "pressure": instant.pressure, "contraction": instant.contraction, "force": instant.tension,
+        "volume": instant.volume, "mass_flow": mass_flow,
+    }  # fmt: skip
+    if not isinstance(muscle.friction, NoFriction):
+        outputs["friction"] = instant.friction
+    if muscle.friction.identified_range is not None:
+        outputs["shortening_speed"] = instant.inner_speed
+    if "internal_energy" in instant.states:
+        outputs["temperature"] = instant.air.temperature
+    return outputs
+
+
+def states_of_muscle(prefix: str, muscle: Muscle, states: tuple[StateVariable, ...]) -> list[StateVariable]:
+    """States of a muscle by their names in the plant."""
+    return [StateVariable(f"{prefix}{s.name}", s.unit, s.nominal, f"{s.meaning} of {muscle.name}") for s in states]
+
+
+def air_states(muscle: Muscle, gas: Gas, ambient: Ambient) -> tuple[StateVariable, ...]:
+    """States of the air in a muscle, by their own names."""
+    return gas.states(muscle.geometry.volume(_TYPICAL_CONTRACTION), ambient)

@@ -13,22 +13,20 @@ from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.system import System
 from ..core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
-from ..friction import NoFriction
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..pneumatics import Circuit, CircuitFlows
-from ..pneumatics.gas import Air, Ambient, Flow, Gas, Polytropic, check_above_vacuum
+from ..pneumatics.gas import Air, Ambient, Gas, Polytropic, check_above_vacuum
 from ..pneumatics.ports import key_by_muscle, key_by_port
 from . import diagnostics
-from .muscle_state import MuscleState, muscle_state
+from .evaluation import PlantEvaluation
+from .muscle_state import MuscleState, air_states, muscle_outputs, muscle_state, states_of_muscle
 from .steady_state import fill_muscles, settle_muscles
 from .validation import check_free, check_parts, check_unique
 
 _AIR_STATES = ("air_mass", "internal_energy")
 _ROUNDING = 1e-3
 """Fraction of its nominal value by which an air mass may become negative within the tolerance (chosen)."""
-_TYPICAL_CONTRACTION = 0.05
-"""Contraction whose muscle volume defines the nominal value of the air mass (chosen)."""
 
 
 @model
@@ -86,8 +84,8 @@ class Plant(System):
         """Air in the muscles, the mechanism's coordinates and speeds, then states of muscles and circuits."""
         air, inner = [], []
         for prefix, muscle in zip(self.prefixes, self.muscles, strict=True):
-            air += _states_of_muscle(prefix, muscle, self._air_states(muscle))
-            inner += _states_of_muscle(prefix, muscle, muscle.states)
+            air += states_of_muscle(prefix, muscle, air_states(muscle, self.gas, self.ambient))
+            inner += states_of_muscle(prefix, muscle, muscle.states)
         moving = []
         for c in self.mechanism.coordinates:
             moving.append(StateVariable(c.name, c.unit, c.nominal, f"{c.name} of the load"))
@@ -95,9 +93,6 @@ class Plant(System):
         own = [(prefix, s) for prefix, circuit in self._circuits() for s in circuit.states(self.ambient)]
         circuits = [replace(s, name=name) for prefix, s in own for name in self._outside(prefix, {s.name: s})]
         return (*air, *moving, *inner, *circuits)
-
-    def _air_states(self, muscle: Muscle) -> tuple[StateVariable, ...]:
-        return self.gas.states(muscle.geometry.volume(_TYPICAL_CONTRACTION), self.ambient)
 
     @functools.cached_property
     def input_variables(self) -> tuple[Input, ...]:
@@ -170,48 +165,49 @@ class Plant(System):
             for (prefix, circuit), air in zip(self._circuits(), airs, strict=True)
         )
 
+    def evaluate(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> PlantEvaluation:
+        """Muscles, circuits, forces and accelerations at a state."""
+        muscles = self.muscle_states(state)
+        forces = self.mechanism.generalised_forces(state, [m.tension for m in muscles], self.resting_lengths)
+        accelerations = self.mechanism.acceleration(state, state, forces, inputs)
+        return PlantEvaluation(muscles, self.circuit_flows(muscles, state, inputs), forces, accelerations)
+
     def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
         """The time derivative of every state."""
-        muscles = self.muscle_states(state)
-        circuits = self.circuit_flows(muscles, state, inputs)
+        return self.rates_of(self.evaluate(state, inputs), state)
+
+    def rates_of(self, at: PlantEvaluation, state: Mapping[str, Value]) -> dict[str, Value]:
+        """The rates from an evaluation at this state."""
         rates: dict[str, Value] = {}
-        for muscle, prefix, flow in zip(muscles, self.prefixes, _flows(circuits), strict=True):
+        for muscle, prefix, flow in zip(at.muscles, self.prefixes, at.flows, strict=True):
             growth = self.gas.rates(muscle.states, muscle.air, flow, muscle.volume_rate, self.ambient)
             rates |= with_prefix(prefix, growth) | with_prefix(prefix, muscle.rates)
-        accelerations = self._accelerations(state, muscles, inputs)
         for c in self.mechanism.coordinates:
-            rates |= {c.name: state[c.speed], c.speed: accelerations[c.name]}
-        for (prefix, _), circuit in zip(self._circuits(), circuits, strict=True):
+            rates |= {c.name: state[c.speed], c.speed: at.accelerations[c.name]}
+        for (prefix, _), circuit in zip(self._circuits(), at.circuits, strict=True):
             rates |= self._outside(prefix, circuit.rates)
         return rates
 
-    def _accelerations(
-        self, state: Mapping[str, Value], muscles: tuple[MuscleState, ...], inputs: Mapping[str, Value]
-    ) -> Mapping[str, Value]:
-        tensions = [muscle.tension for muscle in muscles]
-        forces = self.mechanism.generalised_forces(state, tensions, self.resting_lengths)
-        return self.mechanism.acceleration(state, state, forces, inputs)
-
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
-        """Gauge pressure, contraction, tension, volume and mass flow of every muscle, with friction and with an energy
-        balance its friction force and temperature; outputs of the circuits; accelerations."""
-        muscles = self.muscle_states(state)
-        circuits = self.circuit_flows(muscles, state, inputs)
+        """Gauge pressure, contraction, tension, volume and mass flow of every muscle, with its friction force,
+        shortening speed and temperature where they are modelled; outputs of the circuits; accelerations."""
+        return self.outputs_of(self.evaluate(state, inputs))
+
+    def outputs_of(self, at: PlantEvaluation) -> dict[str, Value]:
+        """The outputs from an evaluation."""
         outputs: dict[str, Value] = {}
-        for part, prefix, muscle, flow in zip(self.muscles, self.prefixes, muscles, _flows(circuits), strict=True):
-            own = {
-                "pressure": muscle.pressure, "contraction": muscle.contraction, "force": muscle.tension,
-                "volume": muscle.volume, "mass_flow": flow.mass,
-            }  # fmt: skip
-            if not isinstance(part.friction, NoFriction):
-                own["friction"] = muscle.friction
-            if "internal_energy" in muscle.states:
-                own["temperature"] = muscle.air.temperature
-            outputs |= with_prefix(prefix, own)
-        for (prefix, _), circuit in zip(self._circuits(), circuits, strict=True):
+        for part, prefix, muscle, flow in zip(self.muscles, self.prefixes, at.muscles, at.flows, strict=True):
+            outputs |= with_prefix(prefix, muscle_outputs(part, muscle, flow.mass))
+        for (prefix, _), circuit in zip(self._circuits(), at.circuits, strict=True):
             outputs |= self._outside(prefix, circuit.outputs)
-        accelerations = self._accelerations(state, muscles, inputs)
-        return outputs | {c.acceleration: accelerations[c.name] for c in self.mechanism.coordinates}
+        return outputs | {c.acceleration: at.accelerations[c.name] for c in self.mechanism.coordinates}
+
+    def rates_and_outputs(
+        self, state: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        """Both from one evaluation."""
+        at = self.evaluate(state, inputs)
+        return self.rates_of(at, state), self.outputs_of(at)
 
     def state_at(self, *, pressure: float | tuple[float, ...], **values: float) -> dict[str, float]:
         """A state by the gauge pressure [Pa] of the muscle (or of each), and by states by name.
@@ -226,7 +222,8 @@ class Plant(System):
         values = {name: as_finite_float(f"Plant: the {name} of a state", value) for name, value in values.items()}
         if len(pressures) != len(self.muscles):
             raise ParameterError(f"Plant: {len(pressures)} pressures are given for {len(self.muscles)} muscles.")
-        air = {f"{p}{s.name}" for p, m in zip(self.prefixes, self.muscles, strict=True) for s in self._air_states(m)}
+        muscles = zip(self.prefixes, self.muscles, strict=True)
+        air = {f"{p}{s.name}" for p, m in muscles for s in air_states(m, self.gas, self.ambient)}
         check_free(values, [s.name for s in self.states if s.name not in air])
         state: dict[str, Value] = {n: 0.0 for c in self.mechanism.coordinates for n in (c.name, c.speed)} | values
         contractions = self.mechanism.contractions(state, self.resting_lengths)
@@ -271,8 +268,8 @@ class Plant(System):
 
     def describe(self) -> tuple[Diagnostic, ...]:
         """The gas and the friction."""
-        texts = (("gas", f"gas: {self.gas}"), ("friction", diagnostics.describe_friction(self.muscles)))
-        return tuple(Diagnostic(DiagnosticCode.MODEL, subject, text) for subject, text in texts)
+        texts = {"gas": f"gas: {self.gas}", "friction": diagnostics.describe_friction(self.muscles)}
+        return tuple(Diagnostic(DiagnosticCode.MODEL, *item) for item in texts.items())
 
     def diagnose(self, columns: Columns) -> list[Diagnostic]:
         """Extrapolation of characteristics, limits of geometries, components beyond the validity of their model."""
@@ -290,11 +287,3 @@ class Plant(System):
     def failure_hint(self, state: Mapping[str, float]) -> str:
         """What to do about the first muscle that is at a limit of its geometry."""
         return next(filter(None, map(diagnostics.geometry_limit_hint, self._enclosures(state))), "")
-
-
-def _states_of_muscle(prefix: str, muscle: Muscle, states: tuple[StateVariable, ...]) -> list[StateVariable]:
-    return [StateVariable(f"{prefix}{s.name}", s.unit, s.nominal, f"{s.meaning} of {muscle.name}") for s in states]
-
-
-def _flows(circuits: tuple[CircuitFlows, ...]) -> list[Flow]:
-    return [flow for circuit in circuits for flow in circuit.flows]

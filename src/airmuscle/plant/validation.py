@@ -28,6 +28,7 @@ def check_parts(
     check_structure((tuple(muscles), tuple(circuits), mechanism))
     for each in circuits:
         check_not_shared(f"Plant: its {type(each).__name__}", each.supply)
+        each.supply.check_ambient(ambient)
     _check_counts(muscles, circuit, circuits, mechanism)
 
 

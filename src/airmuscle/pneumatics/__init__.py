@@ -15,6 +15,7 @@ from .supply import AirSource, RegulatedSupply, SharedSupply, Supply, Tank
 from .tube import Tube, TubeOrifice
 from .tube_model import TubeModel
 from .valve import Valve
+from .virial_gas import VirialGas
 from .with_tubes import WithTubes
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "TubeModel",
     "TubeOrifice",
     "Valve",
+    "VirialGas",
     "WithLeak",
     "WithTubes",
     "absolute_pressure",

@@ -11,7 +11,7 @@ from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.variables import StateVariable, add_prefix, select_prefix, with_prefix
 from .flow import orifice_flow, proportional_opening
-from .gas import Air, Ambient, Flow, Gas, Isothermal, absolute_pressure
+from .gas import Air, Ambient, Flow, Gas, Isothermal, absolute_pressure, gauge_pressure
 from .orifice import Orifice
 
 
@@ -34,6 +34,10 @@ class AirSource(abc.ABC):
         """Time derivatives of the states for a drawn flow, and the flow into the supply from outside the plant."""
         return {}, drawn
 
+    def check_ambient(self, ambient: Ambient) -> None:
+        """Raise ParameterError where the supply cannot exist in this ambient air; by default nothing is raised."""
+        return None
+
 
 @model
 class Supply(AirSource):
@@ -46,6 +50,16 @@ class Supply(AirSource):
 
     def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
         return Air(absolute_pressure(self.pressure, ambient), ambient.temperature)
+
+    def check_ambient(self, ambient: Ambient) -> None:
+        """Raise ParameterError for a pressure that is not above absolute vacuum."""
+        if not absolute_pressure(self.pressure, ambient) > 0.0:
+            vacuum = f"{gauge_pressure(0.0, ambient) / 1e3:.4g} kPa"
+            raise ParameterError(
+                f"Supply.pressure (p_s, gauge pressure of the supply) is {self.pressure / 1e3:.4g} kPa, which is not "
+                f"above absolute vacuum; allowed range: above {vacuum} at an ambient pressure of "
+                f"{ambient.pressure / 1e3:.4g} kPa. Give a higher pressure, or check the ambient pressure."
+            )
 
 
 @model
@@ -80,6 +94,10 @@ class Tank(AirSource):
 
     def check(self) -> None:
         check_not_shared("Tank", self.supply)
+
+    def check_ambient(self, ambient: Ambient) -> None:
+        """As the feeding supply."""
+        self.supply.check_ambient(ambient)
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         return (*self.gas.states(self.volume, ambient), *add_prefix("supply.", self.supply.states(ambient)))
@@ -122,6 +140,10 @@ class RegulatedSupply(AirSource):
 
     def check(self) -> None:
         check_not_shared("RegulatedSupply", self.supply)
+
+    def check_ambient(self, ambient: Ambient) -> None:
+        """As the feeding supply."""
+        self.supply.check_ambient(ambient)
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         return (*self.gas.states(self.volume, ambient), *add_prefix("supply.", self.supply.states(ambient)))

@@ -7,14 +7,19 @@ from .downsampling import BlockMeans, Decimation
 from .mapping import ColumnMapping
 from .reader import read
 from .recording import Recording
+from .time_base import NoTime, RecordedTime, TimeBase, UniformTime
 
 __all__ = [
     "QUANTITIES",
     "BlockMeans",
     "ColumnMapping",
     "Decimation",
+    "NoTime",
     "Quantity",
+    "RecordedTime",
     "Recording",
+    "TimeBase",
+    "UniformTime",
     "read",
     "read_csv",
     "write_csv",

@@ -34,6 +34,7 @@ QUANTITIES: dict[str, Quantity] = {
     "latched": Quantity("1", "u_latch", "1 while the load is latched, 0 when released"),
     "branch": Quantity("1", "b", "branch stated in the file, 1 inflating, 2 deflating; used for comparison only"),
     "friction": Quantity("N", "F_f", "friction force of the muscle, opposing its motion"),
+    "shortening_speed": Quantity("m/s", "v_m", "shortening speed of the contractile element"),
     "bristle": Quantity("m", "z", "deflection of a friction element (bristle)"),
     "stop": Quantity("m", "z_s", "deflection of a stop operator (Prandtl–Ishlinskii)"),
     "temperature": Quantity("K", "T", "absolute temperature of the air in the muscle"),

@@ -14,25 +14,28 @@ from ..core.arrays import Array
 from ..core.constants import STANDARD_GRAVITY
 from ..core.errors import ColumnError, UnitError, suggestion
 from ..core.hints import Hint, HintedText
-from ..core.units import AMBIENT_PRESSURE, UnitConversion, conversion
+from ..core.units import AMBIENT_PRESSURE, UnitConversion, conversion, quantity
 from .clock import seconds_from_clock
 from .columns import QUANTITIES
-from .constants import collect_constants, constant_from_column
+from .constants import collect_constants, constant_from_column, parse_constant_name
 from .heading import UNIT_SPELLINGS, Heading, find_quantity_name, parse_heading
 from .plausibility import check_plausible
 from .recording import Recording
 from .table import Cells, RawTable
+from .time_base import RecordedTime, TimeBase
 
 
 def interpret(
-    table: RawTable, *, units: Mapping[str, str], constants: Mapping[str, float | str], ordered: bool = True
-) -> Recording:
+    table: RawTable, *, units: Mapping[str, str], constants: Mapping[str, float | str],
+    time_base: TimeBase = RecordedTime(),
+) -> Recording:  # fmt: skip
     """Convert a table to a Recording; `units` and `constants` given by the user override those of the file.
 
-    Time that does not increase is rejected unless `ordered` is false.
+    A constant that is the name of a quantity, `length`, gives a column with this value in every row.
     Raises ColumnError or UnitError; the message names file, row, value and remedy.
     """
-    run_constants = collect_constants(table, constants)
+    held = {name: value for name, value in constants.items() if _is_quantity(name)}
+    run_constants = collect_constants(table, {n: value for n, value in constants.items() if n not in held})
     headings = _resolve_headings(table, units)
     for heading, cells in zip(headings, table.columns, strict=True):
         if not heading.known and not isinstance(cells, list):
@@ -47,9 +50,44 @@ def interpret(
         else:
             note = _keep_unknown_column(table, heading, cells, columns)
         notes += [note] if note and note not in notes else []
-    check_plausible(table, columns, run_constants.get("resting_length"), ambient, ordered=ordered)
-    written = {h.name: h.unit for h in headings if h.known and h.unit}
+    notes += _add_held(table, columns, held, ambient)
+    notes += _apply_time_base(table, columns, time_base)
+    check_plausible(table, columns, run_constants.get("resting_length"), ambient, ordered=time_base.ordered)
+    written = {h.name: h.unit for h in headings if h.known and h.unit and h.name in columns}
     return Recording(columns, table.origin, run_constants, tuple(notes), written)
+
+
+def _is_quantity(name: str) -> bool:
+    return parse_constant_name(name) is None and parse_heading(name).known
+
+
+def _add_held(table: RawTable, columns: dict[str, Array], held: Mapping[str, float | str], ambient: float) -> list[str]:
+    """Add a column for each quantity that the user states for the whole run; returns a note on each."""
+    notes = []
+    rows = len(table.rows)
+    for text, value in held.items():
+        heading = parse_heading(text)
+        where = f"{table.origin}: {heading.name}"
+        if heading.name in columns:
+            raise ColumnError(f"{where} is stated as a constant, but a column contains it. Omit one of them.")
+        number = f"{value!r} {heading.unit}" if heading.unit and not isinstance(value, str) else value
+        si = quantity(number, heading.target or "1", ambient=ambient, where=where)
+        columns[heading.name] = np.full(rows, si)
+        unit = "" if heading.target == "1" else f" {heading.target}"
+        notes.append(f"The {heading.name} is {si:.6g}{unit} in every row, as specified by the user.")
+    return notes
+
+
+def _apply_time_base(table: RawTable, columns: dict[str, Array], time_base: TimeBase) -> list[str]:
+    """Replace or remove the time column; returns a note if it is changed."""
+    if "time" not in columns:
+        return []
+    time, note = time_base.apply(table, columns["time"])
+    if time is None:
+        del columns["time"]
+    else:
+        columns["time"] = time
+    return [note] if note else []
 
 
 def _resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:

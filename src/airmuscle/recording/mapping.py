@@ -5,6 +5,12 @@ A mapping file (TOML; all keys are optional):
 resting_length = "300 mm"
 decimal = ","
 
+file_name = "cut{specimen}_held{length [cm]}cm"
+time = "uniform"
+
+[constants]
+temperature = "20 °C"
+
 [columns]
 "Channel 1" = "pressure [bara]"
 "Channel 2" = { quantity = "force", unit = "kg" }
@@ -24,9 +30,11 @@ from ..core.errors import ColumnError, FileError, ParameterError, suggestion
 from .columns import QUANTITIES
 from .constants import parse_constant_name
 from .file_kind import check_regular_file
+from .file_name import FileNamePattern
 from .heading import parse_heading
 from .table import RawTable
 from .text_format import TextFormat
+from .time_base import TIME_BASES, TimeBase
 
 CONSTANT_NAMES = ("resting_length", "ambient", "specimen", "run")
 """Constants of a run that a mapping may state."""
@@ -42,6 +50,8 @@ class ColumnMapping:
     delimiter, decimal  of text files
     sheet      worksheet of an Excel file
     group      group of a TDMS or MDF file, struct of a MAT file
+    file_name  pattern of values in the names of the files, `held{length [cm]}cm`, as in FileNamePattern
+    time       time base: recorded, uniform (for rounded stamps), unordered or none
     """
 
     columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
@@ -50,8 +60,20 @@ class ColumnMapping:
     decimal: str | None = None
     sheet: str | None = None
     group: str | None = None
+    file_name: str | None = None
+    time: str | None = None
 
     def __post_init__(self) -> None:
+        if self.time is not None and self.time not in TIME_BASES:
+            raise ColumnError(f"mapping: time is '{self.time}'; allowed range: {', '.join(TIME_BASES)}.")
+        for name in self.constants:
+            if name not in CONSTANT_NAMES and not (parse_constant_name(name) or parse_heading(name).known):
+                raise ColumnError(
+                    f"mapping: '{name}' is no constant of a run; allowed range: {', '.join(CONSTANT_NAMES)}, or a "
+                    f"quantity that was held, such as length.{suggestion(name, (*CONSTANT_NAMES, *QUANTITIES))}"
+                )
+        if self.file_name is not None:
+            FileNamePattern(self.file_name)  # raises for placeholders that are no quantity
         for column, heading in self.columns.items():
             if heading and not (parse_heading(heading).known or parse_constant_name(heading)):
                 name = heading.partition("[")[0].strip()
@@ -65,11 +87,25 @@ class ColumnMapping:
         """The part of the mapping that applies to text files."""
         return TextFormat(self.delimiter, self.decimal, headerless=any(c.isdecimal() for c in self.columns))
 
+    @property
+    def time_base(self) -> TimeBase:
+        """The time base of the files."""
+        return TIME_BASES[self.time or "recorded"]
+
+    def constants_of(self, path: Path) -> dict[str, float | str]:
+        """The constants of one file: those in its name take precedence over those of all files."""
+        values = FileNamePattern(self.file_name).values(path) if self.file_name else {}
+        return {**self.constants, **values}
+
     def with_overrides(self, **values: Any) -> ColumnMapping:
         """A copy in which all values other than None replace those of the mapping; columns and constants are merged."""
         stated = {name: value for name, value in values.items() if value is not None}
         columns = {**self.columns, **{str(k): v for k, v in stated.pop("columns", {}).items()}}
-        constants = {**self.constants, **{name: stated.pop(name) for name in CONSTANT_NAMES if name in stated}}
+        constants = {
+            **self.constants,
+            **stated.pop("constants", {}),
+            **{name: stated.pop(name) for name in CONSTANT_NAMES if name in stated},
+        }
         return dataclasses.replace(self, columns=columns, constants=constants, **stated)
 
 
@@ -83,17 +119,19 @@ def read_mapping(path: str | Path) -> ColumnMapping:
         raise FileError(f"{path}: cannot be read ({reason.strerror}). Check the name and the folder.") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as reason:
         raise FileError(f"{path.name}: is not a valid TOML file ({reason}).") from None
-    known = ("columns", *CONSTANT_NAMES, "delimiter", "decimal", "sheet", "group")
+    known = ("columns", "constants", *CONSTANT_NAMES, "delimiter", "decimal", "sheet", "group", "file_name", "time")
     for key, value in content.items():
         if key not in known:
             raise ParameterError(
                 f"{path.name}: unknown key '{key}'; allowed range: {', '.join(known)}.{suggestion(key, known)}"
             )
-        if key not in ("columns", *CONSTANT_NAMES) and not isinstance(value, str):
+        if key not in ("columns", "constants", *CONSTANT_NAMES) and not isinstance(value, str):
             raise ParameterError(f"{path.name}: {key} = {value!r}; it must be a quoted text.")
     columns = content.pop("columns", {})
     if not isinstance(columns, dict):
         raise ParameterError(f"{path.name}: columns must be a table: [columns], followed by one line per column.")
+    if not isinstance(content.get("constants", {}), dict):
+        raise ParameterError(f"{path.name}: constants must be a table: [constants], followed by one line per constant.")
     headings = {name: _parse_entry(path, name, value) for name, value in columns.items()}
     return ColumnMapping().with_overrides(columns=headings, **content)
 

@@ -8,7 +8,9 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ColumnError
+from ..core.hints import HintedText
 from .table import RawTable
+from .time_base import AS_RECORDED, UNIFORM, WITHOUT_TIME
 
 CONTRACTION_RANGE = (-0.5, 1.0)
 """Plausible contractions (chosen): a contraction of 1 is impossible, as is a stretch by half of the length."""
@@ -54,11 +56,13 @@ def _check_ordered(table: RawTable, time: Array) -> None:
     not_increasing = np.diff(time) <= 0
     if not_increasing.any():
         row = int(np.argmax(not_increasing)) + 1
+        hints = () if (np.diff(time) < 0).any() else (UNIFORM, AS_RECORDED, WITHOUT_TIME)
         relation = "repeats the time" if time[row] == time[row - 1] else "is less than the time"
-        raise ColumnError(
+        message = (
             f"{table.location(row)}: time {time[row]:.9g} s {relation} of the previous row ({time[row - 1]:.9g} s). "
-            "Time must increase: sort the rows, delete the repeated one, or write two runs to two files."
+            f"Time must increase: sort the rows, delete the repeated one, or write two runs to two files."
         )
+        raise ColumnError(HintedText(message, *hints))
 
 
 def _check_above_vacuum(table: RawTable, pressure: Array, ambient: float) -> None:

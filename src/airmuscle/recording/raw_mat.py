@@ -6,6 +6,7 @@ structure with time that Simulink saves.
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -14,7 +15,9 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import ColumnError, FileError, suggestion
+from ..core.hints import Hint
 from .channels import Channel, merge_channels
+from .heading import parse_heading
 from .optional_dependency import import_lab_package, run_reader
 from .separate_process import read_in_separate_process
 from .table import RawTable
@@ -23,18 +26,21 @@ _INTERNAL_PREFIXES = ("__", "#")
 """Beginnings of names that no MATLAB variable has: header, function workspace, references, subsystem."""
 
 
-def read_mat_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
+def read_mat_tables(path: Path, group: str | None = None, columns: Sequence[str] = ()) -> tuple[RawTable, ...]:
     """Read one table from each struct with vectors, or from the named struct. Raises FileError or ColumnError.
+
+    If the vectors of a struct differ in length, those of the length of the mapped `columns` are read, or without any
+    those of the length of the known quantities.
 
     The packages for this format are native code, therefore a separate process reads the file.
     """
     tables: tuple[RawTable, ...] = read_in_separate_process(
-        "pymatreader", __name__, "read_mat_tables_here", path, group
+        "pymatreader", __name__, "read_mat_tables_here", path, group, tuple(columns)
     )
     return tables
 
 
-def read_mat_tables_here(path: Path, group: str | None) -> tuple[RawTable, ...]:
+def read_mat_tables_here(path: Path, group: str | None, columns: Sequence[str] = ()) -> tuple[RawTable, ...]:
     """As `read_mat_tables`, in this process."""
     pymatreader = import_lab_package("pymatreader", path)
 
@@ -58,7 +64,8 @@ def read_mat_tables_here(path: Path, group: str | None) -> tuple[RawTable, ...]:
             "(timeseries, table) cannot be read: save vectors or a struct of vectors, or write the table as CSV."
         )
     constants = _scalar_fields(variables)
-    return tuple(_make_table(path, name, fields, constants, len(groups) > 1) for name, fields in selected.items())
+    several = len(groups) > 1
+    return tuple(_make_table(path, name, fields, constants, several, columns) for name, fields in selected.items())
 
 
 def _find_groups(name: str, fields: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -102,11 +109,41 @@ def _scalar_fields(fields: Mapping[str, Any]) -> dict[str, float | str]:
 
 
 def _make_table(
-    path: Path, name: str, fields: Mapping[str, Any], constants: Mapping[str, float | str], several: bool
-) -> RawTable:
+    path: Path, name: str, fields: Mapping[str, Any], constants: Mapping[str, float | str], several: bool,
+    columns: Sequence[str],
+) -> RawTable:  # fmt: skip
     origin = f"{path.name}, {name or 'variables'}" if several else path.name
-    channels = list(_channels(origin, fields))
-    return merge_channels(origin, channels, {**constants, **_scalar_fields(fields)})
+    channels, notes = _of_one_length(origin, list(_channels(origin, fields)), columns)
+    table = merge_channels(origin, channels, {**constants, **_scalar_fields(fields)})
+    return dataclasses.replace(table, notes=(*table.notes, *notes))
+
+
+def _of_one_length(
+    origin: str, channels: list[Channel], columns: Sequence[str]
+) -> tuple[list[Channel], tuple[str, ...]]:
+    """The channels of the length of the mapped ones, or of the known quantities, and a note on the others.
+
+    Raises ColumnError where the length remains open.
+    """
+    lengths = sorted({len(channel.values) for channel in channels})
+    if len(lengths) < 2:
+        return channels, ()
+    mapped = [c for c in channels if c.name in columns or c.name.partition("[")[0].strip() in columns]
+    selecting = mapped or [c for c in channels if parse_heading(c.name).known]
+    selected = {len(channel.values) for channel in selecting}
+    if len(selected) != 1:
+        sizes = "; ".join(
+            f"{length} rows: {', '.join(c.name for c in channels if len(c.values) == length)}" for length in lengths
+        )
+        raise ColumnError(
+            f"{origin}: the vectors have different lengths ({sizes}). Name the columns of one length; the others are "
+            "then not read.",
+            hint=Hint("To map a column", "columns", {f"{channels[0].name}": "time [s]"}, function="read"),
+        )
+    (length,) = selected
+    left_out = [f"{c.name} ({len(c.values)} rows)" for c in channels if len(c.values) != length]
+    note = f"Not read, because their length differs from the {length} rows of the table: {', '.join(left_out)}."
+    return [c for c in channels if len(c.values) == length], (note,)
 
 
 def _channels(origin: str, fields: Mapping[str, Any]) -> Iterator[Channel]:

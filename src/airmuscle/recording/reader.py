@@ -19,6 +19,7 @@ from .raw_mdf import read_mdf_tables
 from .raw_tdms import read_tdms_tables
 from .recording import Recording
 from .table import RawTable
+from .time_base import RecordedTime, TimeBase
 from .unit_consistency import check_unit_consistency
 
 Source = str | Path | Iterable[str | Path]
@@ -28,7 +29,7 @@ TEXT_EXTENSIONS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn")
 _BINARY_READERS: Mapping[str, Callable[[Path, ColumnMapping], Tables]] = {
     ".xlsx": lambda path, m: read_excel_tables(path, m.sheet, headerless=m.text_format.headerless),
     ".xlsm": lambda path, m: read_excel_tables(path, m.sheet, headerless=m.text_format.headerless),
-    ".mat": lambda path, m: read_mat_tables(path, m.group),
+    ".mat": lambda path, m: read_mat_tables(path, m.group, tuple(m.columns)),
     ".tdms": lambda path, m: read_tdms_tables(path, m.group),
     ".mf4": lambda path, m: read_mdf_tables(path, m.group),
     ".mdf": lambda path, m: read_mdf_tables(path, m.group),
@@ -50,8 +51,11 @@ def read(
     decimal: str | None = None,
     sheet: str | None = None,
     group: str | None = None,
+    constants: Mapping[str, float | str] | None = None,
+    file_name: str | None = None,
     downsampling: Downsampling = Decimation(),
     ordered: bool = True,
+    time_base: TimeBase | None = None,
     progress: Progress | None = None,
 ) -> tuple[Recording, ...]:
     """Read the recordings in a file, several files, a glob pattern (`runs/*.csv`) or a folder, in SI units.
@@ -62,7 +66,11 @@ def read(
     resting_length, ambient, specimen  constants of the runs; lengths [m] and pressures [Pa], or texts with a unit
     delimiter, decimal, sheet, group   as in ColumnMapping
     downsampling  reduction of very long files, which a note reports
-    ordered       whether time must increase
+    constants     further constants of the runs; a quantity, {"length": "7.3 cm"}, was held and becomes a column
+    file_name     pattern of values in the names of the files: "cut{specimen}_held{length [cm]}cm"
+    ordered       whether the recorded time must increase
+    time_base     RecordedTime(), UniformTime() for stamps that the logger rounded, or NoTime(); by default that of the
+                  mapping, or the recorded time
     progress      called with the name of a file and the fraction that has been read
 
     The extension gives the format: text (CSV), Excel, MAT, TDMS or MDF. A load in kg becomes a force with standard
@@ -73,14 +81,14 @@ def read(
     base = mapping if isinstance(mapping, ColumnMapping) else read_mapping(mapping) if mapping else ColumnMapping()
     column_mapping = base.with_overrides(
         columns=columns, resting_length=resting_length, ambient=ambient, specimen=specimen, delimiter=delimiter,
-        decimal=decimal, sheet=sheet, group=group,
+        decimal=decimal, sheet=sheet, group=group, constants=constants or {}, file_name=file_name,
     )  # fmt: skip
     recordings = [
         interpret(
             apply_mapping(table, column_mapping),
             units=units or {},
-            constants=column_mapping.constants,
-            ordered=ordered,
+            constants=column_mapping.constants_of(path),
+            time_base=time_base or (column_mapping.time_base if column_mapping.time else RecordedTime(ordered)),
         )
         for path in find_files(source)
         for table in read_tables(path, column_mapping, downsampling, progress)

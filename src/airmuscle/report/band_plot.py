@@ -11,7 +11,7 @@ from ..core.errors import IdentificationError
 from ..identify import Fit, confidence_band
 from ..recording import Recording
 from .chapter import Plot
-from .levels import levels_of
+from .levels import is_pressure_ramp, levels_of
 
 LEVEL = 0.95
 MAX_CURVES = 5
@@ -42,7 +42,7 @@ _CAPTION = (
 
 def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
     """Return the fitted curves with 95 % bands and the half width of the bands; None if no band can be computed."""
-    quantity, curve = fit.fitted_quantity.name, _CURVE_AXES[fit.fitted_quantity.name]
+    quantity, curve = fit.fitted_quantity.name, _curve_axes(fit)
     levels = levels_of(fit.recording[curve.constant], MAX_CURVES)
     figure, (left, right) = plotting.new_figure(1, 2, width=7.4, height=3.7)
     (factor, unit), (x_factor, x_unit) = _DISPLAY_UNITS[quantity], _DISPLAY_UNITS[curve.varying]
@@ -66,6 +66,13 @@ def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
     right.set(xlabel=f"{curve.varying} [{x_unit}]", ylabel=f"half width of the band [{unit}]", ylim=(0.0, None))
     plotting.legend_below(figure, left, columns=MAX_CURVES + 1)
     return Plot(name, _CAPTION, figure)
+
+
+def _curve_axes(fit: Fit) -> _CurveAxes:
+    """Return the quantities of the curves; over the pressure if it was swept at held contractions."""
+    data, quantity = fit.recording, fit.fitted_quantity.name
+    ramp = quantity == "force" and is_pressure_ramp(data["pressure"], data["contraction"])
+    return _CurveAxes("contraction", "pressure") if ramp else _CURVE_AXES[quantity]
 
 
 def _curve_points(fit: Fit, curve: _CurveAxes, level: float) -> Recording:

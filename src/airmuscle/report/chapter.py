@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import enum
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,28 @@ import numpy.typing as npt
 from ..core.reference import Reference
 from .formula import to_plain
 
-HOLDS, DIFFERS, NOT_PRINTED = "holds", "differs", "not printed"
+HOLDS, DIFFERS, DEPENDS = "holds", "differs", "depends"
+NOT_TESTABLE, NOT_PRINTED = "not testable", "not printed"
+
+
+class Kind(enum.Enum):
+    """Kind of an entry in the list of claims; each kind is listed and counted apart from the others."""
+
+    CLAIM = "claim"
+    FINDING = "comparison"
+    CHECK = "check"
+
+    @property
+    def description(self) -> str:
+        """Description of the kind for the report."""
+        return _DESCRIPTIONS[self]
+
+
+_DESCRIPTIONS = {
+    Kind.CLAIM: "claims of the paper",
+    Kind.FINDING: "comparisons of this report, which the paper does not make",
+    Kind.CHECK: "checks of the computation",
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,12 +44,19 @@ class PublishedValue(abc.ABC):
     """The value that a paper prints for a claim, and the criterion for the reproduced number.
 
     Where a paper says only "low" or "comparable", the bound is `chosen`: then `claims.json` gives no published
-    value, and the bound as the tolerance.
+    value, and the bound as the tolerance. A value that follows from printed ones, or from a word such as "higher", is
+    `derived`: it is not published either, and `claims.json` gives it as the expected value.
     """
 
     value: float
     tolerance: float = 0.0
     chosen: bool = False
+    derived: bool = False
+
+    @property
+    def published(self) -> bool:
+        """Whether the paper prints the value."""
+        return not (self.chosen or self.derived)
 
     @abc.abstractmethod
     def agrees(self, reproduced: float) -> bool:
@@ -57,10 +86,12 @@ class AtMost(PublishedValue):
 
 @dataclasses.dataclass(frozen=True)
 class Claim:
-    """One statement of a paper with the printed and the reproduced value.
+    """One statement of a paper, in one case, with the printed and the reproduced value.
 
-    `printed` is None if the paper gives no value to compare with, `reproduced` is None if no value can be computed;
-    in both cases the verdict is "not printed". `note` gives the reason of a difference, or the values chosen.
+    `case` names the interpretation, load or range for which the statement is evaluated; a statement with several cases
+    counts once. `printed` is None if the paper gives no value to compare with, `reproduced` is None if no value can be
+    computed; in both cases the verdict is "not printed". `lost` marks a statement about measurements that are lost: its
+    verdict is "not testable". `note` gives the reason of a difference, or the values chosen.
     """
 
     paper: str
@@ -69,9 +100,19 @@ class Claim:
     reproduced: float | None
     unit: str
     note: str = ""
+    case: str = ""
+    kind: Kind = Kind.CLAIM
+    lost: bool = False
+
+    @property
+    def text(self) -> str:
+        """The statement with its case: `accurate below 20 % [line A]`."""
+        return f"{self.claim} [{self.case}]" if self.case else self.claim
 
     @property
     def verdict(self) -> str:
+        if self.lost:
+            return NOT_TESTABLE
         if self.printed is None or self.reproduced is None or not math.isfinite(self.reproduced):
             return NOT_PRINTED
         return HOLDS if self.printed.agrees(self.reproduced) else DIFFERS
@@ -81,14 +122,48 @@ class Claim:
         printed = self.printed
         return {
             "paper": self.paper,
-            "claim": to_plain(self.claim),
-            "published": None if printed is None or printed.chosen else printed.value,
+            "kind": self.kind.value,
+            "claim": to_plain(self.text),
+            "statement": to_plain(self.claim),
+            "case": to_plain(self.case),
+            "published": printed.value if printed and printed.published else None,
+            "expected": printed.value if printed and printed.derived else None,
             "reproduced": self.reproduced,
             "unit": self.unit,
             "tolerance": None if printed is None else printed.value if printed.chosen else printed.tolerance,
             "verdict": self.verdict,
             "note": to_plain(self.note),
         }
+
+
+@dataclasses.dataclass(frozen=True)
+class Statement:
+    """A statement with all the cases for which it is evaluated."""
+
+    claim: str
+    cases: tuple[Claim, ...]
+
+    @property
+    def common_note(self) -> str:
+        """The note of several cases that have the same one; otherwise empty."""
+        notes = {case.note for case in self.cases}
+        return notes.pop() if len(notes) == 1 < len(self.cases) else ""
+
+    @property
+    def verdict(self) -> str:
+        """The common verdict of the cases; "depends" if the statement holds in some and differs in others."""
+        verdicts = [case.verdict for case in self.cases]
+        decided = {verdict for verdict in verdicts if verdict in (HOLDS, DIFFERS)}
+        return DEPENDS if len(decided) > 1 else decided.pop() if decided else verdicts[0]
+
+
+def statements(claims: Iterable[Claim], kind: Kind = Kind.CLAIM) -> tuple[Statement, ...]:
+    """Return the statements of one kind in the order of their first case, each with all its cases."""
+    cases: dict[tuple[str, str], list[Claim]] = {}
+    for claim in claims:
+        if claim.kind is kind:
+            cases.setdefault((claim.paper, claim.claim), []).append(claim)
+    return tuple(Statement(text, tuple(group)) for (_, text), group in cases.items())
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -120,6 +195,17 @@ class Plot:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class DisplayedEquation:
+    """An equation in LaTeX, one entry of `lines` for each definition, and its source text by language."""
+
+    name: str
+    title: str
+    lines: tuple[str, ...]
+    note: str
+    sources: Mapping[str, str]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class Chapter:
     """A chapter of a report: summary, claims, tables, figures, references and the sources of all values."""
 
@@ -132,3 +218,4 @@ class Chapter:
     references: tuple[Reference, ...] = ()
     chosen: tuple[tuple[str, str, str], ...] = ()
     """Values used for the figures: (meaning, value with unit, source or "chosen")."""
+    equations: tuple[DisplayedEquation, ...] = ()

@@ -51,9 +51,11 @@ def _ranking(comparison: Comparison) -> Table:
 
 
 def _excluded(comparison: Comparison) -> Table | None:
-    if not comparison.excluded:
+    left_out = (*comparison.excluded, *comparison.unavailable)
+    if not left_out:
         return None
-    columns = {"law": [e.name for e in comparison.excluded], "reason": [e.reason for e in comparison.excluded]}
+    columns = {"law": [e.name for e in left_out], "cause": [e.cause for e in left_out]}
+    columns["reason"] = [e.reason for e in left_out]
     return Table("excluded", "Laws that are not ranked", columns)
 
 

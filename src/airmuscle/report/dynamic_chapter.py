@@ -16,6 +16,9 @@ from ..recording.recording import column_heading
 from .chapter import Chapter, Plot, Table
 from .uncertainty_chapter import NORMAL_QUANTILE, UNBOUNDED
 
+MAX_OPTIMA = 8
+"""Maximum number of optima in a table; the lowest are shown."""
+
 
 def dynamic_chapters(
     fit: DynamicFit, title: str, profiles: Sequence[DynamicProfile] = (), remarks: Sequence[str] = ()
@@ -49,6 +52,7 @@ def _estimates(fit: DynamicFit, title: str, remarks: Sequence[str]) -> Chapter:
     tables = [
         _estimate_table(fit),
         *_undetermined_table(fit),
+        *_optima_table(fit),
         Table("rms", "Residuals by record", rms),
         _correlations(fit),
     ]
@@ -94,6 +98,23 @@ def _undetermined_table(fit: DynamicFit) -> list[Table]:
         "experiment that determines it": [each.remedy for each in undetermined],
     }
     return [Table("not-determined", "Parameter combinations that the records do not determine", columns)]
+
+
+def _optima_table(fit: DynamicFit) -> list[Table]:
+    """Return a table of the optima of the searches with their estimates, if there are several."""
+    if len(fit.optima) < 2:
+        return []
+    shown = fit.optima[:MAX_OPTIMA]
+    columns: dict[str, Any] = {
+        "searches": [each.searches for each in shown],
+        "rms residual relative to the lowest": [
+            float(np.sqrt(each.cost / max(fit.optima[0].cost, 1e-300))) for each in shown
+        ],
+    }
+    for i, estimate in enumerate(fit.estimates):
+        unit = f" [{estimate.display_unit}]" if estimate.display_unit else ""
+        columns[f"{estimate.name}{unit}"] = [float(each.values[i]) for each in shown]
+    return [Table("optima", "Optima of the searches", columns)]
 
 
 def _correlations(fit: DynamicFit) -> Table:

@@ -10,23 +10,29 @@ from ..identify.surface.shape import shape_violations_of_fit
 from ..library.entry import Entry
 from .band_plot import band_plot
 from .chapter import Chapter, Plot, Table
+from .equation_section import equation_section
 from .isobar_plot import compute_isobars, isobar_plot
-from .levels import levels_of
+from .levels import is_pressure_ramp, levels_of
+from .ramp_plot import ramp_plot
 from .shape_chapter import violation_table
 
 MAX_CURVES = 8
 
 
 def fit_chapter(fit: Fit, entry: Entry, notes: Sequence[str] = ()) -> Chapter:
-    """Return the chapter of a fit: goodness of fit, parameters, isobars with measured points, and residuals by row."""
+    """Return the chapter of a fit: equation, goodness of fit, parameters, isobars with measured points, residuals."""
     remarks = "\n\n".join((*fit.notes, *notes))
+    equations, symbols = equation_section(fit)
     errors = Plot("errors", "Modelled against measured values, and residuals.", fit.plot())
     return Chapter(
         paper="fit",
         title=entry.title,
         summary=f"{entry.note}\n\n{remarks}",
-        tables=(_goodness_of_fit(fit), _parameters(fit), *_violations(fit), _correlations(fit), _rows(fit)),
-        plots=tuple(plot for plot in (_isobars(fit, entry), errors, band_plot(fit)) if plot is not None),
+        equations=equations,
+        tables=(_goodness_of_fit(fit), *symbols, _parameters(fit), *_violations(fit), _correlations(fit), _rows(fit)),
+        plots=tuple(
+            plot for plot in (ramp_plot(fit), _isobars(fit, entry), errors, band_plot(fit)) if plot is not None
+        ),
         references=tuple(cite(entry)),
     )
 
@@ -74,10 +80,13 @@ def _rows(fit: Fit) -> Table:
 
 
 def _isobars(fit: Fit, entry: Entry) -> Plot:
-    """Return the isobars of the fitted law at measured pressures, with the measured points."""
-    curves = compute_isobars(
-        fit.model, entry.validity_range, pressures=levels_of(fit.recording["pressure"], MAX_CURVES)
-    )
+    """Return the isobars of the fitted law at measured pressures, with the measured points.
+
+    The pressures are round if the pressure was swept.
+    """
+    ramp = is_pressure_ramp(fit.recording["pressure"], fit.recording["contraction"])
+    pressures = None if ramp else levels_of(fit.recording["pressure"], MAX_CURVES)
+    curves = compute_isobars(fit.model, entry.validity_range, pressures=pressures)
     return isobar_plot(fit.model, entry.title, curves, entry.validity_range, measured=fit.recording)
 
 

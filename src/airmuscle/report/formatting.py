@@ -4,14 +4,27 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 
-from .chapter import DIFFERS, HOLDS, NOT_PRINTED, AtLeast, AtMost, Claim, Table
+from .chapter import (
+    DEPENDS,
+    DIFFERS,
+    HOLDS,
+    NOT_PRINTED,
+    NOT_TESTABLE,
+    AtLeast,
+    AtMost,
+    Claim,
+    Kind,
+    Table,
+    statements,
+)
 
-MARKS = {HOLDS: "✓", DIFFERS: "✗", NOT_PRINTED: "–"}
+MARKS = {HOLDS: "✓", DIFFERS: "✗", DEPENDS: "±", NOT_TESTABLE: "?", NOT_PRINTED: "–"}
 """A sign next to each verdict, so that it does not depend on colour."""
 
 MISSING = "–"
@@ -104,13 +117,13 @@ def format_published(claim: Claim) -> str:
         return MISSING
     relation = _RELATIONS.get(type(claim.printed), "")
     tolerance = f" ± {format_number(claim.printed.tolerance)}" if claim.printed.tolerance else ""
-    chosen = " (chosen)" if claim.printed.chosen else ""
-    return f"{relation}{format_number(claim.printed.value)}{tolerance}{chosen}"
+    origin = " (chosen)" if claim.printed.chosen else " (derived)" if claim.printed.derived else ""
+    return f"{relation}{format_number(claim.printed.value)}{tolerance}{origin}"
 
 
-def count_verdicts(claims: tuple[Claim, ...]) -> dict[str, int]:
-    """Return the number of claims with each verdict."""
-    verdicts = [claim.verdict for claim in claims]
+def count_verdicts(claims: Iterable[Claim], kind: Kind = Kind.CLAIM) -> dict[str, int]:
+    """Return the number of statements of one kind with each verdict; the cases of a statement count once."""
+    verdicts = [statement.verdict for statement in statements(claims, kind)]
     return {verdict: verdicts.count(verdict) for verdict in MARKS}
 
 

@@ -10,13 +10,14 @@ from __future__ import annotations
 import functools
 import html
 import re
+from typing import Literal
 from xml.etree import ElementTree
 
 _FORMULA = re.compile(r"\\\((.+?)\\\)")
 _FORMULA_WITH_PUNCTUATION = re.compile(r"([(\[]*)\\\((.+?)\\\)([)\],.;:%]*)")
 _NO_WRAP = '<span class="nowrap">{}</span>'
 """Browsers break lines between a formula and the punctuation next to it."""
-_NAME = re.compile(r"(?P<base>[A-Za-z]+)(?:_(?P<index>[A-Za-z0-9]+))?")
+_NAME = re.compile(r"(?P<base>[A-Za-z]+)(?:_(?P<index>[A-Za-z0-9]+(?:_[A-Za-z0-9]+)*))?")
 _UNIT_SPACE = re.compile(r"(?<=\d) (?=%|(?:k?N|[kM]?Pa|[mc]?m|k?g|m?s|bar|K|rad|Hz)\b)")
 _GREEK = {
     name: rf"\{name}"
@@ -72,14 +73,20 @@ def _symbol_latex(match: re.Match[str]) -> str:
         return r"q_\text{m}"
     if index is None:
         return latex
-    return f"{latex}_{{{index}}}" if _INDICES.fullmatch(index) else rf"{latex}_\text{{{index}}}"
+    parts = [each if _INDICES.fullmatch(each) else rf"\text{{{each}}}" for each in index.split("_")]
+    return f"{latex}_{parts[0]}" if len(parts) == 1 and parts[0] != index else f"{latex}_{{{', '.join(parts)}}}"
+
+
+def to_display_mathml(latex: str) -> str:
+    """Return an equation in LaTeX as a MathML element on a line of its own."""
+    return _mathml(latex, "block")
 
 
 @functools.cache
-def _mathml(latex: str) -> str:
+def _mathml(latex: str, display: Literal["block", "inline"] = "inline") -> str:
     from latex2mathml.converter import convert  # needed by reports only
 
-    return convert(latex).replace("<mo>&#x0002F;</mo>", '<mo lspace="0" rspace="0">&#x0002F;</mo>')
+    return convert(latex, display=display).replace("<mo>&#x0002F;</mo>", '<mo lspace="0" rspace="0">&#x0002F;</mo>')
 
 
 @functools.cache

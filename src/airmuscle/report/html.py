@@ -10,7 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from .chapter import Chapter
+from .chapter import Chapter, Kind, statements
 from .formatting import (
     MARKS,
     P_VALUE,
@@ -23,7 +23,7 @@ from .formatting import (
     table_rows,
     typographic,
 )
-from .formula import symbol_formula, to_mathml, to_plain
+from .formula import symbol_formula, to_display_mathml, to_mathml, to_plain
 from .versions import versions
 
 MAX_SVG_BYTES = 600_000
@@ -47,6 +47,7 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
         cell=lambda value, header="": Markup(render_cell(header, value)),
         header=lambda text: Markup(render_header(text)),
         formulas=lambda text: Markup(to_mathml(text)),
+        equation=lambda latex: Markup(to_display_mathml(latex)),
         plain=to_plain,
         published=lambda claim: typographic(format_published(claim)),
         unit=format_unit,
@@ -62,7 +63,9 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
         title=title,
         date=date.isoformat(),
         chapters=chapters,
-        verdicts=count_verdicts(claims),
+        claims=claims,
+        kinds=list(Kind),
+        statements=statements,
         count_verdicts=count_verdicts,
         marks=MARKS,
         versions=versions(),

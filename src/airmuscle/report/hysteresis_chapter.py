@@ -8,17 +8,21 @@ from typing import Any
 import numpy as np
 
 from ..core.plotting import BLACK, BLUE, RED, legend_below, new_figure
-from ..identify.hysteresis import HysteresisFit, HysteresisLoop, LoopFit
+from ..identify.hysteresis import HysteresisFit, HysteresisLoop, JointFit, LoopFit
 from ..identify.hysteresis.plot import plot_loops
 from ..recording.display_units import display_scale
 from ..recording.segment import motion_direction
 from .chapter import Chapter, Plot, Table
 from .formatting import P_VALUE
+from .joint_friction_chapter import joint_friction_chapter
 
 
-def hysteresis_chapters(loop_fits: Sequence[LoopFit], creep: Sequence[str] = ()) -> list[Chapter]:
-    """Return one chapter per loop; the sentences on creep form the last chapter."""
-    chapters = [_chapter(each, "" if len(loop_fits) == 1 else f"-{i}") for i, each in enumerate(loop_fits, 1)]
+def hysteresis_chapters(
+    loop_fits: Sequence[LoopFit], creep: Sequence[str] = (), joint: Sequence[JointFit] = ()
+) -> list[Chapter]:
+    """Return the chapter of the joint fits, if any, and one per loop; the sentences on creep form the last chapter."""
+    chapters = [joint_friction_chapter(joint)] if joint else []
+    chapters += [_chapter(each, "" if len(loop_fits) == 1 else f"-{i}") for i, each in enumerate(loop_fits, 1)]
     if creep:
         chapters.append(Chapter("creep", "Creep", "\n\n".join(creep)))
     return chapters
@@ -78,10 +82,7 @@ def describe_row_counts(loop: HysteresisLoop) -> str:
     """Return a sentence with the number of rows used from each branch."""
     direction = motion_direction(loop.friction_path.displacement(loop.recording), loop.recording.columns.get("time"))
     up, down = (int(np.count_nonzero((direction == sign) & loop.fitted_rows)) for sign in (1, -1))
-    text = f"{up} rows of the rising branch and {down} of the falling branch are used, of {len(loop.recording)}."
-    if 10 * min(up, down) < max(up, down):
-        text += " One branch has very few rows: use all rows, or measure the loop more slowly."
-    return text
+    return f"{up} rows of the rising branch and {down} of the falling branch are used, of {len(loop.recording)}."
 
 
 def _law_table(loop_fit: LoopFit, suffix: str) -> Table:

@@ -21,6 +21,8 @@ DASHES = plotting.DASHES[:5]
 """Line styles that are distinguishable on neighbouring curves."""
 PRESSURE_TOLERANCE = 0.005
 """Maximum difference between a measured point and its isobar, as a fraction of the maximum pressure (chosen)."""
+MAX_TITLE_LINES = 3
+"""Maximum number of lines of a title; the rest is left out."""
 MAX_FORCE_RATIO = 8.0
 """Maximum of the force axis as a multiple of the median force, for laws that diverge (chosen)."""
 POINTS, COARSE_POINTS = 241, 61
@@ -103,7 +105,7 @@ def isobar_plot(
         xlim=(100 * curves.contractions[0], 100 * curves.contractions[-1]),
         ylim=(0.0, 1.06 * _force_axis_limit(curves, point, measured)),
     )
-    axes.set_title(textwrap.fill(title, 60), fontsize=9)
+    axes.set_title(textwrap.fill(title, 60, max_lines=MAX_TITLE_LINES, placeholder=" …"), fontsize=9)
     plotting.legend_outside(axes, title="gauge pressure")
     caption = f"{title}: force over contraction at constant gauge pressure."
     if point is not None:

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from ..analysis.energy_defect import maxwell_defect
 from ..characteristic.base import Characteristic
 from ..characteristic.contractile_surface import exponents
-from ..core.plotting import LINES, legend_outside, new_figure
 from ..core.reference import cite
 from ..geometry.base import Geometry
-from ..identify import Fit
-from ..identify.censored_least_squares import uncensored_rank
 from ..library import catalogue
-from ..report.chapter import Chapter, Claim, Equal, Plot, Table
+from ..report.chapter import Chapter, Plot, Table
+from . import hosovsky_effect_ranges as causing_over_ranges
 from . import hosovsky_effects as causing
 from . import hosovsky_fill as filling
+from . import hosovsky_joint as joining
 from . import hosovsky_release as releasing
+from .hosovsky_claims import gas_findings, measurement_claims, surface_claims
+from .hosovsky_figures import hill_model, isobars, surface_in_space
 from .hosovsky_plant import (
     FORCE_MAPS,
     MATRIX,
@@ -38,45 +37,11 @@ the parallel spring \(F_\text{PP}\) and the contractile element \(F_\text{KE}\),
 
 The paper prints neither the coefficients nor mass, spring, damper and geometry. The surface is fitted to the measured
 force map of a DMSP-20-300, and alternatively to the table of Festo's sizing tool. Valves, supply, schedule, released
-mass and integrator are as printed. All other values are listed below with their sources. Every verdict on the quick
-release states whether it holds over the ranges of all chosen values."""
+mass and integrator are as printed. All other values are listed below with their sources. Every statement on the quick
+release is evaluated for the nominal values, for each chosen value varied alone, and for all of them varied together.
 
-
-def surface_claims(fit: Fit) -> tuple[Claim, ...]:
-    """Return the claims on the contractile surface: number and rank of its coefficients, force limits."""
-    law = surface()
-    rank = uncensored_rank(fit.problem, fit.problem.jacobian(fit.values))
-    force = law.force(np.linspace(0, 1e6, 51)[:, None], np.linspace(-0.05, 0.4, 46)[None, :])
-    positive = "coefficients determined by the rows of the force map with a positive force"
-    note = f"Condition number {fit.condition:.3g} (scaled); rms error {fit.rmse:.3g} N. "
-    note += " ".join(map(_sentence, fit.notes))
-    limit = "force compensator: {} force of the surface"
-    return (
-        Claim(PAPER, "coefficients of a polynomial of total degree five", Equal(21, 0), len(exponents(5)), "1"),
-        Claim(PAPER, positive, Equal(21, 0), rank, "1", note),
-        Claim(PAPER, limit.format("maximum"), Equal(1200.0, 0.0), float(force.max()), "N"),
-        Claim(PAPER, limit.format("minimum"), Equal(0.0, 0.0), float(force.min()), "N"),
-    )
-
-
-def _sentence(note: str) -> str:
-    return f"{note[:1].upper()}{note[1:].rstrip('.')}."
-
-
-def surface_figure() -> Plot:
-    """Return the isobars of the surface and the measured points; Fig. 2 of the paper shows the surface."""
-    law, data = surface(), catalogue.load_data(FORCE_MAPS[0])
-    figure, axes = new_figure()
-    contraction = np.linspace(0.0, 0.26, 200)
-    for i, pressure in enumerate((675e3, 525e3, 375e3, 250e3, 135e3)):
-        rows = np.isclose(data["pressure"], pressure)
-        axes.plot(contraction * 100, law.force(pressure, contraction), color=LINES[i], label=f"{pressure / 1e3:g} kPa")
-        axes.plot(data["contraction"][rows] * 100, data["force"][rows], "o", color=LINES[i])
-    axes.axhline(1200.0, color="0.4", linewidth=0.8, linestyle=":")
-    axes.set(xlabel="contraction [%]", ylabel="force [N]", xlim=(0, 27), ylim=(-30, 1700))
-    legend_outside(axes, title="gauge pressure")
-    caption = "Contractile surface (lines) fitted to a measured DMSP-20-300 (points), limited to 0 to 1200 N (dotted)."
-    return Plot("hosovsky_surface", caption, figure)
+Equation (11) multiplies a volume flow by \(P_0\) = 100 kPa. The default here is the mass flow of ISO 6358, for which
+\(R\,T_0\,\rho_0\) = 99.72 kPa stands in its place; both are evaluated."""
 
 
 def coefficient_table() -> Table:
@@ -104,33 +69,49 @@ def chapter(
     fill = filling.run_fill(parameters)
     effects = causing.compute_effects(parameters, suspected)
     low, high = releasing.release_pair(parameters)
-    ranges = releasing.range_table(parameters)
+    ranges, joint = releasing.range_table(parameters), joining.joint_variation(parameters)
+    ratios = causing_over_ranges.ratio_ranges(parameters, suspected)
+    explanation = f"{causing.describe_effects(effects)} {causing_over_ranges.describe_ranges(ratios)}"
     return Chapter(
         PAPER,
         "Hošovský et al.: muscle dynamics by Hill's model",
         SUMMARY,
         claims=(
             *surface_claims(surface_fit()),
-            *filling.claims(fill, causing.describe_effects(effects)),
+            *filling.claims(fill, explanation),
+            *measurement_claims(),
             *releasing.claims(low, high, ranges),
+            *joining.claims(joint),
+            *gas_findings(effects),
         ),
         tables=(
             causing.effect_table(effects),
+            causing_over_ranges.range_table(ratios),
             ranges,
+            joining.joint_table(joint),
             coefficient_table(),
             maxwell_table(parameters),
             _extrapolation_table(fill, low, high),
             *_time_series(fill, low, high),
         ),
-        plots=(
-            surface_figure(),
-            filling.valve_figure(MATRIX, fill.plant.ambient.temperature),
-            filling.figure_3(fill),
-            causing.effect_plot(effects),
-            releasing.figure_4(low, high),
-        ),
+        plots=_plots(fill, effects, low, high),
         references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(catalogue.load_law(FORCE_MAPS[0]))),
         chosen=(*parameters.as_rows(), *suspected.as_rows()),
+    )
+
+
+def _plots(
+    fill: filling.FillRun, effects: tuple[causing.Effect, ...], low: releasing.Release, high: releasing.Release
+) -> tuple[Plot, ...]:
+    """Return all figures in the order of the report."""
+    return (
+        hill_model(),
+        surface_in_space(),
+        isobars(),
+        filling.valve_figure(MATRIX, fill.plant.ambient.temperature),
+        filling.figure_3(fill),
+        causing.effect_plot(effects),
+        releasing.figure_4(low, high),
     )
 
 

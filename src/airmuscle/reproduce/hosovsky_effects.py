@@ -1,8 +1,8 @@
 """Effects of the suspected causes of the deviations in Fig. 3 of Hošovský et al. on fill and discharge.
 
-The paper suspects the line between valve and muscle, the flow law, the isothermal gas and the constant spring; the
-volume is added, as its formula is lost in our copy. One component of the printed plant is substituted at a time, then
-one of each cause together. The parameter values are chosen, as the paper prints none.
+The paper suspects the line between valve and muscle, the flow law, the isothermal ideal gas and the constant spring;
+the volume is added, as its formula is lost in our copy. One component of the printed plant is substituted at a time,
+then one of each cause together. The parameter values are chosen, as the paper prints none.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.plotting import DASHES, LINES, new_figure
-from ..muscle import CubicSpring, LinearSpring, Spring, ViscoelasticWall, Wall
+from ..muscle import CubicSeriesSpring, CubicSpring, LinearSpring, SeriesElement, Spring, ViscoelasticWall, Wall
 from ..plant.plant import Plant
-from ..pneumatics import DistributedTube, Orifice, SubsonicIndexValve, Tube, TubeModel, Valve
+from ..pneumatics import DistributedTube, Orifice, SubsonicIndexValve, Tube, TubeModel, Valve, VirialGas
 from ..pneumatics.gas import EnergyBalance, Gas, Polytropic
 from ..recording import Recording
 from ..report.chapter import Plot, Table
 from ..report.formula import to_mathtext
 from ..simulation import simulate
 from ..simulation.integrators import Rodas4
-from .hosovsky_plant import MATRIX, ChosenValue, UnpublishedParameters, hanging_load, plant
+from .hosovsky_plant import MATRIX, MATRIX_BY_VOLUME, ChosenValue, UnpublishedParameters, hanging_load, plant
 from .hosovsky_schedule import DISCHARGING, DURATION, FILLING, SCHEDULE
 
 SPACING = 4e-3
@@ -47,6 +47,12 @@ class SuspectedCauses:
     )
     wall_compliance: ChosenValue = ChosenValue(2e-11, 5e-12, 5e-11, "m3/Pa", "compliance of the wall")
     wall_time_constant: ChosenValue = ChosenValue(0.2, 0.05, 1.0, "s", "time constant of the viscoelastic wall")
+    series_stiffness: ChosenValue = ChosenValue(
+        1e5, 5e4, 3e5, "N/m", "series spring of Fig. 1, stiffness at zero stretch"
+    )
+    series_hardening: ChosenValue = ChosenValue(
+        5e-3, 2e-3, 2e-2, "m", "series spring of Fig. 1, stretch at which the force is twice the linear one"
+    )
     dead_volume: ChosenValue = ChosenValue(2e-5, 5e-6, 4e-5, "m3", "volume of fittings and ports at the muscle")
 
     def as_rows(self) -> tuple[tuple[str, str, str], ...]:
@@ -65,6 +71,7 @@ class Substitution:
     wall: Wall | None = None
     valve: Orifice = MATRIX
     tube: TubeModel | None = None
+    series: SeriesElement | None = None
     braid_angle: float | None = None
     pressure_column: str = "pressure"
 
@@ -74,18 +81,19 @@ class Substitution:
             parameters = parameters.with_value("braid_angle", self.braid_angle)
         return plant(
             parameters, hanging_load(parameters), gas=self.gas, spring=self.spring, valve=self.valve, tube=self.tube,
-            wall=self.wall,
+            wall=self.wall, series=self.series,
         )  # fmt: skip
 
 
 PRINTED = Substitution("as printed", "isothermal gas, constant spring, rigid wall, no line")
-CAUSES = ("line", "flow law", "heat transfer", "spring", "volume")
+CAUSES = ("line", "flow law", "heat transfer", "spring", "volume", "gas law")
 COMBINED = "combined"
 
 
 def substitutions(parameters: UnpublishedParameters, suspected: SuspectedCauses) -> tuple[Substitution, ...]:
     """Return all substitutions by cause; the last one combines one of each cause."""
     s, stiffness = suspected, parameters.stiffness.value
+    series = CubicSeriesSpring(s.series_stiffness.value, s.series_hardening.value)
     length, diameter, dead = s.line_length.value, s.line_diameter.value, s.dead_volume.value
     critical = dataclasses.replace(MATRIX, critical_ratio=s.critical_ratio.value)
     lumped, heat = Tube.from_dimensions(length, diameter), EnergyBalance(s.heat_transfer.value)
@@ -101,16 +109,20 @@ def substitutions(parameters: UnpublishedParameters, suspected: SuspectedCauses)
         Substitution("flow law", rf"\(b = {s.critical_ratio.value:g}\)", valve=critical),
         Substitution("flow law", rf"\(m = {s.index.value:g}\)", valve=indexed),
         Substitution("flow law", f"laminar above {s.laminar_ratio.value:g}", valve=laminar),
-        Substitution("heat transfer", rf"first law, \(hA = {s.heat_transfer.value:g}\) W/K", gas=heat),
+        *(Substitution("heat transfer", rf"first law, \(hA = {value:g}\) W/K", gas=EnergyBalance(value))
+          for value in (s.heat_transfer.low, s.heat_transfer.value, s.heat_transfer.high)),
         Substitution("heat transfer", "first law, adiabatic", gas=EnergyBalance(0.0)),
         Substitution("heat transfer", r"polytropic, \(n = 1.2\)", gas=Polytropic(1.2)),
         Substitution("spring", "no spring", spring=LinearSpring(0.0)),
         Substitution("spring", "three times the stiffness", spring=LinearSpring(3.0 * stiffness)),
         Substitution("spring", "hardening spring", spring=hardening),
+        Substitution("spring", "nonlinear series spring", series=series),
         Substitution("volume", f"braid angle {angles.low:g} rad", braid_angle=angles.low),
         Substitution("volume", f"braid angle {angles.high:g} rad", braid_angle=angles.high),
         Substitution("volume", "viscoelastic wall", wall=wall),
         Substitution("volume", f"fittings of {dead * 1e6:g} cm³", tube=_dead_volume(dead)),
+        Substitution("gas law", "van der Waals, second virial coefficient", gas=VirialGas()),
+        Substitution("gas law", r"volume flow of (11), \(P_0 Q\)", valve=MATRIX_BY_VOLUME),
         Substitution(COMBINED, r"line, \(b\), first law, spring, wall", heat, hardening, wall,
                      critical, dataclasses.replace(lumped, gas=heat)),
     )  # fmt: skip
@@ -140,17 +152,19 @@ class Effect:
 
 def compute_effects(parameters: UnpublishedParameters, suspected: SuspectedCauses) -> tuple[Effect, ...]:
     """Simulate all substitutions and return their changes relative to the printed plant."""
-    base = _run(PRINTED, parameters)
-    return tuple(_effect(base, item, _run(item, parameters)) for item in substitutions(parameters, suspected))
+    base = run_fill_of(PRINTED, parameters)
+    return tuple(effect_of(base, item, run_fill_of(item, parameters)) for item in substitutions(parameters, suspected))
 
 
-def _run(substitution: Substitution, parameters: UnpublishedParameters) -> Recording:
+def run_fill_of(substitution: Substitution, parameters: UnpublishedParameters) -> Recording:
+    """Simulate fill and discharge of the plant with a substituted component."""
     return simulate(
         substitution.plant(parameters), SCHEDULE, duration=DURATION, integrator=Rodas4(1e-7), output_times=SPACING
     )
 
 
-def _effect(base: Recording, substitution: Substitution, run: Recording) -> Effect:
+def effect_of(base: Recording, substitution: Substitution, run: Recording) -> Effect:
+    """Return the changes of a run with a substituted component relative to that of the printed plant."""
     pressure, contraction = (
         run[substitution.pressure_column] - base["pressure"],
         run["contraction"] - base["contraction"],
@@ -203,7 +217,7 @@ def fill_discharge_ratio(effect: Effect) -> float:
 def effect_plot(effects: tuple[Effect, ...]) -> Plot:
     """Return the changes of pressure and contraction after the opening of each valve, one row per cause."""
     rows = (*CAUSES, COMBINED)
-    figure, axes = new_figure(len(rows), 4, width=9.6, height=10.0, sharex="col")
+    figure, axes = new_figure(len(rows), 4, width=9.6, height=11.6, sharex="col")
     for panels, cause in zip(axes, rows, strict=True):
         _draw_row(panels, [effect for effect in effects if effect.substitution.cause == cause])
         panels[0].set_ylabel(f"{cause}\nchange [kPa]")
@@ -250,7 +264,7 @@ def describe_effects(effects: tuple[Effect, ...]) -> str:
     combined = effects[-1]
     return (
         f"Largest pressure change during filling by cause: {listed}. Filling is affected more than discharging, by at "
-        f"least a fifth, by: {', '.join(stronger) or 'none'}. All causes combined: "
+        f"least a fifth at the chosen values, by: {', '.join(stronger) or 'none'}. All causes combined: "
         f"{_fill_change(combined) / 1e3:.3g} kPa during filling, {fill_discharge_ratio(combined):.2g} times the "
         "change during discharging."
     )

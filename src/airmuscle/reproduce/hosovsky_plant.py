@@ -11,10 +11,10 @@ from ..geometry.braid import Braid
 from ..identify import Fit, fit
 from ..library import catalogue
 from ..mechanism import HangingMass, Mechanism, WithLatch
-from ..muscle import LinearDamper, LinearSpring, Muscle, RigidWall, Spring, Wall
+from ..muscle import LinearDamper, LinearSpring, Muscle, RigidSeriesElement, RigidWall, SeriesElement, Spring, Wall
 from ..plant.plant import Plant
 from ..pneumatics import FillDischarge, Orifice, Supply, TubeModel, Valve, WithTubes
-from ..pneumatics.gas import Ambient, Gas, Isothermal
+from ..pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Ambient, Gas, Isothermal
 from ..report.formatting import format_number, format_quantity, typographic
 
 PAPER = "hosovsky"
@@ -23,6 +23,14 @@ FORCE_MAPS = ("dmsp-20-300", "festo-tool-dmsp-20")
 
 MATRIX = Valve(2.6167e-9, 0.433)
 """MATRIX EMX821.104C224: b = 0.433 and the digits of C are printed; the exponent e-9 is lost in our copy."""
+REFERENCE_PRESSURE = 100e3
+"""Pressure P0 of the reference atmosphere of ISO 8778 [Pa]."""
+VOLUME_FLOW_RATIO = REFERENCE_PRESSURE / (GAS_CONSTANT * REFERENCE_TEMPERATURE * REFERENCE_DENSITY)
+"""Ratio P0/(R T0 rho0) of the pressure rates by the volume flow of equation (11) and by the mass flow of ISO 6358 [1].
+
+The density rho0 of ISO 8778 is that of humid air and R that of dry air, so that R T0 rho0 = 99 716 Pa."""
+MATRIX_BY_VOLUME = dataclasses.replace(MATRIX, conductance=MATRIX.conductance * VOLUME_FLOW_RATIO)
+"""The valve as equation (11) takes its volume flow: as air whose density is P0/(R T0)."""
 SUPPLY_PRESSURE = 650e3 - 101_325.0
 """The step of 650 kPa, assumed to be absolute (inferred from the sensor range of 0 to 0.6 MPa); gauge [Pa]."""
 RELEASED_MASS = 30.0
@@ -112,14 +120,17 @@ def plant(
     wall: Wall | None = None,
     valve: Orifice = MATRIX,
     tube: TubeModel | None = None,
+    series: SeriesElement | None = None,
     data: str = FORCE_MAPS[0],
 ) -> Plant:
     """Return the plant: muscle, two valves with closed centre, load and gas.
 
-    The defaults are those of the paper: isothermal gas, rigid wall, no line.
+    The defaults are those of the paper: isothermal gas, rigid wall, no line, no series spring.
     """
     valves = FillDischarge(Supply(SUPPLY_PRESSURE), valve, valve)
-    actuator = dataclasses.replace(muscle(parameters, data, spring), wall=wall or RigidWall())
+    actuator = dataclasses.replace(
+        muscle(parameters, data, spring), wall=wall or RigidWall(), series=series or RigidSeriesElement()
+    )
     circuit = valves if tube is None else WithTubes(valves, tube)
     return Plant(actuator, circuit, mechanism, gas or Isothermal(), Ambient())
 

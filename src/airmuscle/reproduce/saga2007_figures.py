@@ -22,6 +22,7 @@ from .saga2007_muscle import (
 )
 from .saga2007_muscle import LINES as RUBBER
 from .saga2007_pairs import errors, ideal_errors
+from .saga2007_previous import previous_model_figure
 
 CONTRACTION = np.concatenate([np.geomspace(2e-4, 0.01, 25), np.linspace(0.012, 0.4, 110)])
 MPA = 1e-6
@@ -29,7 +30,16 @@ MPA = 1e-6
 
 def plots() -> tuple[Plot, ...]:
     """Return all figures in the order of the report."""
-    drawn = (outlines, rubber, contraction_over_pressure, force_over_contraction, snap_through, interpretations, pairs)
+    drawn = (
+        previous_model_figure,
+        outlines,
+        rubber,
+        contraction_over_pressure,
+        force_over_contraction,
+        snap_through,
+        interpretations,
+        pairs,
+    )
     return tuple(draw() for draw in drawn)
 
 

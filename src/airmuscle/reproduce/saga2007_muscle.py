@@ -18,6 +18,7 @@ from ..geometry.parabola import Parabola
 from ..geometry.pleated import PleatedTube
 from ..geometry.straight_fibre import StraightFibre
 
+PAPER = "saga2007"
 LENGTH, DIAMETER, WALL = 0.072, 0.012, 0.002
 """Fibre length, end diameter and wall thickness [m] of Table 1."""
 PRESSURE = 0.11e6
@@ -75,6 +76,8 @@ def contraction_at(law: Characteristic, pressure: float, force: float) -> float:
     """
     low, high = law.contraction_range
     grid = np.linspace(max(low, 1e-3), high * (1 - 1e-6), 150)
+    if isinstance(law, Saga2007):  # its formula is regular at small contraction
+        grid = np.concatenate([np.geomspace(1e-9, grid[0], 60, endpoint=False), grid])
     reachable = np.flatnonzero(pressure_along(law, grid, force) <= pressure)
     if not reachable.size:
         return 0.0

@@ -157,6 +157,6 @@ def _table(name: str, title: str, rows: dict[tuple[str, str], Array]) -> Table:
     note = (
         r"Compared with the exact meridian of the same muscle; \(w = 1\), \(M = m/\pi\), rubber along the arc. No "
         "value: beyond the pole, or no exact outline (line A without load at 1 %). The previous model is the circle "
-        "with the middle balance."
+        "with the middle balance; its printed sum over the fibres is 1.3 % smaller than that used here."
     )
     return Table(f"saga2007_pairs_{name}", f"Error of the pairs of outline and closure: {title}", columns, note)

@@ -25,6 +25,7 @@ from .saga2007_muscle import (
     pressure_along,
     with_rings,
 )
+from .saga2007_previous import previous_model_table
 
 CONTRACTIONS = np.array([0.001, 0.01, 0.05, 0.10, 0.20, 0.35])
 
@@ -38,6 +39,7 @@ def tables() -> tuple[Table, ...]:
         limit_table(),
         virtual_work_table(),
         curve_table(),
+        previous_model_table(),
         *saga2007_pairs.tables(),
     )
 

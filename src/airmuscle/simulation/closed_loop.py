@@ -9,20 +9,18 @@ import numpy as np
 
 from ..control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoopState
 from ..control.controller import Measurement
-from ..control.driver import Driver
-from ..control.piecewise_linear import PiecewiseLinear, merge_columns
-from ..control.with_drivers import WithDrivers, apply_drivers
-from ..core.arrays import Array
+from ..control.piecewise_linear import PiecewiseLinear
+from ..control.with_drivers import WithDrivers
+from ..core.arrays import Array, flat_view
 from ..core.diagnostics import Diagnostic, DiagnosticCode
 from ..core.errors import ParameterError
 from ..core.status import Status
 from ..plant.units import column_units
-from .buffers import Buffer
 from .integrators import RawSolution
-from .output_times import merge_output_times
+from .intervals import DrivenIntervals, HeldIntervals, Intervals
 from .problem import Problem
-from .rows import evaluate_rows, make_recording, truncate_at_invalid_row
-from .sampled_loop import SampledLoop, prepare_loop
+from .rows import make_recording, recorded_rows, truncate_at_invalid_row
+from .sampled_loop import SampledLoop, make_measurement, prepare_loop
 from .solution import Solution, Statistics
 
 
@@ -41,153 +39,105 @@ def solve_closed_loop(problem: Problem) -> Solution:
     return _solution(problem, run)
 
 
+_Sample = tuple[Any, tuple[float, ...], tuple[float, ...], Status]
+"""The memory of a controller, its measurements and commands, and whether these can be applied."""
+
+
 class _Run:
-    """A control loop being simulated: rows and segments so far, and the state at the last completed interval."""
+    """A control loop being simulated: the intervals so far, and the state at the end of the last complete one."""
 
     def __init__(self, problem: Problem, prepared: SampledLoop, control_state: ControlLoopState) -> None:
-        self.problem, self.prepared, self.control_state = problem, prepared, control_state
-        compiled, integrator = problem.compiled, problem.integrator
+        self.prepared, self._last = prepared, tuple(control_state)
+        compiled, integrator, loop = problem.compiled, problem.integrator, prepared.loop
         assert integrator is not None
         self.bound = integrator.bind(compiled)
         self.bound.state[:] = problem.initial_vector
-        n, m = compiled.sizes.states, compiled.sizes.inputs
-        segments = prepared.inputs.ends.size
-        self.ends, self.values, self.slopes = Buffer(None, segments), Buffer(m, segments), Buffer(m, segments)
-        self.times, self.rows = Buffer(None, prepared.times.size), Buffer(n, prepared.times.size)
+        states, chains = compiled.sizes.states, WithDrivers(loop.other_inputs, loop.drivers).chains
+        self.intervals: Intervals = (
+            DrivenIntervals(prepared, states, chains) if chains else HeldIntervals(prepared, states)
+        )
         self.samples: list[tuple[tuple[float, ...], tuple[float, ...]]] = []
-        self.applied = np.array(control_state.applied_inputs or prepared.inputs.values[0])
         self.status, self.time = Status.DONE, problem.start_time
         self.state = self.bound.state.copy()
         self.stopped_at = problem.start_time
-        self.kept_segments = 0
-        loop = prepared.loop
-        self.chains: dict[str, tuple[Driver, ...]] = WithDrivers(loop.other_inputs, loop.drivers).chains
-        self.driven = {name: compiled.description.input_names.index(name) for name in self.chains}
+        self._measure = make_measurement(compiled, loop, self.bound.state)
+        self._measured_names, self._setpoint_names = loop.controller.measured_columns, loop.controller.setpoints
+        self._ranges = [(name, low, high) for name, (low, high) in prepared.ranges.items()]
+        self._setpoints: tuple[list[float], dict[str, float]] = [], {}
 
     def integrate(self) -> None:
         """Sample and integrate from edge to edge, until the end or until an interval fails."""
-        prepared, edges = self.prepared, self.prepared.edges
-        for k in range(len(edges) - 1):
+        prepared, bound, intervals, samples = self.prepared, self.bound, self.intervals, self.samples
+        edges, view, kept = prepared.edges, flat_view(bound.state), flat_view(self.state)
+        memory, origin, _, count, measured, commanded, applied, drivers = self._last
+        applied = applied or tuple(prepared.inputs.values[0].tolist())
+        for k, end in enumerate(edges[1:]):
             try:
-                state = self.control_state
                 if k or prepared.sampled:
-                    state, self.status = self._sample(state, prepared.setpoints[k])
+                    memory, measured, commanded, self.status = self._sample(memory, applied, prepared.setpoints[k])
                     if self.status:
                         return
-                state = self._integrate_interval(state, k)
+                    count += 1
+                begin = edges[k]
+                drivers = intervals.append(k, commanded, drivers)
+                self.status, self.stopped_at = intervals.integrate(bound, begin)
+                if self.status is Status.DONE:
+                    for i, limit in prepared.lower_bounds:
+                        if view[i] < limit:
+                            self.status = Status.NEGATIVE_AIR_MASS
+                    applied = tuple(intervals.final_inputs(begin, end))
             except KeyboardInterrupt:
-                self._discard_interval()
+                intervals.discard()
+                self.stopped_at, bound.state[:] = self.time, self.state
                 self.status = Status.INTERRUPTED
                 return
-            self.samples.append((state.measured, state.commanded))
-            self.kept_segments = self.ends.size
+            samples.append((measured, commanded))
+            intervals.keep()
             if self.status:
                 return
-            self.time, self.state[:] = edges[k + 1], self.bound.state
-            self.control_state = state._replace(time=edges[k + 1], applied_inputs=tuple(self.applied.tolist()))
+            self.time, kept[:] = end, view
+            self._last = memory, origin, end, count, measured, commanded, applied, drivers
 
-    def _sample(self, state: ControlLoopState, setpoints: list[float]) -> tuple[ControlLoopState, Status]:
-        """The state after a sample, with the new commands; and whether they can be applied."""
-        prepared, loop = self.prepared, self.prepared.loop
-        controller = loop.controller
-        columns = prepared.measure(self.bound.state, self.applied)
-        measured = tuple(columns.values())
+    @property
+    def control_state(self) -> ControlLoopState:
+        """The state of the loop at the end of the last complete interval."""
+        return ControlLoopState(*self._last)
+
+    def _sample(self, memory: Any, applied: tuple[float, ...], setpoints: list[float]) -> _Sample:
+        """The controller's memory after a sample, measurements, new commands, and whether they can be applied."""
+        loop = self.prepared.loop
+        measured = tuple(self._measure(applied))
         if not all(map(math.isfinite, measured)):
-            return state, Status.NOT_FINITE
-        measurement = Measurement(columns, dict(zip(controller.setpoints, setpoints, strict=True)), prepared.ranges)
-        commands, memory = controller.step(state.controller, measurement, loop.sample_time)
+            return memory, measured, (), Status.NOT_FINITE
+        if setpoints != self._setpoints[0]:
+            self._setpoints = setpoints, dict(zip(self._setpoint_names, setpoints, strict=True))
+        columns = dict(zip(self._measured_names, measured, strict=True))
+        measurement = Measurement(columns, self._setpoints[1], self.prepared.ranges)
+        commands, memory = loop.controller.step(memory, measurement, loop.sample_time)
         try:
-            commanded = tuple(
-                [min(max(0.0 + commands[name], low), high) for name, (low, high) in prepared.ranges.items()]
-            )
+            wanted = [(0.0 + commands[name], low, high) for name, low, high in self._ranges]
+            commanded = tuple([low if low > v else high if high < v else v for v, low, high in wanted])
         except (KeyError, TypeError, ValueError):
+            controller = loop.controller
             raise ParameterError(
                 f"{type(controller).__name__} commands {commands!r}; it must give a number for each of "
                 f"{', '.join(controller.inputs)}."
             ) from None
-        if not all(map(math.isfinite, commanded)):
-            return state, Status.NON_FINITE_COMMAND
-        count = state.sample_count + 1
-        return ControlLoopState(
-            memory, state.origin, state.time, count, measured, commanded, state.applied_inputs, state.drivers
-        ), Status.DONE
-
-    def _integrate_interval(self, state: ControlLoopState, k: int) -> ControlLoopState:
-        """Integrate interval k under the commands of a state; the state with those of the drivers at its end."""
-        prepared, begin, end = self.prepared, self.prepared.edges[k], self.prepared.edges[k + 1]
-        first, last = prepared.segment_offsets[k : k + 2]
-        inputs = prepared.inputs
-        inputs.values[first:last, prepared.commanded] = state.commanded
-        times = prepared.times[prepared.row_offsets[k] : prepared.row_offsets[k + 1]]
-        ends: Any
-        values: Any
-        slopes: Any
-        if self.chains:
-            part = PiecewiseLinear(inputs.ends[first:last], inputs.values[first:last], inputs.slopes[first:last])
-            columns = [part.column(i) for i in range(inputs.values.shape[1])]
-            drivers = apply_drivers(self.chains, state.drivers, columns, self.driven, begin)
-            ends, values, slopes = merge_columns(columns, begin)
-            state = state._replace(drivers=drivers)
-            if len(ends) > 1:
-                times = merge_output_times(times, np.array(ends), prepared.loop.sample_time)
-        else:
-            ends, values, slopes = inputs.ends[first:last], inputs.values[first:last], inputs.slopes[first:last]
-        self._append(ends, values, slopes, times, last - first if not self.chains else len(ends))
-        self._run_interval(begin, end)
-        return state
-
-    def _append(self, ends: Any, values: Any, slopes: Any, times: Array, count: int) -> None:
-        """Append the segments and the times of an interval to the buffers."""
-        self.first_segment, self.first_row = self.ends.size, self.times.size
-        for buffer, new in ((self.ends, ends), (self.values, values), (self.slopes, slopes)):
-            buffer.reserve(count)
-            target = buffer.array[buffer.size : buffer.size + count]
-            target.reshape(-1)[:] = new if isinstance(new, list) else new.reshape(-1)
-            buffer.size += count
-        self.times.reserve(times.size)
-        self.times.array[self.times.size : self.times.size + times.size] = times
-        self.times.size += times.size
-        self.rows.reserve(times.size)
-
-    def _discard_interval(self) -> None:
-        """Forget an interval that was interrupted, so that the run can be continued from its beginning."""
-        self.times.size = self.rows.size
-        for buffer in (self.ends, self.values, self.slopes):
-            buffer.size = min(buffer.size, self.kept_segments)
-        self.stopped_at, self.bound.state[:] = self.time, self.state
-
-    def _run_interval(self, begin: float, end: float) -> None:
-        """Integrate through the segments that were appended last, and fill the rows."""
-        count = self.ends.size - self.first_segment
-        wanted = self.times.size - self.first_row
-        s, r = self.first_segment, self.first_row
-        addresses = (self.ends.at(s), self.values.at(s), self.slopes.at(s))
-        result = self.bound.run_part(begin, addresses, count, self.times.at(r), self.rows.at(r), wanted)
-        self.status, reached, self.stopped_at = result
-        self.rows.size = r + reached
-        if reached < wanted:
-            self.times.size = self.rows.size
-        if self.status == Status.DONE:
-            state = self.bound.state
-            if any(state[i] < bound for i, bound in self.prepared.lower_bounds):
-                self.status = Status.NEGATIVE_AIR_MASS
-            last = self.ends.size - 1
-            start = float(self.ends.array[last - 1]) if count > 1 else begin
-            self.applied = self.values.array[last] + self.slopes.array[last] * (end - start)
+        finite = all(map(math.isfinite, commanded))
+        return memory, measured, commanded, Status.DONE if finite else Status.NON_FINITE_COMMAND
 
 
 def _solution(problem: Problem, run: _Run) -> Solution:
     """The rows of all intervals as one solution."""
     compiled, prepared, integrator = problem.compiled, run.prepared, problem.integrator
-    segments = PiecewiseLinear(run.ends.rows, run.values.rows, run.slopes.rows)
-    times, states = run.times.rows, run.rows.rows
+    segments, (times, states) = run.intervals.signal, run.intervals.rows
     begun = bool(run.samples)
     at, state = (run.stopped_at, run.bound.state.copy()) if begun else (run.time, run.state)
     raw = RawSolution(states, times.size, at, state, run.status, *run.bound.step_counts)
     if not segments.ends.size:  # the run ended before its first interval
         shape = (1, compiled.sizes.inputs)
         segments = PiecewiseLinear(np.array([problem.end_time]), np.zeros(shape), np.zeros(shape))
-    table = evaluate_rows(compiled, states, times, segments, problem.start_time)
+    table = recorded_rows(compiled, states, times, segments, problem.start_time)
     raw, table = truncate_at_invalid_row(compiled, raw, table, times)
     units = column_units(problem.system, compiled.output_names)
     note = f"controlled by {prepared.loop.describe(units)}"

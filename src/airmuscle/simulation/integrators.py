@@ -11,7 +11,7 @@ import numpy as np
 from ..compile.cache.kernel import Kernel, fixed_step, rodas4
 from ..compile.program import CompiledSystem, Tableau
 from ..control.piecewise_linear import PiecewiseLinear
-from ..core.arrays import Array
+from ..core.arrays import Array, flat_view
 from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..core.reference import Reference
@@ -86,6 +86,7 @@ class BoundIntegrator:
         end = (self._clock, self._count, INTERRUPT_CHECK_STEPS, work)
         self._kernel = binding.kernel.bind(*binding.leading, *run, *binding.trailing, *end)
         self._first = len(binding.leading) + 1
+        self._clock_view, self._count_view = flat_view(self._clock), flat_view(self._count)
         self._budget = len(binding.leading) + len(run) + len(binding.trailing) + 2
 
     def run(
@@ -119,18 +120,18 @@ class BoundIntegrator:
 
         Ends, values and slopes of the segments, times and rows are given by the addresses of their first numbers.
         """
-        for i, address in enumerate(segments, self._first):
-            self._kernel.point(i, address, count)
-        self._kernel.point(self._first + 3, times, wanted)
-        self._kernel.point(self._first + 4, rows, wanted)
-        self._clock[:] = begin, 0.0, begin
-        self._count[0] = self._count[1] = 0
-        before = int(self._count[2])
+        self._kernel.point(self._first, segments, count)
+        self._kernel.point(self._first + 3, (times, rows), wanted)
+        clock, counts = self._clock_view, self._count_view
+        clock[0] = clock[2] = begin
+        clock[1] = 0.0
+        counts[0] = counts[1] = 0
+        before = counts[2]
         status = self._kernel()
         if status == _PAUSED:
             status = self._continue(status, before + MAX_STEPS)
             self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
-        return Status(status), int(self._count[1]), float(self._clock[0])
+        return Status.DONE if status == 0 else Status(status), counts[1], clock[0]
 
     @property
     def step_counts(self) -> tuple[int, int]:

@@ -44,7 +44,10 @@ def _grid(spacing: float, start: float, duration: float) -> Array:
             f"simulate: a spacing of output_times of {spacing!r} s makes {duration / spacing:.3g} rows of a run of "
             f"{duration:g} s; {MAX_ROWS} are allowed. The result does not depend on it: choose a wider one."
         )
-    return np.asarray(start + spacing * np.arange(int(duration / spacing * (1 + 1e-12)) + 1))
+    grid: Array = np.arange(int(duration / spacing * (1 + 1e-12)) + 1, dtype=float)
+    grid *= spacing
+    grid += start
+    return grid
 
 
 def _times(given: Any) -> Array:
@@ -74,8 +77,12 @@ def merge_output_times(grid: Array, instants: Array, duration: float) -> Array:
 
 def _merge_few(grid: Array, instants: Array, close: float) -> Array:
     """The same for few instants: the grid between one and the next, less the rows close to them."""
-    lower = np.searchsorted(grid, instants - close, side="left").tolist()
-    upper = np.searchsorted(grid, instants + close, side="right").tolist()
+    lower = grid.searchsorted(instants - close, side="left").tolist()
+    upper = grid.searchsorted(instants + close, side="right").tolist()
+    if upper == [row + 1 for row in lower] and len(set(lower)) == len(lower):  # each takes the place of one row
+        merged = grid.copy()
+        merged[lower] = instants
+        return merged
     parts, row = [], 0
     for i, (low, high) in enumerate(zip(lower, upper, strict=True)):
         if low > row:
@@ -85,3 +92,20 @@ def _merge_few(grid: Array, instants: Array, close: float) -> Array:
         row = max(row, high)
     parts.append(grid[row:])
     return np.concatenate(parts)
+
+
+def merge_few_output_times(grid: list[float], instants: list[float], duration: float) -> list[float]:
+    """The same for a few rows and instants, as lists; at least one instant."""
+    close = 1e-9 * duration
+    merged: list[float] = []
+    row, count = 0, len(grid)
+    for i, instant in enumerate(instants):
+        while row < count and grid[row] < instant - close:
+            merged.append(grid[row])
+            row += 1
+        if not i or instant > instants[i - 1]:
+            merged.append(instant)
+        while row < count and grid[row] <= instant + close:
+            row += 1
+    merged += grid[row:]
+    return merged

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,13 +17,18 @@ from ..control.control_loop import ControlLoop, ControlLoopState
 from ..control.inputs import InputSignal, check_input_signal
 from ..control.piecewise_linear import PiecewiseLinear
 from ..control.with_drivers import WithDrivers
-from ..core.arrays import Array
+from ..core.arrays import FEW, Array
 from ..core.declaration import as_float
 from ..core.errors import ParameterError
 from ..core.system import System
 from ..plant.state import check_system, state_vector
 from .integrators import Integrator, default_integrator
 from .output_times import output_times
+
+NUMBERS = frozenset({float, int, np.float64})
+"""Types of numbers that need no conversion."""
+LARGEST = sys.float_info.max
+"""The largest finite number."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -100,7 +107,7 @@ class Problem:
         inputs = self.compiled.description.input_names
         segments = self.input.segments(inputs, self.start_time, self.duration)
         segments.check_shape(len(inputs), self.start_time)
-        return segments
+        return segments.as_floats()
 
     @functools.cached_property
     def times(self) -> Array:
@@ -112,9 +119,32 @@ class Problem:
         """The initial state (n,), given or the default."""
         if self.initial_state is None:
             return default_state(self.compiled)
-        vector = state_vector(self.system, self.initial_state)
-        self.system.check_state(self.initial_state)
+        return initial_vector(self.compiled, self.initial_state)
+
+
+def initial_vector(compiled: CompiledSystem, state: Mapping[str, float]) -> Array:
+    """A given initial state (n,), checked; that of the run before is not checked again."""
+    known, system = compiled.description, compiled.system
+    numbers = plain_numbers(state, known.state_limits)
+    if numbers is None or numbers != known.checked_state:
+        vector = state_vector(system, state)
+        system.check_state(state)
+        known.checked_state = vector.tolist()
         return vector
+    return np.array(numbers)
+
+
+def plain_numbers(values: Mapping[str, float], limits: Mapping[str, float]) -> list[float] | None:
+    """The values in the order of their lower limits; None where `state_vector` must check them, or refuse them."""
+    if not isinstance(values, Mapping) or len(values) != len(limits):
+        return None
+    numbers: list[float] = []
+    for name, low in limits.items():
+        value: Any = values.get(name)
+        if type(value) not in NUMBERS or not low <= value or not abs(value) <= LARGEST:
+            return None
+        numbers.append(value)
+    return numbers
 
 
 def default_state(compiled: CompiledSystem) -> Array:
@@ -144,14 +174,14 @@ def check_input_range(compiled: CompiledSystem, segments: PiecewiseLinear, start
     known = compiled.description
     if not len(known.input_names):
         return
-    low, high = known.input_lower_limits, known.input_upper_limits
     values, slopes = segments.values, segments.slopes
     tables = [values]
-    if slopes.any():
+    if any(slopes.ravel().tolist()) if slopes.size <= FEW else slopes.any():
         tables.append(values + slopes * (segments.ends - segments.starts(start))[:, None])
     for table in tables:
-        if (table.min(axis=0) >= low).all() and (table.max(axis=0) <= high).all():
+        if _are_within(table, known.input_limits.values()):
             continue
+        low, high = known.input_lower_limits, known.input_upper_limits
         row, column = np.argwhere((table < low) | (table > high))[0]
         variable = compiled.system.input_variables[column]
         unit = "" if variable.unit in ("", "1") else f" {variable.unit}"
@@ -159,3 +189,13 @@ def check_input_range(compiled: CompiledSystem, segments: PiecewiseLinear, start
             f"the input '{variable.name}' is {table[row, column]:g}{unit} before {segments.ends[row]:g} s; allowed "
             f"range: {variable.minimum:g} to {variable.maximum:g}{unit} ({variable.meaning})."
         )
+
+
+def _are_within(table: Array, limits: Iterable[tuple[int, tuple[float, float]]]) -> bool:
+    """Whether every column of a table (N, m) is within its limits."""
+    if table.size > FEW:
+        smallest, largest = table.min(axis=0).tolist(), table.max(axis=0).tolist()
+    else:
+        columns = list(zip(*table.tolist(), strict=True))
+        smallest, largest = list(map(min, columns)), list(map(max, columns))
+    return all(low <= smallest[i] and largest[i] <= high for i, (low, high) in limits)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,23 +29,52 @@ class RowTable(NamedTuple):
 
     inputs: Array
     outputs: Array
-    lower: Array
-    upper: Array
+    lower: list[float]
+    upper: list[float]
     first_invalid: int
+
+
+class RowRecorder:
+    """The kernel of the rows, bound to a compiled system. For one thread at a time."""
+
+    def __init__(self, compiled: CompiledSystem) -> None:
+        self.sizes = sizes = compiled.sizes
+        self._ranges = np.empty((2, sizes.states + sizes.inputs + sizes.outputs))
+        states, inputs, outputs = (np.empty((0, width)) for width in (sizes.states, sizes.inputs, sizes.outputs))
+        none, nothing = np.empty(0), np.empty((0, sizes.inputs))
+        self._kernel = record.bind(
+            compiled.address["outputs"], compiled.precomputed, states, none, 0.0, none, nothing, nothing, inputs,
+            outputs, *self._ranges,
+        )  # fmt: skip
+
+    def evaluate(self, states: Array, times: Array, segments: PiecewiseLinear, start: float) -> RowTable:
+        """Inputs and outputs at states (N, n) and rising times (N,) of a run whose segments begin at `start` [s]."""
+        count = times.size
+        inputs, outputs = np.empty((count, self.sizes.inputs)), np.empty((count, self.sizes.outputs))
+        arguments = (states, times, start, segments.ends, segments.values, segments.slopes, inputs, outputs)
+        for i, argument in enumerate(arguments, 2):
+            self._kernel.replace(i, argument)
+        first = self._kernel()
+        lower, upper = self._ranges.tolist()
+        return RowTable(inputs, outputs, lower, upper, first)
 
 
 def evaluate_rows(
     compiled: CompiledSystem, states: Array, times: Array, segments: PiecewiseLinear, start: float
 ) -> RowTable:
     """Inputs and outputs at states (N, n) and rising times (N,) of a run whose segments begin at `start` [s]."""
-    sizes, count = compiled.sizes, times.size
-    inputs, outputs = np.empty((count, sizes.inputs)), np.empty((count, sizes.outputs))
-    lower, upper = np.empty((2, sizes.states + sizes.inputs + sizes.outputs))
-    first = record(
-        compiled.address["outputs"], compiled.precomputed, states, times, start, segments.ends, segments.values,
-        segments.slopes, inputs, outputs, lower, upper,
-    )  # fmt: skip
-    return RowTable(inputs, outputs, lower, upper, first)
+    return RowRecorder(compiled).evaluate(states, times, segments, start)
+
+
+def recorded_rows(
+    compiled: CompiledSystem, states: Array, times: Array, segments: PiecewiseLinear, start: float
+) -> RowTable:
+    """The same of a system with its own parameters, whose recorder is kept with its description."""
+    idle = compiled.description.recorders
+    recorder = idle.pop() if idle else RowRecorder(compiled)
+    table = recorder.evaluate(states, times, segments, start)
+    idle.append(recorder)
+    return table
 
 
 def truncate_at_invalid_row(
@@ -54,11 +84,13 @@ def truncate_at_invalid_row(
 
     A fixed step can end in numbers that are far off; isothermal air has a pressure, below vacuum, in a negative volume.
     """
-    known, sizes = compiled.description, compiled.sizes
+    known, lower = compiled.description, table.lower
     positive = known.positive_outputs
-    volumes = sizes.states + sizes.inputs + positive
-    valid = table.first_invalid == raw.reached and bool((table.lower[: sizes.states] >= known.lower_bounds).all())
-    if valid and bool((table.lower[volumes] > 0.0).all()):
+    if (
+        table.first_invalid == raw.reached
+        and all(map(operator.ge, lower, known.state_limits.values()))
+        and all(lower[i] > 0.0 for i in known.positive_columns)
+    ):
         return raw, table
     reasons: dict[Status, Any] = {
         Status.NOT_FINITE: ~np.isfinite(table.outputs).all(axis=1),
@@ -72,8 +104,8 @@ def truncate_at_invalid_row(
     status = next(status for status, rows in reasons.items() if rows[row])
     raw = raw._replace(reached=row, time=float(times[row]), state=raw.rows[row], status=status)
     inputs, outputs = table.inputs[:row], table.outputs[:row]
-    columns = np.hstack([raw.rows[:row], inputs, outputs]) if row else np.full((1, table.lower.size), np.nan)
-    return raw, RowTable(inputs, outputs, columns.min(axis=0), columns.max(axis=0), row)
+    columns = np.hstack([raw.rows[:row], inputs, outputs]) if row else np.full((1, len(lower)), np.nan)
+    return raw, RowTable(inputs, outputs, columns.min(axis=0).tolist(), columns.max(axis=0).tolist(), row)
 
 
 def make_recording(
@@ -95,19 +127,17 @@ def make_recording(
     columns.update(zip(known.input_names, table.inputs.T, strict=True))
     columns.update(more)
     text = f"simulated by {integrator}: {raw.steps} steps, {raw.rejected} rejected"
-    diagnostics = [*before, Diagnostic(DiagnosticCode.INTEGRATOR, "integrator", text), *known.remarks]
+    diagnostics = [*before, Diagnostic(DiagnosticCode.INTEGRATOR, "integrator", text)]
+    notes = [*(diagnostic.message for diagnostic in diagnostics), *known.remark_texts]
+    diagnostics += known.remarks
+    later: list[Diagnostic] = []
     if reached:
-        diagnostics += compiled.system.diagnose(Columns(columns, _limits(compiled, table)))
+        limits = dict(zip(known.column_names, zip(table.lower, table.upper, strict=True), strict=True))
+        later += compiled.system.diagnose(Columns(columns, limits))
     if raw.status != Status.DONE:
-        diagnostics.append(early_end(compiled, raw, end))
-    notes = tuple(diagnostic.message for diagnostic in diagnostics)
-    return Recording.from_arrays(columns, "simulation", known.constants, notes), tuple(diagnostics)
-
-
-def _limits(compiled: CompiledSystem, table: RowTable) -> dict[str, tuple[float, float]]:
-    known = compiled.description
-    names = (*known.state_names, *known.input_names, *known.output_names)
-    return dict(zip(names, zip(table.lower.tolist(), table.upper.tolist(), strict=True), strict=True))
+        later.append(early_end(compiled, raw, end))
+    notes += [diagnostic.message for diagnostic in later]
+    return Recording.from_arrays(columns, "simulation", known.constants, tuple(notes)), (*diagnostics, *later)
 
 
 def early_end(compiled: CompiledSystem, raw: RawSolution, end: float) -> Diagnostic:

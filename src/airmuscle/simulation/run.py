@@ -22,8 +22,8 @@ from ..plant.state import check_system, state_vector
 from ..recording import Recording
 from .closed_loop import solve_closed_loop
 from .integrators import BoundIntegrator, Integrator, default_integrator
-from .problem import Problem, check_input_range
-from .rows import early_end, evaluate_rows, make_recording, truncate_at_invalid_row
+from .problem import NUMBERS, Problem, check_input_range, plain_numbers
+from .rows import early_end, make_recording, recorded_rows, truncate_at_invalid_row
 from .solution import Solution, Statistics
 
 
@@ -41,7 +41,7 @@ def _solve_open_loop(problem: Problem) -> Solution:
     raw = bound.run(segments, problem.start_time, problem.initial_vector, times)
     give_back(pool, integrator, bound)
     reached = raw.reached
-    table = evaluate_rows(compiled, raw.rows[:reached], times[:reached], segments, problem.start_time)
+    table = recorded_rows(compiled, raw.rows[:reached], times[:reached], segments, problem.start_time)
     raw, table = truncate_at_invalid_row(compiled, raw, table, times)
     recording, diagnostics = make_recording(compiled, raw, table, times, integrator, problem.end_time, {})
     final = dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
@@ -133,13 +133,13 @@ def _hold(
 ) -> list[float] | None:
     """The state after a step with held inputs; None for what `advance` must check in full, or report as failed."""
     known = compiled.description
-    x = _floats(state, known.state_limits)
-    if x is None or len(state) != len(x):
+    x = plain_numbers(state, known.state_limits)
+    if x is None:
         return None
     held = [0.0] * len(known.input_names)
     for name, value in inputs.items():
         column, (low, high) = known.input_limits.get(name, _NO_INPUT)
-        if type(value) not in _NUMBERS or not low <= value <= high:
+        if type(value) not in NUMBERS or not low <= value <= high:
             return None
         held[column] = value
     bound = borrow(known.holders, compiled, integrator)
@@ -152,19 +152,7 @@ def _hold(
     return final
 
 
-_NUMBERS = frozenset({float, int, np.float64})
 _NO_INPUT = -1, (np.inf, -np.inf)
-
-
-def _floats(values: Mapping[str, float], limits: Mapping[str, float]) -> list[float] | None:
-    """The values in the order of their lower limits; None where one is missing, no number, infinite or too small."""
-    numbers: list[float] = []
-    for name, low in limits.items():
-        value: Any = values.get(name)
-        if type(value) not in _NUMBERS or not low <= value or not abs(value) < np.inf:
-            return None
-        numbers.append(value)
-    return numbers
 
 
 def _segments(

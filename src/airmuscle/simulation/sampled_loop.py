@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ..compile.program import CompiledSystem
 from ..control.control_loop import ControlLoop, ControlLoopState
 from ..control.inputs import InputSignal
 from ..control.piecewise_linear import PiecewiseLinear
-from ..core.arrays import Array
+from ..core.arrays import Array, flat_view
 from ..core.errors import ParameterError
 from .output_times import output_times
 from .problem import Problem
@@ -34,7 +34,7 @@ class SampledLoop:
                interval k begin at index segment_offsets[k]
     setpoints  at the start of every interval
     times      output times; those of interval k begin at index row_offsets[k], and drivers add instants
-    measure    measured columns by name, from the state (n,) and the inputs (m,)
+    input_names    of the plant
     ranges     minimum and maximum of every commanded input
     """
 
@@ -48,7 +48,7 @@ class SampledLoop:
     setpoints: list[list[float]]
     times: Array
     row_offsets: list[int]
-    measure: Callable[[Array, Array], dict[str, float]]
+    input_names: tuple[str, ...]
     ranges: Mapping[str, tuple[float, float]]
     lower_bounds: list[tuple[int, float]]
 
@@ -63,7 +63,7 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
     close = _CLOSE * loop.sample_time
     others = _snap(loop.other_inputs, names, edges, close)
     starts = np.unique(np.concatenate([edges[:-1], others.starts(start)]))
-    inputs = others.split_at(starts, start)
+    inputs = others.split_at(starts, start).as_floats()
     commanded = [names.index(name) for name in loop.controller.inputs]
     inputs.values[:, commanded] = inputs.slopes[:, commanded] = 0.0
     segment_offsets = np.append(np.searchsorted(starts, edges[:-1]), starts.size)
@@ -74,7 +74,7 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
     return SampledLoop(
         loop, edges.tolist(), sampled, inputs, segment_offsets.tolist(), commanded, setpoint,
         setpoint.inputs_at(edges[:-1], start).tolist(), times, [0, *row_offsets[1:].tolist()],
-        _measurement(compiled, loop), _ranges(compiled, loop),
+        names, _ranges(compiled, loop),
         [(i, bound) for i, bound in enumerate(bounds) if bound > -math.inf],
     )  # fmt: skip
 
@@ -116,21 +116,25 @@ def _snap(signal: InputSignal, names: tuple[str, ...], edges: Array, close: floa
     return PiecewiseLinear(ends[kept], segments.values[kept], segments.slopes[kept])
 
 
-def _measurement(compiled: CompiledSystem, loop: ControlLoop) -> Callable[[Array, Array], dict[str, float]]:
-    """A function of state (n,) and inputs (m,) that gives the measured columns by name."""
-    known, names = compiled.description, loop.controller.measured_columns
+def make_measurement(
+    compiled: CompiledSystem, loop: ControlLoop, state: Array
+) -> Callable[[Sequence[float]], list[float]]:
+    """A function of the inputs (m,) that gives the measured columns at what `state` (n,) holds when it is called."""
+    known, names, view = compiled.description, loop.controller.measured_columns, flat_view(state)
     if all(name in known.state_names for name in names):
-        indices = [(name, known.state_names.index(name)) for name in names]
-        return lambda state, inputs: {name: float(state[i]) for name, i in indices}
+        indices = [known.state_names.index(name) for name in names]
+        return lambda inputs: [view[i] for i in indices]
     sizes = compiled.sizes
-    x, u, y = np.zeros((1, sizes.states)), np.zeros((1, sizes.inputs)), np.empty((1, sizes.outputs))
-    run = evaluate.bind(compiled.address["outputs"], compiled.precomputed, x, u, y)
+    u, y = np.zeros((1, sizes.inputs)), np.empty((1, sizes.outputs))
+    run = evaluate.bind(compiled.address["outputs"], compiled.precomputed, state.reshape(1, -1), u, y)
     columns = (*known.state_names, *known.output_names)
-    wanted = [(name, columns.index(name) - sizes.states) for name in names]
+    wanted = [columns.index(name) - sizes.states for name in names]
+    applied, outputs = flat_view(u), flat_view(y)
 
-    def measure(state: Array, inputs: Array) -> dict[str, float]:
-        x[0], u[0] = state, inputs
+    def measure(inputs: Sequence[float]) -> list[float]:
+        for i, value in enumerate(inputs):
+            applied[i] = value
         run()
-        return {name: float(y[0, i] if i >= 0 else state[i]) for name, i in wanted}
+        return [outputs[i] if i >= 0 else view[i] for i in wanted]
 
     return measure

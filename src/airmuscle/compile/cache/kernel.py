@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import ctypes
 import importlib
+import math
 import threading
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -20,12 +22,13 @@ from .object_code import build, load_engine
 
 _ITEMS = {np.dtype(np.int64): "q", np.dtype(np.float64): "d", np.dtype(np.float32): "f"}
 _compiling = threading.RLock()
+_address, _view = ctypes.addressof, ctypes.c_char.from_buffer
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 
 
 def address_of(array: Any) -> int:
     """The address of the first element of a C-contiguous, writeable array."""
-    return ctypes.addressof(ctypes.c_char.from_buffer(array)) if array.size else 0
+    return _address(_view(array)) if array.size else 0
 
 
 def _kind(argument: Any) -> str:
@@ -35,6 +38,16 @@ def _kind(argument: Any) -> str:
     if type(argument) is int:
         return "q"
     return f"{_ITEMS[argument.dtype]}{argument.ndim}"
+
+
+def _array_at(address: int, shape: tuple[int, ...]) -> Any:
+    """The array of float64 at an address."""
+    count = math.prod(shape)
+    return (
+        np.ctypeslib.as_array((ctypes.c_double * count).from_address(address)).reshape(shape)
+        if count
+        else np.empty(shape)
+    )
 
 
 class Kernel:
@@ -110,20 +123,27 @@ class BoundKernel:
         elif kind == "q":
             self._slots[offset] = argument
         else:
-            self._slots[offset] = address_of(argument)
-            for i, length in enumerate(argument.shape, offset + 1):
-                self._slots[i] = length
+            slots = self._slots
+            slots[offset] = _address(_view(argument)) if argument.size else 0
+            for length in argument.shape:
+                offset += 1
+                slots[offset] = length
 
-    def point(self, index: int, address: int, length: int) -> None:
-        """Let array number `index` begin at another address and have another first dimension, within a live array."""
-        offset = self._offsets[index]
-        self._slots[offset] = address
-        self._slots[offset + 1] = length
+    def point(self, index: int, addresses: Sequence[int], length: int) -> None:
+        """Let arrays from number `index` on begin at other addresses within live arrays, with this first dimension."""
+        slots, offsets, arguments = self._slots, self._offsets, self._arguments
+        for i, address in enumerate(addresses, index):
+            offset = offsets[i]
+            slots[offset] = address
+            slots[offset + 1] = length
+        if self._numba is not None:
+            for i, address in enumerate(addresses, index):
+                arguments[i] = _array_at(address, (length, *arguments[i].shape[1:]))
 
     def __call__(self) -> int:
         """Run the kernel; its status."""
         if self._numba is None:
-            return int(self._run(self._address))
+            return self._run(self._address)  # type: ignore[no-any-return]
         return int(self._numba(*self._arguments) or 0)
 
 

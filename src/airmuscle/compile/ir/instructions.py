@@ -6,7 +6,7 @@ import dataclasses
 import enum
 import functools
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...core.errors import TraceError
 
@@ -82,8 +82,7 @@ CALLED = frozenset({
 """The operations for which a function of the C library is called."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Instruction:
+class Instruction(NamedTuple):
     """`result = operation(arguments)`; every result is assigned once."""
 
     operation: Operation

@@ -12,12 +12,13 @@ from ...compile import System
 from ...core.arrays import Array
 from ...core.errors import IdentificationError, ParameterError
 from ...simulation.integrators import Integrator, Rodas4
-from ..identifiability import Identifiability, analyse_identifiability
+from ..identifiability import analyse_identifiability
 from ..result import Estimate
 from .experiment import Experiment, ParameterPaths, RecordUnknown, make_unknowns
 from .levenberg_marquardt import LevenbergMarquardt
 from .problem import MAX_RUNS, DynamicFitProblem
 from .record_model import RecordModel, count_readings
+from .reliability import describe_bounds, describe_flatness, describe_optima, distinct_optima
 from .result import DynamicFit
 
 MAX_AUTOCORRELATION = 0.3
@@ -69,13 +70,12 @@ def fit_dynamic(
     problem = DynamicFitProblem(models, unknowns, np.array(list(observed.values()), dtype=float))
     _check_row_count(problem)
     outcomes = sorted(_solve_all(problem, initial_guesses(problem, starts, seed)), key=lambda outcome: outcome[1])
-    best, cost = outcomes[0]
-    if not np.isfinite(cost):
+    if not np.isfinite(outcomes[0][1]):
         problem.residuals(np.array([u.value for u in unknowns]) / problem.scales)  # raises the cause, if there is one
         raise IdentificationError(
             "the plant cannot be simulated from any initial guess. Check the bounds and the initial conditions."
         )
-    return _build_result(problem, best, np.array([c for _, c in outcomes]))
+    return _build_result(problem, np.array([x for x, _ in outcomes]), np.array([c for _, c in outcomes]))
 
 
 def _solve_all(problem: DynamicFitProblem, guesses: Sequence[Array]) -> list[tuple[Array, float]]:
@@ -121,7 +121,9 @@ def initial_guesses(problem: DynamicFitProblem, count: int, seed: int) -> list[A
     return [values / problem.scales, *(np.column_stack(columns) / problem.scales)]
 
 
-def _build_result(problem: DynamicFitProblem, scaled: Array, costs: Array) -> DynamicFit:
+def _build_result(problem: DynamicFitProblem, searches: Array, costs: Array) -> DynamicFit:
+    """The result from the scaled unknowns (S, P) and sums of squares (S,) of all searches, the lowest first."""
+    scaled = searches[0]
     residuals, jacobian = problem.residuals(scaled)
     low, high = problem.bounds
     margin = 1e-6 * np.maximum(np.abs(scaled), 1.0)
@@ -131,7 +133,8 @@ def _build_result(problem: DynamicFitProblem, scaled: Array, costs: Array) -> Dy
     names = [problem.unknowns[k].name for k in inner]
     analysis = analyse_identifiability(jacobian[:, inner], names, np.ones(inner.size), residual_std)
     covariance = np.full((scaled.size, scaled.size), np.nan)
-    covariance[np.ix_(inner, inner)] = analysis.inverse() * residual_std**2
+    inverse = analysis.inverse()
+    covariance[np.ix_(inner, inner)] = inverse * residual_std**2
     standard_errors = np.sqrt(np.diag(covariance))
     estimates = tuple(
         Estimate(u.name, u.symbol, float(value), float(stderr), u.unit, u.meaning, bool(bound))
@@ -140,21 +143,24 @@ def _build_result(problem: DynamicFitProblem, scaled: Array, costs: Array) -> Dy
         )
     )
     correlations = covariance / np.outer(standard_errors, standard_errors)
-    notes = _collect_notes(residuals, analysis, estimates)
-    return DynamicFit(problem, estimates, correlations, analysis, residual_std, costs, notes)
+    optima = distinct_optima(searches * problem.scales, costs, problem.scales)
+    notes = [
+        *(str(combination) for combination in analysis.undetermined),
+        *describe_bounds(estimates, jacobian, inverse, on_bound, problem.scales),
+        *describe_optima(optima, estimates, costs),
+        *_describe_model_error(residuals, estimates, inner.size),
+    ]
+    return DynamicFit(problem, estimates, correlations, analysis, residual_std, costs, optima, tuple(notes))
 
 
-def _collect_notes(residuals: Array, analysis: Identifiability, estimates: Sequence[Estimate]) -> tuple[str, ...]:
-    """Undetermined combinations, unknowns on a bound, and signs of model error."""
-    notes = [str(combination) for combination in analysis.undetermined]
-    for estimate in estimates:
-        if estimate.on_bound:
-            notes.append(f"{estimate.name} is on its bound, {estimate.value:.4g} {estimate.display_unit}".rstrip())
+def _describe_model_error(residuals: Array, estimates: Sequence[Estimate], unknowns: int) -> list[str]:
+    """Sentences on autocorrelated residuals, which are a sign of model error, and on what they leave open."""
     autocorrelation = float(np.sum(residuals[1:] * residuals[:-1]) / max(np.sum(residuals**2), 1e-300))
-    if autocorrelation > MAX_AUTOCORRELATION:
-        factor = np.sqrt((1 + autocorrelation) / (1 - autocorrelation))
-        notes.append(
-            f"the residuals are autocorrelated (lag 1: {autocorrelation:.2f}), which indicates model error rather than "
-            f"noise; the standard errors are too small by a factor of about {factor:.1f}"
-        )
-    return tuple(notes)
+    if autocorrelation <= MAX_AUTOCORRELATION:
+        return []
+    factor = np.sqrt((1 + autocorrelation) / (1 - autocorrelation))
+    return [
+        f"the residuals are autocorrelated (lag 1: {autocorrelation:.2f}), which indicates model error rather than "
+        f"noise; the standard errors are too small by a factor of about {factor:.1f}",
+        *describe_flatness(estimates, residuals.size - unknowns),
+    ]

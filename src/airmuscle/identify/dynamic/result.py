@@ -16,6 +16,7 @@ from ..result import Estimate, estimate_table
 from .experiment import Unknown
 from .problem import DynamicFitProblem
 from .profile import DynamicProfile, compute_profile
+from .reliability import Optimum, searches_at_lowest
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -31,6 +32,8 @@ class DynamicFit:
     """Standard deviation of the residuals relative to the sensors, with N - P degrees of freedom."""
     costs: Array
     """Sums of squared residuals of the searches, lowest first; infinite where an initial guess failed."""
+    optima: tuple[Optimum, ...]
+    """The distinct optima of the searches, lowest first."""
     notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
@@ -57,7 +60,7 @@ class DynamicFit:
     @property
     def starts_at_optimum(self) -> int:
         """Number of searches that reached the lowest sum of squares, within 0.1 %."""
-        return int(np.count_nonzero(self.costs <= 1.001 * self.costs[0] + 1e-9))
+        return searches_at_lowest(self.costs)
 
     def plant(self, record: int = 0) -> System:
         """The plant of one record with the estimated parameters."""
@@ -102,5 +105,7 @@ class DynamicFit:
             f"residual std {self.residual_std:.3g} times that of the sensors; rank {analysis.rank} of "
             f"{analysis.singular_values.size} unknowns that are not on a bound"
         )
-        lines.append(f"{self.starts_at_optimum} of {self.costs.size} searches reached this optimum")
+        single = "one search, so other optima were not sought; increase the number of starts"
+        several = f"{self.starts_at_optimum} of {self.costs.size} searches reached this optimum"
+        lines.append(single if self.costs.size == 1 else several)
         return lines

@@ -1,5 +1,6 @@
 """Identification of friction and creep from hysteresis loops, with tests whether the data justify them."""
 
+from .agreement import RunAgreement
 from .creep import Creep, fit_creep
 from .fit import (
     ContractionPath,
@@ -10,6 +11,8 @@ from .fit import (
     initial_friction_laws,
 )
 from .holds import Hold, find_holds
+from .joint import fit_jointly, identified_friction
+from .joint_result import JointFit
 from .loops import HysteresisLoop, LoopFit, find_loops, fit_loop
 from .result import HysteresisFit
 
@@ -20,13 +23,17 @@ __all__ = [
     "Hold",
     "HysteresisFit",
     "HysteresisLoop",
+    "JointFit",
     "LoopFit",
     "PolynomialCurve",
     "PressurePath",
+    "RunAgreement",
     "find_holds",
     "find_loops",
     "fit_creep",
     "fit_hysteresis",
+    "fit_jointly",
     "fit_loop",
+    "identified_friction",
     "initial_friction_laws",
 ]

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ...characteristic.base import Characteristic
-from ...core import tree
 from ...core.arrays import Array
 from ...core.declaration import model, parameter
 from ...core.errors import IdentificationError
 from ...core.hints import Hint
-from ...core.tree import Leaf
 from ...friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, PrandtlIshlinskii
 from ...recording import Recording
 from ...recording.segment import motion_direction
+from .axis import MILLIMETRES, Axis
+from .limits import data_limits
 from .result import HysteresisFit, assess_fit
-from .series import MILLIMETRES, Axis, LoopSeries
+from .search import free_parameters, search_parameters
+from .series import LoopSeries
 
 RowMask = npt.NDArray[np.bool_]
 
@@ -154,16 +153,16 @@ def fit_hysteresis(
     Raises IdentificationError where there are too few rows or the path is constant.
     """
     run = make_loop_series(recording, static_curve, friction_path, fitted_rows)
-    free = [leaf for leaf in tree.leaves(friction) if leaf.declared.fitted]
-    if run.fitted_rows.sum() <= len(free) + run.design_matrix.shape[1] + 2 or not np.ptp(run.path) > 0:
+    free = free_parameters(friction)
+    if run.fitted_rows.sum() <= free + run.design_matrix.shape[1] + 2 or not np.ptp(run.path) > 0:
         raise IdentificationError(
             f"{recording.origin}: {int(run.fitted_rows.sum())} fitted rows along a path of {np.ptp(run.path):.3g} m "
-            f"cannot determine {len(free)} parameters of {type(friction).__name__} and {run.design_matrix.shape[1]} of "
+            f"cannot determine {free} parameters of {type(friction).__name__} and {run.design_matrix.shape[1]} of "
             "the static curve. Give a run with a rising and a falling branch, or include more rows."
         )
-    fitted = _fit_stiffnesses(friction, run) if friction.linear_in else _fit_iteratively(friction, run)
+    fitted, undetermined = search_parameters(friction, (run,))
     second_run = make_loop_series(repeat[0], static_curve, friction_path, repeat[1]) if repeat else None
-    return assess_fit(fitted, len(free), run, second_run)
+    return assess_fit(fitted, undetermined, run, second_run)
 
 
 def make_loop_series(
@@ -173,68 +172,20 @@ def make_loop_series(
     target = recording["force"] - static_curve.known_force(recording)
     finite = np.isfinite(target)
     rows = finite if fitted_rows is None else np.asarray(fitted_rows, dtype=bool) & finite
-    time = recording.columns.get("time")
     path = friction_path.displacement(recording)
-    matrix = static_curve.design_matrix(recording)
-    direction = motion_direction(path, time)
-    return LoopSeries(recording.origin, path, time, target, matrix, rows, direction, friction_path.axis)
-
-
-def _fit_stiffnesses(friction: Any, run: LoopSeries) -> Friction:
-    """Stiffnesses of elements with given limits, by non-negative linear least squares."""
-    from scipy.optimize import lsq_linear
-
-    terms = friction.element_deflections(run.path)[run.fitted_rows]
-    norms = np.linalg.norm(terms, axis=0)
-    norms = np.where(norms > 0, norms, 1.0)
-    matrix = np.hstack([run.design_matrix[run.fitted_rows], -terms / norms])
-    lower = np.concatenate([np.full(run.design_matrix.shape[1], -np.inf), np.zeros(terms.shape[1])])
-    result = lsq_linear(matrix, run.target[run.fitted_rows], (lower, np.inf), method="bvls")
-    stiffnesses = np.maximum(result.x[run.design_matrix.shape[1] :], 0.0) / norms
-    fitted: Friction = dataclasses.replace(friction, **{friction.linear_in: tuple(stiffnesses)})
-    return fitted
-
-
-def _fit_iteratively(friction: Friction, run: LoopSeries) -> Friction:
-    """Nonlinear least squares over the free parameters; the static curve is solved for at every evaluation."""
-    from scipy.optimize import least_squares
-
-    all_leaves = list(tree.leaves(friction))
-    free = [i for i, leaf in enumerate(all_leaves) if leaf.declared.fitted]
-    coordinates = [_SearchCoordinate.from_leaf(all_leaves[i]) for i in free]
-
-    def law(x: Sequence[float]) -> Friction:
-        values = [leaf.value for leaf in all_leaves]
-        for i, coordinate, value in zip(free, coordinates, x, strict=True):
-            values[i] = coordinate.parameter_value(float(value))
-        return tree.unflatten(friction, values)
-
-    start = [c.start for c in coordinates]
-    bounds = ([c.low for c in coordinates], [c.high for c in coordinates])
-    result = least_squares(lambda x: run.fitted_residuals(law(x)), start, bounds=bounds, x_scale=1.0, max_nfev=60)
-    return tree.with_parameters(friction, [leaf.value for leaf in tree.leaves(law(result.x))])
-
-
-@dataclasses.dataclass(frozen=True)
-class _SearchCoordinate:
-    """A parameter as a search coordinate: its logarithm if its lower bound is positive, else scaled by its size."""
-
-    start: float
-    low: float
-    high: float
-    size: float
-
-    @classmethod
-    def from_leaf(cls, leaf: Leaf) -> _SearchCoordinate:
-        low, high = leaf.declared.bounds
-        if low > 0:
-            return cls(float(np.log(leaf.value)), float(np.log(low)), float(np.log(high)), 0.0)
-        size = abs(leaf.value) or 1.0
-        return cls(leaf.value / size, low / size, high / size, size)
-
-    def parameter_value(self, coordinate: float) -> float:
-        """The parameter for a value of the coordinate."""
-        return coordinate * self.size if self.size else float(np.exp(coordinate))
+    time = recording.columns.get("time")
+    return LoopSeries(
+        origin=recording.origin,
+        path=path,
+        time=time,
+        target=target,
+        design_matrix=static_curve.design_matrix(recording),
+        fitted_rows=rows,
+        direction=motion_direction(path, time),
+        pressure=recording.columns.get("pressure"),
+        limits=data_limits(recording["force"], path, time, rows),
+        axis=friction_path.axis,
+    )
 
 
 def _resting_length(recording: Recording) -> float:

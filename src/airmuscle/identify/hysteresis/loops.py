@@ -34,6 +34,7 @@ from .fit import (
     initial_friction_laws,
     make_loop_series,
 )
+from .limits import speed_reservation
 from .result import HysteresisFit
 
 
@@ -46,6 +47,8 @@ class HysteresisLoop:
     friction_path: FrictionPath
     static_curve: StaticCurve
     fitted_rows: RowMask
+    transient_rows: int = 0
+    """Number of fitted rows in which the pressure changes quickly."""
     repeat: tuple[Recording, RowMask] | None = None
     """A second run of the same kind at the same level, for validation, and its fitted rows."""
 
@@ -157,7 +160,14 @@ def _make_loop(
     rows = _select_rows(recording, sensors, all_rows)
     direction = _directions(recording, friction_path)
     _check_two_directions(recording, direction, rows)
-    return HysteresisLoop(recording, run, friction_path, static_curve, rows)
+    transient = 0 if run.kind is ISOBARIC else int(np.count_nonzero(rows & ~_has_steady_pressure(recording, sensors)))
+    return HysteresisLoop(recording, run, friction_path, static_curve, rows, transient)
+
+
+def _has_steady_pressure(recording: Recording, sensors: Mapping[str, Sensor]) -> RowMask:
+    """Mask of the rows in which the pressure changes slowly, whatever the length does."""
+    columns = {name: recording[name] for name in ("time", "pressure") if name in recording}
+    return quasi_static_rows(dataclasses.replace(recording, columns=columns), sensors)
 
 
 def _select_rows(recording: Recording, sensors: Mapping[str, Sensor], all_rows: bool) -> RowMask:
@@ -180,7 +190,7 @@ def _check_two_directions(recording: Recording, direction: np.ndarray, fitted_ro
             raise IdentificationError(
                 f"{recording.origin}: the {branch} branch has no rows to fit{detail}, but a loop needs a rising and a "
                 "falling branch. Give such a run, or run it more slowly where its rows are not quasi-static.",
-                hint=Hint("To fit all rows", "all_rows", True),
+                hint=Hint("To fit all rows, if only the length changes quickly", "all_rows", True),
             )
 
 
@@ -204,6 +214,8 @@ def _is_same_level(one: Run, other: Run) -> bool:
 def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str], None] | None = None) -> LoopFit:
     """Fit every friction law to a loop and sort the fits by AICc.
 
+    A law with terms of speed is left out if the speed in the loop hardly varies.
+
     `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii; `progress` is called with the name of
     each law.
     """
@@ -211,6 +223,10 @@ def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str
     fits, failed = list[HysteresisFit](), dict[str, HintedText]()
     for initial in initial_friction_laws(series.path[loop.fitted_rows], series.fitted_residuals(None), elements):
         name = type(initial).__name__
+        too_uniform = "" if initial.rate_independent else speed_reservation(series.limits, series.axis)
+        if too_uniform:
+            failed[name] = HintedText(too_uniform)
+            continue
         if progress is not None:
             progress(name)
         try:
@@ -225,5 +241,6 @@ def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str
         except IdentificationError as error:
             failed[name] = error.message
         else:
-            fits.append(fit)
+            marked = dataclasses.replace(fit.series, transient_rows=loop.transient_rows)
+            fits.append(dataclasses.replace(fit, series=marked))
     return LoopFit(loop, tuple(sorted(fits, key=lambda fit: -fit.aicc_reduction)), failed)

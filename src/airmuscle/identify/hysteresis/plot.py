@@ -10,7 +10,8 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.plotting import DASHES, LINES, legend_below, new_figure
 from ...friction import Friction
-from .series import MILLIMETRES, Axis, LoopSeries
+from .axis import MILLIMETRES, Axis
+from .series import LoopSeries
 
 TURNING_POINTS = (2.0, -2.0, -0.6, -1.1, -0.6, 0.5, -0.3, 0.5, 2.0)
 """Turning points of the path of `plot_loops`, as multiples of the presliding distance of the law (chosen)."""
@@ -60,11 +61,12 @@ def plot_hysteresis(series: LoopSeries, friction: Friction, coefficients: Array,
     measured = series.target - series.design_matrix @ coefficients
     figure, (upper, lower) = new_figure(2, 1, width=6.0, height=5.6, sharex=True)
     path, rows = series.path * series.axis.factor, series.fitted_rows
-    force = -friction.force_along(series.path, series.time)
-    upper.plot(path[rows], measured[rows], "o", color=LINES[0], alpha=0.5, label="measured - static curve")
+    force = -series.friction_force(friction)
+    points: dict[str, Any] = {"marker": "o", "markersize": 3, "linestyle": "none", "color": LINES[0], "alpha": 0.5}
+    upper.plot(path[rows], measured[rows], **points, label="measured - static curve")
     upper.plot(path, force, color=LINES[1], label=f"{type(friction).__name__}, whole path")
     upper.set_ylabel("force [N]")
-    lower.plot(path[rows], (measured - force)[rows], "o", color=LINES[0], alpha=0.5)
+    lower.plot(path[rows], (measured - force)[rows], **points)
     lower.axhline(0.0, color=LINES[1])
     lower.set(xlabel=series.axis.label, ylabel="residual (measured - model) [N]")
     upper.set_title(title)

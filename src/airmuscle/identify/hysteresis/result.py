@@ -10,13 +10,18 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.tree import leaves
 from ...friction import Friction
+from ..identifiability import UndeterminedCombination
 from ..model_evidence import aicc, effective_sample_size, f_test_p_value, format_p_value
 from . import branches
+from .limits import limit_reservations, parameters_on_bounds, undetermined_parameters
 from .plot import plot_hysteresis
 from .series import LoopSeries
 
 SIGNIFICANCE_LEVEL = 0.01
 """p-value below which an F test is significant (chosen)."""
+
+MAX_TRANSIENT_RATIO = 0.1
+"""Maximum part of the fitted rows in which the pressure may change quickly for a friction to be justified (chosen)."""
 
 MIN_BRANCH_RATIO = 0.1
 """Minimum ratio of the rows of the two branches for a friction to be justified (chosen)."""
@@ -48,16 +53,18 @@ class HysteresisFit:
     repeat_rmse_without_friction: float
     repeatability: float
     series: LoopSeries
+    weak_combinations: tuple[UndeterminedCombination, ...] = ()
+    """Combinations of parameters that the data determine poorly or not at all."""
+
+    @property
+    def on_bounds(self) -> tuple[str, ...]:
+        """Paths of the parameters that the search moved to a bound, declared or set by the data."""
+        return parameters_on_bounds(self.friction, self.series.limits)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Paths of the parameters that the search moved to a bound: the data do not determine them."""
-        free = [leaf for leaf in leaves(self.friction) if leaf.declared.fitted and leaf.declared.bounds[0] > 0]
-        return tuple(
-            leaf.path
-            for leaf in free
-            if not 1.01 * leaf.declared.bounds[0] < leaf.value < 0.99 * leaf.declared.bounds[1]
-        )
+        """Paths of the parameters that the data do not determine: on a bound, or with a large standard error."""
+        return undetermined_parameters(self.friction, self.series.limits, self.weak_combinations)
 
     @property
     def justified(self) -> bool:
@@ -69,15 +76,30 @@ class HysteresisFit:
     @property
     def reservations(self) -> tuple[str, ...]:
         """The reasons, as sentences, why this loop cannot justify a friction whatever the statistical tests say."""
+        reasons = list(self.reservations_of_rows)
+        if self.rmse < self.repeatability:
+            reasons.append("The error is below the repeatability, which indicates overfitting.")
+        series = self.series
+        return (*reasons, *limit_reservations(self.friction, series.limits, self.weak_combinations, series.axis))
+
+    @property
+    def reservations_of_rows(self) -> tuple[str, ...]:
+        """The reasons, as sentences, that follow from the fitted rows of the loop and hold for every law."""
         reasons = []
         direction = self.series.direction[self.series.fitted_rows]
         up, down = int(np.count_nonzero(direction > 0)), int(np.count_nonzero(direction < 0))
         if MIN_BRANCH_RATIO * max(up, down) > min(up, down):
-            reasons.append(f"One branch has very few rows ({min(up, down)} against {max(up, down)}).")
+            reasons.append(
+                f"One branch has very few rows ({min(up, down)} against {max(up, down)}); measure the loop more slowly."
+            )
         if not np.isfinite(self.gap):
             reasons.append("The branches have no common part of the path in the fitted rows.")
-        if self.rmse < self.repeatability:
-            reasons.append("The error is below the repeatability, which indicates overfitting.")
+        transient = self.series.transient_rows
+        if transient > MAX_TRANSIENT_RATIO * direction.size:
+            reasons.append(
+                f"The pressure changes quickly in {transient} of {direction.size} fitted rows; there the pulses of "
+                "valves and the dynamics of the gas appear as friction."
+            )
         return tuple(reasons)
 
     @property
@@ -96,6 +118,7 @@ class HysteresisFit:
         text = " ".join([text, *self.reservations])
         if self.undetermined:
             text += f" Not determined: {', '.join(self.undetermined)}."
+        text = " ".join([text, *(str(each) for each in self.weak_combinations)])
         return f"{text} The data {'justify' if self.justified else 'do not justify'} this friction."
 
     @property
@@ -130,8 +153,11 @@ class HysteresisFit:
         return "\n".join([f"{type(self.friction).__name__} fitted to {self.series.origin}", *lines, self.verdict])
 
 
-def assess_fit(friction: Friction, free: int, run: LoopSeries, repeat: LoopSeries | None) -> HysteresisFit:
-    """The statistics of a fitted friction with `free` fitted parameters, compared with the static curve alone."""
+def assess_fit(
+    friction: Friction, weak: tuple[UndeterminedCombination, ...], run: LoopSeries, repeat: LoopSeries | None
+) -> HysteresisFit:
+    """The statistics of a fitted friction with its poorly determined combinations, compared with the static curve."""
+    free = sum(leaf.declared.fitted for leaf in leaves(friction))
     coefficients, static = run.coefficients(friction), run.coefficients(None)
     rows = run.fitted_rows
     residuals, plain = run.residuals(friction, coefficients)[rows], run.residuals(None, static)[rows]
@@ -159,6 +185,7 @@ def assess_fit(friction: Friction, free: int, run: LoopSeries, repeat: LoopSerie
         repeat_rmse_without_friction=plain_repeat_rmse,
         repeatability=repeatability,
         series=run,
+        weak_combinations=weak,
     )
 
 

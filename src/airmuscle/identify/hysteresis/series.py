@@ -3,41 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...friction import Friction
-
-
-@dataclasses.dataclass(frozen=True)
-class Axis:
-    """The axis on which a path [m] is plotted: its label, and the factor from metres to its unit.
-
-    `si_unit` is the SI unit of the driving quantity, of which `si_factor` correspond to a metre.
-    """
-
-    label: str
-    factor: float
-    si_unit: str = "m"
-    si_factor: float = 1.0
-
-    def display(self, value: float, unit: str) -> tuple[float, str]:
-        """The value and unit of a parameter of the friction with the driving quantity in place of the displacement."""
-        if self.si_unit == "m":
-            return value, "" if unit == "1" else unit
-        conversions = {
-            "m": (value * self.si_factor, self.si_unit),
-            "m/s": (value * self.si_factor, f"{self.si_unit}/s"),
-            "N/m": (value / self.si_factor, f"N/{self.si_unit}"),
-            "N s/m": (value / self.si_factor, f"N s/{self.si_unit}"),
-            "1": (value, ""),
-        }
-        return conversions.get(unit, (value, unit))
-
-
-MILLIMETRES = Axis("displacement [mm]", 1e3)
+from .axis import MILLIMETRES, Axis
+from .limits import DataLimits
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -57,7 +31,13 @@ class LoopSeries:
     """Mask of the rows whose residuals are minimised."""
     direction: Array
     """1 where the path rises, -1 where it falls."""
+    limits: DataLimits
+    """Greatest force and range of the speed of the fitted rows."""
+    pressure: Array | None = None
+    """Gauge pressure [Pa], shape (N,), of a friction that depends on the pressure; None if it is not recorded."""
     axis: Axis = MILLIMETRES
+    transient_rows: int = 0
+    """Number of fitted rows in which the pressure changes quickly."""
 
     def coefficients(self, friction: Friction | None) -> Array:
         """Least-squares coefficients of the static curve with this friction, or without friction; shape (C,)."""
@@ -72,14 +52,23 @@ class LoopSeries:
         force = self._friction_force(friction)
         return self._residuals(force, self._coefficients(force))[self.fitted_rows]
 
+    def friction_force(self, friction: Friction) -> Array:
+        """Friction force [N] at every row and its pressure, shape (N,)."""
+        force = np.asarray(friction.force_along(self.path, self.time))
+        return force if self.pressure is None else np.asarray(friction.pressure_factor(self.pressure) * force)
+
     def _friction_force(self, friction: Friction | None) -> Array | None:
-        """Friction force [N] at every row, shape (N,)."""
-        return None if friction is None else np.asarray(friction.force_along(self.path, self.time))
+        return None if friction is None else self.friction_force(friction)
 
     def _coefficients(self, friction_force: Array | None) -> Array:
         rows = self.fitted_rows
         target = self.target if friction_force is None else self.target + friction_force
-        return np.asarray(np.linalg.lstsq(self.design_matrix[rows], target[rows], rcond=None)[0])
+        return np.asarray(self._pseudoinverse @ target[rows])
+
+    @functools.cached_property
+    def _pseudoinverse(self) -> Array:
+        """Pseudoinverse of the design matrix at the fitted rows, shape (C, fitted rows)."""
+        return np.asarray(np.linalg.pinv(self.design_matrix[self.fitted_rows]))
 
     def _residuals(self, friction_force: Array | None, coefficients: Array) -> Array:
         difference = self.target - self.design_matrix @ coefficients

@@ -8,10 +8,11 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from ...core.errors import ColumnError
+from ...core.hints import Hint, HintedText
 from ..columns import quantity_of
 from ..recording import Recording
 from .quasi_static import quasi_static_rows
-from .runs import AT_REST, KINDS, Run
+from .runs import AT_REST, FREE, KINDS, Run, moved_column
 from .sampling import Sampling
 from .sensor import Sensor
 
@@ -41,6 +42,7 @@ def collect_findings(
         *_time_findings(recording, sampling),
         *_sensor_findings(recording, sensors),
         *_run_findings(recording, runs),
+        *_motion_findings(recording),
         *_duration_findings(recording, sampling, sensors),
     ]
     return tuple(sorted(findings, key=lambda finding: not finding.serious))
@@ -100,12 +102,26 @@ def _run_findings(recording: Recording, runs: tuple[Run, ...]) -> Iterator[Findi
         )
     elif isinstance(stated, str) and runs:
         kinds = {run.kind.name for run in runs}
-        if stated not in kinds and stated in {kind.name for kind in KINDS}:
+        open_kind = moved_column(recording) is None and kinds == {FREE.name}
+        if stated not in kinds and stated in {kind.name for kind in KINDS} and not open_kind:
             yield Finding(
                 f"the run is stated to be {stated}, but the data are {' and '.join(sorted(kinds))}"
                 f"{_pressure_range(recording)}. Correct the statement, or use another file.",
                 serious=True,
             )
+
+
+def _motion_findings(recording: Recording) -> Iterator[Finding]:
+    """A recording of pressure and force without a length: the kind of the run and the contraction remain open."""
+    if moved_column(recording) is None and "pressure" in recording and "force" in recording:
+        yield Finding(
+            HintedText(
+                "no length or contraction was recorded, so the kind of the run is open and no characteristic can be "
+                "identified.",
+                Hint("To state the held length of an isometric run", "constants", {"length": "73.2 mm"}, "read"),
+                Hint("To state its place in the names of the files", "file_name", "held{length [mm]}", "read"),
+            )
+        )
 
 
 def _pressure_range(recording: Recording) -> str:

@@ -2,9 +2,10 @@
 
 A run with constant pressure is isobaric, with constant length or contraction isometric, with constant force isotonic. A
 quantity is constant if it stays within `RELATIVE_BAND` of its maximum (within `CONTRACTION_BAND` for a contraction), or
-within the noise of its sensor. A file may contain many consecutive runs, as tables of static points do: these are runs
-at the levels of the quantity that explains the most rows. A pressure that oscillates within `RIPPLE_BAND` while the
-muscle is moved is the ripple of its regulator, and counts as constant.
+within the noise of its sensor. A run is isotonic only if its motion was measured. A file may contain
+many consecutive runs, as tables of static points do: these are runs at the levels of the quantity that explains the
+most rows. A pressure that oscillates within `RIPPLE_BAND` while the muscle is moved is the ripple of its regulator, and
+counts as constant.
 """
 
 from __future__ import annotations
@@ -71,8 +72,14 @@ def find_runs(recording: Recording, sensors: Mapping[str, Sensor] | None = None)
     whole = _classify(recording, Interval(0, len(recording)), bands)
     if whole.kind is not FREE:
         return (whole,)
-    candidates = [runs for kind in KINDS if (runs := _runs_at_levels(recording, kind, bands))]
+    candidates = [runs for kind in _kinds_of(recording) if (runs := _runs_at_levels(recording, kind, bands))]
     return max(candidates, key=lambda runs: sum(len(run.interval) for run in runs), default=(whole,))
+
+
+def _kinds_of(recording: Recording) -> tuple[RunKind, ...]:
+    """The kinds that the columns can tell: without a measured motion, a constant force is that of a slack muscle at a
+    held length as well as an isotonic one."""
+    return KINDS if moved_column(recording) is not None else tuple(kind for kind in KINDS if kind is not ISOTONIC)
 
 
 def _column(recording: Recording, kind: RunKind) -> str | None:
@@ -99,6 +106,7 @@ def _min_band(recording: Recording, name: str) -> float:
 def _classify(recording: Recording, interval: Interval, bands: dict[str, float]) -> Run:
     """The run in an interval. Of several constant quantities, pressure takes precedence, then length, then force."""
     names = {kind: name for kind in KINDS if (name := _column(recording, kind))}
+    possible = _kinds_of(recording)
     constant = [
         kind
         for kind, name in names.items()
@@ -106,7 +114,8 @@ def _classify(recording: Recording, interval: Interval, bands: dict[str, float])
         or (kind is ISOBARIC and _has_ripple(recording, interval, bands))
     ]
     swept = tuple(name for kind, name in names.items() if kind not in constant)
-    if not constant or (len(names) == 1 and swept):
+    isotonic_only = constant == [ISOTONIC] and ISOTONIC not in possible
+    if not constant or (len(names) == 1 and swept) or (isotonic_only and swept):
         return Run(interval, FREE, None, None, swept)
     if not swept:
         return Run(interval, AT_REST, None, None, ())

@@ -1,0 +1,199 @@
+"""Compared points: the rows of all recordings with their cross-validation folds, shared by all candidate laws."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..characteristic.base import Characteristic
+from ..core import tree
+from ..core.arrays import Array
+from ..core.errors import AirmuscleError, IdentificationError
+from ..core.hints import HintedText
+from ..recording import Recording
+from .candidates import Candidate
+from .cross_validation import Labels
+from .fit_points import FitPoints
+from .force_evaluation import evaluate_force, slack_rows
+from .group_refits import GroupRefits
+from .loss import LeastSquares, Loss
+from .problem import FitProblem
+from .result import Fit
+from .solver import LeastSquaresSolution, design_matrix, is_linear
+from .static_fit import refit
+
+FORCE_MARGIN = 3.0
+"""Limit of the force of laws that give contraction or pressure, in maxima of the measured force (chosen)."""
+
+
+class EvaluatedRows(NamedTuple):
+    """The rows of a recording with a positive force [SI], and its resting length [m] if it is known."""
+
+    pressure: Array
+    contraction: Array
+    force: Array
+    resting_length: float | None
+
+
+def evaluated_rows(run: Recording, rows: npt.NDArray[np.bool_] | None = None) -> EvaluatedRows:
+    """The rows of a recording, or those of a mask, in which the errors of laws in force are evaluated."""
+    pressure, contraction, force = (run[name] for name in ("pressure", "contraction", "force"))
+    mask = (force > 0) & np.isfinite(pressure + contraction + force)
+    if rows is not None:
+        mask &= rows
+    length = run.constants.get("resting_length")
+    return EvaluatedRows(pressure[mask], contraction[mask], force[mask], None if length is None else float(length))
+
+
+def law_of_length(model: Characteristic, length: float | None) -> Any:
+    """The law of a muscle with this resting length [m], if the model depends on it."""
+    law: Any = model
+    return law.with_resting_length(length) if length is not None and hasattr(law, "with_resting_length") else law
+
+
+def force_residuals(model: Characteristic, runs: Sequence[Recording], max_force: float) -> Array:
+    """Residuals (model - measured) in force [N] at the rows with a positive force, with the law of each run's length.
+
+    `max_force` [N] limits the force of laws that give contraction or pressure.
+    """
+    return residuals_of_rows(model, [evaluated_rows(run) for run in runs], max_force)
+
+
+def residuals_of_rows(model: Characteristic, parts: Sequence[EvaluatedRows], max_force: float) -> Array:
+    """Residuals (model - measured) in force [N] at these rows; one evaluation of the law for each resting length."""
+    residuals: list[Array] = [np.zeros(0)] * len(parts)
+    for length in dict.fromkeys(part.resting_length for part in parts):
+        same = [i for i, part in enumerate(parts) if part.resting_length == length]
+        pressure, contraction = (np.concatenate([parts[i][column] for i in same]) for column in (0, 1))
+        forces = evaluate_force(law_of_length(model, length), pressure, contraction, max_force)
+        ends = np.cumsum([parts[i].force.size for i in same])[:-1]
+        for i, modelled in zip(same, np.split(forces, ends), strict=True):
+            residuals[i] = modelled - parts[i].force
+    return np.concatenate(residuals)
+
+
+def cause_of(error: AirmuscleError) -> str:
+    """The cause of an error in one phrase."""
+    return getattr(error, "cause", "") or "the fit fails"
+
+
+class LeftOutGroup(NamedTuple):
+    """A group of rows that is left out: its name, and the mask of its rows in each recording."""
+
+    name: str
+    masks: list[npt.NDArray[np.bool_]]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ComparedPoints:
+    """All recordings and the folds. Sensors, runs and branches are estimated once for all candidates."""
+
+    recordings: Sequence[Recording]
+    labels: Sequence[Labels]
+    folds: tuple[LeftOutGroup, ...]
+
+    @classmethod
+    def from_recordings(
+        cls, runs: Sequence[Recording], labels: Sequence[Labels], names: Sequence[str]
+    ) -> ComparedPoints:
+        """The points divided into the folds of these names."""
+        return cls(runs, labels, tuple(LeftOutGroup(name, [label == name for label in labels]) for name in names))
+
+    @functools.cached_property
+    def points(self) -> FitPoints:
+        """The rows of all recordings."""
+        return FitPoints.from_recordings(self.recordings)
+
+    @functools.cached_property
+    def max_force(self) -> float:
+        """Limit of the force [N] of laws that give contraction or pressure."""
+        return FORCE_MARGIN * max(float(np.nanmax(run["force"])) for run in self.recordings)
+
+    @functools.cached_property
+    def rows(self) -> list[EvaluatedRows]:
+        """The evaluated rows of each recording."""
+        return [evaluated_rows(run) for run in self.recordings]
+
+    @functools.cached_property
+    def _left_out_rows(self) -> list[list[EvaluatedRows]]:
+        return [
+            [evaluated_rows(run, mask) for run, mask in zip(self.recordings, fold.masks, strict=True) if mask.any()]
+            for fold in self.folds
+        ]
+
+    @functools.cached_property
+    def _group(self) -> npt.NDArray[np.intp]:
+        """The index of the fold of each complete row; one more than the last for rows that are never left out."""
+        group = np.full(len(self.points.joined), len(self.folds))
+        for i, fold in enumerate(self.folds):
+            group[np.concatenate(fold.masks)] = i
+        return group[~self.points.missing]
+
+    def slack_count(self, model: Characteristic) -> tuple[int, int]:
+        """The number of rows with a positive force at which a law is slack, and the number of all of them.
+
+        Raises IdentificationError where the law gives no force although it is not slack.
+        """
+        masks = [slack_rows(law_of_length(model, r.resting_length), r.pressure, r.contraction) for r in self.rows]
+        return sum(int(np.count_nonzero(mask)) for mask in masks), sum(mask.size for mask in masks)
+
+    def left_out_residuals(self, candidate: Candidate, fit: Fit, loss: Loss) -> Iterator[tuple[str, Array]]:
+        """The name of each fold and the residuals in force [N] on its rows of the law fitted to all other rows.
+
+        Raises IdentificationError where the other rows do not determine the parameters.
+        """
+        models = _FoldModels(fit, self._group, len(self.folds)) if isinstance(loss, LeastSquares) else None
+        for i, (fold, rows) in enumerate(zip(self.folds, self._left_out_rows, strict=True)):
+            model = None if models is None else models.without(i)
+            if model is None:
+                model = self._refit_exactly(candidate, fit, fold, loss)
+            yield fold.name, residuals_of_rows(model, rows, self.max_force)
+
+    def _refit_exactly(self, candidate: Candidate, fit: Fit, fold: LeftOutGroup, loss: Loss) -> Characteristic:
+        """The refit by a search of its own."""
+        training = [
+            run if not mask.any() else run.rows(~mask) for run, mask in zip(self.recordings, fold.masks, strict=True)
+        ]
+        try:
+            points = FitPoints.from_recordings([run for run in training if len(run)])
+            return refit(fit.model, points, loss=loss, fixed=candidate.fixed)
+        except AirmuscleError as error:
+            cause = f"without {fold.name}, {cause_of(error)}"
+            message = HintedText(f"Not determined without {fold.name}: ", error.message)
+            raise IdentificationError(message, cause=cause) from None
+
+
+class _FoldModels:
+    """The laws fitted to all groups but one, from the fit to all rows."""
+
+    def __init__(self, fit: Fit, group: npt.NDArray[np.intp], count: int) -> None:
+        self._problem, self._group, self._count = fit.problem, group, count
+        self._refits = GroupRefits(fit.problem, _solution(fit), group, count + 1)
+
+    def without(self, index: int) -> Characteristic | None:
+        """The law without one group; None where the refit is not certain."""
+        counts = np.ones(self._count + 1)
+        counts[index] = 0.0
+        values = self._refits.refit(counts)
+        if values is None:
+            return None
+        problem, rows = self._problem, self._group != index
+        law: Any = tree.with_parameters(problem.law, problem.leaf_values(values))
+        if hasattr(law, "rescaled"):
+            law = law.rescaled(*((float(x[rows].min()), float(x[rows].max())) for x in problem.arguments))
+        model: Characteristic = law
+        return model
+
+
+def _solution(fit: Fit) -> LeastSquaresSolution:
+    """The solution of a fit, with its Jacobian."""
+    problem: FitProblem = fit.problem
+    if not is_linear(problem):
+        return LeastSquaresSolution(fit.values, problem.predict(fit.values), problem.jacobian(fit.values))
+    matrix, constant = design_matrix(problem)
+    return LeastSquaresSolution(fit.values, matrix @ fit.values + constant, matrix)

@@ -1,0 +1,126 @@
+"""Refits of a law to groups of its data with other multiplicities: cross-validation folds and bootstrap samples.
+
+The Jacobian at the fit to all rows is evaluated once; the normal matrices of the groups in its orthonormal basis give
+the refits of a law that is linear in its parameters, and the first Gauss-Newton step of any other law.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..core.arrays import Array
+from .censored_least_squares import RANK_TOLERANCE
+from .gauss_newton import (
+    MIN_EIGENVALUE,
+    FirstStep,
+    StepBasis,
+    gauss_newton,
+    held_on_bounds,
+    normal_equations,
+    normal_step,
+    orthonormal_basis,
+)
+from .problem import FitProblem
+from .solver import LeastSquaresSolution, is_linear
+
+RowIndices = npt.NDArray[np.intp]
+RELATIVE_STEP = 1e-6
+"""Step, in standard deviations of the residuals, at which a refit ends (chosen)."""
+_RANK_MARGIN = 10.0
+"""Factor between the rank tolerance and the bound of a singular value below which the exact rank is computed."""
+_MAX_ITERATIONS = 30
+"""Maximum changes of the set of violated bounds in a linear refit; it took fewer than 10 in all tests."""
+
+
+class _Sums(NamedTuple):
+    """By group, in the basis: normal matrices, those of the uncensored rows, gradients, and the sums of squares."""
+
+    normal: Array
+    uncensored: Array
+    gradient: Array
+    squares: Array
+
+
+class GroupRefits:
+    """Least-squares refits of a law, started at its fit to all rows; `group` (N,) is the group of each row,
+    from 0 to `count` - 1."""
+
+    def __init__(self, problem: FitProblem, solution: LeastSquaresSolution, group: RowIndices, count: int) -> None:
+        self._problem, self._solution, self._group = problem, solution, group
+        self._linear = is_linear(problem)
+        self._active = problem.active_rows(solution.modelled)
+        weighted = problem.weights[:, None] * solution.jacobian
+        residuals = problem.residuals(solution.modelled)
+        free = ~held_on_bounds(problem, solution.values, weighted.T @ residuals)
+        basis = orthonormal_basis(weighted[self._active], free)
+        self._basis = basis
+        if basis is not None:
+            self._rows = weighted @ basis.directions
+            self._sums = self._sum_groups(residuals, count)
+            self._smallest = 1.0 / float(np.linalg.norm(basis.directions * _norms(weighted[self._active])[:, None], 2))
+
+    def refit(self, counts: Array) -> Array | None:
+        """The parameters (P,) for these multiplicities of the groups (G,); None where the refit is not certain."""
+        if self._basis is None or not self._is_determined(counts):
+            return None
+        normal, gradient = (np.tensordot(counts, part, 1) for part in (self._sums.normal, self._sums.gradient))
+        step = normal_step(normal, gradient)
+        if step is None:
+            return None
+        return self._solve_linear(counts, step, self._basis) if self._linear else self._iterate(counts, step)
+
+    def _sum_groups(self, residuals: Array, count: int) -> _Sums:
+        masked = self._rows * self._active[:, None]
+        uncensored = self._problem.censoring == 0
+        size = masked.shape[1]
+        sums = _Sums(*(np.zeros(shape) for shape in ((count, size, size),) * 2 + ((count, size), (count,))))
+        for i in range(count):
+            rows = self._group == i
+            sums.normal[i], sums.gradient[i] = normal_equations(masked[rows], residuals[rows])
+            sums.squares[i] = float(residuals[rows] @ residuals[rows])
+            measured = self._rows[rows & uncensored]
+            sums.uncensored[i] = measured.T @ measured
+        return sums
+
+    def _is_determined(self, counts: Array) -> bool:
+        """Whether the uncensored rows determine all parameters, by a lower bound of the scaled singular values."""
+        lowest = float(np.linalg.eigvalsh(np.tensordot(counts, self._sums.uncensored, 1))[0])
+        return lowest > MIN_EIGENVALUE and np.sqrt(lowest) * self._smallest > _RANK_MARGIN * RANK_TOLERANCE
+
+    def _solve_linear(self, counts: Array, step: Array, basis: StepBasis) -> Array | None:
+        """Newton steps of the one-sided squares: the rows whose bound is violated are those of the previous step."""
+        problem, solution = self._problem, self._solution
+        if not problem.censoring.any():
+            return np.asarray(solution.values + basis.directions @ step)
+        repeats, previous = counts[self._group], self._active
+        difference = problem.weights * (solution.modelled - problem.target)
+        for _ in range(_MAX_ITERATIONS):
+            modelled = solution.modelled + (self._rows @ step) / problem.weights
+            active = problem.active_rows(modelled)
+            if np.array_equal(active[repeats > 0], previous[repeats > 0]):
+                return np.asarray(solution.values + basis.directions @ step)
+            weight = np.sqrt(repeats * active)
+            next_step = normal_step(*normal_equations(self._rows * weight[:, None], difference * weight))
+            if next_step is None:
+                return None
+            step, previous = next_step, active
+        return None
+
+    def _iterate(self, counts: Array, step: Array) -> Array | None:
+        """Gauss-Newton steps on the drawn rows."""
+        assert self._basis is not None
+        repeats = counts[self._group]
+        drawn = repeats > 0
+        problem = self._problem.rows(drawn)
+        problem = dataclasses.replace(problem, weights=problem.weights * np.sqrt(repeats[drawn]))
+        start = FirstStep(self._basis, step, float(counts @ self._sums.squares))
+        found = gauss_newton(problem, self._solution.values, start, RELATIVE_STEP)
+        return None if found is None else found[0]
+
+
+def _norms(matrix: Array) -> Array:
+    return np.asarray(np.linalg.norm(matrix, axis=0))

@@ -1,0 +1,281 @@
+"""Equation of a law: its traced expression in named symbols, with shared parts defined once."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+
+from ...characteristic.base import Characteristic
+from ...core.tree import Leaf, leaves
+from .expression import ADD, COMPARISONS, NEGATIVE, PRODUCT, QUOTIENT, WHERE, Expressions, Node, in_order
+from .intervals import Bounds, within
+from .polynomial import assemble, coefficients_by_monomial, depends_on, expand, summands
+from .tracing import traced_expression
+
+MAX_OPERATIONS = 600
+"""Maximum number of operations of an equation that is shown (chosen)."""
+MIN_SHARED_OPERATIONS = 3
+"""Minimum number of operations of a part that occurs twice and gets a symbol of its own; one less for a part that
+occurs more often (chosen)."""
+MAX_INNER_TERMS = 6
+"""Maximum number of terms of a sum inside a function or product; a longer one gets a symbol of its own (chosen)."""
+BAR = 1e5
+"""Pressure unit of the physical form [Pa]."""
+MAX_PARAMETERS = 120
+"""Maximum number of parameters of an equation that is shown (chosen)."""
+
+
+_INDEX = re.compile(r"\[\d+\]$")
+
+
+@dataclasses.dataclass(frozen=True)
+class Symbol:
+    """A symbol of an equation; the value [SI] is None for an argument, for the result and for a shared part."""
+
+    name: str
+    unit: str
+    meaning: str
+    value: float | None = None
+
+
+ARGUMENTS = {
+    "pressure": Symbol("p", "Pa", "gauge pressure"),
+    "contraction": Symbol("eps", "1", "contraction"),
+    "force": Symbol("F", "N", "force"),
+}
+"""Arguments and results of laws."""
+PRESSURE_IN_BAR = Symbol("P", "bar", "gauge pressure")
+_PART_NAMES = {("p",): "qhn", ("eps",): "xyz", ("F",): "ywv", (): "cgsm"}
+"""Symbols of shared parts by the arguments that they depend on: the first that no parameter has."""
+_MIXED_PART_NAMES, _SUM_NAMES = "zwv", "uvs"
+"""Symbols of other shared parts, and of long sums."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LawEquation:
+    """A law as an equation within a validity range; symbols stand under their names in the expressions."""
+
+    title: str
+    result: Symbol
+    arguments: tuple[Symbol, ...]
+    parameters: tuple[Symbol, ...]
+    """With their values, in the order of their first occurrence in the law."""
+    parts: tuple[tuple[Symbol, Node], ...]
+    """Parts that occur repeatedly, each defined by the ones before it."""
+    value: Node
+    part_nodes: Mapping[Node, str]
+    """Names of the parts."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Traced:
+    """A law within a validity range: its arguments, its parameters with their leaves, and the expression."""
+
+    new: Expressions
+    arguments: tuple[Node, ...]
+    parameters: Mapping[Node, Leaf]
+    value: Node
+
+
+def law_equation(
+    law: Characteristic, quantity: str, arguments: Sequence[str], ranges: Mapping[str, Bounds]
+) -> tuple[LawEquation, ...]:
+    """The equations of a law for one quantity in terms of two others, for arguments within their ranges [SI].
+
+    The first has the parameters as symbols. If the law is a polynomial of scaled arguments, the second is the same
+    polynomial in the physical quantities, the pressure in bar. No equation if the law has no closed form, or one of
+    more than `MAX_OPERATIONS` operations. Limits and extrapolations that are not reached within the ranges are left
+    out.
+    """
+    traced = _trace(law, quantity, arguments, ranges)
+    if traced is None:
+        return ()
+    names = [ARGUMENTS[name] for name in arguments]
+    value, coefficients = _with_monomials(traced)
+    if _operations(value) > MAX_OPERATIONS:
+        return ()
+    labels = _labels(traced, coefficients)
+    if len(depends_on(value, list(labels))) > MAX_PARAMETERS:
+        return ()
+    scaled = _named(value, traced, labels, ARGUMENTS[quantity], names)
+    physical = _physical(traced, ARGUMENTS[quantity], names) if coefficients and scaled.parts else None
+    return (scaled,) if physical is None else (scaled, physical)
+
+
+def _trace(
+    law: Characteristic, quantity: str, arguments: Sequence[str], ranges: Mapping[str, Bounds]
+) -> _Traced | None:
+    new = Expressions()
+    points = tuple(new.symbol(ARGUMENTS[name].name) for name in arguments)
+    own = {new.symbol(f"parameter {leaf.path}"): leaf for leaf in leaves(law)}
+    value = traced_expression(law, quantity, new, points, list(own))
+    if value is None:
+        return None
+    known = {node: ranges[name] for node, name in zip(points, arguments, strict=True)}
+    values = {node: (float(leaf.value), float(leaf.value)) for node, leaf in own.items()}
+    return _Traced(new, points, own, _complete(within(value, new, known | values), new))
+
+
+def _complete(root: Node, new: Expressions) -> Node:
+    """The expression with every branch that has only one side made a choice between it and zero."""
+    nodes: dict[Node, Node] = {}
+    for old in in_order(root):
+        arguments = [nodes[each] for each in old.arguments]
+        if old.kind == "if":
+            nodes[old] = new.apply(WHERE, *arguments, new.number(0.0))
+        else:
+            nodes[old] = new.apply(old.kind, *arguments) if arguments else old
+    return nodes[root]
+
+
+def _with_monomials(traced: _Traced) -> tuple[Node, dict[Node, tuple[int, ...]]]:
+    """The expression with every polynomial written as a sum of monomials, and the powers by coefficient."""
+    powers: dict[Node, tuple[int, ...]] = {}
+    shared = _shared(traced.value)
+    parts = [n for n in in_order(traced.value) if n in shared and len(depends_on(n, traced.arguments)) == 1]
+    parts.sort(key=lambda n: traced.arguments.index(depends_on(n, traced.arguments)[0]), reverse=True)
+    atoms = [*parts, *reversed(traced.arguments)]
+
+    def rewritten(node: Node) -> Node:
+        if node in atoms or not node.arguments:
+            return node
+        if node.kind in (ADD, NEGATIVE, PRODUCT, QUOTIENT):
+            polynomial = expand(node, {*atoms, *traced.parameters})
+            terms = None if polynomial is None else coefficients_by_monomial(polynomial, traced.parameters)
+            if terms is not None:
+                used = [atom for atom in atoms if any(atom in dict(monomial) for monomial in terms)]
+                powers.update({c: tuple(dict(m).get(atom, 0) for atom in used) for m, c in terms.items()})
+                return assemble(terms, used, traced.new)
+        return traced.new.apply(node.kind, *(rewritten(each) for each in node.arguments))
+
+    return (rewritten(traced.value) if _operations(traced.value) <= MAX_OPERATIONS else traced.value), powers
+
+
+def _operations(root: Node) -> int:
+    return sum(1 for node in in_order(root) if node.arguments)
+
+
+def _shared(root: Node) -> set[Node]:
+    """The parts of an expression that occur repeatedly and are not short."""
+    uses = Counter(each for node in in_order(root) for each in node.arguments)
+    shared: set[Node] = set()
+    cost: dict[Node, int] = {}
+    for node in in_order(root):
+        own = bool(node.arguments) and node.kind != NEGATIVE
+        cost[node] = own + sum(0 if each in shared else cost[each] for each in set(node.arguments))
+        enough = MIN_SHARED_OPERATIONS if uses[node] == 2 else MIN_SHARED_OPERATIONS - 1
+        if uses[node] > 1 and cost[node] >= enough and node.kind not in COMPARISONS:
+            shared.add(node)
+    return shared
+
+
+def _long_sums(root: Node) -> set[Node]:
+    """The sums inside an expression that have too many terms to stand inside a function or product."""
+    inner = {each for node in in_order(root) if node.kind != ADD for each in node.arguments if each.kind == ADD}
+    terms = {each for node in in_order(root) if node.kind == ADD for each in node.arguments[1:] if each.kind == ADD}
+    return {node for node in inner | terms if len(summands(node)) > MAX_INNER_TERMS}
+
+
+def _labels(traced: _Traced, powers: Mapping[Node, tuple[int, ...]]) -> dict[Node, str]:
+    """A name for each parameter: its symbol with the powers or the number of a coefficient, unique in the law."""
+    lists: dict[str, list[Node]] = {}
+    for node, leaf in traced.parameters.items():
+        lists.setdefault(_INDEX.sub("", leaf.path), []).append(node)
+    names = {node: name for nodes in lists.values() for node, name in _list_labels(nodes, traced, powers).items()}
+    counts = Counter(names.values())
+    taken = {symbol.name for symbol in ARGUMENTS.values()} | {PRESSURE_IN_BAR.name}
+    for node, leaf in traced.parameters.items():
+        if counts[names[node]] > 1 or names[node] in taken:
+            owner = re.sub(r"\W+", "_", _INDEX.sub("", leaf.path).rpartition(".")[0]) or "law"
+            names[node] = f"{names[node]}_{owner}"
+    return names
+
+
+def _list_labels(nodes: Sequence[Node], traced: _Traced, powers: Mapping[Node, tuple[int, ...]]) -> dict[Node, str]:
+    """The names of the coefficients of one list, by their powers if these differ, or of one parameter."""
+    leaf = traced.parameters[nodes[0]]
+    base = re.sub(r"\W+", "_", leaf.declared.symbol).strip("_") or "c"
+    if not _INDEX.search(leaf.path):
+        return {nodes[0]: base}
+    base = re.sub(r"_(ij|i|j|k)$", "", base)
+    indices = ["".join(map(str, powers.get(node, ()))) for node in nodes]
+    if "" in indices or len(set(indices)) < len(indices):
+        indices = [str(i) for i in range(len(nodes))]
+    return {node: f"{base}_{index}" for node, index in zip(nodes, indices, strict=True)}
+
+
+def _named(
+    value: Node, traced: _Traced, labels: Mapping[Node, str], result: Symbol, arguments: Sequence[Symbol]
+) -> LawEquation:
+    """The equation with its parameters and shared parts under their names."""
+    new = traced.new
+    renamed: dict[Node, Node] = {}
+    for node in in_order(value):
+        inner = [renamed[each] for each in node.arguments]
+        renamed[node] = new.apply(node.kind, *inner) if inner else new.symbol(labels[node]) if node in labels else node
+    root = renamed[value]
+    shared = _shared(root) | _long_sums(root)
+    present = set(in_order(root))
+    parameters = tuple(
+        Symbol(labels[node], leaf.declared.unit, leaf.declared.meaning, float(leaf.value))
+        for node, leaf in sorted(traced.parameters.items(), key=lambda item: not item[1].declared.fitted)
+        if new.symbol(labels[node]) in present
+    )
+    names = _part_names([n for n in in_order(root) if n in shared], traced.arguments, {p.name for p in parameters})
+    parts = tuple((Symbol(name, "", ""), node) for node, name in names.items())
+    return LawEquation("Parameters as symbols, SI units", result, tuple(arguments), parameters, parts, root, names)
+
+
+def _part_names(parts: Sequence[Node], arguments: Sequence[Node], taken: Collection[str]) -> dict[Node, str]:
+    names: dict[Node, str] = {}
+    used = {name.partition("_")[0] for name in taken}
+    for node in parts:
+        own = tuple(symbol.name for symbol in depends_on(node, arguments))
+        letters = _SUM_NAMES if len(summands(node)) > MAX_INNER_TERMS else _PART_NAMES.get(own, _MIXED_PART_NAMES)
+        base = next((letter for letter in letters if letter not in used), letters[0])
+        name, number = base, 1
+        while name in taken or name in names.values():
+            number += 1
+            name = f"{base}_{number}"
+        names[node] = name
+    return names
+
+
+def _physical(traced: _Traced, result: Symbol, arguments: Sequence[Symbol]) -> LawEquation | None:
+    """The polynomials with numbers, in the physical arguments, pressures in bar; None if there is none."""
+    new, numbers = traced.new, dict[Node, Node]()
+    bar = new.symbol(PRESSURE_IN_BAR.name)
+    for node in in_order(traced.value):
+        if node in traced.parameters:
+            numbers[node] = new.number(float(traced.parameters[node].value))
+        elif node in traced.arguments and node.name == ARGUMENTS["pressure"].name:
+            numbers[node] = new.product(new.number(BAR), bar)
+        else:
+            numbers[node] = _copied(node, numbers, new)
+    points = [bar if node.name == "p" else node for node in traced.arguments][::-1]
+    count = 0
+
+    def rewritten(node: Node) -> Node:
+        nonlocal count
+        polynomial = expand(node, points) if node.arguments else None
+        if polynomial is not None:
+            count += 1
+            return assemble({m: new.number(float(c)) for m, c in polynomial.items()}, points, new)
+        return new.apply(node.kind, *(rewritten(each) for each in node.arguments)) if node.arguments else node
+
+    value = rewritten(numbers[traced.value])
+    if not count:
+        return None
+    symbols = tuple(PRESSURE_IN_BAR if each.unit == "Pa" else each for each in arguments)
+    names = _part_names([n for n in in_order(value) if n in _long_sums(value)], points, ())
+    parts = tuple((Symbol(name, "", ""), node) for node, name in names.items())
+    return LawEquation("Physical form: numbers, with the pressure in bar", result, symbols, (), parts, value, names)
+
+
+def _copied(node: Node, numbers: Mapping[Node, Node], new: Expressions) -> Node:
+    """The node on replaced arguments, without rounding: products and quotients of numbers are not evaluated."""
+    if not node.arguments:
+        return node
+    return new.unevaluated(node.kind, *(numbers[each] for each in node.arguments))

@@ -1,0 +1,183 @@
+"""Expressions: nodes of a formula, shared where they are equal, with the elementary simplifications."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+NUMBER, SYMBOL, ADD, NEGATIVE, PRODUCT, QUOTIENT, POWER = "number", "symbol", "add", "neg", "mul", "div", "pow"
+MAXIMUM, MINIMUM, WHERE = "max", "min", "where"
+COMPARISONS = ("lt", "le", "eq", "ne")
+LOGICAL = ("not", "and", "or")
+FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "abs")
+
+
+class Node:
+    """One operation of an expression, a number or a symbol. Nodes of one `Expressions` are equal if identical."""
+
+    __slots__ = ("arguments", "kind", "value")
+
+    def __init__(self, kind: str, arguments: tuple[Node, ...], value: float | str | None) -> None:
+        self.kind, self.arguments, self.value = kind, arguments, value
+
+    @property
+    def number(self) -> float:
+        """The value of a number."""
+        assert isinstance(self.value, float)
+        return self.value
+
+    @property
+    def name(self) -> str:
+        """The name of a symbol."""
+        assert isinstance(self.value, str)
+        return self.value
+
+
+def is_number(node: Node, value: float | None = None) -> bool:
+    """Whether a node is a number, and the given one if a value is given."""
+    return node.kind == NUMBER and (value is None or node.value == value)
+
+
+def in_order(root: Node) -> Iterator[Node]:
+    """Each node of an expression once, arguments first."""
+    seen: set[Node] = set()
+    stack = [(root, False)]
+    while stack:
+        node, expanded = stack.pop()
+        if expanded:
+            yield node
+        elif node not in seen:
+            seen.add(node)
+            stack.append((node, True))
+            stack += [(each, False) for each in reversed(node.arguments) if each not in seen]
+
+
+class Expressions:
+    """Builder of nodes; equal operations on equal arguments give one node."""
+
+    def __init__(self) -> None:
+        self._nodes: dict[tuple[object, ...], Node] = {}
+
+    def _node(self, kind: str, *arguments: Node, value: float | str | None = None) -> Node:
+        key = (kind, value, *arguments)
+        return self._nodes.setdefault(key, Node(kind, arguments, value))
+
+    def number(self, value: float) -> Node:
+        """A number; minus zero is zero."""
+        return self._node(NUMBER, value=float(value) + 0.0)
+
+    def symbol(self, name: str) -> Node:
+        """A symbol."""
+        return self._node(SYMBOL, value=name)
+
+    def add(self, a: Node, b: Node) -> Node:
+        """The sum a + b; the selection of one of two summands is one node."""
+        if is_number(a) and is_number(b):
+            return self.number(a.number + b.number)
+        if is_number(a, 0.0) or is_number(b, 0.0):
+            return b if is_number(a, 0.0) else a
+        if self.negative(a) is b:
+            return self.number(0.0)
+        if a.kind == b.kind == "if" and b.arguments[0] is self.negation(a.arguments[0]):
+            return self.where(a.arguments[0], a.arguments[1], b.arguments[1])
+        return self._node(ADD, a, b)
+
+    def negative(self, a: Node) -> Node:
+        """The negative -a."""
+        if is_number(a):
+            return self.number(-a.number)
+        return a.arguments[0] if a.kind == NEGATIVE else self._node(NEGATIVE, a)
+
+    def product(self, a: Node, b: Node) -> Node:
+        """The product a b; powers of one base are collected, and a sign is moved outside."""
+        if is_number(a) and is_number(b):
+            return self.number(a.number * b.number)
+        for one, other in ((a, b), (b, a)):
+            if is_number(one, 0.0) or is_number(one, 1.0):
+                return other if is_number(one, 1.0) else one
+            if one.kind == NEGATIVE or (is_number(one) and one.number < 0):
+                return self.negative(self.product(self.negative(one), other))
+        (base, m), (other_base, n) = _as_power(a), _as_power(b)
+        if base is other_base:
+            return self.power(base, self.number(m + n))
+        return self._node(PRODUCT, a, b)
+
+    def quotient(self, a: Node, b: Node) -> Node:
+        """The quotient a/b."""
+        if is_number(a) and is_number(b) and b.number != 0.0:
+            return self.number(a.number / b.number)
+        if is_number(b, 1.0) or is_number(a, 0.0):
+            return a
+        if a.kind == NEGATIVE:
+            return self.negative(self.quotient(a.arguments[0], b))
+        return self._node(QUOTIENT, a, b)
+
+    def power(self, a: Node, exponent: Node) -> Node:
+        """The power a^exponent."""
+        if is_number(exponent, 0.0):
+            return self.number(1.0)
+        if is_number(exponent, 1.0):
+            return a
+        if is_number(a) and is_number(exponent) and (a.number > 0 or exponent.number == int(exponent.number) > 0):
+            return self.number(a.number**exponent.number)
+        return self._node(POWER, a, exponent)
+
+    def negation(self, condition: Node) -> Node:
+        """The logical negation of a condition."""
+        if is_number(condition):
+            return self.number(float(condition.number == 0.0))
+        return condition.arguments[0] if condition.kind == "not" else self._node("not", condition)
+
+    def where(self, condition: Node, a: Node, b: Node) -> Node:
+        """a where the condition holds, else b; a maximum, minimum or absolute value if it is one."""
+        if a is b:
+            return a
+        if is_number(condition):
+            return a if condition.number != 0.0 else b
+        if condition.kind == "not":
+            return self.where(condition.arguments[0], b, a)
+        if condition.kind in ("lt", "le"):
+            low, high = condition.arguments
+            if (low, high) == (b, a):
+                return self._node(MAXIMUM, a, b)
+            if (low, high) == (a, b):
+                return self._node(MINIMUM, a, b)
+            if is_number(low, 0.0) and high is a and b is self.negative(a):
+                return self._node("abs", a)
+        return self._node(WHERE, condition, a, b)
+
+    def apply(self, kind: str, *arguments: Node) -> Node:
+        """Any operation by its kind, simplified."""
+        match kind:
+            case "add":
+                return self.add(*arguments)
+            case "neg":
+                return self.negative(*arguments)
+            case "mul":
+                return self.product(*arguments)
+            case "div":
+                return self.quotient(*arguments)
+            case "pow":
+                return self.power(*arguments)
+            case "not":
+                return self.negation(*arguments)
+            case "where":
+                return self.where(*arguments)
+            case "if" if is_number(arguments[0]):
+                return arguments[1] if arguments[0].number != 0.0 else self.number(0.0)
+        if kind in COMPARISONS and all(is_number(each) for each in arguments):
+            return self.number(float(_COMPARE[kind](arguments[0].number, arguments[1].number)))
+        return self._node(kind, *arguments)
+
+    def unevaluated(self, kind: str, *arguments: Node) -> Node:
+        """An operation as it is, with numbers that are not evaluated: a polynomial is then expanded exactly."""
+        return self._node(kind, *arguments)
+
+
+_COMPARE = {"lt": float.__lt__, "le": float.__le__, "eq": float.__eq__, "ne": float.__ne__}
+
+
+def _as_power(node: Node) -> tuple[Node, float]:
+    if node.kind == POWER and is_number(node.arguments[1]) and math.isfinite(node.arguments[1].number):
+        return node.arguments[0], node.arguments[1].number
+    return node, 1.0

@@ -1,0 +1,64 @@
+"""Section of a fit report: the equation of the fitted law, its symbols with values, and its text for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..core.reference import Reference
+from ..identify import Fit
+from .chapter import DisplayedEquation, Table
+from .equation import LawEquation, law_equation
+from .equation.source_code import REMARKS, displayed_lines, source_codes
+from .formatting import format_number, format_unit
+
+
+def equation_section(fit: Fit) -> tuple[tuple[DisplayedEquation, ...], tuple[Table, ...]]:
+    """Return the equations of a fitted law within the range of its data, and the table of their symbols.
+
+    The first equation has the parameters as symbols. A polynomial in scaled quantities follows in physical quantities.
+    A law without a closed form is represented by the definition in its documentation.
+    """
+    quantity = fit.fitted_quantity
+    equations = law_equation(fit.model, quantity.name, quantity.arguments, fit.data_ranges)
+    if not equations:
+        return (_definition(type(fit.model)),), ()
+    validity = _validity(fit.data_ranges, quantity.arguments)
+    shown = tuple(_displayed(equation, f"equation-{i}", validity) for i, equation in enumerate(equations, 1))
+    return shown, (_symbol_table(equations[0]),)
+
+
+def _displayed(equation: LawEquation, name: str, validity: str) -> DisplayedEquation:
+    unit_of = ", ".join(f"{each.meaning} {each.name} [{each.unit}]" for each in (equation.result, *equation.arguments))
+    texts = {f"{language} ({REMARKS[language]})": text for language, text in source_codes(equation, validity).items()}
+    note = f"{unit_of[0].upper()}{unit_of[1:]}. {validity}"
+    return DisplayedEquation(name, equation.title, tuple(displayed_lines(equation)), note, texts)
+
+
+def _validity(ranges: Mapping[str, tuple[float, float]], arguments: tuple[str, ...]) -> str:
+    scales = {"pressure": (1e-3, " kPa"), "contraction": (1.0, ""), "force": (1.0, " N")}
+    parts = [
+        f"{name} {format_number(ranges[name][0] * factor)} to {format_number(ranges[name][1] * factor)}{unit}"
+        for name in arguments
+        for factor, unit in [scales[name]]
+    ]
+    return f"Valid for {' and '.join(parts)}, the range of the data; outside it the law may be continued differently."
+
+
+def _symbol_table(equation: LawEquation) -> Table:
+    columns: dict[str, list[Any]] = {
+        "symbol": [each.name for each in equation.parameters],
+        "value (SI)": [each.value for each in equation.parameters],
+        "unit": [format_unit(each.unit) for each in equation.parameters],
+        "meaning": [each.meaning for each in equation.parameters],
+    }
+    return Table("equation-symbols", "Symbols of the equation", columns)
+
+
+def _definition(law: type[Any]) -> DisplayedEquation:
+    """Return the definition of a law whose expression has no closed form, or is too long to be shown."""
+    text = " ".join((law.__doc__ or law.__name__).split("\n\n")[0].split())
+    references: tuple[Reference, ...] = getattr(law, "references", ())
+    sources = "; ".join(f"{each.authors} {each.year or ''}".strip() for each in references)
+    note = f"{text} The law has no closed form of a length that can be shown. Source: {sources or 'none published'}."
+    return DisplayedEquation("equation-1", "Definition", (), note, {})

@@ -1,0 +1,201 @@
+"""Previous model of the straight-fibre muscle: circular meridian of Ferraresi et al. 2001, as Saga et al. print it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..characteristic.rubber import RubberLine
+from ..core.errors import ParameterError, SolveError
+from ..core.plotting import BLACK, DASHES, LINES, new_figure
+from ..geometry.circular_arc import CircularArc
+from ..report.chapter import AtLeast, Claim, Plot, Table
+from . import saga2007_pairs as pairs
+from .saga2007_muscle import DIAMETER, LENGTH, PAPER, PRESSURE, WALL, exact_meridian
+from .saga2007_muscle import LINES as RUBBER
+
+FIBRES = 16
+"""Number of fibres of Table 1."""
+FIG_1 = (PRESSURE, 0.16e6)
+"""Gauge pressures [Pa] of Fig. 1 (chosen: that of the claims, and the end of the axis of Fig. 8)."""
+FIG_1_LOAD = 100.0
+"""Load of Fig. 1 [N] (chosen)."""
+RADIUS_CHANGE = 1.05
+"""Ratio of two radii from which on the circle changes (chosen)."""
+INITIAL_RADIUS_RATIO = 0.9
+"""Ratio of initial to end radius in the table, to show the term of the two radii (chosen)."""
+
+
+class Circle(NamedTuple):
+    """Circular meridian: radius R [m] and half angle phi [rad]."""
+
+    radius: Any
+    half_angle: Any
+
+
+@dataclasses.dataclass(frozen=True)
+class Ferraresi2001:
+    """Muscle with a circular meridian and the force balances (A) and (B), whose labels are lost.
+
+        (A) (2 E R^2 s/ri)(sin phi - phi cos phi) + E lf s (r0 - ri)/ri + T sin phi Sum_{n=-N/4}^{N/4} cos(2 pi n/N)
+              - p [R^2 phi + 2 R r0 sin phi - (R^2/2) sin 2 phi] = 0
+        (B) F + pi p (r0 + R (1 - cos phi))^2 - N T = 0
+
+    R, phi radius and half angle of the meridian, lf = 2 R phi length of a fibre, r0 radius of the ends, ri initial
+    radius of the tube, s wall thickness, E modulus, T tension of one fibre, p gauge pressure, F tension. The modulus is
+    the slope of the rubber line; its intercept, which (A) does not contain, adds beta lf s. The sum is cot(pi/N).
+    Reference: Ferraresi et al. 2001, as quoted by Saga et al. 2007.
+    """
+
+    rubber: RubberLine
+    fibre_length: float = LENGTH
+    end_radius: float = DIAMETER / 2
+    initial_radius: float = DIAMETER / 2
+    wall_thickness: float = WALL
+    fibres: int = FIBRES
+
+    def __post_init__(self) -> None:
+        if self.fibres < 4 or self.fibres % 4:
+            raise ParameterError(f"Ferraresi2001: fibres is {self.fibres}; it must be a multiple of 4, 4 or more.")
+
+    @property
+    def fibre_sum(self) -> float:
+        """Sum of the cosines over the fibres of one half [1], as printed."""
+        quarter = self.fibres // 4
+        return math.fsum(math.cos(2 * math.pi * n / self.fibres) for n in range(-quarter, quarter + 1))
+
+    def circle(self, contraction: Any) -> Circle:
+        """Radius [m] and half angle [rad] of the meridian at a contraction, from sin(phi)/phi = 1 - contraction."""
+        half_angle = np.sqrt(CircularArc().angle_squared(contraction))
+        return Circle(self.fibre_length / (2 * half_angle), half_angle)
+
+    def middle_radius(self, contraction: Any) -> Any:
+        """Radius of the tube in the middle [m]."""
+        radius, angle = self.circle(contraction)
+        return self.end_radius + radius * (1 - np.cos(angle))
+
+    def hoop_force(self, contraction: Any) -> Any:
+        """Hoop force of the rubber on the half shell [N]: the first two terms of (A), and that of the intercept."""
+        radius, angle = self.circle(contraction)
+        s, ri = self.wall_thickness, self.initial_radius
+        bulged = 2 * self.rubber.slope * radius**2 * s / ri * (np.sin(angle) - angle * np.cos(angle))
+        widened = self.rubber.slope * self.fibre_length * s * (self.end_radius - ri) / ri
+        return bulged + widened + self.rubber.intercept * self.fibre_length * s
+
+    def half_section(self, contraction: Any) -> Any:
+        """The bracket of (A) [m2], on which the pressure acts."""
+        radius, angle = self.circle(contraction)
+        r0 = self.end_radius
+        return radius**2 * angle + 2 * radius * r0 * np.sin(angle) - radius**2 / 2 * np.sin(2 * angle)
+
+    def residuals(self, pressure: Any, contraction: Any, force: Any, fibre_tension: Any) -> tuple[Any, Any]:
+        """Residuals of (A) and (B) [N]."""
+        angle = self.circle(contraction).half_angle
+        radial = self.hoop_force(contraction) + fibre_tension * np.sin(angle) * self.fibre_sum
+        axial = force + np.pi * pressure * self.middle_radius(contraction) ** 2 - self.fibres * fibre_tension
+        return radial - pressure * self.half_section(contraction), axial
+
+    def pressure(self, contraction: Any, force: Any) -> Any:
+        """Gauge pressure [Pa] at a contraction and a tension [N]; NaN where the balances have no solution."""
+        lever = np.sin(self.circle(contraction).half_angle) * self.fibre_sum / self.fibres
+        area = self.half_section(contraction) - lever * np.pi * self.middle_radius(contraction) ** 2
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(area > 0, (self.hoop_force(contraction) + lever * force) / area, np.nan)
+
+    def fibre_tension(self, pressure: Any, contraction: Any, force: Any) -> Any:
+        """Tension of one fibre [N] by (B)."""
+        return (force + np.pi * pressure * self.middle_radius(contraction) ** 2) / self.fibres
+
+    def contraction(self, pressure: float, force: float) -> float:
+        """Smallest contraction [1] in equilibrium at a gauge pressure [Pa] and a tension [N].
+
+        Raises SolveError if there is none from 0.01 to 45 %.
+        """
+        from scipy.optimize import brentq
+
+        grid = np.geomspace(1e-4, 0.45, 400)
+        above = np.flatnonzero(self.pressure(grid, force) >= pressure)
+        if not above.size or above[0] == 0:
+            raise SolveError(
+                f"Ferraresi2001: no contraction from 0.01 to 45 % at {pressure / 1e3:g} kPa and {force:g} N. "
+                "Change the pressure or the load."
+            )
+        low, high = grid[above[0] - 1], grid[above[0]]
+        return float(brentq(lambda c: float(self.pressure(c, force)) - pressure, low, high, xtol=1e-14))
+
+
+def previous_model_claims() -> tuple[Claim, ...]:
+    """Return the claim of Fig. 1: centre and radius of the circle change with pressure."""
+    model = Ferraresi2001(RUBBER["A"])
+    first, second = (float(model.circle(model.contraction(p, FIG_1_LOAD)).radius) for p in FIG_1)
+    loads = (50.0, 150.0)
+    held = [float(model.pressure(0.1, force)) for force in loads]
+    radii = [float(model.circle(model.contraction(p, f)).radius) for p, f in zip(held, loads, strict=True)]
+    text = "Fig. 1: centre and radius of the circular meridian change with pressure: ratio of the radii"
+    bound = AtLeast(RADIUS_CHANGE, chosen=True)
+    at_load = f"{1e3 * first:.3g} and {1e3 * second:.3g} mm at {FIG_1[0] / 1e6:g} and {FIG_1[1] / 1e6:g} MPa."
+    at_contraction = (
+        f"At 10 % contraction with {loads[0]:g} and {loads[1]:g} N, that is at {held[0] / 1e6:.3g} and "
+        f"{held[1] / 1e6:.3g} MPa. The circle depends on the contraction only, by sin(φ)/φ = 1 − ε; the pressure of a "
+        "wanted contraction and load is then explicit, also in this model."
+    )
+    return (
+        Claim(PAPER, text, bound, first / second, "1", at_load, f"line A, constant load of {FIG_1_LOAD:g} N"),
+        Claim(PAPER, text, bound, radii[0] / radii[1], "1", at_contraction, "line A, constant contraction"),
+    )
+
+
+def previous_model_table() -> Table:
+    """Return the pressures of the previous model, as printed and with other fibres, and of the exact meridian."""
+    contraction = pairs.CONTRACTIONS
+    rows: list[tuple[str, float, Any]] = []
+    for name, line in RUBBER.items():
+        narrow = Ferraresi2001(line, initial_radius=INITIAL_RADIUS_RATIO * DIAMETER / 2)
+        for force in (0.0, 100.0):
+            even = pairs.pressures(line, force, contraction)["circle", "middle balance"]
+            rows.append((f"(A), (B) as printed, line {name}", force, Ferraresi2001(line).pressure(contraction, force)))
+            rows.append((f"with evenly distributed fibres, line {name}", force, even))
+            rows.append((f"as printed, ri = {INITIAL_RADIUS_RATIO:g} r0, line {name}", force,
+                         narrow.pressure(contraction, force)))  # fmt: skip
+            exact = np.asarray(exact_meridian(line).shape_at_force(contraction, force).pressure)
+            rows.append((f"exact meridian, line {name}", force, exact))
+    columns: dict[str, Any] = {"model": [r[0] for r in rows], "load [N]": [r[1] for r in rows]}
+    for i, c in enumerate(contraction):
+        columns[f"pressure at {100 * c:g} % [MPa]"] = [round(float(r[2][i]) / 1e6, 6) for r in rows]
+    note = (
+        r"The printed sum over the fibres is \(\cot(\pi/N)\) = 5.027 for 16 fibres; evenly distributed fibres give "
+        r"\(N/\pi\) = 5.093. The initial radius is that of the ends unless stated (chosen: it is not printed for this "
+        "muscle). No value: no exact outline (line A without load at 1 %)."
+    )
+    return Table("saga2007_previous", "Previous model: circular meridian with equations (A) and (B)", columns, note)
+
+
+def previous_model_figure() -> Plot:
+    """Return Fig. 1: the circular meridian at two pressures, with centres and radii."""
+    figure, axes = new_figure(height=4.2)
+    model = Ferraresi2001(RUBBER["A"])
+    for i, pressure in enumerate(FIG_1):
+        radius, angle = (1e3 * model.circle(c := model.contraction(pressure, FIG_1_LOAD)).radius, model.circle(c)[1])
+        centre = 1e3 * model.end_radius - radius * math.cos(angle)
+        theta = np.linspace(-angle, angle, 201)
+        label = f"{pressure / 1e6:g} MPa, {100 * c:.1f} %"
+        axes.plot(radius * np.sin(theta), centre + radius * np.cos(theta), DASHES[i], color=LINES[i], label=label)
+        axes.plot([0.0], [centre], "o", color=LINES[i])
+        direction = (-0.6 if i else 0.75) * angle
+        tip = (radius * math.sin(direction), centre + radius * math.cos(direction))
+        axes.annotate("", tip, (0.0, centre), arrowprops={"arrowstyle": "->", "color": LINES[i], "linewidth": 0.9})
+        at = (0.3 * tip[0], centre + 0.3 * (tip[1] - centre))
+        text, side = f"$R_{2 - i}$ = {radius:.1f} mm", ("right" if i else "left")
+        axes.annotate(text, at, xytext=(-6 if i else 6, 0), textcoords="offset points", ha=side, color=LINES[i])
+    axes.axhline(0.0, color=BLACK, linewidth=0.8, linestyle="-.")
+    axes.set(xlabel="position along the axis [mm]", ylabel="radius [mm]", aspect="equal")
+    axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), title="pressure, contraction")
+    return Plot(
+        "saga2007_fig1",
+        f"Circular meridian of the previous model at two pressures and a load of {FIG_1_LOAD:g} N, as in Fig. 1: "
+        "centre (dot) and radius move, R1 < R2. By equations (A) and (B) as printed, with line A.",
+        figure,
+    )

@@ -1,0 +1,229 @@
+"""Claims about the way from a call to its kernel: what is quick for few numbers gives, to the last bit, what the way
+for many gives; what is kept with a plant is checked again where it changes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from joints import chosen_muscle
+
+from airmuscle.compile.cache.kernel import record
+from airmuscle.compile.program import compile_system
+from airmuscle.control.control_loop import ControlLoop
+from airmuscle.control.driver import PWM, Driver, PwmState
+from airmuscle.control.inputs import InputSignal, SampledSignal, Schedule
+from airmuscle.control.pid import PID
+from airmuscle.control.piecewise_linear import PiecewiseLinear, merge_columns
+from airmuscle.core import arrays
+from airmuscle.core.errors import GeometryLimitError, ParameterError
+from airmuscle.mechanism import HangingMass
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.simulation import Problem, simulate, solve
+from airmuscle.simulation import output_times as rows_of_a_run
+from airmuscle.simulation.output_times import merge_few_output_times, merge_output_times
+from airmuscle.simulation.rows import RowRecorder
+
+TICKS = st.integers(0, 400).map(lambda i: i / 64)
+
+
+def lifting() -> Plant:
+    valve = Valve(5e-9, 0.433)
+    return Plant(chosen_muscle(), FillDischarge(Supply(6e5), valve, valve), HangingMass(10.0))
+
+
+# Rows
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 4, 5, 7, 8, 250])
+def test_the_range_of_a_column_is_its_smallest_and_largest_number(count):
+    plant = lifting()
+    compiled, rng = compile_system(plant), np.random.default_rng(count)
+    start = np.array([plant.state_at(pressure=1e5)[s.name] for s in plant.states])
+    states = start * (1 + 1e-3 * rng.standard_normal((count, start.size)))
+    states[count // 2 :: 90, 1] = np.nan
+    times = np.sort(rng.random(count))
+    ends = np.array([0.25, 0.5, 1.0])
+    segments = PiecewiseLinear(ends, rng.random((3, 2)), rng.standard_normal((3, 2)))
+    table = RowRecorder(compiled).evaluate(states, times, segments, 0.0)
+    assert np.array_equal(table.inputs, segments.inputs_at(times, 0.0))
+    columns = np.hstack([states, table.inputs, table.outputs])
+    assert table.lower == np.fmin.reduce(columns, axis=0, initial=np.inf).tolist()
+    assert table.upper == np.fmax.reduce(columns, axis=0, initial=-np.inf).tolist()
+    unfit = np.flatnonzero(~np.isfinite(table.outputs).all(axis=1))
+    assert table.first_invalid == (unfit[0] if unfit.size else count)
+    assert bool(unfit.size) == (count > 0)
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan])
+def test_an_output_that_is_not_finite_is_found_in_its_row(value):
+    compiled = compile_system(lifting())
+    recorder, states = RowRecorder(compiled), np.zeros((9, 3))
+    segments = PiecewiseLinear(np.ones(1), np.zeros((1, 2)), np.zeros((1, 2)))
+    states[:] = list(lifting().state_at(pressure=1e5).values())
+    assert recorder.evaluate(states, np.linspace(0, 1, 9), segments, 0.0).first_invalid == 9
+    states[6, 0] = value
+    assert recorder.evaluate(states, np.linspace(0, 1, 9), segments, 0.0).first_invalid == 6
+
+
+def test_a_kept_recorder_gives_what_a_new_one_gives(monkeypatch):
+    plant, signal = lifting(), Schedule({"fill": ((0.1, 1.0), (0.3, 0.0))})
+    start, bound = plant.state_at(pressure=1e5), []
+    bind = record.bind
+    monkeypatch.setattr(record, "bind", lambda *given: bound.append(1) or bind(*given))
+    long = simulate(plant, signal, duration=1.0, initial_state=start)
+    simulate(plant, signal, duration=0.2, initial_state=start, output_times=0.1)
+    again = simulate(plant, signal, duration=1.0, initial_state=start)
+    assert len(bound) == 1
+    fresh = simulate(lifting(), signal, duration=1.0, initial_state=start)
+    for other in (again, fresh):
+        assert all(np.array_equal(other[name], long[name]) for name in long)
+
+
+# Times
+
+
+@settings(max_examples=300)
+@given(st.lists(TICKS, unique=True, max_size=30), st.lists(TICKS, min_size=1, max_size=8), st.sampled_from([0, 1e-12]))
+def test_few_rows_and_instants_are_merged_as_many_are(grid, instants, shift):
+    grid, instants = np.sort(np.array(grid, dtype=float)), np.sort(instants) + shift
+    few, given_few = merge_few_output_times(grid.tolist(), instants.tolist(), 10.0), rows_of_a_run._FEW
+    rows_of_a_run._FEW = 0
+    try:
+        many = merge_output_times(grid, instants, 10.0).tolist()
+    finally:
+        rows_of_a_run._FEW = given_few
+    assert merge_output_times(grid, instants, 10.0).tolist() == many
+    assert few == many
+
+
+# Input
+
+
+@settings(max_examples=100)
+@given(st.integers(1, 60), st.integers(0, 2**32 - 1))
+def test_an_input_beyond_its_range_is_found_among_few_and_many_numbers(count, seed):
+    rng = np.random.default_rng(seed)
+    at, name, value = int(rng.integers(count)), str(rng.choice(["fill", "discharge"])), float(rng.choice([-0.1, 1.1]))
+    levels = {n: rng.random(count).tolist() for n in ("fill", "discharge")}
+    plant, start = lifting(), lifting().state_at(pressure=1e5)
+    Problem(plant, Schedule({n: tuple(enumerate(v)) for n, v in levels.items()}), count, start)
+    levels[name][at] = value
+    message = rf"the input '{name}' is {value:g} before {at + 1:g} s; allowed range: 0 to 1 "
+    with pytest.raises(ParameterError, match=message):
+        Problem(plant, Schedule({n: tuple(enumerate(v)) for n, v in levels.items()}), count, start)
+
+
+@pytest.mark.parametrize("count", [2, 4 * arrays.FEW])
+@pytest.mark.parametrize("spoil", ["end", "value", "slope", "order"])
+def test_segments_that_a_kernel_cannot_take_are_refused_among_few_and_many(count, spoil):
+    ends, values, slopes = np.arange(1.0, count + 1), np.zeros((count, 1)), np.zeros((count, 1))
+    PiecewiseLinear(ends, values, slopes).check_shape(1, 0.0)
+    if spoil == "order":
+        ends[-1] = ends[-2]
+    else:
+        {"end": ends, "value": values, "slope": slopes}[spoil][-1] = np.nan
+    with pytest.raises(ParameterError, match="segments"):
+        PiecewiseLinear(ends, values, slopes).check_shape(1, 0.0)
+
+
+class Steps(InputSignal):
+    """A user's signal in integers and by columns: the valve opens after two seconds and closes after three."""
+
+    def segments(self, inputs, start, duration):
+        values = np.zeros((3, len(inputs)), dtype=np.int64, order="F")
+        values[1, inputs.index("fill")] = 1
+        return PiecewiseLinear(np.array([2, 3, 4]), values, np.zeros_like(values))
+
+
+@pytest.mark.parametrize("loop", [False, True], ids=["open loop", "control loop"])
+def test_a_signal_in_integers_is_the_signal_in_floats(loop):
+    plant, start = lifting(), lifting().state_at(pressure=1e5)
+    controller, pressure = PID("pressure", "discharge", gain=-1e-6), Schedule({"pressure": ((0.0, 1e5),)})
+    own, usual = (
+        simulate(
+            plant,
+            ControlLoop(controller, 0.5, pressure, other_inputs=signal) if loop else signal,
+            duration=4.0,
+            initial_state=start,
+        )
+        for signal in (Steps(), Schedule({"fill": ((2.0, 1.0), (3.0, 0.0))}))
+    )
+    assert usual["fill"].max() == 1.0
+    assert all(np.array_equal(own[name], usual[name]) for name in usual)
+
+
+# The initial state
+
+
+def test_an_initial_state_is_checked_again_where_it_differs_from_the_last_one():
+    plant = lifting()
+    good = plant.state_at(pressure=1e5)
+    impossible = {**good, "position": 0.29}
+    for _ in range(2):
+        Problem(plant, Schedule({}), 1.0, good)
+        with pytest.raises(GeometryLimitError):
+            Problem(plant, Schedule({}), 1.0, impossible)
+    for wrong in ("0", None, np.nan, 10**400):
+        with pytest.raises(ParameterError, match="initial state"):
+            Problem(plant, Schedule({}), 1.0, {**good, "position": wrong})
+
+
+# Drivers
+
+
+@settings(max_examples=300)
+@given(st.integers(0, 64), st.integers(1, 40), st.floats(0, 1), st.one_of(st.just(-np.inf), st.just(np.inf), TICKS))
+def test_an_interval_without_a_new_period_continues_the_pulse(start, length, duty, pulse_end):
+    """The rest of a pulse in one interval is what a longer interval, in which a period begins, has up to there."""
+    begin, driver = start / 64, PWM(0.5)
+    state = PwmState(0.0, 1.0, pulse_end)
+    end = min(begin + length / 64, 2.0)
+    short, later = driver.step(state, [(end, duty, 0.0)], begin)
+    long, _ = driver.step(state, [(3.0, duty, 0.0)], begin)
+    assert later == state
+    assert short[-1][0] == end
+    edges = np.linspace(begin, end, 50)[:-1]
+    assert [level_at(short, t) for t in edges] == [level_at(long, t) for t in edges]
+
+
+def level_at(segments, time):
+    return next(level for end, level, _ in segments if time < end)
+
+
+def test_single_segments_are_merged_as_several_are():
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        end, values, slopes = 1.0 + rng.random(), rng.standard_normal(3), rng.standard_normal(3)
+        columns = [[(end, v, s)] for v, s in zip(values.tolist(), slopes.tolist(), strict=True)]
+        split = [[(0.5, v, s), (end, v + 0.5 * s, s)] for [(_, v, s)] in columns]
+        ends, merged, slope = merge_columns(columns, 0.0)
+        both = merge_columns([*columns[:2], split[2]], 0.0)
+        assert (ends, merged, slope) == ([end], both[1][:3], both[2][:3])
+
+
+class Unchanged(Driver):
+    """The command itself."""
+
+    def init(self, start):
+        return ()
+
+    def step(self, state, command, start):
+        return list(command), state
+
+
+@pytest.mark.parametrize("other", [Schedule({}), SampledSignal({"discharge": ((0.1, 0.0), (0.5, 0.3))})])
+def test_a_loop_whose_drivers_change_nothing_is_the_loop_without_drivers(other):
+    controller = PID("pressure", "fill", gain=1.5e-5, integral_time=0.4)
+    setpoint = Schedule({"pressure": ((0.0, 1e5), (0.51, 3e5), (0.75, 5e4))})
+    plant = lifting()
+    start = plant.state_at(pressure=1e4)
+    held, driven = (
+        solve(Problem(plant, ControlLoop(controller, 1 / 64, setpoint, other, drivers), 1.0, start))
+        for drivers in ({}, {"fill": Unchanged()})
+    )
+    assert held.recording["fill"].max() > 0.0
+    assert all(np.array_equal(held.recording[name], driven.recording[name]) for name in held.recording)
+    assert (held.final_state, held.control_state[1:7]) == (driven.final_state, driven.control_state[1:7])

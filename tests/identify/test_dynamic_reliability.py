@@ -1,0 +1,156 @@
+"""What standard errors of a dynamic fit do not contain is said: other optima, a single search, bounds, flat directions.
+
+An unknown on its bound has no standard error, and the consequence is named. The effect of the bound on the others is
+that of a fit with another bound. Numbers are chosen.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+
+from airmuscle.control import Schedule
+from airmuscle.identify.dynamic import Experiment, InitialConditions, fit_dynamic
+from airmuscle.identify.dynamic.reliability import (
+    describe_bounds,
+    describe_flatness,
+    describe_optima,
+    distinct_optima,
+    searches_at_lowest,
+)
+from airmuscle.identify.result import Estimate
+from airmuscle.library.catalogue import load
+from airmuscle.mechanism import Isometric
+from airmuscle.muscle import Muscle
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
+from airmuscle.report.dynamic_chapter import dynamic_chapters
+from airmuscle.simulation import simulate
+
+FILL = Schedule({"fill": ((0.0, 1.0),)})
+CONDUCTANCE, RATIO = "circuit.fill.conductance", "circuit.fill.critical_ratio"
+
+
+def a_fill(ratio: float = 0.35, noise: float = 200.0) -> tuple[Plant, Experiment]:
+    """A held muscle filled through a valve, recorded with noise."""
+    entry = load("dmsp-20-300")
+    muscle = Muscle(entry.characteristic, entry.geometry)
+    valve = Valve(3e-9, ratio)
+    plant = Plant(muscle, FillDischarge(Supply(6e5), valve, valve), Isometric(0.05), Polytropic(1.2))
+    run = simulate(plant, FILL, duration=1.5, initial_state=plant.state_at(pressure=0.0), output_times=0.01)
+    noisy = run["pressure"] + noise * np.random.default_rng(2).standard_normal(len(run))
+    record = dataclasses.replace(run, columns={"time": run["time"], "pressure": noisy}, units={})
+    return plant, Experiment(record, FILL, InitialConditions.at_coordinates(plant, 0.0))
+
+
+def an_estimate(name: str, value: float, stderr: float, on_bound: bool = False) -> Estimate:
+    return Estimate(name, name, value, stderr, "1", "", on_bound)
+
+
+def test_another_optimum_of_nearly_the_same_residual_is_named_with_its_values() -> None:
+    estimates = [an_estimate("valve.critical_ratio", 0.5, 0.005), an_estimate("valve.conductance", 2.0, 0.01)]
+    values, costs = np.array([[0.5, 2.0], [0.69, 2.01], [0.2, 9.0]]), np.array([1000.0, 1020.1, 5000.0])
+    optima = distinct_optima(values, costs, np.ones(2))
+    assert [each.searches for each in optima] == [1, 1, 1]
+    first, second = describe_optima(optima, estimates, costs)
+    assert "one search of 3 ended where the rms residual is only 1.0% greater" in first
+    assert "valve.critical_ratio 0.69 instead of 0.5;" in first
+    assert "conductance" not in first
+    assert "only one of 3 searches reached this optimum" in second
+
+
+def test_searches_that_agree_are_one_optimum_and_need_no_remark() -> None:
+    values, costs = np.array([[0.5, 2.0], [0.5005, 2.001], [0.5, 2.0]]), np.array([1000.0, 1000.2, 1000.3])
+    optima = distinct_optima(values, costs, np.ones(2))
+    assert [each.searches for each in optima] == [3]
+    assert searches_at_lowest(costs) == 3
+    assert describe_optima(optima, [an_estimate("a", 0.5, 0.01), an_estimate("b", 2.0, 0.01)], costs) == []
+
+
+def test_a_worse_optimum_and_one_within_the_standard_errors_are_no_alternative() -> None:
+    costs = np.array([1000.0, 1000.1, 1003.0, 1300.0])
+    values = np.array([[0.5], [0.5], [0.55], [0.9]])
+    optima = distinct_optima(values, costs, np.ones(1))
+    assert len(optima) == 3
+    assert describe_optima(optima, [an_estimate("a", 0.5, 0.03)], costs) == []
+
+
+def test_a_bound_moves_the_other_unknowns_by_the_gradient_of_the_constrained_optimum() -> None:
+    random = np.random.default_rng(4)
+    jacobian = random.standard_normal((60, 3)) + random.standard_normal((60, 1))
+    data = random.standard_normal(60)
+    scales = np.array([2.0, 0.5, 3.0])
+
+    def others(bound: float) -> np.ndarray:
+        return np.linalg.lstsq(jacobian[:, :2], data - jacobian[:, 2] * bound / scales[2], rcond=None)[0] * scales[:2]
+
+    value = 1.2
+    expected = others(1.1 * value) - others(value)
+    inner = others(value)
+    estimates = [
+        *(an_estimate(f"x{i}", inner[i], 1e-3) for i in range(2)),
+        an_estimate("tube.volume", value, np.nan, True),
+    ]
+    inverse = np.linalg.inv(jacobian[:, :2].T @ jacobian[:, :2])
+    (note,) = describe_bounds(estimates, jacobian, inverse, np.array([False, False, True]), scales)
+    for i in range(2):
+        assert f"x{i} by {expected[i]:+.2g}" in note
+    assert "tube.volume is on its bound, 1.2, and has no standard error" in note
+    assert "must not be used with another volume" in note
+
+
+def test_a_critical_ratio_on_its_bound_has_no_standard_error_and_a_named_consequence() -> None:
+    plant, experiment = a_fill(ratio=0.1)
+    fit = fit_dynamic(
+        plant_with_ratio(plant, 0.4), [experiment], free=(CONDUCTANCE, RATIO), observed={"pressure": 200.0},
+        bounds={RATIO: (0.3, 0.9)},
+    )  # fmt: skip
+    assert fit[RATIO].on_bound
+    assert np.isnan(fit[RATIO].stderr)
+    note = next(note for note in fit.notes if RATIO in note)
+    assert "has no standard error" in note
+    assert "the predicted time to the final pressure is biased" in note
+    stated = re.search(rf"would move {re.escape(CONDUCTANCE)} by (\S+)", note)
+    assert stated
+    wider = fit_dynamic(
+        plant_with_ratio(plant, 0.4), [experiment], free=(CONDUCTANCE, RATIO), observed={"pressure": 200.0},
+        bounds={RATIO: (0.33, 0.9)},
+    )  # fmt: skip
+    assert float(stated[1]) == pytest.approx(wider[CONDUCTANCE].value - fit[CONDUCTANCE].value, rel=0.3)
+
+
+def plant_with_ratio(plant: Plant, ratio: float) -> Plant:
+    circuit = plant.circuit
+    assert isinstance(circuit, FillDischarge)
+    return dataclasses.replace(plant, circuit=dataclasses.replace(circuit, fill=Valve(3e-9, ratio)))
+
+
+def test_a_fit_with_model_error_states_the_range_at_one_per_cent_of_rms() -> None:
+    estimates = [an_estimate("valve.critical_ratio", 0.5, 0.01), an_estimate("valve.conductance", 2.0, 1e-4)]
+    (note,) = describe_flatness(estimates, 10_000)
+    half = 0.01 * np.sqrt(0.0201 * 10_000)
+    assert f"valve.critical_ratio {0.5 - half:.3g} to {0.5 + half:.3g}" in note
+    assert "conductance" not in note
+    assert describe_flatness(estimates, 300) == []
+
+
+def test_the_range_at_one_per_cent_of_rms_is_that_of_a_linear_fit() -> None:
+    random = np.random.default_rng(1)
+    design, data = random.standard_normal((400, 2)), random.standard_normal(400)
+    best, cost, *_ = np.linalg.lstsq(design, data, rcond=None)
+    stderr = np.sqrt(cost[0] / 398 * np.linalg.inv(design.T @ design)[0, 0])
+    half = stderr * np.sqrt(0.0201 * 398)
+    moved = np.linalg.lstsq(design[:, 1:], data - design[:, 0] * (best[0] + half), rcond=None)[1][0]
+    assert np.sqrt(moved / cost[0]) == pytest.approx(1.01, abs=1e-6)
+
+
+def test_the_report_shows_the_optima_and_a_single_search_says_so() -> None:
+    plant, experiment = a_fill()
+    fit = fit_dynamic(plant, [experiment], free=(CONDUCTANCE,), observed={"pressure": 200.0})
+    assert "one search, so other optima were not sought" in str(fit)
+    optima = (*fit.optima, dataclasses.replace(fit.optima[0], values=2 * fit.optima[0].values, cost=2 * fit.costs[0]))
+    tables = {t.name: t for t in dynamic_chapters(dataclasses.replace(fit, optima=optima), "Fill")[0].tables}
+    assert tables["optima"].columns["rms residual relative to the lowest"] == pytest.approx([1.0, 2**0.5])

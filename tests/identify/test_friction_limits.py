@@ -1,0 +1,104 @@
+"""Limits of friction parameters: a muscle has no greater friction than its force, and no speed that was not measured.
+
+Terms of speed need loops at clearly different speeds; rows in which valves pulse justify no friction.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from airmuscle.friction import Dahl, LuGre, MaxwellSlip
+from airmuscle.identify.hysteresis import PolynomialCurve, find_loops, fit_hysteresis, fit_loop
+from airmuscle.identify.hysteresis.limits import data_limits
+from airmuscle.recording import Recording
+
+LENGTH = 0.3
+CURVE = PolynomialCurve("contraction", 1)
+TURNS = (0.02, 0.16, 0.02, 0.16, 0.02)
+
+
+def loop(friction, speeds, noise=0.5, rows=120):
+    """An isobaric loop with one speed [m/s] for each of its four legs."""
+    legs = list(itertools.pairwise(TURNS))
+    contraction = np.concatenate([np.linspace(a, b, rows, endpoint=False) for a, b in legs])
+    time = np.cumsum(np.repeat([abs(b - a) * LENGTH / rows / v for (a, b), v in zip(legs, speeds, strict=True)], rows))
+    rng = np.random.default_rng(11)
+    force = 900.0 - 4000.0 * contraction + noise * rng.standard_normal(time.size)
+    force = force - friction.force_along(contraction * LENGTH, time)
+    columns = {"time": time, "pressure": np.full(time.size, 4e5), "contraction": contraction, "force": force}
+    return Recording(columns, "loop", {"resting_length": LENGTH})
+
+
+@pytest.mark.parametrize("initial", [1e3, 1.5e4, 9e4])
+def test_the_terms_of_speed_of_one_speed_stay_within_the_force_of_the_muscle_and_are_not_justified(initial):
+    run = loop(Dahl(4e4, 25.0), (2e-3,) * 4)
+    fit = fit_hysteresis(LuGre(4e4, 20.0, initial, 1e-3), run, static_curve=CURVE)
+    greatest = float(np.abs(run["force"]).max())
+    assert 0.0 <= fit.friction.stribeck_force <= greatest
+    assert fit.friction.damping <= greatest / 2e-3
+    assert not fit.justified
+    assert "The speed in the data is 0.002 to 0.002 m/s, so the terms of speed are not determined" in fit.verdict
+
+
+def test_a_loop_at_one_speed_leaves_out_a_law_with_terms_of_speed_and_says_why():
+    found = fit_loop(find_loops([loop(Dahl(4e4, 25.0), (1e-3,) * 4)])[0], elements=3)
+    assert "LuGre" not in {type(fit.friction).__name__ for fit in found.fits}
+    assert "measure loops at clearly different speeds" in found.failed["LuGre"]
+
+
+def test_loops_at_different_speeds_determine_the_stribeck_curve():
+    run = loop(LuGre(4e4, 15.0, 12.0, 3e-3), (1e-3, 1e-3, 4e-3, 2e-2), noise=0.1)
+    fit = fit_hysteresis(LuGre(3e4, 20.0, 5.0, 5e-3), run, static_curve=CURVE)
+    assert (fit.friction.coulomb_force, fit.friction.stribeck_force) == pytest.approx((15.0, 12.0), rel=0.05)
+    assert fit.friction.stribeck_speed == pytest.approx(3e-3, rel=0.05)
+    assert not any("measure loops at clearly different speeds" in reason for reason in fit.reservations)
+
+
+def test_parameters_that_the_data_do_not_determine_are_named_in_words():
+    run = loop(Dahl(4e4, 25.0), (1e-3, 2e-3, 4e-3, 2e-2))
+    fit = fit_hysteresis(LuGre(4e4, 20.0, 5.0, 5e-3), run, static_curve=CURVE)
+    assert "stribeck_speed" in fit.undetermined
+    assert "determined" in str(fit.weak_combinations[0])
+    assert "A law with terms of speed is justified only if all of its parameters are determined." in fit.verdict
+    assert not fit.justified
+
+
+def test_the_speeds_of_the_data_are_those_of_the_legs_whatever_the_noise():
+    rng = np.random.default_rng(3)
+    run = loop(Dahl(4e4, 25.0), (1e-3, 2e-3, 4e-3, 2e-2))
+    path = run["contraction"] * LENGTH + 1e-5 * rng.standard_normal(len(run))
+    limits = data_limits(run["force"], path, run["time"], np.ones(len(run), dtype=bool))
+    assert (limits.low_speed, limits.high_speed) == pytest.approx((1e-3, 2e-2), rel=0.1)
+    assert limits.force == np.abs(run["force"]).max()
+
+
+def test_no_element_slides_at_a_greater_force_than_that_of_the_muscle():
+    run = loop(Dahl(4e4, 25.0), (2e-3,) * 4)
+    slips = MaxwellSlip((1.0, 1.0, 1.0), (1e-9, 2e-9, 1e-3))
+    fit = fit_hysteresis(slips, run, static_curve=CURVE)
+    forces = np.array(fit.friction.stiffnesses) * fit.friction.limits
+    assert forces.max() <= np.abs(run["force"]).max() * (1 + 1e-9)
+
+
+def test_the_pulses_of_valves_are_no_friction():
+    """Steps of the pressure with a force sensor that lags by 30 ms, without any friction, and all rows fitted."""
+    levels = np.concatenate([np.linspace(1e5, 5e5, 9), np.linspace(4.5e5, 1e5, 8)])
+    time = np.arange(0.0, 2.0 * levels.size, 0.02)
+    target = levels[np.minimum((time / 2.0).astype(int), levels.size - 1)]
+    pressure, lagged = np.empty_like(time), np.empty_like(time)
+    p, f = levels[0], levels[0]
+    for i, goal in enumerate(target):
+        p += 0.02 / 0.4 * (goal - p)
+        f += 0.02 / 0.3 * (p - f)
+        pressure[i], lagged[i] = p, f
+    rng = np.random.default_rng(5)
+    columns = {"time": time, "pressure": pressure + 100.0 * rng.standard_normal(time.size),
+               "contraction": np.full(time.size, 0.05), "force": 1.5e-3 * lagged + 0.5 * rng.standard_normal(time.size)}  # fmt: skip
+    recording = Recording(columns, "steps", {"resting_length": LENGTH})
+    found = fit_loop(find_loops([recording], all_rows=True, degree=1)[0], elements=3)
+    assert min(fit.p_value for fit in found.fits) < 0.01, "by the tests alone this would be a friction"
+    assert found.recommended is None
+    assert "the pulses of valves and the dynamics of the gas appear as friction" in found.fits[0].verdict
