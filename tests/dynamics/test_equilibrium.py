@@ -252,13 +252,13 @@ def test_what_rests_anywhere_is_said_to():
         plant = Plant(chosen_muscle(), ClosedChamber(), mechanism)
         inputs = {"latched": 1.0} if plant.inputs == ("latched",) else None
         with pytest.raises(
-            EquilibriumError, match=r"is in equilibrium at every place.*plant.state_at\(pressure=..., position=...\)"
+            EquilibriumError, match=r"is in equilibrium at every position.*plant.state_at\(pressure=..., position=...\)"
         ):
             find_equilibrium(plant, pressure=1e5, inputs=inputs)
 
 
 def test_a_joint_whose_muscles_cannot_both_be_mounted_is_refused():
-    with pytest.raises(GeometryLimitError, match="no place within the contraction limits of left, right"):
+    with pytest.raises(GeometryLimitError, match="no position within the contraction limits of left, right"):
         find_equilibrium(joint_plant(WithOffsets(replace(JOINT), (-0.6 + 0.12, -0.6 + 0.12))), pressure=1e5)
 
 

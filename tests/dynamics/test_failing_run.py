@@ -256,7 +256,7 @@ def test_a_run_says_where_no_muscle_can_be():
     columns = {"time": np.array([0.0, 1.0]), "pressure": np.zeros(2), "contraction": np.array([0.0, -0.2])}
     (found,) = [d for d in plant.diagnose(Columns(columns)) if d.code is DiagnosticCode.GEOMETRY_LIMIT]
     assert "by at most 9.664 % at 1 s" in found.text
-    assert found.text.endswith("no real muscle can do this")
+    assert found.text.endswith("such contractions are not physical")
     series = replace(plant, muscle=replace(plant.muscle, damper=LinearDamper(50.0), series=SeriesSpring(3e4)))
     columns["inner_contraction"] = np.array([-0.2, 0.0])
     (found,) = [d for d in series.diagnose(Columns(columns)) if d.code is DiagnosticCode.GEOMETRY_LIMIT]

@@ -41,7 +41,7 @@ def test_the_code_on_mechanisms_runs(capsys):
 
 def test_the_code_on_linearisation_runs(capsys):
     found = run("linearise.md")
-    assert found["shut"]["position"] < found["rest"]["position"]
+    assert found["shut"]["position"] < found["equilibrium"]["position"]
     assert found["small"].outputs == ("position", "pressure")
     stiffnesses = re.match(r"(\d+) and (\d+) N/m\n", capsys.readouterr().out)
     assert int(stiffnesses[2]) > int(stiffnesses[1])

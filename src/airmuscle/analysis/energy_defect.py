@@ -19,16 +19,16 @@ _POINTS = 41
 
 @dataclasses.dataclass(frozen=True)
 class EnergyDefect:
-    """The largest difference of two sides that should be equal over a validity range, and where it stands."""
+    """Maximum difference of two quantities that should be equal over a validity range, and its location."""
 
     worst: float
     unit: str
     pressure: float
     contraction: float
     relative: float
-    """`worst` over the largest magnitude of the side that the muscle's volume gives."""
+    """`worst` divided by the maximum magnitude of the quantity that follows from the volume of the muscle."""
     slack: float
-    """The part of the validity range that was left out because the muscle does not pull there."""
+    """Fraction of the validity range that was excluded because the muscle is slack there."""
 
     def __str__(self) -> str:
         return (
@@ -38,11 +38,11 @@ class EnergyDefect:
 
 
 def maxwell_defect(characteristic: Characteristic, geometry: Geometry, validity_range: ValidityRange) -> EnergyDefect:
-    """The largest |dF/dp + dV/dL| [m2] over the validity range; zero where force and volume come from one potential.
+    """Maximum |dF/dp + dV/dL| [m2] over the validity range; zero if force and volume derive from one potential.
 
-    F(p, L) tension, V(L) volume, dV/dL = -(dV/deps)/L0. A muscle with a defect makes or loses energy on a closed
-    path of pressure and length: the defect times the area of the path. Only where the muscle pulls: the volume of
-    a slack one does not follow from its length.
+    F(p, L) tension, V(L) volume, dV/dL = -(dV/deps)/L0. A muscle with a defect generates or loses energy on a closed
+    path of pressure and length: the defect times the enclosed area. Slack states are excluded, because the volume of a
+    slack muscle does not follow from its length. Raises SolveError if the muscle is slack everywhere.
     """
 
     def sides(pressure: Array, contraction: Array) -> tuple[Array, Array]:
@@ -55,10 +55,11 @@ def maxwell_defect(characteristic: Characteristic, geometry: Geometry, validity_
 def virtual_work_defect(
     characteristic: Characteristic, geometry: Geometry, validity_range: ValidityRange
 ) -> EnergyDefect:
-    """The largest |F + p dV/dL| [N] over the validity range, where it pulls: the part of wall, ends and assumptions.
+    """Maximum |F + p dV/dL| [N] over the taut states of the validity range: forces of wall and ends, model errors.
 
-    Zero for a muscle that is nothing but its volume. A law may keep energy and still differ, by the energy that its
-    wall stores; `maxwell_defect` tells the two apart.
+    Zero for an ideal muscle, whose force is due to its volume only. A law may conserve energy and still differ by the
+    energy stored in its wall; `maxwell_defect` distinguishes the two. Raises SolveError if the muscle is slack
+    everywhere.
     """
 
     def sides(pressure: Array, contraction: Array) -> tuple[Array, Array]:
@@ -79,11 +80,11 @@ def _largest(
     )
     taut = np.asarray(law.force(p, c)) > 0
     if not taut.any():
-        raise SolveError(f"{type(law).__name__} pulls nowhere on the validity range, so that no defect can be told.")
+        raise SolveError(f"{type(law).__name__} is slack in its whole validity range; the defect is not defined.")
     p, c = p[taut], c[taut]
-    found, due = (np.broadcast_to(side, p.shape) for side in sides(p, c))
-    difference = np.abs(found - due)
+    actual, expected = (np.broadcast_to(side, p.shape) for side in sides(p, c))
+    difference = np.abs(actual - expected)
     at = int(np.argmax(difference))
     worst = float(difference[at])
-    relative = worst / float(np.abs(due).max())
+    relative = worst / float(np.abs(expected).max())
     return EnergyDefect(worst, unit, float(p[at]), float(c[at]), relative, slack=float(1 - taut.mean()))

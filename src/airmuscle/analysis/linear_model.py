@@ -38,7 +38,7 @@ class LinearModel:
     units           unit of every name
     state, input_values    the operating point
     rates           (n,) rates of the states there: all zero at an equilibrium
-    stiffness       of a Plant, its stiffness at constant pressure and with shut valves; None for another system
+    stiffness       of a Plant: its stiffness at constant pressure and with closed valves; None for another system
     """
 
     A: Array
@@ -56,14 +56,14 @@ class LinearModel:
 
     @property
     def poles(self) -> tuple[Pole, ...]:
-        """The eigenvalues of A, the slowest first. Shut-in air and friction at rest are poles at zero."""
+        """Eigenvalues of A, the slowest first. Enclosed air and friction at rest give poles at zero."""
         values = sorted(np.linalg.eigvals(self.A).tolist(), key=lambda s: (abs(s), s.imag))
         return tuple(
             Pole(complex(s), abs(s) / (2 * math.pi), -complex(s).real / abs(s) if s else math.nan) for s in values
         )
 
     def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> LinearModel:
-        """The same with only these inputs and outputs, in this order. Raises ParameterError for an unknown name."""
+        """The model with only these inputs and outputs, in this order. Raises ParameterError for an unknown name."""
         rows, columns = _places("output", outputs, self.outputs), _places("input", inputs, self.inputs)
         return dataclasses.replace(
             self,
@@ -75,8 +75,11 @@ class LinearModel:
         )
 
     def frequency_response(self, frequencies: npt.ArrayLike) -> npt.NDArray[np.complex128]:
-        """H(j 2 pi f) = C (j 2 pi f I - A)^-1 B + D at frequencies (F,) [Hz], of shape (F, k, m)."""
-        found = []
+        """H(j 2 pi f) = C (j 2 pi f I - A)^-1 B + D at frequencies (F,) [Hz], of shape (F, k, m).
+
+        Raises ParameterError for a frequency that is negative or not finite, and at a pole on the imaginary axis.
+        """
+        responses = []
         for f in np.atleast_1d(np.asarray(frequencies, dtype=float)):
             if not (np.isfinite(f) and f >= 0):
                 raise ParameterError(
@@ -84,13 +87,13 @@ class LinearModel:
                 )
             shifted = 2j * math.pi * f * np.eye(len(self.states)) - self.A
             try:
-                found.append(self.C @ np.linalg.solve(shifted, self.B) + self.D)
+                responses.append(self.C @ np.linalg.solve(shifted, self.B) + self.D)
             except np.linalg.LinAlgError:
                 raise ParameterError(
-                    f"frequency_response: there is a pole at {f:g} Hz, as shut-in air is at 0 Hz, and the response is "
-                    "infinite. Choose another frequency."
+                    f"frequency_response: there is a pole at {f:g} Hz, and the response is infinite (for "
+                    "enclosed air at 0 Hz). Choose another frequency."
                 ) from None
-        return np.array(found, dtype=complex)
+        return np.array(responses, dtype=complex)
 
     def to_scipy(self) -> Any:
         """A scipy.signal.StateSpace; it carries no names."""
@@ -106,7 +109,7 @@ class LinearModel:
             raise AirmuscleError(
                 "to_control needs the package 'control' (python-control); pip install control, or use to_scipy()."
             ) from None
-        # The package takes a dot in a name for that of a system and its signal.
+        # python-control interprets a dot in a name as the separator of system and signal.
         names = {
             kind: [name.replace(".", "_") for name in given]
             for kind, given in (("states", self.states), ("inputs", self.inputs), ("outputs", self.outputs))
@@ -125,10 +128,10 @@ class LinearModel:
 def linearise(plant: System, state: Mapping[str, float], inputs: Mapping[str, float] | None = None) -> LinearModel:
     """A system linearised at a state and inputs (0 unless given), by exact derivatives of the simulated equations.
 
-    At a kink - a valve just shut, a muscle just slack, a stop just touched - derivatives are those of one side, and
-    where two kinks meet, as in the middle of a valve without overlap, of one side of each: choose a state away from
-    it. The state need not be an equilibrium; `rates` says whether it is. Raises ParameterError for an unknown or
-    missing name, or an input beyond its range.
+    At a kink (a valve that starts to open, a muscle that becomes slack, an end stop in first contact) the derivatives
+    are those of one side, and where two kinks coincide, as in the centre position of a valve without overlap, of one
+    side of each: choose a state that is not at a kink. The state need not be an equilibrium; at an equilibrium, `rates`
+    is zero. Raises ParameterError for an unknown or missing name, or an input beyond its range.
     """
     check_system("linearise", plant)
     x = state_vector(plant, state).tolist()

@@ -1,4 +1,4 @@
-"""Stiffness of a muscle and of its load: at constant pressure, and with shut valves."""
+"""Stiffness of a muscle and of its load at constant pressure and with closed valves."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..pneumatics.gas import NO_FLOW, gauge_pressure
 
 
 class StiffnessPair(NamedTuple):
-    """A stiffness at constant pressure and with shut valves, in the unit of its owner."""
+    """Stiffness at constant pressure and with closed valves, in the unit of the containing field."""
 
     constant_pressure: float
     shut_valves: float
@@ -26,10 +26,10 @@ class StiffnessPair(NamedTuple):
 class Stiffness:
     """Stiffnesses of a plant at one state.
 
-    muscles      of every muscle by its name, -dF/deps [N]
-    per_metre    the same by length, dF/dL [N/m]
-    coordinates  of every coordinate, -dQ/dq [N/m, N m/rad], with the change of the muscles' moment arms; the springs
-                 and weights of the mechanism are not included
+    muscles      of every muscle by name, -dF/deps [N]
+    per_metre    of every muscle by name, dF/dL [N/m]
+    coordinates  of every coordinate, -dQ/dq [N/m, N m/rad], including the change of the moment arms of the muscles,
+                 without the springs and weights of the mechanism
     """
 
     muscles: Mapping[str, StiffnessPair]
@@ -40,28 +40,28 @@ class Stiffness:
 def stiffness(plant: Plant, state: Mapping[str, float]) -> Stiffness:
     """Both stiffnesses of a plant at a state: exact derivatives of its laws.
 
-        k_p = -dF/deps,   k_m = k_p - (dF/dp) (dp/deps),   dp/deps by the gas with no flow and no heat
+        k_p = -dF/deps,   k_m = k_p - (dF/dp) (dp/deps),   dp/deps of the gas without flow and heat transfer
                                                           (polytropic: -n p_abs/V dV/deps)
 
-    With shut valves the pressure rises where a muscle is stretched, and the muscle is stiffer. Isothermal and
-    polytropic air follow their process; with EnergyBalance the motion is taken as adiabatic; that of a slow motion is
-    Isothermal's. A series spring acts in series: 1/k = 1/k_inner + 1/k_SE. Friction, creep and wall do not move. A
-    slack muscle has none. Raises ParameterError for an unknown or missing name and for an impossible state,
-    GeometryLimitError where a muscle cannot take its contraction.
+    With closed valves, the pressure increases when a muscle is stretched, so that the muscle is stiffer. Isothermal and
+    polytropic gases follow their process; EnergyBalance is evaluated as adiabatic, for a fast motion; use Isothermal
+    for a slow one. A series spring acts in series: 1/k = 1/k_inner + 1/k_SE. The states of friction, creep and wall are
+    constant. A slack muscle has zero stiffness. Raises ParameterError for an unknown or missing name and for an
+    impossible state, GeometryLimitError for a contraction beyond the limits of a geometry.
     """
     state_vector(plant, state)
     plant.check_state(state)
     ports = plant.muscle_states(state)
-    found = [_of_muscle(plant, muscle, port) for muscle, port in zip(plant.muscles, ports, strict=True)]
+    pairs = [_of_muscle(plant, muscle, port) for muscle, port in zip(plant.muscles, ports, strict=True)]
     names = [m.name for m in plant.muscles]
     lengths = [float(length) for length in plant.resting_lengths]
-    per_metre = [StiffnessPair(*(k / length for k in both)) for both, length in zip(found, lengths, strict=True)]
+    per_metre = [StiffnessPair(*(k / length for k in both)) for both, length in zip(pairs, lengths, strict=True)]
     coordinates = {
-        c.name: StiffnessPair(*(_against(plant, state, ports, ks, c.name) for ks in zip(*found, strict=True)))
+        c.name: StiffnessPair(*(_against(plant, state, ports, ks, c.name) for ks in zip(*pairs, strict=True)))
         for c in plant.mechanism.coordinates
     }
     return Stiffness(
-        dict(zip(names, found, strict=True)), dict(zip(names, per_metre, strict=True)), coordinates
+        dict(zip(names, pairs, strict=True)), dict(zip(names, per_metre, strict=True)), coordinates
     )  # fmt: skip
 
 
@@ -89,7 +89,7 @@ def _slopes(muscle: Muscle, port: MuscleState) -> tuple[float, float]:
 
 
 def _pressure_slope(plant: Plant, muscle: Muscle, port: MuscleState) -> float:
-    """dp/deps [Pa] of the air shut in: its pressure by volume and by what the gas law makes of its content."""
+    """dp/deps [Pa] of enclosed air: derivative of its pressure with respect to volume and gas states."""
     content = {s.name: port.states[s.name] for s in plant.gas.states(port.volume, plant.ambient)}
     names = list(content)
     growth = muscle.geometry.volume_derivative(port.inner_contraction)
@@ -107,7 +107,7 @@ def _pressure_slope(plant: Plant, muscle: Muscle, port: MuscleState) -> float:
 def _against(
     plant: Plant, state: Mapping[str, float], ports: Sequence[MuscleState], stiffnesses: Sequence[float], name: str
 ) -> float:
-    """-dQ/dq of one coordinate, with tensions that fall along these stiffnesses."""
+    """-dQ/dq of one coordinate, for tensions that decrease with contraction by these stiffnesses."""
     mechanism, lengths = plant.mechanism, plant.resting_lengths
     names = [c.name for c in mechanism.coordinates]
 

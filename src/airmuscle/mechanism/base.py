@@ -17,8 +17,8 @@ INFINITY = float("inf")
 class Coordinate:
     """One generalised coordinate and the name of its speed.
 
-    `nominal` and `nominal_speed` are the magnitudes below which errors do not matter. `lower_limit` and `upper_limit`
-    bound the search for equilibria; they are not end stops.
+    `nominal` and `nominal_speed` are the scales of the absolute tolerances. `lower_limit` and `upper_limit` bound the
+    search for equilibria; they are not end stops.
     """
 
     name: str

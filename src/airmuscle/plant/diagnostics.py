@@ -15,13 +15,13 @@ from ..friction import NoFriction
 from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle
 
 MARGIN = 1e-3
-"""Part of a geometry's contraction range within which a muscle counts as at its limit (chosen)."""
+"""Fraction of the contraction range of a geometry within which a muscle is at its limit (chosen)."""
 _TOLERANCE = 1e-9
-"""Part of a range by which a column may exceed it through rounding."""
+"""Fraction of a range by which a column may exceed it through rounding."""
 
 
 def describe_friction(muscles: Sequence[Muscle]) -> str:
-    """The friction of the muscles; the default is none, which a reader should know."""
+    """Text on the friction of the muscles; also stated if there is none, which is the default."""
     if all(isinstance(m.friction, NoFriction) for m in muscles):
         return "friction: off"
     if len(muscles) == 1:
@@ -31,7 +31,7 @@ def describe_friction(muscles: Sequence[Muscle]) -> str:
 
 
 class ColumnLimit(NamedTuple):
-    """The lower and upper limit of a column of a run, of one muscle."""
+    """Lower and upper limit of a column of a run, for one muscle."""
 
     muscle: str
     code: DiagnosticCode
@@ -51,13 +51,13 @@ def column_limits(muscles: Sequence[Muscle], prefixes: Sequence[str]) -> tuple[C
 
 
 def extrapolation(limits: Sequence[ColumnLimit], columns: Columns) -> list[Diagnostic]:
-    """When and how far a run left the validity range of a characteristic or of a friction, or the contraction range of
-    a geometry."""
-    found = []
+    """Diagnostics of a run that left the validity range of a characteristic, the range of the data of a friction, or
+    the contraction range of a geometry."""
+    diagnostics = []
     for muscle, code, column, quantity, bounds in limits:
         if column in columns and columns["time"].size and _exceeds(columns.limits(column), bounds):
-            found.append(_excess(columns["time"], columns[column], muscle, code, quantity, bounds))
-    return found
+            diagnostics.append(_excess(columns["time"], columns[column], muscle, code, quantity, bounds))
+    return diagnostics
 
 
 def _exceeds(limits: tuple[float, float], bounds: tuple[float, float]) -> bool:
@@ -94,7 +94,7 @@ def _excess(
             "the range of the data of its friction",
             "the friction there is extrapolated",
         ),
-        DiagnosticCode.GEOMETRY_LIMIT: ("the contraction range of its geometry", "no real muscle can do this"),
+        DiagnosticCode.GEOMETRY_LIMIT: ("the contraction range of its geometry", "such contractions are not physical"),
     }[code]
     text = (
         f"{subject} was outside {where} in {quantity.replace('_', ' ')} ({low / scale:.4g} to {high / scale:.4g} "
@@ -105,7 +105,7 @@ def _excess(
 
 
 class Enclosure(NamedTuple):
-    """A muscle, its contraction [1], that of its contractile part [1], and its volume [m3]."""
+    """A muscle with its contraction, the contraction of its contractile part, and its volume [m3]."""
 
     muscle: Muscle
     contraction: float
@@ -116,18 +116,18 @@ class Enclosure(NamedTuple):
 def enclosures(
     muscles: Sequence[Muscle], prefixes: Sequence[str], contractions: Sequence[float], state: Mapping[str, float]
 ) -> list[Enclosure]:
-    """Every muscle at a state in which the mechanism gives it a contraction."""
-    found = []
+    """Contractions and volumes of all muscles at a state."""
+    result = []
     for muscle, prefix, contraction in zip(muscles, prefixes, contractions, strict=True):
         own = select_prefix(prefix, state)
         inner = muscle.inner_contraction(contraction, own)
-        found.append(Enclosure(muscle, contraction, inner, muscle.volume(inner, own)))
-    return found
+        result.append(Enclosure(muscle, contraction, inner, muscle.volume(inner, own)))
+    return result
 
 
-def check_enclosures(found: Sequence[Enclosure]) -> None:
+def check_enclosures(given: Sequence[Enclosure]) -> None:
     """Raise GeometryLimitError for an impossible contraction, ParameterError for a volume that is not positive."""
-    for muscle, contraction, inner, volume in found:
+    for muscle, contraction, inner, volume in given:
         muscle.geometry.check_contraction(inner)
         if not volume > 0.0:
             raise ParameterError(
@@ -137,7 +137,7 @@ def check_enclosures(found: Sequence[Enclosure]) -> None:
 
 
 def geometry_limit_hint(enclosure: Enclosure) -> str:
-    """What to do about a muscle that is at a limit of its geometry; empty where it is not."""
+    """Remedy for a muscle at a limit of its geometry; empty if it is not at a limit."""
     muscle, inner = enclosure.muscle, float(enclosure.inner_contraction)
     low, high = muscle.geometry.contraction_range
     margin = MARGIN * (high - low)

@@ -1,4 +1,4 @@
-"""WithEnergyMeters: a plant that also integrates the power of its parts, so that its energy balances can be checked."""
+"""WithEnergyMeters: a plant with integrated powers of its components, for checks of its energy balances."""
 
 from __future__ import annotations
 
@@ -33,13 +33,14 @@ _FRICTION = StateVariable("friction_work", "J", 1.0, "work done against friction
 
 @model
 class WithEnergyMeters(System):
-    """A plant with meters as further states, and its energies and its air mass as outputs.
+    """A plant with energy and mass meters as further states, and its energies and its air mass as outputs.
 
-    Four balances must close. Mechanical: kinetic + potential energy grow by `work_of_tension`, which includes the push
-    of an end stop, less `mechanism_loss`, as long as a latch moves only from rest. Muscle: `work_of_contractile` is
-    `work_of_tension` + `damping_heat` + `element_work` + `friction_work` (where there is friction), as long as no
-    muscle is slack. Air: `air_energy`, of the air in the muscles, grows by `energy_of_flow` + `heat_to_air` less
-    `work_of_air`. Mass: `air_total`, of all air, grows by `air_supplied` less `air_exhausted`.
+    Four balances must close. Mechanical: kinetic + potential energy increase by `work_of_tension`, which includes the
+    contact force of an end stop, minus `mechanism_loss`, provided that a latch is operated at rest only. Muscle:
+    `work_of_contractile` is `work_of_tension` + `damping_heat` + `element_work` + `friction_work` (with friction),
+    provided that no muscle is slack. Air: `air_energy`, of the air in the muscles, increases by `energy_of_flow` +
+    `heat_to_air` minus `work_of_air`. Mass: `air_total`, of all air, increases by `air_supplied` minus
+    `air_exhausted`.
     """
 
     from_file: ClassVar[bool] = False
@@ -48,7 +49,7 @@ class WithEnergyMeters(System):
 
     @property
     def meters(self) -> tuple[StateVariable, ...]:
-        """Every meter."""
+        """All meters."""
         return (*_METERS, _FRICTION) if any(_has_friction(m) for m in self.plant.muscles) else _METERS
 
     @property
@@ -74,7 +75,7 @@ class WithEnergyMeters(System):
 
     @property
     def state_lower_bounds(self) -> Sequence[float]:
-        """Those of the plant; meters have none."""
+        """The bounds of the plant; meters have none."""
         return [*self.plant.state_lower_bounds, *(-float("inf") for _ in self.meters)]
 
     @property
@@ -97,19 +98,19 @@ class WithEnergyMeters(System):
         return {**state, **{meter.name: 0.0 for meter in self.meters}}
 
     def check_state(self, state: Mapping[str, float]) -> None:
-        """As the plant's."""
+        """Raise the errors of the plant's `check_state`."""
         self.plant.check_state(state)
 
     def describe(self) -> tuple[Diagnostic, ...]:
-        """As the plant's."""
+        """The assumptions of the plant."""
         return self.plant.describe()
 
     def diagnose(self, columns: Columns) -> list[Diagnostic]:
-        """As the plant's."""
+        """The diagnostics of the plant."""
         return self.plant.diagnose(columns)
 
     def failure_hint(self, state: Mapping[str, float]) -> str:
-        """As the plant's."""
+        """The remedy of the plant."""
         return self.plant.failure_hint(state)
 
     def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:

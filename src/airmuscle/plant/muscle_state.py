@@ -12,14 +12,14 @@ from ..muscle import Muscle
 from ..pneumatics.gas import Air, Ambient, Gas, gauge_pressure
 
 _TYPICAL_CONTRACTION = 0.05
-"""Contraction [1] at which a muscle's volume gives the nominal size of its air mass (chosen)."""
+"""Contraction whose muscle volume defines the nominal value of the air mass (chosen)."""
 
 
 class MuscleState(NamedTuple):
     """One muscle at one instant: contraction [1], shortening speed [m/s], volume [m3], pressures [Pa], forces [N].
 
-    `inner_contraction` and `inner_speed` are those of the contractile part, which behind a series spring differ from
-    the fittings'. `states` are the muscle's own and those of its air, by their own names; `rates` those of the former.
+    `inner_contraction` and `inner_speed` belong to the contractile part; with a series spring they differ from those of
+    the fittings. `states` are the states of the muscle and of its air, without prefix; `rates` the rates of the former.
     """
 
     contraction: Value

@@ -26,7 +26,7 @@ from .validation import check_free, check_parts, check_unique
 
 _AIR_STATES = ("air_mass", "internal_energy")
 _ROUNDING = 1e-3
-"""Part of its nominal size by which a tolerance may let an air mass become negative (chosen)."""
+"""Fraction of its nominal value by which an air mass may become negative within the tolerance (chosen)."""
 
 
 @model
@@ -34,8 +34,8 @@ class Plant(System):
     """Ordinary differential equations of muscles, valves and load. Air mass [kg] is the state, pressure an output.
 
     `muscle` is one or a tuple. `circuit` is a tuple with one for each muscle, or a single one that feeds them all.
-    With one muscle the names are plain (`air_mass`, `pressure`, `bristle`); with several they carry its name
-    (`left.pressure`), as does what belongs to a circuit in a tuple, or to a muscle's tube in a circuit for all.
+    With one muscle, names have no prefix (`air_mass`, `pressure`, `bristle`); with several, the muscle's name is the
+    prefix (`left.pressure`), also for a circuit in a tuple and for the tube of a muscle in a shared circuit.
     """
 
     checks_structure: ClassVar[bool] = True

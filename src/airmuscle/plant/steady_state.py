@@ -1,4 +1,4 @@
-"""Steady state of muscles and their air at given pressures; nothing is checked, and values may be arrays."""
+"""Steady state of muscles and their air at given pressures, without checks; values may be arrays."""
 
 from __future__ import annotations
 

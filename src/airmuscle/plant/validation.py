@@ -1,4 +1,4 @@
-"""Validation of a plant's parts: their kinds, their numbers, their names, closed-form laws."""
+"""Validation of the parts of a plant: types, numbers, names, closed-form laws."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def check_parts(
     muscles: Sequence[Muscle], circuit: Any, circuits: Sequence[Circuit], mechanism: Mechanism, gas: Gas,
     ambient: Ambient,
 ) -> None:  # fmt: skip
-    """Raise ParameterError where the parts are no plant, TraceError where a law is not closed-form."""
+    """Raise ParameterError for parts that do not form a plant, TraceError for a law without closed form."""
     parts: list[tuple[str, Any, type[Any]]] = [("mechanism", mechanism, Mechanism), ("gas", gas, Gas)]
     parts += [("ambient", ambient, Ambient)]
     parts += [("muscle", m, Muscle) for m in muscles] + [("circuit", c, Circuit) for c in circuits]
@@ -33,7 +33,7 @@ def check_parts(
 
 
 def check_unique(names: Sequence[str]) -> None:
-    """Raise ParameterError where two states or inputs share a name."""
+    """Raise ParameterError if two states or inputs share a name."""
     for name in (n for n in names if names.count(n) > 1):
         raise ParameterError(f"Plant: two of its parts use the name '{name}'; rename one of them.")
 
@@ -73,7 +73,7 @@ def _check_counts(muscles: Sequence[Muscle], circuit: Any, circuits: Sequence[Ci
 
 
 def check_free(values: Iterable[str], free: Sequence[str]) -> None:
-    """Raise ParameterError for a name that is no state, or is a state of the air, which follows from the pressure."""
+    """Raise ParameterError for a name that is not a state, or for a state of the air, which the pressure determines."""
     for name in values:
         if name not in free:
             raise ParameterError(f"Plant: no coordinate '{name}'; there are {', '.join(free) or 'none'}.")

@@ -189,7 +189,7 @@ def _solution(problem: Problem, run: CompiledRun | CalledRun) -> Solution:
 def _controller_columns(problem: Problem, run: CompiledRun | CalledRun, times: Array) -> dict[str, Array]:
     """Set points in time; measurements and commands of the last sample at every row."""
     prepared, controller = run.prepared, run.prepared.loop.controller
-    intervals = np.searchsorted(np.array(prepared.edges), times, side="right") - 1
+    intervals = np.searchsorted(prepared.instants, times, side="right") - 1
     intervals = np.clip(intervals, 0, max(len(run.measured) - 1, 0))
     setpoints = prepared.setpoint_signal.inputs_at(times, problem.start_time)
     columns = {f"{SETPOINT}{name}": setpoints[:, i] for i, name in enumerate(controller.setpoints)}

@@ -36,16 +36,16 @@ class CompiledLoop:
         measured_at = np.array([columns.index(name) for name in self.law.measured_columns], dtype=np.int64)
         commanded_at = np.array(prepared.commanded, dtype=np.int64)
         limits = np.array([prepared.ranges[name] for name in self.law.inputs], dtype=float).reshape(-1, 2)
-        self.edges = np.array(prepared.edges)
+        self.edges = prepared.instants
         self.measuring = compiled.address["outputs"], measured_at
         low, high = np.ascontiguousarray(limits[:, 0]), np.ascontiguousarray(limits[:, 1])
         self.commanding = np.array([loop.sample_time]), low, high, commanded_at
         self.intervals = (
             self.edges, np.spacing(np.abs(self.edges)), 0 if prepared.sampled else 1,
-            np.array(prepared.setpoints, dtype=float).reshape(self.edges.size - 1, -1),
+            prepared.setpoint_values,
         )  # fmt: skip
-        self.offsets = np.array(prepared.segment_offsets, dtype=np.int64)
-        self.grid = prepared.times, np.array(prepared.row_offsets, dtype=np.int64)
+        self.offsets = prepared.first_segments
+        self.grid = prepared.times, prepared.first_rows
 
 
 def can_be_compiled(prepared: SampledLoop) -> bool:

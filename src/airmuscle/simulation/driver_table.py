@@ -30,8 +30,8 @@ def are_known(loop: ControlLoop) -> bool:
 
 def greatest_capacity(prepared: SampledLoop) -> int:
     """The greatest number of segments of an input within an interval, before and after each of its drivers."""
-    duration = float(np.diff(prepared.edges).max())
-    pieces = int(np.diff(prepared.segment_offsets).max())
+    duration = float(np.diff(prepared.instants).max())
+    pieces = int(np.diff(prepared.first_segments).max())
     return max((_capacity(chain, pieces, duration) for chain in _chains(prepared.loop).values()), default=pieces)
 
 
@@ -49,7 +49,7 @@ class DriverTable:
         self._order = [(name, driver) for name, chain in chains.items() for driver in chain]
         for name in chains:
             if name not in loop.controller.inputs:
-                check_command_range(name, inputs.column(names.index(name)), prepared.edges[0])
+                check_command_range(name, inputs.column(names.index(name)), float(prepared.instants[0]))
         m = inputs.values.shape[1]
         self.kinds = np.array([(names.index(n), _KINDS[type(d)]) for n, d in self._order], np.int64).reshape(-1, 2)
         self.settings = _table([_settings(driver) for _, driver in self._order])

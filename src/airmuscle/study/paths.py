@@ -1,8 +1,8 @@
 """Parameter paths: the numbers of a scenario that a study may vary.
 
 All declared parameters of the plant may vary, with the paths of `airmuscle.core.leaves`: `circuit.fill.conductance`. Of
-the other tables, all numbers may vary: `command.fill[0][1]` (value of the first point; `[0][0]` is its time),
-`run.duration`, `run.start.pressure`, `run.method.rtol`.
+the other tables, all numbers may vary: `input.fill[0][1]` (value of the first point; `[0][0]` is its time),
+`run.duration`, `run.initial_state.pressure`, `run.integrator.rtol`.
 """
 
 from __future__ import annotations

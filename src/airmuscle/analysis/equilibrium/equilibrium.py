@@ -1,4 +1,4 @@
-"""All equilibria that are found of a plant, and of each of many plants the stable one nearest to full length."""
+"""Equilibria of a plant, and the stable equilibrium nearest to full length of each of many plants."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from .stability import are_stable
 from .statics import Rows, Statics
 
 TABLE_SIZE = 500_000
-"""Numbers in a table of states of plants side by side; more take memory and gain little (measured)."""
+"""Size of a table of states of several plants; a greater one takes memory and saves little time (measured)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Equilibrium:
-    """One equilibrium: its state, and whether the mechanism returns to it after a small push."""
+    """One equilibrium: its state, and whether it is stable for small displacements of the mechanism."""
 
     state: dict[str, float]
     stable: bool
@@ -38,20 +38,21 @@ def find_equilibria(
     air_mass: MuscleValues = None,
     inputs: Mapping[str, float] | None = None,
 ) -> tuple[Equilibrium, ...]:
-    """Every static equilibrium that is found, by rising coordinates, for what is given of each muscle's air.
+    """Static equilibria for given pressures or air masses of the muscles, sorted by ascending coordinates.
 
     pressure   gauge pressure [Pa] of the muscle, a number for all or a tuple with one for each
-    air_mass   instead: mass of the air [kg] behind shut valves; the pressure follows from the gas, and the air has the
-               temperature that it has at rest
-    inputs     0 unless given, so a latch is open
+    air_mass   alternatively: mass of the air [kg] with closed valves; the gas law determines the pressure at the
+               temperature of the air at rest
+    inputs     0 by default, so that a latch is open
 
-    Walls, series springs, tubes and tanks are in steady state, friction and creep relaxed. `stable` is judged by the
-    eigenvalues of the motion at this constant pressure, or with this air shut in; friction is left out.
-    With one coordinate the whole reach of the muscles is searched, and a pair of equilibria that lies closer than 1/100
-    of it is found where the force has its extreme between them. With several, Newton's method starts from many places;
-    it may miss an equilibrium that none of them leads to. Raises ParameterError for values that are impossible,
-    GeometryLimitError where a muscle cannot take a contraction that its mechanism holds it at, EquilibriumError where
-    every place is one.
+    Walls, series springs, tubes and tanks are in steady state, friction and creep relaxed. `stable` follows from the
+    eigenvalues of the motion, without friction, at constant pressure or with enclosed air.
+
+    With one coordinate, the whole range of the muscles is searched; a pair of equilibria closer than 1/100 of the range
+    is found by the extremum of the force between them. With several, Newton's method starts from many points and may
+    miss an equilibrium to which none of them converges. Raises ParameterError for invalid values, GeometryLimitError if
+    the mechanism fixes a muscle at a contraction beyond its limits, EquilibriumError if every position is an
+    equilibrium.
     """
     one = _statics(plant, pressure, air_mass, inputs)
     rows, x = _balances(one)
@@ -65,7 +66,7 @@ def find_equilibria(
 
 
 def _is_degenerate(one: Statics) -> bool:
-    """Whether a plant with one coordinate is in balance everywhere, or has no place at all."""
+    """Whether a plant with one coordinate is in equilibrium everywhere, or has no permitted position."""
     if len(one.coordinates) != 1:
         return False
     x = grid(one)
@@ -81,8 +82,8 @@ def find_equilibrium(
 ) -> dict[str, float]:
     """The stable equilibrium whose muscles are nearest to full length; arguments are those of `find_equilibria`.
 
-    Nearest is the smallest sum of squared contractions. Raises EquilibriumError, which names the muscles and the
-    forces, where no stable equilibrium is found.
+    Nearest to full length is the smallest sum of squared contractions. Raises EquilibriumError, with the muscles and
+    their forces, if no stable equilibrium is found.
     """
     one = _statics(plant, pressure, air_mass, inputs)
     state = _nearest(one)[0]
@@ -94,7 +95,7 @@ def find_equilibrium(
 def find_equilibrium_of_each(
     compiled: CompiledSystem, parameters: Array, pressures: tuple[float, ...], inputs: Array
 ) -> Array:
-    """The states (N, n) of `find_equilibrium` for plants of one structure with parameters (N, P); NaN where none is.
+    """The states (N, n) of `find_equilibrium` for plants of one structure with parameters (N, P); NaN if none exists.
 
     The gauge pressures [Pa] of the muscles and the inputs (m,) are the same for all; `compiled` is any of the plants.
     """
@@ -107,14 +108,14 @@ def find_equilibrium_of_each(
 
 
 def block_size(states: int) -> int:
-    """How many plants with so many states are evaluated together."""
+    """Number of plants with this number of states that are evaluated together."""
     return max(1, TABLE_SIZE // (GRID_POINTS * states))
 
 
 def _each_nearest(compiled: CompiledSystem, parameters: Array, pressures: tuple[float, ...], inputs: Array) -> Array:
     try:
         return _nearest(Statics.of_plants(compiled, parameters, pressures, inputs))
-    except (TypeError, ValueError, ArithmeticError, AirmuscleError):  # a plant is impossible
+    except (TypeError, ValueError, ArithmeticError, AirmuscleError):  # one of the plants is invalid
         if len(parameters) == 1:
             return np.full((1, len(compiled.description.state_names)), np.nan)
     return np.vstack([_each_nearest(compiled, row[None], pressures, inputs) for row in parameters])
@@ -123,19 +124,19 @@ def _each_nearest(compiled: CompiledSystem, parameters: Array, pressures: tuple[
 def _statics(
     plant: Plant, pressure: MuscleValues, air_mass: MuscleValues, inputs: Mapping[str, float] | None
 ) -> Statics:
-    """The request, checked, as a table of one plant."""
+    """The checked arguments as a table of one plant."""
     air = air_of_each(plant, pressure, air_mass)
     values = np.array(list(complete_inputs(plant, inputs).values()), dtype=float)
     compiled = compile_system(plant)
     one = Statics.of_plants(compiled, compiled.parameters[None], air, values, pressure is None)
     if not one.shut and not one.allowed().all():
         plant.state_at(pressure=air)
-        raise EquilibriumError(f"{type(plant.mechanism).__name__} takes no pressures of {air} Pa.")
+        raise EquilibriumError(f"{type(plant.mechanism).__name__}: the pressures {air} Pa are not allowed.")
     return one
 
 
 def _balances(statics: Statics) -> tuple[Rows, Array]:
-    """The row of its plant and the place (d,) of every balance."""
+    """The row of the plant and the coordinates (d,) of every equilibrium."""
     count = len(statics.coordinates)
     if count == 1:
         return equilibria_of_one_coordinate(statics)
@@ -147,7 +148,7 @@ def _balances(statics: Statics) -> tuple[Rows, Array]:
 
 
 def _judged(statics: Statics, rows: Rows, x: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """States (R, n) at places (R, d) of plants, and whether they are stable (R,)."""
+    """States (R, n) of plants at coordinates (R, d), and whether they are stable (R,)."""
     if not rows.size:
         return np.empty((0, len(statics.names))), np.empty(0, dtype=bool)
     there = statics.of(rows)
@@ -156,7 +157,7 @@ def _judged(statics: Statics, rows: Rows, x: Array) -> tuple[Array, npt.NDArray[
 
 
 def _nearest(statics: Statics) -> Array:
-    """Of each plant the state (N, n) of the stable equilibrium nearest to full length; NaN where there is none."""
+    """State (N, n) of the stable equilibrium nearest to full length of each plant; NaN if none exists."""
     table = np.full((len(statics.parameters), len(statics.names)), np.nan)
     rows = np.flatnonzero(statics.allowed())
     if not rows.size:
@@ -168,7 +169,7 @@ def _nearest(statics: Statics) -> Array:
     there = statics.of(rows)
     states, stable = _judged(statics, rows, x)
     contracted = there.contracted(x[:, None])[:, 0]
-    order = np.lexsort((contracted, rows))  # of equilibria as near as each other the first
+    order = np.lexsort((contracted, rows))  # of several with equal contraction, the first
     order = order[stable[order]]
     first = np.diff(rows[order], prepend=-1) > 0
     table[rows[order][first]] = states[order][first]

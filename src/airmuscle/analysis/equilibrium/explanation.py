@@ -1,4 +1,4 @@
-"""Why a plant has no equilibrium: what each muscle pulls, and what would balance the load."""
+"""Error messages for a plant without equilibrium: muscle forces, and the force required by the load."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from .statics import Statics
 
 
 def no_equilibrium(one: Statics) -> PhysicsError:
-    """The error for one plant without a stable equilibrium, with the forces at both ends of its reach.
+    """The error for one plant without a stable equilibrium, with the forces at both ends of its range.
 
-    GeometryLimitError where its muscles have no place in common, EquilibriumError otherwise.
+    GeometryLimitError if no position is within the limits of all muscles, EquilibriumError otherwise.
     """
     kind, count = type(one.plants.mechanism).__name__, len(one.coordinates)
     if count == 0:
@@ -25,16 +25,16 @@ def no_equilibrium(one: Statics) -> PhysicsError:
     if count == 1 and not len(x):
         muscles = ", ".join(m.name for m in one.separate[0].muscles)
         return GeometryLimitError(
-            f"{kind} has no place within the contraction limits of {muscles}; change offsets, radius or arms."
+            f"{kind} has no position within the contraction limits of {muscles}; change offsets, radius or arms."
         )
     f = one.accelerations(x[None])[0] if len(x) else x
     x, f = x[np.isfinite(f).all(axis=1)], f[np.isfinite(f).all(axis=1)]
     if not len(x):
-        return EquilibriumError(f"{kind} has no equilibrium: no place can hold the given air.")
+        return EquilibriumError(f"{kind} has no equilibrium: no position permits the given air masses.")
     if not f.any():
         return EquilibriumError(
-            f"{kind} is in equilibrium at every place: no force acts on it under these inputs. Choose an initial state "
-            f"by plant.state_at(pressure=..., {one.coordinates[0].name}=...)."
+            f"{kind} is in equilibrium at every position: no force acts on it under these inputs. Choose an initial "
+            f"state by plant.state_at(pressure=..., {one.coordinates[0].name}=...)."
         )
     if count == 1:
         places, load = [x[0], x[-1]], _required_tension(one, x[0])
@@ -75,15 +75,15 @@ def _line(one: Statics, x: Array) -> str:
 
 
 def _required_tension(one: Statics, x: Array) -> str:
-    """What a single muscle would have to pull to hold the load; nothing for several muscles."""
+    """The tension of a single muscle that would hold the load; empty for several muscles."""
     plant = one.separate[0]
     if len(plant.muscles) > 1:
         return ""
     state, mechanism = one.state(one.place(x)), plant.mechanism
     inputs = dict(zip(plant.inputs, one.inputs.tolist(), strict=True))
-    found = []
+    accelerations = []
     for tension in (0.0, 1.0):
         forces = mechanism.generalised_forces(state, [tension], plant.resting_lengths)
-        found.append(float(mechanism.acceleration(state, state, forces, inputs)[one.coordinates[0].name]))
-    slope = found[1] - found[0]
-    return f" The load requires a tension of {-found[0] / slope:.6g} N." if slope else ""
+        accelerations.append(float(mechanism.acceleration(state, state, forces, inputs)[one.coordinates[0].name]))
+    slope = accelerations[1] - accelerations[0]
+    return f" The load requires a tension of {-accelerations[0] / slope:.6g} N." if slope else ""

@@ -45,7 +45,7 @@ def starts(one: Statics) -> Array:
     """Start points (K, d) within the permitted range of one plant: evenly spread contractions (additive recurrence)."""
     limits = [[float(np.asarray(end).flat[0]) for end in ends] for ends in one.contraction_limits]
     low, high = np.array(limits).T
-    high = np.minimum(high, 0.5)  # beyond this contraction a muscle has passed its greatest volume
+    high = np.minimum(high, 0.5)  # at greater contractions a muscle is beyond its maximum volume
     root = 2.0
     for _ in range(30):
         root = (1.0 + root) ** (1.0 / (low.size + 1))

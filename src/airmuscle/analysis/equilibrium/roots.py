@@ -1,4 +1,4 @@
-"""Roots of one function for each of many plants, between the places at which it was evaluated."""
+"""Roots of one function for each of many plants, between the points at which it was evaluated."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from ...core.arrays import Array
 Rows = npt.NDArray[np.intp]
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 JUMP = 1e-6
-"""What may be left at a root, relative to the median of all places; a function that has more there changes its
-sign by a jump (chosen)."""
+"""Residual at a root relative to the median of all points; with a greater residual, the sign changes by a
+discontinuity (chosen)."""
 CLOSE = 1e-13
-"""Step that ends a search for a root, relative to the initial interval; the remaining error is far less (chosen)."""
+"""Step at which a root search ends, relative to the initial interval; the remaining error is far smaller (chosen)."""
 
 
 class SingleDofPlants(Protocol):
-    """Plants with one coordinate, each a row."""
+    """Plants with one coordinate, one per row."""
 
     def of(self, rows: Rows) -> SingleDofPlants:
-        """Some of them, which may be repeated."""
+        """A selection of the plants, possibly with repetitions."""
 
     def accelerations(self, x: Array) -> Array:
-        """Acceleration of the coordinate from rest, at one place of each (N,) or at several (N, K)."""
+        """Acceleration of the coordinate from rest, at one point of each plant (N,) or at several (N, K)."""
 
 
 def balances(plants: SingleDofPlants, x: Array, f: Array) -> tuple[Rows, Array]:
-    """Every place of balance and the row of its plant, by row and place, from accelerations f (N, K) at rising x.
+    """Rows of the plants and coordinates of all roots, in ascending order, from accelerations f (N, K) at ascending x.
 
-    They are where f is 0, of a stretch in balance its two ends; one between every two places of different sign; and a
-    pair where f comes near zero, crosses it and comes back.
+    Roots are the points with f = 0 (both ends of an interval with f = 0), one point between neighbours of different
+    sign, and two points where f crosses zero twice between neighbours of equal sign.
     """
     with np.errstate(invalid="ignore", over="ignore"):
         zero = np.pad(f == 0.0, ((0, 0), (1, 1)))
@@ -53,7 +53,7 @@ def balances(plants: SingleDofPlants, x: Array, f: Array) -> tuple[Rows, Array]:
 
 
 def _roots(plants: SingleDofPlants, f: Array, rows: Rows, low: Array, high: Array) -> tuple[Rows, Array]:
-    """The roots between places of different sign; where the function passes through infinity there is none."""
+    """The roots between points of different sign; there is none where the function passes through infinity."""
     if not rows.size:
         return rows, low
     there = plants.of(rows)
@@ -66,7 +66,7 @@ def _roots(plants: SingleDofPlants, f: Array, rows: Rows, low: Array, high: Arra
 
 
 def between(plants: SingleDofPlants, low: Array, high: Array) -> Array:
-    """The roots between places (R,) of different sign: false position, the end that stays halved (Illinois)."""
+    """The roots between points (R,) of different sign by the false position method (Illinois variant)."""
     search = _Search(np.arange(low.size), low, high, plants.accelerations(low), plants.accelerations(high), low)
     close = np.maximum(CLOSE * (high - low), np.spacing(np.maximum(np.abs(low), np.abs(high))))
     found, ended = low.copy(), np.zeros(low.size, dtype=bool)
@@ -79,14 +79,14 @@ def between(plants: SingleDofPlants, low: Array, high: Array) -> Array:
         if ended.all():
             break
         search = search.narrowed(middle, at)
-        if 2 * ended.sum() > ended.size:  # the few that take longest need not keep the others waiting
+        if 2 * ended.sum() > ended.size:  # continue with the unfinished rows only
             kept = np.flatnonzero(~ended)
             plants, search, ended = plants.of(kept), search.of(kept), ended[kept]
     return found
 
 
 class _Search(NamedTuple):
-    """A search between two ends, for every row: the function there, and the place looked at last."""
+    """Bracketing interval of every row: both ends, the function values there, and the last point evaluated."""
 
     rows: Rows
     low: Array
@@ -100,13 +100,13 @@ class _Search(NamedTuple):
         return _Search(self.rows[kept], *(part[kept] for part in self[1:]))
 
     def middle(self) -> Array:
-        """Where a straight line between the ends crosses zero; an end itself where the root is within its rounding."""
+        """Zero of the secant through the ends; an end itself if the root is within its rounding error."""
         with np.errstate(all="ignore"):
             crossing = self.low + (self.high - self.low) * self.at_low / (self.at_low - self.at_high)
         return np.where(np.isfinite(crossing), np.clip(crossing, self.low, self.high), 0.5 * (self.low + self.high))
 
     def narrowed(self, middle: Array, at: Array) -> _Search:
-        """The part of each that holds the root; an end that stays twice counts for half."""
+        """The subinterval that contains the root; the value at an end that is retained twice is halved (Illinois)."""
         as_low = at * self.at_low > 0.0
         at_low = self.at_low * np.where(self.last >= self.high, 0.5, 1.0)
         at_high = self.at_high * np.where(self.last <= self.low, 0.5, 1.0)
@@ -121,7 +121,7 @@ class _Search(NamedTuple):
 
 
 def _nears_zero(f: Array) -> npt.NDArray[np.bool_]:
-    """Whether the middle of three neighbours of one sign is nearest to zero, for all of them (N, K - 2)."""
+    """Whether the second of three neighbours of equal sign is nearest to zero (N, K - 2)."""
     a, b, c = (f[:, k : k + max(f.shape[1] - 2, 0)] for k in range(3))
     one_sign = (np.sign(a) == np.sign(b)) & (np.sign(b) == np.sign(c)) & (b != 0.0)
     a, b, c = np.abs(a), np.abs(b), np.abs(c)
@@ -129,7 +129,7 @@ def _nears_zero(f: Array) -> npt.NDArray[np.bool_]:
 
 
 def _pairs(plants: SingleDofPlants, f: Array, rows: Rows, x: Array, sign: Array) -> list[tuple[Rows, Array]]:
-    """The two roots between three places x (3, R), where the function crosses zero there and comes back."""
+    """The two roots between three points x (3, R) of equal sign, if the function crosses zero twice there."""
     if not rows.size:
         return []
     turn = _across(plants.of(rows).accelerations, x[0], x[2], sign)
@@ -139,7 +139,7 @@ def _pairs(plants: SingleDofPlants, f: Array, rows: Rows, x: Array, sign: Array)
 
 
 def _across(function: Callable[[Array], Array], low: Array, high: Array, sign: Array) -> Array:
-    """A place between two at which the function has the other sign, by golden section; not a number where none is."""
+    """A point between two at which the function has the opposite sign, by golden-section search; NaN without one."""
     inner = np.stack([high - GOLDEN * (high - low), low + GOLDEN * (high - low)])
     values = np.stack([sign * function(v) for v in inner])
     turn = np.full(low.shape, np.nan)

@@ -1,4 +1,4 @@
-"""The pressure of air that is shut in a muscle at rest."""
+"""Pressure of the air enclosed in a muscle at rest."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from ...plant.plant import Plant
 from ...pneumatics.gas import absolute_pressure, gauge_pressure
 
 MAX_PRESSURE = 1e8
-"""Greatest absolute pressure [Pa] at which a mass of air is sought."""
+"""Maximum absolute pressure [Pa] of the search."""
 _TOLERANCE = 1e-13
-"""Relative error of the air mass that ends the search."""
+"""Relative error of the air mass at which the search ends."""
 
 
 def shut_air_pressure(plant: Plant, muscle: Muscle, air_mass: float, contraction: Array) -> Array:
     """Gauge pressure [Pa] of a mass of air [kg] in a muscle at rest, wall and series spring in steady state.
 
-    Contractions are arrays that broadcast with the plant's parameters; NaN where no pressure up to 1000 bar belongs to
-    the mass.
+    Contractions are arrays that broadcast with the parameters of the plant; NaN if the pressure would exceed
+    1000 bar.
     """
 
     def excess(x: Array) -> Array:
-        """log of the air that the muscle holds at an absolute pressure exp(x), less that of the given air."""
+        """Logarithm of the ratio of the air mass at the absolute pressure exp(x) to the given air mass."""
         p = gauge_pressure(np.exp(x), plant.ambient)
         own = muscle.steady_state(p, contraction)
         volume = muscle.volume(muscle.inner_contraction(contraction, own), own)
@@ -43,8 +43,8 @@ def shut_air_pressure(plant: Plant, muscle: Muscle, air_mass: float, contraction
 
 
 def _secant(excess: Callable[[Array], Array], a: Array) -> Array:
-    """The root of every element; NaN where the secant does not find it. It is exact for a rigid wall and a gas that
-    keeps to one process."""
+    """The root of every element by the secant method; NaN if it fails. For a rigid wall and a polytropic process it is
+    exact."""
     at_a = excess(a)
     b = a - at_a
     root, lost = np.full(a.shape, np.nan), np.zeros(a.shape, dtype=bool)
@@ -60,7 +60,7 @@ def _secant(excess: Callable[[Array], Array], a: Array) -> Array:
 
 
 def _bisection(excess: Callable[[Array], Array], shape: tuple[int, ...]) -> Array:
-    """The root of every element between 1 Pa and the greatest pressure; NaN where there is none."""
+    """The root of every element between 1 Pa and the maximum pressure, by bisection; NaN if there is none."""
     low, high = np.zeros(shape), np.full(shape, math.log(MAX_PRESSURE))
     possible = (excess(low) < 0.0) & (excess(high) > 0.0)
     while True:

@@ -13,7 +13,7 @@ from ...core.arrays import Array
 from ...plant.plant import Plant
 
 MARGIN = 1e-9
-"""Greatest real part of an eigenvalue, relative to the greatest eigenvalue, that counts as none (chosen)."""
+"""Real part of an eigenvalue, relative to the greatest eigenvalue, up to which it counts as zero (chosen)."""
 _functions: weakref.WeakKeyDictionary[Program, Any] = weakref.WeakKeyDictionary()
 
 
@@ -22,9 +22,9 @@ def are_stable(
 ) -> npt.NDArray[np.bool_]:
     """Whether no eigenvalue of the motion has a positive real part, for plants with parameters (R, P) at states (R, n).
 
-    The motion is that of coordinates, series springs, creep and walls. With given pressures the air follows the
-    volume, m = m_0 V/V_0; with `shut` valves its mass and temperature stay the same. Friction is left out, as it would
-    hold any place. Where the motion has no finite derivatives nothing is stable.
+    The motion is that of coordinates, series springs, creep and walls. At given pressures, the states of the air
+    are proportional to the volume, m = m_0 V/V_0; with `shut` valves they are constant. Friction is excluded, because
+    it would hold any position. A state without finite derivatives is not stable.
     """
     plant, names = compiled.system, [s.name for s in compiled.system.states]
     assert isinstance(plant, Plant)
@@ -41,13 +41,13 @@ def are_stable(
             pushed = np.einsum("rij,rj->ri", by_state[:, :, held], states[:, held])
             matrix = matrix + pushed[:, :, None] * growth[:, None, :]
     stable = np.array(np.isfinite(matrix).all(axis=(1, 2)))
-    found = np.linalg.eigvals(matrix[stable])
-    stable[stable] = found.real.max(axis=1) <= MARGIN * np.abs(found).max(axis=1)
+    eigenvalues = np.linalg.eigvals(matrix[stable])
+    stable[stable] = eigenvalues.real.max(axis=1) <= MARGIN * np.abs(eigenvalues).max(axis=1)
     return stable
 
 
 def _kinds(plant: Plant) -> tuple[set[str], set[str]]:
-    """The states of the muscles' air, and those that move."""
+    """The states of the air in the muscles, and the states of the motion."""
     air, friction = set[str](), set[str]()
     for prefix, muscle in zip(plant.prefixes, plant.muscles, strict=True):
         air |= {prefix + s.name for s in plant.gas.states(muscle.geometry.volume(0.05), plant.ambient)}
@@ -60,7 +60,7 @@ def _kinds(plant: Plant) -> tuple[set[str], set[str]]:
 def _slopes(
     compiled: CompiledSystem, free: list[int], parameters: Array, states: Array, inputs: Array
 ) -> tuple[Array, Array, Array]:
-    """Rates of f free states by all (R, f, n), the volume of every muscle (R, k), and these by states (R, k, n)."""
+    """Jacobian of the rates of f states (R, f, n), the volumes of the muscles (R, k), and their Jacobian (R, k, n)."""
     count, size = states.shape
     results = _function(compiled, free)(states.T, np.repeat(inputs[:, None], count, axis=1), parameters.T)
     by_state, volumes, growths = (r.full() for r in results)
@@ -69,7 +69,7 @@ def _slopes(
 
 
 def _function(compiled: CompiledSystem, free: list[int]) -> Any:
-    """(x, u, p) -> (df/dx of what is free, V, dV/dx), differentiated once for a structure, which says what is free."""
+    """(x, u, p) -> (df/dx of the states of the motion, V, dV/dx), differentiated once for each structure."""
     program, plant = compiled.program, compiled.system
     assert isinstance(plant, Plant)
     if program not in _functions:

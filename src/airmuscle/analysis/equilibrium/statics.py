@@ -1,4 +1,4 @@
-"""Plants at rest as functions of their coordinates: their states there, and the accelerations that are left."""
+"""Statics of plants: states at rest and residual accelerations as functions of the coordinates."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from .shut_air import shut_air_pressure
 
 Rows = npt.NDArray[np.intp]
 LOWEST_CONTRACTION = -0.5
-"""Smallest contraction [1] at which an equilibrium is sought; a geometry may be defined far beyond it (chosen)."""
+"""Smallest contraction in the search for equilibria; a geometry may be defined far below it (chosen)."""
 _NO_ARRAYS = (TypeError, ValueError, ArithmeticError, AirmuscleError)
-"""What a law raises that is written for single numbers, or that is impossible for one of the plants."""
+"""Errors of a law that accepts scalars only, or that is not defined for one of the plants."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Statics:
-    """N plants of one structure at rest, as functions of their d coordinates at K places each, x (N, K, d).
+    """N plants of one structure at rest, as functions of their d coordinates at K points each, x (N, K, d).
 
     compiled     any of the plants
     parameters   (N, P) all parameters of each
-    precomputed  (N, c) what the compiled functions need of them
-    air          of each muscle the gauge pressure [Pa] or, of air that is shut in, its mass [kg]
+    precomputed  (N, c) parameter-dependent values for the compiled functions
+    air          gauge pressure [Pa] of each muscle or, with `shut` valves, mass of its air [kg]
     inputs       (m,); air and inputs are the same for all plants
     plants       one Plant with an array (N, 1) for every parameter
     """
@@ -59,14 +59,14 @@ class Statics:
         return cls(compiled, parameters, precomputed, air, shut, inputs, _with_arrays(plant, parameters))
 
     def of(self, rows: Rows) -> Statics:
-        """Some of the plants, which may be repeated."""
+        """A selection of the plants, possibly with repetitions."""
         parameters = self.parameters[rows]
         plants = self.plants if len(self.parameters) == 1 else _with_arrays(self.plants, parameters)
         return dataclasses.replace(self, parameters=parameters, precomputed=self.precomputed[rows], plants=plants)
 
     @functools.cached_property
     def separate(self) -> list[Plant]:
-        """The plants, each with numbers."""
+        """The plants, each with scalar parameters."""
         plant = self.compiled.system
         assert isinstance(plant, Plant)
         return [tree.unflatten(plant, row.tolist()) for row in self.parameters]
@@ -93,20 +93,20 @@ class Statics:
 
     @functools.cached_property
     def contraction_limits(self) -> list[tuple[Value, Value]]:
-        """The contractions [1] between which an equilibrium of each muscle is sought."""
+        """Limits of the contraction of each muscle in the search for equilibria."""
         return [_search_range(muscle) for muscle in self.plants.muscles]
 
     def allowed(self) -> npt.NDArray[np.bool_]:
-        """Which plants (N,) take these inputs and pressures."""
-        found = np.array(np.broadcast_to(True, (len(self.parameters), 1)))
+        """Plants (N,) for which the inputs and pressures are allowed."""
+        permitted = np.array(np.broadcast_to(True, (len(self.parameters), 1)))
         for variable, value in zip(self.plants.input_variables, self.inputs, strict=True):
-            found &= (variable.minimum <= value) & (value <= variable.maximum)
+            permitted &= (variable.minimum <= value) & (value <= variable.maximum)
         for pressure in () if self.shut else self.air:
-            found &= np.asarray(absolute_pressure(pressure, self.plants.ambient)) > 0.0
-        return found[:, 0]
+            permitted &= np.asarray(absolute_pressure(pressure, self.plants.ambient)) > 0.0
+        return permitted[:, 0]
 
     def contractions(self, x: Array) -> list[Array]:
-        """Contraction [1] of every muscle (N, K)."""
+        """Contraction of every muscle (N, K)."""
         try:
             values = self.plants.mechanism.contractions(self._coordinate_values(x), self.plants.resting_lengths)
             return [np.broadcast_to(np.asarray(eps, dtype=float), x.shape[:2]) for eps in values]
@@ -118,7 +118,7 @@ class Statics:
             return list(table)
 
     def within_reach(self, x: Array) -> npt.NDArray[np.bool_]:
-        """Whether every muscle can take its contraction (N, K)."""
+        """Whether the contraction of every muscle is within its limits (N, K)."""
         inside = np.ones(x.shape[:2], dtype=bool)
         for eps, (low, high) in zip(self.contractions(x), self.contraction_limits, strict=True):
             inside &= (eps >= low) & (eps <= high)
@@ -132,7 +132,7 @@ class Statics:
         return {c.name: x[..., i] for i, c in enumerate(self.coordinates)}
 
     def states(self, x: Array) -> Array:
-        """The states at rest (N, K, n); NaN where a plant cannot be."""
+        """The states at rest (N, K, n); NaN at impossible coordinates."""
         try:
             with np.errstate(all="ignore"):
                 return self._states(x)
@@ -161,7 +161,7 @@ class Statics:
         return table
 
     def _states_one_by_one(self, x: Array) -> Array:
-        """The same of plants with laws that take no arrays."""
+        """The states at rest of plants with laws that accept scalars only."""
         table = np.full((*x.shape[:2], len(self.names)), np.nan)
         for i, k in np.ndindex(*x.shape[:2]):
             plant, place = self.separate[i], self.place(x[i, k])
@@ -178,7 +178,7 @@ class Statics:
         return table
 
     def accelerations(self, x: Array) -> Array:
-        """Acceleration of every coordinate from rest (N, K, d); NaN where a plant cannot be."""
+        """Acceleration of every coordinate from rest (N, K, d); NaN at impossible coordinates."""
         states = np.ascontiguousarray(self.states(x))
         rates = np.empty_like(states)
         if states.size:
@@ -186,7 +186,7 @@ class Statics:
         return np.asarray(rates[..., [self.names.index(c.speed) for c in self.coordinates]])
 
     def contracted(self, x: Array) -> Array:
-        """The sum of squared contractions (N, K): the distance of a place from full length."""
+        """Sum of squared contractions (N, K): the distance from full length."""
         return sum((eps**2 for eps in self.contractions(x)), np.zeros(x.shape[:2]))
 
     def state(self, x: Mapping[str, float]) -> dict[str, float]:
@@ -196,8 +196,8 @@ class Statics:
 
 
 def _with_arrays(plant: Plant, parameters: Array) -> Plant:
-    """The plant with an array (N, 1) for every parameter, also of one plant: it then rests where it would beside
-    others to the last digit, which a power of numbers would not give."""
+    """The plant with an array (N, 1) for every parameter, also if N = 1: powers of scalars and arrays differ in the
+    last digit, and the equilibrium of a plant must not depend on the number of plants."""
     return tree.unflatten(plant, [column[:, None].copy() for column in parameters.T])
 
 

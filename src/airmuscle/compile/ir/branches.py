@@ -1,11 +1,12 @@
-"""Sparsity from zero factors: branches that need not be evaluated.
+"""Sparsity from zero factors: conditional evaluation of instructions that are multiplied by zero.
 
-A *gate* is such a factor: what a command alone decides, how far a number lies outside its clamp, the condition of a
-choice. With the gate at zero (a clamped number is then itself, and its comparisons
-are known) some results are known beforehand, and what only they need is superfluous. These instructions are set apart,
-to be branched around.
+A *gate* is such a factor: a value that depends on the commands only, the distance of a value from its clamping
+interval, or the condition of a selection. If the gate is zero (a clamped value then equals the unclamped value, and the
+related comparisons have known results), some results are known without evaluation, and the instructions that only they
+use are redundant. These instructions are collected in blocks that a branch skips.
 
-Both ways give the same numbers, unless what is skipped is not finite: zero times that would be NaN, and here is zero.
+Evaluation with and without the branch gives the same values, except where a skipped value is not finite: its product
+with zero would be NaN and is zero here.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ from .scheduling import Gates, IndependentGroup, Item, in_order
 
 ZERO, ONE = ("c", 0.0), ("c", 1.0)
 STEADY, COMMANDED, VARYING = range(3)
-"""What parameters are, what a command decides, and what has to do with states."""
+"""Dependence of a value: on parameters only, on commands (and parameters) only, or on states."""
 WORTH, WORTH_OF_CHOICES = 8, 30
-"""Operations that must be saved for a branch to pay; more where the states decide how often (measured)."""
+"""Least cost of the skipped operations for which a branch saves time; greater for conditions on states (measured)."""
 _SLOW = {Operation.DIVIDE, Operation.INVERSE, Operation.SQRT}
 _SIMPLE = {
     Operation.ADD, Operation.SUBTRACT, Operation.MULTIPLY, Operation.NEGATE, Operation.SQUARE, Operation.TWICE,
@@ -35,7 +36,7 @@ _EXTREMES = (Operation.MAXIMUM, Operation.MINIMUM)
 
 @dataclasses.dataclass(frozen=True)
 class _Case:
-    """Gates, and what is known of other results where all of them are zero."""
+    """Gates, the results that are known if all of them are zero, and the least cost of skipped operations."""
 
     gates: Gates
     facts: Mapping[Operand, Operand] = dataclasses.field(default_factory=dict)
@@ -43,10 +44,10 @@ class _Case:
 
 
 def skipping(code: Code, level: Callable[[Operand], int], early: frozenset[Operand] = frozenset()) -> list[Item]:
-    """The instructions of code in an order that it can be run in, those that a zero makes superfluous set apart.
+    """The instructions of `code` in an executable order, with those that a zero gate makes redundant in blocks.
 
-    `level` says what an input is: STEADY, COMMANDED, or VARYING. What depends on a command, and on nothing that
-    varies, may be a gate. What is `early` shares no piece with the rest, so that it can go ahead.
+    `level` classifies an input: STEADY, COMMANDED or VARYING. A result that depends on commands and on no varying
+    input may be a gate. Instructions in `early` do not share a block with others, so that they can be executed first.
     """
     search = _Search(code, early)
     for case in _cases(code.body, _Comparisons(code.body), level):
@@ -55,7 +56,7 @@ def skipping(code: Code, level: Callable[[Operand], int], early: frozenset[Opera
 
 
 def _cases(body: Sequence[Instruction], comparisons: _Comparisons, level: Callable[[Operand], int]) -> Iterable[_Case]:
-    """What may be a gate: commands first, then clamps and conditions."""
+    """The candidate gates: commands first, then clamps and conditions."""
     levels: dict[Operand, int] = {}
 
     def of(operand: Operand) -> int:
@@ -79,7 +80,7 @@ def _cases(body: Sequence[Instruction], comparisons: _Comparisons, level: Callab
 
 
 class _Comparisons:
-    """What comparisons say of numbers that are clamped."""
+    """Results of comparisons that follow if values lie within their clamping intervals."""
 
     def __init__(self, body: Sequence[Instruction]) -> None:
         self._line = {line.result: line for line in body}
@@ -87,9 +88,9 @@ class _Comparisons:
         self._below = {line.arguments: line.result for line in body if line.operation == Operation.LESS}
 
     def _of(self, gates: Gates, ordered: Iterable[tuple[Operand, Operand]], facts: dict[Operand, Operand]) -> _Case:
-        """With the gates at zero each `low` is not above its `high`.
+        """The case in which the gates are zero and therefore low <= high for each ordered pair.
 
-        Whether high is not above low is not settled by that, where they are equal: such a comparison is a gate too.
+        high <= low remains undetermined, because both may be equal: such a comparison becomes a further gate.
         """
         further: dict[Operand, Operand] = {}
         for low, high in ordered:
@@ -102,7 +103,7 @@ class _Comparisons:
         return _Case((*gates, *further), facts | further)
 
     def inside(self, difference: Instruction) -> list[_Case]:
-        """The case of a number within its clamp, if what is subtracted are these two."""
+        """The case of a value within its clamping interval, if `difference` is a value minus its clamped value."""
         for number, clamped in (difference.arguments, difference.arguments[::-1]):
             facts: dict[Operand, Operand] = {}
             ordered: list[tuple[Operand, Operand]] = []
@@ -123,7 +124,7 @@ class _Comparisons:
 
 
 class _Search:
-    """Case by case, what is superfluous in it, if that is worth a branch."""
+    """Search for the redundant instructions of each case, if skipping them is worth a branch."""
 
     def __init__(self, code: Code, early: frozenset[Operand]) -> None:
         self.apart = IndependentGroup({}, {})
@@ -137,14 +138,14 @@ class _Search:
         self._kept: set[Operand] = set()
 
     def set_apart(self, case: _Case) -> None:
-        """Set apart what is superfluous where the gates are zero.
+        """Collect the instructions that are redundant if the gates are zero.
 
-        Gates themselves are never set apart, nor the clamps that they are made of.
+        The gates and the clamped values from which they are computed are always evaluated.
         """
         if any(gate in self.apart.gates for gate in case.gates):
             return
         needed = {*case.gates, *(operand for operand, value in case.facts.items() if value[0] != "c")}
-        ahead = frozenset() if self._early.issuperset(case.gates) else self._early  # what goes ahead cannot wait
+        ahead = frozenset() if self._early.issuperset(case.gates) else self._early  # they cannot wait for a gate
         superfluous, instead = self._superfluous(self._known(case), self._kept | needed | ahead)
         if sum(_cost(self._line[operand]) for operand in superfluous) >= case.worth:
             self._kept |= needed
@@ -152,7 +153,7 @@ class _Search:
             self.apart.instead.update(instead)
 
     def _known(self, case: _Case) -> dict[Operand, Operand]:
-        """Results that are a constant, or that of another instruction, in this case."""
+        """Results that equal a constant or another result in this case."""
         known = {**dict.fromkeys(case.gates, ZERO), **case.facts}
         waiting = [line for operand in known for line in self._users.get(operand, ())]
         while waiting:
@@ -167,14 +168,14 @@ class _Search:
     def _superfluous(
         self, known: Mapping[Operand, Operand], kept: set[Operand]
     ) -> tuple[set[Operand], dict[Operand, Operand]]:
-        """Results that need not be computed, given what is known; and what those are that others still ask for.
+        """Redundant results, given the known ones; and the known values of those that remaining instructions use.
 
-        What is `kept` is computed in any case.
+        The results in `kept` are always computed.
         """
         times: dict[Operand, int] = {}
 
         def asked(operand: Operand, more: int = 0) -> int:
-            """How often a result is asked for by what is not superfluous."""
+            """Number of uses of a result by instructions that are not redundant."""
             if operand not in times:
                 times[operand] = len(self._users.get(operand, ())) + (operand in kept) + (operand in self._outputs)
             times[operand] += more
@@ -198,7 +199,7 @@ class _Search:
         return superfluous, {o: v for o, v in named.items() if asked(o)}
 
     def _worth_naming(self, operand: Operand, value: Operand) -> bool:
-        """Whether it helps to know a result: a sum that is one of its parts is better computed."""
+        """Whether a known result is useful: a sum that equals one of its terms is cheaper to compute."""
         if operand not in self._line or operand in self.apart.gates:
             return False
         return value[0] == "c" or self._line[operand].operation == Operation.SELECT
@@ -209,7 +210,7 @@ def _cost(line: Instruction) -> int:
 
 
 def _value(operation: Operation, x: Sequence[Operand]) -> Operand | None:
-    """What an operation gives if that is a constant or one of its operands whatever the others are; else None."""
+    """The result of an operation if it is a constant or an operand for any value of the others; else None."""
     zero, one = ZERO in x, ONE in x
     if operation in (Operation.MULTIPLY, Operation.AND):
         return ZERO if zero else x[x[0] == ONE] if one else None

@@ -1,4 +1,4 @@
-"""CasADi expressions as a list of instructions, with what depends on parameters alone set apart."""
+"""CasADi expressions as a list of instructions; those that depend on parameters only are separated."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ _CASADI_NAMES = {
     Operation.CONSTANT_POWER: "CONSTPOW", Operation.LESS: "LT", Operation.LESS_EQUAL: "LE", Operation.EQUAL: "EQ",
     Operation.NOT_EQUAL: "NE", Operation.MASK: "IF_ELSE_ZERO",
 }  # fmt: skip
-"""Names that CasADi spells otherwise, without their prefix OP_."""
+"""Names in CasADi that differ, without their prefix OP_."""
 _OWN = (Operation.SELECT, Operation.MAXIMUM, Operation.MINIMUM)
 _COMPARE = (Operation.LESS_EQUAL, Operation.LESS)
 
@@ -83,7 +83,7 @@ CALLED = frozenset({
 
 
 class Instruction(NamedTuple):
-    """`result = operation(arguments)`, once each."""
+    """`result = operation(arguments)`; every result is assigned once."""
 
     operation: Operation
     result: Operand
@@ -92,7 +92,7 @@ class Instruction(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Code:
-    """Instructions in order, and where their results go: (output number, index, operand)."""
+    """Instructions in execution order, and the destinations of results: (output number, index, operand)."""
 
     body: tuple[Instruction, ...]
     outputs: tuple[tuple[int, int, Operand], ...]
@@ -100,7 +100,7 @@ class Code:
 
 @functools.cache
 def _casadi_operations() -> dict[int, Operation]:
-    """Operations by CasADi's number."""
+    """Operations by their number in CasADi."""
     import casadi
 
     named = {
@@ -115,7 +115,7 @@ def instructions(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
 
 
 def recorded(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
-    """The instructions as CasADi has them, the larger and smaller of two still as choices, which have derivatives."""
+    """The instructions as recorded by CasADi; maxima and minima are still selections, which can be differentiated."""
     import casadi
 
     operations = _casadi_operations()
@@ -142,7 +142,7 @@ def recorded(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
 
 
 def finished(code: Code) -> Code:
-    """Code as it is printed: choices found, what nobody needs left out."""
+    """Code ready for printing: maxima and minima are recognised, unused instructions are removed."""
     body = _selects(code.body)
     by_result = {line.result: line for line in body}
     chosen: list[Instruction] = []
@@ -155,7 +155,7 @@ def finished(code: Code) -> Code:
 
 
 def _selects(body: Sequence[Instruction]) -> list[Instruction]:
-    """Each sum of a mask and its opposite mask as one Operation.SELECT."""
+    """The instructions with each sum of a mask and its complementary mask as one Operation.SELECT."""
     by_result = {line.result: line for line in body}
 
     def mask(operand: Operand) -> Instruction | None:
@@ -182,10 +182,10 @@ def _selects(body: Sequence[Instruction]) -> list[Instruction]:
 
 
 def _extreme_of_zero(line: Instruction, by_result: Mapping[Operand, Instruction]) -> list[Instruction]:
-    """A mask that hides a number below zero, or above it, as the larger or smaller of the two; so too in a product,
+    """A mask of the positive or negative part of a value as a maximum or minimum with zero; also within a product,
     which can then be fused with a sum.
 
-    NaN is hidden or shown as by the mask: where the comparison fails, the second of the two is chosen.
+    NaN is treated as by the mask: if the comparison is false, the second operand is selected.
     """
     (condition, masked), zero = line.arguments, ("c", 0.0)
     test, product = by_result.get(condition), by_result.get(masked)
@@ -208,7 +208,7 @@ def _extreme_of_zero(line: Instruction, by_result: Mapping[Operand, Instruction]
 
 
 def _extreme(line: Instruction, by_result: Mapping[Operand, Instruction]) -> Instruction:
-    """A Operation.SELECT of the larger or smaller of the two that its condition compares, as what it is."""
+    """An Operation.SELECT of the greater or smaller of two compared values as Operation.MAXIMUM or MINIMUM."""
     condition, a, b = line.arguments
     test = by_result.get(condition)
     if test is not None and test.operation in _COMPARE:
@@ -230,9 +230,10 @@ def _without_unused(body: list[Instruction], outputs: tuple[tuple[int, int, Oper
 
 
 def hoisted(code: Code, parameter_input: int) -> tuple[Code, tuple[Instruction, ...], tuple[Operand, ...]]:
-    """Code without what depends on parameters alone; that part; and the operands it hands over, in order.
+    """Loop-invariant code motion: the remaining code, the instructions that depend on parameters only, their results.
 
-    A division by such a quantity becomes a product with its inverse, which is handed over instead.
+    The results are the operands that the remaining code uses, in order. A division by such an operand becomes a product
+    with its precomputed inverse.
     """
     varies: dict[Operand, bool] = {}
 

@@ -1,8 +1,8 @@
 """Exact derivatives of a list of instructions, by elimination on its graph.
 
-Every instruction is a vertex, every dependence an edge that carries a local partial derivative. A vertex v between
-p and s is eliminated by c_sp += c_sv c_vp; at the end edges lead from the inputs to the results alone. Always the
-vertex with the fewest products goes next (Markowitz), which needs fewer operations than forward or reverse mode.
+Every instruction is a vertex, every dependence an edge with a local partial derivative. A vertex v between p and s is
+eliminated by c_sp += c_sv c_vp; finally, all edges lead from inputs to results. The next vertex is always one with the
+fewest products (Markowitz criterion), which requires fewer operations than the forward or reverse mode.
 
 Reference: Griewank, A., Walther, A., Evaluating Derivatives, 2nd ed., SIAM 2008, chapters 9 and 10.
 """
@@ -16,7 +16,7 @@ from ...core.errors import TraceError
 from .instructions import Instruction, Operand, Operation
 
 Row = dict[Operand, Operand]
-"""The derivatives of one result by the inputs that it depends on."""
+"""The derivatives of one result with respect to the inputs on which it depends."""
 ZERO, ONE, LESS, TWO, HALF = (("c", value) for value in (0.0, 1.0, -1.0, 2.0, 0.5))
 _COMMUTE = (Operation.ADD, Operation.MULTIPLY)
 _CONDITIONS = (
@@ -31,7 +31,7 @@ _CONDITIONS = (
 
 
 class Tape:
-    """Instructions under construction; what is computed once is not computed again, nor are trivial products."""
+    """Instruction list under construction, with elimination of common subexpressions and trivial products."""
 
     def __init__(self, body: Iterable[Instruction]) -> None:
         self.body = list(body)
@@ -47,11 +47,11 @@ class Tape:
             self._masks.add(line.result)
 
     def take(self, longer: Tape) -> None:
-        """Go on from where another one that began as this stands."""
+        """Replace the content by that of a continued copy of this tape."""
         self.body, self._known, self._masks = longer.body, longer._known, longer._masks
 
     def put(self, operation: Operation, *arguments: Operand) -> Operand:
-        """The result of an operation, which is appended unless it is known."""
+        """The result of an operation; the instruction is appended unless it exists already."""
         if operation in _COMMUTE and (operation, arguments[::-1]) in self._known:
             arguments = arguments[::-1]
         if (operation, arguments) not in self._known:
@@ -69,7 +69,7 @@ class Tape:
         return ("c", -a[1]) if a[0] == "c" else self.put(Operation.NEGATE, a)
 
     def times(self, a: Operand, b: Operand) -> Operand:
-        """a b; where one is a condition, the other or zero, so that an infinite slope not taken does no harm."""
+        """a b; a product with a condition is a mask, so that an infinite slope in an unselected branch is masked."""
         if b[0] == "c" or (a[0] != "c" and b in self._masks):
             a, b = b, a
         if a[0] == b[0] == "c":
@@ -140,16 +140,16 @@ _RULES: dict[Operation, Rule] = {
 
 
 def derivatives(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand]) -> list[Row]:
-    """The derivatives of results by inputs, whose instructions are appended to the tape.
+    """The derivatives of results with respect to inputs, whose instructions are appended to the tape.
 
-    Vertices that are alike in cost go in the order of the instructions or against it, whichever needs fewer operations.
-    Raises TraceError for an operation that has no rule.
+    Vertices of equal cost are eliminated in the order of the instructions or in reverse order, whichever requires fewer
+    operations. Raises TraceError for an operation without a differentiation rule.
     """
     tries = [Tape(tape.body), Tape(tape.body)]
-    found = [_eliminated(one, results, inputs, sign) for one, sign in zip(tries, (1, -1), strict=True)]
+    candidates = [_eliminated(one, results, inputs, sign) for one, sign in zip(tries, (1, -1), strict=True)]
     best = min((0, 1), key=lambda i: len(tries[i].body))
     tape.take(tries[best])
-    return found[best]
+    return candidates[best]
 
 
 def _eliminated(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand], sign: int) -> list[Row]:
@@ -167,9 +167,9 @@ def _eliminated(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand
     queue = [entry(v) for v in into if v not in ends]
     heapq.heapify(queue)
     while queue:
-        found = heapq.heappop(queue)
-        vertex = found[2]
-        if vertex in into and found == entry(vertex):
+        current = heapq.heappop(queue)
+        vertex = current[2]
+        if vertex in into and current == entry(vertex):
             for changed in _eliminate(tape, into, out, vertex):
                 if changed in order and changed in into:
                     heapq.heappush(queue, entry(changed))
@@ -179,7 +179,7 @@ def _eliminated(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand
 def _graph(
     tape: Tape, results: set[Operand], inputs: set[Operand]
 ) -> tuple[dict[Operand, Row], dict[Operand, set[Operand]]]:
-    """Edges into every vertex that depends on an input and reaches a result, and where each one's edges lead."""
+    """Incoming edges of every vertex that depends on an input and affects a result, and the successors of each."""
     moved, needed = set(inputs), set(results)
     lines = list(tape.body)
     for line in lines:
@@ -208,7 +208,7 @@ def _graph(
 
 
 def _eliminate(tape: Tape, into: dict[Operand, Row], out: dict[Operand, set[Operand]], vertex: Operand) -> set[Operand]:
-    """Take a vertex out; the vertices whose edges changed."""
+    """Eliminate a vertex and return the vertices whose edges have changed."""
     row, targets = into.pop(vertex), sorted(out.pop(vertex, ()), key=str)
     for source in row:
         out[source].discard(vertex)

@@ -1,4 +1,4 @@
-"""Instructions that may be skipped, in pieces between the others: each after what it needs, as late as may be."""
+"""Scheduling of instructions and conditional blocks: each after its operands and as late as possible."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ZERO = ("c", 0.0)
 
 @dataclasses.dataclass(frozen=True)
 class ConditionalBlock:
-    """Instructions that need not run where all gates are zero; what those results that others use are then."""
+    """Instructions that are skipped if all gates are zero, and the values of their results in that case."""
 
     gates: Gates
     body: tuple[Instruction, ...]
@@ -28,16 +28,17 @@ _Piece = tuple[Gates, bool]
 
 @dataclasses.dataclass(frozen=True)
 class IndependentGroup:
-    """Which results need not be computed where their gates are zero, and what is known of them then."""
+    """Results that need not be computed if their gates are zero, and their known values in that case."""
 
     gates: dict[Operand, Gates]
     instead: dict[Operand, Operand]
 
 
 def in_order(code: Code, apart: IndependentGroup, early: frozenset[Operand]) -> list[Item]:
-    """All instructions, each after what it needs and else as they were; a piece stands before its first user.
+    """All instructions in their original order as far as operands permit; a block directly precedes its first use.
 
-    What is computed long before it is needed would wait in memory. What is `early` shares no piece with the rest.
+    A value that is computed long before its use would be spilled to memory. Instructions in `early` do not share a
+    block with others.
     """
     items = _Pieces(code, apart, early).found()
     owner = {result: k for k, item in enumerate(items) for result in _results(item)}
@@ -72,8 +73,9 @@ def _needs(item: Item) -> Iterable[Operand]:
 
 
 def _turns(code: Code, items: Sequence[Item]) -> list[float]:
-    """When each item comes if it can: an instruction where it was, a piece before the first that uses it, and functions
-    of the C library at once, because what is in registers does not outlive their call.
+    """Priority of each item: the original position of an instruction, the position before the first use of a block.
+
+    Calls of the C library are executed as early as possible, because values in registers do not survive a call.
     """
     place = {line.result: k for k, line in enumerate(code.body)}
     first: dict[Operand, int] = {}
@@ -91,7 +93,7 @@ def _turns(code: Code, items: Sequence[Item]) -> list[float]:
 
 
 class _Pieces:
-    """The pieces that results set apart fall into: as few as what they need of others allows."""
+    """Partition of the conditional results into as few blocks as their dependences allow."""
 
     def __init__(self, code: Code, apart: IndependentGroup, early: frozenset[Operand]) -> None:
         self._code, self._apart, self._early = code, apart, early
@@ -105,14 +107,16 @@ class _Pieces:
         self._results = {line.result for line in code.body}
 
     def found(self) -> list[Item]:
-        """All instructions, in some order that they can be run in."""
+        """All instructions and blocks, in an executable order."""
         items: list[Item] = []
         left = list(self._code.body)
         while left:
             left = self._straight(left, items)
             ready = self._ready(left)
             if left and not ready:
-                raise TraceError("instructions wait for each other; this is a fault of the program, please report it.")
+                raise TraceError(
+                    "the instructions have a cyclic dependence; this is an error in airmuscle, please report it."
+                )
             for (gates, _), body in ready.items():
                 items.append(ConditionalBlock(gates, tuple(body), self._seen(body)))
                 self._done.update(line.result for line in body)
@@ -123,7 +127,7 @@ class _Pieces:
         return all(operand in self._done or operand not in self._results for operand in operands)
 
     def _straight(self, left: Sequence[Instruction], items: list[Item]) -> list[Instruction]:
-        """Append what needs no gate and nothing that waits for one; the rest."""
+        """Append the unconditional instructions whose operands are available; return the remaining ones."""
         waiting = []
         for line in left:
             if line.result in self._apart.gates or not self._available(line.arguments):
@@ -134,12 +138,12 @@ class _Pieces:
         return waiting
 
     def _ready(self, left: Sequence[Instruction]) -> dict[_Piece, list[Instruction]]:
-        """The pieces all of which can run, from what is done and from themselves; or what of one can, if none is whole.
+        """The blocks that are executable completely; if there are none, the executable part of one block.
 
-        A piece is what is left of some gates, early or not.
+        A block contains the remaining instructions with the same gates, separately for early ones.
         """
         rest: dict[_Piece, int] = {}
-        found: dict[_Piece, list[Instruction]] = {}
+        parts: dict[_Piece, list[Instruction]] = {}
         within: dict[_Piece, set[Operand]] = {}
         for line in left:
             gates = self._apart.gates.get(line.result)
@@ -151,12 +155,12 @@ class _Pieces:
             instead = self._apart.instead.get(line.result, ZERO)
             if self._available([*gates, instead, *(a for a in line.arguments if a not in own)]):
                 own.add(line.result)
-                found.setdefault(piece, []).append(line)
-        whole = {piece: body for piece, body in found.items() if len(body) == rest[piece]}
-        return whole or dict(list(found.items())[:1])
+                parts.setdefault(piece, []).append(line)
+        whole = {piece: body for piece, body in parts.items() if len(body) == rest[piece]}
+        return whole or dict(list(parts.items())[:1])
 
     def _seen(self, body: Sequence[Instruction]) -> tuple[tuple[Operand, Operand], ...]:
-        """The results of a piece that others use, and what they are where it is skipped."""
+        """The results of a block that other instructions use, with their values if the block is skipped."""
         own = {line.result for line in body}
         return tuple(
             (line.result, self._apart.instead.get(line.result, ZERO))

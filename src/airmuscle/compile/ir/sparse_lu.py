@@ -1,7 +1,7 @@
-"""Symbolic factors L D U of d I - J, with L and U of unit diagonal; sparsity worked out while printing; no pivoting.
+"""Symbolic sparse factorisation L D U of d I - J without pivoting; L and U have unit diagonals.
 
-Unit diagonals leave one multiplication by 1/D between the two substitutions, where all states pass side by side: what
-a step waits for is the longest chain, not the sum of operations.
+With unit diagonals, the two substitutions are separated by one multiplication by 1/D, which is independent for all
+states: the latency of a solution is determined by the longest chain of dependent operations, not by their number.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ Place = tuple[int, int]
 
 
 def distinct(expressions: Sequence[Any]) -> tuple[Any, tuple[int, ...]]:
-    """The expressions that differ, as one vector, and where in it each of those given stands.
+    """The distinct expressions as one vector, and the index of each given expression in it.
 
-    A system with its sensitivities repeats one block along the diagonal: it is computed and factorised once.
+    A system with its sensitivities has equal diagonal blocks: they are computed and factorised once.
     """
     import casadi
 
@@ -26,9 +26,9 @@ def distinct(expressions: Sequence[Any]) -> tuple[Any, tuple[int, ...]]:
 
 
 class Factors:
-    """The factors of d I - J, whose non-zeros stand at `places`, and which of J's distinct values stands in each.
+    """The factors of d I - J; `places` are the non-zero elements of J, `slots` the indices of their distinct values.
 
-    `values` are the distinct factors in terms of the symbols `j` of J's distinct values and `d`.
+    `values` are the distinct factors as expressions of `d` and of the symbols `j` of the distinct values of J.
     """
 
     def __init__(self, places: Sequence[Place], slots: Sequence[int], size: int) -> None:
@@ -60,7 +60,7 @@ class Factors:
 
 
 def _factorise(a: dict[Place, Any], order: Sequence[int]) -> None:
-    """Put L below the diagonal of the given order, U above it, and the inverse of D on it."""
+    """Replace the matrix by L below the diagonal (in the given order), U above it, and the inverse of D on it."""
     import casadi
 
     for n, k in enumerate(order):
@@ -78,9 +78,10 @@ def _factorise(a: dict[Place, Any], order: Sequence[int]) -> None:
 
 
 def _order(places: Iterable[Place], size: int) -> tuple[int, ...]:
-    """The states in the order of elimination: always the one that may fill in the fewest places (Markowitz).
+    """The order of elimination: always the state with the smallest possible fill-in (Markowitz criterion).
 
-    Of equals, the one that has waited for the fewest others: what is independent is then eliminated side by side.
+    Of several, the one with the shortest chain of preceding eliminations, so that independent eliminations run in
+    parallel.
     """
     rows = [{j for i, j in places if i == k and j != k} for k in range(size)]
     columns = [{i for i, j in places if j == k and i != k} for k in range(size)]

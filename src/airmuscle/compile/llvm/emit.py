@@ -1,4 +1,4 @@
-"""Instructions printed as LLVM IR: straight lines, and branches around what may be skipped."""
+"""LLVM intermediate representation of instructions: straight-line code, and branches around conditional blocks."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from ..ir.scheduling import ConditionalBlock, Item
 from .types import DOUBLE, LlvmType
 
 FLAGS = "nsz arcp contract reassoc afn"
-"""Fast arithmetic that keeps NaN and infinity: a failed step must still show (never nnan, ninf)."""
+"""Fast-math flags without nnan and ninf: a failed step must remain detectable by NaN or infinity."""
 
 LEVEL = {"u": COMMANDED, "w": STEADY, "h": STEADY}
-"""Which arguments do not vary with the states: inputs, their slopes, and the step."""
+"""Arguments that do not depend on the states: inputs, their slopes, and the step size."""
 
 _BINARY = {Operation.ADD: "fadd", Operation.SUBTRACT: "fsub", Operation.MULTIPLY: "fmul", Operation.DIVIDE: "fdiv"}
 _INTRINSICS = {Operation.SQRT: "sqrt", Operation.ABS: "fabs"}
@@ -28,14 +28,14 @@ _CALLS = {
 _COMPARISONS = {Operation.LESS_EQUAL: "ole", Operation.LESS: "olt", Operation.EQUAL: "oeq", Operation.NOT_EQUAL: "une"}
 _OF_ONE = (*sorted(_CALLS.values()), *(DOUBLE.intrinsic(name) for name in _INTRINSICS.values()))
 DECLARED = "".join(f"declare double @{name}(double)\n" for name in _OF_ONE) + "declare double @pow(double, double)\n"
-"""Functions that printed ones may call, as LLVM wants to know them."""
+"""Declarations of the functions that printed code may call."""
 
 
 class FunctionBody:
-    """The lines of one LLVM function under construction; what is computed once is not computed again.
+    """The lines of one LLVM function under construction, with elimination of common subexpressions.
 
-    Every value is a `number`. In lanes, functions that LLVM has not are called by the names in `needed`, which
-    `elementary` prints.
+    Every value has the type `number`. In lanes, functions that are not LLVM intrinsics are called by the names in
+    `needed`, whose definitions `vector_math` prints.
     """
 
     def __init__(self, scalars: Sequence[str] = (), number: LlvmType = DOUBLE) -> None:
@@ -48,7 +48,7 @@ class FunctionBody:
         self._constants: dict[str, float] = {}
 
     def put(self, expression: str) -> str:
-        """The name of the value of `expression`, which is computed unless it is known."""
+        """The name of the value of `expression`; the instruction is appended unless it exists already."""
         if expression not in self._known:
             self._known[expression] = self._name()
             self.lines.append(f"  {self._known[expression]} = {expression}")
@@ -59,15 +59,15 @@ class FunctionBody:
         return f"%v{self._named}"
 
     def constant(self, value: float) -> str:
-        """A constant; in lanes the same in all of them, which LLVM sees through."""
+        """A constant; in lanes a splat, which LLVM recognises as a constant."""
         number = self.number
-        found = number.literal(value)
+        result = number.literal(value)
         if number.lanes > 1:
-            first = self.put(f"insertelement {number.text} poison, {number.element} {found}, i32 0")
+            first = self.put(f"insertelement {number.text} poison, {number.element} {result}, i32 0")
             places = f"<{number.lanes} x i32> zeroinitializer"
-            found = self.put(f"shufflevector {number.text} {first}, {number.text} poison, {places}")
-        self._constants[found] = value
-        return found
+            result = self.put(f"shufflevector {number.text} {first}, {number.text} poison, {places}")
+        self._constants[result] = value
+        return result
 
     def load(self, array: str, index: int) -> str:
         """The value of an array element, or of a scalar argument."""
@@ -88,7 +88,7 @@ class FunctionBody:
         return self.put(f"select {number.mask} {test}, {number.text} {when_true}, {number.text} {when_false}")
 
     def call(self, function: str, x: Sequence[str]) -> str:
-        """A function of the C library, or what stands for it in lanes."""
+        """Call of a function of the C library, or of its vectorised replacement in lanes."""
         number = self.number
         arguments = ", ".join(f"{number.text} {a}" for a in x)
         if number == DOUBLE:
@@ -97,30 +97,30 @@ class FunctionBody:
         return self.put(f"call {number.text} @{number.function(function)}({arguments})")
 
     def intrinsic(self, name: str, x: Sequence[str], flags: str = FLAGS) -> str:
-        """A function that LLVM has."""
+        """Call of an LLVM intrinsic."""
         arguments = ", ".join(f"{self.number.text} {a}" for a in x)
         return self.put(f"call {flags} {self.number.text} @{self.number.intrinsic(name)}({arguments})")
 
     def power(self, base: str, exponent: str) -> str:
-        """base**exponent; in lanes whole and half constants are products, as LLVM makes them of one number."""
+        """base**exponent; in lanes, integer and half-integer constants give products, as LLVM does for scalars."""
         value = self._constants.get(exponent)
         if self.number == DOUBLE or value is None or abs(value) > 16 or not (2 * value).is_integer():
             return self.call("pow", (base, exponent))
-        found, square, left = self.constant(1.0), base, int(abs(value))
+        result, square, left = self.constant(1.0), base, int(abs(value))
         while left:
             if left % 2:
-                found = self.put(f"fmul {FLAGS} {self.number.text} {found}, {square}")
+                result = self.put(f"fmul {FLAGS} {self.number.text} {result}, {square}")
             square, left = self.put(f"fmul {FLAGS} {self.number.text} {square}, {square}"), left // 2
         if abs(value) % 1:
-            found = self.put(f"fmul {FLAGS} {self.number.text} {found}, {self.intrinsic('sqrt', (base,))}")
-        return found if value >= 0 else self.put(f"fdiv {FLAGS} {self.number.text} {self.constant(1.0)}, {found}")
+            result = self.put(f"fmul {FLAGS} {self.number.text} {result}, {self.intrinsic('sqrt', (base,))}")
+        return result if value >= 0 else self.put(f"fdiv {FLAGS} {self.number.text} {self.constant(1.0)}, {result}")
 
     def unless_zero(
         self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
     ) -> dict[Operand, str]:
-        """What `compute` appends and returns where one of `gates` is not zero, and elsewhere `instead`.
+        """The results that `compute` appends and returns if one of `gates` is not zero, otherwise those of `instead`.
 
-        In lanes it is computed if any of them needs it; a lane that does not has what it has alone.
+        In lanes, the block is executed if any lane requires it; the other lanes keep the values of `instead`.
         """
         number, here = self.number, self._name()[1:]
         self.lines += [f"  br label %{here}.if", f"{here}.if:"]
@@ -131,24 +131,24 @@ class FunctionBody:
             bits = self.put(f"bitcast {number.mask} {test} to i{number.lanes}")
             any_lane = self.put(f"icmp ne i{number.lanes} {bits}, 0")
         self.lines += [f"  br i1 {any_lane}, label %{here}.then, label %{here}.end", f"{here}.then:"]
-        outside, self._known = self._known, dict(self._known)  # what is computed in here is not known out there
-        found = compute()
+        outside, self._known = self._known, dict(self._known)  # values of the block are not available after it
+        inside = compute()
         if number.lanes > 1:
             for operand, value in instead.items():
-                found[operand] = self.put(
-                    f"select {number.mask} {test}, {number.text} {found[operand]}, {number.text} {value}"
+                inside[operand] = self.put(
+                    f"select {number.mask} {test}, {number.text} {inside[operand]}, {number.text} {value}"
                 )
         self._known = outside
         self.lines += [f"  br label %{here}.end", f"{here}.end:"]
         joined = {}
         for operand, value in instead.items():
             joined[operand] = self._name()
-            ways = f"[ {value}, %{here}.if ], [ {found[operand]}, %{here}.then ]"
+            ways = f"[ {value}, %{here}.if ], [ {inside[operand]}, %{here}.then ]"
             self.lines.append(f"  {joined[operand]} = phi {number.text} {ways}")
         return joined
 
     def operate(self, operation: Operation, x: Sequence[str]) -> str:
-        """The printed form of one CasADi operation on values; raises TraceError for one that is not known."""
+        """The value of one operation, whose instructions are appended; raises TraceError for an unknown operation."""
         kind, one, zero = self.number.text, self.constant(1.0), self.constant(0.0)
         if operation in _BINARY:
             return self.put(f"{_BINARY[operation]} {FLAGS} {kind} {x[0]}, {x[1]}")
@@ -170,7 +170,7 @@ class FunctionBody:
             Operation.OR: lambda: self.choose("une", self.put(f"fadd {kind} {x[0]}, {x[1]}"), zero, one, zero),
             Operation.FMIN: lambda: self.choose("olt", x[0], x[1], x[0], x[1]),
             Operation.FMAX: lambda: self.choose("ogt", x[0], x[1], x[0], x[1]),
-            # strict: of two equal numbers either is the larger, and this is what the processor's instruction does
+            # strict comparison, as in the processor's instruction: of two equal values either may be returned
             Operation.MINIMUM: lambda: self.choose("olt", x[0], x[1], x[0], x[1]),
             Operation.MAXIMUM: lambda: self.choose("ogt", x[0], x[1], x[0], x[1]),
             Operation.MASK: lambda: self.choose("une", x[0], zero, x[1], zero),
@@ -188,9 +188,10 @@ class FunctionBody:
 def computed(
     block: FunctionBody, code: Code, inputs: Sequence[str], held: Mapping[Operand, int], given: Mapping[Operand, str]
 ) -> dict[tuple[int, int], str]:
-    """Append code to a block: `inputs` name the arrays, `held` says what stands in `c`, `given` what is known.
+    """Append code to a block and return the names of its results by output and index.
 
-    Returns the names of the results by output and index.
+    `inputs` are the names of the arrays, `held` the indices of precomputed operands in `c`, `given` the names of known
+    values.
     """
     values = run(block, with_gates(code, inputs, held), inputs, held, given)
     return {(o, i): value_of(block, operand, inputs, held, values) for o, i, operand in code.outputs}
@@ -199,7 +200,7 @@ def computed(
 def with_gates(
     code: Code, inputs: Sequence[str], held: Mapping[Operand, int], early: frozenset[Operand] = frozenset()
 ) -> list[Item]:
-    """The instructions of code, those set apart that a zero factor or a number within its clamp makes superfluous."""
+    """The instructions of `code`, with those that a zero factor or an inactive clamp makes redundant in blocks."""
 
     def level(operand: Operand) -> int:
         return STEADY if operand in held else LEVEL.get(inputs[operand[1]], VARYING)
@@ -214,7 +215,7 @@ def run(
     held: Mapping[Operand, int],
     given: Mapping[Operand, str] | None = None,
 ) -> dict[Operand, str]:
-    """Append instructions to a block; the names of their results, and of the operands `given` beforehand."""
+    """Append instructions to a block; return the names of their results and of the operands in `given`."""
     values = dict(given or {})
     for line in body:
         append(block, line, inputs, held, values)
@@ -224,7 +225,7 @@ def run(
 def append(
     block: FunctionBody, line: Item, inputs: Sequence[str], held: Mapping[Operand, int], values: dict[Operand, str]
 ) -> None:
-    """Append one instruction, or some that may be skipped, and add the names of results to `values`."""
+    """Append an instruction or a conditional block, and add the names of its results to `values`."""
     if isinstance(line, ConditionalBlock):
         instead = {operand: value_of(block, value, inputs, held, values) for operand, value in line.instead}
         gates = [value_of(block, gate, inputs, held, values) for gate in line.gates]
@@ -241,7 +242,7 @@ def value_of(
     held: Mapping[Operand, int],
     values: Mapping[Operand, str],
 ) -> str:
-    """The name of an operand's value, which is loaded if it stands in an array."""
+    """The name of the value of an operand, which is loaded if it is an array element."""
     if operand in values:
         return values[operand]
     if operand in held:
@@ -258,9 +259,9 @@ def hand_over(
     inputs: Sequence[str],
     places: dict[str, int],
 ) -> dict[Operand, int]:
-    """Append the parameters-only part of a function, and say where in `c` its results stand.
+    """Append the part of a function that depends on parameters only; return the indices of its results in `c`.
 
-    `places` are the values that stand there already: functions that need the same value share its place.
+    `places` contains the indices of values that are stored already, so that functions share equal values.
     """
     values = run(block, once, inputs, {})
     held = {}

@@ -1,4 +1,4 @@
-"""LLVM text as machine code, by llvmlite, which numba brings."""
+"""Compilation of LLVM text to machine code by llvmlite."""
 
 from __future__ import annotations
 

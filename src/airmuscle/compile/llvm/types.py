@@ -15,22 +15,22 @@ class LlvmType:
 
     @property
     def element(self) -> str:
-        """LLVM's name of one of the numbers."""
+        """LLVM name of the element type."""
         return "double" if self.bits == 64 else "float"
 
     @property
     def text(self) -> str:
-        """LLVM's name of the whole value."""
+        """LLVM name of the type."""
         return self._of(self.element)
 
     @property
     def mask(self) -> str:
-        """LLVM's name of the result of a comparison."""
+        """LLVM name of the type of a comparison."""
         return self._of("i1")
 
     @property
     def whole(self) -> str:
-        """LLVM's name of the same bits taken as whole numbers."""
+        """LLVM name of the integer type of the same size."""
         return self._of(f"i{self.bits}")
 
     @property
@@ -40,19 +40,19 @@ class LlvmType:
 
     @property
     def alignment(self) -> int:
-        """Bytes at whose multiples a value stands: its own size, a cache line at most."""
+        """Alignment of a value in bytes: its size, at most a cache line."""
         return min(self.size, 64)
 
     def intrinsic(self, name: str) -> str:
-        """LLVM's own function of this name on such values: llvm.sqrt.f64, llvm.sqrt.v32f64."""
+        """Name of an LLVM intrinsic for this type: llvm.sqrt.f64, llvm.sqrt.v32f64."""
         return f"llvm.{name}.{f'v{self.lanes}' if self.lanes > 1 else ''}f{self.bits}"
 
     def function(self, name: str) -> str:
-        """What stands for a function of the C library on such values; `elementary` prints it."""
+        """Name of the vectorised replacement of a C library function, which `vector_math` defines."""
         return f"{name}.v{self.lanes}f{self.bits}"
 
     def literal(self, value: float) -> str:
-        """One of the numbers as LLVM text; a shorter one is rounded first, as LLVM wants it exact."""
+        """A number as LLVM text; in single precision it is rounded first, because LLVM requires an exact value."""
         if self.bits == 32:
             value = struct.unpack("<f", struct.pack("<f", value))[0]
         return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"

@@ -1,9 +1,9 @@
-"""Exponential, logarithm, power, sine and cosine in lanes, and every other function of the C library lane by lane.
+"""Vectorised exponential, logarithm, power, sine and cosine; other functions of the C library lane by lane.
 
-A call of the C library would take the lanes one after the other; these are written in operations that take all of them
-at once. Greatest error against extended precision, in units of the last place: exp 0.85, log 0.51, pow 1.0, sin and cos
-0.81 (tests/dynamics/test_lanes.py), over the whole range, with zero, infinity and NaN as in IEEE 754; angles beyond
-LARGEST_ANGLE are left to the C library. In single precision they are computed in double and rounded once.
+The C library processes one lane per call; these functions consist of operations on all lanes. Maximum error against
+extended precision, in units in the last place: exp 0.85, log 0.51, pow 1.0, sin and cos 0.81
+(tests/dynamics/test_lanes.py), over the whole range, with zero, infinity and NaN as in IEEE 754; angles beyond
+LARGEST_ANGLE are computed by the C library. Single precision is computed in double precision and rounded once.
 
 References: range reduction and the exact product by the parts of ln 2 after Tang, P. T. P., ACM TOMS 15(2), 1989;
 sum and product with their rounding error after Dekker, T. J., Numerische Mathematik 18, 1971.
@@ -20,18 +20,18 @@ from .types import LlvmType
 LN2_HIGH, LN2_LOW = 0.693147180559890330187, 5.497923018708371e-14
 """ln 2 in two parts; the first ends in zeros, so that its product with an exponent is exact."""
 QUARTER_HIGH, QUARTER_LOW, QUARTER_LEAST = math.pi / 2, 6.123233995736766e-17, -1.4973849048591698e-33
-"""A quarter of a turn in three parts."""
+"""pi/2 in three parts."""
 LARGEST_ANGLE = 1e6
-"""Radians up to which these parts are enough."""
+"""Largest angle [rad] for which these parts are sufficient."""
 TWO_THIRDS_LOW = 2.0**-53 / 3
-"""2/3 less the double next to it."""
+"""2/3 minus the nearest double."""
 ROUNDER = 1.5 * 2.0**52
-"""Added to a whole number of moderate size, this leaves the number in the last bits of the sum."""
+"""Added to an integer of moderate size, this leaves the integer in the last bits of the sum."""
 LEAST_NORMAL = 2.0**-1022
 
 
 class _Exact(FunctionBody):
-    """Arithmetic in double lanes that is done as written: nothing reordered, no NaN or zero assumed away."""
+    """Arithmetic in double lanes without fast-math flags: no reordering, no assumptions on NaN or zero."""
 
     def __init__(self, lanes: int) -> None:
         super().__init__((), LlvmType(64, lanes))
@@ -75,16 +75,16 @@ class _Exact(FunctionBody):
         return self.put(f"bitcast {self.number.whole} {a} to {self.number.text}")
 
     def on_bits(self, operation: str, a: str, b: float | str) -> str:
-        """A whole-number operation with a constant, which is given as the double of the same bits, or with a value."""
+        """An integer operation with a constant, given as the double of the same bits, or with a value."""
         other = self.bits(self.constant(b)) if isinstance(b, float) else b
         return self.put(f"{operation} {self.number.whole} {a}, {other}")
 
     def shifted(self, operation: str, a: str) -> str:
-        """Shift by the 52 bits of a mantissa."""
+        """Shift by the 52 bits of the mantissa."""
         return self.on_bits(operation, a, 52 * 5e-324)
 
     def power_of_two(self, n: str) -> str:
-        """2**n for a whole number n from -1022 to 1023."""
+        """2**n for an integer n from -1022 to 1023."""
         low = self.shifted("shl", self.bits(self.add(n, self.constant(ROUNDER))))
         return self.from_bits(self.on_bits("add", low, 1.0))
 
@@ -100,7 +100,7 @@ class _Exact(FunctionBody):
         return total, self.add(self.subtract(a, self.subtract(total, of_b)), self.subtract(b, of_b))
 
     def exponential(self, x: str, low: str | None = None) -> str:
-        """e**(x + low), low being about a rounding of x: 2**n e**r with |r| <= ln 2 / 2, by Taylor's sum."""
+        """e**(x + low) with low of the order of the rounding error of x: 2**n e**r, |r| <= ln 2 / 2, Taylor series."""
         x = self.choose("ogt", x, self.constant(720.0), self.constant(720.0), x)
         x = self.choose("olt", x, self.constant(-760.0), self.constant(-760.0), x)
         n = self.rounded(self.times(x, self.constant(1 / math.log(2))))
@@ -136,7 +136,7 @@ class _Exact(FunctionBody):
         return self._at_the_ends(x, *self.sum_of(high, low))
 
     def _after_the_first(self, s: str, lost: str) -> tuple[str, str]:
-        """2 artanh(s + lost) - 2 (s + lost): 2/3 s**3 in two parts, the second with all that follows."""
+        """2 artanh(s + lost) - 2 (s + lost) in two parts: 2/3 s**3, and its error with all further terms."""
         z = self.times(s, s)
         z_lost = self.fused(self.add(s, s), lost, self.fused(s, s, self.negative(z)))
         third = self.times(s, z)
@@ -150,7 +150,7 @@ class _Exact(FunctionBody):
         return cube, self.fused(self.times(third, z), tail, cube_lost)
 
     def _at_the_ends(self, x: str, high: str, low: str) -> tuple[str, str]:
-        """The logarithm of 0, of infinity and of what has none."""
+        """The logarithm with its values at 0, infinity, negative arguments and NaN."""
         zero, infinity = self.constant(0.0), self.constant(math.inf)
         high = self.choose("olt", x, infinity, high, x)
         high = self.choose("oeq", x, zero, self.constant(-math.inf), high)
@@ -178,7 +178,7 @@ class _Exact(FunctionBody):
         return self.choose("oeq", x, one, one, value)
 
     def sine(self, x: str, quarters: float) -> str:
-        """sin(x + quarters pi/2) for |x| up to LARGEST_ANGLE: less the nearest quarter turn, then Taylor's sums."""
+        """sin(x + quarters pi/2) for |x| up to LARGEST_ANGLE: reduction by multiples of pi/2, then Taylor series."""
         n = self.rounded(self.times(x, self.constant(2 / math.pi)))
         back = self.negative(n)
         nearly = self.fused(back, self.constant(QUARTER_HIGH), x)
@@ -196,12 +196,12 @@ class _Exact(FunctionBody):
         cosine = self.add(near, self.fused(self.times(z, z), even, self.subtract(left, self.times(r, lost))))
         turn = self.bits(self.add(self.add(n, self.constant(quarters)), self.constant(ROUNDER)))
         which = self.put(f"trunc {self.number.whole} {turn} to {self.number.mask}")
-        found = self.put(f"select {self.number.mask} {which}, {self.number.text} {cosine}, {self.number.text} {sine}")
+        chosen = self.put(f"select {self.number.mask} {which}, {self.number.text} {cosine}, {self.number.text} {sine}")
         sign = self.on_bits("shl", self.on_bits("and", turn, 2 * 5e-324), 62 * 5e-324)
-        return self.from_bits(self.on_bits("xor", self.bits(found), sign))
+        return self.from_bits(self.on_bits("xor", self.bits(chosen), sign))
 
     def unless_large(self, x: str, otherwise: str) -> None:
-        """Return what the function `otherwise` gives where any lane is beyond LARGEST_ANGLE, infinite or NaN."""
+        """Return the value of the function `otherwise` if any lane exceeds LARGEST_ANGLE, is infinite or NaN."""
         number = self.number
         large = self.put(f"fcmp ugt {number.text} {self.size_of(x)}, {self.constant(LARGEST_ANGLE)}")
         some = self.put(f"call i1 @llvm.vector.reduce.or.v{number.lanes}i1({number.mask} {large})")
@@ -238,7 +238,7 @@ def definition(name: str, count: int, number: LlvmType) -> str:
 
 
 def _in_double(name: str, count: int, number: LlvmType, double: LlvmType) -> str:
-    """A function of shorter numbers by that of doubles, which is printed with it."""
+    """A function in single precision by that in double precision, which is printed with it."""
     block, arguments = _Exact(number.lanes), [f"%{a}" for a in "xy"[:count]]
     wide = [block.put(f"fpext {number.text} {a} to {double.text}") for a in arguments]
     given = ", ".join(f"{double.text} {a}" for a in wide)
@@ -248,16 +248,16 @@ def _in_double(name: str, count: int, number: LlvmType, double: LlvmType) -> str
 
 
 def _lane_by_lane(name: str, as_name: str, arguments: Sequence[str], number: LlvmType) -> str:
-    block, found = FunctionBody((), number), "poison"
+    block, vector = FunctionBody((), number), "poison"
     for i in range(number.lanes):
         given = [block.put(f"extractelement {number.text} {a}, i32 {i}") for a in arguments]
         value = block.put(f"call double @{name}({', '.join(f'double {a}' for a in given)})")
-        found = block.put(f"insertelement {number.text} {found}, double {value}, i32 {i}")
-    return function_of_values(as_name, arguments, block, number, found)
+        vector = block.put(f"insertelement {number.text} {vector}, double {value}, i32 {i}")
+    return function_of_values(as_name, arguments, block, number, vector)
 
 
 def declarations(numbers: Collection[LlvmType]) -> str:
-    """LLVM's own functions that the printer and this file call, on these numbers and on as many doubles."""
+    """Declarations of the intrinsics that printed code calls, for these types and for doubles with as many lanes."""
     text = ""
     for kind in sorted(
         {*numbers, *(LlvmType(64, number.lanes) for number in numbers)}, key=lambda k: (k.bits, k.lanes)

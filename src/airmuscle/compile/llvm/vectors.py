@@ -1,4 +1,4 @@
-"""Arithmetic on values of a function under construction: single numbers, and columns, which are LLVM vectors."""
+"""Arithmetic on values of a function under construction: scalars and LLVM vectors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .emit import FLAGS, FunctionBody
 class LlvmValue:
     """The name of a value in a block: one `double`, or with `lanes` a vector `<lanes x double>`.
 
-    A number that meets a column is spread over its lanes, which need not be a power of two.
+    A scalar operand of a vector is broadcast to its lanes, whose number need not be a power of two.
     """
 
     block: FunctionBody
@@ -21,11 +21,11 @@ class LlvmValue:
 
     @property
     def kind(self) -> str:
-        """LLVM's name of the type."""
+        """LLVM name of the type."""
         return f"<{self.lanes} x double>" if self.lanes else "double"
 
     def spread(self, lanes: int) -> LlvmValue:
-        """The number in every lane; a column stays as it is."""
+        """The scalar in every lane; a vector is returned unchanged."""
         if self.lanes or not lanes:
             return self
         kind = f"<{lanes} x double>"
@@ -35,8 +35,8 @@ class LlvmValue:
 
     def _with(self, operation: str, other: LlvmValue) -> LlvmValue:
         a, b = self.spread(other.lanes), other.spread(self.lanes)
-        found = self.block.put(f"{operation} {FLAGS} {a.kind} {a.name}, {b.name}")
-        return dataclasses.replace(a, name=found)
+        result = self.block.put(f"{operation} {FLAGS} {a.kind} {a.name}, {b.name}")
+        return dataclasses.replace(a, name=result)
 
     def __add__(self, other: LlvmValue) -> LlvmValue:
         return self._with("fadd", other)
@@ -48,13 +48,13 @@ class LlvmValue:
         return self._with("fmul", other)
 
     def store(self, array: str, index: int) -> None:
-        """Write it into array elements from `index` on."""
+        """Write the value to array elements from `index` on."""
         place = self.block.put(f"getelementptr inbounds double, ptr %{array}, i64 {index}")
         self.block.lines.append(f"  store {self.kind} {self.name}, ptr {place}, align 8")
 
 
 def loaded(block: FunctionBody, array: str, index: int, lanes: int = 0) -> LlvmValue:
-    """What stands in array elements from `index` on."""
+    """The value of array elements from `index` on."""
     if not lanes:
         return LlvmValue(block, block.load(array, index))
     place = block.put(f"getelementptr inbounds double, ptr %{array}, i64 {index}")
@@ -62,7 +62,7 @@ def loaded(block: FunctionBody, array: str, index: int, lanes: int = 0) -> LlvmV
 
 
 def packed(block: FunctionBody, values: Mapping[int, str], lanes: int) -> LlvmValue:
-    """These numbers in their lanes, zero in all others."""
+    """A vector with these scalars in their lanes and zero in all others."""
     name = "zeroinitializer"
     for lane, value in values.items():
         name = block.put(f"insertelement <{lanes} x double> {name}, double {value}, i32 {lane}")

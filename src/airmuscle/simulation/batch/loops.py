@@ -20,7 +20,7 @@ from ..closed_loop import CalledRun
 from ..compiled_law import parameters_of
 from ..compiled_loop import CompiledLoop, CompiledRun, can_be_compiled
 from ..problem import Problem
-from ..sampled_loop import SampledLoop, prepare_loop
+from ..sampled_loop import SampledLoop, first_rows_of, prepare_loop
 from .variations import Variations, variations_of
 
 CONTROLLER = "controller."
@@ -94,14 +94,15 @@ class LoopBatch:
 
     def _at_times(self, prepared: SampledLoop) -> SampledLoop:
         """The same loop with rows at the times of the batch alone."""
-        offsets = np.searchsorted(self.times, prepared.edges, side="right")
-        return dataclasses.replace(prepared, times=self.times, row_offsets=[0, *offsets[1:].tolist()])
+        rows = first_rows_of(self.times, prepared.instants)
+        return dataclasses.replace(prepared, times=self.times, first_rows=rows)
 
     def columns(self, index: int, run: CompiledRun | CalledRun, times: Array) -> Mapping[str, Array]:
         """Set points, measurements and commands at the rows (R,) of one plant."""
         prepared, controller = run.prepared, self.loops[0].controller
-        edges = np.array(prepared.edges)
-        intervals = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, max(len(run.measured) - 1, 0))
+        intervals = np.clip(
+            np.searchsorted(prepared.instants, times, side="right") - 1, 0, max(len(run.measured) - 1, 0)
+        )
         setpoints = prepared.setpoint_signal.inputs_at(times, self.template.start_time)
         columns = {f"{SETPOINT}{name}": setpoints[:, i] for i, name in enumerate(controller.setpoints)}
         for values, prefix, names in (
