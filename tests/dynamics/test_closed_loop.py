@@ -36,7 +36,8 @@ from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, ProportionalRegulator, ProportionalValve, SecondOrderLag, Supply, Valve
 from airmuscle.pneumatics.gas import Isothermal
 from airmuscle.simulation import Problem, closed_loop, simulate, solve
-from airmuscle.simulation.integrators import BoundIntegrator, DormandPrince8, Rodas4, RungeKutta4
+from airmuscle.simulation.bound_integrator import BoundIntegrator
+from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
 
 VALVE = Valve(2.6e-9, 0.4)
 TICK = 2.0**-6

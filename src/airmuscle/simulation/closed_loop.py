@@ -16,8 +16,8 @@ from ..core.diagnostics import Diagnostic, DiagnosticCode
 from ..core.errors import ParameterError
 from ..core.status import Status
 from ..plant.units import column_units
+from .bound_integrator import RawSolution
 from .compiled_loop import CompiledLoop, CompiledRun, can_be_compiled
-from .integrators import RawSolution
 from .intervals import DrivenIntervals, HeldIntervals, Intervals
 from .problem import Problem
 from .rows import make_recording, recorded_rows, truncate_at_invalid_row

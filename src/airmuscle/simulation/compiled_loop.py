@@ -14,9 +14,10 @@ from ..control.control_loop import ControlLoopState
 from ..control.piecewise_linear import PiecewiseLinear
 from ..core.arrays import Array
 from ..core.status import Status
+from .bound_integrator import INTERRUPT_CHECK_STEPS, MAX_STEPS
 from .compiled_law import compiled_sample, parameters_of
 from .driver_table import MAX_CAPACITY, DriverTable, are_known, greatest_capacity
-from .integrators import INTERRUPT_CHECK_STEPS, MAX_STEPS, Integrator
+from .integrators import Integrator
 from .sampled_loop import SampledLoop
 
 FIRST_SEGMENTS = 4096

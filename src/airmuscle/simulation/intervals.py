@@ -19,7 +19,7 @@ from ..control.piecewise_linear import PiecewiseLinear, Segment, merge_columns
 from ..control.with_drivers import apply_drivers
 from ..core.arrays import Array, flat_view
 from ..core.status import Status
-from .integrators import BoundIntegrator
+from .bound_integrator import BoundIntegrator
 from .output_times import merge_few_output_times
 from .sampled_loop import SampledLoop
 

@@ -14,7 +14,8 @@ from ...compile.program import CompiledSystem
 from ...control.piecewise_linear import PiecewiseLinear
 from ...core.arrays import Array
 from ...core.status import Status
-from ..integrators import Integrator, RawSolution
+from ..bound_integrator import RawSolution
+from ..integrators import Integrator
 from ..rows import evaluate_rows
 from .loops import LoopBatch
 from .variations import Variations

@@ -16,9 +16,11 @@ from ...control.control_law import ControlLaw
 from ...control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
 from ...core.arrays import Array
 from ...core.errors import ParameterError
+from ...core.system import System
 from ..closed_loop import CalledRun
 from ..compiled_law import parameters_of
 from ..compiled_loop import CompiledLoop, CompiledRun, can_be_compiled
+from ..integrators import Integrator
 from ..problem import Problem
 from ..sampled_loop import SampledLoop, first_rows_of, prepare_loop
 from .variations import Variations, variations_of
@@ -42,6 +44,16 @@ class LoopBatch:
     times: Array
     _prepared: dict[int, SampledLoop | CompiledLoop] = dataclasses.field(default_factory=dict)
     _preparing: Any = dataclasses.field(default_factory=threading.Lock)
+
+    @classmethod
+    def of(
+        cls, plant: System, loops: tuple[ControlLoop, ...], laws: Variations | None, span: tuple[float, float],
+        times: Array, integrator: Integrator,
+    ) -> LoopBatch:  # fmt: skip
+        """The loops of plants that are simulated over a span (start, duration) [s] with rows at `times` (N,)."""
+        start, duration = span
+        template = Problem(plant, loops[0], duration, start_time=start, integrator=integrator)
+        return cls(template, loops, laws, times)
 
     @functools.cached_property
     def column_names(self) -> tuple[str, ...]:
@@ -139,14 +151,16 @@ def _names(loop: ControlLoop) -> tuple[tuple[str, ...], ...]:
     return controller.measured_columns, controller.setpoints, controller.inputs
 
 
-def split_variations(
-    given: Mapping[str, npt.ArrayLike], loops: tuple[ControlLoop, ...], count: int | None
-) -> tuple[dict[str, npt.ArrayLike], Variations | None]:
+def vary(
+    plant: System, given: Mapping[str, npt.ArrayLike], loops: tuple[ControlLoop, ...] | None, count: int | None
+) -> tuple[Variations, Variations | None]:
     """The variations of the plants, and those of the controllers, whose paths begin with "controller."."""
+    if not loops or not isinstance(given, Mapping):
+        return variations_of(plant, given, count), None
     plants = {path: values for path, values in given.items() if not str(path).startswith(CONTROLLER)}
     laws = {path[len(CONTROLLER) :]: given[path] for path in given if path not in plants}
     if not laws:
-        return plants, None
+        return variations_of(plant, plants, count), None
     controller = loops[0].controller
     if len(loops) > 1 or not isinstance(controller, ControlLaw):
         reason = "there is one loop for each plant" if len(loops) > 1 else "its controller is no ControlLaw"
@@ -154,4 +168,5 @@ def split_variations(
             f"variations: '{CONTROLLER}{next(iter(laws))}' varies a parameter of the controller, but {reason}. Give a "
             "list of loops with the controllers instead."
         )
-    return plants, variations_of(controller, laws, count)
+    varied = variations_of(controller, laws, count)
+    return variations_of(plant, plants, len(varied.values)), varied

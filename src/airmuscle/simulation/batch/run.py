@@ -18,18 +18,19 @@ from ...core.errors import ParameterError, suggestion
 from ...core.status import Status
 from ...core.system import System
 from ...plant.state import check_system
-from ..integrators import MAX_STEPS, ExplicitRungeKutta, Integrator, default_integrator
+from ..bound_integrator import MAX_STEPS
+from ..integrators import ExplicitRungeKutta, Integrator, default_integrator
 from ..output_times import output_times as times_of
-from ..problem import Problem, check_input_range
+from ..problem import check_input_range
 from .initial_states import check_states, count_of_states, default_states, given_states
 from .job import NOT_RUN, BatchJob
 from .lanes import check_precision, lane_workers
-from .loops import LoopBatch, loops_of, split_variations
+from .loops import LoopBatch, loops_of, vary
 from .precision import Double, Precision
 from .solution import BatchSolution
 from .storage import InMemory, OnDisk
 from .thread_pool import Queue, available_cores, progress, run_workers
-from .variations import Variations, variations_of
+from .variations import Variations
 
 
 def simulate_batch(
@@ -74,27 +75,15 @@ def simulate_batch(
     start_time = as_float("simulate_batch: start_time", start_time)
     integrator = default_integrator(integrator)
     _check_time(duration, start_time, integrator)
-    _check_options(initial_states, keep, into, precision, cores)
-    check_precision(precision, integrator)
-    if loops and precision != Double():
-        raise ParameterError("simulate_batch: control loops are computed in double precision; leave out precision.")
-    count_given = _count(initial_states, input)
-    laws = None
-    if loops:
-        variations, laws = split_variations(variations, loops, count_given)
-        count_given = count_given if laws is None else len(laws.values)
-    varied = variations_of(plant, variations, count_given)
+    _check_options(initial_states, keep, into, precision, cores, integrator, loops=bool(loops))
+    varied, laws = vary(plant, variations, loops, _count(initial_states, input))
     count = len(varied.values)
     compiled = compile_system(plant)
     segments = () if loops else _segments(compiled, input, count, start_time, duration)  # type: ignore[arg-type]
-    end = np.array([start_time + duration])
-    instants = segments[0].ends if isinstance(input, InputSignal) else end
-    times = end if keep is not None and len(keep) == 0 else times_of(output_times, start_time, duration, instants)
+    shared = segments[0].ends if isinstance(input, InputSignal) else None
+    times = _times(output_times, start_time, duration, shared, keep)
     states, reasons = _initial_states(varied, initial_states, count)
-    batch = None
-    if loops:
-        template = Problem(plant, loops[0], duration, start_time=start_time, integrator=integrator)
-        batch = LoopBatch(template, loops, laws, times)
+    batch = LoopBatch.of(plant, loops, laws, (start_time, duration), times, integrator) if loops else None
     job, storage = _job(
         compiled, varied, integrator, states, segments, start_time, duration, times, reasons, keep, into, precision,
         batch,
@@ -105,6 +94,17 @@ def simulate_batch(
     except BaseException:
         storage.abandon()
         raise
+
+
+def _times(
+    given: float | npt.ArrayLike | None, start: float, duration: float, instants: Array | None,
+    keep: Sequence[str] | None,
+) -> Array:  # fmt: skip
+    """The times of the rows, with the instants of the input that all plants share; the end if no column is kept."""
+    end = np.array([start + duration])
+    if keep is not None and len(keep) == 0:
+        return end
+    return times_of(given, start, duration, end if instants is None else instants)
 
 
 def _check_time(duration: float, start_time: float, integrator: Integrator) -> None:
@@ -119,7 +119,10 @@ def _check_time(duration: float, start_time: float, integrator: Integrator) -> N
         )
 
 
-def _check_options(initial_states: object, keep: object, into: object, precision: object, cores: object) -> None:
+def _check_options(
+    initial_states: object, keep: object, into: object, precision: object, cores: object, integrator: Integrator,
+    *, loops: bool,
+) -> None:  # fmt: skip
     if initial_states is not None and not isinstance(initial_states, Mapping):
         raise ParameterError(
             f"initial_states is {str(initial_states)[:80]}; give for each state a number for all, or a column (N,)."
@@ -130,6 +133,7 @@ def _check_options(initial_states: object, keep: object, into: object, precision
         raise ParameterError(f"into is {into!r}; give the path of a folder.")
     if not isinstance(precision, Precision):
         raise ParameterError(f"precision is {precision!r}; give Double() or Single().")
+    check_precision(precision, integrator, loops=loops)
     if cores is not None and (not isinstance(cores, int) or cores < 1):
         raise ParameterError(f"simulate_batch: cores is {cores!r}; it must be a whole number from 1 on.")
 
