@@ -14,6 +14,7 @@ import pytest
 import airmuscle as am
 from airmuscle.analysis import find_equilibria, joint_statics, stiffness
 from airmuscle.characteristic import Clamped, ContractileSurface, VirtualWork
+from airmuscle.characteristic.contractile_surface import exponents
 from airmuscle.core.errors import ParameterError, SolveError
 from airmuscle.mechanism import AntagonisticJoint, CrankProfile, HangingMass, JointWithEndStops, WithLatch
 from airmuscle.mechanism.contact import HuntCrossley
@@ -123,18 +124,21 @@ def test_a_load_is_carried_by_the_difference_of_the_torques():
     assert points.cocontraction[0, 0] == pytest.approx(0.04 * right, rel=1e-12)
 
 
-def test_a_general_law_may_have_several_solutions_and_all_are_solutions():
-    """A law with a saturating pressure dependence, for which a stiffness is reached at two levels of co-contraction."""
-    law = ContractileSurface((600.0, -300.0, 30.0, 350.0, 120.0, -250.0), 0.0, 6e5, 0.0, 0.25, 0.0, 1e4, 2)
+def test_a_law_whose_stiffness_falls_again_with_pressure_has_two_solutions_and_both_are_found():
+    """A cubic law with a term x q^2: the stiffness of a symmetric joint has a maximum over the co-contraction."""
+    powers = dict.fromkeys(exponents(3), 0.0) | {
+        (0, 0): 700.0, (1, 0): -350.0, (0, 1): 400.0, (1, 1): -60.0, (1, 2): 150.0,
+    }  # fmt: skip
+    law = ContractileSurface(tuple(powers.values()), 0.0, 6e5, 0.0, 0.25, 0.0, 1e4, 3)
     statics = joint_statics(pair(am.Muscle(law, BRAID), replace(JOINT, weight_torque=0.0)))
-    levels = np.linspace(0.5e5, 5.9e5, 25)
-    wanted = statics.angles((levels, levels)).constant_pressure
-    points = statics.pressures(np.zeros(25), wanted[:, 0])
-    assert points.count.max() > 1
-    for row in range(25):
+    levels = np.linspace(0.4e5, 5.6e5, 24)
+    wanted = statics.angles((levels, levels)).constant_pressure[:, 0]
+    points = statics.pressures(np.zeros(24), wanted)
+    assert points.count.max() >= 2
+    for row in range(24):
         own = points.pressures[row][np.isfinite(points.pressures[row, :, 0])]
         assert np.abs(own - levels[row]).max(axis=1).min() < 1.0, row
-        np.testing.assert_allclose(points.constant_pressure[row][: len(own)], wanted[row, 0], rtol=1e-9)
+        np.testing.assert_allclose(points.constant_pressure[row][: len(own)], wanted[row], rtol=1e-9)
 
 
 def test_the_search_in_cells_agrees_with_the_closed_form():

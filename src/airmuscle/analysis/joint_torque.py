@@ -17,9 +17,18 @@ from ..plant.plant import Plant
 from ..pneumatics.gas import absolute_pressure
 from .static_stiffness import enclosed_pressure_slope
 
-QUANTITIES = ("torque", "stiffness", "torque_by_pressure", "stiffness_by_pressure", "tension", "shut_valves")
+QUANTITIES = (
+    "torque",
+    "stiffness",
+    "torque_by_pressure",
+    "stiffness_by_pressure",
+    "tension",
+    "shut_valves",
+    "moment_arm",
+)
 """Quantities of a muscle of a joint: torque Q [N m], -dQ/dtheta at constant pressure [N m/rad], their derivatives with
-respect to the pressure, tension [N], and -dQ/dtheta with closed valves, that is, at constant air mass [N m/rad]."""
+respect to the pressure, tension [N], -dQ/dtheta with closed valves, that is, at constant air mass [N m/rad], and moment
+arm [m]."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -111,7 +120,7 @@ def _torque_function(plant: Plant, index: int, limited: bool) -> TorqueFunction:
     by_pressure = casadi.jacobian(torque, pressure)
     squeezed = by_pressure * _pressure_slope(plant, muscle, pressure, contraction) * arm / length
     row = casadi.horzcat(
-        torque, stiffness, by_pressure, casadi.jacobian(stiffness, pressure), tension, stiffness - squeezed
+        torque, stiffness, by_pressure, casadi.jacobian(stiffness, pressure), tension, stiffness - squeezed, arm
     )
     function = casadi.Function("torque", [angle, pressure], [casadi.densify(casadi.cse(row))])
     affine = not any(casadi.which_depends(by_pressure, pressure, 1, False))

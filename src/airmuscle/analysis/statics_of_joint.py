@@ -11,11 +11,11 @@ from ..core.arrays import Array
 from ..core.errors import ParameterError, SolveError
 from ..plant.plant import Plant
 from ..pneumatics.gas import gauge_pressure
+from ..recording import Recording
+from .joint_limits import LEVELS, stiffness_range, taut_branch
 from .joint_solutions import affine_candidates, are_balanced, balanced_angles, general_candidates
 from .joint_torque import TorqueFunction, TracedRow, check_joint, load_function, torque_functions
 
-LEVELS = 129
-"""Number of pressures of each muscle at which the reachable stiffnesses are evaluated (chosen)."""
 RESULTS = ("torque", "stiffness", "tension", "shut_valves")
 
 
@@ -89,6 +89,27 @@ class JointStatics:
         both = np.stack([np.broadcast_to(p[:, None], found.shape) for p in (first, second)], axis=2)
         return self._points(found, np.where(np.isnan(found)[..., None], np.nan, both))
 
+    def with_columns(self, recording: Recording) -> Recording:
+        """A recording of the plant with torque, stiffness, shut_valves_stiffness and cocontraction as further columns.
+
+        The torque is that of the recorded tensions, with damping and friction; the stiffnesses are those of the laws at
+        the recorded angle and pressures, friction relaxed. Raises ColumnError without angle, pressures and forces.
+        """
+        angle, muscles, torques = recording[self.plant.mechanism.coordinates[0].name], [], []
+        for prefix, function in zip(self.plant.prefixes, self.torques, strict=True):
+            stiffness, shut, arm = function(
+                angle, recording[f"{prefix}pressure"], "stiffness", "shut_valves", "moment_arm"
+            )
+            muscles.append((stiffness, shut))
+            torques.append(arm * recording[f"{prefix}force"])
+        constant, shut = (sum(values) for values in zip(*muscles, strict=True))
+        return recording.with_columns(
+            torque=torques[0] + torques[1],
+            stiffness=constant,
+            shut_valves_stiffness=shut,
+            cocontraction=np.minimum(np.abs(torques[0]), np.abs(torques[1])),
+        )
+
     def check_reachable(self, angle: Any, stiffness: Any, load: Any = 0.0) -> JointPoints:
         """The result of `pressures`. Raises SolveError, with what is reachable, for the first point without one."""
         points = self.pressures(angle, stiffness, load)
@@ -115,8 +136,8 @@ class JointStatics:
         torque = self.load(angle, names=("torque",))[0] + load
         functions = self.unlimited if all(f.affine for f in self.unlimited) else self.torques
         levels = np.linspace(*self.pressure_range, LEVELS)
-        pairs = [_between_taut(function, angle, levels) for function in functions]
-        limits = np.array([_range_of_balance(pairs, row, torque[row]) for row in range(angle.size)])
+        pairs = [taut_branch(function, angle, levels) for function in functions]
+        limits = np.array([stiffness_range(pairs, row, torque[row]) for row in range(angle.size)])
         return limits[:, 0], limits[:, 1]
 
     def explain(self, angle: float, stiffness: float, load: float = 0.0) -> str:
@@ -207,33 +228,3 @@ def _as_points(label: str, *values: Any) -> list[Array]:
     if any(a.ndim != 1 or not np.isfinite(a).all() for a in arrays):
         raise ParameterError(f"joint_statics: {label} must be finite numbers or arrays (N,) of one length.")
     return list(arrays)
-
-
-def _between_taut(function: TorqueFunction, angle: Array, levels: Array) -> tuple[Array, Array]:
-    """Torque and stiffness (N, LEVELS) at pressures from that at which the muscle becomes taut, to the maximum."""
-    (tension,) = function(angle[:, None], levels, "tension")
-    taut = tension > 0.0
-    slack = np.where(taut.any(axis=1), taut.argmax(axis=1), 0)
-    rows = np.arange(angle.size)
-    before = np.maximum(slack - 1, 0)
-    force, next_force = tension[rows, before], tension[rows, slack]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(slack > 0, -force / (next_force - force), 0.0)
-    start = levels[before] + share * (levels[slack] - levels[before])
-    inner = start[:, None] + np.linspace(0.0, 1.0, LEVELS) * (levels[-1] - start)[:, None]
-    torque, stiffness = function(angle[:, None], inner, "torque", "stiffness")
-    invalid = (~taut.any(axis=1)).reshape(-1, 1)
-    return np.where(invalid, np.nan, torque), np.where(invalid, np.nan, stiffness)
-
-
-def _range_of_balance(pairs: list[tuple[Array, Array]], row: int, torque: float) -> tuple[float, float]:
-    """Extreme stiffnesses along the pressures of two taut muscles whose torques sum to `torque`; NaN without one."""
-    sums = []
-    for (own, own_k), (other, other_k) in (pairs, pairs[::-1]):
-        order = np.argsort(other[row])
-        x, k = other[row][order], other_k[row][order]
-        needed = torque - own[row]
-        inside = (needed >= x[0]) & (needed <= x[-1])
-        sums.append(own_k[row][inside] + np.interp(needed[inside], x, k))
-    both = np.concatenate(sums)
-    return (float(both.min()), float(both.max())) if both.size else (np.nan, np.nan)

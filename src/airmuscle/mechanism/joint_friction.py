@@ -36,7 +36,10 @@ class JointWithFriction(MechanismWrapper):
         if not angles:
             raise ParameterError(f"JointWithFriction: {owner} has no angle; use another mechanism.")
         if self.coordinate and self.coordinate not in angles:
-            raise ParameterError(f"JointWithFriction: no angle '{self.coordinate}'; {owner} has {', '.join(angles)}.")
+            raise ParameterError(
+                f"JointWithFriction: its coordinate is '{self.coordinate}'; allowed are the angles of {owner}: "
+                f"{', '.join(angles)}."
+            )
         if not self.coordinate and len(angles) > 1:
             raise ParameterError(
                 f"JointWithFriction: {owner} has {len(angles)} angles; set coordinate to the one with friction: "
