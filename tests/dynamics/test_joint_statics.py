@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.analysis import find_equilibria, joint_statics, stiffness
+from airmuscle.analysis import find_equilibria, find_equilibrium, joint_statics, plot_reachable_region, stiffness
 from airmuscle.characteristic import Clamped, ContractileSurface, VirtualWork
 from airmuscle.characteristic.contractile_surface import exponents
-from airmuscle.core.errors import ParameterError, SolveError
+from airmuscle.core.errors import ColumnError, ParameterError, SolveError
 from airmuscle.mechanism import AntagonisticJoint, CrankProfile, HangingMass, JointWithEndStops, WithLatch
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import LinearSpring, SeriesSpring, SwellingWall
@@ -209,3 +209,37 @@ def test_end_stops_carry_what_the_muscles_pull_beyond_them():
     free, held = (joint_statics(pair(mechanism=m)).angles((5e5, 1e5)).angle[0] for m in (JOINT, stopped))
     assert free[0] > 0.4
     assert held.tolist() == pytest.approx([0.1], abs=5e-3)
+
+
+# Recordings and the figure
+
+
+def test_a_recording_gains_torque_stiffness_and_cocontraction():
+    """In the slow part of a run the torque carries the weight, and the stiffnesses are those of the plant."""
+    plant = pair()
+    statics = joint_statics(plant)
+    start = find_equilibrium(plant, pressure=(3e5, 2.5e5))
+    command = am.Schedule({"left.fill": ((0.1, 1.0), (0.2, 0.0))})
+    run = statics.with_columns(am.simulate(plant, command, duration=3.0, initial_state=start))
+    weight = 2.0 * np.sin(run["angle"])
+    inertial = 0.05 * run["angular_acceleration"] + 0.2 * run["angular_speed"]
+    np.testing.assert_allclose(run["torque"], weight + inertial, atol=1e-9)
+    smaller = 0.04 * np.minimum(run["left.force"], run["right.force"])
+    np.testing.assert_allclose(run["cocontraction"], smaller, rtol=1e-12)
+    state = {s.name: float(run[s.name][-1]) for s in plant.states}
+    both = stiffness(plant, state).coordinates["angle"]
+    assert run["stiffness"][-1] == pytest.approx(both.constant_pressure, rel=1e-9)
+    assert run["shut_valves_stiffness"][-1] == pytest.approx(both.shut_valves, rel=1e-9)
+    with pytest.raises(ColumnError, match=r"left\.pressure"):
+        statics.with_columns(am.Recording({"time": np.zeros(2), "angle": np.zeros(2)}, origin="made"))
+
+
+def test_the_figure_shows_the_limits_of_the_stiffness_and_contours_of_stiffness_and_angle():
+    statics = joint_statics(pair())
+    region, plane = plot_reachable_region(statics, 1.0).axes
+    low, high = statics.stiffness_limits(np.radians(region.lines[0].get_xdata()), 1.0)
+    np.testing.assert_allclose(region.lines[0].get_ydata(), low)
+    np.testing.assert_allclose(region.lines[1].get_ydata(), high)
+    assert plane.get_xlabel() == "pressure of left [bar]"
+    assert len(plane.collections) == 2
+    assert plane.texts

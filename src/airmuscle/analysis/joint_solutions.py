@@ -138,10 +138,13 @@ def _cells(functions: Functions, pressures: Range, angle: Array, torque: Array, 
             ends.append((np.where(taut, np.minimum(*both), np.inf), np.where(taut, np.maximum(*both), -np.inf)))
     possible = np.ones((angle.size, CELLS, CELLS), dtype=bool)
     for (low, high), (other_low, other_high), wanted in zip(ends[:2], ends[2:], (torque, stiffness), strict=True):
-        margin = 0.5 * (np.where(np.isfinite(low), high - low, 0.0))  # the values need not be monotonic in a cell
-        other = 0.5 * np.where(np.isfinite(other_low), other_high - other_low, 0.0)
-        possible &= (low - margin)[:, :, None] + (other_low - other)[:, None, :] <= wanted[:, None, None]
-        possible &= (high + margin)[:, :, None] + (other_high + other)[:, None, :] >= wanted[:, None, None]
+        # The values need not be monotonic in a cell, so that its range is widened by half on both sides.
+        widened, other_widened = (
+            0.5 * np.where(np.isfinite(a), b - a, 0.0) for a, b in ((low, high), (other_low, other_high))
+        )
+        most, least = wanted[:, None] - low + widened, wanted[:, None] - high - widened
+        possible &= (other_low - other_widened)[:, None, :] <= most[:, :, None]
+        possible &= (other_high + other_widened)[:, None, :] >= least[:, :, None]
     row, first, second = np.nonzero(possible)
     centres = 0.5 * (levels[:-1] + levels[1:])
     return row, np.stack([centres[first], centres[second]], axis=1)

@@ -25,7 +25,7 @@ class ListRow:
 
 
 def list_entries(json: Json = False) -> None:
-    """List the muscles, laws, valves, plants and data sets of the library.
+    """List the muscles, laws, valves, plants and data of the library.
 
     A muscle can be simulated; a characteristic cannot, because it has no geometry or is not solved for the force.
     A valve is used in a scenario as { library = NAME }, and a plant as [plant] library = NAME; `airmuscle simulate
