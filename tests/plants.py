@@ -26,12 +26,19 @@ from airmuscle.geometry.vessel import Vessel
 from airmuscle.library import catalogue
 from airmuscle.mechanism import (
     AntagonisticJoint,
+    ArmLink,
+    ConstantRadius,
+    CrankProfile,
     HangingMass,
     Isometric,
     Isotonic,
     JointWithEndStops,
+    JointWithFriction,
     Lever,
+    MuscleRoute,
     MusclesInSeries,
+    PlanarArm,
+    PolynomialProfile,
     PrescribedMotion,
     Pulley,
     SpringLoad,
@@ -170,6 +177,20 @@ EXAMPLES = {
     "pulley with stops": pulled(WithEndStops(Pulley(0.02, 5.0), -0.005, 0.02, HuntCrossley(1e9))),
     "joint with stops": pulled(
         JointWithEndStops(WithOffsets(AntagonisticJoint(0.03, 0.05, 0.2), (0.08, 0.08)), -0.2, 0.2, 0.05, HuntCrossley(1e9)), 2
+    ),
+    "shaped joint with friction": pulled(
+        JointWithFriction(
+            AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.1, 1.5, -1.2, 1.2, PolynomialProfile((0.2, -0.1))), 0.3
+        ), 2
+    ),
+    "arm": pulled(
+        PlanarArm(
+            (ArmLink(0.3, 1.5, 0.14, 0.01, 0.1, -1.3, 1.3), ArmLink(0.25, 1.0, 0.11, 0.005, 0.1, -1.3, 1.3)),
+            (MuscleRoute((1,), (0.03,), 0.1), MuscleRoute((1,), (-0.03,), 0.1),
+             MuscleRoute((1, 2), (0.02, 0.02), 0.1, (ConstantRadius(), CrankProfile(0.2))),
+             MuscleRoute((2,), (-0.02,), 0.1, (CrankProfile(-0.2),))),
+            0.5,
+        ), 4
     ),
     "muscles in series": pulled(MusclesInSeries(HangingMass(5.0), (0.5,), 1.0), 2),
 }  # fmt: skip

@@ -18,13 +18,20 @@ from airmuscle.core import autodiff
 from airmuscle.core.errors import ParameterError
 from airmuscle.mechanism import (
     AntagonisticJoint,
+    ArmLink,
+    ConstantRadius,
+    CrankProfile,
     HangingMass,
     Isometric,
     Isotonic,
     JointWithEndStops,
+    JointWithFriction,
     Lever,
     Mechanism,
+    MuscleRoute,
     MusclesInSeries,
+    PlanarArm,
+    PolynomialProfile,
     PrescribedMotion,
     Pulley,
     SpringLoad,
@@ -39,6 +46,16 @@ from airmuscle.pneumatics.gas import Isothermal
 
 CONTACT = HuntCrossley(1e7, 0.4)
 JOINT = AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12)
+SHAPED = replace(JOINT, weight_angle=1.2, min_angle=-1.4, max_angle=1.4, profile=PolynomialProfile((0.3, -0.2)))
+ARM = PlanarArm(
+    (ArmLink(0.3, 1.5, 0.14, 0.01, 0.1), ArmLink(0.25, 1.0, 0.11, 0.005, 0.2), ArmLink(0.1, 0.4, 0.05, 0.0, 0.05)),
+    (
+        MuscleRoute((1,), (0.03,), 0.1),
+        MuscleRoute((1, 2), (-0.03, -0.02), 0.1, (ConstantRadius(), CrankProfile(0.3))),
+        MuscleRoute((2, 3), (0.02, -0.01), 0.05),
+    ),
+    0.5,
+)
 LEVER = Lever((0.05, 0.08), 4.0, 0.3, 0.01, 0.1, (0.1, 0.15))
 MECHANISMS: dict[str, tuple[Mechanism, int]] = {
     "hanging": (HangingMass(8.0), 2),
@@ -53,6 +70,16 @@ MECHANISMS: dict[str, tuple[Mechanism, int]] = {
     "series on a lever": (MusclesInSeries(replace(LEVER, arms=(0.07,), offsets=()), (0.3,)), 2),
     "series in a frame": (MusclesInSeries(Isometric(0.05), (0.3,)), 2),
     "joint": (JOINT, 2),
+    "crank": (replace(SHAPED, profile=CrankProfile(0.1)), 2),
+    "shaped": (SHAPED, 2),
+    "rubbing": (JointWithFriction(SHAPED, 0.4), 2),
+    "arm": (ARM, 3),
+    "rubbing stopped arm": (
+        JointWithEndStops(
+            JointWithFriction(ARM, 0.4, coordinate="joint2.angle"), -0.1, 0.2, 0.05, CONTACT, "joint1.angle"
+        ),
+        3,
+    ),
     "stopped": (WithEndStops(SpringLoad(3.0, 2000.0), -0.01, 0.02, CONTACT), 1),
     "stopped chain": (
         WithEndStops(MusclesInSeries(HangingMass(5.0), (0.3,)), -0.01, 0.02, CONTACT, "node1.position"),

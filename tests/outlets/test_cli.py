@@ -30,7 +30,7 @@ from airmuscle.cli.terminal import print_json, print_table
 from airmuscle.core.errors import UnknownNameError, printable
 from airmuscle.core.reference import Reference
 from airmuscle.library.catalogue import load
-from airmuscle.library.files import list_laws, list_valves
+from airmuscle.library.files import list_laws, list_plants, list_valves
 from airmuscle.recording import read_csv
 from airmuscle.report.chapter import Chapter, Claim, Equal
 from airmuscle.reproduce import run
@@ -144,7 +144,7 @@ def test_wrong_usage_is_exit_code_2(arguments: tuple[str, ...]):
 def test_list_names_every_entry_with_title_kind_and_trust():
     found = json.loads(airmuscle("list", "--json").output)
     listed = {entry["name"]: entry for entry in found if entry["kind"] != "data set"}
-    assert tuple(listed) == (*list_laws(), *list_valves())
+    assert tuple(listed) == (*list_laws(), *list_valves(), *list_plants())
     entry = load(MUSCLE)
     assert listed[MUSCLE] == {
         "name": MUSCLE,

@@ -11,6 +11,7 @@ import pytest
 
 from airmuscle import mechanism
 from airmuscle.library.build import build
+from airmuscle.library.files import list_plants
 from airmuscle.library.location import Location
 from airmuscle.library.models import model_names
 from airmuscle.mechanism import AntagonisticJoint, JointWithEndStops, Mechanism
@@ -37,6 +38,19 @@ def test_the_code_on_mechanisms_runs(capsys):
     assert found["run"]["angle"][-1] > 0.1
     assert found["pull"]["position"].max() == pytest.approx(0.03, abs=1e-9)
     assert re.fullmatch(r"0\.\d{3} rad\n", capsys.readouterr().out)
+
+
+def test_the_code_on_joints_runs(capsys):
+    found = run("joints.md")
+    assert found["points"].count.tolist() == [1, 1, 1]
+    np.testing.assert_allclose(found["back"].angle, found["points"].angle, atol=1e-9)
+    assert found["height"] == pytest.approx(-0.55, abs=0.05)
+    assert "no pressures give a stiffness of 500 N m/rad" in capsys.readouterr().out
+
+
+def test_every_plant_of_the_library_is_on_the_page_of_joints():
+    text = (DOCS / "joints.md").read_text(encoding="utf-8")
+    assert [name for name in list_plants() if f"| `{name}` |" not in text] == []
 
 
 def test_the_code_on_linearisation_runs(capsys):

@@ -17,10 +17,12 @@ from airmuscle.cli.app import app
 from airmuscle.core.errors import AirmuscleWarning, FileError, ParameterError, UnitError, UnknownNameError
 from airmuscle.core.reference import cite
 from airmuscle.library.build import build, load_valve
-from airmuscle.library.catalogue import load, load_law
+from airmuscle.library.catalogue import load
 from airmuscle.library.entry import Entry
-from airmuscle.library.files import list_laws, list_library, list_valves
+from airmuscle.library.files import list_laws, list_library, list_plants, list_valves
+from airmuscle.library.law_file import load_law
 from airmuscle.library.location import Location
+from airmuscle.library.plant_file import PlantEntry
 from airmuscle.library.valve_entry import ValveEntry
 from airmuscle.pneumatics import CheckValve, Valve, in_series
 from airmuscle.reproduce.hosovsky_plant import MATRIX
@@ -248,10 +250,11 @@ def test_the_command_line_lists_shows_and_cites_valves():
 
 
 def test_load_reads_every_entry_that_the_library_lists():
-    assert set(list_library()) == {*list_laws(), *list_valves()}
+    assert set(list_library()) == {*list_laws(), *list_valves(), *list_plants()}
     kinds = {name: type(load(name)) for name in list_library()}
     assert {name for name, kind in kinds.items() if kind is ValveEntry} == set(list_valves())
     assert {name for name, kind in kinds.items() if kind is Entry} == set(list_laws())
+    assert {name for name, kind in kinds.items() if kind is PlantEntry} == set(list_plants())
     assert am.load is load
     assert load("matrix-821") == load_valve("matrix-821")
     assert load("dmsp-20-300") == load_law("dmsp-20-300")

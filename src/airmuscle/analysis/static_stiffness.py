@@ -12,7 +12,7 @@ from ..muscle import ElasticSeriesElement, Muscle
 from ..plant.muscle_state import MuscleState
 from ..plant.plant import Plant
 from ..plant.state import state_vector
-from ..pneumatics.gas import NO_FLOW, gauge_pressure
+from ..pneumatics.gas import NO_FLOW, Air, gauge_pressure
 
 
 class StiffnessPair(NamedTuple):
@@ -67,7 +67,7 @@ def stiffness(plant: Plant, state: Mapping[str, float]) -> Stiffness:
 
 def _of_muscle(plant: Plant, muscle: Muscle, port: MuscleState) -> StiffnessPair:
     by_pressure, by_contraction = _slopes(muscle, port)
-    squeezed = _pressure_slope(plant, muscle, port)
+    squeezed = float(enclosed_pressure_slope(plant, muscle, port.inner_contraction, port.volume, port.air, port.states))
     inside = (0.0 - by_contraction, 0.0 - by_contraction - by_pressure * squeezed)
     if not isinstance(muscle.series, ElasticSeriesElement):
         return StiffnessPair(*inside)
@@ -88,20 +88,25 @@ def _slopes(muscle: Muscle, port: MuscleState) -> tuple[float, float]:
     return float(along[0]), float(along[1])
 
 
-def _pressure_slope(plant: Plant, muscle: Muscle, port: MuscleState) -> float:
-    """dp/deps [Pa] of enclosed air: derivative of its pressure with respect to volume and gas states."""
-    content = {s.name: port.states[s.name] for s in plant.gas.states(port.volume, plant.ambient)}
+def enclosed_pressure_slope(
+    plant: Plant, muscle: Muscle, inner_contraction: Value, volume: Value, air: Air, states: Mapping[str, Value]
+) -> Value:
+    """dp/deps [Pa] of enclosed air: derivative of its pressure with respect to volume and gas states.
+
+    The values are numbers or symbols; `states` contains those of the gas.
+    """
+    content = {s.name: states[s.name] for s in plant.gas.states(volume, plant.ambient)}
     names = list(content)
-    growth = muscle.geometry.volume_derivative(port.inner_contraction)
-    moved, still = (plant.gas.rates(content, port.air, NO_FLOW, rate, plant.ambient) for rate in (growth, 0.0))
+    growth = muscle.geometry.volume_derivative(inner_contraction)
+    moved, still = (plant.gas.rates(content, air, NO_FLOW, rate, plant.ambient) for rate in (growth, 0.0))
 
     def pressure(x: Sequence[Value]) -> list[Value]:
-        air = plant.gas.air(dict(zip(names, x[1:], strict=True)), x[0], plant.ambient)
-        return [gauge_pressure(air.pressure, plant.ambient)]
+        enclosed = plant.gas.air(dict(zip(names, x[1:], strict=True)), x[0], plant.ambient)
+        return [gauge_pressure(enclosed.pressure, plant.ambient)]
 
-    at = [float(v) for v in (port.volume, *content.values())]
-    along = [float(growth), *(float(moved[n] - still[n]) for n in names)]
-    return float(autodiff.jvp(pressure, at, along)[0])
+    at = [volume, *content.values()]
+    along = [growth, *(moved[n] - still[n] for n in names)]
+    return autodiff.jvp(pressure, at, along)[0]
 
 
 def _against(

@@ -17,8 +17,8 @@ from ..core.units import quantity
 from ..identify import ModelConversion
 from ..identify import convert as convert_model
 from ..identify.conversion import GRID_POINTS, sample_on_grid
-from ..library.catalogue import load_law
 from ..library.entry import Entry
+from ..library.law_file import load_law
 from ..library.write import save
 from ..report.isobar_plot import validity_range_of
 from .initial_law import find_initial_law

@@ -23,8 +23,8 @@ from ..identify.hysteresis import (
     fit_loop,
     identified_friction,
 )
-from ..library.catalogue import load_law
 from ..library.entry import Entry
+from ..library.law_file import load_law
 from ..library.write import part_toml, save
 from ..recording import Recording
 from ..report.chapter import Chapter

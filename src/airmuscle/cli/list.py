@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 
 from ..characteristic import ForceLaw
-from ..library.files import DATA, LAWS, VALVES, list_data, list_laws, list_valves
+from ..library.files import DATA, LAWS, PLANTS, VALVES, list_data, list_laws, list_plants, list_valves
 from ..library.models import model_class
 from .options import Json
 from .terminal import print_json, print_table
@@ -25,11 +25,12 @@ class ListRow:
 
 
 def list_entries(json: Json = False) -> None:
-    """List the muscles, laws, valves and data sets of the library.
+    """List the muscles, laws, valves, plants and data of the library.
 
     A muscle can be simulated; a characteristic cannot, because it has no geometry or is not solved for the force.
-    A valve is used in a scenario as { library = NAME }. A data set is used as FILES of `airmuscle fit`. The provenance
-    is the origin of the numbers: printed, measured, data sheet, secondary source, fitted or chosen.
+    A valve is used in a scenario as { library = NAME }, and a plant as [plant] library = NAME; `airmuscle simulate
+    NAME` runs its example. A data set is used as FILES of `airmuscle fit`. The provenance is the origin of the
+    numbers: printed, measured, data sheet, secondary source, fitted or chosen.
 
     \b
     Examples:
@@ -44,10 +45,11 @@ def list_entries(json: Json = False) -> None:
 
 
 def library_rows() -> list[ListRow]:
-    """All library entries, valves and data sets, read from the files without building any model."""
+    """All library entries, valves, plants and data sets, read from the files without building any model."""
     return [
         *(_entry_row(LAWS / f"{name}.toml") for name in list_laws()),
         *(_valve_row(VALVES / f"{name}.toml") for name in list_valves()),
+        *(_plant_row(PLANTS / f"{name}.toml") for name in list_plants()),
         *(_data_row(DATA / f"{name}.csv") for name in list_data()),
     ]
 
@@ -63,6 +65,12 @@ def _entry_row(path: Path) -> ListRow:
 def _valve_row(path: Path) -> ListRow:
     tables = tomllib.loads(path.read_text(encoding="utf-8"))
     return ListRow(path.stem, tables["title"], f"valve, {tables['valve']['model']}", tables["provenance"])
+
+
+def _plant_row(path: Path) -> ListRow:
+    tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    mechanism = tables["plant"]["mechanism"]["model"]
+    return ListRow(path.stem, tables["title"], f"plant, {mechanism}", tables["provenance"])
 
 
 def _data_row(path: Path) -> ListRow:

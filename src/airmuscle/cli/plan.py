@@ -10,7 +10,7 @@ import typer
 from ..characteristic import ValidityRange
 from ..core.units import quantity
 from ..identify.experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
-from ..library.catalogue import load_law
+from ..library.law_file import load_law
 from ..recording import write_csv
 from ..report.output_folder import atomic_folder, check_writable
 from .options import Json, Name, OptionalFolder

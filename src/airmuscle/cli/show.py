@@ -8,6 +8,7 @@ from typing import Any
 from ..core import cite, leaves
 from ..library.catalogue import load
 from ..library.entry import Entry
+from ..library.plant_file import PlantEntry
 from ..library.valve_entry import ValveEntry
 from ..report.formatting import format_number
 from .options import Json, Name
@@ -15,7 +16,7 @@ from .terminal import echo, print_json, print_table
 
 PARTS = (
     "characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "validity_range",
-    "valve", "exhaust", "switching_times",
+    "valve", "exhaust", "switching_times", "plant",
 )  # fmt: skip
 MAX_VALUES = 30
 """Longest list of values that the table shows completely."""
@@ -39,7 +40,7 @@ def show(name: Name, json: Json = False) -> None:
         _print(data)
 
 
-def entry_to_dict(entry: Entry | ValveEntry) -> dict[str, Any]:
+def entry_to_dict(entry: Entry | ValveEntry | PlantEntry) -> dict[str, Any]:
     """An entry as plain data, all numbers SI."""
     parts = {part: getattr(entry, part) for part in PARTS if getattr(entry, part, None) is not None}
     # A geometric law contains the geometry among its own parameters; it is listed once.
@@ -65,8 +66,9 @@ def entry_to_dict(entry: Entry | ValveEntry) -> dict[str, Any]:
                 "tolerance": check.tolerance,
                 "source": check.source,
             }
-            for check in entry.checks
+            for check in getattr(entry, "checks", ())
         ],
+        "sources": dict(getattr(entry, "sources", ())),
         "references": [str(reference) for reference in cite(entry)],
     }
 
@@ -110,6 +112,9 @@ def _print(entry: dict[str, Any]) -> None:
         ]
         echo()
         print_table(("checked quantity", "at (SI)", "published value (SI)", "source"), checks)
+    if entry["sources"]:
+        echo()
+        print_table(("numbers", "source"), entry["sources"].items())
     echo()
     for reference in entry["references"]:
         echo(f"- {reference}")

@@ -20,7 +20,13 @@ from .terminal import echo, print_json, print_table
 
 
 def simulate(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="A file with [plant], [input] and [run].")],
+    scenario: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SCENARIO.toml",
+            help="A file with [plant], [input] and [run], or the name of a plant of the library.",
+        ),
+    ],
     out: Folder = Path("run"),
     json: Json = False,
 ) -> None:
@@ -34,6 +40,7 @@ def simulate(
     \b
     Examples:
       airmuscle simulate examples/fill_discharge.toml --out run
+      airmuscle simulate joint-dmsp-20-matrix --out run
     """
     loaded = load_scenario(scenario)
     check_writable(out)

@@ -14,8 +14,8 @@ from ..core import leaves
 from ..core.errors import AirmuscleWarning, GeometryLimitError, PhysicsError, SolveError
 from ..core.plotting import save
 from ..core.units import quantity
-from ..library.catalogue import load_law
 from ..library.entry import Entry
+from ..library.law_file import load_law
 from ..pneumatics import Ambient
 from ..pneumatics.gas import check_above_vacuum
 from ..report.isobar_plot import (

@@ -1,17 +1,14 @@
 """Loading of library entries and data sets by name, and of files of the same form by path.
 
-`load("dmsp-20-300")`, `load("matrix-821")` and `load("my/muscle.toml")` return an Entry or a ValveEntry; a unique
-beginning of a name is sufficient.
+`load("dmsp-20-300")`, `load("matrix-821")`, `load("joint-dmsp-20-matrix")` and `load("my/muscle.toml")` return an
+Entry, a ValveEntry or a PlantEntry; a unique beginning of a name is sufficient.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from ..core.errors import ParameterError, UnknownNameError
 from ..recording import Recording, read_csv
 from .build import build_valve_entry
 from .entry import Entry, issue_warning
@@ -19,51 +16,43 @@ from .entry_file import build_entry
 from .files import (
     DATA,
     LAWS,
+    PLANTS,
     VALVES,
     complete_name,
     is_path,
     list_data,
-    list_laws,
     list_library,
+    list_plants,
     list_valves,
     read_toml,
 )
+from .law_file import describes_plant, describes_valve
+from .plant_file import PlantEntry, build_plant_entry
 from .valve_entry import ValveEntry
 
 
-def load(name_or_path: str | Path) -> Entry | ValveEntry:
-    """A library entry (muscle, law or valve) by its name or a unique beginning of it, or a file by its path.
+def load(name_or_path: str | Path) -> Entry | ValveEntry | PlantEntry:
+    """A library entry (muscle, law, valve or plant) by its name or a unique beginning of it, or a file by its path.
 
-    In a plant, write `.muscle` of an Entry, and `.valve` or `.exhaust` of a ValveEntry. Raises UnknownNameError,
+    In a plant, write `.muscle` of an Entry, and `.valve` or `.exhaust` of a ValveEntry; a PlantEntry contains a
+    `.plant`. Raises UnknownNameError,
     FileError, ParameterError or UnitError with the location. A warning of the entry is issued as an AirmuscleWarning.
     """
     if is_path(name_or_path):
         path = file = Path(name_or_path)
     else:
         name = complete_name(str(name_or_path), list_library(), "library entry")
-        path = (VALVES if name in list_valves() else LAWS) / f"{name}.toml"
+        folder = VALVES if name in list_valves() else PLANTS if name in list_plants() else LAWS
+        path = folder / f"{name}.toml"
         file = Path(path.name)
     tables = read_toml(path)
-    entry: Entry | ValveEntry
-    if _describes_valve(tables):
+    entry: Entry | ValveEntry | PlantEntry
+    if describes_valve(tables):
         entry = build_valve_entry(tables, path.stem, file)
+    elif describes_plant(tables):
+        entry = build_plant_entry(tables, path.stem, file, path.parent)
     else:
         entry = build_entry(tables, path.stem, file, path.parent)
-    issue_warning(entry.name, entry.warning, stacklevel=2)
-    return entry
-
-
-def load_law(name_or_path: str | Path) -> Entry:
-    """A muscle or a law by its name or a unique beginning of it, or its file by its path; as `load`, without valves."""
-    if is_path(name_or_path):
-        path = file = Path(name_or_path)
-    else:
-        path = LAWS / f"{_complete_law_name(str(name_or_path))}.toml"
-        file = Path(path.name)
-    tables = read_toml(path)
-    if _describes_valve(tables):
-        raise ParameterError(f"{file}: the file describes a valve; a muscle or a law is required.")
-    entry = build_entry(tables, path.stem, file, path.parent)
     issue_warning(entry.name, entry.warning, stacklevel=2)
     return entry
 
@@ -78,13 +67,3 @@ def load_data(name: str) -> Recording:
     lines = path.read_text(encoding="utf-8").splitlines()
     header = " ".join(line.lstrip("# ") for line in lines if line.startswith("#") and " = " not in line)
     return dataclasses.replace(recording, notes=(*recording.notes, header))
-
-
-def _describes_valve(tables: Mapping[str, Any]) -> bool:
-    return "valve" in tables and "characteristic" not in tables
-
-
-def _complete_law_name(name: str) -> str:
-    if name in list_valves():
-        raise UnknownNameError(f"'{name}' is a valve; a muscle or a law is required: {', '.join(list_laws())}.")
-    return complete_name(name, list_laws(), "muscle or law")

@@ -14,13 +14,15 @@ LAWS = Path(__file__).parent
 """Folder of the muscles and laws."""
 VALVES = LAWS / "valves"
 """Folder of the valves."""
+PLANTS = LAWS / "plants"
+"""Folder of the plants."""
 DATA = LAWS / "data"
 """Folder of the data sets."""
 
 
 def list_library() -> tuple[str, ...]:
-    """Names of all entries that `load` reads: muscles, laws and valves, sorted."""
-    return tuple(sorted((*list_laws(), *list_valves())))
+    """Names of all entries that `load` reads: muscles, laws, valves and plants, sorted."""
+    return tuple(sorted((*list_laws(), *list_valves(), *list_plants())))
 
 
 def list_laws() -> tuple[str, ...]:
@@ -31,6 +33,11 @@ def list_laws() -> tuple[str, ...]:
 def list_valves() -> tuple[str, ...]:
     """Names of all valves, sorted."""
     return tuple(sorted(path.stem for path in VALVES.glob("*.toml")))
+
+
+def list_plants() -> tuple[str, ...]:
+    """Names of all plants, sorted."""
+    return tuple(sorted(path.stem for path in PLANTS.glob("*.toml")))
 
 
 def list_data() -> tuple[str, ...]:

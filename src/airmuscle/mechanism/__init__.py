@@ -7,29 +7,40 @@ from .end_stops import JointWithEndStops, WithEndStops
 from .hanging_mass import HangingMass
 from .isometric import Isometric
 from .isotonic import Isotonic
+from .joint_friction import JointWithFriction
 from .latch import WithLatch
 from .lever import Lever
 from .muscles_in_series import MusclesInSeries
 from .offsets import WithOffsets
+from .planar_arm import ArmLink, MuscleRoute, PlanarArm
 from .prescribed_motion import PrescribedMotion
 from .pulley import Pulley
+from .pulley_profile import ConstantRadius, CrankProfile, PolynomialProfile, PulleyProfile
 from .spring_load import SpringLoad
 from .wrapper import MechanismWrapper
 
 __all__ = [
     "AntagonisticJoint",
+    "ArmLink",
+    "ConstantRadius",
     "Coordinate",
+    "CrankProfile",
     "HangingMass",
     "HuntCrossley",
     "Isometric",
     "Isotonic",
     "JointWithEndStops",
+    "JointWithFriction",
     "Lever",
     "Mechanism",
     "MechanismWrapper",
+    "MuscleRoute",
     "MusclesInSeries",
+    "PlanarArm",
+    "PolynomialProfile",
     "PrescribedMotion",
     "Pulley",
+    "PulleyProfile",
     "SpringLoad",
     "WithEndStops",
     "WithLatch",

@@ -37,6 +37,10 @@ QUANTITIES: dict[str, Quantity] = {
     "shortening_speed": Quantity("m/s", "v_m", "shortening speed of the contractile element"),
     "bristle": Quantity("m", "z", "deflection of a friction element (bristle)"),
     "stop": Quantity("m", "z_s", "deflection of a stop operator (Prandtl–Ishlinskii)"),
+    "torque": Quantity("N m", "Q", "torque of the muscles on a joint, positive in the direction of the angle"),
+    "stiffness": Quantity("N m/rad", "K_p", "stiffness of a joint at constant pressure of its muscles"),
+    "shut_valves_stiffness": Quantity("N m/rad", "K_m", "stiffness of a joint at constant air mass of its muscles"),
+    "cocontraction": Quantity("N m", "Q_c", "part of the torques of two muscles that cancels at a joint"),
     "temperature": Quantity("K", "T", "absolute temperature of the air in the muscle"),
 }
 

@@ -13,7 +13,7 @@ from ..core.errors import AirmuscleWarning
 from ..identify.correlation_index import CorrelationIndex, correlation_index
 from ..identify.surface.basis import LoadRange
 from ..identify.surface.monotone import fit_monotone
-from ..library.catalogue import load_law
+from ..library.law_file import load_law
 from ..recording import Recording
 
 MISPRINT_INDEX = 2

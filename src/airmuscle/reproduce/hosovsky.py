@@ -9,7 +9,7 @@ from ..characteristic.base import Characteristic
 from ..characteristic.contractile_surface import exponents
 from ..core.reference import cite
 from ..geometry.base import Geometry
-from ..library import catalogue
+from ..library import law_file
 from ..report.chapter import Chapter, Plot, Table
 from . import hosovsky_effect_ranges as causing_over_ranges
 from . import hosovsky_effects as causing
@@ -95,7 +95,7 @@ def chapter(
             *_time_series(fill, low, high),
         ),
         plots=_plots(fill, effects, low, high),
-        references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(catalogue.load_law(FORCE_MAPS[0]))),
+        references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(law_file.load_law(FORCE_MAPS[0]))),
         chosen=(*parameters.as_rows(), *suspected.as_rows()),
     )
 
@@ -121,12 +121,12 @@ def maxwell_table(parameters: UnpublishedParameters) -> Table:
     laws: dict[str, tuple[Characteristic, Geometry]]
     laws = {f"surface fitted to {name}, without the limits": (surface_fit(name).model, shape) for name in FORCE_MAPS}
     for name in ("dmsp-20-300", "dmsp-10-250"):
-        entry = catalogue.load_law(name)
+        entry = law_file.load_law(name)
         laws[f"Martens-Boblan 2017, {name}"] = (entry.characteristic, entry.muscle.geometry)
     validity_ranges = [
         surface(FORCE_MAPS[0]).validity_range,
         surface(FORCE_MAPS[1]).validity_range,
-        *(catalogue.load_law(n).validity_range for n in ("dmsp-20-300", "dmsp-10-250")),
+        *(law_file.load_law(n).validity_range for n in ("dmsp-20-300", "dmsp-10-250")),
     ]
     defects = [
         maxwell_defect(law, volume, validity_range)

@@ -42,11 +42,11 @@ from ..identify.dynamic.experiment import ParameterPaths, RecordUnknown
 from ..library.build import build
 from ..library.files import read_toml
 from ..library.location import Location, check_keys, check_type, read_finite_number, read_text
+from ..library.plant_file import build_plant
 from ..library.write import scenario_toml
 from ..plant.plant import Plant
 from ..simulation import Integrator
 from .record import Record, optional_table, signal_unit
-from .scenario import build_plant
 
 _TABLES = ("title", "plant", "input", "observed", "fit", "record")
 _FIT = ("free", "own", "start_time", "initial_state", "starts", "seed", "integrator", "bounds")

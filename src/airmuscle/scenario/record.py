@@ -11,12 +11,12 @@ import numpy as np
 from ..core.errors import ParameterError
 from ..identify.dynamic import Experiment, InitialConditions
 from ..library.location import Location, check_keys, located_errors, read_finite_number, read_text
+from ..library.plant_file import build_plant
 from ..plant.plant import Plant
 from ..recording import Recording, read
 from ..recording.columns import quantity_of
 from ..simulation.problem import check_signal
 from .inputs import build_input_signal
-from .scenario import build_plant
 
 FIRST_ROWS = 3
 """Number of first rows whose median is the default initial pressure (chosen)."""

@@ -24,27 +24,24 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType, NoneType
+from types import MappingProxyType
 from typing import Any
 
 from ..analysis.equilibrium import find_equilibrium
-from ..characteristic.base import ForceLaw
 from ..control.control_loop import ControlLoop
 from ..control.inputs import InputSignal
 from ..core.errors import ParameterError, suggestion
 from ..library.build import build
-from ..library.catalogue import load_law
-from ..library.entry import MISSING_GEOMETRY, Entry
-from ..library.files import read_toml
+from ..library.files import is_path, list_plants, read_toml
 from ..library.location import Location, check_keys, check_type, located_errors, read_finite_number, read_text
-from ..muscle import Muscle
+from ..library.plant_file import SCENARIO_TABLES, build_plant, plant_tables
 from ..plant.plant import Plant
 from ..recording import Recording
 from ..simulation import Integrator, Problem, solve
 from .controller import build_control_loop, signal_units
 from .inputs import build_input_signal
 
-TABLES = ("title", "plant", "input", "run", "output")
+TABLES = ("title", *SCENARIO_TABLES)
 RUN = ("duration", "start_time", "output_times", "initial_state", "integrator")
 OUTPUT = ("columns",)
 DEFAULT_INITIAL_STATE: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
@@ -83,8 +80,15 @@ class Scenario:
 
 
 def load_scenario(path: str | Path) -> Scenario:
-    """The scenario in a file. Raises FileError, ParameterError, UnitError or UnknownNameError with the location."""
+    """The scenario in a file, or that of a plant of the library by its complete name.
+
+    A file of this name takes precedence. Raises FileError, ParameterError, UnitError or UnknownNameError with the
+    location.
+    """
     file = Path(path)
+    if str(path) in list_plants() and not is_path(str(path)) and not file.exists():
+        tables, location = plant_tables(str(path))
+        return build_scenario({key: tables[key] for key in TABLES if key in tables}, location)
     return build_scenario(read_toml(file), Location(str(file), "", file.parent))
 
 
@@ -156,61 +160,6 @@ def _read_duration(table: Mapping[str, Any], key: str, location: Location) -> fl
     if not duration > 0:
         raise ParameterError(f"{location}, {key} is {table[key]!r}; it must be greater than zero.")
     return duration
-
-
-def build_plant(table: Mapping[str, Any], location: Location) -> Plant:
-    """The plant of a table [plant]. Raises FileError, ParameterError, UnitError or UnknownNameError."""
-    value = table.get("muscle")
-    if value is None:
-        raise ParameterError(
-            f"{location}: 'muscle' is missing; name a library entry or a muscle file, or write [plant.muscle]."
-        )
-    muscle: Muscle | tuple[Muscle, ...]
-    if isinstance(value, list):
-        muscle = tuple(build_muscle(item, location.inside(f"muscle[{i}]")) for i, item in enumerate(value))
-    else:
-        muscle = build_muscle(value, location.inside("muscle"))
-    others = {"model": "Plant", **{key: item for key, item in table.items() if key != "muscle"}}
-    plant: Plant = check_type(build(others, location, {"muscle": muscle}), Plant, location)
-    return plant
-
-
-def build_muscle(value: Any, location: Location) -> Muscle:
-    """The muscle of a library name, a file or a table. Raises FileError, ParameterError, UnitError or
-    UnknownNameError."""
-    if isinstance(value, Mapping):
-        table = {"model": "Muscle", **value}
-        name = table.pop("library", None)
-        parts = {} if name is None else _entry_parts(_load_entry(name, location.inside("library")), table, location)
-        muscle: Muscle = build(table, location, parts)
-        return muscle
-    entry = _load_entry(value, location)
-    with located_errors(location):
-        return entry.muscle
-
-
-def _load_entry(value: Any, location: Location) -> Entry:
-    if not isinstance(value, str):
-        raise ParameterError(f"{location} is {value!r}; name a library entry or a muscle file.")
-    with located_errors(location):
-        return load_law(location.folder / value if value.endswith(".toml") else value)
-
-
-def _entry_parts(entry: Entry, replaced: Mapping[str, Any], location: Location) -> dict[str, Any]:
-    """Parts of an entry that a table does not replace; the table may add missing parts, such as a geometry."""
-    names = [f.name for f in dataclasses.fields(Muscle) if f.name not in ("contractile", "name")]
-    parts = {"contractile": entry.characteristic, **{name: getattr(entry, name, None) for name in names}}
-    if "contractile" in replaced:
-        del parts["validity_range"]  # it belongs to the replaced law
-    kept = {name: part for name, part in parts.items() if part is not None and name not in replaced}
-    if not isinstance(kept.get("contractile"), ForceLaw | NoneType):
-        raise ParameterError(
-            f"{location}: {entry.name} is {type(entry.characteristic).__name__}, which is not solved for the force; "
-            "a plant needs a ForceLaw. In Python, as_force_law(law, validity range) makes one."
-        )
-    if "geometry" not in {*kept, *replaced}:
-        raise ParameterError(f"{location}: {entry.name} lacks {MISSING_GEOMETRY}.")
-    return kept
 
 
 def initial_pressure(tables: Mapping[str, Any], location: Location) -> float | None:

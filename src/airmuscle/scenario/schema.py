@@ -173,6 +173,9 @@ def _required_fields(cls: type[Any]) -> list[str]:
 def _plant(models: _ModelSchemas) -> Schema:
     """Table of a plant; a muscle may also be the name of a library entry, or a table based on one."""
     plant, muscle = (models.table(cls, model_needed=False) for cls in (Plant, Muscle))
+    needed = plant.pop("required")
+    plant["properties"]["library"] = {"description": "a plant of the library, whose parts are replaced", **_TEXT}
+    plant["anyOf"] = [{"required": ["library"]}, {"required": needed}]
     name = {"description": "a library entry, or a muscle file relative to this file", **_TEXT}
     required = muscle.pop("required")
     muscle["properties"]["library"] = name

@@ -1,0 +1,22 @@
+"""Figure docs/images/joint.png: reachable region of a joint of the library. Run python docs/make_joint_figure.py"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import airmuscle as am
+from airmuscle.analysis import joint_statics, plot_reachable_region
+from airmuscle.core.plotting import save
+
+PICTURE = Path(__file__).with_name("images") / "joint.png"
+
+
+def main() -> None:
+    """Write the figure."""
+    entry = am.load("joint-dmsp-20-regulators")
+    save(plot_reachable_region(joint_statics(entry.plant), load=1.0), PICTURE)
+    print(f"wrote {PICTURE}")
+
+
+if __name__ == "__main__":
+    main()
