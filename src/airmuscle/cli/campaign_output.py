@@ -19,7 +19,8 @@ from ..identify.campaign import (
     ReleaseStage,
     StaticStage,
 )
-from ..report.campaign_chapters import USES, UnreadFile, ValidationRow
+from ..report.campaign_chapters import UnreadFile, ValidationRow
+from ..report.campaign_stages import USES, stage_result
 from ..scenario.campaign import RecordScenario
 from .fit_output import fit_to_dict
 from .terminal import echo, print_table
@@ -36,11 +37,13 @@ def print_campaign(
         echo(f"warning: {file.name} was left out: {file.reason}", err=True)
     echo()
     for name, stage in campaign.stages:
-        echo(f"{name}: {stage.verdict}")
+        echo(f"{name}: {stage_result(stage)}")
+    for band in campaign.static.bands if isinstance(campaign.static, StaticStage) else ():
+        echo(str(band))
     for row in validation:
         echo(
             f"kept aside: {row.record}: rms error {row.rmse:.4g} N, {100 * row.share:.3g} % of {row.rows} rows within "
-            f"-+{row.half_width:.3g} N"
+            f"±{row.half_width:.3g} N"
         )
     for each in campaign.next_experiments:
         echo(f"measure next: {each.measure} ({each.purpose})")

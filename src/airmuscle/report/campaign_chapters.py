@@ -18,22 +18,13 @@ from ..identify.campaign import (
 )
 from ..library.entry import Entry
 from .campaign_plots import characteristic_plot, creep_plot, fill_plot, prediction_plot, residual_plot
+from .campaign_stages import USES, count_records, stage_result
 from .chapter import Chapter, Plot, Table
 from .compare_chapter import compare_chapter
 from .dynamic_chapter import dynamic_chapters
 from .fit_chapter import fit_chapter
 from .hysteresis_chapter import hysteresis_chapters
-
-USES = {
-    RecordKind.ISOBARIC: "static characteristic, hysteresis",
-    RecordKind.ISOMETRIC: "static characteristic",
-    RecordKind.ISOTONIC: "static characteristic",
-    RecordKind.STATIC: "static characteristic",
-    RecordKind.FILL: "valve, volume",
-    RecordKind.RELEASE: "damping",
-    RecordKind.CREEP: "creep",
-    RecordKind.UNUSED: "nothing",
-}
+from .joint_friction_chapter import joint_friction_chapter
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,12 +55,13 @@ def campaign_chapters(
     validation: Sequence[ValidationRow] = (),
 ) -> list[Chapter]:
     """Return the chapters of a campaign; `scenarios` are pairs of a record and its scenario file or the reason."""
-    chapters = [_overview(campaign, unread, dict(scenarios), validation)]
+    chapters = [_overview(campaign, unread, dict(scenarios)), _predictions(campaign, validation), _next(campaign)]
     if isinstance(campaign.static, StaticStage) and entry is not None:
         chapters.append(compare_chapter(campaign.static.comparison))
         chapters.append(fit_chapter(campaign.static.fit, entry))
     if isinstance(campaign.hysteresis, FrictionStage):
-        chapters += hysteresis_chapters(campaign.hysteresis.loops, (), campaign.hysteresis.joint)
+        loops, joint = campaign.hysteresis.loops, campaign.hysteresis.joint
+        chapters += [joint_friction_chapter(joint)] if joint else hysteresis_chapters(loops)
     if isinstance(campaign.creep, CreepStage):
         chapters.append(_creep(campaign.creep))
     if isinstance(campaign.fills, FillStage):
@@ -79,32 +71,55 @@ def campaign_chapters(
     return chapters
 
 
-def _overview(
-    campaign: Campaign, unread: Sequence[UnreadFile], scenarios: dict[str, str], validation: Sequence[ValidationRow]
-) -> Chapter:
+def _overview(campaign: Campaign, unread: Sequence[UnreadFile], scenarios: dict[str, str]) -> Chapter:
+    """Return the chapter of the stages and the records."""
     used = sum(record.kind is not RecordKind.UNUSED for record in campaign.records)
-    identified = [name for name, stage in campaign.stages if not isinstance(stage, LeftOutStage)]
-    summary = [
-        f"{used} of {len(campaign.records)} records are used. Identified: {', '.join(identified) or 'nothing'}.",
-        *(f"{name.capitalize()}: {stage.verdict}" for name, stage in campaign.stages),
-    ]
-    plots: list[Plot | None] = [characteristic_plot(campaign), prediction_plot(campaign), residual_plot(campaign)]
-    if isinstance(campaign.fills, FillStage):
-        plots.append(fill_plot(campaign.fills))
+    sentences = [f"{used} of {len(campaign.records)} records are used."]
+    if unread:
+        sentences.append(f"{len(unread)} {'file' if len(unread) == 1 else 'files'} could not be read.")
+    left_out = [name for name, stage in campaign.stages if isinstance(stage, LeftOutStage)]
+    sentences.append(f"Not identified: {', '.join(left_out)}." if left_out else "All stages are identified.")
+    if isinstance(campaign.static, StaticStage):
+        sentences += [f"{band}" for band in campaign.static.bands]
+    columns: dict[str, Any] = {
+        "stage": [name for name, _ in campaign.stages],
+        "records": [count_records(campaign, name) for name, _ in campaign.stages],
+        "result": [stage_result(stage) for _, stage in campaign.stages],
+    }
     tables = [
-        _band_table(campaign),
-        _validation_table(validation),
-        _next_table(campaign),
-        _plan_table(campaign),
-        _record_table(campaign, scenarios),
-        _unread_table(unread),
-    ]
+        Table("campaign-stages", "Stages", columns), _record_table(campaign, scenarios), _unread_table(unread)
+    ]  # fmt: skip
     return Chapter(
         paper="campaign",
         title="Overview",
-        summary="\n\n".join(summary),
+        summary=" ".join(sentences),
+        tables=tuple(table for table in tables if table is not None),
+    )
+
+
+def _predictions(campaign: Campaign, validation: Sequence[ValidationRow]) -> Chapter:
+    """Return the chapter of the muscle: characteristic, predicted loops and fills, residuals and bands."""
+    plots: list[Plot | None] = [characteristic_plot(campaign), prediction_plot(campaign), residual_plot(campaign)]
+    if isinstance(campaign.fills, FillStage):
+        plots.append(fill_plot(campaign.fills))
+    tables = [_band_table(campaign), _validation_table(validation)]
+    return Chapter(
+        paper="campaign-muscle",
+        title="Muscle and prediction error",
+        summary="The predicted force is that of the static law minus friction and creep along the recorded motion.",
         tables=tuple(table for table in tables if table is not None),
         plots=tuple(plot for plot in plots if plot is not None),
+    )
+
+
+def _next(campaign: Campaign) -> Chapter:
+    """Return the chapter of the next experiments."""
+    tables = [_next_table(campaign), _plan_table(campaign)]
+    return Chapter(
+        paper="campaign-next",
+        title="What to measure next",
+        summary="Missing stages first, then parameters that the records do not determine, then further static runs.",
+        tables=tuple(table for table in tables if table is not None),
     )
 
 
@@ -163,7 +178,7 @@ def _next_table(campaign: Campaign) -> Table | None:
         "measure": [each.measure for each in campaign.next_experiments],
         "because of": [each.purpose for each in campaign.next_experiments],
     }
-    return Table("campaign-next", "What to measure next", columns)
+    return Table("campaign-next", "Experiments", columns)
 
 
 def _plan_table(campaign: Campaign) -> Table | None:

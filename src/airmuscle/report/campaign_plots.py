@@ -16,7 +16,9 @@ MAX_LOOPS, MAX_PANELS = 6, 6
 """Maximum number of loops in a figure, and of panels of fills (chosen)."""
 CURVE_POINTS = 161
 LEVEL_TOLERANCE = 0.03
-"""Maximum relative difference of the pressure of a point from that of its curve (chosen)."""
+"""Maximum relative difference of two pressures that have one curve (chosen)."""
+POINT_TOLERANCE = 0.005
+"""Maximum difference of the pressure of a point from that of its curve, relative to the maximum (chosen)."""
 
 
 def characteristic_plot(campaign: Campaign) -> Plot | None:
@@ -33,12 +35,12 @@ def characteristic_plot(campaign: Campaign) -> Plot | None:
     for i, pressure in enumerate(pressures):
         colour, force = LINES[i % len(LINES)], np.asarray(law.force(np.full(eps.size, pressure), eps), dtype=float)
         force = np.where(force > 0.0, force, np.nan)
-        label = f"{pressure / 1e3:.4g} kPa"
+        label = f"{pressure / 1e3:.3g} kPa"
         axes.plot(100 * eps, force, color=colour, linestyle=DASHES[i % 5], label=label, zorder=3)
         half = stage.band.half_width
         axes.fill_between(100 * eps, np.maximum(force - half, 0), force + half, color=colour, alpha=0.18, linewidth=0)
         for run in runs:
-            rows = np.abs(run["pressure"] - pressure) <= LEVEL_TOLERANCE * max(pressures)
+            rows = np.abs(run["pressure"] - pressure) <= POINT_TOLERANCE * max(pressures)
             style = {"color": colour, "linestyle": "none", "marker": ".", "markersize": 2.5, "alpha": 0.7}
             axes.plot(100 * run["contraction"][rows], run["force"][rows], **style)
     axes.set(xlabel="contraction [%]", ylabel="force [N]", ylim=(0.0, None))
@@ -120,7 +122,7 @@ def _level_text(column: str, value: float) -> str:
         column, (1e3, "mm")
     )
     scaled = factor * value
-    return f"{0.0 if abs(scaled) < 5e-3 else scaled:.4g} {unit}"
+    return f"{0.0 if abs(scaled) < 5e-3 else scaled:.3g} {unit}"
 
 
 def residual_plot(campaign: Campaign) -> Plot | None:
@@ -169,7 +171,7 @@ def fill_plot(stage: FillStage) -> Plot:
         upper.plot(time, 1e-3 * modelled["pressure"], color=RED, linewidth=1.0, label="joint fit")
         lower.plot(time, 1e-3 * (modelled["pressure"] - recording["pressure"]), **dots)
         lower.axhline(0.0, color=BLACK, linewidth=0.8)
-        upper.set_title(f"contraction {100 * stage.contractions[i] + 0.0:.3g} %", fontsize=8)
+        upper.set_title(f"contraction {_level_text('contraction', float(stage.contractions[i]))}", fontsize=8)
         lower.set_xlabel("time [s]")
     panels[0, 0].set_ylabel("pressure [kPa]")
     panels[1, 0].set_ylabel("residual [kPa]")

@@ -50,11 +50,11 @@ class ErrorBand:
     def __str__(self) -> str:
         if not self.groups:
             return (
-                f"95 % band of the force for {self.purpose}: -+{self.half_width:.3g} N, from the residuals of the fit "
+                f"95 % band of the force for {self.purpose}: ±{self.half_width:.3g} N, from the residuals of the fit "
                 "itself, because there are fewer than three levels; it is too narrow for other levels."
             )
         return (
-            f"95 % band of the force for {self.purpose}: -+{self.half_width:.3g} N, from {self.rows} rows of "
+            f"95 % band of the force for {self.purpose}: ±{self.half_width:.3g} N, from {self.rows} rows of "
             f"{self.groups} {'group' if self.groups == 1 else 'groups'} left out in turn (rms error "
             f"{self.rmse:.3g} N)."
         )

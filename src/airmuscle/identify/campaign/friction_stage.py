@@ -15,13 +15,13 @@ from ...recording import Recording
 from ..hysteresis import HysteresisLoop, JointFit, LoopFit, find_loops, fit_jointly, fit_loop, identified_friction
 from .creep_stage import creep_force
 from .record import CampaignRecord, RecordKind
-from .rows import displacement, path_rows, with_force
+from .rows import PREDICTED_ROWS, displacement, path_rows, with_force
 from .stage import LeftOutStage
 
 NAME = "hysteresis"
 CURVE_DEGREE = 5
 """Degree of the polynomial static curve of each loop (chosen)."""
-MAX_LOOPS = 8
+MAX_LOOPS = 6
 """Maximum number of loops that are fitted; of more, those at evenly spaced pressures (chosen)."""
 
 
@@ -125,7 +125,7 @@ def friction_along(friction: Friction, recording: Recording) -> Array:
     """
     if isinstance(friction, NoFriction):
         return np.zeros(len(recording))
-    rows = path_rows(recording)
+    rows = path_rows(recording, PREDICTED_ROWS)
     time = recording.columns.get("time")
     path = displacement(recording)[rows]
     force = np.asarray(friction.force_along(path, None if time is None else time[rows]))

@@ -151,7 +151,7 @@ def _describe(run: Run) -> str:
         return run.kind.name
     factor, unit = units.get(run.constant_column, (1e3, "mm"))
     value = run.constant_value * factor
-    return f"{run.kind.name} at {0.0 if abs(value) < 5e-3 else value:.4g} {unit}"
+    return f"{run.kind.name} at {0.0 if abs(value) < 5e-3 else value:.3g} {unit}"
 
 
 def _longest(runs: Sequence[Run]) -> Run | None:

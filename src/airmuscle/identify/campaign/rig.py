@@ -14,6 +14,8 @@ LEVEL_TOLERANCE = 0.03
 """Maximum relative difference of two pressures that are one level (chosen)."""
 MAX_RATIO = 1.5
 """Maximum ratio of the forces of two records at the same pressure, contraction and length (chosen)."""
+MAX_SCALE = 10.0
+"""Maximum ratio of the greatest forces by pressure of two isobaric records of one length (chosen)."""
 MIN_FORCE = 0.1
 """Minimum force of the compared rows, as a fraction of the maximum force (chosen)."""
 REMEDY = "Give the files of one muscle and one rig in a folder of their own"
@@ -33,8 +35,31 @@ def check_one_rig(records: Sequence[CampaignRecord]) -> None:
                 f"{REMEDY}."
             )
         isobaric = [record for record in own if record.kind is RecordKind.ISOBARIC]
+        _check_scale(isobaric)
         for one, other in itertools.combinations(isobaric, 2):
             _check_forces(one, other)
+
+
+def _check_scale(records: Sequence[CampaignRecord]) -> None:
+    """Raise IdentificationError where the force by pressure differs by a factor that only a unit explains."""
+    scales = [
+        (float(np.max(record.recording["force"])) / record.level[1], record)
+        for record in records
+        if record.level is not None and record.level[1] > 0
+    ]
+    positive = sorted((pair for pair in scales if pair[0] > 0), key=lambda pair: pair[0])
+    if positive and positive[-1][0] > MAX_SCALE * positive[0][0]:
+        (low, first), (high, last) = positive[0], positive[-1]
+        raise IdentificationError(
+            f"the force by pressure of {last.origin} ({_units(last)}) is {high / low:.3g} times that of {first.origin} "
+            f"({_units(first)}), at the same length: a unit is wrong, or the files are of different muscles. "
+            f"{REMEDY}, or correct the units."
+        )
+
+
+def _units(record: CampaignRecord) -> str:
+    units = record.recording.units
+    return ", ".join(f"{name} in {units[name]}" for name in ("pressure", "force") if name in units)
 
 
 def _check_forces(one: CampaignRecord, other: CampaignRecord) -> None:

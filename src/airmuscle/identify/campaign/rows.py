@@ -11,8 +11,10 @@ from ...core.arrays import Array
 from ...recording import Recording
 from ...recording.segment.sensor import estimate_noise
 
-MAX_ROWS = 200
+MAX_ROWS = 160
 """Maximum number of rows of a record for a fit of friction (chosen)."""
+PREDICTED_ROWS = 3000
+"""Maximum number of rows of a record for which the friction is computed (chosen)."""
 NOISE_STEPS = 4.0
 """Mean step of the displacement between two rows, in standard deviations of its noise (chosen)."""
 
@@ -32,12 +34,12 @@ def displacement(recording: Recording) -> Array:
     return np.asarray(recording["contraction"] * float(recording.constants["resting_length"]))
 
 
-def path_rows(recording: Recording) -> Array:
-    """The numbers of the rows that follow the motion without that of the noise: at most `MAX_ROWS`."""
+def path_rows(recording: Recording, max_rows: int = MAX_ROWS) -> Array:
+    """The numbers of at most `max_rows` rows that follow the motion without that of the noise."""
     path = displacement(recording)
     noise = estimate_noise(path)
     span = float(np.ptp(path))
-    count = MAX_ROWS if noise == 0.0 else int(min(MAX_ROWS, max(2.0 * span / (NOISE_STEPS * noise), 20)))
+    count = max_rows if noise == 0.0 else int(min(max_rows, max(2.0 * span / (NOISE_STEPS * noise), 20)))
     return thinned_rows(len(recording), count)
 
 

@@ -19,7 +19,7 @@ from .rows import thin, with_force
 from .stage import LeftOutStage
 
 NAME = "static characteristic"
-FIT_ROWS, MIN_FIT_ROWS = 1200, 25
+FIT_ROWS, MIN_FIT_ROWS = 1000, 25
 """Maximum number of rows of all records in the static fits, and minimum number of each (chosen)."""
 
 
