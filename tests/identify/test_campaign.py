@@ -78,6 +78,18 @@ def test_a_fill_and_its_discharge_are_two_steps_with_their_instants():
     assert down.change == pytest.approx(-6.2e5, rel=0.01)
 
 
+def test_a_file_with_several_isobaric_runs_gives_one_record_for_each():
+    parts, offset = [MUSCLE.isobaric(bar, RANDOM) for bar in (2.0, 4.0, 6.0)], 0.0
+    for part in parts:
+        part["time"] = part["time"] + offset
+        offset = part["time"][-1] + 0.1
+    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    records = classify_records([recording(joined, "three")])
+    assert [record.kind for record in records] == [RecordKind.ISOBARIC] * 3
+    assert [round(record.level[1] / 1e5) for record in records] == [2, 4, 6]
+    assert records[1].origin == "three, rows 701 to 1400"
+
+
 def test_records_that_cannot_be_used_state_the_reason():
     columns = MUSCLE.isobaric(3.0, RANDOM)
     without_length = {name: values for name, values in columns.items() if name != "length"}

@@ -34,7 +34,7 @@ def print_campaign(
     rows = [(record.origin, record.kind.value, record.reason, USES[record.kind]) for record in campaign.records]
     print_table(("record", "kind", "reason", "used for"), rows)
     for file in unread:
-        echo(f"warning: {file.name} was left out: {file.reason}", err=True)
+        echo(f"warning: left out: {file.reason}", err=True)
     echo()
     for name, stage in campaign.stages:
         echo(f"{name}: {stage_result(stage)}")

@@ -100,14 +100,15 @@ def _find_loops(records: Sequence[CampaignRecord], creep: CreepElements) -> tupl
             recording = with_force(record.recording, creep_force(creep, record.recording))
             by_length.setdefault(record.resting_length, []).append(recording.rows(path_rows(recording)))
     for recordings in by_length.values():
+        usable = []
         for recording in recordings:
             try:
                 find_loops([recording], degree=CURVE_DEGREE, all_rows=True)
             except AirmuscleError as error:
-                failed.append(str(error.message))
-        usable = [r for r in recordings if not any(r.origin in text for text in failed)]
-        if usable:
-            loops += find_loops(usable, degree=CURVE_DEGREE, all_rows=True)
+                failed.append(error.message)
+            else:
+                usable.append(recording)
+        loops += find_loops(usable, degree=CURVE_DEGREE, all_rows=True) if usable else ()
     return loops, failed
 
 

@@ -11,13 +11,26 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...recording import Recording
-from ...recording.segment import AT_REST, ISOBARIC, ISOMETRIC, ISOTONIC, Inspection, Run, inspect_all, quasi_static_rows
+from ...recording.segment import (
+    AT_REST,
+    ISOBARIC,
+    ISOMETRIC,
+    ISOTONIC,
+    Inspection,
+    Run,
+    estimate_sensors,
+    inspect,
+    inspect_all,
+    quasi_static_rows,
+)
 from ...recording.segment.runs import CONTRACTION_BAND, RELATIVE_BAND
 from .transient import PressureStep, find_motion, find_pressure_steps
 
 RowMask = npt.NDArray[np.bool_]
 MIN_HOLD, MIN_HOLD_RATIO = 10.0, 10.0
 """Minimum duration of a hold [s], and its minimum ratio to the duration of the motion before it (chosen)."""
+MIN_RUN_ROWS = 100
+"""Minimum number of rows of a run that is a record of its own (chosen)."""
 MIN_ROWS = 8
 """Minimum number of rows of a record (chosen)."""
 MIN_SLOW = 0.5
@@ -80,8 +93,32 @@ class CampaignRecord:
 
 
 def classify_records(recordings: Sequence[Recording]) -> tuple[CampaignRecord, ...]:
-    """The records of a campaign with their kinds; the sensors are estimated from all recordings of the rig together."""
-    return tuple(_classify(inspection) for inspection in inspect_all(recordings))
+    """The records of a campaign with their kinds; the sensors are estimated from all recordings of the rig together.
+
+    A recording with several long runs at levels of one quantity gives one record for each of them.
+    """
+    sensors = estimate_sensors(recordings) if recordings else {}
+    records = []
+    for inspection in inspect_all(recordings):
+        record = _classify(inspection)
+        parts = _long_runs(record) if record.kind.is_static else []
+        records += [_classify(inspect(part, sensors)) for part in parts] or [record]
+    return tuple(records)
+
+
+def _long_runs(record: CampaignRecord) -> list[Recording]:
+    """The rows of each long run of a record with time; empty unless there are several."""
+    recording = record.recording
+    runs = [run for run in record.inspection.runs if len(run.interval) >= MIN_RUN_ROWS and run.constant_column]
+    if "time" not in recording or len(runs) < 2:
+        return []
+    return [
+        dataclasses.replace(
+            recording.rows(run.interval.rows),
+            origin=f"{recording.origin}, rows {run.interval.start + 1} to {run.interval.stop}",
+        )
+        for run in runs
+    ]
 
 
 def _classify(inspection: Inspection) -> CampaignRecord:
