@@ -48,6 +48,7 @@ COMMANDS = (
     CommandRow("convert", "convert", "convert", "Approximate one characteristic by another."),
     CommandRow("hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."),
     CommandRow("fit-dynamic", "fit_dynamic", "fit_dynamic", "Identify plant parameters from transient records."),
+    CommandRow("campaign", "campaign", "campaign", "Identify a muscle from all files of a test rig."),
     CommandRow("plan", "plan", "plan", "Design the most informative static experiments (D-optimal)."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("sweep", "sweep", "sweep", "Run a parameter study of a scenario."),

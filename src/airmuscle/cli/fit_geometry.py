@@ -41,7 +41,7 @@ def parse_braid(text: str | None) -> BraidSize | None:
         for name, (_, _, value) in zip(names, parts, strict=True)
     }
     size = BraidSize(**values)
-    _braid(size, 1.0)  # the bounds are checked before any file is read
+    braid_of_length(size, 1.0)  # the bounds are checked before any file is read
     return size
 
 
@@ -60,7 +60,7 @@ def with_braid(entry: Entry, size: BraidSize | None, recordings: Sequence[Record
         )
     lengths = resting_lengths(recordings) or _lengths_of(law)
     check_one_length(lengths)
-    return dataclasses.replace(entry, geometry=_braid(size, lengths[0]))
+    return dataclasses.replace(entry, geometry=braid_of_length(size, lengths[0]))
 
 
 def check_one_length(lengths: Sequence[float]) -> None:
@@ -92,7 +92,7 @@ def _lengths_of(law: object) -> tuple[float, ...]:
     return tuple({float(leaf.value) for leaf in tree.leaves(law) if leaf.declared.name == "resting_length"})
 
 
-def _braid(size: BraidSize, resting_length: float) -> Braid:
+def braid_of_length(size: BraidSize, resting_length: float) -> Braid:
     try:
         return Braid(size.radius, size.angle, resting_length)
     except ParameterError as error:

@@ -82,6 +82,7 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
         "all_rows": lambda hint: "use --all-rows",
         "characteristic": lambda hint: "use --muscle NAME with --use-characteristic",
     },
+    "campaign": _FILES,
     "plan": {"fixed": _fix},
     "fit-dynamic": {**_RECORDS, "free": lambda hint: f"write free = {json.dumps(list(hint.value))} under [fit]"},
 }

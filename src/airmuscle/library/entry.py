@@ -12,6 +12,7 @@ from ..core.reference import Reference
 from ..friction.base import Friction
 from ..geometry.base import Geometry
 from ..muscle import CreepElements, Damper, Muscle, SeriesElement, Spring, Stop, Wall
+from .uncertainty import ParameterUncertainty
 
 OPTIONAL_PARTS = ("spring", "damper", "friction", "wall", "series", "stop", "creep")
 """Optional elements of a muscle, as fields of an entry and tables of its file."""
@@ -40,8 +41,8 @@ class Entry:
     """Library entry of a muscle or a law, all numbers SI; `muscle` is the Muscle for use in a plant.
 
     `provenance` is the origin of the numbers (printed, measured, secondary source, fitted, chosen), `warning` a
-    restriction of use, which is issued when the entry is loaded, and `validity_range` the range of the measurements or
-    the publication, if the file states it.
+    restriction of use, which is issued when the entry is loaded, `validity_range` the range of the measurements or the
+    publication, and `uncertainty` the standard errors and correlations of fitted parameters, if the file states them.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Entry:
     validity_range: ValidityRange | None = None
     checks: tuple[Check, ...] = ()
     references: tuple[Reference, ...] = ()
+    uncertainty: ParameterUncertainty | None = None
 
     @property
     def muscle(self) -> Muscle:

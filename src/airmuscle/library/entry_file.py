@@ -17,6 +17,7 @@ from .build import TEXT_KEYS, build, read_entry_texts
 from .entry import Check, Entry
 from .location import Location, check_keys, check_type, read_finite_number, read_table_array, read_text
 from .references import read_references
+from .uncertainty import read_uncertainty
 
 QUANTITIES = {"pressure": "Pa", "contraction": "1", "force": "N", "volume": "m3"}
 """Quantities of a check, each with the unit of numbers without a unit."""
@@ -25,7 +26,7 @@ PARTS = {
     "wall": Wall, "series": SeriesElement, "stop": Stop, "creep": CreepElements,
 }  # fmt: skip
 """Tables of an entry file that describe a model, each with the class that is required."""
-KEYS = (*TEXT_KEYS, *PARTS, "validity_range", "check", "reference")
+KEYS = (*TEXT_KEYS, *PARTS, "validity_range", "uncertainty", "check", "reference")
 """Keys of an entry file."""
 _CONDITIONS = {
     "pressure": ("contraction", "force"),
@@ -66,6 +67,9 @@ def build_entry(tables: Mapping[str, Any], name: str, file: Path, folder: Path) 
         else None,
         checks=tuple(_read_check(*row) for row in read_table_array(tables, "check", location)),
         references=read_references(tables, location),
+        uncertainty=read_uncertainty(tables["uncertainty"], location.inside("uncertainty"))
+        if "uncertainty" in tables
+        else None,
     )
 
 

@@ -11,6 +11,7 @@ from typing import Any
 from ..core.errors import FileError, ParameterError
 from .build import TEXT_KEYS
 from .entry import OPTIONAL_PARTS, Check, Entry
+from .uncertainty import uncertainty_table
 
 
 def to_toml(entry: Entry) -> str:
@@ -23,6 +24,8 @@ def to_toml(entry: Entry) -> str:
             tables[part] = _model_table(thing)
     if entry.validity_range is not None:
         tables["validity_range"] = dataclasses.asdict(entry.validity_range)
+    if entry.uncertainty is not None:
+        tables["uncertainty"] = uncertainty_table(entry.uncertainty)
     if entry.checks:
         tables["check"] = [_check_table(check) for check in entry.checks]
     if entry.references:

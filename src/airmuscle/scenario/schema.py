@@ -19,7 +19,7 @@ from ..control.controller import RELATIVE, Controller
 from ..control.driver import Driver
 from ..core.declaration import Parameter, parameters
 from ..core.reference import Reference
-from ..library import entry_file
+from ..library import entry_file, uncertainty
 from ..library.build import TEXT_KEYS
 from ..library.models import model_class, model_names
 from ..library.valve_entry import PATHS
@@ -66,6 +66,7 @@ def muscle_schema() -> Schema:
         **dict.fromkeys(TEXT_KEYS, _TEXT),
         **{key: models.kind(cls) for key, cls in entry_file.PARTS.items()},
         "validity_range": models.table(model_class("ValidityRange", "schema"), model_needed=False),
+        "uncertainty": _table(_uncertainty(), uncertainty.KEYS),
         "check": {"type": "array", "items": _table(check, ("quantity", "equals", "tolerance", "source"))},
         "reference": {"type": "array", "items": models.table(Reference, model_needed=None)},
     }
@@ -75,6 +76,12 @@ def muscle_schema() -> Schema:
         ("title", "provenance", "characteristic"),
         models,
     )
+
+
+def _uncertainty() -> Schema:
+    numbers = {"type": "array", "items": {"type": "number"}}
+    names = {"type": "array", "items": _TEXT}
+    return {"parameters": names, "standard_errors": numbers, "correlations": {"type": "array", "items": numbers}}
 
 
 def _document(title: str, properties: Schema, required: Sequence[str], models: _ModelSchemas) -> Schema:

@@ -1,0 +1,31 @@
+"""Identification of one muscle from all records of a bench campaign."""
+
+from .campaign import STAGES, Campaign, Prediction, identify_campaign
+from .creep_stage import CreepStage
+from .error_band import ErrorBand
+from .fill_stage import FillStage, valve_commands
+from .friction_stage import FrictionStage
+from .next_experiment import NextExperiment
+from .record import CampaignRecord, RecordKind, classify_records
+from .release_stage import ReleaseStage
+from .stage import LeftOutStage
+from .static_stage import StaticStage
+
+__all__ = [
+    "STAGES",
+    "Campaign",
+    "CampaignRecord",
+    "CreepStage",
+    "ErrorBand",
+    "FillStage",
+    "FrictionStage",
+    "LeftOutStage",
+    "NextExperiment",
+    "Prediction",
+    "RecordKind",
+    "ReleaseStage",
+    "StaticStage",
+    "classify_records",
+    "identify_campaign",
+    "valve_commands",
+]

@@ -1,0 +1,100 @@
+"""Next experiments of a campaign: remedies of stages without a result, and the D-optimal static runs."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from ...characteristic.validity_range import ValidityRange
+from ...core.errors import AirmuscleError
+from ..experiment_design import BenchLimits, ExperimentPlan, optimal_design
+from .creep_stage import CreepStage
+from .fill_stage import FillStage
+from .record import CampaignRecord
+from .stage import LeftOutStage
+from .static_stage import StaticStage
+
+PLANNED_RUNS, PLANNED_POINTS = 4, 15
+"""Number of planned static runs, and of their points (chosen)."""
+MIN_LENGTHS = 3
+"""Number of resting lengths from which the error for other lengths can be judged."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class NextExperiment:
+    """An experiment that would improve the muscle: what to measure, and why; `plan` has the runs of a static one."""
+
+    measure: str
+    purpose: str
+    plan: ExperimentPlan | None = None
+
+
+def plan_next(
+    stages: Sequence[object], static: StaticStage | LeftOutStage, records: Sequence[CampaignRecord]
+) -> tuple[NextExperiment, ...]:
+    """What to measure next: first what is missing, then what is not determined, then further static runs."""
+    missing = [
+        NextExperiment(_sentence(stage.remedy), f"{stage.name}: {stage.reason.rstrip('.')}")
+        for stage in stages
+        if isinstance(stage, LeftOutStage) and stage.remedy
+    ]
+    return (*missing, *_undetermined(stages), *_lengths(static, records), *_static_runs(static))
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
+
+
+def _undetermined(stages: Sequence[object]) -> list[NextExperiment]:
+    """The experiments that separate what the fills do not, and longer holds."""
+    experiments = []
+    for stage in stages:
+        if isinstance(stage, FillStage):
+            for each in stage.fit.identifiability.undetermined:
+                names = ", ".join(name for name, _ in each.shares)
+                experiments.append(NextExperiment(_sentence(each.remedy), f"fills: {names} are not determined"))
+        if isinstance(stage, CreepStage) and stage.elements.relaxation_times:
+            longest = max(stage.elements.relaxation_times)
+            if longest > stage.longest / 2:
+                text = f"Hold the length for {6 * longest:.2g} s instead of {stage.longest:.3g} s."
+                experiments.append(NextExperiment(text, "creep: the longest relaxation time is extrapolated"))
+    return experiments
+
+
+def _lengths(static: StaticStage | LeftOutStage, records: Sequence[CampaignRecord]) -> list[NextExperiment]:
+    lengths = {r.resting_length for r in records if r.kind.is_static and r.resting_length is not None}
+    if isinstance(static, LeftOutStage) or len(lengths) >= MIN_LENGTHS:
+        return []
+    return [
+        NextExperiment(
+            "Measure muscles of the same type with three resting lengths, each at three pressures or more.",
+            f"lengths: {len(lengths)} resting {'length is' if len(lengths) == 1 else 'lengths are'} measured, so the "
+            "error for other lengths is not known",
+        )
+    ]
+
+
+def _static_runs(static: StaticStage | LeftOutStage) -> list[NextExperiment]:
+    if isinstance(static, LeftOutStage):
+        return []
+    fit = static.fit
+    ranges = fit.data_ranges
+    low = max(ranges["pressure"][0], 0.0)
+    limits = BenchLimits(
+        ValidityRange(low, ranges["pressure"][1], max(ranges["contraction"][0], 0.0), ranges["contraction"][1]),
+        ranges["force"][1],
+    )
+    fixed = tuple(leaf.path for i, leaf in enumerate(fit.problem.leaves) if i not in set(fit.problem.free))
+    try:
+        plan = optimal_design(
+            fit.model, limits, runs=PLANNED_RUNS, points=PLANNED_POINTS, sigma=max(fit.sigma, 1e-9), fixed=fixed
+        )
+    except AirmuscleError:
+        return []  # the law has no derivative at a corner of the range; the other experiments remain
+    return [
+        NextExperiment(
+            f"Measure {len(plan.runs)} further static runs at the levels of the table below.",
+            "static characteristic: the D-optimal runs within the range of the records",
+            plan,
+        )
+    ]

@@ -1,0 +1,90 @@
+"""Static characteristic of a campaign: model selection on rows freed of friction and creep, and its error bands."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+from ...core.errors import AirmuscleError
+from ...friction import Friction
+from ...muscle import CreepElements
+from ...recording import Recording
+from ..model_selection import Comparison, compare
+from ..result import Fit
+from .creep_stage import creep_force
+from .error_band import ErrorBand, calibrate
+from .friction_stage import friction_along
+from .record import CampaignRecord, slow_rows
+from .rows import thin, with_force
+from .stage import LeftOutStage
+
+NAME = "static characteristic"
+FIT_ROWS, MIN_FIT_ROWS = 1000, 25
+"""Maximum number of rows of all records in the static fits, and minimum number of each (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class StaticStage:
+    """The model selection, the rows of the fits, and the bands of the errors of the recommended law."""
+
+    comparison: Comparison
+    points: tuple[Recording, ...]
+    """The rows of the fit, freed of friction and creep, one recording for each record."""
+    bands: tuple[ErrorBand, ...]
+    """One for each purpose that the records can judge."""
+
+    @property
+    def fit(self) -> Fit:
+        """The fit of the recommended law."""
+        return self.comparison.recommended.fit
+
+    @property
+    def band(self) -> ErrorBand:
+        """The band for the muscles and the range of the records."""
+        return self.bands[0]
+
+    @property
+    def verdict(self) -> str:
+        """The recommended law and the bands, as sentences."""
+        return " ".join([self.comparison.reason, *(str(band) for band in self.bands)])
+
+
+def fit_static_stage(
+    records: Sequence[CampaignRecord], friction: Friction, creep: CreepElements, progress: Callable[[float], None]
+) -> StaticStage | LeftOutStage:
+    """Select and fit the static characteristic to the quasi-static rows of all records.
+
+    The friction and creep forces along the motion of each record are added to the measured force, so that the law is
+    that of the muscle without them.
+    """
+    used = [record for record in records if record.kind.is_static]
+    if not used:
+        return LeftOutStage(
+            NAME,
+            "no record is a slow run with force and length",
+            "record the force while the length changes slowly at constant pressure, at three pressures or more",
+        )
+    cleaned = [freed_rows(record, friction, creep) for record in used]
+    used = [record for record, rows in zip(used, cleaned, strict=True) if len(rows)]
+    cleaned = [rows for rows in cleaned if len(rows)]
+    try:
+        points = tuple(thin(r, max(FIT_ROWS // len(cleaned), MIN_FIT_ROWS)) for r in cleaned)
+        comparison = compare(points, progress=lambda _, fraction: progress(0.9 * fraction))
+        bands = calibrate(comparison.recommended.fit, points, used)
+    except AirmuscleError as error:
+        return LeftOutStage(NAME, str(error.message), "measure at more levels of pressure and contraction")
+    progress(1.0)
+    return StaticStage(comparison, points, bands)
+
+
+def freed_rows(record: CampaignRecord, friction: Friction, creep: CreepElements) -> Recording:
+    """The quasi-static rows with tension of a record, its force freed of friction and creep."""
+    recording = record.recording
+    if record.resting_length is not None:
+        added = creep_force(creep, recording) + friction_along(friction, recording)
+        recording = with_force(recording, added)
+    sensors = record.inspection.sensors
+    rows = slow_rows(record.recording, record.inspection) & (record.recording["force"] > 0.0)
+    if "force" in sensors:
+        rows &= sensors["force"].censoring(record.recording["force"]) == 0.0
+    return recording.rows(rows)

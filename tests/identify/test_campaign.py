@@ -1,0 +1,244 @@
+"""A campaign finds one muscle in all files of a rig: each record is used for what it shows, what the records do not
+show is named with the measurement that would show it, and predictions of unseen records stay within the stated bands.
+The truth is computed by a muscle that differs in kind from every law of the library (made_campaign.py).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from made_campaign import THREE_LENGTHS, TrueMuscle, unseen_records, write_campaign, write_german
+
+from airmuscle.core.errors import IdentificationError
+from airmuscle.identify.campaign import (
+    CreepStage,
+    FillStage,
+    FrictionStage,
+    LeftOutStage,
+    RecordKind,
+    ReleaseStage,
+    StaticStage,
+    classify_records,
+    identify_campaign,
+)
+from airmuscle.identify.campaign.creep_stage import creep_stretches, fit_creep_stage
+from airmuscle.identify.campaign.volume import VolumeChange, relate_volumes
+from airmuscle.recording import Recording, read
+
+RANDOM = np.random.default_rng(3)
+MUSCLE = TrueMuscle(0.3)
+
+
+def recording(columns, name, length=0.3, **constants):
+    return Recording(columns, name, {"resting_length": length, **constants})
+
+
+@pytest.fixture(scope="module")
+def one_length(tmp_path_factory):
+    folder = write_campaign(tmp_path_factory.mktemp("rig"), (0.3,))
+    return identify_campaign(read(folder))
+
+
+def shares_within_bands(campaign, lengths, seed=9):
+    """By record: whether the measured force of each row with tension is within the band."""
+    inside = {}
+    for name, (columns, length) in unseen_records(lengths, seed).items():
+        run = recording(columns, name, length)
+        prediction, taut = campaign.predict(run), run["force"] > 0.0
+        inside[name] = ((run["force"] >= prediction.low) & (run["force"] <= prediction.high))[taut]
+    return inside
+
+
+def test_each_record_is_sorted_by_its_kind():
+    made = {
+        "isobaric": MUSCLE.isobaric(3.0, RANDOM),
+        "isometric": MUSCLE.isometric(0.05, RANDOM),
+        "fill": MUSCLE.fill(0.08, RANDOM),
+        "creep": MUSCLE.hold(3.0, 0.06, RANDOM),
+        "release": MUSCLE.release(2.0, 30.0, RANDOM),
+    }
+    records = classify_records([recording(columns, name) for name, columns in made.items()])
+    assert {record.origin: record.kind.value for record in records} == {name: name for name in made}
+
+
+def test_a_fast_ramp_of_the_pressure_is_not_a_fill():
+    """A triangle of 5 s changes by 23 kPa in 0.1 s, as a fill does, but at a constant rate."""
+    (record,) = classify_records([recording(MUSCLE.isometric(0.05, RANDOM, duration=10.0), "ramp")])
+    assert record.kind is RecordKind.ISOMETRIC
+
+
+def test_a_fill_and_its_discharge_are_two_steps_with_their_instants():
+    (record,) = classify_records([recording(MUSCLE.fill(0.08, RANDOM), "fill")])
+    up, down = record.steps
+    assert up.start == pytest.approx(0.2, abs=0.02)
+    assert down.start == pytest.approx(2.5, abs=0.02)
+    assert up.change == pytest.approx(6.2e5, rel=0.01)
+    assert down.change == pytest.approx(-6.2e5, rel=0.01)
+
+
+def test_a_file_with_several_isobaric_runs_gives_one_record_for_each():
+    parts, offset = [MUSCLE.isobaric(bar, RANDOM) for bar in (2.0, 4.0, 6.0)], 0.0
+    for part in parts:
+        part["time"] = part["time"] + offset
+        offset = part["time"][-1] + 0.1
+    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    records = classify_records([recording(joined, "three")])
+    assert [record.kind for record in records] == [RecordKind.ISOBARIC] * 3
+    assert [round(record.level[1] / 1e5) for record in records] == [2, 4, 6]
+    assert records[1].origin == "three, rows 701 to 1400"
+
+
+def test_records_that_cannot_be_used_state_the_reason():
+    columns = MUSCLE.isobaric(3.0, RANDOM)
+    without_length = {name: values for name, values in columns.items() if name != "length"}
+    without_pressure = {name: values for name, values in columns.items() if name != "pressure"}
+    short = {name: values[:5] for name, values in columns.items()}
+    records = classify_records(
+        [recording(without_length, "a"), recording(without_pressure, "b"), recording(short, "c")]
+    )
+    assert all(record.kind is RecordKind.UNUSED for record in records)
+    reasons = [record.reason for record in records]
+    assert "contraction is not known" in reasons[0]
+    assert reasons[1] == "no pressure column"
+    assert "at least 8" in reasons[2]
+
+
+def test_no_usable_record_is_an_error_that_names_each_record():
+    short = {name: values[:5] for name, values in MUSCLE.isobaric(3.0, RANDOM).items()}
+    with pytest.raises(IdentificationError, match=r"no record of the campaign can be used \(run: 5 rows"):
+        identify_campaign([recording(short, "run")])
+
+
+def test_two_specimens_of_one_length_are_refused():
+    runs = [recording(MUSCLE.isobaric(3.0, RANDOM), name, specimen=name) for name in ("A", "B")]
+    with pytest.raises(IdentificationError, match=r"records of 300 mm are of several specimens: A, B"):
+        identify_campaign(runs)
+
+
+def test_two_muscles_in_one_folder_are_refused():
+    strong = dataclasses.replace(MUSCLE, area=2.0 * MUSCLE.area)
+    runs = [recording(MUSCLE.isobaric(3.0, RANDOM), "thin"), recording(strong.isobaric(3.0, RANDOM), "thick")]
+    with pytest.raises(IdentificationError, match=r"thin and thick contradict each other: at 300 kPa"):
+        identify_campaign(runs)
+
+
+def test_creep_of_maxwell_elements_is_found_again_with_its_standard_error():
+    time = np.linspace(0.0, 100.0, 1500)
+    path = 0.018 * np.clip((time - 2.0) / 0.4, 0.0, 1.0)
+    stretch = creep_stretches(time, path, np.array([8.0]))[:, 0]
+    rng = np.random.default_rng(1)
+    force = 800.0 - 1500.0 * stretch + rng.normal(0.0, 1.0, time.size)
+    columns = {"time": time, "pressure": np.full(time.size, 3e5), "length": 0.3 - path, "force": force}
+    stage = fit_creep_stage(classify_records([recording(columns, "hold")]))
+    assert isinstance(stage, CreepStage)
+    (stiffness,), (relaxation,) = stage.elements.stiffnesses, stage.elements.relaxation_times
+    assert abs(stiffness - 1500.0) < 3.0 * stage.standard_errors[0]
+    assert abs(relaxation - 8.0) < 3.0 * stage.standard_errors[1]
+    assert stage.standard_errors[1] < 0.5
+
+
+def test_a_force_that_rises_in_a_hold_is_no_creep_of_the_muscle():
+    time = np.linspace(0.0, 100.0, 1500)
+    path = 0.018 * np.clip((time - 2.0) / 0.4, 0.0, 1.0)
+    force = 500.0 + 100.0 * creep_stretches(time, path, np.array([8.0]))[:, 0] / 0.018
+    columns = {"time": time, "pressure": np.full(time.size, 3e5), "length": 0.3 - path, "force": force}
+    stage = fit_creep_stage(classify_records([recording(columns, "hold")]))
+    assert isinstance(stage, LeftOutStage)
+    assert "does not relax" in stage.reason
+
+
+def test_the_stretch_of_a_maxwell_element_is_exact_for_a_constant_speed():
+    time, tau, speed = np.linspace(0.0, 5.0, 21), 1.5, 0.01
+    stretch = creep_stretches(time, speed * time, np.array([tau]))[:, 0]
+    np.testing.assert_allclose(stretch, speed * tau * (1.0 - np.exp(-time / tau)), rtol=1e-12)
+
+
+def test_fills_at_several_lengths_determine_volume_and_conductance():
+    change = VolumeChange((7e-4, -5e-4), 0.3, 0.25)
+    contractions, true_scale, at_rest = np.array([0.0, 0.08, 0.15]), 0.4, 9e-5
+    relative = (at_rest + change(contractions)) / true_scale
+    estimate = relate_volumes(relative, 1e-3 * relative, contractions, change)
+    assert estimate.volume_at_rest == pytest.approx(at_rest, rel=1e-9)
+    assert estimate.scale == pytest.approx(true_scale, rel=1e-9)
+
+
+def test_fills_at_one_length_determine_only_the_ratio():
+    change = VolumeChange((7e-4, -5e-4), 0.3, 0.25)
+    assert relate_volumes(np.full(3, 2e-4), np.full(3, 1e-6), np.full(3, 0.05), change) is None
+
+
+@pytest.mark.slow
+def test_every_stage_of_the_made_campaign_is_identified(one_length):
+    kinds = (CreepStage, FrictionStage, StaticStage, FillStage, ReleaseStage)
+    assert [type(stage) for _, stage in one_length.stages] == list(kinds)
+    assert one_length.hysteresis.selected is not None
+    assert one_length.muscle() is not None
+
+
+@pytest.mark.slow
+def test_predictions_at_unseen_pressures_and_speeds_stay_within_the_bands(one_length):
+    inside = np.concatenate(list(shares_within_bands(one_length, (0.3,)).values()))
+    assert 0.93 <= inside.mean() <= 0.97
+
+
+@pytest.mark.slow
+def test_the_friction_increases_with_the_pressure_as_the_truth_does(one_length):
+    amplitudes = {round(run.pressure, -4): run.joint_amplitude for run in one_length.hysteresis.selected.agreement}
+    for pressure, amplitude in amplitudes.items():
+        assert amplitude == pytest.approx(6.0 + 5.0 * (pressure / 1e5) ** 0.93, rel=0.25)
+
+
+@pytest.mark.slow
+def test_the_volume_follows_from_the_fills_and_the_static_law(one_length):
+    for contraction in (0.0, 0.08, 0.15):
+        estimated = float(one_length.geometry().volume(contraction))
+        assert estimated == pytest.approx(MUSCLE.volume(contraction), rel=0.15)
+
+
+@pytest.mark.slow
+def test_a_fill_is_predicted_by_the_others_within_one_per_cent_of_the_supply(one_length):
+    assert max(one_length.fills.cross_rms) < 6.2e3
+
+
+def test_stages_without_records_state_what_to_measure():
+    runs = [recording(MUSCLE.isobaric(bar, RANDOM), f"{bar} bar") for bar in (1.0, 3.0, 5.0)]
+    campaign = identify_campaign(runs)
+    left_out = {name for name, stage in campaign.stages if isinstance(stage, LeftOutStage)}
+    assert left_out == {"creep", "fills and volume", "release"}
+    measures = " ".join(each.measure for each in campaign.next_experiments)
+    assert "Record a fill from ambient pressure" in measures
+    assert "hold the length for two minutes" in measures
+    assert campaign.muscle() is None
+
+
+def test_progress_ends_at_one_and_each_stage_is_reported_when_it_ends():
+    runs = [recording(MUSCLE.isobaric(bar, RANDOM), f"{bar} bar") for bar in (1.0, 3.0)]
+    fractions, ended = [], []
+    identify_campaign(
+        runs,
+        progress=lambda _, fraction: fractions.append(fraction),
+        finished=lambda name, _: ended.append(name),
+    )
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == pytest.approx(1.0)
+    assert ended == ["records", "creep", "hysteresis", "static characteristic", "fills and volume", "release", "plan"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_predictions_at_unseen_pressures_lengths_and_speeds_stay_within_the_bands(tmp_path, seed):
+    campaign = identify_campaign(read(write_campaign(tmp_path / "rig", THREE_LENGTHS, seed)))
+    inside = shares_within_bands(campaign, THREE_LENGTHS, seed=seed + 50)
+    for quantity in ("pressure", "speed", "length"):
+        rows = np.concatenate([values for name, values in inside.items() if name.startswith(quantity)])
+        assert 0.93 <= rows.mean() <= 0.97, quantity
+
+
+def test_a_file_written_in_german_is_read_as_it_was_made(tmp_path):
+    columns = MUSCLE.isobaric(2.0, RANDOM)
+    write_german(tmp_path / "isobar.csv", columns, 0.3)
+    (run,) = read(tmp_path / "isobar.csv")
+    np.testing.assert_allclose(run["pressure"], columns["pressure"], atol=10.0)
+    np.testing.assert_allclose(run["contraction"], (0.3 - columns["length"]) / 0.3, atol=1e-6)
