@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import statistics
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -13,7 +13,7 @@ from rodas4 import hand_written_rates, kernel, lsoda
 
 import airmuscle as am
 from airmuscle.compile.program import compile_system
-from airmuscle.control import PID, PWM, ControlLoop, SplitRange
+from airmuscle.control import PID, PWM, Controller, ControlLoop, SplitRange
 from airmuscle.simulation import Rodas4
 
 HEADER = ("call", "median", "minimum", "kernel", "call / kernel")
@@ -21,14 +21,43 @@ STEP = 1e-5
 """Duration of one `advance` [s]."""
 SAMPLE_TIME = 5e-3
 """Sample time of the control loops [s]."""
+LOOP_DURATION = 5.0
+"""Duration of a run of a control loop [s]."""
+SETPOINT = am.Schedule({"pressure": ((0.0, 1e5), (1.0, 2e5))})
 ADVANCES = 200
 TEXT = (
     f"One muscle lifting a mass, 3 states, Rodas4(1e-6). `simulate` runs {DURATION:g} s with a row every "
     f"{SPACING * 1e3:g} ms and returns a Recording of states, outputs and inputs; its kernel is the integration alone. "
     f"`advance` and `compiled(plant).step` take one step of {STEP * 1e6:g} us; the kernel beside them is "
-    "the integration of such steps in one run. The rows of the controllers give the time of one sample less that of "
-    "the integration of the same segments."
+    "the integration of such steps in one run. The rows of the controllers give the time of a run of "
+    f"{LOOP_DURATION:g} s by its {LOOP_DURATION / SAMPLE_TIME:g} samples; beside them is the same run with the "
+    "recorded commands as its input signal."
 )
+
+
+@dataclasses.dataclass(frozen=True)
+class Called(Controller):
+    """A controller that calls a control law from Python."""
+
+    inner: PID
+
+    @property
+    def measured_columns(self) -> tuple[str, ...]:
+        return self.inner.measured_columns
+
+    @property
+    def setpoints(self) -> tuple[str, ...]:
+        return self.inner.setpoints
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return self.inner.inputs
+
+    def init(self) -> Any:
+        return self.inner.init()
+
+    def step(self, memory: Any, measurement: Any, dt: float) -> Any:
+        return self.inner.step(memory, measurement, dt)
 
 
 def with_default_state(run: Run) -> Callable[[], Any]:
@@ -122,34 +151,41 @@ def steps(rounds: int) -> tuple[list[tuple[str, ...]], list[Target]]:
 
 
 def control_samples(rounds: int) -> tuple[list[tuple[str, ...]], list[Target]]:
-    """One sample of a loop with a PID in Python: inputs held, and two pulsed inputs."""
-    run = runs()[3]
-    plant, duration = run.system, 5.0
+    """One sample of a loop with a PID, compiled and called from Python: inputs held, and two pulsed inputs."""
     pid = PID("pressure", SplitRange("fill", "discharge"), gain=1.5e-5, integral_time=0.4)
-    setpoint = am.Schedule({"pressure": ((0.0, 1e5), (1.0, 2e5))})
     pulses = {"fill": PWM(50.0), "discharge": PWM(50.0)}
     rows, targets = [], []
-    for name, drivers, limit in (("held", {}, 15), ("two pulsed inputs", pulses, 40)):
-        loop = ControlLoop(pid, SAMPLE_TIME, setpoint, drivers=drivers)
-        problem = am.Problem(plant, loop, duration, run.initial_state, output_times=duration)
-        recorded = am.solve(problem).recording
-        open_loop = am.Problem(plant, loop.as_open_loop(recorded), duration, run.initial_state, output_times=duration)
-        times = time_variants({"loop": lambda p=problem: am.solve(p), "open": lambda p=open_loop: am.solve(p)}, rounds)
-        samples = duration / SAMPLE_TIME
-        whole, alone = times["loop"], times["open"]
-        cost = statistics.median([whole.median - alone.median]) / samples
-        least = (whole.minimum - alone.minimum) / samples
-        rows.append(
-            (
-                f"a sample of a PID, {name}",
-                format_time(cost),
-                format_time(least),
-                format_time(alone.median / samples),
-                "",
-            )
-        )
-        targets.append(Target(f"call: a sample of a PID, {name}", least * 1e6, limit, "us"))
+    for name, drivers, limits in (("held", {}, (5, 15)), ("two pulsed inputs", pulses, (10, 40))):
+        law = ControlLoop(pid, SAMPLE_TIME, SETPOINT, drivers=drivers)
+        called = ControlLoop(Called(pid), SAMPLE_TIME, SETPOINT, drivers=drivers)
+        times = _loop_times(law, called, rounds)
+        samples = LOOP_DURATION / SAMPLE_TIME
+        replay = times["replay"].median / samples
+        for kind, limit in (("compiled", limits[0]), ("called from Python", limits[1])):
+            whole = times[kind]
+            cost, least = whole.median / samples, whole.minimum / samples
+            title = f"a sample of a PID, {kind}, {name}"
+            ratio = whole.median / times["replay"].median
+            rows.append((title, format_time(cost), format_time(least), format_time(replay), f"{ratio:.2f}"))
+            if kind == "compiled":
+                targets.append(Target(f"call: {title}", cost * 1e6, limit, "us"))
+                targets.append(Target(f"call: loop / replay of its commands, {name}", ratio, 2, "x"))
+            else:
+                beside = least - times["replay"].minimum / samples
+                targets.append(Target(f"call: {title}, beside the integration", beside * 1e6, limit, "us"))
     return rows, targets
+
+
+def _loop_times(law: ControlLoop, called: ControlLoop, rounds: int) -> dict[str, Any]:
+    """Times of a run of the loop in both ways, and of the same run with its commands as an input signal."""
+    run = runs()[3]
+    problems = {
+        kind: am.Problem(run.system, loop, LOOP_DURATION, run.initial_state, output_times=LOOP_DURATION)
+        for kind, loop in (("compiled", law), ("called from Python", called))
+    }
+    commands = law.as_open_loop(am.solve(problems["compiled"]).recording)
+    problems["replay"] = dataclasses.replace(problems["compiled"], input=commands)
+    return time_variants({kind: (lambda p=problem: am.solve(p)) for kind, problem in problems.items()}, rounds)
 
 
 def section(rounds: int = 15) -> Section:

@@ -105,8 +105,7 @@ class {name}(SisoController):
     commanded: Commanded
     proportional_gain: float = parameter("u/y", "K", "gain of a test")
 
-    def init(self):
-        return None
+    initial_memory = {{}}
 
     def step(self, memory, measurement, dt):
         error = measurement.setpoints[self.measured] - measurement.columns[self.measured]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from called_controller import Called
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from joints import chosen_muscle
@@ -216,7 +217,7 @@ class Unchanged(Driver):
 
 @pytest.mark.parametrize("other", [Schedule({}), SampledSignal({"discharge": ((0.1, 0.0), (0.5, 0.3))})])
 def test_a_loop_whose_drivers_change_nothing_is_the_loop_without_drivers(other):
-    controller = PID("pressure", "fill", gain=1.5e-5, integral_time=0.4)
+    controller = Called(PID("pressure", "fill", gain=1.5e-5, integral_time=0.4))
     setpoint = Schedule({"pressure": ((0.0, 1e5), (0.51, 3e5), (0.75, 5e4))})
     plant = lifting()
     start = plant.state_at(pressure=1e4)

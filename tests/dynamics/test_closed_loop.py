@@ -35,8 +35,9 @@ from airmuscle.mechanism import HangingMass, Isometric, WithLatch
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, ProportionalRegulator, ProportionalValve, SecondOrderLag, Supply, Valve
 from airmuscle.pneumatics.gas import Isothermal
-from airmuscle.simulation import Problem, simulate, solve
-from airmuscle.simulation.integrators import BoundIntegrator, DormandPrince8, Rodas4, RungeKutta4
+from airmuscle.simulation import Problem, closed_loop, simulate, solve
+from airmuscle.simulation.bound_integrator import BoundIntegrator
+from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
 
 VALVE = Valve(2.6e-9, 0.4)
 TICK = 2.0**-6
@@ -435,15 +436,16 @@ def test_a_loop_that_is_interrupted_can_be_taken_up():
 def test_a_loop_that_is_interrupted_within_a_piece_goes_on_from_the_sample_before(monkeypatch):
     integrate, run = BoundIntegrator.run_part, iter(range(100))
     loop, plant = ControlLoop(VALVES, TICK, PRESSURE, drivers={"fill": PWM(30.0)}), lifting()
+    monkeypatch.setattr(closed_loop, "can_be_compiled", lambda prepared: False)
     whole = solution(plant, loop, duration=1.0)
 
     def interrupted(self, *given):
         status, reached, time = integrate(self, *given)
         return (Status.INTERRUPTED, min(reached, 1), time) if next(run) == 20 else (status, reached, time)
 
-    monkeypatch.setattr(BoundIntegrator, "run_part", interrupted)
-    part = solution(plant, loop, duration=1.0, complete=False)
-    monkeypatch.undo()
+    with monkeypatch.context() as patch:
+        patch.setattr(BoundIntegrator, "run_part", interrupted)
+        part = solution(plant, loop, duration=1.0, complete=False)
     assert "interrupted" in part.recording.notes[-1]
     assert (part.final_time, part.control_state.time, part.control_state.sample_count) == (20 * TICK, 20 * TICK, 20)
     rest = solution(
@@ -491,7 +493,9 @@ def test_the_recording_says_who_commanded_what():
     loop = ControlLoop(VALVES, TICK, PRESSURE)
     run = simulate(lifting(), loop, duration=0.5)
     assert run.notes[0].startswith("controlled by PID(measured='pressure', commanded=SplitRange(positive='fill'")
-    assert run.notes[0].endswith("sample time 15.62 ms, measured pressure [Pa], commanded fill, discharge")
+    assert run.notes[0].endswith(
+        "sample time 15.62 ms, measured pressure [Pa], commanded fill, discharge; compiled with the plant"
+    )
     heads = list(run.to_pandas())
     assert {"setpoint.pressure [Pa]", "measured.pressure [Pa]", "command.fill [1]", "command.discharge [1]"} <= set(
         heads
@@ -576,15 +580,11 @@ def test_a_memory_belongs_to_its_instant(start_time):
         )
 
 
-def test_a_batch_and_an_experiment_refuse_a_loop():
+def test_an_experiment_takes_the_commands_of_a_loop():
     from airmuscle.identify.dynamic.experiment import Experiment
     from airmuscle.identify.dynamic.initial_conditions import InitialConditions
-    from airmuscle.simulation.batch import simulate_batch
 
     loop, plant = ControlLoop(VALVES, 0.1, PRESSURE), lifting()
-    for given in (loop, [loop, loop]):
-        with pytest.raises(ParameterError, match=r"simulate_batch: the input must be known beforehand.*ControlLoop"):
-            simulate_batch(plant, {"mechanism.mass": [9.0, 10.0]}, given, duration=1.0)
     run = simulate(plant, loop, duration=0.2)
     with pytest.raises(ParameterError, match="the input is ControlLoop"):
         Experiment(run, loop, InitialConditions.at_rest(plant, 0.0))

@@ -4,18 +4,24 @@ and code for another processor are never run; a kernel that needs the library of
 from __future__ import annotations
 
 import concurrent.futures
+import ctypes
 import math
+import os
 import warnings
 
+import casadi
 import numba
 import numpy as np
 import pytest
 from filling import runs
 
 from airmuscle.compile.cache import kernel as kernels
+from airmuscle.compile.cache import module
 from airmuscle.compile.cache import store as kept
 from airmuscle.compile.cache.kernel import BoundKernel, Kernel
 from airmuscle.compile.cache.object_code import build
+from airmuscle.compile.function import Function
+from airmuscle.compile.llvm.jit import object_code
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import Schedule
 from airmuscle.core.errors import AirmuscleWarning
@@ -276,3 +282,37 @@ def test_threads_that_ask_at_once_get_one_machine_code(empty, without_numba, mon
     with concurrent.futures.ThreadPoolExecutor(8) as pool:
         assert all(np.array_equal(results, right) for results in pool.map(found, range(64)))
     assert len(looked) == 1
+
+
+# Printed modules
+
+
+def squares() -> float:
+    """3^2 + 1 by a module that is compiled for this call."""
+    x = casadi.SX.sym("x", 1)
+    function = Function({"x": x}, {"y": x * x + 1.0})
+    given, result = np.array([3.0]), np.empty(1)
+    ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(function.address)(given.ctypes.data, result.ctypes.data)
+    return float(result[0])
+
+
+def test_the_machine_code_of_a_module_is_generated_once(empty, monkeypatch):
+    texts = []
+    monkeypatch.setattr(module, "object_code", lambda text: texts.append(text) or object_code(text))
+    assert [squares(), squares()] == [10.0, 10.0]
+    assert len(texts) == len(files(empty)) == 1
+    (file,) = files(empty)
+    file.write_bytes(file.read_bytes()[:-1] + b"?")
+    assert squares() == 10.0
+    assert len(texts) == 2, "damaged code is generated anew"
+
+
+def test_codes_that_were_not_used_for_the_longest_time_are_removed(empty, monkeypatch):
+    monkeypatch.setattr(kept, "MAX_FILES", 2)
+    for age, name in enumerate(("a", "b")):
+        kept.save(name, (), b"code")
+        path = empty / kept._file_name(name, ())
+        os.utime(path, (1e9 + age, 1e9 + age))
+    assert kept.load("a", ()) == b"code"  # now b is the one that was not used for the longest time
+    kept.save("c", (), b"code")
+    assert [kept.load(name, ()) for name in "abc"] == [b"code", None, b"code"]

@@ -102,7 +102,7 @@ def test_anti_windup_tends_to_its_rest_with_its_time_constant(t_d, tracking, exp
     for _ in range(2000):
         commands, memory = pid.step(memory, Measurement({"y": 0.0}, {"y": e}, {"fill": (0.0, greatest)}), H)
         assert 0.0 <= commands["fill"] <= greatest
-        beyond.append(k * e + memory.integral - greatest)
+        beyond.append(k * e + memory["integral"] - greatest)
     rest = k * e * expected / t_i
     assert beyond[-1] == pytest.approx(rest, rel=1e-9)
     away = np.array(beyond[60:200]) - rest
@@ -114,7 +114,9 @@ def test_anti_windup_never_overshoots_where_its_time_constant_is_less_than_a_per
     memory = pid.init()
     for _ in range(50):
         _, memory = pid.step(memory, Measurement({"y": 0.0}, {"y": 3.0}, {"fill": (0.0, 1.0)}), H)
-    assert 6.0 + memory.integral == pytest.approx(1.0 + 2.0 * H / 0.5 * 3.0, rel=1e-9), "at the limit, and one step on"
+    assert 6.0 + memory["integral"] == pytest.approx(1.0 + 2.0 * H / 0.5 * 3.0, rel=1e-9), (
+        "at the limit, and one step on"
+    )
 
 
 def test_a_controller_keeps_nothing_outside_its_memory():

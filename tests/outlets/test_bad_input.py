@@ -30,7 +30,7 @@ from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.report.output_folder import atomic_folder, check_writable
-from airmuscle.simulation import integrators
+from airmuscle.simulation import bound_integrator
 
 MUSCLE = "dmsp-20-300"
 HEAD = "pressure [bar],length [mm],force [N]"
@@ -440,7 +440,7 @@ def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch
     )
     bind = fixed_step.bind
     monkeypatch.setattr(fixed_step, "bind", lambda *arguments: Interrupted(bind(*arguments)))
-    monkeypatch.setattr(integrators, "INTERRUPT_CHECK_STEPS", 100)
+    monkeypatch.setattr(bound_integrator, "INTERRUPT_CHECK_STEPS", 100)
     result = CliRunner().invoke(app, ["simulate", str(tmp_path / "run.toml"), "--out", str(tmp_path / "run")])
     assert result.exit_code == 130
     assert result.stderr.removeprefix(COMPILING) == f"partial results were written to {tmp_path / 'run'}\ninterrupted\n"

@@ -25,7 +25,7 @@ def page():
 
 def test_every_interface_has_a_block(page):
     assert len(BLOCKS) == 6
-    bases = ("ForceLaw", "Friction", "Orifice", "am.Mechanism", "Controller", "am.System")
+    bases = ("ForceLaw", "Friction", "Orifice", "am.Mechanism", "ControlLaw", "am.System")
     assert [re.search(r"class \w+\((.*?)\)", block)[1] for block in BLOCKS] == list(bases)
 
 

@@ -203,6 +203,7 @@ def test_exclusions_of_a_comparison_name_options_everywhere(tmp_path):
     result = airmuscle("fit", tmp_path / "bench.csv", *asked, "--out", tmp_path / "fit")
     assert result.exit_code == 0, result.stderr
     page = (tmp_path / "fit" / "report.html").read_text("utf-8")
-    assert "--fix" in result.stdout
+    assert "--fix" in page
+    assert "excluded: surface of degree 6: the data cannot separate" in result.stdout
     assert "fixed=" not in result.stdout + page
     assert "profile: " in result.stdout

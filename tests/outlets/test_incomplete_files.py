@@ -208,4 +208,4 @@ def test_known_quantities_decide_without_a_mapping_and_an_open_choice_names_it(t
     message = refusal(mat_file(tmp_path / "open.mat", data=data, calibration=np.ones((3, 2))))
     assert "3 rows: calibration(:,1), calibration(:,2); 40 rows: data(:,1)" in message
     shown = airmuscle("inspect", tmp_path / "open.mat").stderr
-    assert "--column 'data(:,1)=time [s]'" in shown
+    assert '--column "data(:,1)=time [s]"' in shown

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from .cache.module import load_module
 from .functions import Printer
-from .llvm.jit import jit_compile
 
 
 class Function:
@@ -20,5 +20,5 @@ class Function:
         rows = {name: casadi.densify(casadi.vec(casadi.SX(value).T)) for name, value in outputs.items()}
         printer = Printer()
         printer.add("function", inputs, rows)
-        self._engine = jit_compile(printer.module())
+        self._engine = load_module(printer.module())
         self.address = int(self._engine.get_function_address("function"))

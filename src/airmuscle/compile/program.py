@@ -16,9 +16,9 @@ from ..core import tree
 from ..core.arrays import Array
 from ..core.system import SensitivitySystem, System
 from . import functions, sensitivities, sensitivities_explicit
+from .cache.module import load_module
 from .functions import ArraySizes, TracedSystem
 from .functions_simd import lanes_module
-from .llvm.jit import jit_compile
 from .llvm.types import LlvmType
 
 Tableau = tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]
@@ -41,7 +41,7 @@ class Program:
             self._form = functions.trace_system(system)
             text, self.sizes = functions.implicit_module(self._form)
         self.output_names = self._form.output_names
-        self._engine = jit_compile(text)
+        self._engine = load_module(text)
         self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
         self._prepare = _prepare_function(self._engine)
         self._steps: dict[Any, tuple[Any, int]] = {}
@@ -61,7 +61,7 @@ class Program:
         with self._compiling:
             if tableau not in self._steps:
                 text, size = self._step_module(tableau)
-                self._steps[tableau] = jit_compile(text), size
+                self._steps[tableau] = load_module(text), size
         engine, size = self._steps[tableau]
         return int(engine.get_function_address("step")), _prepare_function(engine)(parameters, size)
 
@@ -75,7 +75,7 @@ class Program:
         with self._compiling:
             if (tableau, number) not in self._steps:
                 text, size = lanes_module(self.traced, *tableau, number)
-                self._steps[tableau, number] = jit_compile(text), size
+                self._steps[tableau, number] = load_module(text), size
         engine, size = self._steps[tableau, number]
         prepare, step, outputs = (int(engine.get_function_address(n)) for n in ("prepare", "step", "outputs"))
         return (prepare, step, outputs), size

@@ -1,5 +1,6 @@
 """Control: input signals in time, drivers between command and valve, sampled controllers and their loop."""
 
+from .control_law import ControlLaw
 from .control_loop import ControlLoop, ControlLoopState
 from .controller import Controller, Measurement
 from .driver import PWM, Driver, SolenoidDriver
@@ -16,6 +17,7 @@ __all__ = [
     "PID",
     "PWM",
     "ZERO_INPUT",
+    "ControlLaw",
     "ControlLoop",
     "ControlLoopState",
     "Controller",

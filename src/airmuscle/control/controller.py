@@ -6,6 +6,8 @@ import abc
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from ..core.ops import Value
+
 RELATIVE = ("u", "y", "u/y")
 """Units of a controller's parameters that follow from the loop: u is the unit of the commanded input, y that of the
 measured column. In Python such a number is SI; a file gives it in any unit that fits: `"0.4 1/bar"`."""
@@ -15,9 +17,9 @@ class Measurement(NamedTuple):
     """Input of a controller at a sampling instant, by name and in SI: the measured columns, their set points, and the
     range (minimum, maximum) of every commanded input; of one with a driver 0 to 1."""
 
-    columns: Mapping[str, float]
-    setpoints: Mapping[str, float]
-    ranges: Mapping[str, tuple[float, float]]
+    columns: Mapping[str, Value]
+    setpoints: Mapping[str, Value]
+    ranges: Mapping[str, tuple[Value, Value]]
 
 
 class Controller(abc.ABC):

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar
 
+from ..core import ops
 from ..core.declaration import model, parameter
+from ..core.ops import Value
 from ..core.reference import Reference
 from .controller import Measurement
 from .pid import ASTROM_HAGGLUND1995
@@ -30,12 +33,16 @@ class OnOffController(SisoController):
         "y", "H", "width between switching on and off", bounds=(0.0, float("inf")), default=0.0
     )
 
-    def init(self) -> bool:
-        """Off."""
-        return False
+    @property
+    def initial_memory(self) -> dict[str, float]:
+        """Whether the maximum is commanded (0 or 1)."""
+        return {"on": 0.0}
 
-    def step(self, memory: bool, measurement: Measurement, dt: float) -> tuple[dict[str, float], bool]:
+    def step(
+        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
         error = measurement.columns[self.measured] - measurement.setpoints[self.measured]
-        on = error < -self.hysteresis / 2 or (memory and not error > self.hysteresis / 2)
+        half = self.hysteresis / 2
+        on = ops.where(error < -half, 1.0, ops.where(error > half, 0.0, memory["on"]))
         minimum, maximum = range_of(self.commanded, measurement.ranges)
-        return commands(self.commanded, maximum if on else minimum), on
+        return commands(self.commanded, ops.where(on > 0, maximum, minimum)), {"on": on}

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import functools
-import math
-from typing import ClassVar, NamedTuple
+from collections.abc import Mapping
+from typing import ClassVar
 
+from ..core import ops
 from ..core.declaration import model, parameter
+from ..core.ops import Value
 from ..core.reference import Reference
 from .controller import Measurement
 from .siso import SisoController
@@ -20,16 +21,6 @@ ASTROM_HAGGLUND1995 = Reference(
     year=1995,
     note="standard form, filter of the derivative, weights of the set point, back-calculation, differences in time",
 )
-
-
-class PIDMemory(NamedTuple):
-    """A PID controller between two samples: whether it has started, its integral and derivative parts [u], and the
-    weighted error of the derivative at the last sample [y]."""
-
-    started: bool
-    integral: float
-    derivative: float
-    weighted: float
 
 
 @model
@@ -69,31 +60,37 @@ class PID(SisoController):
     )
     initial_output: float = parameter("u", "u_0", "first command; without integral action the bias", default=0.0)
 
-    def init(self) -> PIDMemory:
-        return PIDMemory(started=False, integral=0.0, derivative=0.0, weighted=0.0)
+    @property
+    def initial_memory(self) -> dict[str, float]:
+        """Whether it has started (0 or 1), I and D [u], and c r - y of the last sample [y]."""
+        return {"started": 0.0, "integral": 0.0, "derivative": 0.0, "weighted_error": 0.0}
 
-    def step(self, memory: PIDMemory, measurement: Measurement, dt: float) -> tuple[dict[str, float], PIDMemory]:
-        columns, setpoints, ranges = measurement
-        setpoint, measured, gain = setpoints[self.measured], columns[self.measured], self.gain
-        proportional = gain * (self.setpoint_weight * setpoint - measured)
+    def step(
+        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        setpoint, measured = measurement.setpoints[self.measured], measurement.columns[self.measured]
+        proportional = self.gain * (self.setpoint_weight * setpoint - measured)
         weighted = self.derivative_weight * setpoint - measured
-        if memory.started:
-            integral = memory.integral
-            filtered = self.derivative_time + self.derivative_filter * dt
-            increment = gain * self.derivative_filter * (weighted - memory.weighted)
-            derivative = self.derivative_time / filtered * (memory.derivative + increment)
-        else:
-            integral = self.initial_output - proportional if self.integral_time > 0 else self.initial_output
-            derivative = 0.0
+        started, integrates = memory["started"] > 0, self.integral_time > 0
+        filtered = self.derivative_time + self.derivative_filter * dt
+        increment = self.gain * self.derivative_filter * (weighted - memory["weighted_error"])
+        derivative = self.derivative_time / filtered * (memory["derivative"] + increment)
+        derivative = ops.where(started, derivative, 0.0)
+        first = self.initial_output - ops.where(integrates, proportional, 0.0)
+        integral = ops.where(started, memory["integral"], first)
         wanted = proportional + integral + derivative
-        minimum, maximum = range_of(self.commanded, ranges)
-        limited = minimum if minimum > wanted else maximum if maximum < wanted else wanted
-        if self.integral_time > 0:
-            integral += gain * dt / self.integral_time * (setpoint - measured)
-            integral += min(dt / self._tracking, 1.0) * (limited - wanted)
-        return commands(self.commanded, limited), PIDMemory(True, integral, derivative, weighted)
+        minimum, maximum = range_of(self.commanded, measurement.ranges)
+        limited = ops.clip(wanted, minimum, maximum)
+        integral_time = ops.where(integrates, self.integral_time, 1.0)
+        tracking = ops.where(integrates, self._tracking(), 1.0)
+        later = integral + self.gain * dt / integral_time * (setpoint - measured)
+        later = later + ops.minimum(dt / tracking, 1.0) * (limited - wanted)
+        integral = ops.where(integrates, later, integral)
+        values = {"started": 1.0, "integral": integral, "derivative": derivative, "weighted_error": weighted}
+        return commands(self.commanded, limited), values
 
-    @functools.cached_property
-    def _tracking(self) -> float:
+    def _tracking(self) -> Value:
         """The time constant [s] of the anti-windup."""
-        return self.tracking_time or math.sqrt(self.integral_time * self.derivative_time) or self.integral_time
+        product = self.integral_time * self.derivative_time
+        by_rule = ops.where(product > 0, ops.sqrt(ops.where(product > 0, product, 1.0)), self.integral_time)
+        return ops.where(self.tracking_time > 0, self.tracking_time, by_rule)

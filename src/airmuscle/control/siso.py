@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from .controller import Controller
+from .control_law import ControlLaw
 from .split_range import Commanded, inputs_of
 
 
-class SisoController(Controller):
-    """A controller that compares one column, `measured`, with its set point; `commanded` is what it manipulates."""
+class SisoController(ControlLaw):
+    """A control law that compares one column, `measured`, with its set point; `commanded` is what it manipulates."""
 
     measured: str
     commanded: Commanded

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ..core import ops
 from ..core.declaration import model
 from ..core.errors import ParameterError
+from ..core.ops import Value
 
 
 @model
@@ -29,19 +31,15 @@ def inputs_of(commanded: Commanded) -> tuple[str, ...]:
     return (commanded,) if isinstance(commanded, str) else (commanded.positive, commanded.negative)
 
 
-def range_of(commanded: Commanded, ranges: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
+def range_of(commanded: Commanded, ranges: Mapping[str, tuple[Value, Value]]) -> tuple[Value, Value]:
     """The range of a controller output, from those of the inputs."""
     if isinstance(commanded, str):
         return ranges[commanded]
     return -ranges[commanded.negative][1], ranges[commanded.positive][1]
 
 
-def commands(commanded: Commanded, output: float) -> dict[str, float]:
+def commands(commanded: Commanded, output: Value) -> dict[str, Value]:
     """The values of the inputs for a controller output."""
     if isinstance(commanded, str):
         return {commanded: output}
-    opposite = -output
-    return {
-        commanded.positive: 0.0 if output < 0.0 else output,
-        commanded.negative: 0.0 if opposite < 0.0 else opposite,
-    }
+    return {commanded.positive: ops.maximum(output, 0.0), commanded.negative: ops.maximum(-output, 0.0)}

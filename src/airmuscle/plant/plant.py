@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from ..core.declaration import as_finite_float, model
 from ..core.diagnostics import Columns, Diagnostic, DiagnosticCode
-from ..core.errors import ParameterError
+from ..core.errors import GeometryLimitError, ParameterError
 from ..core.ops import Value
 from ..core.system import System
 from ..core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
@@ -285,5 +285,9 @@ class Plant(System):
         return diagnostics.column_limits(self.muscles, self.prefixes)
 
     def failure_hint(self, state: Mapping[str, float]) -> str:
-        """What to do about the first muscle that is at a limit of its geometry."""
-        return next(filter(None, map(diagnostics.geometry_limit_hint, self._enclosures(state))), "")
+        """What to do about the first muscle that is at, or beyond, a limit of its geometry."""
+        try:
+            enclosures = self._enclosures(state)
+        except GeometryLimitError as error:
+            return str(error)
+        return next(filter(None, map(diagnostics.geometry_limit_hint, enclosures)), "")

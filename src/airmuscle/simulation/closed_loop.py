@@ -16,7 +16,8 @@ from ..core.diagnostics import Diagnostic, DiagnosticCode
 from ..core.errors import ParameterError
 from ..core.status import Status
 from ..plant.units import column_units
-from .integrators import RawSolution
+from .bound_integrator import RawSolution
+from .compiled_loop import CompiledLoop, CompiledRun, can_be_compiled
 from .intervals import DrivenIntervals, HeldIntervals, Intervals
 from .problem import Problem
 from .rows import make_recording, recorded_rows, truncate_at_invalid_row
@@ -34,17 +35,29 @@ def solve_closed_loop(problem: Problem) -> Solution:
     """
     loop = problem.input
     control_state = problem.control_state or loop.init(problem.start_time)  # type: ignore[union-attr]
-    run = _Run(problem, prepare_loop(problem, control_state), control_state)
+    run = start_run(problem, prepare_loop(problem, control_state), control_state)
     run.integrate()
     return _solution(problem, run)
+
+
+def start_run(problem: Problem, prepared: SampledLoop, control_state: ControlLoopState) -> CompiledRun | CalledRun:
+    """A run of the loop as one program where it can be compiled, else one that calls the controller at each sample."""
+    assert problem.integrator is not None
+    if can_be_compiled(prepared):
+        loop = CompiledLoop(problem.compiled, prepared)
+        run = CompiledRun(loop, problem.compiled, problem.integrator, problem.initial_vector, control_state)
+        if run.can_run:
+            return run
+    return CalledRun(problem, prepared, control_state)
 
 
 _Sample = tuple[Any, tuple[float, ...], tuple[float, ...], Status]
 """The memory of a controller, its measurements and commands, and whether these can be applied."""
 
 
-class _Run:
-    """A control loop being simulated: the intervals so far, and the state at the end of the last complete one."""
+class CalledRun:
+    """A run of a loop whose controller is called at each sample: the intervals so far, and the state at the end of the
+    last complete one."""
 
     def __init__(self, problem: Problem, prepared: SampledLoop, control_state: ControlLoopState) -> None:
         self.prepared, self._last = prepared, tuple(control_state)
@@ -64,6 +77,29 @@ class _Run:
         self._measured_names, self._setpoint_names = loop.controller.measured_columns, loop.controller.setpoints
         self._ranges = [(name, low, high) for name, (low, high) in prepared.ranges.items()]
         self._setpoints: tuple[list[float], dict[str, float]] = [], {}
+
+    @property
+    def signal(self) -> PiecewiseLinear:
+        """The segments of all inputs of the intervals that have begun."""
+        return self.intervals.signal
+
+    @property
+    def rows(self) -> tuple[Array, Array]:
+        """Times (N,) and states (N, n) of the rows that were reached."""
+        return self.intervals.rows
+
+    @property
+    def measured(self) -> Array:
+        """Measurements (K, columns) of every interval that has begun."""
+        return self._sampled(0, len(self._measured_names))
+
+    @property
+    def commanded(self) -> Array:
+        """Commands (K, inputs) of every interval that has begun."""
+        return self._sampled(1, len(self._ranges))
+
+    def _sampled(self, kind: int, width: int) -> Array:
+        return np.array([sample[kind] for sample in self.samples], dtype=float).reshape(len(self.samples), width)
 
     def integrate(self) -> None:
         """Sample and integrate from edge to edge, until the end or until an interval fails."""
@@ -127,11 +163,11 @@ class _Run:
         return memory, measured, commanded, Status.DONE if finite else Status.NON_FINITE_COMMAND
 
 
-def _solution(problem: Problem, run: _Run) -> Solution:
+def _solution(problem: Problem, run: CompiledRun | CalledRun) -> Solution:
     """The rows of all intervals as one solution."""
     compiled, prepared, integrator = problem.compiled, run.prepared, problem.integrator
-    segments, (times, states) = run.intervals.signal, run.intervals.rows
-    begun = bool(run.samples)
+    segments, (times, states) = run.signal, run.rows
+    begun = len(run.measured) > 0
     at, state = (run.stopped_at, run.bound.state.copy()) if begun else (run.time, run.state)
     raw = RawSolution(states, times.size, at, state, run.status, *run.bound.step_counts)
     if not segments.ends.size:  # the run ended before its first interval
@@ -140,7 +176,8 @@ def _solution(problem: Problem, run: _Run) -> Solution:
     table = recorded_rows(compiled, states, times, segments, problem.start_time)
     raw, table = truncate_at_invalid_row(compiled, raw, table, times)
     units = column_units(problem.system, compiled.output_names)
-    note = f"controlled by {prepared.loop.describe(units)}"
+    way = "compiled with the plant" if isinstance(run, CompiledRun) else "called from Python at each sample"
+    note = f"controlled by {prepared.loop.describe(units)}; {way}"
     remark = Diagnostic(DiagnosticCode.CONTROLLER, type(prepared.loop.controller).__name__, note)
     more = _controller_columns(problem, run, times[: raw.reached])
     recording, diagnostics = make_recording(compiled, raw, table, times, integrator, problem.end_time, more, (remark,))
@@ -149,15 +186,14 @@ def _solution(problem: Problem, run: _Run) -> Solution:
     return Solution(problem, recording, raw.status, statistics, diagnostics, run.time, final, run.control_state)
 
 
-def _controller_columns(problem: Problem, run: _Run, times: Array) -> dict[str, Array]:
+def _controller_columns(problem: Problem, run: CompiledRun | CalledRun, times: Array) -> dict[str, Array]:
     """Set points in time; measurements and commands of the last sample at every row."""
     prepared, controller = run.prepared, run.prepared.loop.controller
-    intervals = np.searchsorted(np.array(prepared.edges), times, side="right") - 1
-    intervals = np.clip(intervals, 0, max(len(run.samples) - 1, 0))
+    intervals = np.searchsorted(prepared.instants, times, side="right") - 1
+    intervals = np.clip(intervals, 0, max(len(run.measured) - 1, 0))
     setpoints = prepared.setpoint_signal.inputs_at(times, problem.start_time)
     columns = {f"{SETPOINT}{name}": setpoints[:, i] for i, name in enumerate(controller.setpoints)}
     kinds = ((MEASURED, controller.measured_columns), (COMMAND, controller.inputs))
-    for kind, (prefix, names) in enumerate(kinds):
-        values = np.array([sample[kind] for sample in run.samples], dtype=float).reshape(-1, len(names))
+    for values, (prefix, names) in zip((run.measured, run.commanded), kinds, strict=True):
         columns |= {f"{prefix}{name}": values[intervals, i] for i, name in enumerate(names)}
     return columns

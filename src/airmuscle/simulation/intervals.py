@@ -19,7 +19,7 @@ from ..control.piecewise_linear import PiecewiseLinear, Segment, merge_columns
 from ..control.with_drivers import apply_drivers
 from ..core.arrays import Array, flat_view
 from ..core.status import Status
-from .integrators import BoundIntegrator
+from .bound_integrator import BoundIntegrator
 from .output_times import merge_few_output_times
 from .sampled_loop import SampledLoop
 
@@ -34,6 +34,10 @@ class Intervals(abc.ABC):
     segment_count, row_count    segments that were appended, rows that were reached
     """
 
+    _ends: Any
+    _values: Any
+    _slopes: Any
+
     def __init__(self, prepared: SampledLoop, states: int) -> None:
         self.prepared, self.states, self.inputs = prepared, states, prepared.inputs.values.shape[1]
         self.segment_count = self.row_count = 0
@@ -47,9 +51,12 @@ class Intervals(abc.ABC):
     def integrate(self, bound: BoundIntegrator, begin: float) -> tuple[Status, float]:
         """Integrate through the interval that was appended last, and fill its rows; how and where it ended."""
 
-    @abc.abstractmethod
     def final_inputs(self, begin: float, end: float) -> list[float]:
         """The inputs (m,) at the end of the interval that was appended last."""
+        last, width = self.segment_count - 1, self.inputs
+        duration = end - (self._ends[last - 1] if last > self._first else begin)
+        values, slopes = self._values, self._slopes
+        return [values[i] + slopes[i] * duration for i in range(last * width, (last + 1) * width)]
 
     @property
     @abc.abstractmethod
@@ -99,12 +106,6 @@ class HeldIntervals(Intervals):
         )  # fmt: skip
         self.row_count = row + reached
         return status, at
-
-    def final_inputs(self, begin: float, end: float) -> list[float]:
-        last, width = self.segment_count - 1, self.inputs
-        duration = end - (self._ends[last - 1] if last > self._first else begin)
-        values, slopes = self._values, self._slopes
-        return [values[i] + slopes[i] * duration for i in range(last * width, (last + 1) * width)]
 
     @property
     def signal(self) -> PiecewiseLinear:
@@ -174,12 +175,6 @@ class DrivenIntervals(Intervals):
         )  # fmt: skip
         self.row_count = row + reached
         return status, at
-
-    def final_inputs(self, begin: float, end: float) -> list[float]:
-        last, width = self.segment_count - 1, self.inputs
-        duration = end - (self._ends[last - 1] if last > self._first else begin)
-        values, slopes = self._values, self._slopes
-        return [values[i] + slopes[i] * duration for i in range(last * width, (last + 1) * width)]
 
     @property
     def signal(self) -> PiecewiseLinear:

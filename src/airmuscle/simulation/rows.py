@@ -14,7 +14,8 @@ from ..core.arrays import Array
 from ..core.diagnostics import Columns, Diagnostic, DiagnosticCode
 from ..core.status import Status
 from ..recording import Recording
-from .integrators import Integrator, RawSolution
+from .bound_integrator import RawSolution
+from .integrators import Integrator
 
 _HINTS = {
     Status.TOO_MANY_STEPS: "Raise the tolerance, lengthen a fixed step, or look for a valve that chatters.",

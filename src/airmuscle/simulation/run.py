@@ -20,8 +20,9 @@ from ..core.status import Status
 from ..core.system import System
 from ..plant.state import check_system, state_vector
 from ..recording import Recording
+from .bound_integrator import BoundIntegrator
 from .closed_loop import solve_closed_loop
-from .integrators import BoundIntegrator, Integrator, default_integrator
+from .integrators import Integrator, default_integrator
 from .problem import NUMBERS, Problem, check_input_range, plain_numbers
 from .rows import early_end, make_recording, recorded_rows, truncate_at_invalid_row
 from .solution import Solution, Statistics

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from ..compile.cache.kernel import evaluate
 from ..compile.program import CompiledSystem
@@ -28,29 +30,56 @@ _CLOSE = 1e-9
 class SampledLoop:
     """A control loop prepared for one run.
 
-    edges      (K + 1,) start of the run, sampling instants, end of the run [s]
-    sampled    whether the first interval begins with a sample: not when a run continues between two samples
-    inputs     segments of all inputs, split at the edges; commanded inputs are filled in during the run. Those of
-               interval k begin at index segment_offsets[k]
-    setpoints  at the start of every interval
-    times      output times; those of interval k begin at index row_offsets[k], and drivers add instants
-    input_names    of the plant
-    ranges     minimum and maximum of every commanded input
+    instants         (K + 1,) start of the run, sampling instants, end of the run [s]
+    sampled          whether the first interval begins with a sample: not when a run continues between two samples
+    inputs           segments of all inputs, split at the instants; commanded inputs are filled in during the run
+    first_segments   (K + 1,) the first segment of each interval
+    setpoint_values  (K, s) set points at the start of every interval
+    times            output times; drivers add instants
+    first_rows       (K + 1,) the first output time of each interval
+    input_names      of the plant
+    ranges           minimum and maximum of every commanded input
+
+    The lists `edges`, `setpoints`, `segment_offsets` and `row_offsets` have the same numbers, for runs in Python.
     """
 
     loop: ControlLoop
-    edges: list[float]
+    instants: Array
     sampled: bool
     inputs: PiecewiseLinear
-    segment_offsets: list[int]
+    first_segments: npt.NDArray[np.int64]
     commanded: list[int]
     setpoint_signal: PiecewiseLinear
-    setpoints: list[list[float]]
+    setpoint_values: Array
     times: Array
-    row_offsets: list[int]
+    first_rows: npt.NDArray[np.int64]
     input_names: tuple[str, ...]
     ranges: Mapping[str, tuple[float, float]]
     lower_bounds: list[tuple[int, float]]
+
+    @functools.cached_property
+    def edges(self) -> list[float]:
+        """The instants as numbers."""
+        numbers: list[float] = self.instants.tolist()
+        return numbers
+
+    @functools.cached_property
+    def setpoints(self) -> list[list[float]]:
+        """The set points as numbers."""
+        numbers: list[list[float]] = self.setpoint_values.tolist()
+        return numbers
+
+    @functools.cached_property
+    def segment_offsets(self) -> list[int]:
+        """The first segments as numbers."""
+        numbers: list[int] = self.first_segments.tolist()
+        return numbers
+
+    @functools.cached_property
+    def row_offsets(self) -> list[int]:
+        """The first rows as numbers."""
+        numbers: list[int] = self.first_rows.tolist()
+        return numbers
 
 
 def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
@@ -66,17 +95,22 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
     inputs = others.split_at(starts, start).as_floats()
     commanded = [names.index(name) for name in loop.controller.inputs]
     inputs.values[:, commanded] = inputs.slopes[:, commanded] = 0.0
-    segment_offsets = np.append(np.searchsorted(starts, edges[:-1]), starts.size)
+    first_segments = np.append(np.searchsorted(starts, edges[:-1]), starts.size)
     times = output_times(problem.output_times, start, duration, np.append(start, inputs.ends))
     setpoint = _snap(loop.setpoint, loop.controller.setpoints, edges, close)
-    row_offsets = np.searchsorted(times, edges, side="right")
     bounds = known.lower_bounds.tolist()
     return SampledLoop(
-        loop, edges.tolist(), sampled, inputs, segment_offsets.tolist(), commanded, setpoint,
-        setpoint.inputs_at(edges[:-1], start).tolist(), times, [0, *row_offsets[1:].tolist()],
-        names, _ranges(compiled, loop),
+        loop, edges, sampled, inputs, first_segments, commanded, setpoint, setpoint.inputs_at(edges[:-1], start), times,
+        first_rows_of(times, edges), names, _ranges(compiled, loop),
         [(i, bound) for i, bound in enumerate(bounds) if bound > -math.inf],
     )  # fmt: skip
+
+
+def first_rows_of(times: Array, instants: Array) -> npt.NDArray[np.int64]:
+    """The first output time of each interval (K + 1,); the rows at the end of an interval belong to it."""
+    rows = np.searchsorted(times, instants, side="right")
+    rows[0] = 0
+    return rows
 
 
 def _ranges(compiled: CompiledSystem, loop: ControlLoop) -> dict[str, tuple[float, float]]:

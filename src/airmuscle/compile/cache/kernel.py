@@ -140,6 +140,20 @@ class BoundKernel:
             for i, address in enumerate(addresses, index):
                 arguments[i] = _array_at(address, (length, *arguments[i].shape[1:]))
 
+    @property
+    def entry_address(self) -> int | None:
+        """The address of the entry point, for other kernels that call this one; None without machine code."""
+        return None if self._numba else ctypes.cast(self._run, ctypes.c_void_p).value
+
+    @property
+    def slots(self) -> Any:
+        """The slots of the arguments as an array of int64 that shares their memory."""
+        return np.frombuffer(memoryview(self._slots), dtype=np.int64)
+
+    def slot_of(self, index: int) -> int:
+        """The place in the slots of argument number `index`."""
+        return self._offsets[index]
+
     def __call__(self) -> int:
         """Run the kernel; its status."""
         if self._numba is None:
@@ -149,4 +163,4 @@ class BoundKernel:
 
 rodas4, fixed_step, lanes = Kernel("rodas4"), Kernel("fixed_step"), Kernel("lanes")
 evaluate, evaluate_rates, record = Kernel("evaluate"), Kernel("evaluate_rates", "rates"), Kernel("record")
-newton = Kernel("newton")
+newton, sampled_loop = Kernel("newton"), Kernel("sampled_loop")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from ..llvm.jit import engine_of
 from ..target import native
 from .entry_point import entry_point, numba_arguments
 
@@ -14,12 +15,7 @@ _STANDALONE = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": Tr
 
 def load_engine(code: bytes) -> Any:
     """An execution engine that holds the machine code; its function is `entry`."""
-    import llvmlite.binding as llvm
-
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), native(3))
-    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
-    engine.finalize_object()
-    return engine
+    return engine_of(code)
 
 
 def build(kernel: Any, kinds: Sequence[str]) -> bytes:

@@ -8,6 +8,7 @@ of other sources or versions, or a damaged file, is compiled anew.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import importlib.util
@@ -22,7 +23,9 @@ from collections.abc import Sequence
 from ...core.errors import AirmuscleWarning
 
 _PACKAGE = pathlib.Path(__file__).parents[1]
-_SOURCES = (*sorted((_PACKAGE / "kernels").glob("*.py")), *sorted((_PACKAGE / "cache").glob("*.py")))
+_SOURCES = [path for room in ("kernels", "cache", "llvm") for path in sorted((_PACKAGE / room).glob("*.py"))]
+MAX_FILES = 400
+"""Number of stored codes, each of 10 to 500 kB (chosen); then those that were not used for the longest time go."""
 _HASH = hashlib.sha256().digest_size
 _POSIX = hasattr(os, "getuid")
 
@@ -30,9 +33,14 @@ _POSIX = hasattr(os, "getuid")
 def load(name: str, kinds: Sequence[str]) -> bytes | None:
     """The stored machine code of a kernel for arguments of these kinds; None where there is none that is valid."""
     folder = cache_folder()
-    content = None if folder is None else _read(folder / _file_name(name, kinds))
+    if folder is None:
+        return None
+    path = folder / _file_name(name, kinds)
+    content = _read(path)
     if content is None:
         return None
+    with contextlib.suppress(OSError):  # the time of its last use, for `_remove_oldest`
+        os.utime(path)
     origin, checksum, code = content[:_HASH], content[_HASH : 2 * _HASH], content[2 * _HASH :]
     return code if origin == _origin() and checksum == hashlib.sha256(code).digest() else None
 
@@ -47,9 +55,18 @@ def save(name: str, kinds: Sequence[str], code: bytes) -> bytes:
     try:
         temporary.write_bytes(_origin() + hashlib.sha256(code).digest() + code)
         os.replace(temporary, target)
+        _remove_oldest(folder)
     except OSError as error:
         _warn_once(f"{folder} cannot be written to ({error.strerror or error})")
     return code
+
+
+def _remove_oldest(folder: pathlib.Path) -> None:
+    """Remove the codes that were not used for the longest time, until MAX_FILES are left."""
+    with contextlib.suppress(OSError):  # another process removes the same
+        files = sorted(folder.glob("*.code"), key=lambda path: path.stat().st_mtime)
+        for path in files[:-MAX_FILES]:
+            path.unlink()
 
 
 def cache_folder() -> pathlib.Path | None:
@@ -106,8 +123,8 @@ def _processor() -> str:
 
 
 def _file_name(name: str, kinds: Sequence[str]) -> str:
-    """A name for each processor and each kind of arguments, so that none replaces the other."""
-    key = f"{','.join(kinds)} {_processor()}"
+    """A name for each processor, kind of arguments and version of the program, so that none replaces the other."""
+    key = f"{','.join(kinds)} {_processor()} {_origin().hex()}"
     return f"{name}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.code"
 
 

@@ -33,3 +33,15 @@ def pointer(typing_context: Any, array: Any) -> Any:
         return builder.ptrtoint(data, ir.IntType(64))
 
     return signature, generate
+
+
+@intrinsic
+def call_kernel(typing_context: Any, address: Any, slots: Any) -> Any:
+    """Call the entry point of a compiled kernel at `address` with the address of its slots; its status."""
+    signature = types.int64(types.intp, types.intp)
+
+    def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        word = ir.IntType(64)
+        return builder.call(builder.inttoptr(values[0], ir.FunctionType(word, [word]).as_pointer()), [values[1]])
+
+    return signature, generate

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,10 @@ from ...compile.program import CompiledSystem
 from ...control.piecewise_linear import PiecewiseLinear
 from ...core.arrays import Array
 from ...core.status import Status
-from ..integrators import Integrator, RawSolution
+from ..bound_integrator import RawSolution
+from ..integrators import Integrator
 from ..rows import evaluate_rows
+from .loops import LoopBatch
 from .variations import Variations
 
 NOT_RUN = -1
@@ -43,12 +46,14 @@ class BatchJob:
     reached: npt.NDArray[np.int64]
     reasons: dict[int, str]
     nominal: Array
+    loops: LoopBatch | None = None
 
     @functools.cached_property
     def names(self) -> tuple[str, ...]:
         """All columns that can be kept: states, then outputs, then inputs."""
         known = self.compiled.description
-        return (*known.state_names, *known.output_names, *known.input_names)
+        of_loop = () if self.loops is None else self.loops.column_names
+        return (*known.state_names, *known.output_names, *known.input_names, *of_loop)
 
     @functools.cached_property
     def kept(self) -> npt.NDArray[np.int64]:
@@ -63,8 +68,28 @@ class BatchJob:
     def run_single(self, index: int) -> None:
         """Simulate one plant alone, exactly as `simulate` would, and write its results."""
         one = self.compiled.at(self.variations.parameters(index), self.nominal[index])
-        raw = self.integrator.run(one, self.segments[index], self.start_time, self.initial_states[index], self.times)
-        self._write(index, one, self._truncate(raw))
+        if self.loops is None:
+            segments, state = self.segments[index], self.initial_states[index]
+            raw = self.integrator.run(one, segments, self.start_time, state, self.times)
+            self._write(index, one, self._truncate(raw), segments, {})
+        else:
+            self._run_loop(index, one, self.loops)
+
+    def _run_loop(self, index: int, one: CompiledSystem, loops: LoopBatch) -> None:
+        """Simulate a control loop, whose drivers may add rows to those of the batch, and write its results."""
+        run = loops.run(index, self.variations, one, self.initial_states[index])
+        times, rows = run.rows
+        close = 1e-9 * loops.template.duration
+        at = np.searchsorted(times, self.times - close)
+        at = at[at < times.size]
+        state = run.bound.state.copy() if len(run.measured) else run.state
+        raw = RawSolution(rows[at], at.size, run.stopped_at, state, run.status, *run.bound.step_counts)
+        signal = run.signal
+        if not signal.ends.size:
+            inputs = np.zeros((1, self.compiled.sizes.inputs))
+            signal = PiecewiseLinear(self.times[-1:], inputs, inputs)
+        more = loops.columns(index, run, self.times[: at.size]) if len(run.measured) else {}
+        self._write(index, one, self._truncate(raw), signal, more)
 
     def _truncate(self, raw: RawSolution) -> RawSolution:
         """The solution up to the first row with a negative air mass, as `simulate` ends it."""
@@ -76,16 +101,22 @@ class BatchJob:
         time = float(self.times[row]) if row < raw.reached else raw.time
         return raw._replace(reached=row, time=time, state=rows[row], status=Status.NEGATIVE_AIR_MASS)
 
-    def _write(self, index: int, one: CompiledSystem, raw: RawSolution) -> None:
+    def _write(
+        self, index: int, one: CompiledSystem, raw: RawSolution, segments: PiecewiseLinear, more: Mapping[str, Array]
+    ) -> None:
         reached = raw.reached
         states = np.ascontiguousarray(raw.rows[:reached])
-        table = evaluate_rows(one, states, self.times[:reached], self.segments[index], self.start_time)
+        table = evaluate_rows(one, states, self.times[:reached], segments, self.start_time)
         parts = (states, table.outputs, table.inputs)
         places = [(i, j) for i, part in enumerate(parts) for j in range(part.shape[1])]
-        for place, column in zip(self.kept, self.columns.values(), strict=True):
-            part, j = places[place]
+        for place, (name, column) in zip(self.kept, self.columns.items(), strict=True):
+            if place < len(places):
+                part, j = places[place]
+                values = parts[part][:, j]
+            else:
+                values = more[name][:reached] if more else np.full(reached, np.nan)
             with np.errstate(over="ignore"):  # a column in single precision
-                column[index, :reached] = parts[part][:, j]
+                column[index, :reached] = values
             column[index, reached:] = np.nan
         self.final[index], self.status[index], self.reached[index] = raw.state, raw.status, reached
         if raw.status:

@@ -123,8 +123,10 @@ def _explain(job: BatchJob, index: int, dtype: Any, status: Status) -> None:
         job.mark_not_run(index, status, f"{status.message} {where}")
 
 
-def check_precision(precision: Precision, integrator: object) -> None:
-    """Raise ParameterError for a precision that an integrator cannot compute in."""
+def check_precision(precision: Precision, integrator: object, *, loops: bool) -> None:
+    """Raise ParameterError for a precision in which an integrator or control loops cannot be computed."""
+    if precision.number.bits != 64 and loops:
+        raise ParameterError("simulate_batch: control loops are computed in double precision; omit the precision.")
     if precision.number.bits != 64 and not isinstance(integrator, ExplicitRungeKutta):
         raise ParameterError(
             f"simulate_batch: {type(integrator).__name__} chooses its steps in double precision; {precision} requires "

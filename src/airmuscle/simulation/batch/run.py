@@ -18,23 +18,25 @@ from ...core.errors import ParameterError, suggestion
 from ...core.status import Status
 from ...core.system import System
 from ...plant.state import check_system
-from ..integrators import MAX_STEPS, ExplicitRungeKutta, Integrator, default_integrator
+from ..bound_integrator import MAX_STEPS
+from ..integrators import ExplicitRungeKutta, Integrator, default_integrator
 from ..output_times import output_times as times_of
 from ..problem import check_input_range
 from .initial_states import check_states, count_of_states, default_states, given_states
 from .job import NOT_RUN, BatchJob
 from .lanes import check_precision, lane_workers
+from .loops import LoopBatch, loops_of, vary
 from .precision import Double, Precision
 from .solution import BatchSolution
 from .storage import InMemory, OnDisk
 from .thread_pool import Queue, available_cores, progress, run_workers
-from .variations import Variations, variations_of
+from .variations import Variations
 
 
 def simulate_batch(
     plant: System,
     variations: Mapping[str, npt.ArrayLike],
-    input: InputSignal | Sequence[InputSignal],
+    input: InputSignal | ControlLoop | Sequence[InputSignal] | Sequence[ControlLoop],
     *,
     duration: float,
     initial_states: Mapping[str, npt.ArrayLike] | None = None,
@@ -51,12 +53,15 @@ def simulate_batch(
     plant           any System: a Plant, a user-defined one, or WithSensitivities(...), whose derivatives are then
                     computed in the same pass
     variations      values (N,) by the path of a parameter, as `airmuscle.core.tree.leaves` names it (`mechanism.mass`)
-    input           an InputSignal for all, or one for each
+    input           an InputSignal or a ControlLoop for all, or one for each. With one ControlLoop for all `variations`
+                    may name parameters of its controller, if it is a ControlLaw: `controller.gain`
     initial_states  by state a number for all or a column (N,); by default each Plant's equilibrium at ambient pressure
     output_times    as in `simulate`; with one input for all its instants are among the rows
     integrator      Rodas4(rtol=1e-6) by default: each plant chooses its own steps, exactly as in `simulate`. With an
-                    integrator of fixed step, RungeKutta4(1e-3), sixteen plants are computed together, much faster
-    keep            columns to be kept (N, T): states, outputs, inputs; all unless given, () for final states alone
+                    integrator of fixed step, RungeKutta4(1e-3), and without a loop sixteen plants are computed
+                    together, much faster
+    keep            columns to be kept (N, T): states, outputs, inputs, those of a loop such as `command.fill`; all
+                    unless given, () for final states alone
     into            folder for the columns, one .npy file each; without it they are held in memory
     precision       Double() or Single()
     cores           threads; all cores of this process unless given. The result does not depend on it
@@ -64,25 +69,25 @@ def simulate_batch(
     Raises ParameterError for an impossible path, value, initial state, input or column; the row is named. An
     interrupted batch (Ctrl-C) is returned as far as it was computed; the other plants have Status.INTERRUPTED.
     """
-    _check_open_loop(input)
+    loops = loops_of(input)
     check_system("simulate_batch", plant)
     duration = as_float("simulate_batch: duration", duration)
     start_time = as_float("simulate_batch: start_time", start_time)
     integrator = default_integrator(integrator)
     _check_time(duration, start_time, integrator)
-    _check_options(initial_states, keep, into, precision, cores)
-    check_precision(precision, integrator)
-    varied = variations_of(plant, variations, _count(initial_states, input))
+    _check_options(initial_states, keep, into, precision, cores, integrator, loops=bool(loops))
+    varied, laws = vary(plant, variations, loops, _count(initial_states, input))
     count = len(varied.values)
     compiled = compile_system(plant)
-    segments = _segments(compiled, input, count, start_time, duration)
-    end = np.array([start_time + duration])
-    instants = segments[0].ends if isinstance(input, InputSignal) else end
-    times = end if keep is not None and len(keep) == 0 else times_of(output_times, start_time, duration, instants)
+    segments = () if loops else _segments(compiled, input, count, start_time, duration)  # type: ignore[arg-type]
+    shared = segments[0].ends if isinstance(input, InputSignal) else None
+    times = _times(output_times, start_time, duration, shared, keep)
     states, reasons = _initial_states(varied, initial_states, count)
+    batch = LoopBatch.of(plant, loops, laws, (start_time, duration), times, integrator) if loops else None
     job, storage = _job(
-        compiled, varied, integrator, states, segments, start_time, duration, times, reasons, keep, into, precision
-    )
+        compiled, varied, integrator, states, segments, start_time, duration, times, reasons, keep, into, precision,
+        batch,
+    )  # fmt: skip
     try:
         _run(job, precision, cores or available_cores())
         return _solution(job, storage, precision)
@@ -91,12 +96,15 @@ def simulate_batch(
         raise
 
 
-def _check_open_loop(input: object) -> None:
-    if any(isinstance(one, ControlLoop) for one in (input if isinstance(input, Sequence) else [input])):
-        raise ParameterError(
-            "simulate_batch: the input must be known beforehand, and that of a ControlLoop is not. Use simulate for "
-            "each plant, or a study, `airmuscle sweep`, of a scenario with a controller."
-        )
+def _times(
+    given: float | npt.ArrayLike | None, start: float, duration: float, instants: Array | None,
+    keep: Sequence[str] | None,
+) -> Array:  # fmt: skip
+    """The times of the rows, with the instants of the input that all plants share; the end if no column is kept."""
+    end = np.array([start + duration])
+    if keep is not None and len(keep) == 0:
+        return end
+    return times_of(given, start, duration, end if instants is None else instants)
 
 
 def _check_time(duration: float, start_time: float, integrator: Integrator) -> None:
@@ -111,7 +119,10 @@ def _check_time(duration: float, start_time: float, integrator: Integrator) -> N
         )
 
 
-def _check_options(initial_states: object, keep: object, into: object, precision: object, cores: object) -> None:
+def _check_options(
+    initial_states: object, keep: object, into: object, precision: object, cores: object, integrator: Integrator,
+    *, loops: bool,
+) -> None:  # fmt: skip
     if initial_states is not None and not isinstance(initial_states, Mapping):
         raise ParameterError(
             f"initial_states is {str(initial_states)[:80]}; give for each state a number for all, or a column (N,)."
@@ -122,19 +133,20 @@ def _check_options(initial_states: object, keep: object, into: object, precision
         raise ParameterError(f"into is {into!r}; give the path of a folder.")
     if not isinstance(precision, Precision):
         raise ParameterError(f"precision is {precision!r}; give Double() or Single().")
+    check_precision(precision, integrator, loops=loops)
     if cores is not None and (not isinstance(cores, int) or cores < 1):
         raise ParameterError(f"simulate_batch: cores is {cores!r}; it must be a whole number from 1 on.")
 
 
-def _count(
-    initial_states: Mapping[str, npt.ArrayLike] | None, input: InputSignal | Sequence[InputSignal]
-) -> int | None:
+def _count(initial_states: Mapping[str, npt.ArrayLike] | None, input: object) -> int | None:
     """The number of plants that initial states and inputs are given for."""
     of_states = count_of_states(initial_states)
-    if isinstance(input, InputSignal):
+    if isinstance(input, InputSignal | ControlLoop):
         return of_states
     if not isinstance(input, Sequence):
-        raise ParameterError(f"simulate_batch: the input is {str(input)[:80]}; give an InputSignal, or a list of them.")
+        raise ParameterError(
+            f"simulate_batch: the input is {str(input)[:80]}; give an InputSignal or a ControlLoop, or a list."
+        )
     if of_states is not None and of_states != len(input):
         raise ParameterError(
             f"simulate_batch: there are {len(input)} inputs and initial states for {of_states} plants."
@@ -178,13 +190,14 @@ def _initial_states(
 def _job(
     compiled: CompiledSystem, varied: Variations, integrator: Integrator, states: Array,
     segments: tuple[PiecewiseLinear, ...], start: float, duration: float, times: Array, reasons: dict[int, str],
-    keep: Sequence[str] | None, into: str | Path | None, precision: Precision,
+    keep: Sequence[str] | None, into: str | Path | None, precision: Precision, loops: LoopBatch | None,
 ) -> tuple[BatchJob, InMemory]:  # fmt: skip
     count, n = states.shape
-    nominal = np.empty((count, n)) if isinstance(integrator, ExplicitRungeKutta) else varied.nominal()
+    by_lanes = isinstance(integrator, ExplicitRungeKutta) and loops is None
+    nominal = np.empty((count, n)) if by_lanes else varied.nominal()
     final, status, reached = np.full((count, n), np.nan), np.full(count, NOT_RUN), np.zeros(count, dtype=np.int64)
     given = (compiled, varied, integrator, states, segments, start, duration, times)
-    job = BatchJob(*given, {}, final, status, reached, reasons, nominal)
+    job = BatchJob(*given, {}, final, status, reached, reasons, nominal, loops)
     names = job.names if keep is None else _kept(keep, job.names)
     dtype = np.float64 if precision.number.bits == 64 else np.float32
     if into is None:
@@ -209,7 +222,7 @@ def _run(job: BatchJob, precision: Precision, cores: int) -> None:
     active = np.flatnonzero(np.isfinite(job.initial_states).all(axis=1))
     if not active.size:
         return
-    if isinstance(job.integrator, ExplicitRungeKutta):
+    if isinstance(job.integrator, ExplicitRungeKutta) and job.loops is None:
         queue, workers, each = lane_workers(job, precision, active, cores)
     else:
         job.run_single(int(active[0]))  # what compiles, compiles here, before threads need it at once

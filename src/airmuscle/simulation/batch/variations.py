@@ -138,8 +138,8 @@ def _rows_of(thing: Any) -> Callable[[int], Any] | None:
     return with_numbers if changed else None
 
 
-def variations_of(system: System, given: Mapping[str, npt.ArrayLike], count: int | None) -> Variations:
-    """The variations of a system. Raises ParameterError for an unknown path or an impossible value.
+def variations_of(system: Any, given: Mapping[str, npt.ArrayLike], count: int | None) -> Variations:
+    """The variations of a System, or of a controller. Raises ParameterError for an unknown path or an impossible value.
 
     `count` is the number of plants where initial states or inputs determine it.
     """

@@ -1,0 +1,132 @@
+"""Drivers of an input inside a kernel: pulse width modulation, and a switch with delays and ramps.
+
+They compute what `control.driver.PWM` and `control.driver.SolenoidDriver` compute, operation by operation. A signal is
+an array (3, capacity): end, value at the start, and slope of each segment; `count` of them are used.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+
+THRESHOLD = 0.5
+INFINITY = np.inf
+ARRIVED = 1e-12
+
+
+@numba.njit(error_model="numpy", nogil=True, inline="always")
+def pulse_width_modulation(
+    settings: Any, state: Any, new: Any, signal: Any, count: Any, start: Any, ulp: Any, result: Any
+) -> Any:
+    """Modulate a signal from `start`; the number of segments of the result.
+
+    settings  frequency, smallest pulse
+    state     origin of the carrier, periods begun, end of the last pulse; `new` receives it at the end of the signal
+    ulp       distance from the end of the signal to the next floating-point number
+    """
+    end = signal[0, count - 1]
+    frequency = settings[0]
+    period = 1.0 / frequency
+    smallest = max(settings[1], 1e-9 * period, 4.0 * ulp)
+    origin, begun, pulse_end = state[0], state[1], state[2]
+    levels = 0  # pulses so far: instants in row 0 of the result, levels in row 1
+    on = pulse_end > start
+    result[0, 0], result[1, 0] = start, 1.0 if on else 0.0
+    levels = 1
+    if on and pulse_end < end:
+        result[0, 1], result[1, 1] = pulse_end, 0.0
+        levels = 2
+    last = end - 4.0 * ulp
+    total = int(np.ceil((end - origin) * frequency - begun)) + 1
+    k, begin, periods = 0, start, 0
+    for i in range(max(total, 0)):
+        time = origin + (begun + i) / frequency
+        if time < last:
+            time = max(time, start)
+            while k < count - 1 and signal[0, k] <= time:
+                begin = signal[0, k]
+                k += 1
+            duty = signal[1, k] + (time - begin) * signal[2, k]
+            width = period * min(max(duty, 0.0), 1.0)
+            pulse_end = time + width
+            if period - width < smallest:
+                pulse_end = INFINITY
+            if width < smallest:
+                pulse_end = -INFINITY
+            if periods == 0 and time == start:
+                levels = 0
+            on = pulse_end > time
+            level = 1.0 if on else 0.0
+            if levels == 0 or level != result[1, levels - 1]:
+                result[0, levels], result[1, levels] = time, level
+                levels += 1
+            if on and pulse_end < end:
+                result[0, levels], result[1, levels] = pulse_end, 0.0
+                levels += 1
+            periods += 1
+    for i in range(levels):
+        result[0, i] = result[0, i + 1] if i + 1 < levels else end
+        result[2, i] = 0.0
+    new[0], new[1], new[2] = origin, begun + periods, pulse_end
+    return levels
+
+
+@numba.njit(error_model="numpy", nogil=True, inline="always")
+def delayed_switch(
+    settings: Any, state: Any, new: Any, signal: Any, count: Any, start: Any, events: Any, result: Any
+) -> Any:
+    """Opening of a switch that follows a signal from `start`; the number of segments of the result.
+
+    settings  opening delay, closing delay, opening ramp, closing ramp
+    state     coil, pending instant, target, opening; `new` receives it at the end of the signal
+    events    (3, capacity): workspace
+    """
+    end = signal[0, count - 1]
+    coil, pending, target, opening = state[0], state[1], state[2], state[3]
+    switchings, present, begin = 0, coil, start
+    for k in range(count):
+        value, slope = signal[1, k], signal[2, k]
+        first = value >= THRESHOLD
+        last = value + slope * (signal[0, k] - begin) >= THRESHOLD
+        if first != (present > 0.0):
+            present = 1.0 if first else 0.0
+            events[0, switchings], events[1, switchings] = begin, present
+            switchings += 1
+        if last != first:
+            present = 1.0 if last else 0.0
+            events[0, switchings] = min(begin + (THRESHOLD - value) / slope, signal[0, k])
+            events[1, switchings] = present
+            switchings += 1
+        begin = signal[0, k]
+    edge, segments = start, 0
+    for k in range(switchings + 2):
+        instant = events[0, k] if k < switchings else INFINITY
+        moves = pending < min(instant, end) and coil != target
+        stop = pending if moves else edge
+        if k == switchings + 1:
+            stop = end
+        if stop > edge:  # the motion towards the target until `stop`, and the rest after it
+            ramp = settings[2] if target > opening else settings[3]
+            distance = abs(target - opening)
+            left = distance - ((stop - edge) / ramp if ramp > 0.0 else INFINITY)
+            after = target
+            if left > ARRIVED:
+                after = target + (left if opening - target >= 0.0 else -left)
+            arrival = min(edge + (ramp * distance if after == target else INFINITY), stop)
+            if arrival > edge:
+                result[0, segments], result[1, segments] = arrival, opening
+                result[2, segments] = (after - opening) / (arrival - edge)
+                segments += 1
+            if stop > arrival:
+                result[0, segments], result[1, segments], result[2, segments] = stop, after, 0.0
+                segments += 1
+            opening = after
+        if moves and k <= switchings:
+            edge, target = pending, coil
+        if k < switchings:
+            coil = events[1, k]
+            pending = instant + (settings[0] if coil > 0.0 else settings[1])
+    new[0], new[1], new[2], new[3] = coil, pending if pending >= end else INFINITY, target, opening
+    return segments

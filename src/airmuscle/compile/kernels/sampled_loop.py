@@ -1,0 +1,227 @@
+"""Kernel: a sampled loop, from one sampling instant to the next: measure, command, drive the inputs, integrate."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+
+from ...core.status import Status
+from ..kernel_layout import DriverKind, Progress
+from .calls import call_kernel, invoke, pointer
+from .drivers import delayed_switch, pulse_width_modulation
+
+DONE, PAUSED, NOT_FINITE = Status.DONE.value, Status.PAUSED.value, Status.NOT_FINITE.value
+NON_FINITE_COMMAND, BELOW_LIMIT = Status.NON_FINITE_COMMAND.value, Status.NEGATIVE_AIR_MASS.value
+LARGEST = 1.7976931348623157e308
+MODULATOR = DriverKind.MODULATOR.value
+DRIVER_WIDTH = 4
+"""Numbers of the settings and of the state of a driver."""
+INTERVAL, RUNNING, SEGMENTS, ROWS, SAMPLES, STEPS_BEFORE, FULL, FIRST_SEGMENT, FIRST_ROW = map(int, Progress)
+
+
+@numba.njit(error_model="numpy", nogil=True, inline="always")
+def apply_drivers(
+    kinds: Any, settings: Any, states: Any, new: Any, columns: Any, counts: Any, scratch: Any, start: Any, ulp: Any
+) -> None:
+    """Pass the signals of inputs, columns (m, 3, capacity) with their counts (m,), through their drivers (D,).
+
+    kinds (D, 2)  input and kind of each driver, in the order of the signal; scratch (2, 3, capacity)
+    """
+    for d in range(kinds.shape[0]):
+        i = kinds[d, 0]
+        result = scratch[0]
+        if kinds[d, 1] == MODULATOR:
+            count = pulse_width_modulation(settings[d], states[d], new[d], columns[i], counts[i], start, ulp, result)
+        else:
+            count = delayed_switch(settings[d], states[d], new[d], columns[i], counts[i], start, scratch[1], result)
+        for part in range(3):
+            for k in range(count):
+                columns[i, part, k] = result[part, k]
+        counts[i] = count
+
+
+@numba.njit(error_model="numpy", nogil=True, inline="always")
+def merge_columns(
+    columns: Any, counts: Any, at: Any, begins: Any, start: Any, ends: Any, values: Any, slopes: Any, first: Any
+) -> Any:
+    """Write the signals of all inputs as common segments from number `first` on; how many there are.
+
+    at (m,), begins (m,)  workspace: the present segment of each input and its start
+    """
+    inputs = columns.shape[0]
+    for i in range(inputs):
+        at[i], begins[i] = 0, start
+    end = columns[0, 0, counts[0] - 1]
+    time, segments = start, 0
+    while True:
+        following = end
+        row = first + segments
+        for i in range(inputs):
+            while at[i] < counts[i] - 1 and columns[i, 0, at[i]] <= time:
+                begins[i] = columns[i, 0, at[i]]
+                at[i] += 1
+            values[row, i] = columns[i, 1, at[i]] + (time - begins[i]) * columns[i, 2, at[i]]
+            slopes[row, i] = columns[i, 2, at[i]]
+            if at[i] < counts[i] - 1:
+                following = min(following, columns[i, 0, at[i]])
+        ends[row] = following
+        segments += 1
+        if not following < end:
+            return segments
+        time = following
+
+
+@numba.njit(error_model="numpy", nogil=True, inline="always")
+def merge_times(
+    grid: Any, begin: Any, end: Any, instants: Any, first: Any, count: Any, close: Any, times: Any, row: Any
+) -> Any:
+    """Write the rows `begin` to `end` of a grid and the instants in rising order from `row` on; how many there are.
+
+    A row of the grid within `close` of an instant is replaced by it.
+    """
+    written, k = 0, begin
+    for i in range(first, first + count):
+        while k < end and grid[k] < instants[i] - close:
+            times[row + written] = grid[k]
+            written += 1
+            k += 1
+        times[row + written] = instants[i]
+        written += 1
+        while k < end and grid[k] <= instants[i] + close:
+            k += 1
+    while k < end:
+        times[row + written] = grid[k]
+        written += 1
+        k += 1
+    return written
+
+
+@numba.njit(error_model="numpy", nogil=True)
+def sampled_loop(
+    integrate: Any, slots: Any, places: Any, clock: Any, count: Any, y: Any,
+    outputs: Any, c: Any, o: Any, measured_at: Any,
+    sample: Any, parameters: Any, period: Any, low: Any, high: Any, commanded_at: Any,
+    edges: Any, ulps: Any, first_sample: Any, setpoints: Any,
+    ends: Any, values: Any, slopes: Any, first: Any, grid: Any, grid_row: Any,
+    kinds: Any, settings: Any, states: Any, columns: Any, counts: Any, scratch: Any, begins: Any,
+    bounds: Any, applied: Any, memory: Any, measured: Any, command: Any,
+    kept: Any, kept_applied: Any, kept_states: Any,
+    new_ends: Any, new_values: Any, new_slopes: Any, times: Any, rows: Any, samples: Any, commands: Any,
+    progress: Any, budget: Any,
+) -> Any:  # fmt: skip
+    """Run intervals until the end, an event, or so many steps that the caller should look; a status.
+
+    integrate, slots, places, clock, count, y  entry point of the integrator, its slots, the places in them of ends,
+                  values, slopes, times and rows; its clock, counts and state
+    outputs, c, o, measured_at  printed outputs; where each measured column stands among states and outputs
+    sample(measured, setpoints, memory, low, high, period, parameters, command, memory)  address of the controller
+    edges (K + 1,), ulps (K + 1,), setpoints (K, s)  intervals; samples begin with number `first_sample`
+    ends .. slopes, first (K + 1,), grid, grid_row (K + 1,)  segments and output times, and the first of each interval
+    kinds .. begins  drivers (D, ..) and their workspace
+    memory (2, ..)  of the last completed interval, and of the present one
+    kept, kept_applied, kept_states  state, inputs and drivers at the end of the last completed interval
+    new_ends .. rows  buffers: segments, times and rows of the run, with the instants that drivers add
+    samples (K, ..), commands (K, ..)  measurements and commands of every interval
+    progress      see `kernel_layout.Progress`
+    """
+    n, m, intervals = y.shape[0], values.shape[1], edges.shape[0] - 1
+    driven = kinds.shape[0]
+    needs_outputs = False
+    for i in range(measured_at.shape[0]):
+        needs_outputs = needs_outputs or measured_at[i] >= n
+    steps_at_call = count[2]
+    while progress[INTERVAL] < intervals:
+        k = progress[INTERVAL]
+        begin, end = edges[k], edges[k + 1]
+        if progress[RUNNING] == 0:
+            if count[2] - steps_at_call >= budget:
+                return PAUSED
+            pieces = first[k + 1] - first[k]
+            if driven:
+                room = columns.shape[2] * m
+                too_many = progress[SEGMENTS] + room > new_ends.shape[0]
+                if too_many or progress[ROWS] + room + grid_row[k + 1] - grid_row[k] > times.shape[0]:
+                    progress[FULL] = 1
+                    return PAUSED
+            for i in range(memory.shape[1]):
+                memory[1, i] = memory[0, i]
+            if k >= first_sample:
+                if needs_outputs:
+                    invoke(outputs, (pointer(y), pointer(applied), pointer(c), pointer(o)))
+                for i in range(measured.shape[0]):
+                    at = measured_at[i]
+                    x = y[at] if at < n else o[at - n]
+                    if not abs(x) <= LARGEST:
+                        return NOT_FINITE
+                    measured[i] = x
+                invoke(sample, (
+                    pointer(measured), pointer(setpoints[k]), pointer(memory[0]), pointer(low), pointer(high),
+                    pointer(period), pointer(parameters), pointer(command), pointer(memory[1]),
+                ))  # fmt: skip
+                for i in range(command.shape[0]):
+                    x = 0.0 + command[i]
+                    if low[i] > x:
+                        x = low[i]
+                    if high[i] < x:
+                        x = high[i]
+                    if not abs(x) <= LARGEST:
+                        return NON_FINITE_COMMAND
+                    command[i] = x
+            for i in range(measured.shape[0]):
+                samples[k, i] = measured[i]
+            for i in range(command.shape[0]):
+                commands[k, i] = command[i]
+                for row in range(first[k], first[k + 1]):
+                    values[row, commanded_at[i]] = command[i]
+            progress[SAMPLES] = k + 1
+            if driven:
+                for i in range(m):
+                    counts[0, i] = pieces
+                    for row in range(pieces):
+                        columns[i, 0, row] = ends[first[k] + row]
+                        columns[i, 1, row] = values[first[k] + row, i]
+                        columns[i, 2, row] = slopes[first[k] + row, i]
+                apply_drivers(kinds, settings, kept_states, states, columns, counts[0], scratch, begin, ulps[k + 1])
+                at_segment, at_row = progress[SEGMENTS], progress[ROWS]
+                pieces = merge_columns(
+                    columns, counts[0], counts[1], begins, begin, new_ends, new_values, new_slopes,
+                    at_segment,
+                )  # fmt: skip
+                instants = pieces if pieces > 1 else 0
+                wanted = merge_times(
+                    grid, grid_row[k], grid_row[k + 1], new_ends, at_segment, instants, 1e-9 * period[0], times, at_row
+                )
+            else:
+                at_segment, at_row, wanted = first[k], grid_row[k], grid_row[k + 1] - grid_row[k]
+            progress[FIRST_SEGMENT], progress[FIRST_ROW] = at_segment, at_row
+            progress[SEGMENTS], progress[ROWS] = at_segment + pieces, at_row
+            slots[places[0]], slots[places[1]] = pointer(new_ends[at_segment:]), pointer(new_values[at_segment:])
+            slots[places[2]], slots[places[3]] = pointer(new_slopes[at_segment:]), pointer(times[at_row:])
+            slots[places[4]] = pointer(rows[at_row:])
+            slots[places[0] + 1] = slots[places[1] + 1] = slots[places[2] + 1] = pieces
+            slots[places[3] + 1] = slots[places[4] + 1] = wanted
+            clock[0], clock[1], clock[2] = begin, 0.0, begin
+            count[0] = count[1] = 0
+            progress[STEPS_BEFORE], progress[RUNNING] = count[2], 1
+        status = call_kernel(integrate, pointer(slots))
+        progress[ROWS] = progress[FIRST_ROW] + count[1]
+        if status != DONE:
+            return status
+        for i in range(n):
+            if y[i] < bounds[i]:
+                return BELOW_LIMIT
+        last = progress[SEGMENTS] - 1
+        start = new_ends[last - 1] if last > progress[FIRST_SEGMENT] else begin
+        for i in range(m):
+            applied[i] = new_values[last, i] + new_slopes[last, i] * (end - start)
+            kept_applied[i] = applied[i]
+        for i in range(n):
+            kept[i] = y[i]
+        for i in range(memory.shape[1]):
+            memory[0, i] = memory[1, i]
+        for d in range(driven):
+            for i in range(DRIVER_WIDTH):
+                kept_states[d, i] = states[d, i]
+        progress[INTERVAL], progress[RUNNING] = k + 1, 0
+    return DONE

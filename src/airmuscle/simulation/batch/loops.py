@@ -1,0 +1,172 @@
+"""Control loops of a batch: one for all plants or one for each, and controllers whose parameters differ."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import threading
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...compile.program import CompiledSystem
+from ...control.control_law import ControlLaw
+from ...control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
+from ...core.arrays import Array
+from ...core.errors import ParameterError
+from ...core.system import System
+from ..closed_loop import CalledRun
+from ..compiled_law import parameters_of
+from ..compiled_loop import CompiledLoop, CompiledRun, can_be_compiled
+from ..integrators import Integrator
+from ..problem import Problem
+from ..sampled_loop import SampledLoop, first_rows_of, prepare_loop
+from .variations import Variations, variations_of
+
+CONTROLLER = "controller."
+"""Prefix of the paths of a controller's parameters among variations."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LoopBatch:
+    """The control loops of N plants.
+
+    template  a problem with the plant, for which loops are prepared; its output times are the rows
+    loops     one for all plants, or one for each
+    laws      the controllers, where their parameters differ
+    """
+
+    template: Problem
+    loops: tuple[ControlLoop, ...]
+    laws: Variations | None
+    times: Array
+    _prepared: dict[int, SampledLoop | CompiledLoop] = dataclasses.field(default_factory=dict)
+    _preparing: Any = dataclasses.field(default_factory=threading.Lock)
+
+    @classmethod
+    def of(
+        cls, plant: System, loops: tuple[ControlLoop, ...], laws: Variations | None, span: tuple[float, float],
+        times: Array, integrator: Integrator,
+    ) -> LoopBatch:  # fmt: skip
+        """The loops of plants that are simulated over a span (start, duration) [s] with rows at `times` (N,)."""
+        start, duration = span
+        template = Problem(plant, loops[0], duration, start_time=start, integrator=integrator)
+        return cls(template, loops, laws, times)
+
+    @functools.cached_property
+    def column_names(self) -> tuple[str, ...]:
+        """The columns that loops add to those of the plant."""
+        controller = self.loops[0].controller
+        kinds = (
+            (SETPOINT, controller.setpoints),
+            (MEASURED, controller.measured_columns),
+            (COMMAND, controller.inputs),
+        )
+        return tuple(f"{prefix}{name}" for prefix, names in kinds for name in names)
+
+    def run(self, index: int, plants: Variations, compiled: CompiledSystem, state: Array) -> CompiledRun | CalledRun:
+        """The loop of one plant, integrated from its initial state (n,)."""
+        loop = self.loops[index if len(self.loops) > 1 else 0]
+        prepared = self._loop(loop)
+        start = loop.init(self.template.start_time)
+        integrator = self.template.integrator
+        assert integrator is not None
+        run: CompiledRun | CalledRun
+        if isinstance(prepared, CompiledLoop):
+            parameters = parameters_of(prepared.law) if self.laws is None else self.laws.parameters(index)
+            run = CompiledRun(prepared, compiled, integrator, state, start, parameters)
+        else:
+            run = self._called(index, plants, loop, prepared, state)
+        run.integrate()
+        return run
+
+    def _called(
+        self, index: int, plants: Variations, loop: ControlLoop, prepared: SampledLoop, state: Array
+    ) -> CalledRun:
+        """A run that calls the controller; a prepared loop is filled during a run, so each has its own."""
+        plant = plants.one(index)
+        names = [s.name for s in plant.states]
+        problem = dataclasses.replace(
+            self.template, system=plant, input=loop, initial_state=dict(zip(names, state.tolist(), strict=True))
+        )
+        start = loop.init(problem.start_time)
+        return CalledRun(problem, self._at_times(prepare_loop(problem, start)), start)
+
+    def _loop(self, loop: ControlLoop) -> SampledLoop | CompiledLoop:
+        """A loop prepared for its runs, once for all plants that share it."""
+        with self._preparing:
+            if id(loop) not in self._prepared:
+                problem = dataclasses.replace(self.template, input=loop)
+                prepared = self._at_times(prepare_loop(problem, loop.init(problem.start_time)))
+                compile_it = can_be_compiled(prepared)
+                self._prepared[id(loop)] = CompiledLoop(problem.compiled, prepared) if compile_it else prepared
+        return self._prepared[id(loop)]
+
+    def _at_times(self, prepared: SampledLoop) -> SampledLoop:
+        """The same loop with rows at the times of the batch alone."""
+        rows = first_rows_of(self.times, prepared.instants)
+        return dataclasses.replace(prepared, times=self.times, first_rows=rows)
+
+    def columns(self, index: int, run: CompiledRun | CalledRun, times: Array) -> Mapping[str, Array]:
+        """Set points, measurements and commands at the rows (R,) of one plant."""
+        prepared, controller = run.prepared, self.loops[0].controller
+        intervals = np.clip(
+            np.searchsorted(prepared.instants, times, side="right") - 1, 0, max(len(run.measured) - 1, 0)
+        )
+        setpoints = prepared.setpoint_signal.inputs_at(times, self.template.start_time)
+        columns = {f"{SETPOINT}{name}": setpoints[:, i] for i, name in enumerate(controller.setpoints)}
+        for values, prefix, names in (
+            (run.measured, MEASURED, controller.measured_columns),
+            (run.commanded, COMMAND, controller.inputs),
+        ):
+            columns |= {f"{prefix}{name}": values[intervals, i] for i, name in enumerate(names)}
+        return columns
+
+
+def loops_of(given: Any) -> tuple[ControlLoop, ...] | None:
+    """The control loops among the inputs of a batch; None where its inputs are signals.
+
+    Raises ParameterError where signals and loops are mixed, or loops of different controllers.
+    """
+    inputs = tuple(given) if isinstance(given, Sequence) else (given,)
+    loops = tuple(one for one in inputs if isinstance(one, ControlLoop))
+    if not loops:
+        return None
+    if len(loops) < len(inputs):
+        raise ParameterError("simulate_batch: the inputs are control loops and signals; give one kind for all plants.")
+    first = _names(loops[0])
+    for row, loop in enumerate(loops):
+        if _names(loop) != first:
+            raise ParameterError(
+                f"inputs, row {row}: {type(loop.controller).__name__} measures or commands other columns than that of "
+                "row 0; all loops of a batch need the same measured columns, set points and commanded inputs."
+            )
+    return loops
+
+
+def _names(loop: ControlLoop) -> tuple[tuple[str, ...], ...]:
+    controller = loop.controller
+    return controller.measured_columns, controller.setpoints, controller.inputs
+
+
+def vary(
+    plant: System, given: Mapping[str, npt.ArrayLike], loops: tuple[ControlLoop, ...] | None, count: int | None
+) -> tuple[Variations, Variations | None]:
+    """The variations of the plants, and those of the controllers, whose paths begin with "controller."."""
+    if not loops or not isinstance(given, Mapping):
+        return variations_of(plant, given, count), None
+    plants = {path: values for path, values in given.items() if not str(path).startswith(CONTROLLER)}
+    laws = {path[len(CONTROLLER) :]: given[path] for path in given if path not in plants}
+    if not laws:
+        return variations_of(plant, plants, count), None
+    controller = loops[0].controller
+    if len(loops) > 1 or not isinstance(controller, ControlLaw):
+        reason = "there is one loop for each plant" if len(loops) > 1 else "its controller is no ControlLaw"
+        raise ParameterError(
+            f"variations: '{CONTROLLER}{next(iter(laws))}' varies a parameter of the controller, but {reason}. Give a "
+            "list of loops with the controllers instead."
+        )
+    varied = variations_of(controller, laws, count)
+    return variations_of(plant, plants, len(varied.values)), varied

@@ -1,0 +1,159 @@
+"""Integrator bound to a compiled system: its kernel with all arguments, run after run."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..compile.cache.kernel import Kernel
+from ..compile.functions import ArraySizes
+from ..control.piecewise_linear import PiecewiseLinear
+from ..core.arrays import Array, flat_view
+from ..core.status import Status
+
+INTERRUPT_CHECK_STEPS = 100_000
+"""Steps between two checks whether the user wants to stop."""
+MAX_STEPS = 50_000_000
+"""Steps of one run, by default."""
+_PAUSED, _TOO_MANY = Status.PAUSED.value, Status.TOO_MANY_STEPS.value
+
+
+class RawSolution(NamedTuple):
+    """What an integrator computed: rows (N, n), how many were reached, where and why it stopped, and its counts."""
+
+    rows: Array
+    reached: int
+    time: float
+    state: Array
+    status: Status
+    steps: int
+    rejected: int
+
+
+class Binding(NamedTuple):
+    """What binds an integrator to a system: kernel, arguments before and after those of a run, workspace size."""
+
+    kernel: Kernel
+    leading: tuple[Any, ...]
+    trailing: tuple[Any, ...]
+    work: int
+
+
+class BoundIntegrator:
+    """An integrator bound to one compiled system, with its workspace. For one thread at a time."""
+
+    def __init__(self, binding: Binding, sizes: ArraySizes) -> None:
+        self.state, self._progress = np.zeros(sizes.states), np.zeros(7, dtype=np.int64)
+        self._clock, self._count = self._progress[:3].view(np.float64), self._progress[3:]
+        self._duration = 1.0
+        self._end, self._inputs, slopes = np.ones(1), np.zeros((1, sizes.inputs)), np.zeros((1, sizes.inputs))
+        no_rows = np.zeros(0), np.zeros((0, sizes.states))
+        work = np.zeros(max(binding.work, 1))
+        run = (self.state, self._end, self._inputs, slopes, *no_rows)
+        end = (self._clock, self._count, INTERRUPT_CHECK_STEPS, work)
+        self._kernel = binding.kernel.bind(*binding.leading, *run, *binding.trailing, *end)
+        self._first = len(binding.leading) + 1
+        self._clock_view, self._count_view = flat_view(self._clock), flat_view(self._count)
+        self._budget = len(binding.leading) + len(run) + len(binding.trailing) + 2
+
+    def run(
+        self, segments: PiecewiseLinear, start: float, state: Array, times: Array, max_steps: int = MAX_STEPS,
+        rows: Array | None = None,
+    ) -> RawSolution:  # fmt: skip
+        """Integrate from `state` (n,) at `start` [s] through the segments; rows (N, n) at rising `times` (N,)."""
+        rows = np.empty((times.size, self.state.size)) if rows is None else rows
+        self.state[:] = state
+        for i, argument in enumerate((segments.ends, segments.values, segments.slopes, times, rows), self._first):
+            self._kernel.replace(i, argument)
+        return self._solve(start, rows, max_steps)
+
+    def hold(self, state: Array, inputs: Array, duration: float) -> Status:
+        """Advance `state` (n,) in place by `duration` [s] with the inputs (m,) held. Not to be mixed with `run`."""
+        self.state[:] = state
+        self._inputs[0] = inputs
+        if duration != self._duration:
+            self._end[0] = self._duration = duration
+        self._progress.fill(0)
+        status = self._kernel()
+        if status == _PAUSED:
+            status = self._continue(status, MAX_STEPS)
+        state[:] = self.state
+        return Status.DONE if status == 0 else Status(status)
+
+    def run_part(
+        self, begin: float, segments: tuple[int, int, int], count: int, times: int, rows: int, wanted: int
+    ) -> tuple[Status, int, float]:
+        """Go on from `self.state` at `begin` [s] through `count` segments: how it ended, rows reached, where.
+
+        Ends, values and slopes of the segments, times and rows are given by the addresses of their first numbers.
+        """
+        self._kernel.point(self._first, segments, count)
+        self._kernel.point(self._first + 3, (times, rows), wanted)
+        clock, counts = self._clock_view, self._count_view
+        clock[0] = clock[2] = begin
+        clock[1] = 0.0
+        counts[0] = counts[1] = 0
+        before = counts[2]
+        status = self._kernel()
+        if status == _PAUSED:
+            status = self._continue(status, before + MAX_STEPS)
+            self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
+        return Status.DONE if status == 0 else Status(status), counts[1], clock[0]
+
+    @property
+    def entry_address(self) -> int | None:
+        """The address of the kernel's entry point, for a kernel that calls it; None without machine code."""
+        return self._kernel.entry_address
+
+    @property
+    def slots(self) -> Any:
+        """The slots of the kernel's arguments."""
+        return self._kernel.slots
+
+    @property
+    def places(self) -> Any:
+        """The places in the slots of ends, values and slopes of segments, and of times and rows (5,)."""
+        return np.array([self._kernel.slot_of(self._first + i) for i in range(5)], dtype=np.int64)
+
+    @property
+    def clock(self) -> Array:
+        """Time, next step, start of the current segment."""
+        return self._clock
+
+    @property
+    def count(self) -> Any:
+        """Segment, next row, steps, rejected steps."""
+        return self._count
+
+    @property
+    def step_counts(self) -> tuple[int, int]:
+        """Accepted and rejected steps since the counts were last reset."""
+        return int(self._count[2]), int(self._count[3])
+
+    def _solve(self, start: float, rows: Array, max_steps: int) -> RawSolution:
+        clock, count = self._clock, self._count
+        clock[:] = start, 0.0, start
+        count[:] = 0
+        if max_steps < INTERRUPT_CHECK_STEPS:
+            self._kernel.replace(self._budget, max_steps)
+        try:
+            status = self._kernel()
+            if status == _PAUSED:
+                status = self._continue(status, max_steps)
+        except KeyboardInterrupt:
+            status = Status.INTERRUPTED.value
+        self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
+        _, reached, steps, rejected = count.tolist()
+        rows[reached:] = np.nan
+        return RawSolution(rows, reached, float(clock[0]), self.state.copy(), Status(status), steps, rejected)
+
+    def _continue(self, status: int, max_steps: int) -> int:
+        """Go on where the kernel paused so that an interruption can be noticed."""
+        while status == _PAUSED:
+            left = max_steps - int(self._count[2])
+            if left <= 0:
+                return _TOO_MANY
+            self._kernel.replace(self._budget, min(INTERRUPT_CHECK_STEPS, left))
+            status = self._kernel()
+        return status

@@ -1,0 +1,65 @@
+"""Compiled sample of a control law: measurements, set points and memory to commands and memory, as machine code."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..compile.function import Function
+from ..control.control_law import ControlLaw
+from ..control.controller import Measurement
+from ..core import autodiff, tree
+from ..core.arrays import Array
+from ..core.errors import TraceError
+
+_functions: dict[tree.Structure, Function] = {}
+
+
+def compiled_sample(law: ControlLaw) -> Function:
+    """A function (measured, setpoints, memory, minimum, maximum, sample time, parameters, commands, memory).
+
+    Control laws of one structure share it. Raises TraceError if the law cannot be traced.
+    """
+    structure = tree.structure(law)
+    if structure not in _functions:
+        _functions[structure] = _trace(law)
+    return _functions[structure]
+
+
+def parameters_of(law: ControlLaw) -> Array:
+    """The parameters of a law, for its compiled sample."""
+    return np.append(tree.flatten(law), 0.0)[: max(len(tree.flatten(law)), 1)]
+
+
+def _trace(law: ControlLaw) -> Function:
+    import casadi
+
+    symbolic, parameters = autodiff.symbolic(law)
+    names = {
+        "measured": law.measured_columns,
+        "setpoints": law.setpoints,
+        "memory": tuple(law.initial_memory),
+        "minimum": law.inputs,
+        "maximum": law.inputs,
+        "sample_time": ("sample_time",),
+    }
+    vectors = {key: casadi.SX.sym(key, len(each)) for key, each in names.items()}
+    by_name = {key: {n: vectors[key][i] for i, n in enumerate(each)} for key, each in names.items()}
+    ranges = {name: (by_name["minimum"][name], by_name["maximum"][name]) for name in law.inputs}
+    measurement = Measurement(by_name["measured"], by_name["setpoints"], ranges)
+    owner = type(law).__name__
+    try:
+        commands, memory = symbolic.step(by_name["memory"], measurement, vectors["sample_time"][0])
+        commanded = casadi.densify(casadi.vertcat(*(commands[name] for name in law.inputs)))
+        later = casadi.densify(casadi.vertcat(*(memory[name] for name in names["memory"])))
+    except KeyError as missing:
+        raise TraceError(
+            f"{owner}.step does not return {missing}; it must return a value for each of {', '.join(law.inputs)}, and "
+            f"for each of its memory: {', '.join(names['memory']) or 'none'}."
+        ) from None
+    except (TypeError, ValueError, RuntimeError, NotImplementedError) as reason:
+        raise TraceError(
+            f"{owner}.step cannot be compiled ({' '.join(str(reason).split())[:160]}). Use airmuscle.core.ops instead "
+            "of math, numpy and `if`, or derive the controller from Controller."
+        ) from None
+    autodiff.check_finite(casadi.vertcat(commanded, later), f"{owner}.step")
+    return Function({**vectors, "parameters": parameters}, {"commands": commanded, "later": later})

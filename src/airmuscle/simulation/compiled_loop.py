@@ -1,0 +1,214 @@
+"""Control loop as one program: a control law, drivers and plant from sample to sample without a return to Python."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..compile.cache import kernel
+from ..compile.kernel_layout import Progress
+from ..compile.program import CompiledSystem
+from ..control.control_law import ControlLaw
+from ..control.control_loop import ControlLoopState
+from ..control.piecewise_linear import PiecewiseLinear
+from ..core.arrays import Array
+from ..core.status import Status
+from .bound_integrator import INTERRUPT_CHECK_STEPS, MAX_STEPS
+from .compiled_law import compiled_sample, parameters_of
+from .driver_table import MAX_CAPACITY, DriverTable, are_known, greatest_capacity
+from .integrators import Integrator
+from .sampled_loop import SampledLoop
+
+FIRST_SEGMENTS = 4096
+"""Segments and rows that the buffers of driven inputs hold at first."""
+
+
+class CompiledLoop:
+    """A prepared loop whose controller is a control law, with what all runs of it have in common."""
+
+    def __init__(self, compiled: CompiledSystem, prepared: SampledLoop) -> None:
+        loop, known = prepared.loop, compiled.description
+        assert isinstance(loop.controller, ControlLaw)
+        self.prepared, self.law = prepared, loop.controller
+        self.function = compiled_sample(self.law)
+        self.capacity = greatest_capacity(prepared) if loop.drivers else 0
+        columns = (*known.state_names, *known.output_names)
+        measured_at = np.array([columns.index(name) for name in self.law.measured_columns], dtype=np.int64)
+        commanded_at = np.array(prepared.commanded, dtype=np.int64)
+        limits = np.array([prepared.ranges[name] for name in self.law.inputs], dtype=float).reshape(-1, 2)
+        self.edges = prepared.instants
+        self.measuring = compiled.address["outputs"], measured_at
+        low, high = np.ascontiguousarray(limits[:, 0]), np.ascontiguousarray(limits[:, 1])
+        self.commanding = np.array([loop.sample_time]), low, high, commanded_at
+        self.intervals = (
+            self.edges, np.spacing(np.abs(self.edges)), 0 if prepared.sampled else 1,
+            prepared.setpoint_values,
+        )  # fmt: skip
+        self.offsets = prepared.first_segments
+        self.grid = prepared.times, prepared.first_rows
+
+
+def can_be_compiled(prepared: SampledLoop) -> bool:
+    """Whether a loop consists of what kernels know: a control law, and drivers of this package."""
+    loop = prepared.loop
+    if not isinstance(loop.controller, ControlLaw) or not are_known(loop):
+        return False
+    return not loop.drivers or greatest_capacity(prepared) <= MAX_CAPACITY
+
+
+class CompiledRun:
+    """A run of a compiled loop; the results are those of `closed_loop.CalledRun`, to rounding errors.
+
+    compiled       the plant, whose structure is that of the loop's plant
+    initial_state  (n,)
+    parameters     of the control law (P,); those of the loop's controller unless given
+    """
+
+    def __init__(
+        self, loop: CompiledLoop, compiled: CompiledSystem, integrator: Integrator, initial_state: Array,
+        control_state: ControlLoopState, parameters: Array | None = None,
+    ) -> None:  # fmt: skip
+        self.loop, self._begin_state = loop, control_state
+        self.bound = integrator.bind(compiled)
+        self.bound.state[:] = initial_state
+        self.status, self.stopped_at = Status.DONE, float(loop.edges[0])
+        self._drivers = DriverTable(loop.prepared, control_state, loop.capacity)
+        self._make_arrays(compiled.sizes.states, compiled.sizes.inputs)
+        arguments = self._arguments(compiled, parameters_of(loop.law) if parameters is None else parameters)
+        self._first_buffer = len(arguments) - 9
+        self._kernel = kernel.sampled_loop.bind(*arguments)
+
+    @property
+    def prepared(self) -> SampledLoop:
+        """The prepared loop."""
+        return self.loop.prepared
+
+    @property
+    def can_run(self) -> bool:
+        """Whether the machine code of the integrator can be called by another kernel."""
+        return self.bound.entry_address is not None
+
+    def _make_arrays(self, n: int, m: int) -> None:
+        prepared, state, law = self.loop.prepared, self._begin_state, self.loop.law
+        inputs, intervals = prepared.inputs, self.loop.edges.size - 1
+        self.progress = np.zeros(len(Progress), dtype=np.int64)
+        self._memory = np.array([list(state.controller.values())] * 2, dtype=float).reshape(2, -1)
+        self._measured, self._command = np.array(state.measured, dtype=float), np.array(state.commanded, dtype=float)
+        self._applied = np.array(state.applied_inputs or inputs.values[0], dtype=float)
+        self._kept, self._kept_inputs = self.bound.state.copy(), self._applied.copy()
+        self._samples = np.empty((intervals, len(law.measured_columns)))
+        self._commands = np.empty((intervals, len(law.inputs)))
+        self._inputs = inputs.ends, inputs.values.copy(), inputs.slopes
+        if self._drivers.kinds.size:
+            segments, rows = FIRST_SEGMENTS + self.loop.capacity * m, FIRST_SEGMENTS + 2 * self.loop.capacity * m
+            self._segments: Any = np.empty(segments), np.empty((segments, m)), np.empty((segments, m))
+            self._times, self._rows = np.empty(rows), np.empty((rows, n))
+        else:
+            self._segments = self._inputs
+            self._times, self._rows = prepared.times, np.empty((prepared.times.size, n))
+
+    def _arguments(self, compiled: CompiledSystem, parameters: Array) -> tuple[Any, ...]:
+        loop, bound, drivers = self.loop, self.bound, self._drivers
+        outputs, measured_at = loop.measuring
+        return (
+            bound.entry_address or 0, bound.slots, bound.places, bound.clock, bound.count, bound.state,
+            outputs, compiled.precomputed, np.empty(max(compiled.sizes.outputs, 1)), measured_at,
+            loop.function.address, parameters, *loop.commanding, *loop.intervals, *self._inputs, loop.offsets,
+            *loop.grid, drivers.kinds, drivers.settings, drivers.states, drivers.columns, drivers.counts,
+            drivers.scratch, drivers.begins, compiled.description.lower_bounds, self._applied, self._memory,
+            self._measured, self._command, self._kept, self._kept_inputs, drivers.kept, *self._segments, self._times,
+            self._rows, self._samples, self._commands, self.progress, INTERRUPT_CHECK_STEPS,
+        )  # fmt: skip
+
+    def integrate(self) -> None:
+        """Run the loop until its end, or until an interval fails or the user stops it."""
+        try:
+            status = self._kernel()
+            while status == Status.PAUSED and not self._takes_too_many_steps():
+                if self.progress[Progress.FULL]:
+                    self._extend()
+                status = self._kernel()
+        except KeyboardInterrupt:
+            status = Status.INTERRUPTED
+        self.status = Status.TOO_MANY_STEPS if status == Status.PAUSED else Status(status)
+        if self.progress[Progress.SAMPLES]:
+            self.stopped_at = float(self.bound.clock[0])
+        if self.status == Status.INTERRUPTED:
+            self._discard_interval()
+
+    def _takes_too_many_steps(self) -> bool:
+        running = self.progress[Progress.RUNNING]
+        return bool(running and self.bound.count[2] - self.progress[Progress.STEPS_BEFORE] >= MAX_STEPS)
+
+    def _extend(self) -> None:
+        """Longer buffers for the segments and rows of driven inputs."""
+        self._segments = tuple(map(_longer, self._segments))
+        self._times, self._rows = _longer(self._times), _longer(self._rows)
+        for i, array in enumerate((*self._segments, self._times, self._rows), self._first_buffer):
+            self._kernel.replace(i, array)
+        self.progress[Progress.FULL] = 0
+
+    def _discard_interval(self) -> None:
+        """Forget an interval that was interrupted, so that the run can be continued from its beginning."""
+        progress = self.progress
+        if progress[Progress.RUNNING]:
+            progress[Progress.SEGMENTS] = progress[Progress.FIRST_SEGMENT]
+            progress[Progress.ROWS] = progress[Progress.FIRST_ROW]
+            progress[Progress.SAMPLES] = progress[Progress.INTERVAL]
+        self.stopped_at, self.bound.state[:] = self.time, self._kept
+
+    @property
+    def time(self) -> float:
+        """The end of the last completed interval [s]."""
+        return float(self.loop.edges[self.progress[Progress.INTERVAL]])
+
+    @property
+    def state(self) -> Array:
+        """The state (n,) at the end of the last completed interval."""
+        return self._kept
+
+    @property
+    def measured(self) -> Array:
+        """Measurements (K, columns) of every interval that has begun."""
+        return self._samples[: self.progress[Progress.SAMPLES]]
+
+    @property
+    def commanded(self) -> Array:
+        """Commands (K, inputs) of every interval that has begun."""
+        return self._commands[: self.progress[Progress.SAMPLES]]
+
+    @property
+    def signal(self) -> PiecewiseLinear:
+        """The segments of all inputs of the intervals that have begun."""
+        count = int(self.progress[Progress.SEGMENTS])
+        return PiecewiseLinear(*(array[:count] for array in self._segments))
+
+    @property
+    def rows(self) -> tuple[Array, Array]:
+        """Times (N,) and states (N, n) of the rows that were reached."""
+        count = int(self.progress[Progress.ROWS])
+        return self._times[:count], self._rows[:count]
+
+    @property
+    def control_state(self) -> ControlLoopState:
+        """The state of the loop at the end of the last completed interval."""
+        done, begun = int(self.progress[Progress.INTERVAL]), self._begin_state
+        if not done:
+            return begun
+        return ControlLoopState(
+            controller=dict(zip(self.loop.law.initial_memory, self._memory[0].tolist(), strict=True)),
+            origin=begun.origin,
+            time=self.time,
+            sample_count=begun.sample_count + done - (0 if self.loop.prepared.sampled else 1),
+            measured=tuple(self._samples[done - 1].tolist()),
+            commanded=tuple(self._commands[done - 1].tolist()),
+            applied_inputs=tuple(self._kept_inputs.tolist()),
+            drivers=self._drivers.as_mapping(),
+        )
+
+
+def _longer(array: Array) -> Array:
+    longer = np.empty((2 * len(array), *array.shape[1:]))
+    longer[: len(array)] = array
+    return longer

@@ -1,0 +1,156 @@
+"""A batch of control loops is each loop alone: plants, gains, set points and disturbances differ from row to row, and
+every row is what `solve` gives for it, to the last bit, whether its controller is compiled or called from Python.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from called_controller import Called
+from plants import chosen_muscle
+
+from airmuscle.control import (
+    PID,
+    PWM,
+    ControlLoop,
+    OnOffController,
+    Periodic,
+    Schedule,
+    SolenoidDriver,
+    SplitRange,
+)
+from airmuscle.core.errors import ParameterError
+from airmuscle.core.status import Status
+from airmuscle.mechanism import HangingMass
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.simulation import Problem, Rodas4, RungeKutta4, solve
+from airmuscle.simulation.batch import Single, simulate_batch
+
+VALVE = Valve(2.6e-9, 0.4)
+SPLIT = SplitRange("fill", "discharge")
+LIFT = Plant(chosen_muscle(), FillDischarge(Supply(5.5e5), VALVE, VALVE), HangingMass(2.0))
+PI = PID("pressure", SPLIT, gain=8e-6, integral_time=0.3)
+STEPS = Schedule({"pressure": ((0, 1e5), (0.25, 3e5))})
+PULSES = {name: (PWM(50.0, 1e-3), SolenoidDriver(2e-3, 1.5e-3)) for name in ("fill", "discharge")}
+TIMES = np.linspace(0.0, 0.75, 31)
+
+
+def alone(plant: Plant, loop: ControlLoop, integrator: Any = None, **options: Any):
+    return solve(Problem(plant, loop, 0.75, output_times=TIMES, integrator=integrator or Rodas4(), **options))
+
+
+def assert_rows_are(batch, row: int, solution, columns):
+    recording = solution.recording
+    at = np.searchsorted(recording["time"], TIMES - 1e-12)
+    for name in columns:
+        np.testing.assert_array_equal(batch[name][row], recording[name][at], err_msg=name)
+    assert {name: values[row] for name, values in batch.final.items()} == solution.final_state
+
+
+@pytest.mark.parametrize("drivers", [{}, PULSES], ids=["held", "pulsed"])
+@pytest.mark.parametrize("integrator", [Rodas4(), RungeKutta4(1e-3)], ids=["implicit", "fixed step"])
+def test_plants_and_gains_differ(drivers, integrator):
+    masses, gains = np.array([1.0, 2.0, 2.5]), np.array([4e-6, 1e-5, 2e-5])
+    loop = ControlLoop(PI, 0.0125, STEPS, drivers=drivers)
+    varied = {"mechanism.mass": masses, "controller.gain": gains}
+    batch = simulate_batch(LIFT, varied, loop, duration=0.75, output_times=TIMES, integrator=integrator)
+    names = ["air_mass", "position", "pressure", "fill", "setpoint.pressure", "measured.pressure", "command.discharge"]
+    assert set(names) <= set(batch.columns)
+    assert not batch.failed.size
+    for row in range(3):
+        plant = dataclasses.replace(LIFT, mechanism=HangingMass(masses[row]))
+        own = dataclasses.replace(loop, controller=dataclasses.replace(PI, gain=gains[row]))
+        assert_rows_are(batch, row, alone(plant, own, integrator), names)
+    assert np.unique(batch["position"][:, -1]).size == 3
+
+
+def test_each_plant_may_have_its_own_loop():
+    """Set points, disturbances by the other input, and controllers of several kinds."""
+    loops = [
+        ControlLoop(PI, 0.0125, Schedule({"pressure": ((0, 2e5),)})),
+        ControlLoop(PI, 0.025, STEPS),
+        ControlLoop(OnOffController("pressure", SPLIT, hysteresis=5e3), 0.0125, STEPS, drivers=PULSES),
+    ]
+    batch = simulate_batch(LIFT, {}, loops, duration=0.75, output_times=TIMES)
+    for row, loop in enumerate(loops):
+        assert_rows_are(batch, row, alone(LIFT, loop), ["pressure", "command.fill", "measured.pressure"])
+
+
+def test_disturbances_differ():
+    loops = [
+        ControlLoop(
+            dataclasses.replace(PI, commanded="fill"),
+            0.0125,
+            STEPS,
+            Schedule({"discharge": ((0, 0.0), (0.2, opening))}),
+        )
+        for opening in (0.0, 0.05, 0.4)
+    ]
+    batch = simulate_batch(LIFT, {}, loops, duration=0.75, output_times=TIMES)
+    for row, loop in enumerate(loops):
+        assert_rows_are(batch, row, alone(LIFT, loop), ["pressure", "discharge"])
+
+
+def test_a_controller_that_is_called_from_python():
+    loop = ControlLoop(Called(PI), 0.0125, STEPS, drivers=PULSES)
+    masses = np.array([1.0, 2.0])
+    batch = simulate_batch(LIFT, {"mechanism.mass": masses}, loop, duration=0.75, output_times=TIMES)
+    for row, mass in enumerate(masses):
+        plant = dataclasses.replace(LIFT, mechanism=HangingMass(mass))
+        assert_rows_are(batch, row, alone(plant, loop), ["pressure", "command.fill"])
+    with pytest.raises(ParameterError, match=r"'controller.gain' varies .* its controller is no ControlLaw"):
+        simulate_batch(LIFT, {"controller.gain": [1.0, 2.0]}, loop, duration=0.75)
+
+
+def test_final_states_alone_need_no_rows():
+    gains = np.array([4e-6, 2e-5])
+    loop = ControlLoop(PI, 0.0125, STEPS)
+    kept = simulate_batch(LIFT, {"controller.gain": gains}, loop, duration=0.75, output_times=TIMES)
+    bare = simulate_batch(LIFT, {"controller.gain": gains}, loop, duration=0.75, keep=())
+    for name, values in kept.final.items():
+        assert bare.final[name] == pytest.approx(values, rel=1e-12)
+
+
+def test_a_loop_that_fails_does_not_stop_the_others():
+    loop = ControlLoop(PI, 0.4, STEPS)
+    gains = np.array([1e-9, 1e-3])
+    batch = simulate_batch(
+        LIFT, {"controller.gain": gains}, loop, duration=4.0, integrator=RungeKutta4(0.2), output_times=0.1
+    )
+    for row, gain in enumerate(gains):
+        own = dataclasses.replace(loop, controller=dataclasses.replace(PI, gain=gain))
+        solution = solve(Problem(LIFT, own, 4.0, integrator=RungeKutta4(0.2), output_times=0.1))
+        assert Status(int(batch.status[row])) == solution.status
+    assert batch.failed.tolist() == [0]
+    assert np.isnan(batch["pressure"][0, -1])
+    assert np.isfinite(batch["pressure"][1]).all()
+
+
+def refused(message: str, **changes: Any) -> None:
+    given = {"plant": LIFT, "variations": {}, "input": ControlLoop(PI, 0.0125, STEPS), "duration": 0.75, **changes}
+    with pytest.raises(ParameterError, match=message):
+        simulate_batch(given.pop("plant"), given.pop("variations"), given.pop("input"), **given)
+
+
+def test_bad_batches_of_loops():
+    loop = ControlLoop(PI, 0.0125, STEPS)
+    refused("nothing varies")
+    refused("control loops and signals", input=[loop, Schedule({"fill": ((0, 1.0),)})])
+    other = ControlLoop(dataclasses.replace(PI, commanded="fill"), 0.0125, STEPS)
+    refused("row 1: PID measures or commands other columns", input=[loop, other])
+    refused("no parameter 'gian'. Did you mean 'gain'", variations={"controller.gian": [1.0, 2.0]})
+    refused("row 1: 'setpoint_weight'", variations={"controller.setpoint_weight": [0.5, 2.0]})
+    refused("there is one loop for each plant", input=[loop, loop], variations={"controller.gain": [1.0, 2.0]})
+    refused("one value per plant", variations={"controller.gain": [1e-6, 2e-6], "mechanism.mass": [1.0, 2.0, 3.0]})
+    refused(
+        "double precision",
+        variations={"controller.gain": [1e-6, 2e-6]},
+        precision=Single(),
+        integrator=RungeKutta4(1e-3),
+    )
+    periodic = ControlLoop(PI, 2.0, Periodic(STEPS, 0.5))
+    refused("longer than the run", input=periodic, variations={"controller.gain": [1e-6, 2e-6]})
