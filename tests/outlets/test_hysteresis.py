@@ -21,11 +21,11 @@ from airmuscle.identify.hysteresis import PressurePath, find_holds, find_loops, 
 from airmuscle.identify.hysteresis.plot import plot_loops
 from airmuscle.library.catalogue import load
 from airmuscle.library.location import Location
+from airmuscle.library.plant_file import build_muscle
 from airmuscle.recording import Recording, read
 from airmuscle.recording.csv_writer import write_csv
 from airmuscle.recording.segment import motion_direction
 from airmuscle.report.hysteresis_chapter import hysteresis_chapters
-from airmuscle.scenario.scenario import build_muscle
 
 SLIP = MaxwellSlip((2e4, 1e4, 3e3), (3e-4, 1.2e-3, 5e-3))
 TURNS = (0.02, 0.14, 0.08, 0.12, 0.05, 0.14, 0.02)

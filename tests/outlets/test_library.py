@@ -29,9 +29,9 @@ from airmuscle.library import catalogue, files, write
 from airmuscle.library.entry import Entry
 from airmuscle.library.location import Location
 from airmuscle.library.models import model_class, model_names
+from airmuscle.library.plant_file import build_muscle
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, EndStop, LinearDamper, LinearSpring, PressureDamper, SwellingWall
-from airmuscle.scenario.scenario import build_muscle
 
 GOOD = """
 title = "A muscle of our own"
