@@ -16,6 +16,7 @@ from ..characteristic import (
     InverseLength,
     LogarithmicLength,
     MartensBoblan2017,
+    PooledLengthLaw,
     Reynolds2003,
     Sarosi2012,
     Serres2009,
@@ -24,7 +25,10 @@ from ..characteristic import (
 from ..characteristic.base import Characteristic
 from ..geometry.braid import Braid
 from ..recording import Recording
+from .cross_validation import specimen_name
 
+MIN_POOLED = 3
+"""Minimum number of specimens for partial pooling (chosen): the term in ln L0 takes up the difference of two."""
 _UNREACHED_FORCE = 1e6
 """Upper clamp [N] of a surface inside another law: above the force of any muscle."""
 _INITIAL_BRAID_ANGLE = 0.45
@@ -80,6 +84,8 @@ def standard_candidates(recordings: Sequence[Recording]) -> tuple[Candidate, ...
         candidates += _laws_with_length(scales, scales.max_length)
     if scales.length_count > 1 and scales.max_length is not None:
         candidates += _length_families(scales.max_length)
+        if len({specimen_name(run) for run in recordings}) >= MIN_POOLED:
+            candidates += _pooled_laws(scales.max_length)
     return tuple(candidates)
 
 
@@ -143,3 +149,17 @@ def _length_families(length: float) -> list[Candidate]:
             candidates.append(Candidate(f"term in 1/L0, {degrees}", InverseLength(*args)))
             candidates.append(Candidate(f"term in ln L0, {degrees}", LogarithmicLength(*args)))
     return candidates
+
+
+def _pooled_laws(length: float) -> list[Candidate]:
+    """Laws of partial pooling: a term in ln L0 with a change of degree 1, and specimen effects of degree 2 or 3."""
+    return [
+        Candidate(
+            f"pooled, ln L0, degree {degree}, effects of degree {effects}",
+            PooledLengthLaw(
+                LogarithmicLength(blank_surface(degree), blank_surface(1), length, length), (blank_surface(effects),)
+            ),
+        )
+        for degree in range(2, 6)
+        for effects in (2, 3)
+    ]

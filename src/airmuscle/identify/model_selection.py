@@ -50,8 +50,13 @@ class RankedModel:
 
     @property
     def parameter_count(self) -> int:
-        """Number of fitted parameters."""
-        return len(self.fit.estimates)
+        """Number of fitted parameters; specimen effects count with their effective number, rounded."""
+        return count_parameters(self.fit)
+
+
+def count_parameters(fit: Fit) -> int:
+    """Number of estimates, and the rounded effective number of the specimen effects."""
+    return len(fit.estimates) + (0 if fit.effects is None else round(fit.effects.degrees_of_freedom))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -169,7 +174,7 @@ def _cross_validate(candidate: Candidate, points: ComparedPoints, loss: Loss) ->
     left_out = [each for each in points.left_out_residuals(candidate, full_fit, loss) if each[1].size]
     scores = tuple(FoldScore(name, _rms(residuals), residuals.size) for name, residuals in left_out)
     out_of_sample = np.concatenate([residuals for _, residuals in left_out])
-    criterion = aicc(float(np.mean(in_sample**2)), in_sample.size, len(full_fit.estimates))
+    criterion = aicc(float(np.mean(in_sample**2)), in_sample.size, count_parameters(full_fit))
     return RankedModel(candidate, full_fit, _rms(in_sample), _rms(out_of_sample), criterion, scores, notes)
 
 
