@@ -27,11 +27,13 @@ HELD = (0.0, 0.05, 0.1, 0.15)
 NAMES = tuple(f"muscle {i + 1}" for i in range(len(LENGTHS)))
 SCATTER, NOISE = 12.0, 2.0
 POPULATION = LogarithmicLength(blank_surface(3), blank_surface(1), 0.2, 0.2)
+CHANGED = LogarithmicLength(blank_surface(3), blank_surface(3), 0.2, 0.2)
 POOLED = PooledLengthLaw(POPULATION, (blank_surface(2),))
 CANDIDATES = [
     Candidate("complete pooling", POPULATION),
-    Candidate("rich", LogarithmicLength(blank_surface(3), blank_surface(3), 0.2, 0.2)),
+    Candidate("rich", CHANGED),
     Candidate("partial pooling", POOLED),
+    Candidate("rich, partial pooling", PooledLengthLaw(CHANGED, POOLED.effects)),
 ]
 
 
@@ -56,9 +58,10 @@ def runs(seed: int = 1, scatter: float = SCATTER, rows: int = 20) -> list[Record
     return made
 
 
-def test_one_pooled_law_is_within_five_per_cent_of_the_best_for_both_purposes():
-    joint = select_for_both(runs(), CANDIDATES)
-    assert joint.recommended[0].candidate.name == "partial pooling"
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_one_pooled_law_is_within_five_per_cent_of_the_best_for_both_purposes(seed: int):
+    joint = select_for_both(runs(seed), CANDIDATES)
+    assert isinstance(joint.recommended[0].candidate.law, PooledLengthLaw)
     assert max(joint.ratios) <= 1.05
     separate = {c.leave_out.group_name: c["complete pooling"].cross_validated_rmse for c in joint.comparisons}
     assert separate["run"] > 1.5 * joint.recommended[0].cross_validated_rmse

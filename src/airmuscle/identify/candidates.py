@@ -29,7 +29,7 @@ from .cross_validation import specimen_name
 
 MIN_POOLED = 3
 """Minimum number of specimens for partial pooling (chosen): the term in ln L0 takes up the difference of two."""
-_UNREACHED_FORCE = 1e6
+UNREACHED_FORCE = 1e6
 """Upper clamp [N] of a surface inside another law: above the force of any muscle."""
 _INITIAL_BRAID_ANGLE = 0.45
 """Initial braid angle [rad]; the angles of fluidic muscles lie within 0.15 of it."""
@@ -102,7 +102,7 @@ def unavailable_candidates(recordings: Sequence[Recording]) -> tuple[tuple[str, 
     return tuple(missing)
 
 
-def blank_surface(degree: int, max_force: float = _UNREACHED_FORCE) -> ContractileSurface:
+def blank_surface(degree: int, max_force: float = UNREACHED_FORCE) -> ContractileSurface:
     """A surface with coefficients of zero, clamped above all measured forces."""
     return ContractileSurface.blank(degree, max_force=max(max_force, 1.0))
 
@@ -153,13 +153,10 @@ def _length_families(length: float) -> list[Candidate]:
 
 def _pooled_laws(length: float) -> list[Candidate]:
     """Laws of partial pooling: a term in ln L0 with a change of degree 1, and specimen effects of degree 2 or 3."""
-    return [
-        Candidate(
-            f"pooled, ln L0, degree {degree}, effects of degree {effects}",
-            PooledLengthLaw(
-                LogarithmicLength(blank_surface(degree), blank_surface(1), length, length), (blank_surface(effects),)
-            ),
-        )
-        for degree in range(2, 6)
-        for effects in (2, 3)
-    ]
+    candidates = []
+    for degree in range(2, 6):
+        population = LogarithmicLength(blank_surface(degree), blank_surface(1), length, length)
+        for effects in (2, 3):
+            name = f"pooled, ln L0, degree {degree}, effects of degree {effects}"
+            candidates.append(Candidate(name, PooledLengthLaw(population, (blank_surface(effects),))))
+    return candidates

@@ -106,18 +106,16 @@ class ComparedPoints:
     recordings: Sequence[Recording]
     labels: Sequence[Labels]
     folds: tuple[LeftOutGroup, ...]
+    points: FitPoints
+    """The rows of all recordings."""
 
     @classmethod
     def from_recordings(
-        cls, runs: Sequence[Recording], labels: Sequence[Labels], names: Sequence[str]
+        cls, runs: Sequence[Recording], labels: Sequence[Labels], names: Sequence[str], points: FitPoints | None = None
     ) -> ComparedPoints:
-        """The points divided into the folds of these names."""
-        return cls(runs, labels, tuple(LeftOutGroup(name, [label == name for label in labels]) for name in names))
-
-    @functools.cached_property
-    def points(self) -> FitPoints:
-        """The rows of all recordings."""
-        return FitPoints.from_recordings(self.recordings)
+        """The points divided into the folds of these names; `points` are those of the recordings, if they exist."""
+        folds = tuple(LeftOutGroup(name, [label == name for label in labels]) for name in names)
+        return cls(runs, labels, folds, points or FitPoints.from_recordings(runs))
 
     @functools.cached_property
     def max_force(self) -> float:

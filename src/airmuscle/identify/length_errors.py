@@ -154,10 +154,18 @@ def find_length_errors(model: Characteristic, recordings: Sequence[Recording]) -
         return ()
     try:
         separate = _separate_rmse(recordings, names)
+        if _rmse(model, recordings) <= MIN_MISFIT * separate:
+            return ()
         found = [estimate_length_error(model, recordings, name) for name in names]
     except IdentificationError:
         return ()
     return tuple(sorted((e for e in found if e.explains(separate)), key=lambda e: abs(e.offset)))
+
+
+def _rmse(model: Characteristic, recordings: Sequence[Recording]) -> float:
+    """Root mean square residual of a fitted law, in the fitted quantity."""
+    problem = FitPoints.from_recordings(recordings).problem(model)
+    return float(np.sqrt(np.mean(problem.residuals(problem.predict(problem.initial_values)) ** 2)))
 
 
 def _separate_rmse(recordings: Sequence[Recording], names: Sequence[str]) -> float:

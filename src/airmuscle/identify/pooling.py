@@ -13,6 +13,7 @@ from ..characteristic import Characteristic, ContractileSurface, PooledLengthLaw
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
 from ..recording import Recording
+from .candidates import UNREACHED_FORCE
 from .correlation_index import correlation_index
 from .cross_validation import specimen_name
 from .fit_points import POINT_COLUMNS, FitPoints
@@ -107,7 +108,9 @@ class Pooling:
 def _pooled(
     population: Any, specimens: Specimens, predicted: SpecimenEffects, surface: ContractileSurface
 ) -> PooledLengthLaw:
-    effects = tuple(dataclasses.replace(surface, coefficients=tuple(row)) for row in predicted.coefficients.tolist())
+    limits = {"min_force": -UNREACHED_FORCE, "max_force": UNREACHED_FORCE}
+    rows = predicted.coefficients.tolist()
+    effects = tuple(dataclasses.replace(surface, coefficients=tuple(row), **limits) for row in rows)
     return PooledLengthLaw(population, effects, specimens.names, specimens.lengths)
 
 

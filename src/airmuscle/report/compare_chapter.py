@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core.plotting import BLUE, LINES, MARKERS, legend_outside, new_figure
 from ..identify import Comparison, Fit
+from ..identify.candidate_scores import RankedModel
 from .chapter import Chapter, Plot, Table
 from .formula import symbol_formula, to_mathtext
 
@@ -17,14 +18,18 @@ _MAX_LABELS = 24
 _MAX_CURVES = 6
 
 
-def compare_chapter(comparison: Comparison) -> Chapter:
-    """Return the chapter of a comparison: ranking, exclusions, errors by fold, figures of the recommended fit."""
-    fit = comparison.recommended.fit
+def compare_chapter(comparison: Comparison, recommended: RankedModel | None = None, reason: str = "") -> Chapter:
+    """Return the chapter of a comparison: ranking, exclusions, errors by fold, figures of the recommended fit.
+
+    `recommended` is the law that was selected for several purposes, for the given reason.
+    """
+    fit = (recommended or comparison.recommended).fit
+    joint = "" if reason in ("", comparison.reason) else f"{reason}\n\n"
     tables = (_ranking(comparison), _excluded(comparison), _fold_table(comparison))
     return Chapter(
-        paper="comparison",
-        title="Model selection",
-        summary=f"{comparison.reason}\n\nCross-validation: each {comparison.leave_out.group_name} is left out in turn. "
+        paper=f"comparison-{comparison.leave_out.group_name}" if joint else "comparison",
+        title=f"Model selection for {comparison.purpose}" if joint else "Model selection",
+        summary=f"{joint}{comparison.reason}\n\nCross-validation: each {comparison.leave_out.group_name} is left out in turn. "
         "All errors are errors of the force, over the rows with a positive force.",
         tables=tuple(table for table in tables if table is not None),
         plots=(
