@@ -7,12 +7,15 @@ restricted likelihood of the training rows alone; the shrinkage, the standard er
 from __future__ import annotations
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import airmuscle as am
 from airmuscle.characteristic import ContractileSurface, LogarithmicLength, PooledLengthLaw
+from airmuscle.cli.app import app
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.identify import Candidate, RunSplit, SpecimenSplit, compare, confidence_band, select_for_both
 from airmuscle.identify.candidates import blank_surface, standard_candidates
@@ -21,6 +24,7 @@ from airmuscle.library.catalogue import load
 from airmuscle.library.entry import Entry
 from airmuscle.library.write import save
 from airmuscle.recording import Recording
+from airmuscle.report.equation_section import equation_section
 
 LENGTHS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.25)
 HELD = (0.0, 0.05, 0.1, 0.15)
@@ -196,5 +200,64 @@ def test_partial_pooling_refuses_what_it_cannot_use():
 
 def test_partial_pooling_is_compared_where_three_specimens_are_measured():
     names = [c.name for c in standard_candidates(runs())]
-    assert "pooled, ln L0, degree 3, effects of degree 2" in names
+    assert "pooled, ln L0, degree 3, change of degree 1, effects of degree 2" in names
     assert not any(c.name.startswith("pooled") for c in standard_candidates(runs()[:8]))
+
+
+def answer_of(options: list[str]) -> str:
+    done = CliRunner().invoke(app, options)
+    assert done.exit_code == 0, done.output
+    return done.stdout
+
+
+def test_the_report_shows_the_law_of_the_population_and_the_effect_of_each_specimen():
+    fitted = am.fit(POOLED, runs())
+    equations, (_, effects) = equation_section(fitted)
+    titles = [e.title for e in equations if "specimen" in e.title]
+    assert titles == [f"Effect of specimen {name}, added to the law of the population" for name in NAMES]
+    assert set(effects.columns) == {"term", *(f"{n}{end} [N]" for n in NAMES for end in ("", ", standard error"))}
+    assert effects.columns["muscle 2, standard error [N]"] == list(fitted.effects.standard_errors[1])
+
+
+def test_scores_do_not_depend_on_the_number_of_processes():
+    data = runs()[:12]
+    one, two = (compare(data, CANDIDATES[:3], leave_out=RunSplit(), workers=n) for n in (1, 2))
+    assert [m.cross_validated_rmse for m in one.ranking] == pytest.approx(
+        [m.cross_validated_rmse for m in two.ranking], rel=1e-9)  # fmt: skip
+    assert one.reason == two.reason
+    assert [m.candidate.name for m in one.ranking] == [m.candidate.name for m in two.ranking]
+
+
+def test_the_command_recommends_one_law_for_both_purposes_and_states_the_excess(tmp_path):
+    for run in runs()[:16]:
+        columns = ("pressure", "contraction", "force")
+        rows = "\n".join(",".join(f"{run[c][i]:.9g}" for c in columns) for i in range(len(run)))
+        length = run.constants["resting_length"] * 1e3
+        path = tmp_path / f"L{length:.0f}mm {run['contraction'][0]:g}.csv"
+        path.write_text(f"pressure [Pa],contraction [1],force [N]\n{rows}\n")
+    files = sorted(map(str, tmp_path.glob("*.csv")))
+    common = ["--file-name", "L{resting_length [mm]}mm", "--compare", "--json", "--out", str(tmp_path / "out")]
+    answer = json.loads(answer_of(["fit", *files, *common, "--length-error", "100 mm"]))
+    assert answer["recommended"].startswith("pooled")
+    assert [each["left_out"] for each in answer["purposes"]] == ["run", "specimen"]
+    assert "For other muscles of the same type: rms error" in answer["reason"]
+    assert answer["length_errors"][0]["specimen"] == "100 mm"
+    law = load(tmp_path / "out" / "muscle.toml").characteristic
+    assert law.specimens == ("100 mm", "150 mm", "200 mm", "300 mm")
+    single = json.loads(answer_of(["fit", *files, *common, "--purpose", "length"]))
+    assert single["left_out"] == "specimen"
+    assert "purposes" not in single
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--compare", "--purpose", "all"], "allowed range: repeat, length, both"),
+        (["--compare", "--purpose", "both", "--leave-out", "run"], "excludes --leave-out"),
+        (["--characteristic", "Sarosi2012", "--purpose", "both"], "is for --compare"),
+    ],
+)
+def test_the_command_refuses_a_purpose_that_it_cannot_serve(options, message):
+    result = CliRunner().invoke(app, ["fit", "dmsp-20-300", *options])
+    assert result.exit_code != 0
+    assert message in " ".join(result.output.replace("│", " ").split())

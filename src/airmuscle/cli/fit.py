@@ -70,8 +70,8 @@ PurposeOption = Annotated[
     typer.Option(
         metavar="PURPOSE",
         help="Use of the law that --compare recommends: repeat (further runs of the measured muscles), length (other "
-        "muscles of the type), both (one law for both). Default: both, if three specimens or more were each measured in "
-        "several runs.",
+        "muscles of the type), both (one law for both). Default: both, if three specimens or more were each "
+        "measured in several runs.",
     ),
 ]
 LengthErrors = Annotated[

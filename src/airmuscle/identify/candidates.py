@@ -152,11 +152,11 @@ def _length_families(length: float) -> list[Candidate]:
 
 
 def _pooled_laws(length: float) -> list[Candidate]:
-    """Laws of partial pooling: a term in ln L0 with a change of degree 1, and specimen effects of degree 2 or 3."""
+    """Laws of partial pooling: a population law with a term in ln L0, and specimen effects of degree 2 or 3."""
     candidates = []
-    for degree in range(2, 6):
-        population = LogarithmicLength(blank_surface(degree), blank_surface(1), length, length)
+    for degree, change in ((2, 1), (3, 1), (4, 1), (3, 2), (3, 3)):
+        population = LogarithmicLength(blank_surface(degree), blank_surface(change), length, length)
         for effects in (2, 3):
-            name = f"pooled, ln L0, degree {degree}, effects of degree {effects}"
+            name = f"pooled, ln L0, degree {degree}, change of degree {change}, effects of degree {effects}"
             candidates.append(Candidate(name, PooledLengthLaw(population, (blank_surface(effects),))))
     return candidates

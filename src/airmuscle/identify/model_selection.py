@@ -53,9 +53,10 @@ class Comparison:
             f"Leave-one-{self.leave_out.group_name}-out cross-validation, rms errors in force; the ranking is for "
             f"{self.purpose}."
         )
-        head = f"{'law':<40}{'parameters':>11}{'in sample':>12}{'left out':>12}{'AICc':>12}"
+        width = max(40, *(len(m.candidate.name) + 1 for m in self.ranking))
+        head = f"{'law':<{width}}{'parameters':>11}{'in sample':>12}{'left out':>12}{'AICc':>12}"
         rows = [
-            f"{m.candidate.name:<40}{m.parameter_count:>11}{m.in_sample_rmse:>10.4g} N"
+            f"{m.candidate.name:<{width}}{m.parameter_count:>11}{m.in_sample_rmse:>10.4g} N"
             f"{m.cross_validated_rmse:>10.4g} N{m.aicc:>12.1f}"
             for m in self.ranking
         ]

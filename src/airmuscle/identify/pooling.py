@@ -108,7 +108,7 @@ class Pooling:
 def _pooled(
     population: Any, specimens: Specimens, predicted: SpecimenEffects, surface: ContractileSurface
 ) -> PooledLengthLaw:
-    limits = {"min_force": -UNREACHED_FORCE, "max_force": UNREACHED_FORCE}
+    limits: dict[str, Any] = {"min_force": -UNREACHED_FORCE, "max_force": UNREACHED_FORCE}
     rows = predicted.coefficients.tolist()
     effects = tuple(dataclasses.replace(surface, coefficients=tuple(row), **limits) for row in rows)
     return PooledLengthLaw(population, effects, specimens.names, specimens.lengths)

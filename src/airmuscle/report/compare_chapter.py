@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,10 +27,11 @@ def compare_chapter(comparison: Comparison, recommended: RankedModel | None = No
     fit = (recommended or comparison.recommended).fit
     joint = "" if reason in ("", comparison.reason) else f"{reason}\n\n"
     tables = (_ranking(comparison), _excluded(comparison), _fold_table(comparison))
-    return Chapter(
-        paper=f"comparison-{comparison.leave_out.group_name}" if joint else "comparison",
-        title=f"Model selection for {comparison.purpose}" if joint else "Model selection",
-        summary=f"{joint}{comparison.reason}\n\nCross-validation: each {comparison.leave_out.group_name} is left out in turn. "
+    chapter = Chapter(
+        paper="comparison",
+        title="Model selection",
+        summary=f"{joint}{comparison.reason}\n\n"
+        f"Cross-validation: each {comparison.leave_out.group_name} is left out in turn. "
         "All errors are errors of the force, over the rows with a positive force.",
         tables=tuple(table for table in tables if table is not None),
         plots=(
@@ -37,6 +39,19 @@ def compare_chapter(comparison: Comparison, recommended: RankedModel | None = No
             Plot("residuals", "Residuals of the recommended law over each variable.", residual_figure(fit)),
             Plot("correlations", "Correlations of the parameters of the recommended law.", correlation_figure(fit)),
         ),
+    )
+    return _of_one_purpose(chapter, comparison) if joint else chapter
+
+
+def _of_one_purpose(chapter: Chapter, comparison: Comparison) -> Chapter:
+    """Return the chapter with names that differ from those of the comparison for the other purpose."""
+    group = comparison.leave_out.group_name
+    return replace(
+        chapter,
+        paper=f"comparison-{group}",
+        title=f"Model selection for {comparison.purpose}",
+        tables=tuple(replace(table, name=f"{group}-{table.name}") for table in chapter.tables),
+        plots=tuple(replace(plot, name=f"{group}-{plot.name}") for plot in chapter.plots),
     )
 
 
