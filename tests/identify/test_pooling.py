@@ -62,13 +62,20 @@ def runs(seed: int = 1, scatter: float = SCATTER, rows: int = 20) -> list[Record
     return made
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_one_pooled_law_is_within_five_per_cent_of_the_best_for_both_purposes(seed: int):
-    joint = select_for_both(runs(seed), CANDIDATES)
-    assert isinstance(joint.recommended[0].candidate.law, PooledLengthLaw)
-    assert max(joint.ratios) <= 1.05
-    separate = {c.leave_out.group_name: c["complete pooling"].cross_validated_rmse for c in joint.comparisons}
-    assert separate["run"] > 1.5 * joint.recommended[0].cross_validated_rmse
+def test_one_pooled_law_is_within_five_per_cent_of_the_best_for_both_purposes():
+    """Errors over three sets of six muscles together: with six muscles, chance decides between laws of new muscles."""
+    squares: dict[str, dict[str, float]] = {}
+    for seed in (1, 2, 3):
+        joint = select_for_both(runs(seed), CANDIDATES)
+        assert joint.recommended[0].candidate.name == "partial pooling"
+        for each in joint.comparisons:
+            of_purpose = squares.setdefault(each.leave_out.group_name, {})
+            for m in each.ranking:
+                name = m.candidate.name
+                of_purpose[name] = of_purpose.get(name, 0.0) + m.cross_validated_rmse**2
+    for of_purpose in squares.values():
+        assert of_purpose["partial pooling"] <= 1.05**2 * min(of_purpose.values())
+    assert squares["run"]["complete pooling"] > 4**2 * squares["run"]["partial pooling"]
 
 
 def test_the_law_of_a_new_muscle_is_that_of_the_population():
