@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 import airmuscle as am
 from airmuscle.characteristic import ContractileSurface, LogarithmicLength, PooledLengthLaw
 from airmuscle.cli.app import app
+from airmuscle.cli.fit_options import parse_split
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.identify import Candidate, RunSplit, SpecimenSplit, compare, confidence_band, select_for_both
 from airmuscle.identify.candidates import blank_surface, standard_candidates
@@ -236,7 +237,7 @@ def test_scores_do_not_depend_on_the_number_of_processes():
 
 
 def test_the_command_recommends_one_law_for_both_purposes_and_states_the_excess(tmp_path):
-    for run in runs()[:16]:
+    for run in runs(rows=8)[:16]:
         columns = ("pressure", "contraction", "force")
         rows = "\n".join(",".join(f"{run[c][i]:.9g}" for c in columns) for i in range(len(run)))
         length = run.constants["resting_length"] * 1e3
@@ -251,9 +252,12 @@ def test_the_command_recommends_one_law_for_both_purposes_and_states_the_excess(
     assert answer["length_errors"][0]["specimen"] == "100 mm"
     law = load(tmp_path / "out" / "muscle.toml").characteristic
     assert law.specimens == ("100 mm", "150 mm", "200 mm", "300 mm")
-    single = json.loads(answer_of(["fit", *files, *common, "--purpose", "length"]))
-    assert single["left_out"] == "specimen"
-    assert "purposes" not in single
+
+
+def test_a_purpose_names_the_rows_that_are_left_out():
+    assert parse_split(None, "repeat") == RunSplit()
+    assert parse_split(None, "length") == SpecimenSplit()
+    assert parse_split(None, "both") is None
 
 
 @pytest.mark.parametrize(
