@@ -5,7 +5,8 @@
 FOLDER holds CSV files named `..._cut<cm>cm_held<cm>cm_test<n>.csv` with the columns time, pressure, force, length and
 rest_length, units in the headers. Rows of repeat 8 above 2 N are fitted, those of repeat 9 are used for validation.
 Each error is compared with the repeatability, the difference of the two repeats: a fit below it is overfitted. The
-model is selected with repeat 8 alone, for each purpose, before repeat 9 is used.
+model is selected with repeat 8 alone, for each purpose, before repeat 9 is used; one law for further runs and other
+lengths is also selected with both repeats, by leaving out runs and specimens.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ import numpy as np
 import pandas as pd
 
 from airmuscle.core.errors import IdentificationError
-from airmuscle.identify import BlockSplit, SpecimenSplit, compare, fit
+from airmuscle.identify import BlockSplit, SpecimenSplit, compare, fit, select_for_both
+from airmuscle.identify.candidate_scores import count_parameters
 from airmuscle.identify.candidates import Candidate, blank_surface, standard_candidates
 from airmuscle.identify.compared_points import force_residuals
 from airmuscle.recording import Recording
@@ -81,7 +83,7 @@ def select_specimen(runs: Sequence[Recording], specimen: str, *, others: bool = 
 
 def format_row(name: str, parameters: int, errors: Sequence[float], floor: float) -> str:
     """One row of the table."""
-    return f"{name:<46}{parameters:>5}" + "".join(f"{e:>9.1f}" for e in errors) + f"{floor:>9.1f}"
+    return f"{name:<68}{parameters:>5}" + "".join(f"{e:>9.1f}" for e in errors) + f"{floor:>9.1f}"
 
 
 def validation_errors(
@@ -120,11 +122,13 @@ def main() -> None:
     train, test = repeats(parser.parse_args().folder)
     specimens = sorted({str(run.constants["specimen"]) for run in train})
     for split in (BlockSplit(), SpecimenSplit()):
-        print(compare(train, leave_out=split).reason, flush=True)
+        print(compare(train, leave_out=split, workers=2).reason, flush=True)
+    for name, runs in (("repeat 8", train), ("repeats 8 and 9", train + test)):
+        print(f"\n{name}: {select_for_both(runs, workers=2)}", flush=True)
     floor = repeatability(train, test)
     print(f"\nrms error of the force [N]; fitted to repeat 8 ({sum(map(len, train))} rows), validated on repeat 9")
     columns = "".join(f"{'no ' + name:>9}" for name in specimens)
-    print(f"{'law':<46}{'P':>5}{'rep. 9':>9}{columns}{'repeat.':>9}")
+    print(f"{'law':<68}{'P':>5}{'rep. 9':>9}{columns}{'repeat.':>9}")
     each = [single_surface_errors(select_specimen(train, name), select_specimen(test, name)) for name in specimens]
     print(format_row("one surface of degree 5 per length", 63, [rms(np.concatenate(each))], floor))
     print(format_row("  each length", 21, [rms(e) for e in each], floor))
@@ -132,7 +136,7 @@ def main() -> None:
     for candidate in candidates:
         if hasattr(candidate.law, "with_resting_length") or candidate is candidates[0]:
             try:
-                size = len(fit(candidate.law, train, fixed=candidate.fixed).estimates)
+                size = count_parameters(fit(candidate.law, train, fixed=candidate.fixed))
                 print(
                     format_row(candidate.name, size, validation_errors(candidate, train, test, specimens), floor),
                     flush=True,

@@ -14,6 +14,7 @@ from airmuscle.characteristic import (
     EffectiveLength,
     InverseLength,
     LogarithmicLength,
+    PooledLengthLaw,
     RubberLine,
     VirtualWork,
     as_force_law,
@@ -111,6 +112,7 @@ EXAMPLES = {
     "dead length": of(EffectiveLength(SURFACE, 0.2, 0.02, 0.001)),
     "inverse length": of(InverseLength(SURFACE, SURFACE, 0.2, 0.3)),
     "logarithmic length": of(LogarithmicLength(SURFACE, SURFACE, 0.2, 0.3)),
+    "pooled": of(PooledLengthLaw(SURFACE, (SURFACE,), ("a",), (0.2,), "a")),
     "circle": of(CircleVirtualWork(FIBRES, RubberLine(3e5, 1e5), 2e-3), FIBRES),
     # geometries
     **{

@@ -107,8 +107,13 @@ def test_a_law_that_is_not_determined_for_one_purpose_is_not_the_one_law(monkeyp
     found = select_for_both(two, [family, surface])
     assert found.comparisons[0].ranking[0].candidate is family
     assert found.recommended[0].candidate is surface
-    monkeypatch.setattr(joint_selection, "compare", lambda runs, _, leave_out, progress: compare(
-        two, [family if leave_out == RunSplit() else surface], leave_out=leave_out))  # fmt: skip
+    monkeypatch.setattr(
+        joint_selection,
+        "compare_splits",
+        lambda runs, _, splits, **__: tuple(
+            compare(two, [family if split == RunSplit() else surface], leave_out=split) for split in splits
+        ),
+    )
     with pytest.raises(IdentificationError, match="no candidate is determined without each run and without each"):
         select_for_both(two, [family, surface])
 

@@ -12,6 +12,7 @@ from .hunt2017 import Hunt2017
 from .length_family import InverseLength, LogarithmicLength
 from .martens_boblan2017 import MartensBoblan2017
 from .polynomial_surrogate import PolynomialSurrogate, as_force_law
+from .pooled_length_law import PooledLengthLaw
 from .reynolds2003 import Reynolds2003
 from .rubber import ArcIntegral, AxialIntegral, RubberLine
 from .saga2007 import Saga2007
@@ -41,6 +42,7 @@ __all__ = [
     "LogarithmicLength",
     "MartensBoblan2017",
     "PolynomialSurrogate",
+    "PooledLengthLaw",
     "PressureLaw",
     "Reynolds2003",
     "RubberLine",

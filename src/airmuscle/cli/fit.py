@@ -65,6 +65,23 @@ LeaveOut = Annotated[
         "contraction, pressure, block.",
     ),
 ]
+PurposeOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PURPOSE",
+        help="Use of the law that --compare recommends: repeat (further runs of the measured muscles), length (other "
+        "muscles of the type), both (one law for both). Default: both, if three specimens or more were each "
+        "measured in several runs.",
+    ),
+]
+LengthErrors = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--length-error",
+        metavar="SPECIMEN",
+        help="Estimate the error of the recorded resting length of this specimen together with the law. Repeatable.",
+    ),
+]
 Refits = Annotated[
     int | None,
     typer.Option(min=20, max=100_000, metavar="N", help="Bootstrap with N refits to resampled groups of rows."),
@@ -106,8 +123,10 @@ def fit(
     characteristic: Law = None,
     compare: Compare = False,
     leave_out: LeaveOut = None,
+    purpose: PurposeOption = None,
     bootstrap: Refits = None,
     profile: Profiled = None,
+    length_error: LengthErrors = None,
     shape: Shape = False,
     free_contraction: FreeContraction = None,
     out: Folder = Path("fit"),
@@ -142,12 +161,13 @@ def fit(
       airmuscle fit runs/*.csv --characteristic dmsp-20-300 --bootstrap 1000 --profile weak
       airmuscle fit bench.csv --characteristic ContractileSurface --shape --free-contraction "3 bar=18 %"
       airmuscle fit runs/*.xlsx --mapping rig.toml --compare --leave-out run
+      airmuscle fit muscles/*.csv --mapping rig.toml --compare --purpose both --length-error "20 cm"
       airmuscle fit log_held*.csv --file-name "held{length [mm]}mm" --time uniform --resting-length "200 mm" --compare
       airmuscle solve fit/muscle.toml --pressure "3 bar" --force "100 N"
     """
     if characteristic is None and not compare:
         raise typer.BadParameter("give the characteristic to fit with --characteristic, or rank all with --compare")
-    options = FitOptions.parse(bootstrap, profile, leave_out, shape, free_contraction, compare)
+    options = FitOptions.parse(bootstrap, profile, leave_out, shape, free_contraction, compare, purpose, length_error)
     request = FitRequest(
         options, tuple(fix or ()), degree, robust, uncensored, equal_weights, out, json, parse_braid(braid)
     )

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import typer
 
+from ..core.processes import available_cores
 from ..geometry import Geometry
-from ..identify import Candidate, Comparison, compare, standard_candidates
+from ..identify import Candidate, Comparison, compare, select_for_both, standard_candidates
+from ..identify.candidate_scores import RankedModel
+from ..identify.candidates import MIN_POOLED
+from ..identify.cross_validation import specimen_name
 from ..library.entry import Entry
 from ..recording import Recording
 from ..report.compare_chapter import compare_chapter
@@ -38,22 +43,58 @@ def compare_models(
     named = None if characteristic is None else find_initial_law(characteristic, recordings, request.degree)
     candidates = _candidates(recordings, characteristic, named, request)
     given = None if named is None else candidates
-    with computation_progress("comparison") as show:
-        comparison = compare(
-            recordings, given, leave_out=request.options.split, progress=lambda name, fraction: show(fraction)
-        )
-    comparison = _with_option_names(comparison)
-    best = comparison.recommended
+    selection = _select(recordings, given, request)
+    best = selection.recommended
     extras = request.options.evaluate(best.fit, recordings)
     geometry = named.entry.geometry if named is not None and best.candidate is candidates[-1] else None
     initial, notes = _initial_entry(best.candidate, geometry, recordings, request)
     entry = fitted_entry(best.fit, initial, files)
     notes += missing_geometry(entry)
-    write_results(best.fit, entry, recordings, request.out, [compare_chapter(comparison), *extras.chapters()])
+    chapters = [compare_chapter(each, best, selection.reason) for each in selection.comparisons]
+    write_results(best.fit, entry, recordings, request.out, [*chapters, *extras.chapters()])
     if request.json:
-        print_json(_to_dict(comparison) | {"notes": notes} | extras.to_dict())
+        print_json(selection.to_dict() | {"notes": notes} | extras.to_dict())
         return
-    print_results([str(comparison), *extras.lines(), *(f"note: {note}" for note in notes)], request.out)
+    lines = [*map(str, selection.comparisons), *([selection.reason] if len(selection.comparisons) > 1 else [])]
+    print_results([*lines, *extras.lines(), *(f"note: {note}" for note in notes)], request.out)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Selection:
+    """The recommended law, with the comparison for one purpose or those for both."""
+
+    comparisons: tuple[Comparison, ...]
+    recommended: RankedModel
+    reason: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, all numbers SI; with two purposes the ranking at the top is that for the first."""
+        data = _to_dict(self.comparisons[0])
+        if len(self.comparisons) == 1:
+            return data
+        purposes = [{**_to_dict(each), "fit": None} for each in self.comparisons]
+        name, fit = self.recommended.candidate.name, fit_to_dict(self.recommended.fit)
+        return data | {"recommended": name, "reason": self.reason, "fit": fit, "purposes": purposes}
+
+
+def _select(recordings: list[Recording], given: list[Candidate] | None, request: FitRequest) -> Selection:
+    """The law for the requested purpose, by default for both if specimens and runs can be left out."""
+    options, workers = request.options, available_cores()
+    both = options.purpose == "both" or (options.purpose is None and options.split is None and _serves_both(recordings))
+    with computation_progress("comparison") as show:
+        arguments: dict[str, Any] = {"workers": workers, "progress": lambda name, fraction: show(fraction)}
+        if both:
+            joint = select_for_both(recordings, given, **arguments)
+            comparisons = tuple(map(_with_option_names, joint.comparisons))
+            return Selection(comparisons, joint.recommended[0], str(joint))
+        comparison = _with_option_names(compare(recordings, given, leave_out=options.split, **arguments))
+    return Selection((comparison,), comparison.recommended, comparison.reason)
+
+
+def _serves_both(recordings: list[Recording]) -> bool:
+    """Whether there are three specimens or more, each with several runs."""
+    counts = Counter(specimen_name(run) for run in recordings)
+    return len(counts) >= MIN_POOLED and min(counts.values()) > 1
 
 
 def _with_option_names(comparison: Comparison) -> Comparison:

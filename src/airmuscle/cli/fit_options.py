@@ -19,15 +19,18 @@ from ..identify import (
     GroupSplit,
     Huber,
     LeastSquares,
+    LengthError,
     LevelSplit,
     Loss,
     RunSplit,
     ShapeConstrainedFit,
     SpecimenSplit,
     bootstrap,
+    estimate_length_error,
     profile,
     weakly_determined,
 )
+from ..identify.length_errors import PRIOR_STD
 from ..identify.problem import fitted_quantity_of
 from ..identify.surface.shape import fit_shape_constrained, shape_violations_of_fit
 from ..library.entry import Entry
@@ -38,6 +41,8 @@ from ..report.uncertainty_chapter import Uncertainty, uncertainty_chapter
 from .fit_geometry import BraidSize
 from .progress import computation_progress
 
+PURPOSES: dict[str, GroupSplit | None] = {"repeat": RunSplit(), "length": SpecimenSplit(), "both": None}
+"""Values of --purpose with the split that serves each: further runs of the measured muscles, other muscles, or both."""
 WEAK = "weak"
 """Value of --profile that stands for all weakly determined parameters."""
 
@@ -67,11 +72,16 @@ class FitOptions:
     shape: bool
     free_contractions: tuple[tuple[float, float], ...]
     """Points of zero force: pressures [Pa] and contractions [1]."""
+    purpose: str | None = None
+    """Value of --purpose; None without."""
+    length_errors: tuple[str, ...] = ()
+    """Specimens whose resting length is estimated."""
 
     @classmethod
     def parse(
         cls, refits: int | None, profiled: list[str] | None, leave_out: str | None, shape: bool,
-        free_contraction: list[str] | None, compare: bool,
+        free_contraction: list[str] | None, compare: bool, purpose: str | None = None,
+        length_error: list[str] | None = None,
     ) -> FitOptions:  # fmt: skip
         """The options from their texts. Raises BadParameter or UnitError."""
         if free_contraction and not shape:
@@ -81,7 +91,8 @@ class FitOptions:
                 "--shape is for a ContractileSurface, given with --characteristic; it excludes --compare"
             )
         points = tuple(_parse_point(text) for text in free_contraction or ())
-        return cls(refits, tuple(profiled or ()), parse_split(leave_out), shape, points)
+        split, length_errors = parse_split(leave_out, purpose, compare), tuple(length_error or ())
+        return cls(refits, tuple(profiled or ()), split, shape, points, purpose, length_errors)
 
     def evaluate(self, fit: Fit, recordings: Sequence[Recording]) -> FitExtras:
         """The requested results beyond the fit. Raises IdentificationError or ParameterError."""
@@ -94,7 +105,8 @@ class FitOptions:
         profiles = tuple(profile(fit, name) for name in names)
         shaped = _fit_shaped(fit, recordings, self.free_contractions) if self.shape else None
         none_weak = WEAK in self.profiled and not weak
-        return FitExtras(Uncertainty(fit, sample, profiles), shaped, len(self.free_contractions), none_weak)
+        errors = tuple(estimate_length_error(fit.model, recordings, name) for name in self.length_errors)
+        return FitExtras(Uncertainty(fit, sample, profiles), shaped, len(self.free_contractions), none_weak, errors)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -107,6 +119,7 @@ class FitExtras:
     """Number of points at which the force is constrained to zero."""
     none_weak: bool
     """Whether the weakly determined parameters were requested and there are none."""
+    length_errors: tuple[LengthError, ...] = ()
 
     def chapters(self) -> list[Chapter]:
         """Chapters of the report, which precede that of the fit."""
@@ -116,7 +129,7 @@ class FitExtras:
 
     def lines(self) -> list[str]:
         """Lines for the terminal."""
-        lines = self.uncertainty.lines()
+        lines = [*self.uncertainty.lines(), *map(_describe_length_error, self.length_errors)]
         if self.none_weak:
             lines.append("profile: no parameter is weakly determined; the standard errors are valid")
         if self.shaped is None:
@@ -136,6 +149,9 @@ class FitExtras:
             else self.shaped.unconstrained_violations
         )
         data = {**self.uncertainty.as_data(), "shape_violations": [_violation_to_dict(each) for each in violations]}
+        if self.length_errors:
+            names = ("specimen", "resting_length", "offset", "standard_error", "rmse_before", "rmse_after")
+            data["length_errors"] = [{name: getattr(each, name) for name in names} for each in self.length_errors]
         if self.shaped is not None:
             data["shaped"] = {"rmse": self.shaped.rmse, "unconstrained": self.shaped.unconstrained_rmse}
         return data
@@ -148,8 +164,14 @@ class FitExtras:
         return dataclasses.replace(entry, characteristic=self.shaped.model, note=note)
 
 
-def parse_split(name: str | None) -> GroupSplit | None:
-    """The groups of rows that --leave-out names. Raises BadParameter."""
+def parse_split(name: str | None, purpose: str | None = None, compare: bool = True) -> GroupSplit | None:
+    """The groups of rows that --leave-out names or --purpose needs; None for both purposes. Raises BadParameter."""
+    if purpose is not None:
+        if purpose not in PURPOSES:
+            raise typer.BadParameter(f"--purpose is '{purpose}'; allowed range: {', '.join(PURPOSES)}")
+        if not compare or name is not None:
+            raise typer.BadParameter("--purpose is for --compare, and excludes --leave-out")
+        return PURPOSES[purpose]
     splits: dict[str, GroupSplit] = {
         "run": RunSplit(),
         "specimen": SpecimenSplit(),
@@ -197,3 +219,11 @@ def _fit_shaped(
 
 def _violation_to_dict(violation: Any) -> dict[str, Any]:
     return {**dataclasses.asdict(violation), "rule": violation.rule.description}
+
+
+def _describe_length_error(error: LengthError) -> str:
+    """The estimated error of a resting length, with its consequence."""
+    return (
+        f"length error: as if {error}; rms residual {error.rmse_before:.4g} before, {error.rmse_after:.4g} after the "
+        f"correction (SI); normal prior with a standard deviation of {PRIOR_STD * 1e3:g} mm (chosen)"
+    )

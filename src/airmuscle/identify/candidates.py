@@ -16,6 +16,7 @@ from ..characteristic import (
     InverseLength,
     LogarithmicLength,
     MartensBoblan2017,
+    PooledLengthLaw,
     Reynolds2003,
     Sarosi2012,
     Serres2009,
@@ -24,8 +25,11 @@ from ..characteristic import (
 from ..characteristic.base import Characteristic
 from ..geometry.braid import Braid
 from ..recording import Recording
+from .cross_validation import specimen_name
 
-_UNREACHED_FORCE = 1e6
+MIN_POOLED = 3
+"""Minimum number of specimens for partial pooling (chosen): the term in ln L0 takes up the difference of two."""
+UNREACHED_FORCE = 1e6
 """Upper clamp [N] of a surface inside another law: above the force of any muscle."""
 _INITIAL_BRAID_ANGLE = 0.45
 """Initial braid angle [rad]; the angles of fluidic muscles lie within 0.15 of it."""
@@ -80,6 +84,8 @@ def standard_candidates(recordings: Sequence[Recording]) -> tuple[Candidate, ...
         candidates += _laws_with_length(scales, scales.max_length)
     if scales.length_count > 1 and scales.max_length is not None:
         candidates += _length_families(scales.max_length)
+        if len({specimen_name(run) for run in recordings}) >= MIN_POOLED:
+            candidates += _pooled_laws(scales.max_length)
     return tuple(candidates)
 
 
@@ -96,7 +102,7 @@ def unavailable_candidates(recordings: Sequence[Recording]) -> tuple[tuple[str, 
     return tuple(missing)
 
 
-def blank_surface(degree: int, max_force: float = _UNREACHED_FORCE) -> ContractileSurface:
+def blank_surface(degree: int, max_force: float = UNREACHED_FORCE) -> ContractileSurface:
     """A surface with coefficients of zero, clamped above all measured forces."""
     return ContractileSurface.blank(degree, max_force=max(max_force, 1.0))
 
@@ -142,4 +148,15 @@ def _length_families(length: float) -> list[Candidate]:
             args = (inner, blank_surface(change), length, length)
             candidates.append(Candidate(f"term in 1/L0, {degrees}", InverseLength(*args)))
             candidates.append(Candidate(f"term in ln L0, {degrees}", LogarithmicLength(*args)))
+    return candidates
+
+
+def _pooled_laws(length: float) -> list[Candidate]:
+    """Laws of partial pooling: a population law with a term in ln L0, and specimen effects of degree 2 or 3."""
+    candidates = []
+    for degree, change in ((2, 1), (3, 1), (4, 1), (3, 2), (3, 3)):
+        population = LogarithmicLength(blank_surface(degree), blank_surface(change), length, length)
+        for effects in (2, 3):
+            name = f"pooled, ln L0, degree {degree}, change of degree {change}, effects of degree {effects}"
+            candidates.append(Candidate(name, PooledLengthLaw(population, (blank_surface(effects),))))
     return candidates

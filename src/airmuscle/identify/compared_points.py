@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ..characteristic import PooledLengthLaw
 from ..characteristic.base import Characteristic
 from ..core import tree
 from ..core.arrays import Array
@@ -17,11 +18,12 @@ from ..core.errors import AirmuscleError, IdentificationError
 from ..core.hints import HintedText
 from ..recording import Recording
 from .candidates import Candidate
-from .cross_validation import Labels
+from .cross_validation import Labels, specimen_name
 from .fit_points import FitPoints
 from .force_evaluation import evaluate_force, slack_rows
 from .group_refits import GroupRefits
 from .loss import LeastSquares, Loss
+from .pooling import Pooling, make_pooling
 from .problem import FitProblem
 from .result import Fit
 from .solver import LeastSquaresSolution, design_matrix, is_linear
@@ -38,6 +40,7 @@ class EvaluatedRows(NamedTuple):
     contraction: Array
     force: Array
     resting_length: float | None
+    specimen: str = ""
 
 
 def evaluated_rows(run: Recording, rows: npt.NDArray[np.bool_] | None = None) -> EvaluatedRows:
@@ -47,12 +50,16 @@ def evaluated_rows(run: Recording, rows: npt.NDArray[np.bool_] | None = None) ->
     if rows is not None:
         mask &= rows
     length = run.constants.get("resting_length")
-    return EvaluatedRows(pressure[mask], contraction[mask], force[mask], None if length is None else float(length))
+    return EvaluatedRows(pressure[mask], contraction[mask], force[mask], None if length is None else float(length),
+                         specimen_name(run))  # fmt: skip
 
 
-def law_of_length(model: Characteristic, length: float | None) -> Any:
-    """The law of a muscle with this resting length [m], if the model depends on it."""
+def law_of_length(model: Characteristic, length: float | None, specimen: str = "") -> Any:
+    """The law of a specimen if the model knows it, else of a muscle with this resting length [m], if the model depends
+    on it."""
     law: Any = model
+    if isinstance(law, PooledLengthLaw) and specimen in law.specimens:
+        return law.for_specimen(specimen)
     return law.with_resting_length(length) if length is not None and hasattr(law, "with_resting_length") else law
 
 
@@ -65,12 +72,15 @@ def force_residuals(model: Characteristic, runs: Sequence[Recording], max_force:
 
 
 def residuals_of_rows(model: Characteristic, parts: Sequence[EvaluatedRows], max_force: float) -> Array:
-    """Residuals (model - measured) in force [N] at these rows; one evaluation of the law for each resting length."""
+    """Residuals (model - measured) in force [N] at these rows; one evaluation of the law for each resting length,
+    of a pooled law for each specimen."""
     residuals: list[Array] = [np.zeros(0)] * len(parts)
-    for length in dict.fromkeys(part.resting_length for part in parts):
-        same = [i for i, part in enumerate(parts) if part.resting_length == length]
+    by_specimen = isinstance(model, PooledLengthLaw)
+    muscles = [(part.resting_length, part.specimen if by_specimen else "") for part in parts]
+    for muscle in dict.fromkeys(muscles):
+        same = [i for i, each in enumerate(muscles) if each == muscle]
         pressure, contraction = (np.concatenate([parts[i][column] for i in same]) for column in (0, 1))
-        forces = evaluate_force(law_of_length(model, length), pressure, contraction, max_force)
+        forces = evaluate_force(law_of_length(model, *muscle), pressure, contraction, max_force)
         ends = np.cumsum([parts[i].force.size for i in same])[:-1]
         for i, modelled in zip(same, np.split(forces, ends), strict=True):
             residuals[i] = modelled - parts[i].force
@@ -96,18 +106,16 @@ class ComparedPoints:
     recordings: Sequence[Recording]
     labels: Sequence[Labels]
     folds: tuple[LeftOutGroup, ...]
+    points: FitPoints
+    """The rows of all recordings."""
 
     @classmethod
     def from_recordings(
-        cls, runs: Sequence[Recording], labels: Sequence[Labels], names: Sequence[str]
+        cls, runs: Sequence[Recording], labels: Sequence[Labels], names: Sequence[str], points: FitPoints | None = None
     ) -> ComparedPoints:
-        """The points divided into the folds of these names."""
-        return cls(runs, labels, tuple(LeftOutGroup(name, [label == name for label in labels]) for name in names))
-
-    @functools.cached_property
-    def points(self) -> FitPoints:
-        """The rows of all recordings."""
-        return FitPoints.from_recordings(self.recordings)
+        """The points divided into the folds of these names; `points` are those of the recordings, if they exist."""
+        folds = tuple(LeftOutGroup(name, [label == name for label in labels]) for name in names)
+        return cls(runs, labels, folds, points or FitPoints.from_recordings(runs))
 
     @functools.cached_property
     def max_force(self) -> float:
@@ -147,12 +155,20 @@ class ComparedPoints:
 
         Raises IdentificationError where the other rows do not determine the parameters.
         """
-        models = _FoldModels(fit, self._group, len(self.folds)) if isinstance(loss, LeastSquares) else None
+        models = (
+            _FoldModels(fit, self._group, len(self.folds), self._pooling(candidate, fit))
+            if isinstance(loss, LeastSquares)
+            else None
+        )
         for i, (fold, rows) in enumerate(zip(self.folds, self._left_out_rows, strict=True)):
             model = None if models is None else models.without(i)
             if model is None:
                 model = self._refit_exactly(candidate, fit, fold, loss)
             yield fold.name, residuals_of_rows(model, rows, self.max_force)
+
+    def _pooling(self, candidate: Candidate, fit: Fit) -> Pooling | None:
+        law = candidate.law
+        return make_pooling(law, self.points, fit.problem) if isinstance(law, PooledLengthLaw) else None
 
     def _refit_exactly(self, candidate: Candidate, fit: Fit, fold: LeftOutGroup, loss: Loss) -> Characteristic:
         """The refit by a search of its own."""
@@ -171,8 +187,8 @@ class ComparedPoints:
 class _FoldModels:
     """The laws fitted to all groups but one, from the fit to all rows."""
 
-    def __init__(self, fit: Fit, group: npt.NDArray[np.intp], count: int) -> None:
-        self._problem, self._group, self._count = fit.problem, group, count
+    def __init__(self, fit: Fit, group: npt.NDArray[np.intp], count: int, pooling: Pooling | None = None) -> None:
+        self._problem, self._group, self._count, self._pooling = fit.problem, group, count, pooling
         self._refits = GroupRefits(fit.problem, _solution(fit), group, count + 1)
 
     def without(self, index: int) -> Characteristic | None:
@@ -186,7 +202,7 @@ class _FoldModels:
         law: Any = tree.with_parameters(problem.law, problem.leaf_values(values))
         if hasattr(law, "rescaled"):
             law = law.rescaled(*((float(x[rows].min()), float(x[rows].max())) for x in problem.arguments))
-        model: Characteristic = law
+        model: Characteristic = law if self._pooling is None else self._pooling.law(law, values, rows)
         return model
 
 

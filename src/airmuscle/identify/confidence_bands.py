@@ -10,6 +10,7 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
 from ..recording import Recording
+from .pooling import band_terms
 from .problem import RESTING_LENGTH
 from .result import Fit
 
@@ -30,7 +31,9 @@ def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, predict
     residual variance is added. `points` has the columns that the law takes as arguments, and the constant
     `resting_length` if the law was fitted to several lengths. A parameter on a bound is treated as known.
 
-    The band assumes independent residuals. Rows of one slow ramp are correlated; `bootstrap` by runs shows the effect.
+    The band of a PooledLengthLaw is that of the specimen that `points` state (the constant `specimen`, or else the
+    resting length), or of a new muscle, with the scatter of the specimens. The band assumes independent residuals. Rows
+    of one slow ramp are correlated; `bootstrap` by runs shows the effect.
     Raises IdentificationError without degrees of freedom, or for a level outside 0 to 1.
     """
     from scipy.special import stdtrit
@@ -49,8 +52,12 @@ def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, predict
         columns[RESTING_LENGTH] = np.full(len(points), float(length))
     problem = dataclasses.replace(fit.problem, data=Recording(columns, points.origin))
     value, jacobian = problem.predict(fit.values), problem.jacobian(fit.values)
-    covariance = np.nan_to_num(fit.covariance, nan=0.0)
-    variance = np.einsum("ni,ij,nj->n", jacobian, covariance, jacobian)
+    if fit.effects is None:
+        covariance = np.nan_to_num(fit.covariance, nan=0.0)
+        variance = np.einsum("ni,ij,nj->n", jacobian, covariance, jacobian)
+    else:
+        offset, variance = band_terms(fit, points, jacobian)
+        value = value + offset
     quantile = float(stdtrit(degrees_of_freedom, 0.5 + level / 2))
     half = quantile * np.sqrt(np.maximum(variance, 0.0) + prediction * fit.sigma**2)
     return Band(value, value - half, value + half)

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from ..core.errors import IdentificationError
 from ..recording import Recording
-from .candidates import Candidate, standard_candidates
+from .candidate_scores import RankedModel
+from .candidates import Candidate
 from .cross_validation import RunSplit, SpecimenSplit
-from .model_selection import Comparison, RankedModel, compare
+from .model_selection import Comparison, compare_splits, excess_error
+
+SPLITS = (RunSplit(), SpecimenSplit())
+"""The splits of the two purposes."""
+MAX_EXCESS = 0.05
+"""Maximum excess of the error of a simpler law over the lowest one, for each purpose (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class JointSelection:
-    """The law with the least maximum, over the purposes, of the ratio of its error to the lowest one; `print` it."""
+    """One law for two purposes, with its errors relative to the lowest ones; `print` it."""
 
     comparisons: tuple[Comparison, ...]
     """One for each purpose."""
@@ -39,21 +45,21 @@ def select_for_both(
     recordings: Sequence[Recording],
     candidates: Sequence[Candidate] | None = None,
     *,
+    workers: int = 1,
     progress: Callable[[str, float], None] | None = None,
 ) -> JointSelection:
     """One law for further runs (leave-one-run-out) and for other muscles (leave-one-specimen-out cross-validation).
 
-    candidates  by default `standard_candidates`
+    candidates  by default `standard_candidates`, of which slow laws may be excluded as in `compare`
+    workers     number of processes, as in `compare`
     progress    called with the name of each candidate and the completed fraction
 
+    The best law has the smallest maximum, over the purposes, of the ratio of its error to the lowest one. Of the
+    candidates that are worse for neither purpose by more than one standard error of the difference, and by at most 5 %
+    than the best law of each purpose, the one with the fewest parameters is recommended.
     Raises IdentificationError where no candidate is determined for both purposes.
     """
-    compared = standard_candidates(recordings) if candidates is None else candidates
-    splits = (RunSplit(), SpecimenSplit())
-    comparisons = tuple(
-        compare(recordings, compared, leave_out=split, progress=_part(progress, number, len(splits)))
-        for number, split in enumerate(splits)
-    )
+    comparisons = compare_splits(recordings, candidates, SPLITS, workers=workers, progress=progress)
     rankings = [{model.candidate.name: model for model in each.ranking} for each in comparisons]
     names = [name for name in rankings[0] if all(name in ranking for ranking in rankings)]
     if not names:
@@ -67,11 +73,13 @@ def select_for_both(
         return tuple(r[name].cross_validated_rmse / c.ranking[0].cross_validated_rmse for r, c in pairs)
 
     best = min(names, key=lambda name: (max(ratios(name)), rankings[0][name].parameter_count))
-    return JointSelection(comparisons, tuple(ranking[best] for ranking in rankings), ratios(best))
+    limit = max(1 + MAX_EXCESS, *ratios(best))
+    equivalent = [name for name in names if max(ratios(name)) <= limit and _is_equivalent(name, best, rankings)]
+    chosen = min(equivalent, key=lambda name: (rankings[0][name].parameter_count, max(ratios(name))))
+    return JointSelection(comparisons, tuple(ranking[chosen] for ranking in rankings), ratios(chosen))
 
 
-def _part(
-    progress: Callable[[str, float], None] | None, number: int, count: int
-) -> Callable[[str, float], None] | None:
-    """The progress of one of several comparisons as a part of the whole."""
-    return None if progress is None else lambda name, fraction: progress(name, (number + fraction) / count)
+def _is_equivalent(name: str, best: str, rankings: Sequence[Mapping[str, RankedModel]]) -> bool:
+    """Whether a law is not worse than the best one by more than one standard error of the difference, for each
+    purpose."""
+    return all(excess_error(ranking[name], ranking[best]) <= 0 for ranking in rankings)

@@ -21,6 +21,7 @@ from .cross_validation import specimen_name
 from .fit_points import FitPoints
 from .loss import LeastSquares
 from .model_evidence import effective_sample_size
+from .pooling import population_of
 from .problem import evaluate
 from .solver import solve
 from .static_fit import refit
@@ -112,7 +113,8 @@ def estimate_length_error(
 ) -> LengthError:
     """The error of the resting length of one specimen, estimated together with the parameters of a law.
 
-    model       the law fitted to all recordings, as initial values
+    model       the law fitted to all recordings, as initial values; of a PooledLengthLaw its population law, because
+                effects of the specimens take up an error of their length
     specimen    name as SpecimenSplit gives it: the constant `specimen`, or the resting length in mm
     prior_std   standard deviation [m] of the normal prior of the error, whose mean is 0
 
@@ -124,6 +126,7 @@ def estimate_length_error(
         known = ", ".join(dict.fromkeys(specimen_name(run) for run in recordings))
         raise ParameterError(f"no recording is of specimen '{specimen}'; the specimens are {known}.")
     recorded = float(recordings[members.index(True)].constants["resting_length"])
+    model = population_of(model)
     offset, first, state = 0.0, np.nan, None
     for _ in range(_ITERATIONS):
         state = _State.at(model, recordings, members, offset)
@@ -145,15 +148,24 @@ def find_length_errors(model: Characteristic, recordings: Sequence[Recording]) -
     specimens with resting lengths or more.
     """
     names = list(dict.fromkeys(specimen_name(run) for run in recordings))
+    model = population_of(model)
     complete = all("resting_length" in run.constants for run in recordings)
     if len(names) < 3 or not complete or not hasattr(model, "with_resting_length"):
         return ()
     try:
         separate = _separate_rmse(recordings, names)
+        if _rmse(model, recordings) <= MIN_MISFIT * separate:
+            return ()
         found = [estimate_length_error(model, recordings, name) for name in names]
     except IdentificationError:
         return ()
     return tuple(sorted((e for e in found if e.explains(separate)), key=lambda e: abs(e.offset)))
+
+
+def _rmse(model: Characteristic, recordings: Sequence[Recording]) -> float:
+    """Root mean square residual of a fitted law, in the fitted quantity."""
+    problem = FitPoints.from_recordings(recordings).problem(model)
+    return float(np.sqrt(np.mean(problem.residuals(problem.predict(problem.initial_values)) ** 2)))
 
 
 def _separate_rmse(recordings: Sequence[Recording], names: Sequence[str]) -> float:

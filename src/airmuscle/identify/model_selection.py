@@ -7,66 +7,15 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..characteristic.base import Characteristic
-from ..core.arrays import Array
-from ..core.errors import AirmuscleError, IdentificationError
+from ..core.errors import IdentificationError
 from ..core.hints import HintedText
 from ..recording import Recording
+from .candidate_scores import ExcludedModel, RankedModel, Score, points_of_splits
 from .candidates import Candidate, standard_candidates, unavailable_candidates
-from .compared_points import ComparedPoints, cause_of, residuals_of_rows
-from .cross_validation import GroupSplit, default_split, label_folds
+from .cross_validation import GroupSplit, default_split
 from .length_errors import find_length_errors, length_notes
 from .loss import LeastSquares, Loss
-from .model_evidence import aicc
-from .result import Fit
-from .static_fit import fit_to_points
-
-
-@dataclasses.dataclass(frozen=True)
-class FoldScore:
-    """The out-of-sample error of a law on one fold."""
-
-    fold: str
-    rmse: float
-    """Root mean square error in force [N]."""
-    rows: int
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class RankedModel:
-    """A candidate whose parameters the data determine, with its scores."""
-
-    candidate: Candidate
-    fit: Fit
-    in_sample_rmse: float
-    """Root mean square error in force [N] on the rows of the fit."""
-    cross_validated_rmse: float
-    """Root mean square error in force [N] on the rows left out, over all folds."""
-    aicc: float
-    """Akaike's information criterion of the in-sample errors in force, corrected for small samples."""
-    fold_scores: tuple[FoldScore, ...]
-    notes: tuple[str, ...] = ()
-    """Remarks on the use of the law at the measured points."""
-
-    @property
-    def parameter_count(self) -> int:
-        """Number of fitted parameters."""
-        return len(self.fit.estimates)
-
-
-@dataclasses.dataclass(frozen=True)
-class ExcludedModel:
-    """A candidate whose parameters the data do not determine, or that gives no force at measured points, with the
-    reason."""
-
-    name: str
-    reason: str
-    """The complete reason, with what to do."""
-    cause: str
-    """The cause in one phrase."""
-
-    def __str__(self) -> str:
-        return f"{self.name}: {self.cause}."
+from .parallel_scores import score_candidates
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -104,9 +53,10 @@ class Comparison:
             f"Leave-one-{self.leave_out.group_name}-out cross-validation, rms errors in force; the ranking is for "
             f"{self.purpose}."
         )
-        head = f"{'law':<40}{'parameters':>11}{'in sample':>12}{'left out':>12}{'AICc':>12}"
+        width = max(40, *(len(m.candidate.name) + 1 for m in self.ranking))
+        head = f"{'law':<{width}}{'parameters':>11}{'in sample':>12}{'left out':>12}{'AICc':>12}"
         rows = [
-            f"{m.candidate.name:<40}{m.parameter_count:>11}{m.in_sample_rmse:>10.4g} N"
+            f"{m.candidate.name:<{width}}{m.parameter_count:>11}{m.in_sample_rmse:>10.4g} N"
             f"{m.cross_validated_rmse:>10.4g} N{m.aicc:>12.1f}"
             for m in self.ranking
         ]
@@ -122,14 +72,18 @@ def compare(
     *,
     leave_out: GroupSplit | None = None,
     loss: Loss = LeastSquares(),
+    workers: int = 1,
     progress: Callable[[str, float], None] | None = None,
 ) -> Comparison:
     """Fit all candidates, rank them by their cross-validated error in force, and recommend one.
 
-    candidates  by default `standard_candidates`, the laws whose initial values follow from the data
+    candidates  by default `standard_candidates`, the laws whose initial values follow from the data; of these, a law
+                that is fitted by variable projection is excluded without cross-validation if its error in sample is
+                more than twice the lowest cross-validated error of the others
     leave_out   RunSplit(), LevelSplit("contraction"), LevelSplit("pressure"), SpecimenSplit() or BlockSplit(); it
                 defines the purpose of the ranking: the best law for other muscles is not the best for the measured
                 ones. By default the first of specimens, runs and levels with three groups or more
+    workers     number of processes; a script that asks for several needs `if __name__ == "__main__":`
     progress    called with the name of each candidate and the completed fraction, at the end with an empty name
 
     The recommended law is the one with the fewest parameters among those whose error is not larger than the lowest one
@@ -137,64 +91,47 @@ def compare(
     section 3.4.3). Raises IdentificationError where no candidate is determined.
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    split = leave_out or default_split(runs)
-    labels, names = label_folds(runs, split)
-    points = ComparedPoints.from_recordings(runs, labels, names)
-    ranking, excluded = [], []
+    splits = (leave_out or default_split(runs),)
+    (comparison,) = compare_splits(runs, candidates, splits, loss=loss, workers=workers, progress=progress)
+    return comparison
+
+
+def compare_splits(
+    runs: Sequence[Recording],
+    candidates: Sequence[Candidate] | None,
+    splits: Sequence[GroupSplit],
+    *,
+    loss: Loss = LeastSquares(),
+    workers: int = 1,
+    progress: Callable[[str, float], None] | None = None,
+) -> tuple[Comparison, ...]:
+    """A comparison for each split, as `compare`; every candidate is fitted once to all rows."""
+    points = points_of_splits(runs, splits)
     compared = standard_candidates(runs) if candidates is None else candidates
-    for number, candidate in enumerate(compared):
-        if progress is not None:
-            progress(candidate.name, number / len(compared))
-        try:
-            ranking.append(_cross_validate(candidate, points, loss))
-        except AirmuscleError as error:
-            excluded.append(ExcludedModel(candidate.name, error.message, cause_of(error)))
-    if progress is not None:
-        progress("", 1.0)
+    scores = score_candidates(compared, points, loss, workers, progress, can_exclude=candidates is None)
+    missing = () if candidates is not None else unavailable_candidates(runs)
+    unavailable = tuple(ExcludedModel(name, reason, cause) for name, reason, cause in missing)
+    return tuple(_comparison(runs, split, [each[i] for each in scores], unavailable) for i, split in enumerate(splits))
+
+
+def _comparison(
+    runs: Sequence[Recording], split: GroupSplit, scores: Sequence[Score], unavailable: tuple[ExcludedModel, ...]
+) -> Comparison:
+    ranking = [each for each in scores if isinstance(each, RankedModel)]
+    excluded = tuple(each for each in scores if isinstance(each, ExcludedModel))
     if not ranking:
         reasons = [part for e in excluded for part in (f"\n{e.name}: ", e.reason)]
         raise IdentificationError(HintedText(f"the data determine none of the {len(excluded)} candidates.", *reasons))
-    missing = () if candidates is not None else unavailable_candidates(runs)
-    unavailable = tuple(ExcludedModel(name, reason, cause) for name, reason, cause in missing)
     ranking.sort(key=lambda m: (m.cross_validated_rmse, m.parameter_count))
     recommended, reason = _recommend(ranking, split)
     remarks = length_notes(find_length_errors(recommended.fit.model, runs))
-    return Comparison(tuple(ranking), tuple(excluded), split, recommended, reason, unavailable, remarks)
-
-
-def _cross_validate(candidate: Candidate, points: ComparedPoints, loss: Loss) -> RankedModel:
-    full_fit = fit_to_points(candidate.law, points.points, loss=loss, fixed=candidate.fixed)
-    notes = _slack_notes(full_fit.model, points)
-    in_sample = residuals_of_rows(full_fit.model, points.rows, points.max_force)
-    left_out = [each for each in points.left_out_residuals(candidate, full_fit, loss) if each[1].size]
-    scores = tuple(FoldScore(name, _rms(residuals), residuals.size) for name, residuals in left_out)
-    out_of_sample = np.concatenate([residuals for _, residuals in left_out])
-    criterion = aicc(float(np.mean(in_sample**2)), in_sample.size, len(full_fit.estimates))
-    return RankedModel(candidate, full_fit, _rms(in_sample), _rms(out_of_sample), criterion, scores, notes)
-
-
-def _slack_notes(model: Characteristic, points: ComparedPoints) -> tuple[str, ...]:
-    """A remark where the law is slack at points with a positive force.
-
-    Raises IdentificationError where it gives no force although it is not slack.
-    """
-    slack, count = points.slack_count(model)
-    if not slack:
-        return ()
-    return (
-        f"it is slack at {slack} of {count} points with a positive force and is ranked with zero force there; its "
-        "method force raises SolveError at these points.",
-    )
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+    return Comparison(tuple(ranking), excluded, split, recommended, reason, unavailable, remarks)
 
 
 def _recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[RankedModel, str]:
     """The model by the one-standard-error rule, and the reason as a sentence with the numbers."""
     best = ranking[0]
-    equivalent = [m for m in ranking if _excess_error(m, best) <= 0]
+    equivalent = [m for m in ranking if excess_error(m, best) <= 0]
     recommended = min(equivalent, key=lambda m: (m.parameter_count, m.cross_validated_rmse))
     text = (
         f"Recommended for {split.purpose}: {recommended.candidate.name} with {recommended.parameter_count} parameters, "
@@ -208,7 +145,7 @@ def _recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[Ranke
     )
 
 
-def _excess_error(model: RankedModel, best: RankedModel) -> float:
+def excess_error(model: RankedModel, best: RankedModel) -> float:
     """Difference of the mean square errors [N^2], minus one standard error of it over the folds."""
     pairs = zip(model.fold_scores, best.fold_scores, strict=True)
     difference = np.array([a.rmse**2 - b.rmse**2 for a, b in pairs])

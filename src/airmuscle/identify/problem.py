@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..characteristic import PooledLengthLaw
 from ..characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from ..core import autodiff, tree
 from ..core.arrays import Array
@@ -22,6 +23,8 @@ from .censoring import UNCENSORED, Censoring
 
 RESTING_LENGTH = "resting_length"
 """Column with the resting length [m] of every row, in data of several specimens."""
+SPECIMEN = "specimen"
+"""Column with the index of the specimen of every row, in data of a PooledLengthLaw."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,9 +65,17 @@ def of_length(law: Any, length: float | None) -> Any:
 def evaluate(law: Any, method: str, arguments: tuple[str, str], data: Recording) -> Array:
     """The values of `law.method(*arguments)` at every row, with the law of the row's resting length; shape (N,)."""
     values = np.zeros(len(data))
-    for length, rows in rows_by_length(law, data):
-        values[rows] = getattr(of_length(law, length), method)(*(data[name][rows] for name in arguments))
+    for single, rows in _laws_by_rows(law, data):
+        values[rows] = getattr(single, method)(*(data[name][rows] for name in arguments))
     return values
+
+
+def _laws_by_rows(law: Any, data: Recording) -> list[tuple[Any, npt.NDArray[np.intp]]]:
+    """The law of each specimen, or of each resting length, with the indices of its rows."""
+    if isinstance(law, PooledLengthLaw) and SPECIMEN in data.columns:
+        member = data[SPECIMEN].astype(int)
+        return [(law.for_specimen(law.specimens[i]), np.flatnonzero(member == i)) for i in np.unique(member).tolist()]
+    return [(of_length(law, length), rows) for length, rows in rows_by_length(law, data)]
 
 
 def fitted_quantity_of(law: Characteristic) -> FittedQuantity:

@@ -19,6 +19,7 @@ from .correlation_index import CorrelationIndex
 from .loss import Loss
 from .plot import plot_fit
 from .problem import CONTRACTION, FORCE, FitProblem, FittedQuantity, evaluate
+from .specimen_effects import SpecimenEffects
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,6 +88,8 @@ class Fit:
     """The fitted problem, for refits: data, targets, weights and free parameters."""
     loss: Loss
     notes: tuple[str, ...] = ()
+    effects: SpecimenEffects | None = None
+    """The effects of the specimens on a PooledLengthLaw. Estimates and problem are those of its population law."""
 
     def __getitem__(self, name: str) -> Estimate:
         """An estimate by the path of its parameter, for example `geometry.radius`. Raises ParameterError."""

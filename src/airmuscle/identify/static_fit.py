@@ -8,6 +8,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from ..characteristic import PooledLengthLaw
 from ..characteristic.base import Characteristic
 from ..core import tree
 from ..core.arrays import Array
@@ -20,6 +21,7 @@ from .correlation_index import correlation_index
 from .fit_points import POINT_COLUMNS, FitPoints
 from .gauss_newton import gauss_newton
 from .loss import LeastSquares, Loss
+from .pooling import check_poolable, pool, refit_pooled
 from .problem import FitProblem, evaluate
 from .result import Estimate, Fit, WorstPoint
 from .solver import LeastSquaresSolution, is_linear, solve
@@ -71,6 +73,11 @@ def fit_to_points(
     fixed: Collection[str] = (),
 ) -> Fit:
     """As `fit`, for points whose sensors and runs are estimated once for several laws."""
+    if isinstance(characteristic, PooledLengthLaw):
+        check_poolable(characteristic, points)
+        population = characteristic.population
+        base = fit_to_points(population, points, loss=loss, censoring=censoring, sigma=sigma, fixed=fixed)
+        return pool(characteristic, base, points)
     problem = points.problem(characteristic, censoring=censoring, sigma=sigma, fixed=fixed)
     solution = solve(problem, loss)
     statistics = compute_statistics(problem, solution, loss)
@@ -90,6 +97,8 @@ def refit(
     Other initial values are tried only where the search does not converge, and nothing but the rank is computed of the
     solution. Raises IdentificationError where the points do not determine the parameters.
     """
+    if isinstance(characteristic, PooledLengthLaw):
+        return refit_pooled(characteristic, refit(characteristic.population, points, loss=loss, fixed=fixed), points)
     problem = points.problem(characteristic, fixed=fixed)
     near = None if is_linear(problem) or loss != LeastSquares() else gauss_newton(problem, problem.initial_values)
     try:

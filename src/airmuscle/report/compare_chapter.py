@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..core.plotting import BLUE, LINES, MARKERS, legend_outside, new_figure
 from ..identify import Comparison, Fit
+from ..identify.candidate_scores import RankedModel
 from .chapter import Chapter, Plot, Table
 from .formula import symbol_formula, to_mathtext
 
@@ -17,14 +19,19 @@ _MAX_LABELS = 24
 _MAX_CURVES = 6
 
 
-def compare_chapter(comparison: Comparison) -> Chapter:
-    """Return the chapter of a comparison: ranking, exclusions, errors by fold, figures of the recommended fit."""
-    fit = comparison.recommended.fit
+def compare_chapter(comparison: Comparison, recommended: RankedModel | None = None, reason: str = "") -> Chapter:
+    """Return the chapter of a comparison: ranking, exclusions, errors by fold, figures of the recommended fit.
+
+    `recommended` is the law that was selected for several purposes, for the given reason.
+    """
+    fit = (recommended or comparison.recommended).fit
+    joint = "" if reason in ("", comparison.reason) else f"{reason}\n\n"
     tables = (_ranking(comparison), _excluded(comparison), _fold_table(comparison))
-    return Chapter(
+    chapter = Chapter(
         paper="comparison",
         title="Model selection",
-        summary=f"{comparison.reason}\n\nCross-validation: each {comparison.leave_out.group_name} is left out in turn. "
+        summary=f"{joint}{comparison.reason}\n\n"
+        f"Cross-validation: each {comparison.leave_out.group_name} is left out in turn. "
         "All errors are errors of the force, over the rows with a positive force.",
         tables=tuple(table for table in tables if table is not None),
         plots=(
@@ -32,6 +39,19 @@ def compare_chapter(comparison: Comparison) -> Chapter:
             Plot("residuals", "Residuals of the recommended law over each variable.", residual_figure(fit)),
             Plot("correlations", "Correlations of the parameters of the recommended law.", correlation_figure(fit)),
         ),
+    )
+    return _of_one_purpose(chapter, comparison) if joint else chapter
+
+
+def _of_one_purpose(chapter: Chapter, comparison: Comparison) -> Chapter:
+    """Return the chapter with names that differ from those of the comparison for the other purpose."""
+    group = comparison.leave_out.group_name
+    return replace(
+        chapter,
+        paper=f"comparison-{group}",
+        title=f"Model selection for {comparison.purpose}",
+        tables=tuple(replace(table, name=f"{group}-{table.name}") for table in chapter.tables),
+        plots=tuple(replace(plot, name=f"{group}-{plot.name}") for plot in chapter.plots),
     )
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
+from ..characteristic import PooledLengthLaw
 from ..core.reference import Reference
 from ..identify import Fit
 from .chapter import DisplayedEquation, Table
@@ -25,7 +27,28 @@ def equation_section(fit: Fit) -> tuple[tuple[DisplayedEquation, ...], tuple[Tab
         return (_definition(type(fit.model)),), ()
     validity = _validity(fit.data_ranges, quantity.arguments)
     shown = tuple(_displayed(equation, f"equation-{i}", validity) for i, equation in enumerate(equations, 1))
-    return shown, (_symbol_table(equations[0]),)
+    effects, tables = _specimen_effects(fit, validity)
+    return (*shown, *effects), (_symbol_table(equations[0]), *tables)
+
+
+def _specimen_effects(fit: Fit, validity: str) -> tuple[list[DisplayedEquation], list[Table]]:
+    """Return the term that each specimen adds to the law of the population, and a table of the coefficients."""
+    law, effects = fit.model, fit.effects
+    if effects is None or not isinstance(law, PooledLengthLaw):
+        return [], []
+    shown, quantity = [], fit.fitted_quantity
+    for i, (name, effect) in enumerate(zip(law.specimens, law.effects, strict=True), 1):
+        equations = law_equation(effect, quantity.name, quantity.arguments, fit.data_ranges)
+        titled = dataclasses.replace(
+            equations[-1], title=f"Effect of specimen {name}, added to the law of the population"
+        )
+        shown.append(_displayed(titled, f"effect-{i}", validity))
+    surface: Any = law.effects[0]
+    columns: dict[str, list[Any]] = {"term": list(surface.term_labels)}
+    for name, values, errors in zip(law.specimens, effects.coefficients, effects.standard_errors, strict=True):
+        columns |= {f"{name} [N]": list(values), f"{name}, standard error [N]": list(errors)}
+    title = f"Specimen effects (standard deviation of the prior {format_number(effects.deviation)} N)"
+    return shown, [Table("specimen-effects", title, columns)]
 
 
 def _displayed(equation: LawEquation, name: str, validity: str) -> DisplayedEquation:

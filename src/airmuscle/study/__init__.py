@@ -1,6 +1,7 @@
 """Parameter studies: varied parameters, designs of experiments, metrics and sensitivities of a scenario."""
 
-from .executors import dask_cluster, process_pool
+from ..core.processes import process_pool
+from .executors import dask_cluster
 from .result import StudyResult
 from .run import run_study
 from .study import Study, load_study

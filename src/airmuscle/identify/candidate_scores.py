@@ -1,0 +1,147 @@
+"""Scores of one candidate law: its fit to all rows, and its errors on the rows left out by one or several splits."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..characteristic.base import Characteristic
+from ..core.arrays import Array
+from ..core.errors import AirmuscleError
+from ..recording import Recording
+from .candidates import Candidate
+from .compared_points import ComparedPoints, cause_of, residuals_of_rows
+from .cross_validation import GroupSplit, label_folds
+from .fit_points import FitPoints
+from .loss import Loss
+from .model_evidence import aicc
+from .result import Fit
+from .static_fit import fit_to_points
+
+MAX_EXCESS = 2.0
+"""Ratio of the error on the rows of the fit to the lowest cross-validated error of other laws above which a law is not
+cross-validated (chosen). The error on rows left out is never lower than that on the rows of the fit."""
+
+
+@dataclasses.dataclass(frozen=True)
+class FoldScore:
+    """The out-of-sample error of a law on one fold."""
+
+    fold: str
+    rmse: float
+    """Root mean square error in force [N]."""
+    rows: int
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RankedModel:
+    """A candidate whose parameters the data determine, with its scores."""
+
+    candidate: Candidate
+    fit: Fit
+    in_sample_rmse: float
+    """Root mean square error in force [N] on the rows of the fit."""
+    cross_validated_rmse: float
+    """Root mean square error in force [N] on the rows left out, over all folds."""
+    aicc: float
+    """Akaike's information criterion of the in-sample errors in force, corrected for small samples."""
+    fold_scores: tuple[FoldScore, ...]
+    notes: tuple[str, ...] = ()
+    """Remarks on the use of the law at the measured points."""
+
+    @property
+    def parameter_count(self) -> int:
+        """Number of fitted parameters; specimen effects count with their effective number, rounded."""
+        return count_parameters(self.fit)
+
+
+def count_parameters(fit: Fit) -> int:
+    """Number of estimates, and the rounded effective number of the specimen effects."""
+    return len(fit.estimates) + (0 if fit.effects is None else round(fit.effects.degrees_of_freedom))
+
+
+@dataclasses.dataclass(frozen=True)
+class ExcludedModel:
+    """A candidate whose parameters the data do not determine, or that gives no force at measured points, with the
+    reason."""
+
+    name: str
+    reason: str
+    """The complete reason, with what to do."""
+    cause: str
+    """The cause in one phrase."""
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.cause}."
+
+
+Score = RankedModel | ExcludedModel
+
+
+def points_of_splits(runs: Sequence[Recording], splits: Sequence[GroupSplit]) -> tuple[ComparedPoints, ...]:
+    """The compared points of each split, which share the rows. Raises IdentificationError for fewer than two groups."""
+    points = FitPoints.from_recordings(runs)
+    return tuple(ComparedPoints.from_recordings(runs, *label_folds(runs, split), points) for split in splits)
+
+
+def score_candidate(
+    candidate: Candidate, splits: Sequence[ComparedPoints], loss: Loss, lowest: Sequence[float] = ()
+) -> tuple[Score, ...]:
+    """The scores of a candidate for each split; `lowest` are the lowest errors [N] of other laws, if known."""
+    try:
+        fit = fit_to_points(candidate.law, splits[0].points, loss=loss, fixed=candidate.fixed)
+        notes = _slack_notes(fit.model, splits[0])
+        residuals = residuals_of_rows(fit.model, splits[0].rows, splits[0].max_force)
+    except AirmuscleError as error:
+        return (ExcludedModel(candidate.name, error.message, cause_of(error)),) * len(splits)
+    bounds = lowest or [np.inf] * len(splits)
+    return tuple(
+        _cross_validate(candidate, points, loss, fit, residuals, notes, bound)
+        for points, bound in zip(splits, bounds, strict=True)
+    )
+
+
+def _cross_validate(
+    candidate: Candidate, points: ComparedPoints, loss: Loss, fit: Fit, in_sample: Array, notes: tuple[str, ...],
+    lowest: float,
+) -> Score:  # fmt: skip
+    rmse = _rms(in_sample)
+    if rmse > MAX_EXCESS * lowest:
+        return _excess_error(candidate.name, rmse, lowest)
+    try:
+        left_out = [each for each in points.left_out_residuals(candidate, fit, loss) if each[1].size]
+    except AirmuscleError as error:
+        return ExcludedModel(candidate.name, error.message, cause_of(error))
+    scores = tuple(FoldScore(name, _rms(residuals), residuals.size) for name, residuals in left_out)
+    out_of_sample = _rms(np.concatenate([residuals for _, residuals in left_out]))
+    criterion = aicc(float(np.mean(in_sample**2)), in_sample.size, count_parameters(fit))
+    return RankedModel(candidate, fit, rmse, out_of_sample, criterion, scores, notes)
+
+
+def _excess_error(name: str, rmse: float, lowest: float) -> ExcludedModel:
+    cause = f"its error on the rows of the fit, {rmse:.4g} N, is more than {MAX_EXCESS:g} times the lowest error"
+    reason = (
+        f"{cause[0].upper()}{cause[1:]} of another law on rows left out, {lowest:.4g} N, so it was not "
+        "cross-validated. To cross-validate it, give it as a candidate."
+    )
+    return ExcludedModel(name, reason, cause)
+
+
+def _slack_notes(model: Characteristic, points: ComparedPoints) -> tuple[str, ...]:
+    """A remark where the law is slack at points with a positive force.
+
+    Raises IdentificationError where it gives no force although it is not slack.
+    """
+    slack, count = points.slack_count(model)
+    if not slack:
+        return ()
+    return (
+        f"it is slack at {slack} of {count} points with a positive force and is ranked with zero force there; its "
+        "method force raises SolveError at these points.",
+    )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
