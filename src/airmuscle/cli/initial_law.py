@@ -6,9 +6,9 @@ import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from ..characteristic.length_scaling import scale_to_length
 from ..core.errors import ParameterError
 from ..identify import standard_candidates
-from ..identify.length_scaling import scale_to_length
 from ..library.catalogue import load_law
 from ..library.entry import Entry
 from ..library.models import model_class, model_names

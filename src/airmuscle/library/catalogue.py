@@ -19,20 +19,23 @@ from .entry_file import build_entry
 from .files import (
     DATA,
     LAWS,
+    PRODUCTS,
     VALVES,
     complete_name,
     is_path,
     list_data,
     list_laws,
     list_library,
+    list_products,
     list_valves,
     read_toml,
 )
+from .product_entry import ProductEntry, build_product_entry
 from .valve_entry import ValveEntry
 
 
-def load(name_or_path: str | Path) -> Entry | ValveEntry:
-    """A library entry (muscle, law or valve) by its name or a unique beginning of it, or a file by its path.
+def load(name_or_path: str | Path) -> Entry | ValveEntry | ProductEntry:
+    """A library entry (muscle, law, valve or product) by its name or a unique beginning of it, or a file by its path.
 
     In a plant, write `.muscle` of an Entry, and `.valve` or `.exhaust` of a ValveEntry. Raises UnknownNameError,
     FileError, ParameterError or UnitError with the location. A warning of the entry is issued as an AirmuscleWarning.
@@ -41,12 +44,15 @@ def load(name_or_path: str | Path) -> Entry | ValveEntry:
         path = file = Path(name_or_path)
     else:
         name = complete_name(str(name_or_path), list_library(), "library entry")
-        path = (VALVES if name in list_valves() else LAWS) / f"{name}.toml"
+        folder = VALVES if name in list_valves() else PRODUCTS if name in list_products() else LAWS
+        path = folder / f"{name}.toml"
         file = Path(path.name)
     tables = read_toml(path)
-    entry: Entry | ValveEntry
+    entry: Entry | ValveEntry | ProductEntry
     if _describes_valve(tables):
         entry = build_valve_entry(tables, path.stem, file)
+    elif _describes_product(tables):
+        entry = build_product_entry(tables, path.stem, file)
     else:
         entry = build_entry(tables, path.stem, file, path.parent)
     issue_warning(entry.name, entry.warning, stacklevel=2)
@@ -63,6 +69,8 @@ def load_law(name_or_path: str | Path) -> Entry:
     tables = read_toml(path)
     if _describes_valve(tables):
         raise ParameterError(f"{file}: the file describes a valve; a muscle or a law is required.")
+    if _describes_product(tables):
+        raise ParameterError(f"{file}: the file describes a product without a law; a muscle or a law is required.")
     entry = build_entry(tables, path.stem, file, path.parent)
     issue_warning(entry.name, entry.warning, stacklevel=2)
     return entry
@@ -84,7 +92,20 @@ def _describes_valve(tables: Mapping[str, Any]) -> bool:
     return "valve" in tables and "characteristic" not in tables
 
 
+def _describes_product(tables: Mapping[str, Any]) -> bool:
+    return "ratings" in tables and "characteristic" not in tables
+
+
+def entries_of_product(name: str) -> tuple[str, ...]:
+    """Names of the muscles and laws of the library that were measured on a product, sorted."""
+    return tuple(law for law in list_laws() if read_toml(LAWS / f"{law}.toml").get("product") == name)
+
+
 def _complete_law_name(name: str) -> str:
+    if name in list_products():
+        laws = entries_of_product(name)
+        entries = f"its laws are {', '.join(laws)}" if laws else "no law of it is published; fit one to measurements"
+        raise UnknownNameError(f"'{name}' is a product, of which the library states the permitted values; {entries}.")
     if name in list_valves():
         raise UnknownNameError(f"'{name}' is a valve; a muscle or a law is required: {', '.join(list_laws())}.")
     return complete_name(name, list_laws(), "muscle or law")

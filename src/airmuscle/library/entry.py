@@ -11,7 +11,7 @@ from ..core.errors import AirmuscleWarning, UnknownNameError
 from ..core.reference import Reference
 from ..friction.base import Friction
 from ..geometry.base import Geometry
-from ..muscle import CreepElements, Damper, Muscle, SeriesElement, Spring, Stop, Wall
+from ..muscle import CreepElements, Damper, Muscle, Ratings, SeriesElement, Spring, Stop, Wall
 
 OPTIONAL_PARTS = ("spring", "damper", "friction", "wall", "series", "stop", "creep")
 """Optional elements of a muscle, as fields of an entry and tables of its file."""
@@ -41,7 +41,7 @@ class Entry:
 
     `provenance` is the origin of the numbers (printed, measured, secondary source, fitted, chosen), `warning` a
     restriction of use, which is issued when the entry is loaded, and `validity_range` the range of the measurements or
-    the publication, if the file states it.
+    the publication, if the file states it; `ratings` are the values that the maker of the muscle permits, if known.
     """
 
     name: str
@@ -59,6 +59,7 @@ class Entry:
     note: str = ""
     warning: str = ""
     validity_range: ValidityRange | None = None
+    ratings: Ratings | None = None
     checks: tuple[Check, ...] = ()
     references: tuple[Reference, ...] = ()
 
@@ -70,7 +71,9 @@ class Entry:
             missing = MISSING_GEOMETRY if self.geometry is None else "a law solved for the force: see as_force_law"
             raise UnknownNameError(f"{self.name} is a characteristic, not a muscle; it lacks {missing}.")
         parts = {part: getattr(self, part) for part in OPTIONAL_PARTS if getattr(self, part) is not None}
-        return Muscle(self.characteristic, self.geometry, validity_range=self.validity_range, **parts)
+        return Muscle(
+            self.characteristic, self.geometry, validity_range=self.validity_range, ratings=self.ratings, **parts
+        )
 
 
 def issue_warning(name: str, warning: str, stacklevel: int) -> None:

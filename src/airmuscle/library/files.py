@@ -14,13 +14,15 @@ LAWS = Path(__file__).parent
 """Folder of the muscles and laws."""
 VALVES = LAWS / "valves"
 """Folder of the valves."""
+PRODUCTS = LAWS / "products"
+"""Folder of the ratings of commercial muscles."""
 DATA = LAWS / "data"
 """Folder of the data sets."""
 
 
 def list_library() -> tuple[str, ...]:
-    """Names of all entries that `load` reads: muscles, laws and valves, sorted."""
-    return tuple(sorted((*list_laws(), *list_valves())))
+    """Names of all entries that `load` reads: muscles, laws, valves and products, sorted."""
+    return tuple(sorted((*list_laws(), *list_valves(), *list_products())))
 
 
 def list_laws() -> tuple[str, ...]:
@@ -31,6 +33,11 @@ def list_laws() -> tuple[str, ...]:
 def list_valves() -> tuple[str, ...]:
     """Names of all valves, sorted."""
     return tuple(sorted(path.stem for path in VALVES.glob("*.toml")))
+
+
+def list_products() -> tuple[str, ...]:
+    """Names of all commercial muscles of which the ratings are known, sorted."""
+    return tuple(sorted(path.stem for path in PRODUCTS.glob("*.toml")))
 
 
 def list_data() -> tuple[str, ...]:

@@ -37,6 +37,7 @@ from ..library.catalogue import load_law
 from ..library.entry import MISSING_GEOMETRY, Entry
 from ..library.files import read_toml
 from ..library.location import Location, check_keys, check_type, located_errors, read_finite_number, read_text
+from ..library.scaling import scale_entry
 from ..muscle import Muscle
 from ..plant.plant import Plant
 from ..recording import Recording
@@ -47,6 +48,8 @@ from .inputs import build_input_signal
 TABLES = ("title", "plant", "input", "run", "output")
 RUN = ("duration", "start_time", "output_times", "initial_state", "integrator")
 OUTPUT = ("columns",)
+SIZES = ("resting_length", "diameter")
+"""Sizes to which a table that names a library entry may scale its muscle."""
 DEFAULT_INITIAL_STATE: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
 """Default initial state of a run: equilibrium at ambient pressure."""
 
@@ -181,12 +184,20 @@ def build_muscle(value: Any, location: Location) -> Muscle:
     if isinstance(value, Mapping):
         table = {"model": "Muscle", **value}
         name = table.pop("library", None)
-        parts = {} if name is None else _entry_parts(_load_entry(name, location.inside("library")), table, location)
+        parts = {} if name is None else _entry_parts(_load_scaled(name, table, location), table, location)
         muscle: Muscle = build(table, location, parts)
         return muscle
     entry = _load_entry(value, location)
     with located_errors(location):
         return entry.muscle
+
+
+def _load_scaled(name: Any, table: dict[str, Any], location: Location) -> Entry:
+    """The entry of this name, scaled to the sizes of the table, which are removed from it."""
+    entry = _load_entry(name, location.inside("library"))
+    sizes = {key: read_finite_number(table.pop(key), "m", f"{location}, {key}") for key in SIZES if key in table}
+    with located_errors(location):
+        return scale_entry(entry, **sizes)
 
 
 def _load_entry(value: Any, location: Location) -> Entry:

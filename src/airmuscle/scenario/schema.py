@@ -65,6 +65,8 @@ def muscle_schema() -> Schema:
     tables = {
         **dict.fromkeys(TEXT_KEYS, _TEXT),
         **{key: models.kind(cls) for key, cls in entry_file.PARTS.items()},
+        "product": _TEXT,
+        "ratings": models.table(model_class("Ratings", "schema"), model_needed=False),
         "validity_range": models.table(model_class("ValidityRange", "schema"), model_needed=False),
         "check": {"type": "array", "items": _table(check, ("quantity", "equals", "tolerance", "source"))},
         "reference": {"type": "array", "items": models.table(Reference, model_needed=None)},
@@ -175,7 +177,7 @@ def _plant(models: _ModelSchemas) -> Schema:
     plant, muscle = (models.table(cls, model_needed=False) for cls in (Plant, Muscle))
     name = {"description": "a library entry, or a muscle file relative to this file", **_TEXT}
     required = muscle.pop("required")
-    muscle["properties"]["library"] = name
+    muscle["properties"] |= {"library": name, **{size: _quantity("m", 0.0) for size in scenario.SIZES}}
     table = {**muscle, "anyOf": [{"required": ["library"]}, {"required": required}]}
     each = {"anyOf": [name, table]}
     plant["properties"]["muscle"] = {"anyOf": [*each["anyOf"], {"type": "array", "items": each}]}
