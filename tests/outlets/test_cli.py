@@ -82,6 +82,7 @@ def assert_failed(result: Result, message: str) -> None:
 
 NAMES = (
     "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "plan",
+    "bench",
     "simulate", "sweep", "schema",
 )  # fmt: skip
 

@@ -49,6 +49,7 @@ COMMANDS = (
     CommandRow("hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."),
     CommandRow("fit-dynamic", "fit_dynamic", "fit_dynamic", "Identify plant parameters from transient records."),
     CommandRow("plan", "plan", "plan", "Design the most informative static experiments (D-optimal)."),
+    CommandRow("bench", "bench", "bench", "Fit a surface while rows arrive; name the next point."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("sweep", "sweep", "sweep", "Run a parameter study of a scenario."),
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
