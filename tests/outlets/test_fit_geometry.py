@@ -12,12 +12,12 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.characteristic import EffectiveLength, MartensBoblan2017
-from airmuscle.characteristic.length_scaling import scale_to_length
 from airmuscle.cli.app import app
 from airmuscle.core.errors import ParameterError, UnknownNameError
 from airmuscle.geometry import Braid
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.library.catalogue import load
+from airmuscle.library.length_scaling import scale_to_length
 from airmuscle.library.write import save
 
 MUSCLE = "dmsp-20-300"

@@ -48,6 +48,7 @@ COMMANDS = (
     CommandRow("convert", "convert", "convert", "Approximate one characteristic by another."),
     CommandRow("hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."),
     CommandRow("fit-dynamic", "fit_dynamic", "fit_dynamic", "Identify plant parameters from transient records."),
+    CommandRow("fit-volume", "fit_volume", "fit_volume_command", "Fit the volume of a muscle over its contraction."),
     CommandRow("plan", "plan", "plan", "Design the most informative static experiments (D-optimal)."),
     CommandRow("bench", "bench", "bench", "Fit a surface while rows arrive; name the next point."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),

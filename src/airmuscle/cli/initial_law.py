@@ -6,11 +6,11 @@ import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..characteristic.length_scaling import scale_to_length
 from ..core.errors import ParameterError
 from ..identify import standard_candidates
 from ..library.catalogue import load_law
 from ..library.entry import Entry
+from ..library.length_scaling import scale_to_length
 from ..library.models import model_class, model_names
 from ..recording import Recording
 

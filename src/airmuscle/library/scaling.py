@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 
 from ..characteristic import ChouHannaford1996, TonduLopez2000, VirtualWork
-from ..characteristic.length_scaling import scale_to_length
 from ..core import leaves
 from ..core.errors import ParameterError
 from ..core.units import quantity
 from ..geometry import Braid
 from .entry import Entry
+from .length_scaling import scale_to_length
 
 _BRAID_LAWS = (ChouHannaford1996, TonduLopez2000, VirtualWork)
 """Laws of a braid without wall, whose force at a braid angle is proportional to the square of the diameter."""
