@@ -39,7 +39,7 @@ def fit_chapter(fit: Fit, entry: Entry, notes: Sequence[str] = ()) -> Chapter:
             *_violations(fit),
             _correlations(fit),
             _rows(fit),
-        ),  # fmt: skip
+        ),
         plots=tuple(
             plot for plot in (ramp_plot(fit), _isobars(fit, entry), errors, band_plot(fit)) if plot is not None
         ),
