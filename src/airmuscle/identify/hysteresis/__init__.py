@@ -2,7 +2,7 @@
 
 from .agreement import RunAgreement
 from .creep import Creep, fit_creep
-from .creep_elements import creep_elements
+from .creep_conversion import creep_elements
 from .fit import (
     ContractionPath,
     FixedCharacteristic,
