@@ -22,6 +22,7 @@ import components
 import derivative
 import growth
 import identification
+import live
 import memory
 import model_comparison
 import mujoco_peer
@@ -49,6 +50,7 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (sensitivities.section, 15),
     (identification.section, 3),
     (static_fit.section, 15),
+    (live.section, 1),
     (bootstrap.section, 5),
     (model_comparison.section, 3),
     (new_plant.section, 7),

@@ -196,6 +196,7 @@ ARGUMENTS = {
     "segment": "shape and integrals of one segment between two rings",
     "sigma": "standard deviation of the measurement noise",
     "surrogate_of": "name of the model approximated by a surrogate",
+    "ratings": "values that the maker of the muscle permits",
     "validity_range": "rectangle of pressure and contraction",
     "by": "resampling unit of a bootstrap",
     "candidates": "models to be compared",

@@ -30,7 +30,7 @@ from airmuscle.cli.terminal import print_json, print_table
 from airmuscle.core.errors import UnknownNameError, printable
 from airmuscle.core.reference import Reference
 from airmuscle.library.catalogue import load
-from airmuscle.library.files import list_laws, list_plants, list_valves
+from airmuscle.library.files import list_laws, list_plants, list_products, list_valves
 from airmuscle.recording import read_csv
 from airmuscle.report.chapter import Chapter, Claim, Equal
 from airmuscle.reproduce import run
@@ -81,7 +81,8 @@ def assert_failed(result: Result, message: str) -> None:
 # Help and usage
 
 NAMES = (
-    "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "plan",
+    "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "fit-volume", "plan",
+    "bench",
     "simulate", "sweep", "schema",
 )  # fmt: skip
 
@@ -144,13 +145,13 @@ def test_wrong_usage_is_exit_code_2(arguments: tuple[str, ...]):
 def test_list_names_every_entry_with_title_kind_and_trust():
     found = json.loads(airmuscle("list", "--json").output)
     listed = {entry["name"]: entry for entry in found if entry["kind"] != "data set"}
-    assert tuple(listed) == (*list_laws(), *list_valves(), *list_plants())
+    assert tuple(listed) == (*list_laws(), *list_valves(), *list_plants(), *list_products())
     entry = load(MUSCLE)
     assert listed[MUSCLE] == {
         "name": MUSCLE,
         "title": entry.title,
-        "kind": f"muscle, {type(entry.characteristic).__name__}",
-        "provenance": entry.provenance,
+        "kind": f"muscle, {type(entry.characteristic).__name__}; data set",
+        "provenance": f"{entry.provenance}; measured",
     }
     table = airmuscle("list").output
     assert all(name in table for name in list_laws())
@@ -171,8 +172,8 @@ def test_list_calls_a_muscle_what_can_be_simulated():
 
 def test_list_names_the_data_sets_that_fit_takes():
     found = json.loads(airmuscle("list", "--json").output)
-    data = {entry["name"]: entry["provenance"] for entry in found if entry["kind"] == "data set"}
-    assert data[MUSCLE] == "measured"
+    data = {entry["name"]: entry["provenance"] for entry in found if entry["kind"].endswith("data set")}
+    assert data[MUSCLE] == "printed; measured"
     assert data["festo-tool-dmsp-20"] == "secondary source"
 
 
@@ -284,10 +285,10 @@ def test_every_entry_has_a_chart(tmp_path: Path, name: str):
 
 def test_a_point_outside_the_data_is_a_warning():
     inside, outside = (
-        airmuscle("solve", MUSCLE, f"--pressure={p} kPa", "--contraction=0.1", "--json") for p in (300, 750)
+        airmuscle("solve", "tondu-lopez", f"--pressure={p} kPa", "--contraction=0.1", "--json") for p in (300, 750)
     )
     assert inside.stderr == ""
-    assert re.match(r"warning: the operating point is outside the validity range .*35 to 675 kPa", outside.stderr)
+    assert re.match(r"warning: the operating point is outside the validity range .*50 to 600 kPa", outside.stderr)
     assert json.loads(outside.stdout)["inside_validity_range"] is False
 
 

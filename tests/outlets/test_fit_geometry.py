@@ -16,8 +16,8 @@ from airmuscle.cli.app import app
 from airmuscle.core.errors import ParameterError, UnknownNameError
 from airmuscle.geometry import Braid
 from airmuscle.identify.candidates import blank_surface
-from airmuscle.identify.length_scaling import scale_to_length
 from airmuscle.library.catalogue import load
+from airmuscle.library.length_scaling import scale_to_length
 from airmuscle.library.write import save
 
 MUSCLE = "dmsp-20-300"

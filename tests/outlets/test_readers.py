@@ -271,7 +271,6 @@ def test_a_missing_package_is_an_error_with_the_install_command(tmp_path: Path, 
 def test_an_unknown_format(tmp_path: Path):
     (tmp_path / "run.bin").write_bytes(b"\0\1\2")
     assert "run.bin: the file is a binary file, not a table of text. Export" in refusal(FileError, tmp_path / "run.bin")
-    assert "Save the file as .xlsx or .csv" in refusal(FileError, tmp_path / "run.xls")
 
 
 # Several files

@@ -19,7 +19,7 @@ from airmuscle.core.reference import cite
 from airmuscle.library.build import build, load_valve
 from airmuscle.library.catalogue import load
 from airmuscle.library.entry import Entry
-from airmuscle.library.files import list_laws, list_library, list_plants, list_valves
+from airmuscle.library.files import list_laws, list_library, list_plants, list_products, list_valves
 from airmuscle.library.law_file import load_law
 from airmuscle.library.location import Location
 from airmuscle.library.plant_file import PlantEntry
@@ -250,7 +250,7 @@ def test_the_command_line_lists_shows_and_cites_valves():
 
 
 def test_load_reads_every_entry_that_the_library_lists():
-    assert set(list_library()) == {*list_laws(), *list_valves(), *list_plants()}
+    assert set(list_library()) == {*list_laws(), *list_valves(), *list_plants(), *list_products()}
     kinds = {name: type(load(name)) for name in list_library()}
     assert {name for name, kind in kinds.items() if kind is ValveEntry} == set(list_valves())
     assert {name for name, kind in kinds.items() if kind is Entry} == set(list_laws())

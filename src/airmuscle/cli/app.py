@@ -39,7 +39,7 @@ class CommandRow(NamedTuple):
 
 COMMANDS = (
     CommandRow("reproduce", "reproduce", "reproduce", "Reproduce three papers and test each of their claims."),
-    CommandRow("list", "list", "list_entries", "List the muscles, laws, valves, plants and data of the library."),
+    CommandRow("list", "list", "list_entries", "List muscles, laws, valves, plants, products and data of the library."),
     CommandRow("show", "show", "show", "Show parameters, sources and checks of a library entry."),
     CommandRow("cite", "cite", "cite", "Print the references of a library entry."),
     CommandRow("solve", "solve", "solve", "Solve for pressure, contraction or force, given the other two."),
@@ -49,7 +49,9 @@ COMMANDS = (
     CommandRow("hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."),
     CommandRow("fit-dynamic", "fit_dynamic", "fit_dynamic", "Identify plant parameters from transient records."),
     CommandRow("campaign", "campaign", "campaign", "Identify a muscle from all files of a test rig."),
+    CommandRow("fit-volume", "fit_volume", "fit_volume_command", "Fit the volume of a muscle over its contraction."),
     CommandRow("plan", "plan", "plan", "Design the most informative static experiments (D-optimal)."),
+    CommandRow("bench", "bench", "bench", "Fit a surface while rows arrive; name the next point."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("sweep", "sweep", "sweep", "Run a parameter study of a scenario."),
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),

@@ -8,7 +8,18 @@ import tomllib
 from pathlib import Path
 
 from ..characteristic import ForceLaw
-from ..library.files import DATA, LAWS, PLANTS, VALVES, list_data, list_laws, list_plants, list_valves
+from ..library.files import (
+    DATA,
+    LAWS,
+    PLANTS,
+    PRODUCTS,
+    VALVES,
+    list_data,
+    list_laws,
+    list_plants,
+    list_products,
+    list_valves,
+)  # fmt: skip
 from ..library.models import model_class
 from .options import Json
 from .terminal import print_json, print_table
@@ -25,12 +36,13 @@ class ListRow:
 
 
 def list_entries(json: Json = False) -> None:
-    """List the muscles, laws, valves, plants and data of the library.
+    """List the muscles, laws, valves, plants, products and data of the library.
 
     A muscle can be simulated; a characteristic cannot, because it has no geometry or is not solved for the force.
-    A valve is used in a scenario as { library = NAME }, and a plant as [plant] library = NAME; `airmuscle simulate
-    NAME` runs its example. A data set is used as FILES of `airmuscle fit`. The provenance is the origin of the
-    numbers: printed, measured, data sheet, secondary source, fitted or chosen.
+    A product states the values that the maker of a muscle permits. A valve is used in a scenario as { library = NAME },
+    and a plant as [plant] library = NAME; `airmuscle simulate NAME` runs its example. A data set is used as FILES of
+    `airmuscle fit`; that of a specimen is listed with its law. The provenance is the origin of the numbers: printed,
+    measured, data sheet, secondary source, fitted or chosen.
 
     \b
     Examples:
@@ -46,12 +58,26 @@ def list_entries(json: Json = False) -> None:
 
 def library_rows() -> list[ListRow]:
     """All library entries, valves, plants and data sets, read from the files without building any model."""
+    data = {name: _data_row(DATA / f"{name}.csv") for name in list_data()}
+    laws = [_entry_row(LAWS / f"{name}.toml") for name in list_laws()]
     return [
-        *(_entry_row(LAWS / f"{name}.toml") for name in list_laws()),
+        *(_with_data_set(row, data.pop(row.name)) if row.name in data else row for row in laws),
         *(_valve_row(VALVES / f"{name}.toml") for name in list_valves()),
         *(_plant_row(PLANTS / f"{name}.toml") for name in list_plants()),
-        *(_data_row(DATA / f"{name}.csv") for name in list_data()),
+        *(_product_row(PRODUCTS / f"{name}.toml") for name in list_products()),
+        *data.values(),
     ]
+
+
+def _with_data_set(law: ListRow, data: ListRow) -> ListRow:
+    """One row for a law and the data set of the same name."""
+    provenance = law.provenance if data.provenance in ("", law.provenance) else f"{law.provenance}; {data.provenance}"
+    return dataclasses.replace(law, kind=f"{law.kind}; {data.kind}", provenance=provenance)
+
+
+def _product_row(path: Path) -> ListRow:
+    tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    return ListRow(path.stem, tables["title"], "product, Ratings", tables["provenance"])
 
 
 def _entry_row(path: Path) -> ListRow:

@@ -8,21 +8,25 @@ from typing import Any
 from ..core import cite, leaves
 from ..library.catalogue import load
 from ..library.entry import Entry
+from ..library.files import entries_of_product
 from ..library.plant_file import PlantEntry
+from ..library.product_entry import ProductEntry
+from ..library.scaling import scale_entry
 from ..library.valve_entry import ValveEntry
+from ..muscle import Ratings
 from ..report.formatting import format_number
-from .options import Json, Name
+from .options import Diameter, Json, Name, RestingLength
 from .terminal import echo, print_json, print_table
 
 PARTS = (
-    "characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "validity_range",
-    "valve", "exhaust", "switching_times", "plant",
+    "characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "ratings",
+    "validity_range", "valve", "exhaust", "switching_times", "plant",
 )  # fmt: skip
 MAX_VALUES = 30
 """Longest list of values that the table shows completely."""
 
 
-def show(name: Name, json: Json = False) -> None:
+def show(name: Name, resting_length: RestingLength = None, diameter: Diameter = None, json: Json = False) -> None:
     """Show parameters, sources and checks of a library entry.
 
     The table of parameters contains symbol, value, unit, meaning and bounds.
@@ -31,16 +35,20 @@ def show(name: Name, json: Json = False) -> None:
     Examples:
       airmuscle show dmsp-20-300
       airmuscle show matrix-821
+      airmuscle show festo-dmsp-20
       airmuscle show my/muscle.toml --json
     """
-    data = entry_to_dict(load(name))
+    entry: Any = load(name)
+    if resting_length is not None or diameter is not None:
+        entry = scale_entry(entry, resting_length=resting_length, diameter=diameter)
+    data = entry_to_dict(entry)
     if json:
         print_json(data)
     else:
         _print(data)
 
 
-def entry_to_dict(entry: Entry | ValveEntry | PlantEntry) -> dict[str, Any]:
+def entry_to_dict(entry: Entry | ValveEntry | PlantEntry | ProductEntry) -> dict[str, Any]:
     """An entry as plain data, all numbers SI."""
     parts = {part: getattr(entry, part) for part in PARTS if getattr(entry, part, None) is not None}
     # A geometric law contains the geometry among its own parameters; it is listed once.
@@ -70,6 +78,7 @@ def entry_to_dict(entry: Entry | ValveEntry | PlantEntry) -> dict[str, Any]:
         ],
         "sources": dict(getattr(entry, "sources", ())),
         "references": [str(reference) for reference in cite(entry)],
+        **({"laws": list(entries_of_product(entry.name))} if isinstance(entry, ProductEntry) else {}),
     }
 
 
@@ -85,6 +94,7 @@ def _parameter_rows(part: str, model: Any) -> list[dict[str, Any]]:
             "fitted": leaf.declared.fitted,
         }
         for leaf in leaves(model)
+        if not isinstance(model, Ratings) or leaf.declared.name in model.stated
     ]
 
 
@@ -100,6 +110,8 @@ def _print(entry: dict[str, Any]) -> None:
         for p in _shorten(entry["parameters"])
     ]
     print_table(("parameter", "symbol", "value", "unit", "meaning", "bounds"), rows, right=("value",))
+    if "laws" in entry:
+        echo(f"\nmuscles and laws of this product: {', '.join(entry['laws']) or 'none; fit one to measurements'}")
     if entry["checks"]:
         checks = [
             (

@@ -11,11 +11,13 @@ import typer
 
 from ..characteristic import Characteristic, ForceLaw, ValidityRange
 from ..core import leaves
-from ..core.errors import AirmuscleWarning, GeometryLimitError, PhysicsError, SolveError
+from ..core.errors import AirmuscleWarning, GeometryLimitError, PhysicsError, RatingError, SolveError
 from ..core.plotting import save
 from ..core.units import quantity
 from ..library.entry import Entry
 from ..library.law_file import load_law
+from ..library.scaling import scale_entry
+from ..muscle import Ratings
 from ..pneumatics import Ambient
 from ..pneumatics.gas import check_above_vacuum
 from ..report.isobar_plot import (
@@ -28,7 +30,7 @@ from ..report.isobar_plot import (
 )
 from ..report.output_folder import atomic_folder
 from ..report.write import save_table
-from .options import Json, Name, OptionalFolder
+from .options import Diameter, Json, Name, OptionalFolder, RestingLength
 from .terminal import echo, percent, print_json, print_table
 
 UNITS = {"pressure": "Pa", "contraction": "1", "force": "N"}
@@ -45,6 +47,8 @@ def solve(
     pressure: Pressure = None,
     contraction: Contraction = None,
     force: Force = None,
+    resting_length: RestingLength = None,
+    diameter: Diameter = None,
     out: OptionalFolder = None,
     json: Json = False,
 ) -> None:
@@ -52,21 +56,24 @@ def solve(
 
     \b
     If several solutions exist, the result is the one reached from the state of rest.
+    A point that the maker does not permit is refused, or, where it was measured, reported with a warning.
     With --out, DIR/isobars.png and DIR/isobars.csv show force over contraction, with the operating point.
 
     \b
     Examples:
       airmuscle solve dmsp-20-300 --pressure "3 bar" --force "100 N"
       airmuscle solve dmsp-20-300 --contraction "12 %" --force "100 N" --out chart
+      airmuscle solve tondu-lopez --diameter "30 mm" --resting-length "200 mm" --pressure "3 bar" --force "100 N"
       airmuscle solve my/muscle.toml --pressure "400 kPa" --contraction 0.1 --json
     """
     texts = {"pressure": pressure, "contraction": contraction, "force": force}
     missing = [name for name, text in texts.items() if text is None]
     if len(missing) != 1:
         raise typer.BadParameter(f"give two of --pressure, --contraction and --force, not {3 - len(missing)}")
-    entry = load_law(name)
+    entry = scale_entry(load_law(name), resting_length=resting_length, diameter=diameter)
     point = _solve(entry.characteristic, texts)
     validity_range = validity_range_of(entry.characteristic, entry.validity_range)
+    _check_ratings(point, entry.ratings, validity_range)
     _warn(point, validity_range)
     if json:
         print_json(_to_dict(entry, point, validity_range, missing[0]))
@@ -112,6 +119,20 @@ def _stiffness(entry: Entry, point: WorkingPoint) -> float | None:
         return float(entry.characteristic.stiffness(point.pressure, point.contraction))
     except PhysicsError:
         return None
+
+
+def _check_ratings(point: WorkingPoint, ratings: Ratings | None, validity_range: ValidityRange | None) -> None:
+    """Warn of a measured point that the maker does not permit. Raises RatingError for one that was not measured."""
+    excesses = ratings.excesses(**point._asdict()) if ratings is not None else ()
+    if not excesses:
+        return
+    text = "; ".join(excesses)
+    if validity_range is None or not validity_range.contains(point.pressure, point.contraction):
+        raise RatingError(
+            f"beyond the values that the maker permits, and not measured: {text}. Choose a permitted point, or a "
+            "larger muscle."
+        )
+    warnings.warn(f"beyond the values that the maker permits: {text}.", AirmuscleWarning, stacklevel=2)
 
 
 def _warn(point: WorkingPoint, validity_range: ValidityRange | None) -> None:
@@ -165,6 +186,7 @@ def _to_dict(entry: Entry, point: WorkingPoint, validity_range: ValidityRange | 
         "stiffness": _stiffness(entry, point),
         "resting_length": _resting_length(entry),
         "inside_validity_range": inside,
+        "permitted": None if entry.ratings is None else not entry.ratings.excesses(**point._asdict()),
         "units": {**UNITS, "pressure": "Pa gauge", "stiffness": "N per unit of contraction", "resting_length": "m"},
     }
 

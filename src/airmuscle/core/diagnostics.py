@@ -16,6 +16,7 @@ class DiagnosticCode(enum.StrEnum):
     INTEGRATOR = "integrator"
     MODEL = "model"
     CONTROLLER = "controller"
+    RATING = "rating"
     EXTRAPOLATION = "extrapolation"
     FRICTION_EXTRAPOLATION = "friction extrapolation"
     GEOMETRY_LIMIT = "geometry limit"

@@ -114,6 +114,10 @@ class GeometryLimitError(PhysicsError):
     """A contraction outside the range of the geometry."""
 
 
+class RatingError(PhysicsError):
+    """An operating point that the maker of the muscle does not permit, outside the range of the measurements."""
+
+
 class EquilibriumError(PhysicsError):
     """A plant has no equilibrium; the message names the muscle and the forces."""
 

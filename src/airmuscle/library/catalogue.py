@@ -17,22 +17,26 @@ from .files import (
     DATA,
     LAWS,
     PLANTS,
+    PRODUCTS,
     VALVES,
     complete_name,
     is_path,
     list_data,
     list_library,
     list_plants,
+    list_products,
     list_valves,
     read_toml,
 )
-from .law_file import describes_plant, describes_valve
+from .law_file import describes_plant, describes_product, describes_valve
 from .plant_file import PlantEntry, build_plant_entry
+from .product_entry import ProductEntry, build_product_entry
 from .valve_entry import ValveEntry
 
 
-def load(name_or_path: str | Path) -> Entry | ValveEntry | PlantEntry:
-    """A library entry (muscle, law, valve or plant) by its name or a unique beginning of it, or a file by its path.
+def load(name_or_path: str | Path) -> Entry | ValveEntry | PlantEntry | ProductEntry:
+    """A library entry (muscle, law, valve, plant or product) by its name or a unique beginning of it, or a file by its
+    path.
 
     In a plant, write `.muscle` of an Entry, and `.valve` or `.exhaust` of a ValveEntry; a PlantEntry contains a
     `.plant`. Raises UnknownNameError,
@@ -42,19 +46,27 @@ def load(name_or_path: str | Path) -> Entry | ValveEntry | PlantEntry:
         path = file = Path(name_or_path)
     else:
         name = complete_name(str(name_or_path), list_library(), "library entry")
-        folder = VALVES if name in list_valves() else PLANTS if name in list_plants() else LAWS
+        folder = _folder_of(name)
         path = folder / f"{name}.toml"
         file = Path(path.name)
     tables = read_toml(path)
-    entry: Entry | ValveEntry | PlantEntry
+    entry: Entry | ValveEntry | PlantEntry | ProductEntry
     if describes_valve(tables):
         entry = build_valve_entry(tables, path.stem, file)
     elif describes_plant(tables):
         entry = build_plant_entry(tables, path.stem, file, path.parent)
+    elif describes_product(tables):
+        entry = build_product_entry(tables, path.stem, file)
     else:
         entry = build_entry(tables, path.stem, file, path.parent)
     issue_warning(entry.name, entry.warning, stacklevel=2)
     return entry
+
+
+def _folder_of(name: str) -> Path:
+    """The folder of the file of an entry."""
+    folders = ((VALVES, list_valves()), (PLANTS, list_plants()), (PRODUCTS, list_products()))
+    return next((folder for folder, names in folders if name in names), LAWS)
 
 
 def load_data(name: str) -> Recording:

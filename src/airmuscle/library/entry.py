@@ -11,7 +11,7 @@ from ..core.errors import AirmuscleWarning, UnknownNameError
 from ..core.reference import Reference
 from ..friction.base import Friction
 from ..geometry.base import Geometry
-from ..muscle import CreepElements, Damper, Muscle, SeriesElement, Spring, Stop, Wall
+from ..muscle import CreepElements, Damper, Muscle, Ratings, SeriesElement, Spring, Stop, Wall
 from .uncertainty import ParameterUncertainty
 
 OPTIONAL_PARTS = ("spring", "damper", "friction", "wall", "series", "stop", "creep")
@@ -42,7 +42,8 @@ class Entry:
 
     `provenance` is the origin of the numbers (printed, measured, secondary source, fitted, chosen), `warning` a
     restriction of use, which is issued when the entry is loaded, `validity_range` the range of the measurements or the
-    publication, and `uncertainty` the standard errors and correlations of fitted parameters, if the file states them.
+    publication, `uncertainty` the standard errors and correlations of fitted parameters, if the file states them, and
+    `ratings` the values that the maker of the muscle permits, if known.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Entry:
     note: str = ""
     warning: str = ""
     validity_range: ValidityRange | None = None
+    ratings: Ratings | None = None
     checks: tuple[Check, ...] = ()
     references: tuple[Reference, ...] = ()
     uncertainty: ParameterUncertainty | None = None
@@ -72,7 +74,9 @@ class Entry:
             missing = MISSING_GEOMETRY if self.geometry is None else "a law solved for the force: see as_force_law"
             raise UnknownNameError(f"{self.name} is a characteristic, not a muscle; it lacks {missing}.")
         parts = {part: getattr(self, part) for part in OPTIONAL_PARTS if getattr(self, part) is not None}
-        return Muscle(self.characteristic, self.geometry, validity_range=self.validity_range, **parts)
+        return Muscle(
+            self.characteristic, self.geometry, validity_range=self.validity_range, ratings=self.ratings, **parts
+        )
 
 
 def issue_warning(name: str, warning: str, stacklevel: int) -> None:

@@ -8,7 +8,6 @@ from typing import Any
 
 from ..characteristic.base import Characteristic
 from ..characteristic.validity_range import ValidityRange
-from ..core.declaration import parameters
 from ..core.errors import ParameterError, suggestion
 from ..friction.base import Friction
 from ..geometry.base import Geometry
@@ -16,6 +15,7 @@ from ..muscle import CreepElements, Damper, SeriesElement, Spring, Stop, Wall
 from .build import TEXT_KEYS, build, read_entry_texts
 from .entry import Check, Entry
 from .location import Location, check_keys, check_type, read_finite_number, read_table_array, read_text
+from .product_entry import build_limits, read_ratings
 from .references import read_references
 from .uncertainty import read_uncertainty
 
@@ -26,7 +26,7 @@ PARTS = {
     "wall": Wall, "series": SeriesElement, "stop": Stop, "creep": CreepElements,
 }  # fmt: skip
 """Tables of an entry file that describe a model, each with the class that is required."""
-KEYS = (*TEXT_KEYS, *PARTS, "validity_range", "uncertainty", "check", "reference")
+KEYS = (*TEXT_KEYS, *PARTS, "product", "ratings", "validity_range", "uncertainty", "check", "reference")
 """Keys of an entry file."""
 _CONDITIONS = {
     "pressure": ("contraction", "force"),
@@ -58,26 +58,21 @@ def build_entry(tables: Mapping[str, Any], name: str, file: Path, folder: Path) 
     if "geometry" not in parts:
         geometry = getattr(parts["characteristic"], "geometry", None)
         parts["geometry"] = geometry if isinstance(geometry, Geometry) else None
+    ratings, product_references = read_ratings(tables, location)
     return Entry(
         name=name,
         **texts,
         **parts,
-        validity_range=_build_validity_range(tables["validity_range"], location.inside("validity_range"))
+        ratings=ratings,
+        validity_range=build_limits(ValidityRange, tables["validity_range"], location.inside("validity_range"))
         if "validity_range" in tables
         else None,
         checks=tuple(_read_check(*row) for row in read_table_array(tables, "check", location)),
-        references=read_references(tables, location),
+        references=(*read_references(tables, location), *product_references),
         uncertainty=read_uncertainty(tables["uncertainty"], location.inside("uncertainty"))
         if "uncertainty" in tables
         else None,
     )
-
-
-def _build_validity_range(table: Any, location: Location) -> Any:
-    if not isinstance(table, Mapping):
-        keys = ", ".join(declared.name for declared in parameters(ValidityRange))
-        raise ParameterError(f"{location} is {table!r}; it must be a table. Write its limits in it: {keys}.")
-    return check_type(build({"model": "ValidityRange", **table}, location), ValidityRange, location)
 
 
 def _read_check(table: Mapping[str, Any], location: Location) -> Check:

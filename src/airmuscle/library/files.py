@@ -16,13 +16,15 @@ VALVES = LAWS / "valves"
 """Folder of the valves."""
 PLANTS = LAWS / "plants"
 """Folder of the plants."""
+PRODUCTS = LAWS / "products"
+"""Folder of the ratings of commercial muscles."""
 DATA = LAWS / "data"
 """Folder of the data sets."""
 
 
 def list_library() -> tuple[str, ...]:
-    """Names of all entries that `load` reads: muscles, laws, valves and plants, sorted."""
-    return tuple(sorted((*list_laws(), *list_valves(), *list_plants())))
+    """Names of all entries that `load` reads: muscles, laws, valves, plants and products, sorted."""
+    return tuple(sorted((*list_laws(), *list_valves(), *list_plants(), *list_products())))
 
 
 def list_laws() -> tuple[str, ...]:
@@ -38,6 +40,16 @@ def list_valves() -> tuple[str, ...]:
 def list_plants() -> tuple[str, ...]:
     """Names of all plants, sorted."""
     return tuple(sorted(path.stem for path in PLANTS.glob("*.toml")))
+
+
+def list_products() -> tuple[str, ...]:
+    """Names of all commercial muscles of which the ratings are known, sorted."""
+    return tuple(sorted(path.stem for path in PRODUCTS.glob("*.toml")))
+
+
+def entries_of_product(name: str) -> tuple[str, ...]:
+    """Names of the muscles and laws of the library that were measured on a product, sorted."""
+    return tuple(law for law in list_laws() if read_toml(LAWS / f"{law}.toml").get("product") == name)
 
 
 def list_data() -> tuple[str, ...]:

@@ -28,13 +28,18 @@ from .build import TEXT_KEYS, build, read_entry_texts
 from .entry import MISSING_GEOMETRY, Entry, issue_warning
 from .files import PLANTS, complete_name, list_plants, read_toml
 from .law_file import load_law
-from .location import Location, check_keys, check_type, located_errors, read_text
+from .location import Location, check_keys, check_type, located_errors, read_finite_number, read_text
 from .references import read_references
+from .scaling import scale_entry
 
 SCENARIO_TABLES = ("plant", "input", "run", "output")
 """Tables of a plant of the library that a scenario has, too."""
 KEYS = (*TEXT_KEYS, *SCENARIO_TABLES, "sources", "reference")
 """Keys of the file of a plant."""
+
+
+SIZES = ("resting_length", "diameter")
+"""Sizes to which a table that names a library entry may scale its muscle."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -116,12 +121,20 @@ def build_muscle(value: Any, location: Location) -> Muscle:
     if isinstance(value, Mapping):
         table = {"model": "Muscle", **value}
         name = table.pop("library", None)
-        parts = {} if name is None else _entry_parts(_load_entry(name, location.inside("library")), table, location)
+        parts = {} if name is None else _entry_parts(_load_scaled(name, table, location), table, location)
         muscle: Muscle = build(table, location, parts)
         return muscle
     entry = _load_entry(value, location)
     with located_errors(location):
         return entry.muscle
+
+
+def _load_scaled(name: Any, table: dict[str, Any], location: Location) -> Entry:
+    """The entry of this name, scaled to the sizes of the table, which are removed from it."""
+    entry = _load_entry(name, location.inside("library"))
+    sizes = {key: read_finite_number(table.pop(key), "m", f"{location}, {key}") for key in SIZES if key in table}
+    with located_errors(location):
+        return scale_entry(entry, **sizes)
 
 
 def _load_entry(value: Any, location: Location) -> Entry:

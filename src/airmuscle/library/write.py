@@ -22,6 +22,8 @@ def to_toml(entry: Entry) -> str:
         belongs_to_law = part == "geometry" and thing == getattr(entry.characteristic, "geometry", None)
         if thing is not None and not belongs_to_law:
             tables[part] = _model_table(thing)
+    if entry.ratings is not None:
+        tables["ratings"] = {name: getattr(entry.ratings, name) for name in entry.ratings.stated}
     if entry.validity_range is not None:
         tables["validity_range"] = dataclasses.asdict(entry.validity_range)
     if entry.uncertainty is not None:

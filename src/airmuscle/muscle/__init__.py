@@ -3,6 +3,7 @@
 from .creep import CreepElements
 from .damper import Damper, DirectionalDamper, LinearDamper, PressureDamper
 from .muscle import INNER_CONTRACTION, Muscle
+from .ratings import RatedRange, Ratings
 from .reynolds2003 import Reynolds2003Damper, Reynolds2003Spring
 from .series import CubicSeriesSpring, ElasticSeriesElement, RigidSeriesElement, SeriesElement, SeriesSpring
 from .serres2009 import Serres2009Damper, Serres2009Spring
@@ -24,6 +25,8 @@ __all__ = [
     "Muscle",
     "NoStop",
     "PressureDamper",
+    "RatedRange",
+    "Ratings",
     "Reynolds2003Damper",
     "Reynolds2003Spring",
     "RigidSeriesElement",

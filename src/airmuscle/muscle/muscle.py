@@ -21,6 +21,7 @@ from ..friction.base import Friction, NoFriction
 from ..geometry.base import Geometry
 from .creep import CreepElements
 from .damper import Damper, LinearDamper
+from .ratings import Ratings
 from .series import ElasticSeriesElement, RigidSeriesElement, SeriesElement
 from .series_equilibrium import solve_inner_contraction, without_derivative
 from .spring import LinearSpring, Spring
@@ -71,6 +72,8 @@ class Muscle:
     series: SeriesElement = RigidSeriesElement()
     stop: Stop = NoStop()
     creep: CreepElements = CreepElements()
+    ratings: Ratings | None = None
+    """Values that the maker permits, if known; a simulation reports when and how far they are exceeded."""
 
     @classmethod
     def ideal(cls, geometry: Geometry, name: str = "muscle") -> Muscle:
@@ -90,6 +93,8 @@ class Muscle:
             raise ParameterError(
                 f"Muscle: validity_range is {abridged(self.validity_range)}; it must be a ValidityRange or None."
             )
+        if not isinstance(self.ratings, Ratings | None):
+            raise ParameterError(f"Muscle: ratings is {abridged(self.ratings)}; it must be a Ratings or None.")
         if isinstance(self.series, ElasticSeriesElement):
             self._check_series_elements()
 

@@ -62,12 +62,16 @@ def extrapolation(limits: Sequence[ColumnLimit], columns: Columns) -> list[Diagn
 
 def _exceeds(limits: tuple[float, float], bounds: tuple[float, float]) -> bool:
     (smallest, largest), (low, high) = limits, bounds
-    slack = _TOLERANCE * (high - low)
+    span = high - low if np.isfinite(high - low) else abs(high if np.isfinite(high) else low)
+    slack = _TOLERANCE * span
     return smallest < low - slack or largest > high + slack
 
 
 def _limits(muscle: Muscle, prefix: str) -> Iterator[tuple[DiagnosticCode, str, str, tuple[float, float]]]:
     """The columns of a muscle that have limits: kind of the limit, column, quantity, lower and upper limit."""
+    for rated in muscle.ratings.ranges() if muscle.ratings else ():
+        if rated.quantity in ("force", "pressure", "contraction"):
+            yield DiagnosticCode.RATING, f"{prefix}{rated.quantity}", rated.quantity, (rated.low, rated.high)
     stated = muscle.validity_range or getattr(muscle.contractile, "validity_range", None)
     if stated is not None:
         yield DiagnosticCode.EXTRAPOLATION, f"{prefix}pressure", "pressure", stated.pressure
@@ -86,9 +90,10 @@ def _excess(
     """The diagnostic of a column of pressure, speed or contraction that exceeds its limits."""
     low, high = bounds
     excess = np.maximum(low - values, values - high)
-    scale, unit = {"pressure": (1e3, "kPa"), "speed": (1.0, "m/s")}.get(quantity, (0.01, "%"))
+    scale, unit = {"pressure": (1e3, "kPa"), "speed": (1.0, "m/s"), "force": (1.0, "N")}.get(quantity, (0.01, "%"))
     worst, rows = int(np.argmax(excess)), int(np.count_nonzero(excess > 0))
     where, meaning = {
+        DiagnosticCode.RATING: ("the range that its maker permits", "the muscle may be damaged there"),
         DiagnosticCode.EXTRAPOLATION: ("the validity range of its characteristic", "values there are extrapolated"),
         DiagnosticCode.FRICTION_EXTRAPOLATION: (
             "the range of the data of its friction",
@@ -97,11 +102,27 @@ def _excess(
         DiagnosticCode.GEOMETRY_LIMIT: ("the contraction range of its geometry", "such contractions are not physical"),
     }[code]
     text = (
-        f"{subject} was outside {where} in {quantity.replace('_', ' ')} ({low / scale:.4g} to {high / scale:.4g} "
+        f"{subject} was outside {where} in {quantity.replace('_', ' ')} ({_span(low / scale, high / scale)} "
         f"{unit}) in {rows / values.size:.0%} of the rows, by at most {excess[worst] / scale:.4g} {unit} at "
         f"{time[worst]:.4g} s; {meaning}"
     )
     return Diagnostic(code, subject, text, rows)
+
+
+def _span(low: float, high: float) -> str:
+    if np.isinf(high):
+        return f"at least {low:.4g}"
+    return f"{low:.4g} to {high:.4g}" if np.isfinite(low) else f"at most {high:.4g}"
+
+
+def rated_temperature(muscles: Sequence[Muscle], ambient_temperature: float) -> list[Diagnostic]:
+    """Diagnostics of muscles for which the maker does not permit this ambient temperature [K]."""
+    return [
+        Diagnostic(DiagnosticCode.RATING, muscle.name, f"{muscle.name}: {text}")
+        for muscle in muscles
+        if muscle.ratings
+        for text in muscle.ratings.excesses(temperature=ambient_temperature)
+    ]
 
 
 class Enclosure(NamedTuple):

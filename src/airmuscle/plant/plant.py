@@ -278,7 +278,8 @@ class Plant(System):
             remarks |= self._outside(prefix, circuit.validity_warnings(self._within(prefix, columns), self.ambient))
         names = [(name.removesuffix("."), text) for name, text in remarks.items()]
         components = [Diagnostic(DiagnosticCode.COMPONENT, name, f"{name}: {text}") for name, text in names]
-        return [*diagnostics.extrapolation(self._column_limits, columns), *components]
+        rated = diagnostics.rated_temperature(self.muscles, self.ambient.temperature)
+        return [*rated, *diagnostics.extrapolation(self._column_limits, columns), *components]
 
     @functools.cached_property
     def _column_limits(self) -> tuple[diagnostics.ColumnLimit, ...]:

@@ -56,7 +56,7 @@ def check_text_file(path: Path) -> None:
     if kind:
         raise FileError(
             f"{path.name}: the file is {kind}, not a table of text. Export the data as text (.csv), or give the file "
-            "the extension of its format (.xlsx, .mat, .tdms, .mf4)."
+            "the extension of its format (.xlsx, .ods, .mat, .tdms, .mf4, .parquet, .h5)."
         )
 
 

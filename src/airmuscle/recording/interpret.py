@@ -36,7 +36,7 @@ def interpret(
     """
     held = {name: value for name, value in constants.items() if _is_quantity(name)}
     run_constants = collect_constants(table, {n: value for n, value in constants.items() if n not in held})
-    headings = _resolve_headings(table, units)
+    headings = resolve_headings(table, units)
     for heading, cells in zip(headings, table.columns, strict=True):
         if not heading.known and not isinstance(cells, list):
             constant = constant_from_column(table, heading.text, heading.unit, cells)
@@ -90,7 +90,7 @@ def _apply_time_base(table: RawTable, columns: dict[str, Array], time_base: Time
     return [note] if note else []
 
 
-def _resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
+def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
     """The headings with their units, from the user, the unit row or the heading itself, in this order of precedence."""
     parsed = [parse_heading(text) for text in table.headings]
     user_units = {find_quantity_name(key) or key: unit for key, unit in units.items()}
@@ -152,7 +152,7 @@ def _convert_column(table: RawTable, heading: Heading, cells: Cells, ambient: fl
         seconds = seconds_from_clock(cells)
         if seconds is not None:
             return seconds, f"The time column contains clock times; time is counted from the first, {cells[0]}."
-    change = _conversion(table, heading, ambient)
+    change = unit_conversion(table, heading, ambient)
     values = _parse_numbers(table, heading, cells)
     if change.assumed_gauge:
         reason = f"the unit '{heading.unit}' does not state it. Write bara or kPa(a) for an absolute pressure."
@@ -165,7 +165,7 @@ def _convert_column(table: RawTable, heading: Heading, cells: Cells, ambient: fl
     return change(values), ""
 
 
-def _conversion(table: RawTable, heading: Heading, ambient: float) -> UnitConversion:
+def unit_conversion(table: RawTable, heading: Heading, ambient: float) -> UnitConversion:
     target = heading.target or "1"
     where = f"{table.origin}, column '{heading.text}'"
     usual = ", ".join(UNIT_SPELLINGS[target])

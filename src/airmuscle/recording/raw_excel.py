@@ -28,13 +28,17 @@ def read_excel_tables(path: Path, sheet: str | None = None, *, headerless: bool 
     def read() -> dict[str, Rows]:
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
         try:
-            _check_sheet_exists(path, sheet, book.sheetnames)
+            check_sheet_exists(path, sheet, book.sheetnames)
             names = [w.title for w in book.worksheets] if sheet is None else [sheet]
-            return {name: _nonempty_rows(book[name].iter_rows(values_only=True)) for name in names}
+            return {name: nonempty_rows(book[name].iter_rows(values_only=True)) for name in names}
         finally:
             book.close()
 
-    contents = run_reader(path, "an Excel workbook", read)
+    return tables_of_sheets(path, run_reader(path, "an Excel workbook", read), headerless)
+
+
+def tables_of_sheets(path: Path, contents: dict[str, Rows], headerless: bool) -> tuple[RawTable, ...]:
+    """The tables of the sheets of a workbook. Raises FileError if there is none."""
     sheets = {name: rows for name, rows in contents.items() if _contains_table(rows)}
     if not sheets:
         raise FileError(
@@ -47,14 +51,16 @@ def read_excel_tables(path: Path, sheet: str | None = None, *, headerless: bool 
     )
 
 
-def _check_sheet_exists(path: Path, sheet: str | None, names: list[str]) -> None:
+def check_sheet_exists(path: Path, sheet: str | None, names: list[str]) -> None:
+    """Raise FileError if a workbook has no sheet of this name."""
     if sheet is not None and sheet not in names:
         raise FileError(
             f"{path.name}: no sheet '{sheet}'; the sheets are {', '.join(names)}.{suggestion(sheet, names)}"
         )
 
 
-def _nonempty_rows(rows: Iterable[tuple[Any, ...]]) -> Rows:
+def nonempty_rows(rows: Iterable[tuple[Any, ...]]) -> Rows:
+    """The rows with content, with their numbers, counted from 1."""
     return [(i, list(row)) for i, row in enumerate(rows, 1) if any(cell not in (None, "") for cell in row)]
 
 

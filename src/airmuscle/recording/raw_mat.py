@@ -61,7 +61,8 @@ def read_mat_tables_here(path: Path, group: str | None, columns: Sequence[str] =
     if not selected:
         raise FileError(
             f"{path.name}: no vector of numbers (the file contains {', '.join(variables) or 'no variables'}). Objects "
-            "(timeseries, table) cannot be read: save vectors or a struct of vectors, or write the table as CSV."
+            "of MATLAB cannot be read. Save a table T by S = table2struct(T, 'ToScalar', true); save('data.mat', 'S'), "
+            "a timeseries ts by S = struct('time', ts.Time, 'force', ts.Data); save('data.mat', 'S')."
         )
     constants = _scalar_fields(variables)
     several = len(groups) > 1

@@ -12,11 +12,13 @@ from .file_kind import check_text_file
 from .interpret import interpret
 from .large_csv import Progress, is_large_file, read_large_csv
 from .mapping import ColumnMapping, apply_mapping, read_mapping
+from .raw_columnar import read_hdf5_tables, read_parquet_tables
 from .raw_csv import read_csv_table
 from .raw_excel import read_excel_tables
 from .raw_mat import read_mat_tables
 from .raw_mdf import read_mdf_tables
 from .raw_tdms import read_tdms_tables
+from .raw_workbook import read_workbook_tables
 from .recording import Recording
 from .table import RawTable
 from .time_base import RecordedTime, TimeBase
@@ -29,6 +31,11 @@ TEXT_EXTENSIONS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn")
 _BINARY_READERS: Mapping[str, Callable[[Path, ColumnMapping], Tables]] = {
     ".xlsx": lambda path, m: read_excel_tables(path, m.sheet, headerless=m.text_format.headerless),
     ".xlsm": lambda path, m: read_excel_tables(path, m.sheet, headerless=m.text_format.headerless),
+    ".xls": lambda path, m: read_workbook_tables(path, m.sheet, headerless=m.text_format.headerless),
+    ".ods": lambda path, m: read_workbook_tables(path, m.sheet, headerless=m.text_format.headerless),
+    ".parquet": lambda path, m: read_parquet_tables(path, m.group),
+    ".h5": lambda path, m: read_hdf5_tables(path, m.group),
+    ".hdf5": lambda path, m: read_hdf5_tables(path, m.group),
     ".mat": lambda path, m: read_mat_tables(path, m.group, tuple(m.columns)),
     ".tdms": lambda path, m: read_tdms_tables(path, m.group),
     ".mf4": lambda path, m: read_mdf_tables(path, m.group),
@@ -73,8 +80,8 @@ def read(
                   mapping, or the recorded time
     progress      called with the name of a file and the fraction that has been read
 
-    The extension gives the format: text (CSV), Excel, MAT, TDMS or MDF. A load in kg becomes a force with standard
-    gravity. Files whose units contradict each other are rejected.
+    The extension gives the format: text (CSV), Excel, OpenDocument, MAT, TDMS, MDF, Parquet or HDF5. A load in kg
+    becomes a force with standard gravity. Files whose units contradict each other are rejected.
 
     Raises FileError, ColumnError, UnitError or ParameterError; the message names file, row, value and remedy.
     """
@@ -128,8 +135,6 @@ def read_tables(
     suffix = path.suffix.lower()
     if suffix in _BINARY_READERS:
         return tuple(downsample(table, downsampling) for table in _BINARY_READERS[suffix](path, mapping))
-    if suffix in (".xls", ".ods"):
-        raise FileError(f"{path.name}: the format {suffix} is not supported. Save the file as .xlsx or .csv.")
     check_text_file(path)
     if is_large_file(path):
         return (read_large_csv(path, mapping.text_format, downsampling, progress),)

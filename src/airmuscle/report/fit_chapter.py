@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..analysis.energy_defect import maxwell_defect
+from ..core.errors import AirmuscleError
 from ..core.reference import cite
 from ..identify import Fit
 from ..identify.surface.shape import shape_violations_of_fit
@@ -29,7 +31,15 @@ def fit_chapter(fit: Fit, entry: Entry, notes: Sequence[str] = ()) -> Chapter:
         title=entry.title,
         summary=f"{entry.note}\n\n{remarks}",
         equations=equations,
-        tables=(_goodness_of_fit(fit), *symbols, _parameters(fit), *_violations(fit), _correlations(fit), _rows(fit)),
+        tables=(
+            _goodness_of_fit(fit),
+            *_energy_consistency(fit, entry),
+            *symbols,
+            _parameters(fit),
+            *_violations(fit),
+            _correlations(fit),
+            _rows(fit),
+        ),
         plots=tuple(
             plot for plot in (ramp_plot(fit), _isobars(fit, entry), errors, band_plot(fit)) if plot is not None
         ),
@@ -40,6 +50,19 @@ def fit_chapter(fit: Fit, entry: Entry, notes: Sequence[str] = ()) -> Chapter:
 def _goodness_of_fit(fit: Fit) -> Table:
     names, texts = zip(*fit.summary(), strict=True)
     return Table("figures", "Goodness of fit", {"quantity": list(names), "value": list(texts)})
+
+
+def _energy_consistency(fit: Fit, entry: Entry) -> list[Table]:
+    """Return a table of the Maxwell defect of the law with the volume of the muscle, if it has one."""
+    if entry.geometry is None or entry.validity_range is None:
+        return []
+    try:
+        defect = maxwell_defect(fit.model, entry.geometry, entry.validity_range)
+    except AirmuscleError:  # slack everywhere, or contractions outside the geometry
+        return []
+    title = "Energy consistency of force and volume"
+    note = "The law and the volume derive from one potential where dF/dp + dV/dL is zero."
+    return [Table("energy", title, {"quantity": ["Maxwell defect |dF/dp + dV/dL|"], "value": [str(defect)]}, note)]
 
 
 def _parameters(fit: Fit) -> Table:

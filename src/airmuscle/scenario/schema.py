@@ -19,7 +19,7 @@ from ..control.controller import RELATIVE, Controller
 from ..control.driver import Driver
 from ..core.declaration import Parameter, parameters
 from ..core.reference import Reference
-from ..library import entry_file, uncertainty
+from ..library import entry_file, plant_file, uncertainty
 from ..library.build import TEXT_KEYS
 from ..library.models import model_class, model_names
 from ..library.valve_entry import PATHS
@@ -65,6 +65,8 @@ def muscle_schema() -> Schema:
     tables = {
         **dict.fromkeys(TEXT_KEYS, _TEXT),
         **{key: models.kind(cls) for key, cls in entry_file.PARTS.items()},
+        "product": _TEXT,
+        "ratings": models.table(model_class("Ratings", "schema"), model_needed=False),
         "validity_range": models.table(model_class("ValidityRange", "schema"), model_needed=False),
         "uncertainty": _table(_uncertainty(), uncertainty.KEYS),
         "check": {"type": "array", "items": _table(check, ("quantity", "equals", "tolerance", "source"))},
@@ -185,7 +187,7 @@ def _plant(models: _ModelSchemas) -> Schema:
     plant["anyOf"] = [{"required": ["library"]}, {"required": needed}]
     name = {"description": "a library entry, or a muscle file relative to this file", **_TEXT}
     required = muscle.pop("required")
-    muscle["properties"]["library"] = name
+    muscle["properties"] |= {"library": name, **{size: _quantity("m", 0.0) for size in plant_file.SIZES}}
     table = {**muscle, "anyOf": [{"required": ["library"]}, {"required": required}]}
     each = {"anyOf": [name, table]}
     plant["properties"]["muscle"] = {"anyOf": [*each["anyOf"], {"type": "array", "items": each}]}

@@ -2,6 +2,7 @@
 
 from .agreement import RunAgreement
 from .creep import Creep, fit_creep
+from .creep_conversion import creep_elements
 from .fit import (
     ContractionPath,
     FixedCharacteristic,
@@ -28,6 +29,7 @@ __all__ = [
     "PolynomialCurve",
     "PressurePath",
     "RunAgreement",
+    "creep_elements",
     "find_holds",
     "find_loops",
     "fit_creep",

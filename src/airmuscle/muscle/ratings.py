@@ -1,0 +1,132 @@
+"""Ratings of a muscle: values that its maker permits for force, pressure, contraction, length and temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from ..characteristic.validity_range import CONTRACTION_BOUNDS, PRESSURE_BOUNDS
+from ..core.declaration import INFINITY, model, parameter, parameters
+from ..core.errors import ParameterError
+
+FORCE_BOUNDS = (0.0, 1e6)
+LENGTH_BOUNDS = (1e-3, 20.0)
+TEMPERATURE_BOUNDS = (1.0, 1000.0)
+"""Physical bounds; a limit that is not stated is equal to its bound."""
+QUANTITIES = ("force", "pressure", "contraction", "length", "temperature")
+"""Rated quantities."""
+
+
+class RatedRange(NamedTuple):
+    """Permitted range of a quantity in SI units, with the factor and the unit of its display."""
+
+    quantity: str
+    low: float
+    high: float
+    scale: float
+    unit: str
+    offset: float = 0.0
+
+    def contains(self, value: float) -> bool:
+        """Whether a value is permitted; a margin of 1e-9 of each limit allows for rounding."""
+        return self.low - 1e-9 * abs(self.low) <= value <= self.high + 1e-9 * abs(self.high)
+
+    def display(self, value: float) -> str:
+        """A value with its unit."""
+        return f"{self._scaled(value):.4g} {self.unit}"
+
+    def _scaled(self, value: float) -> float:
+        return (value - self.offset) / self.scale + 0.0
+
+    def __str__(self) -> str:
+        if self.low == -INFINITY:
+            return f"at most {self.display(self.high)}"
+        if self.high == INFINITY:
+            return f"at least {self.display(self.low)}"
+        return f"{self._scaled(self.low):.4g} to {self.display(self.high)}"
+
+
+@model
+class Ratings:
+    """Permitted values of a muscle, as its maker states them; a value that is not stated does not limit.
+
+    They belong to the product and protect it; the validity range of a characteristic belongs to the measurements.
+    Points may be permitted and not measured, or measured and not permitted.
+    """
+
+    max_force: float = parameter(
+        "N", "F_max", "permitted force", bounds=FORCE_BOUNDS, fitted=False, default=FORCE_BOUNDS[1]
+    )
+    min_pressure: float = parameter(
+        "Pa", "p_min", "least permitted gauge pressure", bounds=PRESSURE_BOUNDS, fitted=False,
+        default=PRESSURE_BOUNDS[0],
+    )  # fmt: skip
+    max_pressure: float = parameter(
+        "Pa", "p_max", "greatest permitted gauge pressure", bounds=PRESSURE_BOUNDS, fitted=False,
+        default=PRESSURE_BOUNDS[1],
+    )  # fmt: skip
+    max_contraction: float = parameter(
+        "1", "eps_max", "greatest permitted contraction", bounds=(0.0, CONTRACTION_BOUNDS[1]), fitted=False,
+        default=CONTRACTION_BOUNDS[1],
+    )  # fmt: skip
+    max_prestretch: float = parameter(
+        "1", "eps_pre", "greatest permitted elongation beyond the resting length", bounds=(0.0, -CONTRACTION_BOUNDS[0]),
+        fitted=False, default=-CONTRACTION_BOUNDS[0],
+    )  # fmt: skip
+    min_length: float = parameter(
+        "m", "L_min", "least nominal length", bounds=LENGTH_BOUNDS, fitted=False, default=LENGTH_BOUNDS[0]
+    )
+    max_length: float = parameter(
+        "m", "L_max", "greatest nominal length", bounds=LENGTH_BOUNDS, fitted=False, default=LENGTH_BOUNDS[1]
+    )
+    min_temperature: float = parameter(
+        "K", "T_min", "least permitted ambient temperature", bounds=TEMPERATURE_BOUNDS, fitted=False,
+        default=TEMPERATURE_BOUNDS[0],
+    )  # fmt: skip
+    max_temperature: float = parameter(
+        "K", "T_max", "greatest permitted ambient temperature", bounds=TEMPERATURE_BOUNDS, fitted=False,
+        default=TEMPERATURE_BOUNDS[1],
+    )  # fmt: skip
+
+    def check(self) -> None:
+        for name in ("pressure", "length", "temperature"):
+            low, high = getattr(self, f"min_{name}"), getattr(self, f"max_{name}")
+            if not low < high:
+                raise ParameterError(f"Ratings: min_{name} {low:g} must be less than max_{name} {high:g}.")
+
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """Names of the values that are stated."""
+        return tuple(p.name for p in parameters(self) if getattr(self, p.name) != p.default)
+
+    def ranges(self) -> Iterator[RatedRange]:
+        """Permitted ranges of force, pressure, contraction, length and temperature that state a limit."""
+        stated = {name: getattr(self, name) for name in self.stated}
+        stretch = -stated.get("max_prestretch", INFINITY)
+        rows = (
+            RatedRange("force", -INFINITY, stated.get("max_force", INFINITY), 1.0, "N"),
+            RatedRange("pressure", *_limits(stated, "pressure"), 1e3, "kPa"),
+            RatedRange("contraction", stretch, stated.get("max_contraction", INFINITY), 0.01, "%"),
+            RatedRange("length", *_limits(stated, "length"), 1e-3, "mm"),
+            RatedRange("temperature", *_limits(stated, "temperature"), 1.0, "°C", 273.15),
+        )
+        return (row for row in rows if row.low > -INFINITY or row.high < INFINITY)
+
+    def excesses(self, **values: float) -> tuple[str, ...]:
+        """Texts on the given quantities [SI] that are not permitted, with the allowed ranges; empty if all are.
+
+        The quantities are `force`, `pressure`, `contraction`, `length` and `temperature`. Raises ParameterError for
+        another name.
+        """
+        unknown = set(values) - set(QUANTITIES)
+        if unknown:
+            raise ParameterError(f"Ratings: '{min(unknown)}' is not rated; there are {', '.join(QUANTITIES)}.")
+        return tuple(
+            f"the {row.quantity} {row.display(values[row.quantity])} is not permitted; allowed range: {row}"
+            for row in self.ranges()
+            if row.quantity in values and not row.contains(values[row.quantity])
+        )
+
+
+def _limits(stated: Mapping[str, float], quantity: str) -> tuple[float, float]:
+    return stated.get(f"min_{quantity}", -INFINITY), stated.get(f"max_{quantity}", INFINITY)

@@ -1,0 +1,66 @@
+"""A hold that a muscle with creep elements shows gives back these elements, under a load and at a held length."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from airmuscle.core.errors import IdentificationError, ParameterError
+from airmuscle.identify.hysteresis import creep_elements, fit_creep
+from airmuscle.identify.hysteresis.creep import Creep, CreepFit
+from airmuscle.muscle import CreepElements
+from airmuscle.recording import Recording
+
+K, L0 = 20e3, 0.2
+ELEMENTS = CreepElements((8e3, 4e3), (0.5, 6.0))
+
+
+def simulated_shortening(elements: CreepElements, load: float, time: np.ndarray) -> np.ndarray:
+    """Shortening [m] under a step of the force of the contractile part, integrated with short steps."""
+    k, tau = np.array(elements.stiffnesses), np.array(elements.relaxation_times)
+    x = load / (K + k.sum())
+    z, path = np.full(k.size, x), [x]
+    for step in np.diff(time):
+        for _ in range(20):
+            rate = float(np.sum(k * z / tau)) / (K + k.sum())  # K x' + sum k z' = 0 with z' = x' - z/tau
+            z, x = z + step / 20 * (rate - z / tau), x + step / 20 * rate
+        path.append(x)
+    return np.array(path)
+
+
+@pytest.mark.parametrize("elements", [CreepElements((8e3,), (2.0,)), ELEMENTS])
+def test_a_hold_under_a_load_gives_the_elements(elements: CreepElements):
+    time = np.linspace(0.0, 40.0, 2001)
+    shortening = simulated_shortening(elements, 200.0, time)
+    rng = np.random.default_rng(0)
+    hold = Recording({"time": time, "contraction": shortening / L0 + 1e-6 * rng.standard_normal(2001)}, "hold")
+    found = creep_elements(fit_creep(hold, "contraction"), step=float(shortening[0]), stiffness=K, resting_length=L0)
+    assert sorted(found.relaxation_times) == pytest.approx(sorted(elements.relaxation_times), rel=0.03)
+    assert sorted(found.stiffnesses) == pytest.approx(sorted(elements.stiffnesses), rel=0.03)
+
+
+def test_a_hold_at_a_length_gives_the_elements():
+    time = np.linspace(0.0, 40.0, 2001)
+    pairs = zip(ELEMENTS.stiffnesses, ELEMENTS.relaxation_times, strict=True)
+    force = 300.0 - 0.005 * sum(k * np.exp(-time / tau) for k, tau in pairs)  # after a shortening by 5 mm
+    noise = 0.02 * np.random.default_rng(1).standard_normal(2001)
+    found = creep_elements(fit_creep(Recording({"time": time, "force": force + noise}, "hold"), "force"), step=0.005)
+    assert found.stiffnesses == pytest.approx(ELEMENTS.stiffnesses, rel=0.03)
+    assert found.relaxation_times == pytest.approx(ELEMENTS.relaxation_times, rel=0.03)
+
+
+def made(amplitudes: tuple[float, ...], times: tuple[float, ...], unit: str = "") -> CreepFit:
+    return CreepFit(Creep(0.1, amplitudes, times), 1e-6, (1e-3, 1e-6, 1e-6), (1e-9, 1e-9), 40.0, unit)
+
+
+def test_no_creep_gives_no_elements():
+    assert creep_elements(made((), ()), step=0.01) == CreepElements()
+
+
+def test_creep_that_passive_elements_do_not_have_and_missing_values_are_refused():
+    with pytest.raises(IdentificationError, match="opposite direction of that of passive elements"):
+        creep_elements(made((-3.0,), (2.0,), "N"), step=0.005)
+    with pytest.raises(ParameterError, match="needs the static stiffness and the resting length"):
+        creep_elements(made((0.01,), (2.0,)), step=0.005)
+    with pytest.raises(ParameterError, match="the step is 0 m"):
+        creep_elements(made((0.01,), (2.0,)), step=0.0)

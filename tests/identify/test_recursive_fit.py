@@ -1,0 +1,111 @@
+"""Recursive least squares give the fit to all samples, and name the point that adds most to it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from airmuscle.characteristic import ContractileSurface, ValidityRange
+from airmuscle.core.errors import IdentificationError, ParameterError
+from airmuscle.identify import fit
+from airmuscle.identify.censoring import UNCENSORED
+from airmuscle.identify.experiment_design import BenchLimits
+from airmuscle.identify.recursive_fit import NextPoint, RecursiveFit
+from airmuscle.recording import Recording
+
+LIMITS = BenchLimits(ValidityRange(0.0, 6e5, 0.0, 0.25), 1500.0)
+SIGMA = 2.0
+
+
+def truth(pressure, contraction):
+    """A force that is no polynomial."""
+    return 2.2e-3 * pressure * (1.0 - 3.5 * contraction) + 30.0 * np.tanh(10 * contraction) - 40 * contraction
+
+
+def samples(count: int, seed: int = 3):
+    rng = np.random.default_rng(seed)
+    pressure, contraction = rng.uniform(0, 6e5, count), rng.uniform(0, 0.25, count)
+    return pressure, contraction, truth(pressure, contraction) + SIGMA * rng.standard_normal(count)
+
+
+def fitted(count: int, **options) -> RecursiveFit:
+    result = RecursiveFit(LIMITS, **options)
+    for row in zip(*samples(count), strict=True):
+        result = result.updated(*map(float, row))
+    return result
+
+
+def test_the_coefficients_are_those_of_the_fit_to_all_samples():
+    pressure, contraction, force = samples(400)
+    pressure[:4], contraction[:4] = (0.0, 6e5, 0.0, 6e5), (0.0, 0.0, 0.25, 0.25)  # the range of the data is the limits
+    recursive = RecursiveFit(LIMITS)
+    for row in zip(pressure, contraction, force, strict=True):
+        recursive = recursive.updated(*map(float, row))
+    data = Recording({"pressure": pressure, "contraction": contraction, "force": force}, "made")
+    whole = fit(ContractileSurface.blank(), data, censoring=UNCENSORED)
+    assert recursive.model.coefficients == pytest.approx(whole.model.coefficients, rel=1e-5, abs=1e-4)
+    residuals = recursive.model.polynomial(pressure, contraction) - force
+    assert recursive.rmse == pytest.approx(float(np.sqrt(np.mean(residuals**2))), rel=1e-6)
+
+
+def test_the_standard_error_of_a_prediction_is_that_of_repeated_measurements():
+    predictions, errors = [], []
+    for seed in range(60):
+        result = RecursiveFit(LIMITS, degree=2)
+        rng = np.random.default_rng(seed)
+        for p, c in zip(rng.uniform(0, 6e5, 60), rng.uniform(0, 0.25, 60), strict=True):
+            result = result.updated(p, c, 1e-3 * p - 400 * c + SIGMA * rng.standard_normal())
+        force, error = result.force(3e5, 0.1)
+        predictions.append((force - 260.0) / error)
+        errors.append(error)
+    assert 0.75 < np.std(predictions) < 1.3
+    assert abs(np.mean(predictions)) < 0.45
+
+
+def test_points_that_are_chosen_one_by_one_determine_more_than_points_on_a_path():
+    chosen, path = RecursiveFit(LIMITS, degree=3, sigma=SIGMA), RecursiveFit(LIMITS, degree=3, sigma=SIGMA)
+    for i in range(60):
+        point = chosen.next_point()
+        chosen = chosen.updated(point.pressure, point.contraction, float(truth(point.pressure, point.contraction)))
+        path = path.updated(1e4 * i, 0.004 * i, float(truth(1e4 * i, 0.004 * i)))
+    assert chosen.determined > 0.9
+    assert path.determined < 0.5
+    with pytest.raises(IdentificationError, match=r"the samples determine the force on \d+% of the range"):
+        _ = path.model
+
+
+def test_the_next_point_keeps_to_the_greatest_force():
+    limited = RecursiveFit(BenchLimits(LIMITS.validity_range, 400.0), degree=3)
+    for row in zip(*samples(200), strict=True):
+        limited = limited.updated(*map(float, row))
+    for _ in range(30):
+        point = limited.next_point()
+        assert isinstance(point, NextPoint)
+        assert point.force <= 400.0
+        limited = limited.updated(point.pressure, point.contraction, point.force)
+
+
+def test_forgetting_follows_a_muscle_that_changes():
+    kept, forgetting = fitted(300, degree=2), fitted(300, degree=2, forgetting=0.98)
+    for p, c, f in zip(*samples(300, seed=9), strict=True):
+        kept, forgetting = (r.updated(float(p), float(c), float(f) + 50.0) for r in (kept, forgetting))
+    changed = float(truth(3e5, 0.1)) + 50.0
+    assert abs(forgetting.force(3e5, 0.1)[0] - changed) < 0.4 * abs(kept.force(3e5, 0.1)[0] - changed)
+
+
+def test_samples_outside_the_limits_are_counted_and_left_out():
+    result = RecursiveFit(LIMITS, degree=1).updated(7e5, 0.1, 900.0).updated(3e5, 0.1, 500.0)
+    assert (result.samples, result.outside) == (1, 1)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"degree": 12}, "the degree is 12; allowed range: 0 to 9"),
+        ({"forgetting": 0.2}, "forgetting 0.2 .*; allowed range: sigma and force above 0, forgetting 0.5 to 1"),
+        ({"sigma": 0.0}, "sigma is 0"),
+    ],
+)
+def test_options_out_of_their_range_are_refused(options, message):
+    with pytest.raises(ParameterError, match=message):
+        RecursiveFit(LIMITS, **options)

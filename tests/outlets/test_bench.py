@@ -1,0 +1,148 @@
+"""A growing file or a serial log is read row by row; damaged rows are left out; the surface and the next point follow.
+
+The replay has the data rate of a logger at 1 kHz by its stamps; computing time is measured in benchmarks/live.py.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from airmuscle.cli.app import app
+from airmuscle.core.errors import ColumnError, FileError
+from airmuscle.library.catalogue import load
+from airmuscle.recording import read_csv
+from airmuscle.recording.follow import MAX_UNREADABLE, RowReader, follow_lines
+
+RIG = ("--max-pressure", "6 bar", "--max-force", "1.5 kN")
+
+
+def replay(count: int = 6000, decimal: str = ".") -> str:
+    """A log at 1 kHz: contraction swept slowly and pressure in triangles, with noise."""
+    rng = np.random.default_rng(1)
+    time = np.arange(count) / 1000.0
+    pressure = 6.0 * np.abs((time / 0.7) % 2 - 1)
+    contraction = 12.5 * (1 - np.cos(2 * np.pi * time / 5.3))
+    force = 2.2e2 * pressure * (1 - 0.035 * contraction) - 4 * contraction + rng.normal(0, 2, count)
+    rows = (f"{t:.3f};{p:.5f};{c:.4f};{f:.2f}" for t, p, c, f in zip(time, pressure, contraction, force, strict=True))
+    text = "Zeit [s];Druck [bar];Kontraktion [%];Kraft [N]\n" + "\n".join(rows) + "\n"
+    return text.replace(".", decimal)
+
+
+def bench(*arguments: str, **options):
+    return CliRunner().invoke(app, ["bench", *arguments], **options)
+
+
+def test_rows_as_they_come_are_those_of_the_complete_file(tmp_path: Path):
+    text = replay(200, decimal=",")
+    (tmp_path / "log.csv").write_text(text)
+    whole = read_csv(tmp_path / "log.csv")
+    reader = RowReader("log")
+    rows = [row for line in text.splitlines() if (row := reader.read(line))]
+    for name in ("time", "pressure", "contraction", "force"):
+        assert [row[name] for row in rows] == pytest.approx(list(whole[name]), rel=1e-14)
+    assert reader.skipped == 0
+
+
+def test_a_growing_file_is_read_as_it_comes_and_a_partial_line_waits_for_its_rest(tmp_path: Path):
+    file = tmp_path / "log.csv"
+    pieces = ["pressure [kPa],contraction [%],fo", "rce [N]\n100,1", "0,200\n110,11,210\n", "120,12,2", "20\n"]
+    file.write_text("")
+    clock = itertools.count()
+    feed = iter(pieces)
+
+    def pause(_: float) -> None:
+        with file.open("a") as log:
+            log.write(next(feed, ""))
+
+    reader = RowReader("log")
+    rows = [
+        row
+        for line in follow_lines(file, idle=20, clock=lambda: next(clock), pause=pause)
+        if (row := reader.read(line))
+    ]
+    assert [row["force"] for row in rows] == [200.0, 210.0, 220.0]
+    assert rows[0]["pressure"] == 1e5
+
+
+def test_damaged_rows_of_a_serial_log_are_left_out_and_counted():
+    reader = RowReader("port", columns={"1": "pressure [bar]", "2": "length [mm]", "3": "force [N]"},
+                       constants={"resting_length": "200 mm"})  # fmt: skip
+    rows = [
+        reader.read(line)
+        for line in ("3.0,180,500", "3.0,1", "\x00\x02,180,5x", "nan,180,500", "# a remark", "3.1,178,510")
+    ]
+    assert [row is not None for row in rows] == [True, False, False, False, False, True]
+    assert rows[0]["contraction"] == pytest.approx(0.1)
+    assert reader.skipped == 3
+
+
+def test_a_stream_of_noise_is_refused():
+    reader = RowReader("port")
+    for line in ("pressure [bar],contraction [%],force [N]", "1,2,3"):
+        reader.read(line)
+    for _ in range(MAX_UNREADABLE):
+        assert reader.read("garbage,") is None
+    with pytest.raises(ColumnError, match=r"successive lines are no rows of 3 numbers. Check the baud rate"):
+        reader.read("garbage,")
+    with pytest.raises(ColumnError, match="no column '7'; the columns are 1, 2"):
+        RowReader("port", columns={"1": "pressure [bar]", "7": "force [N]"}).read("1,2")
+    with pytest.raises(FileError, match="cannot be read"):
+        list(follow_lines("no/such.csv", idle=0))
+
+
+def test_a_replay_at_1_khz_gives_the_surface_and_a_next_point(tmp_path: Path):
+    (tmp_path / "log.csv").write_text(replay())
+    result = bench(
+        "--follow",
+        str(tmp_path / "log.csv"),
+        *RIG,
+        "--idle",
+        "0",
+        "--degree",
+        "3",
+        "--out",
+        str(tmp_path / "live"),
+        "--json",
+    )
+    assert result.exit_code == 0, result.stderr
+    reports = [json.loads(line) for line in result.stdout.splitlines()]
+    assert [report["samples"] for report in reports[:3]] == [1000, 2000, 3000]
+    assert reports[-1]["rmse"] == pytest.approx(2.0, rel=0.1)
+    assert reports[-1]["determined"] == 1.0
+    assert set(reports[-1]["next"]) == {"pressure", "contraction", "force", "standard_error"}
+    law = load(tmp_path / "live" / "muscle.toml").characteristic
+    assert float(law.force(3e5, 0.1)) == pytest.approx(220 * 3 * 0.65 - 40, abs=2.0)
+
+
+def test_standard_input_is_followed_to_its_end():
+    result = bench("--follow", "-", *RIG, "--degree", "2", input=replay(1500))
+    assert result.exit_code == 0, result.stderr
+    assert result.stdout.count("samples, rms residual") == 2
+    assert "next:" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "pressure [bar],force [N]\n1,2\n",
+            "there is no contraction or a length with --resting-length; the columns are pressure, force",
+        ),
+        (
+            "pressure [bar],contraction [%],force [N]\n9,2,3\n",
+            r"no row lies within the limits of the test rig \(1 outside",
+        ),
+        ("u,w\n1,2\n", "no column is a known quantity"),
+    ],
+)
+def test_a_stream_without_what_is_needed_is_refused(text: str, message: str):
+    result = bench("--follow", "-", *RIG, input=text)
+    assert result.exit_code == 1
+    assert re.search(message, result.stderr)
