@@ -168,9 +168,8 @@ def fit(
     if characteristic is None and not compare:
         raise typer.BadParameter("give the characteristic to fit with --characteristic, or rank all with --compare")
     options = FitOptions.parse(bootstrap, profile, leave_out, shape, free_contraction, compare, purpose, length_error)
-    request = FitRequest(
-        options, tuple(fix or ()), degree, robust, uncensored, equal_weights, out, json, parse_braid(braid)
-    )
+    request = FitRequest(options, tuple(fix or ()), degree, robust, uncensored, equal_weights, out, json,
+                         parse_braid(braid))  # fmt: skip
     columns = column_mapping(mapping, column=column, constant=constant, file_name=file_name, time=time,
                              resting_length=resting_length, ambient=ambient)  # fmt: skip
     recordings = read_recordings(files, unit, columns)
