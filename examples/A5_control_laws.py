@@ -86,11 +86,11 @@ for i, (name, outer) in enumerate(tracking.items()):
 upper.plot(wave_times, wave / mm, color=plotting.BLACK, linestyle="--", linewidth=0.9)
 upper.set(xlabel="time [s]", ylabel="position [mm]", xlim=(0, 2))
 
-small = am.Valve(conductance=1e-9, critical_ratio=0.35)
+small = am.Valve(conductance=3e-10, critical_ratio=0.35)
 slow = replace(plant, circuit=am.FillDischarge(am.Supply(6 * bar), small, small))
 wanted = am.Schedule({"position": ((0, y0), (0.2, y0 + 8 * mm))})
 switching = {
-    "dead zone": DeadZoneController("position", split, zone=0.3 * mm, lead_time=0.05, filter_time=0.01),
+    "dead zone": DeadZoneController("position", split, zone=0.5 * mm, lead_time=0.02, filter_time=0.005),
     "sigma-delta": SigmaDelta(PID("position", split, gain=60.0), minimum=0.02),
     "sliding mode": SlidingMode("position", split, 1.0, sliding_time=0.05, boundary_layer=4 * mm, filter_time=0.01),
     "super-twisting": SuperTwisting("position", split, 8.0, 0.2, sliding_time=0.05, filter_time=0.01),
@@ -145,7 +145,7 @@ inner = Decentralised(
 outer = AngleAndStiffness(inverse, ("left.pressure", "right.pressure"), gain=30.0, integral_time=0.3)
 law = Cascade(outer, inner, (0.1 * bar,) * 2, (5.5 * bar,) * 2)
 rest = am.find_equilibrium(joint, pressure=2.5 * bar)
-low, high = (float(inverse.stiffness(p * bar, p * bar, 0.0)) for p in (1.5, 3.5))
+low, high = (float(inverse.stiffness(p * bar, p * bar, 0.0)) for p in (2.5, 4.0))
 wanted = am.Schedule({"angle": ((0, 0.0), (0.2, 0.3)), "stiffness": ((0, low), (1.5, high))})
 record = run(law, wanted, 3.0, plant=joint, start=rest, sample_time=5 * ms)
 stiffness = np.array(
@@ -158,8 +158,8 @@ print(f"joint: angle {record['angle'][-1]:.4f} rad for 0.3, stiffness {stiffness
 joint_axes.plot(record["time"], record["angle"] / 0.3, label="angle / 0.3 rad")
 joint_axes.plot(record["time"], stiffness / high, label=f"stiffness / {high:.0f} N m/rad")
 joint_axes.set(xlabel="time [s]", ylabel="share of the final set point")
-for each in (upper, valves, joint_axes):
-    each.legend(fontsize=7)
-figure.tight_layout()
+for each, top in ((upper, 23.5), (valves, 24.5), (joint_axes, 1.9)):
+    each.set_ylim(top=top)
+    each.legend(fontsize=7, loc="upper left", frameon=False)
 plotting.save(figure, "control_laws.png")
 print("wrote control_laws.png")

@@ -11,6 +11,7 @@ from control_plants import LIFT
 
 import airmuscle as am
 from airmuscle.analysis import ExtendedKalmanFilter, StateEstimate, consistency_band, normalised_error_squared
+from airmuscle.analysis.extended_kalman_filter import exponential
 from airmuscle.core.errors import ParameterError
 from airmuscle.simulation import RungeKutta4, advance, compiled
 
@@ -65,6 +66,17 @@ def test_a_filter_that_is_told_too_little_noise_leaves_the_band():
 def test_the_band_is_that_of_the_chi_squared_distribution():
     low, high = consistency_band(4, 50)
     assert (low, high) == pytest.approx((3.25, 4.82), abs=0.01)
+
+
+def test_the_matrix_exponential_is_that_of_scipy():
+    from scipy.linalg import expm
+
+    rng = np.random.default_rng(5)
+    for size in (1e-6, 0.1, 3.0, 40.0):
+        matrix = size * rng.normal(size=(5, 5))
+        exact = expm(matrix)
+        error = np.abs(exponential(matrix) - exact).max() / np.abs(exact).max()
+        assert error <= 1e-11 * max(np.linalg.norm(matrix), 1e-4)
 
 
 def test_the_prediction_is_the_simulation_to_second_order():

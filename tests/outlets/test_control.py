@@ -365,6 +365,24 @@ def test_the_program_of_the_example_runs(tmp_path: Path):
     assert (tmp_path / "control.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
+def test_the_example_of_control_laws_tracks_learns_and_reaches_angle_and_stiffness(tmp_path):
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "examples" / "A5_control_laws.py")], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    errors = {
+        name: float(value) for name, value in re.findall(r"^(.*): rms error ([\d.]+) mm$", done.stdout, re.MULTILINE)
+    }
+    assert errors["feed-forward and feedback"] < 0.5 * min(errors["feedback"], errors["feed-forward"])
+    first, last = map(float, re.search(r"learning: rms error ([\d.]+) mm .*, ([\d.]+) mm", done.stdout).groups())
+    assert last < 0.05 * first
+    angle = re.search(r"angle ([\d.]+) rad for 0.3, stiffness ([\d.]+) N m/rad for ([\d.]+)", done.stdout).groups()
+    assert float(angle[0]) == pytest.approx(0.3, rel=0.05)
+    assert float(angle[1]) == pytest.approx(float(angle[2]), rel=0.05)
+    assert (tmp_path / "control_laws.png").stat().st_size > 10_000
+
+
 STUDY = """
 title = "gains"
 scenario = "scenario.toml"

@@ -12,7 +12,7 @@ from ..core.ops import Value
 from ..core.reference import Reference
 from ..mechanism.base import Mechanism
 from ..muscle.muscle import Muscle
-from .static_inverse import check_invertible, static_force
+from .static_inverse import check_invertible, pressure_between, static_force
 
 TONIETTI_BICCHI2002 = Reference(
     key="tonietti-bicchi-2002",
@@ -24,6 +24,10 @@ TONIETTI_BICCHI2002 = Reference(
 )
 
 
+SLACK_STEPS = 6
+"""Steps of the static inverse at the minimum tension."""
+
+
 @model
 class AntagonisticInverse:
     """Pressures (p_1, p_2) with tau(p_1, p_2, theta) = tau_r and -d tau/d theta = k_r at constant pressure.
@@ -31,8 +35,9 @@ class AntagonisticInverse:
     tau torque of both muscles on the joint, from their static tensions and the moment arms of the mechanism; k_r does
     not include the stiffness of a weight. The mean of the pressures determines the stiffness, their difference the
     torque. Both equations are solved by n Newton steps from the middle of the range p_min to p_max; one step is exact
-    for tensions that are affine in the pressure. Where a pressure leaves its range it is limited, and the other one
-    gives the torque as far as it can: torque has priority over stiffness.
+    for tensions that are affine in the pressure. No muscle is slack: each pressure is at least that of the tension
+    F_min. Where a pressure leaves its range it is limited, and the other one gives the torque as far as it can: torque
+    has priority over stiffness.
     References: Tondu and Lopez (2000), Tonietti and Bicchi (2002).
     """
 
@@ -46,6 +51,9 @@ class AntagonisticInverse:
     )
     max_pressure: float = parameter(
         "Pa", "p_max", "maximum gauge pressure of both muscles", bounds=(1.0, 1e7), fitted=False, default=6e5
+    )
+    min_tension: float = parameter(
+        "N", "F_min", "minimum tension of both muscles (default chosen)", bounds=(0.0, 1e4), fitted=False, default=5.0
     )
     steps: int = 4
 
@@ -85,10 +93,21 @@ class AntagonisticInverse:
         """Stiffness of both muscles -d tau/d theta [N m/rad] at constant pressures [Pa] and an angle [rad]."""
         return -autodiff.derivative(self, "torque", first, second, angle, wrt=2)
 
+    def slack_limits(self, angle: Value) -> tuple[Value, Value]:
+        """Lowest gauge pressures [Pa] at an angle [rad] at which the muscles have their minimum tension."""
+        lengths = [muscle.geometry.resting_length for muscle in self.muscles]
+        contractions = self.mechanism.contractions({self.coordinate: angle}, lengths)
+        first, second = (
+            pressure_between(self.min_pressure, self.max_pressure, muscle, c, self.min_tension, SLACK_STEPS)
+            for muscle, c in zip(self.muscles, contractions, strict=True)
+        )
+        return first, second
+
     def pressures(self, angle: Value, torque: Value, stiffness: Value) -> tuple[Value, Value]:
         """Gauge pressures [Pa] of both muscles at an angle [rad] for a torque [N m] and a stiffness [N m/rad]."""
-        low, high = self.min_pressure, self.max_pressure
-        first = second = 0.5 * (low + high)
+        high = self.max_pressure
+        low_first, low_second = self.slack_limits(angle)
+        first = second = 0.5 * (self.min_pressure + high)
         for _ in range(self.steps):
             missing_torque = torque - self.torque(first, second, angle)
             missing_stiffness = stiffness - self.stiffness(first, second, angle)
@@ -98,12 +117,12 @@ class AntagonisticInverse:
             determinant = ops.where(determinant == 0.0, 1.0, determinant)
             first = first + (d * missing_torque - b * missing_stiffness) / determinant
             second = second + (a * missing_stiffness - c * missing_torque) / determinant
-        first, second = ops.clip(first, low, high), ops.clip(second, low, high)
+        first, second = ops.clip(first, low_first, high), ops.clip(second, low_second, high)
         for _ in range(2):
             missing = torque - self.torque(first, second, angle)
             slope = autodiff.derivative(self, "torque", first, second, angle, wrt=0)
-            first = ops.clip(first + missing / slope, low, high)
+            first = ops.clip(first + missing / slope, low_first, high)
             missing = torque - self.torque(first, second, angle)
             slope = autodiff.derivative(self, "torque", first, second, angle, wrt=1)
-            second = ops.clip(second + missing / slope, low, high)
+            second = ops.clip(second + missing / slope, low_second, high)
         return first, second

@@ -67,19 +67,25 @@ class StaticInverse:
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         """Gauge pressure [Pa] at a contraction [1] and a tension [N]; arrays broadcast."""
-        low, high = self.min_pressure, self.max_pressure
-        at_low, at_high = (self.force(p, contraction) - force for p in (low, high))
-        a, b, at_a, at_b = low, high, at_low, at_high
-        for _ in range(self.steps):
-            difference = at_b - at_a
-            c = b - at_b * (b - a) / ops.where(difference == 0.0, 1.0, difference)
-            at_c = self.force(c, contraction) - force
-            crossed = at_c * at_b < 0.0
-            share = 1.0 - at_c / ops.where(at_b == 0.0, 1.0, at_b)
-            a = ops.where(crossed, b, a)
-            at_a = ops.where(crossed, at_b, at_a * ops.where(share > 0.0, share, 0.5))
-            b, at_b = c, at_c
-        return ops.where(at_low >= 0.0, low, ops.where(at_high <= 0.0, high, b))
+        return pressure_between(self.min_pressure, self.max_pressure, self.law, contraction, force, self.steps)
+
+
+def pressure_between(
+    low: Value, high: Value, law: ForceLaw | Muscle, contraction: Value, force: Value, steps: int
+) -> Value:
+    """Gauge pressure [Pa] from `low` to `high` at which a law has a tension [N] at a contraction [1]."""
+    at_low, at_high = (static_force(law, p, contraction) - force for p in (low, high))
+    a, b, at_a, at_b = low, high, at_low, at_high
+    for _ in range(steps):
+        difference = at_b - at_a
+        c = b - at_b * (b - a) / ops.where(difference == 0.0, 1.0, difference)
+        at_c = static_force(law, c, contraction) - force
+        crossed = at_c * at_b < 0.0
+        share = 1.0 - at_c / ops.where(at_b == 0.0, 1.0, at_b)
+        a = ops.where(crossed, b, a)
+        at_a = ops.where(crossed, at_b, at_a * ops.where(share > 0.0, share, 0.5))
+        b, at_b = c, at_c
+    return ops.where(at_low >= 0.0, low, ops.where(at_high <= 0.0, high, b))
 
 
 def static_force(law: ForceLaw | Muscle, pressure: Value, contraction: Value) -> Value:
