@@ -16,11 +16,11 @@ from airmuscle.control import (
     AngleAndStiffness,
     AntagonisticInverse,
     Cascade,
+    ColumnSensor,
     ControlLoop,
     DeadZoneController,
     Decentralised,
     IterativeLearning,
-    Sensor,
     SetpointCommand,
     SigmaDelta,
     SlidingMode,
@@ -47,8 +47,8 @@ y0, step = start["position"], 5 * ms
 split = SplitRange("fill", "discharge")
 pressure = PID("pressure", split, gain=5 / bar)
 sensors = (
-    Sensor("position", resolution=0.02 * mm, delay=1),
-    Sensor("pressure", resolution=100.0, noise=500.0, delay=1),
+    ColumnSensor("position", resolution=0.02 * mm, delay=1),
+    ColumnSensor("pressure", resolution=100.0, noise=500.0, delay=1),
 )
 wave_times = np.arange(0.0, 4.0 + step / 2, step)
 wave = y0 + 8 * mm * (1 - np.cos(2 * np.pi * wave_times)) / 2

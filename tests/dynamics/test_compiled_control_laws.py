@@ -19,12 +19,12 @@ from airmuscle.control import (
     PID,
     AngleAndStiffness,
     Cascade,
+    ColumnSensor,
     ControlLoop,
     DeadZoneController,
     GainSchedule,
     SampledSignal,
     Schedule,
-    Sensor,
     SetpointCommand,
     SigmaDelta,
     SlidingMode,
@@ -74,7 +74,7 @@ def lqg():
 
 
 SENSED = (
-    Sensor("position", resolution=5e-5, delay=2, lag=3e-3), Sensor("pressure", resolution=100.0, noise=500.0, delay=1),
+    ColumnSensor("position", resolution=5e-5, delay=2, lag=3e-3), ColumnSensor("pressure", resolution=100.0, noise=500.0, delay=1),
 )  # fmt: skip
 LAWS = {
     "feed-forward": (in_cascade(FORWARD), SINE),

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from airmuscle.control import (
     PID,
     Cascade,
+    ColumnSensor,
     DeadZoneController,
     Decentralised,
     GainSchedule,
     IterativeLearning,
-    Sensor,
     SetpointCommand,
     SigmaDelta,
     SlidingMode,
@@ -116,9 +116,9 @@ def test_decentralised_laws_do_not_influence_each_other():
             "allowed range: 0 to",
         ),
         (lambda: DeadZoneController("y", "u", 1.0), "needs two, SplitRange"),
-        (lambda: Sensor("y", delay=2000), "delay is 2000 samples; allowed range: 0 to 1000"),
-        (lambda: WithSensors(PID("y", "u", 1.0), (Sensor("z"),)), "the law does not measure 'z'"),
-        (lambda: WithSensors(PID("y", "u", 1.0), (Sensor("y"), Sensor("y"))), "'y' has two sensors"),
+        (lambda: ColumnSensor("y", delay=2000), "delay is 2000 samples; allowed range: 0 to 1000"),
+        (lambda: WithSensors(PID("y", "u", 1.0), (ColumnSensor("z"),)), "the law does not measure 'z'"),
+        (lambda: WithSensors(PID("y", "u", 1.0), (ColumnSensor("y"), ColumnSensor("y"))), "'y' has two sensors"),
         (lambda: WithSensors(PID("y", "u", 1.0), (), 0.5), "seed is 0.5; it must be a whole number"),
         (lambda: IterativeLearning(0.01, (0.0, 0.0)), "the impulse response is 0"),
         (lambda: IterativeLearning(0.01, (1.0, 0.0), cutoff=60.0), "allowed range: below 50 Hz"),
@@ -224,18 +224,18 @@ def test_deviates_are_normal_and_seeds_are_independent():
 def test_a_sensor_delays_quantises_and_lags():
     direct = PID("y", "u", -1.0)
     y = np.array([0.0, 1.06, 2.0, 3.0, 4.0])
-    delayed = commanded(WithSensors(direct, (Sensor("y", delay=2),)), {"y": np.zeros(5)}, {"y": y})
+    delayed = commanded(WithSensors(direct, (ColumnSensor("y", delay=2),)), {"y": np.zeros(5)}, {"y": y})
     assert [c["u"] for c in delayed] == pytest.approx([0.0, 0.0, 0.0, 1.06, 2.0])
-    rounded = commanded(WithSensors(direct, (Sensor("y", resolution=0.25),)), {"y": np.zeros(5)}, {"y": y})
+    rounded = commanded(WithSensors(direct, (ColumnSensor("y", resolution=0.25),)), {"y": np.zeros(5)}, {"y": y})
     assert [c["u"] for c in rounded] == pytest.approx([0.0, 1.0, 2.0, 3.0, 4.0])
     step = np.array([0.0, 1.0, 1.0, 1.0, 1.0])
-    lagged = commanded(WithSensors(direct, (Sensor("y", lag=0.02),)), {"y": np.zeros(5)}, {"y": step})
+    lagged = commanded(WithSensors(direct, (ColumnSensor("y", lag=0.02),)), {"y": np.zeros(5)}, {"y": step})
     assert [c["u"] for c in lagged] == pytest.approx([1.0 - math.exp(-k * H / 0.02) for k in range(5)])
 
 
 def test_the_noise_has_its_standard_deviation_and_the_seed_determines_it():
     def run(seed):
-        law = WithSensors(PID("y", "u", -1.0), (Sensor("y", noise=0.3),), seed)
+        law = WithSensors(PID("y", "u", -1.0), (ColumnSensor("y", noise=0.3),), seed)
         return np.array([c["u"] for c in commanded(law, {"y": np.zeros(2000)}, {"y": np.zeros(2000)})])
 
     assert run(3.0).std() == pytest.approx(0.3, rel=0.06)

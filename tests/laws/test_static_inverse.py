@@ -110,15 +110,16 @@ def test_beyond_the_range_of_stiffness_the_torque_remains():
 
 def test_a_stiffness_that_would_slacken_a_muscle_keeps_both_at_the_minimum_tension():
     """Without this limit the unclamped force law answers with a pressure at which the muscle is slack."""
-    first, second = INVERSE.pressures(0.3, 0.5, 0.0)
-    lowest = INVERSE.slack_limits(0.3)
+    inverse = dataclasses.replace(INVERSE, min_pressure=0.0)
+    first, second = inverse.pressures(0.3, 0.5, 0.0)
+    lowest = inverse.slack_limits(0.3)
     lengths = [muscle.geometry.resting_length for muscle in MUSCLES]
     contractions = MECHANISM.contractions({"angle": 0.3}, lengths)
     tensions = [m.static_force(p, c) for m, p, c in zip(MUSCLES, (first, second), contractions, strict=True)]
-    assert min(tensions) == pytest.approx(INVERSE.min_tension, rel=1e-6)
+    assert min(tensions) == pytest.approx(inverse.min_tension, rel=1e-6)
     assert first >= lowest[0]
     assert second >= lowest[1]
-    assert INVERSE.torque(first, second, 0.3) == pytest.approx(0.5, rel=1e-6)
+    assert inverse.torque(first, second, 0.3) == pytest.approx(0.5, rel=1e-6)
 
 
 def test_the_torque_that_holds_the_joint_is_that_of_the_equilibrium():

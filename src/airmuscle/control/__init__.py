@@ -16,7 +16,7 @@ from .iterative_learning import IterativeLearning
 from .on_off import OnOffController
 from .pid import PID
 from .piecewise_linear import PiecewiseLinear
-from .sensors import Sensor, WithSensors
+from .sensors import ColumnSensor, WithSensors
 from .setpoint_command import SetpointCommand
 from .sigma_delta import SigmaDelta
 from .siso import SisoController
@@ -36,6 +36,7 @@ __all__ = [
     "AngleAndStiffness",
     "AntagonisticInverse",
     "Cascade",
+    "ColumnSensor",
     "ControlLaw",
     "ControlLoop",
     "ControlLoopState",
@@ -52,7 +53,6 @@ __all__ = [
     "PiecewiseLinear",
     "SampledSignal",
     "Schedule",
-    "Sensor",
     "SetpointCommand",
     "SigmaDelta",
     "SisoController",

@@ -20,7 +20,7 @@ MAX_DELAY = 1000
 
 
 @model
-class Sensor:
+class ColumnSensor:
     """Sensor of one column: first-order lag T y' = x - y, noise, quantisation, delay, in this order.
 
         y_k = y_(k-1) + (1 - exp(-h/T)) (x_k - y_(k-1)),   z_k = q floor((y_k + sigma n_k)/q + 1/2),   output z_(k-d)
@@ -39,7 +39,7 @@ class Sensor:
 
     def check(self) -> None:
         if not 0 <= self.delay <= MAX_DELAY:
-            raise ParameterError(f"Sensor: delay is {self.delay} samples; allowed range: 0 to {MAX_DELAY}.")
+            raise ParameterError(f"ColumnSensor: delay is {self.delay} samples; allowed range: 0 to {MAX_DELAY}.")
 
     @property
     def initial_memory(self) -> dict[str, float]:
@@ -78,7 +78,7 @@ class WithSensors(ControlLaw):
     from_file: ClassVar[bool] = False
 
     law: ControlLaw
-    sensors: tuple[Sensor, ...]
+    sensors: tuple[ColumnSensor, ...]
     seed: float = parameter("1", "seed", "seed of the noise", bounds=(0.0, 2147483644.0), fitted=False, default=0.0)
 
     def check(self) -> None:
