@@ -308,7 +308,7 @@ def test_the_schema_knows_every_controller():
         "StaticFeedForward",
         "WithFeedForward",
     ]
-    assert tables[1]["properties"]["gain"]["description"] == "K [u/y]: proportional gain"
+    assert tables[3]["properties"]["gain"]["description"] == "K [u/y]: proportional gain"
 
 
 def test_the_report_shows_set_point_and_measurement_with_units():
