@@ -14,6 +14,15 @@ WORDS = Path(__file__).with_name("words.toml")
 """Main nouns and verbs of the program."""
 
 ARGUMENTS = {
+    "acceleration_setpoint": "name of the set point of an acceleration",
+    "load_setpoint": "name of the set point of a load",
+    "setpoint_names": "names of the set points of a control law",
+    "feed_forward": "control law without measurement, whose commands are added to those of the feedback",
+    "feedback": "control law with measurement, whose commands are added to those of the feed-forward",
+    "inverse": "static inverse of a muscle",
+    "law": "law that another object contains: a control law or a force law",
+    "laws": "control laws side by side",
+    "steps": "number of steps of an iterative method",
     "air_states": "air states (pressure, temperature) of the muscles of a circuit, or of the segments of a tube",
     "at": "evaluation of a plant: muscles, circuits, forces and accelerations at one state",
     "air": "air state: absolute pressure and temperature",

@@ -202,7 +202,7 @@ PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "SplitRange", positiv
         (SETPOINT, f'{SETPOINT}\ndrivers = {{ pressure = "SolenoidDriver" }}', ParameterError, r"a set point has no drivers; write \[input.drivers\]"),
         (SETPOINT, f'{SETPOINT}\ncontroller = 3', ParameterError, r"a controller is allowed only in a scenario"),
         (SETPOINT, 'file = "none.csv"', AirmuscleError, r"none.csv"),
-        ('model = "PID"', 'model = "Valve"', ParameterError, r"\[input.controller\]: Valve is not a controller; there are OnOffController, PID"),
+        ('model = "PID"', 'model = "Valve"', ParameterError, r"\[input.controller\]: Valve is not a controller; there are DeadZoneController, .*OnOffController, PID"),
         ('model = "PID"', 'model = "PDI"', UnknownNameError, r"no model 'PDI'"),
         ('model = "PID"\n', "", ParameterError, r"\[input.controller\]: the model is not named"),
         ("[input]\n", '[input]\nfill = [["0.1 s", 1]]\n', ParameterError, r"'fill' is commanded by the controller and by other_inputs"),
@@ -297,8 +297,18 @@ def test_what_the_schema_refuses_the_program_refuses(tmp_path: Path, was: str, b
 
 def test_the_schema_knows_every_controller():
     tables = scenario_schema()["properties"]["input"]["properties"]["controller"]["anyOf"]
-    assert [table["properties"]["model"]["const"] for table in tables] == ["OnOffController", "PID"]
-    assert tables[1]["properties"]["gain"]["description"] == "K [u/y]: proportional gain"
+    assert [table["properties"]["model"]["const"] for table in tables] == [
+        "DeadZoneController",
+        "Decentralised",
+        "OnOffController",
+        "PID",
+        "SetpointCommand",
+        "SigmaDelta",
+        "SlidingMode",
+        "StaticFeedForward",
+        "WithFeedForward",
+    ]
+    assert tables[3]["properties"]["gain"]["description"] == "K [u/y]: proportional gain"
 
 
 def test_the_report_shows_set_point_and_measurement_with_units():
@@ -363,6 +373,24 @@ def test_the_program_of_the_example_runs(tmp_path: Path):
     assert done.returncode == 0, done.stderr
     assert "stopped after 2 s and resumed, the run has the same final state: True" in done.stdout
     assert (tmp_path / "control.png").stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_the_example_of_control_laws_tracks_learns_and_reaches_angle_and_stiffness(tmp_path):
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "examples" / "A6_control_laws.py")], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    errors = {
+        name: float(value) for name, value in re.findall(r"^(.*): rms error ([\d.]+) mm$", done.stdout, re.MULTILINE)
+    }
+    assert errors["feed-forward and feedback"] < 0.5 * min(errors["feedback"], errors["feed-forward"])
+    first, last = map(float, re.search(r"learning: rms error ([\d.]+) mm .*, ([\d.]+) mm", done.stdout).groups())
+    assert last < 0.05 * first
+    angle = re.search(r"angle ([\d.]+) rad for 0.3, stiffness ([\d.]+) N m/rad for ([\d.]+)", done.stdout).groups()
+    assert float(angle[0]) == pytest.approx(0.3, rel=0.05)
+    assert float(angle[1]) == pytest.approx(float(angle[2]), rel=0.05)
+    assert (tmp_path / "control_laws.png").stat().st_size > 10_000
 
 
 STUDY = """

@@ -1,23 +1,37 @@
 """Analysis of a plant: equilibria and their stability, stiffness, linearisation, energy consistency."""
 
 from .equilibrium import Equilibrium, find_equilibria, find_equilibrium
+from .extended_kalman_filter import (
+    ExtendedKalmanFilter,
+    Innovation,
+    StateEstimate,
+    consistency_band,
+    normalised_error_squared,
+)
 from .joint_plot import plot_reachable_region
 from .linear_model import LinearModel, Pole, linearise
+from .lqg import design_lqg
 from .static_stiffness import Stiffness, StiffnessPair, stiffness
 from .statics_of_joint import JointPoints, JointStatics, joint_statics
 
 __all__ = [
     "Equilibrium",
+    "ExtendedKalmanFilter",
+    "Innovation",
     "JointPoints",
     "JointStatics",
     "LinearModel",
     "Pole",
+    "StateEstimate",
     "Stiffness",
     "StiffnessPair",
+    "consistency_band",
+    "design_lqg",
     "find_equilibria",
     "find_equilibrium",
     "joint_statics",
     "linearise",
+    "normalised_error_squared",
     "plot_reachable_region",
     "stiffness",
 ]

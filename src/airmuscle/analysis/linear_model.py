@@ -36,7 +36,7 @@ class LinearModel:
     A, B, C, D      (n, n), (n, m), (k, n), (k, m)
     states, inputs, outputs    names, in the order of rows and columns; the states are among the outputs
     units           unit of every name
-    state, input_values    the operating point
+    state, input_values, output_values    the operating point
     rates           (n,) rates of the states there: all zero at an equilibrium
     stiffness       of a Plant: its stiffness at constant pressure and with closed valves; None for another system
     """
@@ -53,6 +53,7 @@ class LinearModel:
     input_values: Mapping[str, float]
     rates: Array
     stiffness: Stiffness | None = None
+    output_values: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     @property
     def poles(self) -> tuple[Pole, ...]:
@@ -148,6 +149,7 @@ def linearise(plant: System, state: Mapping[str, float], inputs: Mapping[str, fl
         tuple(names), tuple(values), (*names, *(compiled.output_names[i] for i in further)),
         column_units(plant, compiled.output_names), dict(zip(names, x, strict=True)), values, at.rates,
         stiffness(plant, state) if plant.equilibrium_plant is plant else None,
+        {**dict(zip(compiled.output_names, at.outputs.tolist(), strict=True)), **dict(zip(names, x, strict=True))},
     )  # fmt: skip
 
 

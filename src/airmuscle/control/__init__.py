@@ -1,38 +1,71 @@
 """Control: input signals in time, drivers between command and valve, sampled controllers and their loop."""
 
+from .angle_and_stiffness import AngleAndStiffness
+from .antagonistic_inverse import AntagonisticInverse
+from .cascade import Cascade
 from .control_law import ControlLaw
 from .control_loop import ControlLoop, ControlLoopState
 from .controller import Controller, Measurement
+from .dead_zone import DeadZoneController
+from .decentralised import Decentralised
 from .driver import PWM, Driver, SolenoidDriver
+from .feed_forward import StaticFeedForward
+from .gain_schedule import GainSchedule
 from .inputs import ZERO_INPUT, InputSignal, Periodic, SampledSignal, Schedule
+from .iterative_learning import IterativeLearning
 from .on_off import OnOffController
 from .pid import PID
 from .piecewise_linear import PiecewiseLinear
+from .sensors import ColumnSensor, WithSensors
+from .setpoint_command import SetpointCommand
+from .sigma_delta import SigmaDelta
 from .siso import SisoController
+from .sliding_mode import SlidingMode
 from .split_range import SplitRange
+from .state_feedback import StateFeedback
+from .static_inverse import StaticInverse
+from .super_twisting import SuperTwisting
 from .trajectory import Trajectory, spline_trajectory
 from .with_drivers import WithDrivers
+from .with_feed_forward import WithFeedForward
 
 __all__ = [
     "PID",
     "PWM",
     "ZERO_INPUT",
+    "AngleAndStiffness",
+    "AntagonisticInverse",
+    "Cascade",
+    "ColumnSensor",
     "ControlLaw",
     "ControlLoop",
     "ControlLoopState",
     "Controller",
+    "DeadZoneController",
+    "Decentralised",
     "Driver",
+    "GainSchedule",
     "InputSignal",
+    "IterativeLearning",
     "Measurement",
     "OnOffController",
     "Periodic",
     "PiecewiseLinear",
     "SampledSignal",
     "Schedule",
+    "SetpointCommand",
+    "SigmaDelta",
     "SisoController",
+    "SlidingMode",
     "SolenoidDriver",
     "SplitRange",
+    "StateFeedback",
+    "StaticFeedForward",
+    "StaticInverse",
+    "SuperTwisting",
     "Trajectory",
     "WithDrivers",
+    "WithFeedForward",
+    "WithSensors",
     "spline_trajectory",
 ]

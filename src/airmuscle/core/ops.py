@@ -76,6 +76,11 @@ def both(a: Value, b: Value) -> Value:
     return library.logical_and(a, b) if hasattr(library, "logical_and") else library.logic_and(a, b)
 
 
+def floor(x: Value) -> Value:
+    """Greatest integer that is not above `x`; its derivative is 0."""
+    return _on_float(_unary("floor", x), x)
+
+
 def _unary(name: str, x: Value) -> Value:
     library = _library(x)
     return getattr(np if library is None else library, name)(x)

@@ -116,7 +116,8 @@ def _operations() -> dict[int, Callable[..., Any]]:
     named: dict[str, Callable[..., Any]] = {
         "ASSIGN": lambda x: x, "ADD": np.add, "SUB": np.subtract, "MUL": np.multiply, "DIV": np.divide,
         "NEG": np.negative, "SQ": lambda x: x * x, "TWICE": lambda x: x + x, "INV": lambda x: np.divide(1.0, x),
-        "SQRT": np.sqrt, "FABS": np.abs, "SIGN": np.sign, "POW": np.power, "CONSTPOW": np.power, "EXP": np.exp,
+        "SQRT": np.sqrt, "FABS": np.abs, "SIGN": np.sign, "FLOOR": np.floor, "POW": np.power, "CONSTPOW": np.power,
+        "EXP": np.exp,
         "LOG": np.log, "LOG1P": np.log1p, "EXPM1": np.expm1, "SIN": np.sin, "COS": np.cos, "TAN": np.tan,
         "ASIN": np.arcsin, "ACOS": np.arccos, "ATAN": np.arctan, "SINH": np.sinh, "COSH": np.cosh, "TANH": np.tanh,
         "ASINH": np.arcsinh, "FMIN": np.fmin, "FMAX": np.fmax,

@@ -93,7 +93,8 @@ class CompiledRun:
         prepared, state, law = self.loop.prepared, self._begin_state, self.loop.law
         inputs, intervals = prepared.inputs, self.loop.edges.size - 1
         self.progress = np.zeros(len(Progress), dtype=np.int64)
-        self._memory = np.array([list(state.controller.values())] * 2, dtype=float).reshape(2, -1)
+        memory = [state.controller[name] for name in law.initial_memory]
+        self._memory = np.array([memory] * 2, dtype=float).reshape(2, -1)
         self._measured, self._command = np.array(state.measured, dtype=float), np.array(state.commanded, dtype=float)
         self._applied = np.array(state.applied_inputs or inputs.values[0], dtype=float)
         self._kept, self._kept_inputs = self.bound.state.copy(), self._applied.copy()

@@ -33,6 +33,7 @@ class Operation(enum.IntEnum):
     SQRT = enum.auto()
     ABS = enum.auto()
     SIGN = enum.auto()
+    FLOOR = enum.auto()
     POWER = enum.auto()
     CONSTANT_POWER = enum.auto()
     EXP = enum.auto()

@@ -135,7 +135,7 @@ _RULES: dict[Operation, Rule] = {
     Operation.MASK: lambda t, x, r: (ZERO, x[0]),
     Operation.SELECT: lambda t, x, r: (ZERO, x[0], t.put(Operation.NOT, x[0])),
     Operation.ASSIGN: lambda t, x, r: (ONE,),
-    **{operation: lambda t, x, r: (ZERO,) * len(x) for operation in (*_CONDITIONS, Operation.SIGN)},
+    **{operation: lambda t, x, r: (ZERO,) * len(x) for operation in (*_CONDITIONS, Operation.SIGN, Operation.FLOOR)},
 }  # fmt: skip
 
 

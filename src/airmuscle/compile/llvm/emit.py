@@ -18,7 +18,7 @@ LEVEL = {"u": COMMANDED, "w": STEADY, "h": STEADY}
 """Arguments that do not depend on the states: inputs, their slopes, and the step size."""
 
 _BINARY = {Operation.ADD: "fadd", Operation.SUBTRACT: "fsub", Operation.MULTIPLY: "fmul", Operation.DIVIDE: "fdiv"}
-_INTRINSICS = {Operation.SQRT: "sqrt", Operation.ABS: "fabs"}
+_INTRINSICS = {Operation.SQRT: "sqrt", Operation.ABS: "fabs", Operation.FLOOR: "floor"}
 _CALLS = {
     Operation.EXP: "exp", Operation.LOG: "log", Operation.SIN: "sin", Operation.COS: "cos", Operation.TAN: "tan",
     Operation.ATAN: "atan", Operation.SINH: "sinh", Operation.COSH: "cosh", Operation.TANH: "tanh",

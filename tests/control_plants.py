@@ -1,0 +1,29 @@
+"""Plants and loops of the tests of control laws: a lifted load, and an antagonistic joint; all numbers are chosen."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from plants import chosen_muscle
+
+from airmuscle.control import PID, AntagonisticInverse, Decentralised, SplitRange
+from airmuscle.mechanism import AntagonisticJoint, HangingMass
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Supply, Valve
+
+VALVE = Valve(2.6e-9, 0.4)
+LARGE = Valve(1e-8, 0.4)
+SPLIT = SplitRange("fill", "discharge")
+LIFT = Plant(chosen_muscle(), FillDischarge(Supply(5.5e5), VALVE, VALVE), HangingMass(2.0))
+MUSCLES = tuple(dataclasses.replace(chosen_muscle(), name=name) for name in ("left", "right"))
+MECHANISM = AntagonisticJoint(radius=0.02, inertia=0.02, damping=0.05, weight_torque=0.5, offset=0.08)
+CIRCUIT = FillDischarge(Supply(5.5e5), LARGE, LARGE)
+JOINT = Plant(MUSCLES, (CIRCUIT, CIRCUIT), MECHANISM)
+PRESSURES = Decentralised(
+    tuple(
+        PID(f"{name}.pressure", SplitRange(f"{name}.fill", f"{name}.discharge"), gain=2e-5)
+        for name in ("left", "right")
+    )
+)
+PRESSURE = PID("pressure", SPLIT, gain=2e-5, integral_time=0.5)
+INVERSE = AntagonisticInverse(MUSCLES, MECHANISM, 0.2e5, 5e5)

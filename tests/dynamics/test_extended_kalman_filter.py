@@ -1,0 +1,139 @@
+"""The extended Kalman filter estimates contraction and force from the pressure alone; it is consistent: the average NEES
+of independent runs is within its 95 % band, and leaves it where the stated noise is wrong. For a linear plant it is the
+Kalman filter.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from control_plants import LIFT
+
+import airmuscle as am
+from airmuscle.analysis import ExtendedKalmanFilter, StateEstimate, consistency_band, normalised_error_squared
+from airmuscle.analysis.extended_kalman_filter import exponential
+from airmuscle.core.errors import ParameterError
+from airmuscle.simulation import RungeKutta4, advance, compiled
+
+H = 5e-3
+PLANT = LIFT
+NOISE = {"air_mass": 2e-6, "speed": 0.02}
+START = am.find_equilibrium(PLANT, pressure=2e5)
+DEVIATIONS = {"air_mass": 2e-6, "position": 1e-3, "speed": 5e-3}
+
+
+def the_filter(**changes):
+    given = {
+        "measured": ("pressure",),
+        "sample_time": H,
+        "process_noise": NOISE,
+        "measurement_noise": {"pressure": 500.0},
+    }
+    return ExtendedKalmanFilter(PLANT, **{**given, **changes})
+
+
+RUNS = 24
+
+
+def average_nees(judged, samples=40, seed=1):
+    """NEES, averaged over runs, at the last sample; the truth has the noise of `the_filter`, by the simulated plant."""
+    rng, true_filter, truth = np.random.default_rng(seed), the_filter(), compiled(PLANT)
+    spread = np.sqrt(np.diag(true_filter.noise))
+    told = []
+    for _ in range(RUNS):
+        estimate = judged.start(START, DEVIATIONS)
+        state = estimate.mean + rng.normal(size=3) * np.sqrt(np.diag(estimate.covariance))
+        for k in range(samples):
+            inputs = [0.3 * (k % 20 < 5), 0.2 * (k % 20 >= 15)]
+            state = truth.step(state, np.array(inputs), H) + spread * rng.normal(size=3)
+            estimate = judged.predict(estimate, inputs)
+            exact = true_filter.columns(StateEstimate(state, estimate.covariance), inputs)
+            estimate, _ = judged.correct(estimate, [exact["pressure"] + 500.0 * rng.normal()], inputs)
+        told.append(normalised_error_squared(estimate, state))
+    return float(np.mean(told))
+
+
+def test_the_average_nees_is_within_its_95_per_cent_band():
+    low, high = consistency_band(3, RUNS)
+    assert low < average_nees(the_filter()) < high
+
+
+def test_a_filter_that_is_told_too_little_noise_leaves_the_band():
+    told = the_filter(process_noise={name: 0.2 * value for name, value in NOISE.items()})
+    assert average_nees(told) > consistency_band(3, RUNS)[1]
+
+
+def test_the_band_is_that_of_the_chi_squared_distribution():
+    low, high = consistency_band(4, 50)
+    assert (low, high) == pytest.approx((3.25, 4.82), abs=0.01)
+
+
+def test_the_matrix_exponential_is_that_of_scipy():
+    from scipy.linalg import expm
+
+    rng = np.random.default_rng(5)
+    for size in (1e-6, 0.1, 3.0, 40.0):
+        matrix = size * rng.normal(size=(5, 5))
+        exact = expm(matrix)
+        error = np.abs(exponential(matrix) - exact).max() / np.abs(exact).max()
+        assert error <= 1e-11 * max(np.linalg.norm(matrix), 1e-4)
+
+
+def test_the_error_of_the_prediction_falls_with_the_third_power_of_the_sample_time():
+    """Of the position, from a state that moves; the local error of a method of second order."""
+    moving, errors = {**START, "speed": 0.1}, []
+    exact_steps = RungeKutta4(1e-5)
+    for h in (4e-3, 2e-3):
+        judged = the_filter(sample_time=h)
+        mean = judged.predict(judged.start(moving, {}), [0.5, 0.0]).mean
+        exact = advance(PLANT, moving, {"fill": 0.5, "discharge": 0.0}, h, exact_steps)
+        errors.append(abs(mean[judged.states.index("speed")] - exact["speed"]))
+    assert errors[1] < errors[0] / 6.0
+
+
+def test_the_transition_matrix_is_the_derivative_of_the_simulation():
+    judged, inputs = the_filter(), {"fill": 0.3, "discharge": 0.0}
+    matrix = judged.transition(judged.start(START, {}).mean, list(inputs.values()))[1]
+    for j, name in enumerate(judged.states):
+        step = 1e-4 * max(abs(START[name]), 1e-2)
+        ends = [advance(PLANT, {**START, name: START[name] + sign * step}, inputs, H) for sign in (1, -1)]
+        difference = np.array([(ends[0][n] - ends[1][n]) / (2 * step) for n in judged.states])
+        assert matrix[:, j] == pytest.approx(difference, rel=0.03, abs=0.03 * np.abs(difference).max())
+
+
+def test_contraction_and_force_follow_from_the_pressure_alone():
+    """3 % of the range, with a wrong first estimate and a load that is right; the valves' commands are known."""
+    command = am.Schedule({"fill": ((0.2, 0.4), (0.5, 0.0)), "discharge": ((1.2, 0.3), (1.5, 0.0))})
+    run = am.simulate(PLANT, command, duration=2.0, initial_state=START, output_times=H, integrator=RungeKutta4(H / 10))
+    noisy = run["pressure"] + np.random.default_rng(3).normal(scale=500.0, size=len(run["time"]))
+    kept = np.isclose((run["time"] / H) % 1.0, 0.0, atol=1e-6) | np.isclose((run["time"] / H) % 1.0, 1.0, atol=1e-6)
+    columns = {name: run[name][kept] for name in ("time", "fill", "discharge")}
+    record = am.Recording({**columns, "pressure": noisy[kept]}, "test")
+    judged = the_filter()
+    first = judged.start({**START, "position": START["position"] + 2e-3}, DEVIATIONS)
+    estimated = judged.estimate(record, first)
+    late = estimated["time"] > 0.3
+    for name in ("contraction", "force"):
+        error = np.abs(estimated[name] - run[name][kept])[late].max()
+        assert error <= 0.03 * np.ptp(run[name]), name
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"measured": ("presure",)}, "measured names 'presure'; there are .*Did you mean 'pressure'"),
+        ({"process_noise": {"pressure": 1.0}}, "process_noise names 'pressure'"),
+        ({"measurement_noise": {}}, "measurement_noise has no number for 'pressure'"),
+        ({"sample_time": -1.0}, "'sample_time' is -1.0; it must be positive"),
+    ],
+)
+def test_an_incomplete_filter_is_refused(changes, message):
+    with pytest.raises(ParameterError, match=message):
+        the_filter(**changes)
+
+
+def test_rows_at_other_intervals_are_refused():
+    judged = the_filter()
+    record = am.Recording({"time": np.array([0.0, H, 3 * H]), "pressure": np.full(3, 2e5)}, "test")
+    with pytest.raises(ParameterError, match=r"the rows must be 0\.005 s apart"):
+        judged.estimate(record, judged.start(START, {}))

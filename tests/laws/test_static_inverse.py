@@ -1,0 +1,131 @@
+"""The static inverse is the root of F(p, eps) = F for every traceable force law: the force at its pressure is the wanted
+one to 1e-9 of the force range, and a force that the range cannot produce gives the nearer limit. Of an antagonistic
+joint, the pressures give the wanted torque and stiffness, and where they cannot, the torque.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from control_plants import INVERSE, JOINT, MECHANISM, MUSCLES
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import airmuscle as am
+from airmuscle.characteristic import ForceLaw, ValidityRange, as_force_law
+from airmuscle.control import AngleAndStiffness, StaticInverse
+from airmuscle.core import autodiff
+from airmuscle.core.errors import ParameterError
+from airmuscle.library.files import LAWS as LAW_FILES
+from airmuscle.muscle import SeriesSpring
+
+
+def force_laws():
+    for name in sorted(path.stem for path in LAW_FILES.glob("*.toml")):
+        entry = am.load(name)
+        law = getattr(entry, "characteristic", None)
+        if isinstance(law, ForceLaw) and law.traceable:
+            yield name, law
+
+
+LAWS = dict(force_laws())
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_force_at_the_pressure_of_the_inverse_is_the_wanted_one(name):
+    inverse = StaticInverse(LAWS[name], max_pressure=6e5)
+    low, high = LAWS[name].contraction_range
+    contraction = np.linspace(max(low, 0.0), 0.6 * high, 25)
+    pressure = np.linspace(0.0, 6e5, 41)[:, None]
+    force = inverse.force(pressure, contraction)
+    rising = (np.diff(force, axis=0) > 0).all(axis=0)
+    assert rising.sum() >= 5
+    taut, contractions = force[:, rising], np.broadcast_to(contraction, force.shape)[:, rising]
+    found = inverse.pressure(contractions, taut)
+    assert np.abs(inverse.force(found, contractions) - taut).max() <= 1e-9 * np.abs(taut).max()
+
+
+def test_a_force_beyond_the_range_gives_the_nearer_limit():
+    inverse = StaticInverse(MUSCLES[0], min_pressure=1e4, max_pressure=4e5)
+    assert inverse.pressure(0.1, 1e6) == 4e5
+    assert inverse.pressure(0.1, -1e6) == 1e4
+
+
+def test_the_inverse_of_an_approximated_law_errs_by_no_more_than_its_stated_error():
+    law = am.load("saga2007").characteristic
+    allowed = ValidityRange(0.5e5, 2.5e5, 0.02, 0.15)
+    surrogate = as_force_law(law, allowed)
+    inverse = StaticInverse(surrogate, max_pressure=3e5)
+    for contraction in (0.04, 0.08, 0.12):
+        for pressure in (0.8e5, 1.5e5, 2.2e5):
+            force = float(law.force(pressure, contraction))
+            slope = surrogate.slopes(pressure, contraction).by_pressure
+            assert abs(inverse.pressure(contraction, force) - pressure) <= 1.05 * surrogate.max_error / slope
+
+
+def test_the_inverse_is_traced_with_its_derivatives():
+    inverse = StaticInverse(am.load("sarosi-dmsp-20-400n").characteristic)
+    slope = autodiff.derivative(inverse, "pressure", 0.1, 300.0, wrt=1)
+    difference = (inverse.pressure(0.1, 300.01) - inverse.pressure(0.1, 299.99)) / 0.02
+    assert slope == pytest.approx(difference, rel=1e-5)
+
+
+def test_what_cannot_be_inverted_is_refused():
+    with pytest.raises(ParameterError, match=r"has no closed form\. Approximate it first: as_force_law"):
+        StaticInverse(untraceable())
+    spring = dataclasses.replace(MUSCLES[0], series=SeriesSpring(2e5), damper=am.LinearDamper(200.0))
+    with pytest.raises(ParameterError, match="has a series spring, whose stretch"):
+        StaticInverse(spring)
+    with pytest.raises(ParameterError, match="min_pressure is 700000 Pa; allowed range: below"):
+        StaticInverse(MUSCLES[0], min_pressure=7e5)
+
+
+def untraceable() -> ForceLaw:
+    class Opaque(ForceLaw):
+        traceable = False
+
+        def force(self, pressure, contraction):
+            return pressure
+
+    return Opaque()
+
+
+@given(st.floats(-0.5, 0.5), st.floats(1.0e5, 4e5), st.floats(1.0e5, 4e5))
+@settings(max_examples=60, deadline=None)
+def test_torque_and_stiffness_of_two_pressures_give_these_pressures(angle, first, second):
+    torque, stiffness = (float(getattr(INVERSE, name)(first, second, angle)) for name in ("torque", "stiffness"))
+    found = INVERSE.pressures(angle, torque, stiffness)
+    assert found == pytest.approx((first, second), rel=1e-8)
+
+
+def test_beyond_the_range_of_stiffness_the_torque_remains():
+    reached = float(INVERSE.stiffness(5e5, 5e5, 0.1))
+    first, second = INVERSE.pressures(0.1, 1.0, 3.0 * reached)
+    assert max(first, second) == pytest.approx(5e5)
+    assert INVERSE.torque(first, second, 0.1) == pytest.approx(1.0, rel=1e-6)
+    assert INVERSE.stiffness(first, second, 0.1) < 1.01 * reached
+
+
+def test_a_stiffness_that_would_slacken_a_muscle_keeps_both_at_the_minimum_tension():
+    """Without this limit the unclamped force law answers with a pressure at which the muscle is slack."""
+    inverse = dataclasses.replace(INVERSE, min_pressure=0.0)
+    first, second = inverse.pressures(0.3, 0.5, 0.0)
+    lowest = inverse.slack_limits(0.3)
+    lengths = [muscle.geometry.resting_length for muscle in MUSCLES]
+    contractions = MECHANISM.contractions({"angle": 0.3}, lengths)
+    tensions = [m.static_force(p, c) for m, p, c in zip(MUSCLES, (first, second), contractions, strict=True)]
+    assert min(tensions) == pytest.approx(inverse.min_tension, rel=1e-6)
+    assert first >= lowest[0]
+    assert second >= lowest[1]
+    assert inverse.torque(first, second, 0.3) == pytest.approx(0.5, rel=1e-6)
+
+
+def test_the_torque_that_holds_the_joint_is_that_of_the_equilibrium():
+    law = AngleAndStiffness(INVERSE, ("left.pressure", "right.pressure"))
+    from_law = float(law._torque_at(0.3, 0.0))
+    assert from_law == pytest.approx(MECHANISM.weight_torque * np.sin(0.3), rel=1e-12)
+    pressures = INVERSE.pressures(0.3, from_law, 8.0)
+    start = am.find_equilibrium(JOINT, pressure=tuple(pressures))
+    assert start["angle"] == pytest.approx(0.3, abs=1e-6)
