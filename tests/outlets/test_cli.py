@@ -81,9 +81,8 @@ def assert_failed(result: Result, message: str) -> None:
 # Help and usage
 
 NAMES = (
-    "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "fit-volume", "plan",
-    "bench",
-    "simulate", "sweep", "schema",
+    "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "campaign",
+    "fit-volume", "plan", "bench", "simulate", "sweep", "schema",
 )  # fmt: skip
 
 
