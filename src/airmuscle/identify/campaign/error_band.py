@@ -65,7 +65,7 @@ def calibrate(fit: Fit, points: Sequence[Recording], records: Sequence[CampaignR
     max_force = FORCE_MARGIN * max(float(np.nanmax(run["force"])) for run in points)
     lengths = [_length(run) for run in points]
     levels = [_level_name(record) for record in records]
-    bands = []
+    bands: list[ErrorBand] = []
     for purpose, labels in (
         ("further pressures and speeds of the measured muscles", _inner(levels)),
         ("other lengths of the same type", _inner(lengths)),
