@@ -105,6 +105,13 @@ def test_records_that_cannot_be_used_state_the_reason():
     assert "at least 8" in reasons[2]
 
 
+def test_a_release_without_a_resting_length_is_not_used():
+    columns = MUSCLE.release(2.0, 30.0, RANDOM)
+    columns["contraction"] = 1.0 - columns.pop("length") / 0.3
+    (record,) = classify_records([Recording(columns, "release")])
+    assert record.kind not in (RecordKind.RELEASE, RecordKind.CREEP)
+
+
 def test_no_usable_record_is_an_error_that_names_each_record():
     short = {name: values[:5] for name, values in MUSCLE.isobaric(3.0, RANDOM).items()}
     with pytest.raises(IdentificationError, match=r"no record of the campaign can be used \(run: 5 rows"):

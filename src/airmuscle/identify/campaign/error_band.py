@@ -65,14 +65,18 @@ def calibrate(fit: Fit, points: Sequence[Recording], records: Sequence[CampaignR
     max_force = FORCE_MARGIN * max(float(np.nanmax(run["force"])) for run in points)
     lengths = [_length(run) for run in points]
     levels = [_level_name(record) for record in records]
-    bands = []
+    bands: list[ErrorBand] = []
     for purpose, labels in (
         ("further pressures and speeds of the measured muscles", _inner(levels)),
         ("other lengths of the same type", _inner(lengths)),
     ):
         residuals, groups = _left_out_residuals(fit, points, labels, max_force)
         if groups:
-            bands.append(_band(purpose, residuals, groups))
+            band = _band(purpose, residuals, groups)
+            widest = max(
+                [band.half_width, *(other.half_width for other in bands)]
+            )  # other lengths are further runs too
+            bands.append(dataclasses.replace(band, half_width=widest))
     if not bands:
         bands.append(_band("the rows of the fit", force_residuals(fit.model, points, max_force), 0))
     return tuple(bands)

@@ -133,12 +133,13 @@ def _classify(inspection: Inspection) -> CampaignRecord:
             reason = f"pressure step of {step.change / 1e3:.4g} kPa within {step.duration:.3g} s at a held length"
             return CampaignRecord(recording, RecordKind.FILL, reason, inspection, steps)
         motion = find_motion(recording)
+        has_length = isinstance(recording.constants.get("resting_length"), float | int)
         if motion is not None and motion.is_single and _is_constant(recording["pressure"]):
             rest = float(recording["time"][-1]) - motion.end
-            if rest >= max(MIN_HOLD, MIN_HOLD_RATIO * motion.duration):
+            if has_length and rest >= max(MIN_HOLD, MIN_HOLD_RATIO * motion.duration):
                 reason = f"motion within {motion.duration:.3g} s, then held for {rest:.4g} s at constant pressure"
                 return CampaignRecord(recording, RecordKind.CREEP, reason, inspection)
-        if motion is not None and motion.is_single and motion.is_fast:
+        if has_length and motion is not None and motion.is_single and motion.is_fast:
             reason = f"motion of {1e3 * abs(motion.travel):.3g} mm within {motion.duration:.3g} s"
             return CampaignRecord(recording, RecordKind.RELEASE, reason, inspection)
     return _classify_static(inspection)
