@@ -73,6 +73,7 @@ def test_the_c_code_computes_the_same_steps(tmp_path):
         np.testing.assert_allclose(rows, expected, rtol=1e-11, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_c_numpy_and_lanes_compute_the_same_batch(tmp_path):
     """Over 0.7 s with the opening of a valve: 37 plants, a number that is not a multiple of any block size."""
     timed = batch.make_variants(tmp_path, 37, 0.7)

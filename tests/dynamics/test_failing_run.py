@@ -159,7 +159,7 @@ def test_what_a_run_is_told_is_of_its_kind(given, message):
     with pytest.raises(AirmuscleError, match=message):
         simulate(isothermal(), **{"input": FILL, "duration": 0.1, "initial_state": STATE, **given})
     with pytest.raises(
-        AirmuscleError, match=message if "input" not in given else "give an InputSignal, or a list of them"
+        AirmuscleError, match=message if "input" not in given else "give an InputSignal, a ControlLoop, or a list"
     ):
         simulate_batch(
             isothermal(), {}, **{"input": [FILL], "duration": 0.1, "initial_states": STATE, **given}

@@ -181,6 +181,7 @@ def repeats(count: int, noise: float) -> list[Fit]:
     return [fit(ContractileSurface.blank(2, **WIDE), clean.with_columns(force=force)) for force in noisy]
 
 
+@pytest.mark.slow
 def test_standard_deviations_are_those_of_repeated_experiments():
     fits = repeats(800, noise=4.0)
     values = np.array([found.values for found in fits])
@@ -191,6 +192,7 @@ def test_standard_deviations_are_those_of_repeated_experiments():
     assert np.corrcoef(values.T) == pytest.approx(fits[0].correlations, abs=0.14)
 
 
+@pytest.mark.slow
 def test_robust_standard_deviations_are_those_of_repeated_experiments():
     truth = surface(1)
     clean = points(truth.force, n=80)

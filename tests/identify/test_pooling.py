@@ -63,6 +63,7 @@ def runs(seed: int = 1, scatter: float = SCATTER, rows: int = 20) -> list[Record
     return made
 
 
+@pytest.mark.slow
 def test_one_pooled_law_is_within_five_per_cent_of_the_best_for_both_purposes():
     """Errors over three sets of six muscles together: with six muscles, chance decides between laws of new muscles."""
     squares: dict[str, dict[str, float]] = {}

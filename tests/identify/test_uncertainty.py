@@ -71,17 +71,20 @@ def share_held(fits, law, *, prediction: bool = False) -> np.ndarray:
     return np.mean(inside, axis=0)
 
 
+@pytest.mark.slow
 def test_bands_hold_the_truth_in_95_of_100_experiments(experiments):
     held = share_held(experiments, PLANE)
     assert ((held >= 0.93) & (held <= 0.97)).all(), held
 
 
+@pytest.mark.slow
 def test_bands_of_readings_hold_a_new_reading_in_95_of_100_experiments(experiments):
     held = share_held(experiments, PLANE, prediction=True)
     assert ((held >= 0.93) & (held <= 0.97)).all(), held
     assert share_held(experiments[:200], PLANE).min() > 0.9
 
 
+@pytest.mark.slow
 def test_intervals_of_parameters_hold_the_truth_in_95_of_100_experiments(experiments):
     factor = student.ppf(0.975, 64 - 3)
     inside = [np.abs(found.values - PLANE.coefficients) <= factor * found.standard_errors for found in experiments]

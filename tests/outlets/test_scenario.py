@@ -5,6 +5,7 @@ What is wrong with it is said with file, table, key, value and what is allowed.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 from pathlib import Path
@@ -39,7 +40,7 @@ from airmuscle.scenario.scenario import load_scenario
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
 
 PAGE = (Path(__file__).parents[2] / "docs" / "scenario.md").read_text(encoding="utf-8")
-WHOLE, FITTED, PAIR, DRIVEN, LINE = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
+WHOLE, FITTED, FROM_LIBRARY, PAIR, DRIVEN, LINE = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
 
 MUSCLE = 'muscle = "chou-hannaford"'
 MASS = 'model = "HangingMass"\nmass = "5 kg"'
@@ -177,6 +178,13 @@ def test_a_fitted_surface_becomes_a_muscle_by_the_geometry_of_the_page(tmp_path:
     muscle = load_scenario(path).plant.muscle
     assert muscle.contractile == surface
     assert muscle.geometry == Braid(0.01, math.radians(24.4), 0.3)
+
+
+def test_a_plant_of_the_library_takes_the_replaced_part_of_the_page(tmp_path: Path):
+    (tmp_path / "joint.toml").write_text(f'{FROM_LIBRARY}\n[input]\n"left.fill" = [["0.1 s", 1]]\n[run]\n{DURATION}\n')
+    plant, original = load_scenario(tmp_path / "joint.toml").plant, load("joint-dmsp-20-matrix").plant
+    assert plant == dataclasses.replace(original, gas=Isothermal())
+    assert plant != original
 
 
 def test_a_signal_is_linear_between_its_points(tmp_path: Path):

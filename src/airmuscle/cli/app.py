@@ -39,7 +39,7 @@ class CommandRow(NamedTuple):
 
 COMMANDS = (
     CommandRow("reproduce", "reproduce", "reproduce", "Reproduce three papers and test each of their claims."),
-    CommandRow("list", "list", "list_entries", "List muscles, laws, valves, plants, products and data of the library."),
+    CommandRow("list", "list", "list_entries", "List muscles, laws, valves, plants, products and data sets."),
     CommandRow("show", "show", "show", "Show parameters, sources and checks of a library entry."),
     CommandRow("cite", "cite", "cite", "Print the references of a library entry."),
     CommandRow("solve", "solve", "solve", "Solve for pressure, contraction or force, given the other two."),

@@ -36,7 +36,7 @@ class ListRow:
 
 
 def list_entries(json: Json = False) -> None:
-    """List muscles, laws, valves, plants, products and data of the library.
+    """List muscles, laws, valves, plants, products and data sets.
 
     A muscle can be simulated; a characteristic cannot, because it has no geometry or is not solved for the force.
     A product states the values that the maker of a muscle permits. A valve is used in a scenario as { library = NAME },

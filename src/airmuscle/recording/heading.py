@@ -29,6 +29,7 @@ UNIT_SPELLINGS: dict[str, tuple[str, ...]] = {
     "m": ("m", "mm", "cm"), "1": ("1", "%", "-"), "N": ("N", "kN"), "s": ("s", "ms", "min"), "m/s": ("m/s", "mm/s"),
     "m/s^2": ("m/s^2", "m/s2"), "m3": ("m3", "cm3"), "kg": ("kg", "g"), "kg/s": ("kg/s", "g/s"), "K": ("K", "°C"),
     "rad": ("rad", "deg"), "rad/s": ("rad/s", "deg/s"), "rad/s^2": ("rad/s^2", "deg/s^2"),
+    "N m": ("N m", "N*m", "N mm"), "N m/rad": ("N m/rad", "N m/deg"),
 }  # fmt: skip
 """Usual spellings of the units of each quantity, used in suggestions and to recognise a suffix as in `pressure_kPa`."""
 

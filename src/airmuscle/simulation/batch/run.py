@@ -145,7 +145,7 @@ def _count(initial_states: Mapping[str, npt.ArrayLike] | None, input: object) ->
         return of_states
     if not isinstance(input, Sequence):
         raise ParameterError(
-            f"simulate_batch: the input is {str(input)[:80]}; give an InputSignal or a ControlLoop, or a list."
+            f"simulate_batch: the input is {str(input)[:80]}; give an InputSignal, a ControlLoop, or a list."
         )
     if of_states is not None and of_states != len(input):
         raise ParameterError(
