@@ -11,7 +11,7 @@ from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
 from .base import ForceLaw
-from .validity_range import CONTRACTION_BOUNDS, PRESSURE_BOUNDS, ValidityRange
+from .validity_range import ValidityRange
 
 HOSOVSKY_HILL = Reference(
     "hosovsky-hill",
@@ -48,17 +48,11 @@ class ContractileSurface(ForceLaw):
     coefficients: tuple[float, ...] = parameter(
         "N", "a_ij", "coefficients of the polynomial in scaled contraction and pressure, ordered by power of pressure"
     )
-    min_pressure: float = parameter(
-        "Pa", "p_low", "lower limit of the validity range in gauge pressure", bounds=PRESSURE_BOUNDS, fitted=False
-    )
-    max_pressure: float = parameter(
-        "Pa", "p_high", "upper limit of the validity range in gauge pressure", bounds=PRESSURE_BOUNDS, fitted=False
-    )
-    min_contraction: float = parameter(
-        "1", "eps_low", "lower limit of the validity range in contraction", bounds=CONTRACTION_BOUNDS, fitted=False
-    )
+    min_pressure: float = parameter("Pa", "p_low", "lower limit of the validity range in gauge pressure", fitted=False)
+    max_pressure: float = parameter("Pa", "p_high", "upper limit of the validity range in gauge pressure", fitted=False)
+    min_contraction: float = parameter("1", "eps_low", "lower limit of the validity range in contraction", fitted=False)
     max_contraction: float = parameter(
-        "1", "eps_high", "upper limit of the validity range in contraction", bounds=CONTRACTION_BOUNDS, fitted=False
+        "1", "eps_high", "upper limit of the validity range in contraction", fitted=False
     )
     min_force: float = parameter("N", "F_min", "lower limit of the force", fitted=False, default=0.0)
     max_force: float = parameter("N", "F_max", "upper limit of the force", fitted=False, default=1200.0)

@@ -25,11 +25,18 @@ def check_parts(
     for field, part, kind in parts:
         _check_kind(field, part, kind)
     _check_closed_form(muscles)
+    _check_validity_ranges(muscles)
     check_structure((tuple(muscles), tuple(circuits), mechanism))
     for each in circuits:
         check_not_shared(f"Plant: its {type(each).__name__}", each.supply)
         each.supply.check_ambient(ambient)
     _check_counts(muscles, circuit, circuits, mechanism)
+
+
+def _check_validity_ranges(muscles: Sequence[Muscle]) -> None:
+    """Raise ParameterError for a law whose validity range is impossible, which a run would need for its notes."""
+    for muscle in muscles:
+        getattr(muscle.contractile, "validity_range", None)
 
 
 def check_unique(names: Sequence[str]) -> None:
