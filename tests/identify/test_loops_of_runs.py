@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
-from airmuscle.core.errors import IdentificationError
+from airmuscle.core.errors import AirmuscleWarning, IdentificationError
 from airmuscle.friction import MaxwellSlip
 from airmuscle.identify.hysteresis import find_loops, fit_loop
 from airmuscle.recording import Recording
@@ -49,3 +51,18 @@ def test_a_file_with_one_run_is_one_loop_with_the_name_of_the_file():
 def test_sweeps_in_one_direction_at_several_levels_are_no_loop():
     with pytest.raises(IdentificationError, match=r"three.csv, rows \d+ to \d+: the falling branch has no rows"):
         find_loops([recording(LEVELS, LEG)])
+
+
+def test_a_loop_of_another_muscle_at_the_same_level_is_no_repeat():
+    first = recording(LEVELS[:1])
+    longer = dataclasses.replace(first, constants={"resting_length": 0.2})
+    other = dataclasses.replace(first, constants={"resting_length": 0.3, "specimen": "B"})
+    assert [loop.repeat is not None for loop in find_loops([first, first])] == [True]
+    assert [loop.repeat for loop in find_loops([first, longer, other])] == [None, None, None]
+
+
+def test_a_recording_without_a_loop_is_left_out_with_a_warning_that_names_it():
+    one_way = dataclasses.replace(recording(LEVELS[:1], LEG), origin="one_way.csv")
+    with pytest.warns(AirmuscleWarning, match=r"left out: one_way\.csv: the falling branch has no rows to fit"):
+        loops = find_loops([one_way, recording(LEVELS[:1])])
+    assert [loop.recording.origin for loop in loops] == ["three.csv"]

@@ -573,18 +573,22 @@ SLOW_IMPORT = """
 import importlib.abc, signal, sys, time
 from airmuscle.__main__ import main
 
+def wait_for_the_signal():
+    print("importing", flush=True)
+    for _ in range(6000):  # one long sleep would miss a signal that arrives just before it
+        time.sleep(0.01)
+
 class Destroyed:
     def __del__(self):
-        time.sleep(60)
+        wait_for_the_signal()
 
 class SlowFinder(importlib.abc.MetaPathFinder):
     def find_spec(self, name, path, target=None):
         if name == MODULE:
-            print("importing", flush=True)
             if KIND == "discarded by a destructor":
                 return Destroyed() and None
             try:
-                time.sleep(60)
+                wait_for_the_signal()
             except KeyboardInterrupt:
                 if KIND == "extension":
                     raise ImportError("initialization failed") from None

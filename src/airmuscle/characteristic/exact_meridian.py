@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -14,19 +13,12 @@ from ..geometry.base import check_contraction_range
 from ..geometry.circular_arc import CircularArc
 from ..geometry.meridian import SAGA_2007, Profile
 from ..geometry.pleated import DAERDEN_LEFEBER_2001, PleatedTube, unwrap_scalar
+from ..geometry.quadrature import graded_quadrature
 from .base import PressureLaw, Slopes
 from .rubber import RubberLine
 from .solve import as_arrays, check_solution, find_first_root
 
 NODES = 120  # Gauss points over half the meridian
-
-
-@functools.cache
-def _graded_quadrature() -> tuple[Any, Any]:
-    """Nodes and weights in v = y (2 - y), which resolves the singularity 1/sqrt(1 - v) at the end of the meridian."""
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    y = (nodes + 1) / 2
-    return y * (2 - y), weights * (1 - y)
 
 
 _MAX_ITERATIONS = 60
@@ -208,7 +200,7 @@ class ExactMeridian(PressureLaw):
     def _evaluate_shape(self, radius: Value, pressure: Value, force: Value) -> MeridianShape:
         """Arc and chord length of the shape with these parameters, and their derivatives."""
         radius, pressure, force = as_arrays(radius, pressure, force)
-        v, weights = (np.reshape(x, (-1,) + (1,) * radius.ndim) for x in _graded_quadrature())
+        v, weights = (np.reshape(x, (-1,) + (1,) * radius.ndim) for x in graded_quadrature(NODES))
         bulge = radius - self.geometry.end_radius
         curve = self._curve(radius, pressure, force, v)
         z, axial, fibre = curve.z, curve.axial, curve.fibre
@@ -264,14 +256,14 @@ class ExactMeridian(PressureLaw):
     def _curve_at(self, contraction: float, force: float) -> tuple[_Curve, Any]:
         """Meridian at the quadrature nodes, and the quadrature weights."""
         shape = self._shape_or_raise(contraction, force)
-        v, weights = _graded_quadrature()
+        v, weights = graded_quadrature(NODES)
         return self._curve(shape.radius, shape.pressure, shape.force, v), weights
 
     def profile(self, contraction: float, force: float, points: int = 201) -> Profile:
         """Outline of one segment at a tension [N]: axial positions from its middle [m] and radii [m]."""
         shape = self._shape_or_raise(contraction, force)
         upper = np.linspace(0.0, 1.0, points // 2 + 1)
-        v, weights = (rule[:, None] for rule in _graded_quadrature())
+        v, weights = (rule[:, None] for rule in graded_quadrature(NODES))
         curve = self._curve(shape.radius, shape.pressure, shape.force, upper * v)
         axial = upper * np.sum(weights * curve.axial * curve.factor, axis=0) / 2
         radius = shape.radius - (shape.radius - self.geometry.end_radius) * upper**2

@@ -18,8 +18,8 @@ from ..library.entry import Entry
 from ..library.write import save
 from ..recording.follow import RowReader, follow_lines
 from ..report.output_folder import atomic_folder, check_writable
-from .bench_files import Columns, Constants, Length, Units, parse_pairs
 from .options import Json, OptionalFolder
+from .reading_options import Columns, Constants, Length, Units, parse_pairs
 from .terminal import echo, percent
 
 QUANTITIES = ("pressure", "contraction", "force")

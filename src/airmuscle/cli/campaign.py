@@ -23,23 +23,13 @@ from ..report.campaign_chapters import UnreadFile, ValidationRow, campaign_chapt
 from ..report.output_folder import atomic_folder, check_writable
 from ..report.write import as_json, write_into
 from ..scenario.campaign import RecordScenario, campaign_scenarios
-from .bench_files import (
-    AmbientPressure,
-    Columns,
-    Constants,
-    Length,
-    NamePattern,
-    TimeOption,
-    Units,
-    column_mapping,
-    parse_pairs,
-)
 from .campaign_output import campaign_to_dict, print_campaign, stage_to_dict
 from .fit_geometry import braid_of_length, check_one_length, parse_braid
 from .initial_law import resting_lengths
 from .option_hints import in_options
-from .options import Folder, Json, Mapping
+from .options import Folder, Json
 from .progress import computation_progress, reading_progress
+from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
 from .terminal import print_json
 
 STAGES_FILE = "stages.json"
@@ -66,19 +56,13 @@ KeptAside = Annotated[
 ]
 
 
+@with_reading_options
 def campaign(
     folder: CampaignFolder,
     validate: KeptAside = None,
     braid: Braid = None,
     out: Folder = Path("campaign"),
-    resting_length: Length = None,
-    ambient: AmbientPressure = None,
-    unit: Units = None,
-    mapping: Mapping = None,
-    column: Columns = None,
-    constant: Constants = None,
-    file_name: NamePattern = None,
-    time: TimeOption = None,
+    reading: ReadingOptions = NO_OPTIONS,
     json: Json = False,
 ) -> None:
     """Identify a muscle from all files of a test rig.
@@ -98,9 +82,7 @@ def campaign(
       airmuscle simulate campaign/scenarios/fill_1.toml
     """
     size = parse_braid(braid)
-    columns = column_mapping(mapping, column=column, constant=constant, file_name=file_name, time=time,
-                             resting_length=resting_length, ambient=ambient)  # fmt: skip
-    units = parse_pairs("--unit", unit)
+    columns, units = reading.column_mapping(), reading.units
     kept_aside = {path.resolve() for path in validate or ()}
     files = [path for path in find_files(folder) if path.resolve() not in kept_aside]
     recordings, unread = _read_each(files, columns, units)

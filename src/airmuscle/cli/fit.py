@@ -11,24 +11,14 @@ from ..identify import UNCENSORED
 from ..identify import fit as fit_model
 from ..recording import Recording
 from ..report.output_folder import check_writable
-from .bench_files import (
-    AmbientPressure,
-    Columns,
-    Constants,
-    Files,
-    Length,
-    NamePattern,
-    TimeOption,
-    Units,
-    column_mapping,
-    read_recordings,
-)
+from .bench_files import Files, read_recordings
 from .fit_compare import compare_models
 from .fit_geometry import missing_geometry, parse_braid, with_braid
 from .fit_options import FitOptions, FitRequest, loss_of
 from .fit_output import fit_to_dict, fitted_entry, print_results, with_option_names, write_results
 from .initial_law import find_initial_law
-from .options import Folder, Json, Mapping
+from .options import Folder, Json
+from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
 from .terminal import print_json
 
 Law = Annotated[
@@ -118,6 +108,7 @@ FreeContraction = Annotated[
 ]
 
 
+@with_reading_options
 def fit(
     files: Files,
     characteristic: Law = None,
@@ -130,15 +121,8 @@ def fit(
     shape: Shape = False,
     free_contraction: FreeContraction = None,
     out: Folder = Path("fit"),
-    resting_length: Length = None,
+    reading: ReadingOptions = NO_OPTIONS,
     braid: BraidOption = None,
-    ambient: AmbientPressure = None,
-    unit: Units = None,
-    mapping: Mapping = None,
-    column: Columns = None,
-    constant: Constants = None,
-    file_name: NamePattern = None,
-    time: TimeOption = None,
     degree: Annotated[int, typer.Option(min=1, max=9, metavar="N", help="Total degree of a ContractileSurface.")] = 5,
     fix: Fixed = None,
     robust: Robust = None,
@@ -170,9 +154,7 @@ def fit(
     options = FitOptions.parse(bootstrap, profile, leave_out, shape, free_contraction, compare, purpose, length_error)
     request = FitRequest(options, tuple(fix or ()), degree, robust, uncensored, equal_weights, out, json,
                          parse_braid(braid))  # fmt: skip
-    columns = column_mapping(mapping, column=column, constant=constant, file_name=file_name, time=time,
-                             resting_length=resting_length, ambient=ambient)  # fmt: skip
-    recordings = read_recordings(files, unit, columns)
+    recordings = read_recordings(files, reading)
     if characteristic is None or compare:
         compare_models(files, recordings, characteristic, request)
     else:

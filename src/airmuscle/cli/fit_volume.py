@@ -23,25 +23,16 @@ from ..report.isobar_plot import validity_range_of
 from ..report.output_folder import atomic_folder, check_writable
 from ..report.volume_chapter import volume_chapter
 from ..report.write import write_into
-from .bench_files import (
-    AmbientPressure,
-    Columns,
-    Constants,
-    Files,
-    Length,
-    NamePattern,
-    TimeOption,
-    Units,
-    column_mapping,
-    read_recordings,
-)
+from .bench_files import Files, read_recordings
 from .fit_geometry import check_one_length
 from .fit_output import list_files
 from .initial_law import resting_lengths
-from .options import Folder, Json, Mapping
+from .options import Folder, Json
+from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
 from .terminal import echo, percent, print_json, print_table
 
 
+@with_reading_options
 def fit_volume_command(
     files: Files,
     muscle: Annotated[
@@ -50,14 +41,7 @@ def fit_volume_command(
     temperature: Annotated[
         str, typer.Option(metavar="QUANTITY", help="Temperature of the air at both ends of a fill.")
     ] = "293.15 K",
-    resting_length: Length = None,
-    ambient: AmbientPressure = None,
-    unit: Units = None,
-    column: Columns = None,
-    constant: Constants = None,
-    file_name: NamePattern = None,
-    time: TimeOption = None,
-    mapping: Mapping = None,
+    reading: ReadingOptions = NO_OPTIONS,
     out: Folder = Path("volume"),
     json: Json = False,
 ) -> None:
@@ -73,11 +57,9 @@ def fit_volume_command(
       airmuscle fit-volume column.csv --resting-length "200 mm" --out volume
       airmuscle fit-volume fills/*.csv --muscle fit/muscle.toml --out volume
     """
-    options = column_mapping(mapping, column=column, constant=constant, resting_length=resting_length, ambient=ambient,
-                             file_name=file_name, time=time)  # fmt: skip
     entry = None if muscle is None else load_law(muscle)
     check_writable(out)
-    recordings = read_recordings(files, unit, options)
+    recordings = read_recordings(files, reading)
     fit = fit_volume(volume_points(recordings, quantity(temperature, "K", where="--temperature")),
                      _length(recordings, entry))  # fmt: skip
     limits = None if entry is None else _limits(entry, fit)

@@ -22,6 +22,7 @@ from ..identify.hysteresis import (
     fit_jointly,
     fit_loop,
     identified_friction,
+    loops_not_joined,
 )
 from ..library.entry import Entry
 from ..library.law_file import load_law
@@ -31,20 +32,10 @@ from ..report.chapter import Chapter
 from ..report.hysteresis_chapter import describe_row_counts, hysteresis_chapters
 from ..report.output_folder import atomic_folder, check_writable
 from ..report.write import write_into
-from .bench_files import (
-    AmbientPressure,
-    Columns,
-    Constants,
-    Files,
-    Length,
-    NamePattern,
-    TimeOption,
-    Units,
-    column_mapping,
-    read_recordings,
-)
+from .bench_files import Files, read_recordings
 from .option_hints import in_options
-from .options import Folder, Json, Mapping
+from .options import Folder, Json
+from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
 from .terminal import echo, print_json, print_table
 
 Muscle = Annotated[
@@ -66,6 +57,7 @@ Elements = Annotated[
 Creep = Annotated[bool, typer.Option("--creep", help="Also fit creep to the longest hold phase of every file.")]
 
 
+@with_reading_options
 def hysteresis(
     files: Files,
     muscle: Muscle = None,
@@ -75,14 +67,7 @@ def hysteresis(
     elements: Elements = 8,
     creep: Creep = False,
     out: Folder = Path("hysteresis"),
-    resting_length: Length = None,
-    ambient: AmbientPressure = None,
-    unit: Units = None,
-    mapping: Mapping = None,
-    column: Columns = None,
-    constant: Constants = None,
-    file_name: NamePattern = None,
-    time: TimeOption = None,
+    reading: ReadingOptions = NO_OPTIONS,
     json: Json = False,
 ) -> None:
     """Fit friction models to hysteresis loops.
@@ -101,9 +86,7 @@ def hysteresis(
     """
     if use_characteristic and muscle is None:
         raise typer.BadParameter("--use-characteristic requires --muscle")
-    columns = column_mapping(mapping, column=column, constant=constant, file_name=file_name, time=time,
-                             resting_length=resting_length, ambient=ambient)  # fmt: skip
-    recordings = read_recordings(files, unit, columns)
+    recordings = read_recordings(files, reading)
     entry = None if muscle is None else load_law(muscle)
     law = entry.characteristic if entry is not None and use_characteristic else None
     loops = find_loops(recordings, characteristic=law, degree=degree, all_rows=all_rows)
@@ -114,11 +97,16 @@ def hysteresis(
     creep_results = _fit_creep(recordings) if creep else []
     path = _write(hysteresis_chapters(fits, creep_results, joint), _select(fits, joint), entry, out)
     if json:
-        data = {"loops": [_to_dict(fit) for fit in fits], "joint": [_joint_to_dict(fit) for fit in joint]}
+        not_joined = list(loops_not_joined(fits)) if joint else []
+        data = {
+            "loops": [_to_dict(fit) for fit in fits],
+            "joint": [_joint_to_dict(fit) for fit in joint],
+            "not_joined": not_joined,
+        }
         print_json({**data, "creep": creep_results, "written": str(path or "")})
         return
     _print(fits, creep_results)
-    _print_joint(joint)
+    _print_joint(joint, loops_not_joined(fits))
     _print_files(path, out, of_all_runs=bool(joint))
 
 
@@ -214,7 +202,7 @@ def _print(fits: Sequence[LoopFit], creep: Sequence[str]) -> None:
         echo(f"creep: {text}")
 
 
-def _print_joint(joint: Sequence[JointFit]) -> None:
+def _print_joint(joint: Sequence[JointFit], not_joined: Sequence[str]) -> None:
     if not joint:
         return
     echo("All runs together, each with its own static curve:")
@@ -227,9 +215,8 @@ def _print_joint(joint: Sequence[JointFit]) -> None:
     headers = ("model", "depends on pressure", "rms error", "difference in AICc", "runs that disagree", "justified")
     print_table(headers, rows, right=headers[3:5])
     best = next((fit for fit in joint if fit.justified), joint[0])
-    for run in best.agreement:
-        echo(str(run))
-    echo(str(best))
+    for sentence in (*map(str, best.agreement), *not_joined, str(best)):
+        echo(sentence)
     echo()
 
 

@@ -14,20 +14,10 @@ from ..recording import ColumnMapping, Recording, read
 from ..recording.columns import quantity_of
 from ..recording.segment import Inspection, Sampling, inspect_all
 from ..report.output_folder import atomic_folder
-from .bench_files import (
-    AmbientPressure,
-    Columns,
-    Constants,
-    Length,
-    NamePattern,
-    TimeOption,
-    Units,
-    column_mapping,
-    parse_pairs,
-)
 from .inspection_text import COLUMNS, column_rows, summary
-from .options import Json, Mapping, OptionalFolder
+from .options import Json, OptionalFolder
 from .progress import reading_progress
+from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
 from .terminal import echo, print_json, print_table
 
 Files = Annotated[
@@ -46,16 +36,10 @@ Group = Annotated[
 ]
 
 
+@with_reading_options
 def inspect(
     files: Files,
-    mapping: Mapping = None,
-    column: Columns = None,
-    constant: Constants = None,
-    file_name: NamePattern = None,
-    time: TimeOption = None,
-    unit: Units = None,
-    resting_length: Length = None,
-    ambient: AmbientPressure = None,
+    reading: ReadingOptions = NO_OPTIONS,
     delimiter: Delimiter = None,
     decimal: Decimal = None,
     sheet: Sheet = None,
@@ -77,10 +61,8 @@ def inspect(
       airmuscle inspect log.mat --column "data(:,1)=time [s]" --column "data(:,2)=pressure [bara]"
       airmuscle inspect runs/*.tdms --mapping rig.toml --json
     """
-    columns = column_mapping(mapping, column=column, constant=constant, file_name=file_name, time=time,
-                             resting_length=resting_length, ambient=ambient, delimiter=delimiter, decimal=decimal,
-                             sheet=sheet, group=group)  # fmt: skip
-    inspections = inspect_all(_read(files, columns, parse_pairs("--unit", unit)))
+    columns = reading.column_mapping(delimiter=delimiter, decimal=decimal, sheet=sheet, group=group)
+    inspections = inspect_all(_read(files, columns, reading.units))
     if out:
         _save_figures(inspections, out)
     if json:

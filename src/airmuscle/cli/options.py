@@ -25,7 +25,3 @@ Folder = Annotated[Path, typer.Option("--out", metavar="DIR", help="Output folde
 OptionalFolder = Annotated[
     Path | None, typer.Option("--out", metavar="DIR", help="Output folder for figures and data; default: none.")
 ]
-Mapping = Annotated[
-    Path | None,
-    typer.Option("--mapping", metavar="FILE", help="Column mapping (TOML) for headers without quantity or unit."),
-]

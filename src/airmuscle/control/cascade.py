@@ -10,9 +10,9 @@ from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
+from ..core.variables import select_prefix, united, with_prefix
 from .control_law import ControlLaw
 from .controller import Measurement
-from .nested_memory import of_part, united, with_prefix
 from .pid import ASTROM_HAGGLUND1995
 
 
@@ -70,14 +70,16 @@ class Cascade(ControlLaw):
     @property
     def initial_memory(self) -> dict[str, float]:
         """The values of both laws, with the prefixes `outer.` and `inner.`."""
-        return {**with_prefix("outer", self.outer.initial_memory), **with_prefix("inner", self.inner.initial_memory)}
+        return {**with_prefix("outer.", self.outer.initial_memory), **with_prefix("inner.", self.inner.initial_memory)}
 
     def step(
         self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
     ) -> tuple[dict[str, Value], dict[str, Value]]:
         limits = zip(self.outer.inputs, self.minimum, self.maximum, strict=True)
         ranges = {name: (low, high) for name, low, high in limits}
-        wanted, first = self.outer.step(of_part("outer", memory), measurement._replace(ranges=ranges), dt)
+        wanted, first = self.outer.step(select_prefix("outer.", memory), measurement._replace(ranges=ranges), dt)
         setpoints = {**measurement.setpoints, **{n: ops.clip(wanted[n], *ranges[n]) for n in self.outer.inputs}}
-        commands, second = self.inner.step(of_part("inner", memory), measurement._replace(setpoints=setpoints), dt)
-        return dict(commands), {**with_prefix("outer", first), **with_prefix("inner", second)}
+        commands, second = self.inner.step(
+            select_prefix("inner.", memory), measurement._replace(setpoints=setpoints), dt
+        )
+        return dict(commands), {**with_prefix("outer.", first), **with_prefix("inner.", second)}

@@ -9,9 +9,9 @@ from ..core.declaration import model
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
+from ..core.variables import select_prefix, united, with_prefix
 from .control_law import ControlLaw
 from .controller import Measurement
-from .nested_memory import of_part, united, with_prefix
 
 SKOGESTAD_POSTLETHWAITE2005 = Reference(
     key="skogestad-postlethwaite-2005",
@@ -60,7 +60,7 @@ class Decentralised(ControlLaw):
         """The values of all laws, with the prefixes `0.`, `1.`, ..."""
         memory: dict[str, float] = {}
         for i, law in enumerate(self.laws):
-            memory |= with_prefix(str(i), law.initial_memory)
+            memory |= with_prefix(f"{i}.", law.initial_memory)
         return memory
 
     def step(
@@ -69,7 +69,7 @@ class Decentralised(ControlLaw):
         commands: dict[str, Value] = {}
         later: dict[str, Value] = {}
         for i, law in enumerate(self.laws):
-            own, kept = law.step(of_part(str(i), memory), measurement, dt)
+            own, kept = law.step(select_prefix(f"{i}.", memory), measurement, dt)
             commands |= own
-            later |= with_prefix(str(i), kept)
+            later |= with_prefix(f"{i}.", kept)
         return commands, later

@@ -12,9 +12,10 @@ from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.tree import leaves, unflatten
+from ..core.variables import united
 from .control_law import ControlLaw
 from .controller import Measurement
-from .nested_memory import united
+from .enclosing_law import EnclosingLaw
 
 RUGH_SHAMMA2000 = Reference(
     key="rugh-shamma-2000",
@@ -28,7 +29,7 @@ RUGH_SHAMMA2000 = Reference(
 
 
 @model
-class GainSchedule(ControlLaw):
+class GainSchedule(EnclosingLaw):
     """theta(z) = theta_i + (theta_(i+1) - theta_i) (z - z_i)/(z_(i+1) - z_i) for z_i <= z <= z_(i+1), constant beyond.
 
     theta parameter of the law, by its path (`gain`, `outer.gain`), z scheduling variable: a measured column. Both
@@ -70,14 +71,6 @@ class GainSchedule(ControlLaw):
     @property
     def measured_columns(self) -> tuple[str, ...]:
         return united(self.law.measured_columns, (self.scheduling_column,))
-
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return self.law.setpoints
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.law.inputs
 
     @property
     def initial_memory(self) -> Mapping[str, float]:

@@ -10,9 +10,10 @@ from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
+from ..core.variables import select_prefix, with_prefix
 from .control_law import ControlLaw
 from .controller import Measurement
-from .nested_memory import of_part, with_prefix
+from .enclosing_law import EnclosingLaw
 from .random_numbers import LECUYER1999, STATE, drawn_normal, seeded
 
 MAX_DELAY = 1000
@@ -64,7 +65,7 @@ class ColumnSensor:
 
 
 @model
-class WithSensors(ControlLaw):
+class WithSensors(EnclosingLaw):
     """A control law whose measurements pass through sensors; a column without a sensor is measured exactly.
 
     The noise is a sequence of the generator MRG32k3a that the seed determines, a whole number: the same in every run,
@@ -95,37 +96,25 @@ class WithSensors(ControlLaw):
             raise ParameterError(f"WithSensors: seed is {self.seed:g}; it must be a whole number.")
 
     @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return self.law.measured_columns
-
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return self.law.setpoints
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.law.inputs
-
-    @property
     def initial_memory(self) -> dict[str, float]:
         """Whether it has started (0 or 1), and the values of the sensors, of the generator and of the law."""
         memory = {"started": 0.0}
         for sensor in self.sensors:
-            memory |= with_prefix(f"sensor.{sensor.column}", sensor.initial_memory)
-        random = with_prefix("random", dict.fromkeys(STATE, 0.0))
-        return {**memory, **random, **with_prefix("law", self.law.initial_memory)}
+            memory |= with_prefix(f"sensor.{sensor.column}.", sensor.initial_memory)
+        random = with_prefix("random.", dict.fromkeys(STATE, 0.0))
+        return {**memory, **random, **with_prefix("law.", self.law.initial_memory)}
 
     def step(
         self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
     ) -> tuple[Mapping[str, Value], dict[str, Value]]:
         started = memory["started"]
-        fresh, kept = seeded(self.seed), of_part("random", memory)
+        fresh, kept = seeded(self.seed), select_prefix("random.", memory)
         random: dict[str, Value] = {name: ops.where(started > 0, kept[name], fresh[name]) for name in STATE}
         columns, later = dict(measurement.columns), {"started": 1.0}
         for sensor in self.sensors:
             deviate, random = drawn_normal(random)
-            own = of_part(f"sensor.{sensor.column}", memory)
+            own = select_prefix(f"sensor.{sensor.column}.", memory)
             columns[sensor.column], after = sensor.measure(own, columns[sensor.column], deviate, started, dt)
-            later |= with_prefix(f"sensor.{sensor.column}", after)
-        commands, law = self.law.step(of_part("law", memory), measurement._replace(columns=columns), dt)
-        return commands, {**later, **with_prefix("random", random), **with_prefix("law", law)}
+            later |= with_prefix(f"sensor.{sensor.column}.", after)
+        commands, law = self.law.step(select_prefix("law.", memory), measurement._replace(columns=columns), dt)
+        return commands, {**later, **with_prefix("random.", random), **with_prefix("law.", law)}

@@ -9,9 +9,10 @@ from ..core import ops
 from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
+from ..core.variables import select_prefix, with_prefix
 from .control_law import ControlLaw
 from .controller import Measurement
-from .nested_memory import of_part, with_prefix
+from .enclosing_law import EnclosingLaw
 
 INOSE1962 = Reference(
     key="inose-1962",
@@ -25,7 +26,7 @@ INOSE1962 = Reference(
 
 
 @model
-class SigmaDelta(ControlLaw):
+class SigmaDelta(EnclosingLaw):
     """v_k = s_(k-1) + u_k,   position_k = 1 where v_k >= 1/2, else 0,   s_k = v_k - position_k.
 
     u command of the inner law for an input, 0 to 1, s sum of what has not been applied, by which the mean of the
@@ -41,32 +42,20 @@ class SigmaDelta(ControlLaw):
     minimum: float = parameter("1", "u_min", "command below which a valve is closed", bounds=(0.0, 1.0), default=0.0)
 
     @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return self.law.measured_columns
-
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return self.law.setpoints
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.law.inputs
-
-    @property
     def initial_memory(self) -> dict[str, float]:
         """The sum of each input, `sum.fill`, and the values of the law."""
         sums = dict.fromkeys(self.inputs, 0.0)
-        return {**with_prefix("sum", sums), **with_prefix("law", self.law.initial_memory)}
+        return {**with_prefix("sum.", sums), **with_prefix("law.", self.law.initial_memory)}
 
     def step(
         self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
     ) -> tuple[dict[str, Value], dict[str, Value]]:
-        wanted, law = self.law.step(of_part("law", memory), measurement, dt)
+        wanted, law = self.law.step(select_prefix("law.", memory), measurement, dt)
         positions: dict[str, Value] = {}
         sums: dict[str, Value] = {}
-        for name, before in of_part("sum", memory).items():
+        for name, before in select_prefix("sum.", memory).items():
             command = ops.clip(wanted[name], 0.0, 1.0)
             total = before + ops.where(command >= self.minimum, command, 0.0)
             positions[name] = ops.where(total >= 0.5, 1.0, 0.0)
             sums[name] = total - positions[name]
-        return positions, {**with_prefix("sum", sums), **with_prefix("law", law)}
+        return positions, {**with_prefix("sum.", sums), **with_prefix("law.", law)}

@@ -10,9 +10,9 @@ from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
+from ..core.variables import select_prefix, with_prefix
 from .control_law import ControlLaw
 from .controller import Measurement
-from .nested_memory import of_part, with_prefix
 
 FRANKLIN1998 = Reference(
     key="franklin-1998",
@@ -82,14 +82,14 @@ class StateFeedback(ControlLaw):
     @property
     def initial_memory(self) -> dict[str, float]:
         """The predicted deviation of each state, `state.pressure`, and the integral of each controlled column."""
-        states = with_prefix("state", dict.fromkeys(self.state_names, 0.0))
-        return {**states, **with_prefix("integral", dict.fromkeys(self.controlled, 0.0))}
+        states = with_prefix("state.", dict.fromkeys(self.state_names, 0.0))
+        return {**states, **with_prefix("integral.", dict.fromkeys(self.controlled, 0.0))}
 
     def step(
         self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
     ) -> tuple[dict[str, Value], dict[str, Value]]:
-        predicted = list(of_part("state", memory).values())
-        integrals = of_part("integral", memory)
+        predicted = list(select_prefix("state.", memory).values())
+        integrals = select_prefix("integral.", memory)
         deviations = zip(self.measured, self.measured_offset, strict=True)
         y = [measurement.columns[name] - offset for name, offset in deviations]
         innovation = [a - b for a, b in zip(y, product(self.output_matrix, predicted), strict=True)]
@@ -108,7 +108,7 @@ class StateFeedback(ControlLaw):
         errors = {name: measurement.columns[name] - measurement.setpoints[name] for name in self.controlled}
         kept = {name: w + ops.where(limited > 0.0, 0.0, dt * errors[name]) for name, w in integrals.items()}
         states = dict(zip(self.state_names, later, strict=True))
-        return commands, {**with_prefix("state", states), **with_prefix("integral", kept)}
+        return commands, {**with_prefix("state.", states), **with_prefix("integral.", kept)}
 
 
 def product(matrix: tuple[Value, ...], vector: list[Value], rows: int = 0) -> list[Value]:

@@ -9,9 +9,9 @@ from ..core.declaration import model
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
+from ..core.variables import select_prefix, united, with_prefix
 from .control_law import ControlLaw
 from .controller import Measurement
-from .nested_memory import of_part, united, with_prefix
 from .pid import ASTROM_HAGGLUND1995
 
 
@@ -54,15 +54,19 @@ class WithFeedForward(ControlLaw):
     def initial_memory(self) -> dict[str, float]:
         """The values of both laws, with the prefixes `feed_forward.` and `feedback.`."""
         parts = ("feed_forward", self.feed_forward), ("feedback", self.feedback)
-        return {name: value for prefix, law in parts for name, value in with_prefix(prefix, law.initial_memory).items()}
+        return {
+            name: value
+            for prefix, law in parts
+            for name, value in with_prefix(f"{prefix}.", law.initial_memory).items()
+        }
 
     def step(
         self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
     ) -> tuple[dict[str, Value], dict[str, Value]]:
-        ahead, first = self.feed_forward.step(of_part("feed_forward", memory), measurement, dt)
+        ahead, first = self.feed_forward.step(select_prefix("feed_forward.", memory), measurement, dt)
         ranges = {
             name: tuple(limit - ahead[name] for limit in measurement.ranges[name]) for name in self.feedback.inputs
         }
-        back, second = self.feedback.step(of_part("feedback", memory), measurement._replace(ranges=ranges), dt)
+        back, second = self.feedback.step(select_prefix("feedback.", memory), measurement._replace(ranges=ranges), dt)
         commands = {name: value + back[name] if name in back else value for name, value in ahead.items()}
-        return commands, {**with_prefix("feed_forward", first), **with_prefix("feedback", second)}
+        return commands, {**with_prefix("feed_forward.", first), **with_prefix("feedback.", second)}

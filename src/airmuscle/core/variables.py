@@ -43,3 +43,8 @@ def select_prefix(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
 def with_prefix(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values with a prefix before each name."""
     return {f"{prefix}{name}": value for name, value in values.items()}
+
+
+def united(*names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return all names, each once, in their order."""
+    return tuple(dict.fromkeys(name for each in names for name in each))

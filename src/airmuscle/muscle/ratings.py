@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..characteristic.validity_range import CONTRACTION_BOUNDS, PRESSURE_BOUNDS
 from ..core.declaration import INFINITY, model, parameter, parameters
@@ -46,6 +46,15 @@ class RatedRange(NamedTuple):
         return f"{self._scaled(self.low):.4g} to {self.display(self.high)}"
 
 
+def _lower_limit(unit: str, symbol: str, description: str, bounds: tuple[float, float]) -> Any:
+    """A parameter that is not fitted; unless it is stated, it is equal to the lower bound and does not limit."""
+    return parameter(unit, symbol, description, bounds=bounds, fitted=False, default=bounds[0])
+
+
+def _upper_limit(unit: str, symbol: str, description: str, bounds: tuple[float, float]) -> Any:
+    return parameter(unit, symbol, description, bounds=bounds, fitted=False, default=bounds[1])
+
+
 @model
 class Ratings:
     """Permitted values of a muscle, as its maker states them; a value that is not stated does not limit.
@@ -54,39 +63,19 @@ class Ratings:
     Points may be permitted and not measured, or measured and not permitted.
     """
 
-    max_force: float = parameter(
-        "N", "F_max", "permitted force", bounds=FORCE_BOUNDS, fitted=False, default=FORCE_BOUNDS[1]
+    max_force: float = _upper_limit("N", "F_max", "permitted force", FORCE_BOUNDS)
+    min_pressure: float = _lower_limit("Pa", "p_min", "least permitted gauge pressure", PRESSURE_BOUNDS)
+    max_pressure: float = _upper_limit("Pa", "p_max", "greatest permitted gauge pressure", PRESSURE_BOUNDS)
+    max_contraction: float = _upper_limit(
+        "1", "eps_max", "greatest permitted contraction", (0.0, CONTRACTION_BOUNDS[1])
     )
-    min_pressure: float = parameter(
-        "Pa", "p_min", "least permitted gauge pressure", bounds=PRESSURE_BOUNDS, fitted=False,
-        default=PRESSURE_BOUNDS[0],
-    )  # fmt: skip
-    max_pressure: float = parameter(
-        "Pa", "p_max", "greatest permitted gauge pressure", bounds=PRESSURE_BOUNDS, fitted=False,
-        default=PRESSURE_BOUNDS[1],
-    )  # fmt: skip
-    max_contraction: float = parameter(
-        "1", "eps_max", "greatest permitted contraction", bounds=(0.0, CONTRACTION_BOUNDS[1]), fitted=False,
-        default=CONTRACTION_BOUNDS[1],
-    )  # fmt: skip
-    max_prestretch: float = parameter(
-        "1", "eps_pre", "greatest permitted elongation beyond the resting length", bounds=(0.0, -CONTRACTION_BOUNDS[0]),
-        fitted=False, default=-CONTRACTION_BOUNDS[0],
-    )  # fmt: skip
-    min_length: float = parameter(
-        "m", "L_min", "least nominal length", bounds=LENGTH_BOUNDS, fitted=False, default=LENGTH_BOUNDS[0]
+    max_prestretch: float = _upper_limit(
+        "1", "eps_pre", "greatest permitted elongation beyond the resting length", (0.0, -CONTRACTION_BOUNDS[0])
     )
-    max_length: float = parameter(
-        "m", "L_max", "greatest nominal length", bounds=LENGTH_BOUNDS, fitted=False, default=LENGTH_BOUNDS[1]
-    )
-    min_temperature: float = parameter(
-        "K", "T_min", "least permitted ambient temperature", bounds=TEMPERATURE_BOUNDS, fitted=False,
-        default=TEMPERATURE_BOUNDS[0],
-    )  # fmt: skip
-    max_temperature: float = parameter(
-        "K", "T_max", "greatest permitted ambient temperature", bounds=TEMPERATURE_BOUNDS, fitted=False,
-        default=TEMPERATURE_BOUNDS[1],
-    )  # fmt: skip
+    min_length: float = _lower_limit("m", "L_min", "least nominal length", LENGTH_BOUNDS)
+    max_length: float = _upper_limit("m", "L_max", "greatest nominal length", LENGTH_BOUNDS)
+    min_temperature: float = _lower_limit("K", "T_min", "least permitted ambient temperature", TEMPERATURE_BOUNDS)
+    max_temperature: float = _upper_limit("K", "T_max", "greatest permitted ambient temperature", TEMPERATURE_BOUNDS)
 
     def check(self) -> None:
         for name in ("pressure", "length", "temperature"):

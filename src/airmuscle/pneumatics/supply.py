@@ -79,8 +79,40 @@ def check_not_shared(owner: str, supply: AirSource) -> None:
         )
 
 
+class SuppliedVolume(AirSource):
+    """Supply with a volume of air that is fed from another supply."""
+
+    supply: AirSource
+    volume: float
+    gas: Gas
+
+    def check(self) -> None:
+        check_not_shared(type(self).__name__, self.supply)
+
+    def check_ambient(self, ambient: Ambient) -> None:
+        """As the feeding supply."""
+        self.supply.check_ambient(ambient)
+
+    def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
+        return (*self.gas.states(self.volume, ambient), *add_prefix("supply.", self.supply.states(ambient)))
+
+    def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
+        return self.gas.air(state, self.volume, ambient)
+
+    def balance(self, state: Mapping[str, Value], drawn: Flow, ambient: Ambient) -> tuple[dict[str, Value], Flow]:
+        upstream, air = select_prefix("supply.", state), self.air(state, ambient)
+        feed_flow = self.feed_flow(self.supply.air(upstream, ambient), air, ambient)
+        upstream_rates, inflow = self.supply.balance(upstream, feed_flow, ambient)
+        rates = self.gas.rates(state, air, feed_flow - drawn, 0.0, ambient)
+        return {**rates, **with_prefix("supply.", upstream_rates)}, inflow
+
+    @abc.abstractmethod
+    def feed_flow(self, upstream: Air, air: Air, ambient: Ambient) -> Flow:
+        """Flow into the volume, from the air of the feeding supply and of the volume."""
+
+
 @model
-class Tank(AirSource):
+class Tank(SuppliedVolume):
     """Tank: a volume fed through an orifice; its pressure falls while more air is drawn than fed.
 
     m' = q_feed - q_drawn; the pressure follows from the gas model. The initial pressure is that of the feeding supply.
@@ -92,34 +124,17 @@ class Tank(AirSource):
     volume: float = parameter("m3", "V_T", "volume of the tank", bounds=(1e-6, 1e2))
     gas: Gas = Isothermal()
 
-    def check(self) -> None:
-        check_not_shared("Tank", self.supply)
-
-    def check_ambient(self, ambient: Ambient) -> None:
-        """As the feeding supply."""
-        self.supply.check_ambient(ambient)
-
-    def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        return (*self.gas.states(self.volume, ambient), *add_prefix("supply.", self.supply.states(ambient)))
-
     def steady_state(self, ambient: Ambient) -> dict[str, Value]:
         upstream = self.supply.steady_state(ambient)
         pressure = self.supply.air(upstream, ambient).pressure
         return {**self.gas.state_at(pressure, self.volume, ambient), **with_prefix("supply.", upstream)}
 
-    def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
-        return self.gas.air(state, self.volume, ambient)
-
-    def balance(self, state: Mapping[str, Value], drawn: Flow, ambient: Ambient) -> tuple[dict[str, Value], Flow]:
-        upstream, air = select_prefix("supply.", state), self.air(state, ambient)
-        feed_flow = orifice_flow(self.feed, self.supply.air(upstream, ambient), air)
-        upstream_rates, inflow = self.supply.balance(upstream, feed_flow, ambient)
-        rates = self.gas.rates(state, air, feed_flow - drawn, 0.0, ambient)
-        return {**rates, **with_prefix("supply.", upstream_rates)}, inflow
+    def feed_flow(self, upstream: Air, air: Air, ambient: Ambient) -> Flow:
+        return orifice_flow(self.feed, upstream, air)
 
 
 @model
-class RegulatedSupply(AirSource):
+class RegulatedSupply(SuppliedVolume):
     """Pressure regulator (non-relieving): the opening is proportional to the control error of the outlet pressure.
 
         opening = clip((p_set - p)/B, 0, 1)
@@ -138,28 +153,11 @@ class RegulatedSupply(AirSource):
     volume: float = parameter("m3", "V_r", "outlet volume", bounds=(1e-7, 1.0), default=5e-5)
     gas: Gas = Isothermal()
 
-    def check(self) -> None:
-        check_not_shared("RegulatedSupply", self.supply)
-
-    def check_ambient(self, ambient: Ambient) -> None:
-        """As the feeding supply."""
-        self.supply.check_ambient(ambient)
-
-    def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        return (*self.gas.states(self.volume, ambient), *add_prefix("supply.", self.supply.states(ambient)))
-
     def steady_state(self, ambient: Ambient) -> dict[str, Value]:
         upstream = self.supply.steady_state(ambient)
         pressure = ops.minimum(absolute_pressure(self.pressure, ambient), self.supply.air(upstream, ambient).pressure)
         return {**self.gas.state_at(pressure, self.volume, ambient), **with_prefix("supply.", upstream)}
 
-    def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
-        return self.gas.air(state, self.volume, ambient)
-
-    def balance(self, state: Mapping[str, Value], drawn: Flow, ambient: Ambient) -> tuple[dict[str, Value], Flow]:
-        upstream, air = select_prefix("supply.", state), self.air(state, ambient)
+    def feed_flow(self, upstream: Air, air: Air, ambient: Ambient) -> Flow:
         opening = proportional_opening(absolute_pressure(self.pressure, ambient) - air.pressure, self.band)
-        feed_flow = orifice_flow(self.valve, self.supply.air(upstream, ambient), air, opening)
-        upstream_rates, inflow = self.supply.balance(upstream, feed_flow, ambient)
-        rates = self.gas.rates(state, air, feed_flow - drawn, 0.0, ambient)
-        return {**rates, **with_prefix("supply.", upstream_rates)}, inflow
+        return orifice_flow(self.valve, upstream, air, opening)

@@ -16,6 +16,7 @@ from ..identify.campaign import (
     ReleaseStage,
     StaticStage,
 )
+from ..identify.hysteresis import loops_not_joined
 from ..library.entry import Entry
 from .campaign_plots import characteristic_plot, creep_plot, fill_plot, prediction_plot, residual_plot
 from .campaign_stages import USES, count_records, stage_result
@@ -61,7 +62,7 @@ def campaign_chapters(
         chapters.append(fit_chapter(campaign.static.fit, entry))
     if isinstance(campaign.hysteresis, FrictionStage):
         loops, joint = campaign.hysteresis.loops, campaign.hysteresis.joint
-        chapters += [joint_friction_chapter(joint)] if joint else hysteresis_chapters(loops)
+        chapters += [joint_friction_chapter(joint, loops_not_joined(loops))] if joint else hysteresis_chapters(loops)
     if isinstance(campaign.creep, CreepStage):
         chapters.append(_creep(campaign.creep))
     if isinstance(campaign.fills, FillStage):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..core.plotting import BLACK, BLUE, RED, legend_below, new_figure
-from ..identify.hysteresis import HysteresisFit, HysteresisLoop, JointFit, LoopFit
+from ..identify.hysteresis import HysteresisFit, HysteresisLoop, JointFit, LoopFit, loops_not_joined
 from ..identify.hysteresis.plot import plot_loops
 from ..recording.display_units import display_scale
 from ..recording.segment import motion_direction
@@ -21,7 +21,7 @@ def hysteresis_chapters(
     loop_fits: Sequence[LoopFit], creep: Sequence[str] = (), joint: Sequence[JointFit] = ()
 ) -> list[Chapter]:
     """Return the chapter of the joint fits, if any, and one per loop; the sentences on creep form the last chapter."""
-    chapters = [joint_friction_chapter(joint)] if joint else []
+    chapters = [joint_friction_chapter(joint, loops_not_joined(loop_fits))] if joint else []
     chapters += [_chapter(each, "" if len(loop_fits) == 1 else f"-{i}") for i, each in enumerate(loop_fits, 1)]
     if creep:
         chapters.append(Chapter("creep", "Creep", "\n\n".join(creep)))

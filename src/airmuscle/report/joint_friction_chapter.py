@@ -10,8 +10,11 @@ from .chapter import Chapter, Plot, Table
 from .formatting import P_VALUE
 
 
-def joint_friction_chapter(fits: Sequence[JointFit]) -> Chapter:
-    """Return the chapter of the joint fits of all laws, lowest AICc first; the best justified one is shown."""
+def joint_friction_chapter(fits: Sequence[JointFit], not_joined: Sequence[str] = ()) -> Chapter:
+    """Return the chapter of the joint fits of all laws, lowest AICc first; the best justified one is shown.
+
+    `not_joined` are sentences on the loops that the joint fit does not use.
+    """
     shown = next((fit for fit in fits if fit.justified), fits[0])
     summary = [shown.verdict]
     if not shown.justified:
@@ -20,6 +23,7 @@ def joint_friction_chapter(fits: Sequence[JointFit]) -> Chapter:
             "The runs justify no friction law that holds for all of them, so none is written. "
             f"{shown.name} is shown as the best one.",
         )
+    summary += not_joined
     return Chapter(
         paper="joint-friction",
         title="Friction of all runs",

@@ -81,14 +81,8 @@ def _fill(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tuple[s
     stage = campaign.fills
     if not isinstance(stage, FillStage) or record not in stage.records:
         return "", "the fills of this muscle were not fitted"
-    number = stage.records.index(record)
-    fitted = stage.fit.plant(number)
-    assert isinstance(fitted, Plant)
-    plant = Plant(muscle, fitted.circuit, fitted.mechanism, gas=fitted.gas)
-    model = stage.fit.problem.record_models[number]
-    start = model.start_time(stage.fit.values)
+    plant, known, start = _fitted_record(stage, record, muscle)
     points = {name: [list(point) for point in rows] for name, rows in valve_commands(record).items()}
-    known = model.experiment.initial_conditions.known
     run = {"duration": float(record.recording["time"][-1]) - start, "initial_state": {"pressure": known["pressure"]}}
     return scenario_toml(record.origin, plant, points, run, _note(record, start)), ""
 
@@ -97,16 +91,22 @@ def _release(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tupl
     stage = campaign.release
     if not isinstance(stage, ReleaseStage) or record not in stage.records:
         return "", "the release of this muscle was not fitted"
+    plant, known, start = _fitted_record(stage, record, muscle)
+    state = {name: known[name] for name in ("pressure", "position", "speed")}
+    run = {"duration": float(record.recording["time"][-1]) - start, "initial_state": state}
+    return scenario_toml(record.origin, plant, {"latched": [[0.0, 0.0]]}, run, _note(record, start)), ""
+
+
+def _fitted_record(
+    stage: FillStage | ReleaseStage, record: CampaignRecord, muscle: Muscle
+) -> tuple[Plant, Mapping[str, float], float]:
+    """The plant of a fitted record with the whole muscle, its initial conditions and its start [s] in the record."""
     number = stage.records.index(record)
     fitted = stage.fit.plant(number)
     assert isinstance(fitted, Plant)
     plant = Plant(muscle, fitted.circuit, fitted.mechanism, gas=fitted.gas)
     model = stage.fit.problem.record_models[number]
-    start = model.start_time(stage.fit.values)
-    known = model.experiment.initial_conditions.known
-    state = {name: known[name] for name in ("pressure", "position", "speed")}
-    run = {"duration": float(record.recording["time"][-1]) - start, "initial_state": state}
-    return scenario_toml(record.origin, plant, {"latched": [[0.0, 0.0]]}, run, _note(record, start)), ""
+    return plant, model.experiment.initial_conditions.known, model.start_time(stage.fit.values)
 
 
 def _slow(record: CampaignRecord, muscle: Muscle) -> str:

@@ -26,8 +26,9 @@ def compiled_sample(law: ControlLaw) -> Function:
 
 
 def parameters_of(law: ControlLaw) -> Array:
-    """The parameters of a law, for its compiled sample."""
-    return np.append(tree.flatten(law), 0.0)[: max(len(tree.flatten(law)), 1)]
+    """The parameters of a law, for its compiled sample: at least one number, so that the array has an address."""
+    parameters = tree.flatten(law)
+    return parameters if len(parameters) else np.zeros(1)
 
 
 def _trace(law: ControlLaw) -> Function:
@@ -56,7 +57,7 @@ def _trace(law: ControlLaw) -> Function:
             f"{owner}.step does not return {missing}; it must return a value for each of {', '.join(law.inputs)}, and "
             f"for each of its memory: {', '.join(names['memory']) or 'none'}."
         ) from None
-    except (TypeError, ValueError, RuntimeError, NotImplementedError) as reason:
+    except (TypeError, ValueError, RuntimeError) as reason:
         raise TraceError(
             f"{owner}.step cannot be compiled ({' '.join(str(reason).split())[:160]}). Use airmuscle.core.ops instead "
             "of math, numpy and `if`, or derive the controller from Controller."

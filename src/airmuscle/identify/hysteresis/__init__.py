@@ -12,7 +12,7 @@ from .fit import (
     initial_friction_laws,
 )
 from .holds import Hold, find_holds
-from .joint import fit_jointly, identified_friction
+from .joint import fit_jointly, identified_friction, loops_not_joined
 from .joint_result import JointFit
 from .loops import HysteresisLoop, LoopFit, find_loops, fit_loop
 from .result import HysteresisFit
@@ -38,4 +38,5 @@ __all__ = [
     "fit_loop",
     "identified_friction",
     "initial_friction_laws",
+    "loops_not_joined",
 ]

@@ -28,9 +28,24 @@ PRESSURE_QUANTILES = (0.01, 0.99)
 
 def joinable_fits(loop_fits: Sequence[LoopFit]) -> tuple[LoopFit, ...]:
     """The loops whose friction a plant can use and whose rows give no reason against a friction."""
+    return tuple(each for each in loop_fits if not _reason_against(each))
+
+
+def loops_not_joined(loop_fits: Sequence[LoopFit]) -> tuple[str, ...]:
+    """Sentences that name each loop that the joint fit does not use, and the reason."""
+    reasons = [(each.loop, _reason_against(each)) for each in loop_fits]
     return tuple(
-        each for each in loop_fits if each.usable_in_plant and each.fits and not each.fits[0].reservations_of_rows
+        f"Not in the joint fit: {loop.recording.origin}, {loop.description}. {why}" for loop, why in reasons if why
     )
+
+
+def _reason_against(loop_fit: LoopFit) -> str:
+    """Why a loop is not fitted together with others, as sentences; empty if it is."""
+    if not loop_fit.usable_in_plant:
+        return "The friction acts along the pressure, which a plant cannot use."
+    if not loop_fit.fits:
+        return "No law could be fitted to it alone."
+    return " ".join(loop_fit.fits[0].reservations_of_rows)
 
 
 def fit_jointly(loop_fits: Sequence[LoopFit], *, progress: Callable[[str], None] | None = None) -> tuple[JointFit, ...]:

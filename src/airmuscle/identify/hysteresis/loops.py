@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from ...characteristic.base import Characteristic
-from ...core.errors import IdentificationError
+from ...core.errors import AirmuscleWarning, IdentificationError
 from ...core.hints import Hint, HintedText
 from ...recording import Recording
 from ...recording.segment import (
@@ -91,23 +92,42 @@ def find_loops(
     """The loops in the runs of recordings, one for each kind and level; a second run at a level validates the first.
 
     Each run with a rising and a falling branch gives a loop; if a recording has several runs, the loop is named after
-    the file and the rows of the run, and runs of one direction are left out.
+    the file and the rows of the run, and runs of one direction are left out. A muscle of another resting length or
+    another specimen gives no repeat. A recording without a usable run is left out with an AirmuscleWarning if another
+    one has a loop.
 
     The static curve is a polynomial of `degree` in the swept quantity, fitted with the friction, or `characteristic`
     with an offset. The fitted rows have a positive force below the limit of the sensor and, unless `all_rows`, are
-    quasi-static. Raises IdentificationError for a run without two branches, or for one that is neither isobaric nor
-    isometric without a characteristic.
+    quasi-static. Raises IdentificationError if no run gives a loop: each has one branch, or is neither isobaric nor
+    isometric while no characteristic is given.
     """
-    sensors, loops = estimate_sensors(recordings), list[HysteresisLoop]()
+    sensors, loops, failed = estimate_sensors(recordings), list[HysteresisLoop](), list[IdentificationError]()
     each_run = [part for recording in recordings for part in _separate_runs(recording, sensors)]
     for recording, run in each_run:
-        loop = _make_loop(recording, run, sensors, characteristic, degree, all_rows)
-        same = next((i for i, other in enumerate(loops) if _is_same_level(other.run, loop.run)), None)
+        try:
+            loop = _make_loop(recording, run, sensors, characteristic, degree, all_rows)
+        except IdentificationError as error:
+            failed.append(error)
+            continue
+        same = next((i for i, other in enumerate(loops) if _is_repeat(other, loop)), None)
         if same is None:
             loops.append(loop)
         elif loops[same].repeat is None:
             loops[same] = dataclasses.replace(loops[same], repeat=(recording, loop.fitted_rows))
+    if failed and not loops:
+        raise failed[0]
+    for reason in failed:
+        warnings.warn(AirmuscleWarning(HintedText("left out: ", reason.message)), stacklevel=2)
     return tuple(loops)
+
+
+def _is_repeat(first: HysteresisLoop, other: HysteresisLoop) -> bool:
+    """Whether a loop is of the same muscle as the first, and of the same kind and level."""
+    constants = [
+        (loop.recording.constants.get("resting_length"), loop.recording.constants.get("specimen"))
+        for loop in (first, other)
+    ]
+    return constants[0] == constants[1] and _is_same_level(first.run, other.run)
 
 
 def _separate_runs(recording: Recording, sensors: Mapping[str, Sensor]) -> list[tuple[Recording, Run]]:
