@@ -89,7 +89,7 @@ def case() -> Case:
 def simulation(method: Integrator) -> Callable[[], Array]:
     """A function that runs the kernel and evaluates all outputs at the rows."""
     ready, segments = compile_system(case().plant), case().segments
-    times = case().experiment.recording["time"]
+    times = case().experiment.recording["time"].copy()  # a kernel takes writeable arrays
     start = np.array([case().experiment.initial_conditions.guess[s.name] for s in case().plant.states])
     under, results = np.ascontiguousarray(segments.inputs_at(times, 0.0)), np.empty((times.size, ready.sizes.outputs))
 
@@ -145,7 +145,7 @@ def make_jax_variant(form: str) -> Callable[[], tuple[Array, Array]]:
     plant, leaves = case().plant, list(tree.leaves(case().plant))
     indices = [[leaf.path for leaf in leaves].index(path) for path in FREE]
     values = np.array([leaves[index].value for index in indices])
-    start, by_start = case().problem(RungeKutta4(STEP)).record_models[0].start(values)
+    start, by_start = case().problem(RungeKutta4(STEP)).record_models[0].initial_state(values)
     t, names = trace_system(plant), [s.name for s in plant.states]
     outputs = list(t.output_names)
     seen = [t.o[outputs.index(name)] if name in outputs else t.x[names.index(name)] for name in SENSORS]

@@ -14,9 +14,31 @@ import numpy as np
 THRESHOLD = 0.5
 INFINITY = np.inf
 ARRIVED = 1e-12
+PART = numba.njit(error_model="numpy", nogil=True, inline="always")
+"""Decorator of a part of a kernel; numba copies it into the kernel."""
 
 
-@numba.njit(error_model="numpy", nogil=True, inline="always")
+@PART
+def end_of_pulse(time: Any, duty: Any, period: Any, smallest: Any) -> Any:
+    """The end of the pulse of a period that begins at `time`: -infinity without a pulse, infinity without a gap."""
+    width = period * min(max(duty, 0.0), 1.0)
+    end = time + width
+    if period - width < smallest:
+        end = INFINITY
+    if width < smallest:
+        end = -INFINITY
+    return end
+
+
+@PART
+def hold_levels(result: Any, levels: Any, end: Any) -> None:
+    """Turn instants at which levels begin into ends of segments without slope."""
+    for i in range(levels):
+        result[0, i] = result[0, i + 1] if i + 1 < levels else end
+        result[2, i] = 0.0
+
+
+@PART
 def pulse_width_modulation(
     settings: Any, state: Any, new: Any, signal: Any, count: Any, start: Any, ulp: Any, result: Any
 ) -> Any:
@@ -31,8 +53,7 @@ def pulse_width_modulation(
     period = 1.0 / frequency
     smallest = max(settings[1], 1e-9 * period, 4.0 * ulp)
     origin, begun, pulse_end = state[0], state[1], state[2]
-    levels = 0  # pulses so far: instants in row 0 of the result, levels in row 1
-    on = pulse_end > start
+    on = pulse_end > start  # pulses so far: instants in row 0 of the result, levels in row 1
     result[0, 0], result[1, 0] = start, 1.0 if on else 0.0
     levels = 1
     if on and pulse_end < end:
@@ -48,13 +69,7 @@ def pulse_width_modulation(
             while k < count - 1 and signal[0, k] <= time:
                 begin = signal[0, k]
                 k += 1
-            duty = signal[1, k] + (time - begin) * signal[2, k]
-            width = period * min(max(duty, 0.0), 1.0)
-            pulse_end = time + width
-            if period - width < smallest:
-                pulse_end = INFINITY
-            if width < smallest:
-                pulse_end = -INFINITY
+            pulse_end = end_of_pulse(time, signal[1, k] + (time - begin) * signal[2, k], period, smallest)
             if periods == 0 and time == start:
                 levels = 0
             on = pulse_end > time
@@ -66,25 +81,14 @@ def pulse_width_modulation(
                 result[0, levels], result[1, levels] = pulse_end, 0.0
                 levels += 1
             periods += 1
-    for i in range(levels):
-        result[0, i] = result[0, i + 1] if i + 1 < levels else end
-        result[2, i] = 0.0
+    hold_levels(result, levels, end)
     new[0], new[1], new[2] = origin, begun + periods, pulse_end
     return levels
 
 
-@numba.njit(error_model="numpy", nogil=True, inline="always")
-def delayed_switch(
-    settings: Any, state: Any, new: Any, signal: Any, count: Any, start: Any, events: Any, result: Any
-) -> Any:
-    """Opening of a switch that follows a signal from `start`; the number of segments of the result.
-
-    settings  opening delay, closing delay, opening ramp, closing ramp
-    state     coil, pending instant, target, opening; `new` receives it at the end of the signal
-    events    (3, capacity): workspace
-    """
-    end = signal[0, count - 1]
-    coil, pending, target, opening = state[0], state[1], state[2], state[3]
+@PART
+def find_switchings(signal: Any, count: Any, start: Any, coil: Any, events: Any) -> Any:
+    """Write the instants at which a signal passes the threshold, and the new coil states; how many there are."""
     switchings, present, begin = 0, coil, start
     for k in range(count):
         value, slope = signal[1, k], signal[2, k]
@@ -100,6 +104,42 @@ def delayed_switch(
             events[1, switchings] = present
             switchings += 1
         begin = signal[0, k]
+    return switchings
+
+
+@PART
+def move_towards(target: Any, opening: Any, edge: Any, stop: Any, settings: Any, result: Any, segments: Any) -> Any:
+    """Write the motion of the opening from `edge` to `stop`, and the rest after it; the opening, and the segments."""
+    ramp = settings[2] if target > opening else settings[3]
+    distance = abs(target - opening)
+    left = distance - ((stop - edge) / ramp if ramp > 0.0 else INFINITY)
+    after = target
+    if left > ARRIVED:
+        after = target + (left if opening - target >= 0.0 else -left)
+    arrival = min(edge + (ramp * distance if after == target else INFINITY), stop)
+    if arrival > edge:
+        result[0, segments], result[1, segments] = arrival, opening
+        result[2, segments] = (after - opening) / (arrival - edge)
+        segments += 1
+    if stop > arrival:
+        result[0, segments], result[1, segments], result[2, segments] = stop, after, 0.0
+        segments += 1
+    return after, segments
+
+
+@PART
+def delayed_switch(
+    settings: Any, state: Any, new: Any, signal: Any, count: Any, start: Any, events: Any, result: Any
+) -> Any:
+    """Opening of a switch that follows a signal from `start`; the number of segments of the result.
+
+    settings  opening delay, closing delay, opening ramp, closing ramp
+    state     coil, pending instant, target, opening; `new` receives it at the end of the signal
+    events    (3, capacity): workspace
+    """
+    end = signal[0, count - 1]
+    coil, pending, target, opening = state[0], state[1], state[2], state[3]
+    switchings = find_switchings(signal, count, start, coil, events)
     edge, segments = start, 0
     for k in range(switchings + 2):
         instant = events[0, k] if k < switchings else INFINITY
@@ -107,22 +147,8 @@ def delayed_switch(
         stop = pending if moves else edge
         if k == switchings + 1:
             stop = end
-        if stop > edge:  # the motion towards the target until `stop`, and the rest after it
-            ramp = settings[2] if target > opening else settings[3]
-            distance = abs(target - opening)
-            left = distance - ((stop - edge) / ramp if ramp > 0.0 else INFINITY)
-            after = target
-            if left > ARRIVED:
-                after = target + (left if opening - target >= 0.0 else -left)
-            arrival = min(edge + (ramp * distance if after == target else INFINITY), stop)
-            if arrival > edge:
-                result[0, segments], result[1, segments] = arrival, opening
-                result[2, segments] = (after - opening) / (arrival - edge)
-                segments += 1
-            if stop > arrival:
-                result[0, segments], result[1, segments], result[2, segments] = stop, after, 0.0
-                segments += 1
-            opening = after
+        if stop > edge:
+            opening, segments = move_towards(target, opening, edge, stop, settings, result, segments)
         if moves and k <= switchings:
             edge, target = pending, coil
         if k < switchings:

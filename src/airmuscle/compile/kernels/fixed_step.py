@@ -13,8 +13,33 @@ import numpy as np
 
 from ...core.status import Status
 from .calls import invoke, pointer
+from .segments import PART, set_inputs, write_present
 
 DONE, PAUSED, NOT_FINITE = Status.DONE.value, Status.PAUSED.value, Status.NOT_FINITE.value
+
+
+@PART
+def write_between(
+    step: Any, at_y: Any, at_u: Any, at_c: Any, at_w: Any, at_new: Any, new: Any,
+    times: Any, row: Any, limit: Any, t: Any, rows: Any,
+) -> Any:  # fmt: skip
+    """Write the states at the output times before `limit`, each reached by a step of its own; the next row."""
+    while row < times.shape[0] and times[row] < limit:
+        invoke(step, (at_y, at_u, at_c, at_w, times[row] - t, at_new))
+        for i in range(new.shape[0]):
+            rows[row, i] = new[i]
+        row += 1
+    return row
+
+
+@PART
+def take(new: Any, y: Any) -> Any:
+    """Copy the new states to `y`; the sum of their sizes."""
+    total_size = 0.0
+    for i in range(y.shape[0]):
+        y[i] = new[i]
+        total_size += abs(new[i])
+    return total_size
 
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
@@ -37,10 +62,7 @@ def fixed_step(
     segment, row = count[0], count[1]
     taken = 0
     status = DONE
-    while row < times.shape[0] and times[row] <= t:
-        for i in range(n):
-            rows[row, i] = y[i]
-        row += 1
+    row = write_present(times, row, t, y, rows)
     while segment < ends.shape[0]:
         end = ends[segment]
         for i in range(m):
@@ -51,30 +73,18 @@ def fixed_step(
             if taken >= budget:
                 status = PAUSED
                 break
-            for i in range(m):
-                u[i] = values[segment, i] + (t - start) * w[i]
+            set_inputs(values, segment, t - start, w, u)
             reached = end if done + 1 == total else start + (done + 1) * length
-            while row < times.shape[0] and times[row] < reached - 1e-9 * length:
-                invoke(step, (at_y, at_u, at_c, at_w, times[row] - t, at_new))
-                for i in range(n):
-                    rows[row, i] = new[i]
-                row += 1
+            row = write_between(step, at_y, at_u, at_c, at_w, at_new, new, times, row, reached - 1e-9 * length, t, rows)
             h = length if done + 1 < total else end - t
             invoke(step, (at_y, at_u, at_c, at_w, h, at_new))
-            total_size = 0.0
-            for i in range(n):
-                y[i] = new[i]
-                total_size += abs(new[i])
-            if not total_size < 1e300:
+            if not take(new, y) < 1e300:
                 status = NOT_FINITE
                 break
             t = reached
             done += 1
             taken += 1
-            while row < times.shape[0] and times[row] <= reached + 1e-9 * length:
-                for i in range(n):
-                    rows[row, i] = y[i]
-                row += 1
+            row = write_present(times, row, reached + 1e-9 * length, y, rows)
         if status != DONE:
             clock[1] = done
             break

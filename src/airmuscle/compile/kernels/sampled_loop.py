@@ -15,12 +15,14 @@ DONE, PAUSED, NOT_FINITE = Status.DONE.value, Status.PAUSED.value, Status.NOT_FI
 NON_FINITE_COMMAND, BELOW_LIMIT = Status.NON_FINITE_COMMAND.value, Status.NEGATIVE_AIR_MASS.value
 LARGEST = 1.7976931348623157e308
 MODULATOR = DriverKind.MODULATOR.value
+PART = numba.njit(error_model="numpy", nogil=True, inline="always")
+"""Decorator of the parts of the kernel; numba copies them into it."""
 DRIVER_WIDTH = 4
 """Numbers of the settings and of the state of a driver."""
 INTERVAL, RUNNING, SEGMENTS, ROWS, SAMPLES, STEPS_BEFORE, FULL, FIRST_SEGMENT, FIRST_ROW = map(int, Progress)
 
 
-@numba.njit(error_model="numpy", nogil=True, inline="always")
+@PART
 def apply_drivers(
     kinds: Any, settings: Any, states: Any, new: Any, columns: Any, counts: Any, scratch: Any, start: Any, ulp: Any
 ) -> None:
@@ -41,7 +43,7 @@ def apply_drivers(
         counts[i] = count
 
 
-@numba.njit(error_model="numpy", nogil=True, inline="always")
+@PART
 def merge_columns(
     columns: Any, counts: Any, at: Any, begins: Any, start: Any, ends: Any, values: Any, slopes: Any, first: Any
 ) -> Any:
@@ -72,7 +74,7 @@ def merge_columns(
         time = following
 
 
-@numba.njit(error_model="numpy", nogil=True, inline="always")
+@PART
 def merge_times(
     grid: Any, begin: Any, end: Any, instants: Any, first: Any, count: Any, close: Any, times: Any, row: Any
 ) -> Any:
@@ -95,6 +97,105 @@ def merge_times(
         written += 1
         k += 1
     return written
+
+
+@PART
+def measure(outputs: Any, y: Any, applied: Any, c: Any, o: Any, measured_at: Any, measured: Any) -> Any:
+    """Write the measured columns; DONE, or NOT_FINITE."""
+    n, needs_outputs, status = y.shape[0], False, DONE
+    for i in range(measured_at.shape[0]):
+        needs_outputs = needs_outputs or measured_at[i] >= n
+    if needs_outputs:
+        invoke(outputs, (pointer(y), pointer(applied), pointer(c), pointer(o)))
+    for i in range(measured.shape[0]):
+        at = measured_at[i]
+        x = y[at] if at < n else o[at - n]
+        if not abs(x) <= LARGEST:
+            status = NOT_FINITE
+            break
+        measured[i] = x
+    return status
+
+
+@PART
+def limit_commands(command: Any, low: Any, high: Any) -> Any:
+    """Limit each command to the range of its input; DONE, or NON_FINITE_COMMAND."""
+    status = DONE
+    for i in range(command.shape[0]):
+        x = 0.0 + command[i]
+        if low[i] > x:
+            x = low[i]
+        if high[i] < x:
+            x = high[i]
+        if not abs(x) <= LARGEST:
+            status = NON_FINITE_COMMAND
+            break
+        command[i] = x
+    return status
+
+
+@PART
+def apply_sample(
+    k: Any, measured: Any, samples: Any, command: Any, commands: Any, commanded_at: Any, first: Any, values: Any
+) -> None:
+    """Write the measurements and the commands of interval `k`, and the commands into its segments."""
+    for i in range(measured.shape[0]):
+        samples[k, i] = measured[i]
+    for i in range(command.shape[0]):
+        commands[k, i] = command[i]
+        for row in range(first[k], first[k + 1]):
+            values[row, commanded_at[i]] = command[i]
+
+
+@PART
+def load_columns(ends: Any, values: Any, slopes: Any, first: Any, pieces: Any, columns: Any, counts: Any) -> None:
+    """Copy the segments of an interval to the signals of the inputs."""
+    for i in range(columns.shape[0]):
+        counts[0, i] = pieces
+        for row in range(pieces):
+            columns[i, 0, row] = ends[first + row]
+            columns[i, 1, row] = values[first + row, i]
+            columns[i, 2, row] = slopes[first + row, i]
+
+
+@PART
+def point_integrator(
+    slots: Any, places: Any, at_segment: Any, pieces: Any, at_row: Any, wanted: Any,
+    ends: Any, values: Any, slopes: Any, times: Any, rows: Any,
+) -> None:  # fmt: skip
+    """Give the integrator its segments, output times and rows."""
+    slots[places[0]], slots[places[1]] = pointer(ends[at_segment:]), pointer(values[at_segment:])
+    slots[places[2]], slots[places[3]] = pointer(slopes[at_segment:]), pointer(times[at_row:])
+    slots[places[4]] = pointer(rows[at_row:])
+    slots[places[0] + 1] = slots[places[1] + 1] = slots[places[2] + 1] = pieces
+    slots[places[3] + 1] = slots[places[4] + 1] = wanted
+
+
+@PART
+def is_below(y: Any, bounds: Any) -> Any:
+    """Whether a state is below its bound."""
+    below = False
+    for i in range(y.shape[0]):
+        below = below or y[i] < bounds[i]
+    return below
+
+
+@PART
+def keep_state(
+    last: Any, start: Any, end: Any, values: Any, slopes: Any, applied: Any, kept_applied: Any,
+    y: Any, kept: Any, memory: Any, states: Any, kept_states: Any,
+) -> None:  # fmt: skip
+    """Keep inputs, state, memory and drivers at the end of an interval, whose last segment is number `last`."""
+    for i in range(applied.shape[0]):
+        applied[i] = values[last, i] + slopes[last, i] * (end - start)
+        kept_applied[i] = applied[i]
+    for i in range(y.shape[0]):
+        kept[i] = y[i]
+    for i in range(memory.shape[1]):
+        memory[0, i] = memory[1, i]
+    for d in range(states.shape[0]):
+        for i in range(DRIVER_WIDTH):
+            kept_states[d, i] = states[d, i]
 
 
 @numba.njit(error_model="numpy", nogil=True)
@@ -125,82 +226,52 @@ def sampled_loop(
     samples (K, ..), commands (K, ..)  measurements and commands of every interval
     progress      see `kernel_layout.Progress`
     """
-    n, m, intervals = y.shape[0], values.shape[1], edges.shape[0] - 1
-    driven = kinds.shape[0]
-    needs_outputs = False
-    for i in range(measured_at.shape[0]):
-        needs_outputs = needs_outputs or measured_at[i] >= n
-    steps_at_call = count[2]
+    intervals, driven, steps_at_call = edges.shape[0] - 1, kinds.shape[0], count[2]
     while progress[INTERVAL] < intervals:
         k = progress[INTERVAL]
         begin, end = edges[k], edges[k + 1]
         if progress[RUNNING] == 0:
             if count[2] - steps_at_call >= budget:
                 return PAUSED
-            pieces = first[k + 1] - first[k]
-            if driven:
-                room = columns.shape[2] * m
-                too_many = progress[SEGMENTS] + room > new_ends.shape[0]
-                if too_many or progress[ROWS] + room + grid_row[k + 1] - grid_row[k] > times.shape[0]:
-                    progress[FULL] = 1
-                    return PAUSED
+            room = columns.shape[2] * values.shape[1] if driven else 0
+            wanted = grid_row[k + 1] - grid_row[k]
+            if driven and (
+                progress[SEGMENTS] + room > new_ends.shape[0] or progress[ROWS] + room + wanted > times.shape[0]
+            ):
+                progress[FULL] = 1
+                return PAUSED
             for i in range(memory.shape[1]):
                 memory[1, i] = memory[0, i]
             if k >= first_sample:
-                if needs_outputs:
-                    invoke(outputs, (pointer(y), pointer(applied), pointer(c), pointer(o)))
-                for i in range(measured.shape[0]):
-                    at = measured_at[i]
-                    x = y[at] if at < n else o[at - n]
-                    if not abs(x) <= LARGEST:
-                        return NOT_FINITE
-                    measured[i] = x
+                status = measure(outputs, y, applied, c, o, measured_at, measured)
+                if status != DONE:
+                    return status
                 invoke(sample, (
                     pointer(measured), pointer(setpoints[k]), pointer(memory[0]), pointer(low), pointer(high),
                     pointer(period), pointer(parameters), pointer(command), pointer(memory[1]),
                 ))  # fmt: skip
-                for i in range(command.shape[0]):
-                    x = 0.0 + command[i]
-                    if low[i] > x:
-                        x = low[i]
-                    if high[i] < x:
-                        x = high[i]
-                    if not abs(x) <= LARGEST:
-                        return NON_FINITE_COMMAND
-                    command[i] = x
-            for i in range(measured.shape[0]):
-                samples[k, i] = measured[i]
-            for i in range(command.shape[0]):
-                commands[k, i] = command[i]
-                for row in range(first[k], first[k + 1]):
-                    values[row, commanded_at[i]] = command[i]
+                status = limit_commands(command, low, high)
+                if status != DONE:
+                    return status
+            apply_sample(k, measured, samples, command, commands, commanded_at, first, values)
             progress[SAMPLES] = k + 1
+            at_segment, at_row, pieces = first[k], grid_row[k], first[k + 1] - first[k]
             if driven:
-                for i in range(m):
-                    counts[0, i] = pieces
-                    for row in range(pieces):
-                        columns[i, 0, row] = ends[first[k] + row]
-                        columns[i, 1, row] = values[first[k] + row, i]
-                        columns[i, 2, row] = slopes[first[k] + row, i]
+                load_columns(ends, values, slopes, first[k], pieces, columns, counts)
                 apply_drivers(kinds, settings, kept_states, states, columns, counts[0], scratch, begin, ulps[k + 1])
                 at_segment, at_row = progress[SEGMENTS], progress[ROWS]
                 pieces = merge_columns(
-                    columns, counts[0], counts[1], begins, begin, new_ends, new_values, new_slopes,
-                    at_segment,
-                )  # fmt: skip
+                    columns, counts[0], counts[1], begins, begin, new_ends, new_values, new_slopes, at_segment
+                )
                 instants = pieces if pieces > 1 else 0
                 wanted = merge_times(
                     grid, grid_row[k], grid_row[k + 1], new_ends, at_segment, instants, 1e-9 * period[0], times, at_row
                 )
-            else:
-                at_segment, at_row, wanted = first[k], grid_row[k], grid_row[k + 1] - grid_row[k]
             progress[FIRST_SEGMENT], progress[FIRST_ROW] = at_segment, at_row
             progress[SEGMENTS], progress[ROWS] = at_segment + pieces, at_row
-            slots[places[0]], slots[places[1]] = pointer(new_ends[at_segment:]), pointer(new_values[at_segment:])
-            slots[places[2]], slots[places[3]] = pointer(new_slopes[at_segment:]), pointer(times[at_row:])
-            slots[places[4]] = pointer(rows[at_row:])
-            slots[places[0] + 1] = slots[places[1] + 1] = slots[places[2] + 1] = pieces
-            slots[places[3] + 1] = slots[places[4] + 1] = wanted
+            point_integrator(
+                slots, places, at_segment, pieces, at_row, wanted, new_ends, new_values, new_slopes, times, rows
+            )
             clock[0], clock[1], clock[2] = begin, 0.0, begin
             count[0] = count[1] = 0
             progress[STEPS_BEFORE], progress[RUNNING] = count[2], 1
@@ -208,20 +279,12 @@ def sampled_loop(
         progress[ROWS] = progress[FIRST_ROW] + count[1]
         if status != DONE:
             return status
-        for i in range(n):
-            if y[i] < bounds[i]:
-                return BELOW_LIMIT
+        if is_below(y, bounds):
+            return BELOW_LIMIT
         last = progress[SEGMENTS] - 1
         start = new_ends[last - 1] if last > progress[FIRST_SEGMENT] else begin
-        for i in range(m):
-            applied[i] = new_values[last, i] + new_slopes[last, i] * (end - start)
-            kept_applied[i] = applied[i]
-        for i in range(n):
-            kept[i] = y[i]
-        for i in range(memory.shape[1]):
-            memory[0, i] = memory[1, i]
-        for d in range(driven):
-            for i in range(DRIVER_WIDTH):
-                kept_states[d, i] = states[d, i]
+        keep_state(
+            last, start, end, new_values, new_slopes, applied, kept_applied, y, kept, memory, states, kept_states
+        )
         progress[INTERVAL], progress[RUNNING] = k + 1, 0
     return DONE

@@ -1,0 +1,30 @@
+"""Parts of the kernels that integrate: inputs within a segment, and rows at output times.
+
+numba copies them into the kernel, so that it remains one function, whose machine code can be stored.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+
+PART = numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True, inline="always")
+"""Decorator of a part of a kernel that integrates."""
+
+
+@PART
+def set_inputs(values: Any, segment: Any, elapsed: Any, w: Any, u: Any) -> None:
+    """The inputs `u` so long after the start of a segment."""
+    for i in range(u.shape[0]):
+        u[i] = values[segment, i] + elapsed * w[i]
+
+
+@PART
+def write_present(times: Any, row: Any, t: Any, y: Any, rows: Any) -> Any:
+    """Write the present states at the output times up to `t`; the next row."""
+    while row < times.shape[0] and times[row] <= t:
+        for i in range(y.shape[0]):
+            rows[row, i] = y[i]
+        row += 1
+    return row
