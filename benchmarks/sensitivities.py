@@ -113,12 +113,13 @@ def evaluate_in_jax(code: Code, inputs: Sequence[Any]) -> list[Any]:
     import jax.numpy as jnp
 
     table: dict[int, Callable[..., Any]] = {
-        casadi.OP_ADD: lambda a, b: a + b, casadi.OP_SUB: lambda a, b: a - b, casadi.OP_MUL: lambda a, b: a * b,
-        casadi.OP_DIV: lambda a, b: a / b, casadi.OP_NEG: lambda a: -a, casadi.OP_SQ: lambda a: a * a,
-        casadi.OP_TWICE: lambda a: a + a, casadi.OP_INV: lambda a: 1.0 / a, casadi.OP_SQRT: jnp.sqrt,
-        casadi.OP_SIN: jnp.sin, casadi.OP_COS: jnp.cos, casadi.OP_LE: lambda a, b: jnp.where(a <= b, 1.0, 0.0),
-        casadi.OP_LT: lambda a, b: jnp.where(a < b, 1.0, 0.0), casadi.OP_NOT: lambda a: 1.0 - a,
-        casadi.OP_IF_ELSE_ZERO: lambda c, a: jnp.where(c != 0, a, 0.0),
+        Operation.ADD: lambda a, b: a + b, Operation.SUBTRACT: lambda a, b: a - b,
+        Operation.MULTIPLY: lambda a, b: a * b, Operation.DIVIDE: lambda a, b: a / b, Operation.NEGATE: lambda a: -a,
+        Operation.SQUARE: lambda a: a * a, Operation.TWICE: lambda a: a + a, Operation.INVERSE: lambda a: 1.0 / a,
+        Operation.SQRT: jnp.sqrt, Operation.SIN: jnp.sin, Operation.COS: jnp.cos,
+        Operation.LESS_EQUAL: lambda a, b: jnp.where(a <= b, 1.0, 0.0),
+        Operation.LESS: lambda a, b: jnp.where(a < b, 1.0, 0.0), Operation.NOT: lambda a: 1.0 - a,
+        Operation.MASK: lambda c, a: jnp.where(c != 0, a, 0.0),
         Operation.SELECT: lambda c, a, b: jnp.where(c != 0, a, b),
         Operation.MAXIMUM: jnp.maximum, Operation.MINIMUM: jnp.minimum,
     }  # fmt: skip
