@@ -27,7 +27,7 @@ ENDS = np.array(
 def run(number, expressions, *columns):
     """The expressions of x, y, z at every row of the columns, computed in lanes; (rows, expressions)."""
     symbols = casadi.SX.sym("x", len(columns))
-    printer = Printer(number)
+    printer = Printer(emit.LlvmLanguage(number))
     outputs = casadi.vertcat(*expressions(*(symbols[i] for i in range(len(columns)))))
     printer.add("f", {"x": symbols}, {"y": casadi.densify(outputs)})
     parts = [vector_math.definition(name, count, number) for name, count in printer.needed.items()]

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from filling import hanging
 
+from airmuscle.compile.ir import emission
 from airmuscle.compile.ir.branches import COMMANDED, STEADY, VARYING, skipping
 from airmuscle.compile.ir.instructions import Code, Instruction, Operand, Operation
 from airmuscle.compile.ir.scheduling import ConditionalBlock
-from airmuscle.compile.llvm import emit
 from airmuscle.compile.program import Program, compile_system
 from airmuscle.control.inputs import Schedule
 from airmuscle.core import ops
@@ -157,9 +157,9 @@ def plant(circuit: Any) -> Plant:
 def test_a_shut_valve_and_a_box_not_left_are_skipped() -> None:
     """Of the rates of a plant, more than a third of all operations; with a valve open, its own come back."""
     kept: list[Any] = []
-    real = emit.skipping
+    real = emission.skipping
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(emit, "skipping", lambda *a: kept.append((a[0], real(*a))) or kept[-1][1])
+        patch.setattr(emission, "skipping", lambda *a: kept.append((a[0], real(*a))) or kept[-1][1])
         Program(plant(FillDischarge))
     code, items = kept[0]
     skipped = [len(item.body) for item in items if isinstance(item, ConditionalBlock)]
@@ -174,7 +174,7 @@ def test_plant_has_the_rates_and_slopes_that_it_has_without_branches(circuit: An
     system = plant(circuit)
     new = compile_system(system)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(emit, "skipping", lambda code, *rest: list(code.body))
+        patch.setattr(emission, "skipping", lambda code, *rest: list(code.body))
         old = Program(system)
     held, sizes = old.precompute(new.parameters), new.sizes
     names = [s.name for s in system.states]

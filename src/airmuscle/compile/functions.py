@@ -1,4 +1,4 @@
-"""The functions that a system is printed as, and their LLVM text."""
+"""Functions that a system is printed as, in LLVM text or any other target language."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ from typing import Any
 from ..core import autodiff
 from ..core.errors import TraceError
 from ..core.system import System
+from .ir import emission
+from .ir.emission import FunctionBlock, TargetLanguage
 from .ir.instructions import Code, Operand, finished, hoisted, instructions, recorded
 from .ir.jacobian import ZERO, Tape, derivatives
 from .ir.sparse_lu import Factors
-from .llvm import emit
-from .llvm.types import DOUBLE, LlvmType
+from .llvm.emit import LlvmLanguage
 
+LLVM = LlvmLanguage()
 PARAMETERS = "p"
 """The argument of a traced function that holds parameters; it is replaced by what `prepare` left in `c`."""
 
@@ -69,14 +71,14 @@ class ArraySizes:
 class Printer:
     """Collects functions; what each needs of the parameters alone is gathered into one `prepare(p, c)`.
 
-    Every element of every array is a `number`; in lanes one of each plant.
+    The text is in LLVM unless another language is given.
     """
 
-    def __init__(self, number: LlvmType = DOUBLE) -> None:
+    def __init__(self, language: TargetLanguage = LLVM) -> None:
         self.text: list[str] = []
         self.needed: dict[str, int] = {}
-        self._number = number
-        self._prepare = emit.FunctionBody((), number)
+        self._language = language
+        self._prepare = language.body()
         self._places: dict[str, int] = {}
 
     @property
@@ -93,24 +95,25 @@ class Printer:
         self, name: str, inputs: Sequence[str], code: Code, outputs: Sequence[str], scalars: Sequence[str] = ()
     ) -> None:
         """The same of instructions."""
-        block = emit.FunctionBody(scalars, self._number)
+        block = self._language.body(scalars)
         for (output, index), value in self.compute(block, code, inputs).items():
             block.store(outputs[output], index, value)
-        self.end(name, [*inputs, *outputs], block)
+        self.end(name, inputs, outputs, block)
 
     def compute(
-        self, block: emit.FunctionBody, code: Code, names: Sequence[str], given: Mapping[Operand, str] | None = None
+        self, block: FunctionBlock, code: Code, names: Sequence[str], given: Mapping[Operand, str] | None = None
     ) -> dict[tuple[int, int], str]:
         """Append code to a function: `names` are its arguments, `given` inputs whose values are there already.
 
         Returns the names of the results by output and index; nothing is stored.
         """
         code, held = self.set_apart(code, names)
-        return emit.computed(block, code, names, held, given or {})
+        return emission.computed(block, code, names, held, given or {})
 
-    def end(self, name: str, arguments: Sequence[str], block: emit.FunctionBody) -> None:
+    def end(self, name: str, inputs: Sequence[str], outputs: Sequence[str], block: FunctionBlock) -> None:
         """Close a function; the argument that holds parameters becomes `c`."""
-        self.text.append(emit.function(name, ["c" if a == PARAMETERS else a for a in arguments], block))
+        inputs = ["c" if a == PARAMETERS else a for a in inputs]
+        self.text.append(self._language.function(name, inputs, outputs, block))
         self.needed |= {**block.needed, **self._prepare.needed}
 
     def without_parameters(self, inputs: dict[str, Any], outputs: dict[str, Any]) -> tuple[Code, dict[Operand, int]]:
@@ -122,18 +125,14 @@ class Printer:
         if PARAMETERS not in names:
             return code, {}
         code, once, handed = hoisted(code, names.index(PARAMETERS))
-        return code, emit.hand_over(self._prepare, once, handed, names, self._places)
+        return code, emission.hand_over(self._prepare, once, handed, names, self._places)
 
     def module(self) -> str:
-        """All functions and `prepare`, as one LLVM text.
-
-        `prepare` runs once for a set of parameters, so it is not worth the time that optimising it would take.
-        """
-        prepare = emit.function("prepare", ["p", "c"], self._prepare, "nounwind noinline optnone")
-        return "\n".join([prepare, *self.text])
+        """`prepare` and all functions, as one text."""
+        return "\n".join([self._language.preparation("prepare", [PARAMETERS], ["c"], self._prepare), *self.text])
 
 
-def implicit_module(t: TracedSystem) -> tuple[str, ArraySizes]:
+def implicit_module(t: TracedSystem, language: TargetLanguage = LLVM) -> tuple[str, ArraySizes]:
     """What an implicit method needs: rhs, jac, factor, solve, stage, df_dt and outputs.
 
     rhs(x, u, c, f)              f = rates
@@ -153,7 +152,7 @@ def implicit_module(t: TracedSystem) -> tuple[str, ArraySizes]:
     a, g, b = (casadi.SX.sym(n, k) for n, k in (("A", lu.values.numel()), ("g", size), ("b", size)))
     stage, solve = lu.solved(a, [t.f[i] + g[i] for i in range(size)]), lu.solved(a, [b[i] for i in range(size)])
     point = {"x": t.x, "u": t.u, PARAMETERS: t.p}
-    printer = Printer()
+    printer = Printer(language)
     printer.add_code("rhs", list(point), finished(code), ["f"])
     printer.add_code("jac", list(point), slopes, ["f", "J"])
     printer.add("factor", {"J": lu.j, "d": lu.d}, {"A": lu.values}, ["d"])

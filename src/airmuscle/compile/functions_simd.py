@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from .functions import PARAMETERS, Printer, TracedSystem
+from .ir import emission
 from .ir.instructions import Code, Operand
 from .llvm import emit, vector_math
-from .llvm.emit import FLAGS, FunctionBody
+from .llvm.emit import FLAGS, FunctionBody, LlvmLanguage
 from .llvm.types import LlvmType
 
 POINT = ("x", "u", PARAMETERS)
@@ -25,7 +26,7 @@ def lanes_module(
     outputs(x, u, c, o)      what a row of each plant shows
     prepare(p, c)            what both need of the parameters
     """
-    printer = Printer(number)
+    printer = Printer(LlvmLanguage(number))
     point = dict(zip(POINT, (t.x, t.u, t.p), strict=True))
     code, held = printer.without_parameters(point, {"f": t.f})
     step = _Step(t, code, held, number)
@@ -51,7 +52,7 @@ class _Step:
         self.number = LlvmType(number.bits, min(number.lanes, AT_ONCE * 8 // number.bits))
         self.groups = number.lanes // self.number.lanes
         self.states, self.inputs = t.x.shape[0], t.u.shape[0]
-        self.items, self.outputs, self.held = emit.with_gates(code, POINT, held), code.outputs, held
+        self.items, self.outputs, self.held = emission.with_gates(code, POINT, held), code.outputs, held
         self.block = FunctionBody((), self.number)
 
     def printed(self, a: Sequence[Sequence[float]], b: Sequence[float]) -> str:
@@ -78,8 +79,8 @@ class _Step:
             given["in", 1, i] = self._input(i, sum(row))
         for operand, place in self.held.items():
             given[operand] = self._load(f"c{stage}", place)
-        values = emit.run(self.block, self.items, (), {}, given)
-        found = {i: emit.value_of(self.block, operand, (), {}, values) for _, i, operand in self.outputs}
+        values = emission.run(self.block, self.items, (), {}, given)
+        found = {i: emission.value_of(self.block, operand, (), {}, values) for _, i, operand in self.outputs}
         return [found[i] for i in range(self.states)]
 
     def _load(self, array: str, index: int) -> str:

@@ -166,7 +166,7 @@ def _print_along(
         further = last.compute(printer, block, last.results)
         rows += [further[v] for v in last.results]
     stored(rows, target)
-    printer.end(name, [*arguments, target], block)
+    printer.end(name, arguments, [target], block)
 
 
 class _Step:
@@ -199,14 +199,14 @@ class _Step:
         rates = self.rates.compute(printer, block, [*self.rates.results, *s.parts])
         rows = [rates[f] for f in self.rates.results] + s.rows(rates, self.t.rows(block, "x"))
         stored(rows, "f")
-        printer.end("rhs", [*POINT, "f"], block)
+        printer.end("rhs", POINT, ["f"], block)
         block = FunctionBody()
         wanted = [*self.rates.results, *s.parts, *self.bends.parts]
         found, rows = self.rates.compute(printer, block, wanted), self.t.rows(block, "x")
         stored([found[f] for f in self.rates.results] + s.rows(found, rows), "f")
         bends = self.bends.rows(found, rows)
         stored([found[part] for part in self.jacobian] + [bends[q] for q in self.moving], "J")
-        printer.end("jac", [*POINT, "f", "J"], block)
+        printer.end("jac", POINT, ["f", "J"], block)
 
     def print_factor(self, printer: Printer) -> None:
         """factor(J, d, A)."""
@@ -214,14 +214,14 @@ class _Step:
         found = printer.compute(block, code, ["J", "d"])
         bends = self._bends(block, "J", len(self.jacobian))
         stored([LlvmValue(block, found[0, i]) for i in range(self.lu.values.numel())] + list(bends.values()), "A")
-        printer.end("factor", ["J", "d", "A"], block)
+        printer.end("factor", ["J", "d"], ["A"], block)
 
     def print_solve(self, printer: Printer) -> None:
         """solve(A, b, y)."""
         block = FunctionBody()
         right = [loaded(block, "b", i) for i in range(self.t.size)]
         stored(self._solved(block, right, self.t.rows(block, "b")), "y")
-        printer.end("solve", ["A", "b", "y"], block)
+        printer.end("solve", ["A", "b"], ["y"], block)
 
     def print_stage(self, printer: Printer) -> None:
         """stage(x, u, c, A, g, k)."""
@@ -231,7 +231,7 @@ class _Step:
         slopes = self.slopes.rows(found, t.rows(block, "x"))
         columns = [d + more for d, more in zip(slopes, t.rows(block, "g"), strict=True)]
         stored(self._solved(block, right, columns), "k")
-        printer.end("stage", [*POINT, "A", "g", "k"], block)
+        printer.end("stage", [*POINT, "A", "g"], ["k"], block)
 
     def _solved(self, block: FunctionBody, right: list[LlvmValue], columns: list[LlvmValue]) -> list[LlvmValue]:
         """k = (d I - J)^-1 right, then (d I - J)^-1 (columns + dJ k), with the factors and dJ that stand in A."""

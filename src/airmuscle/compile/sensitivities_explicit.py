@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from .functions import PARAMETERS, Printer
+from .ir import emission
 from .ir.instructions import Code, Instruction, Operand, finished
 from .ir.scheduling import Item
-from .llvm import emit
+from .llvm.emit import FunctionBody
 from .llvm.vectors import LlvmValue, loaded
 from .sensitivities import POINT, DirectionalDerivative, TangentSystem, Values, stored
 
@@ -24,7 +25,7 @@ class _Stage:
         rates: Values,
         along: DirectionalDerivative,
         printer: Printer,
-        block: emit.FunctionBody,
+        block: FunctionBody,
         given: dict[Operand, str],
     ) -> None:
         self.rates, self.along, self.block, self.values = rates, along, block, given
@@ -36,7 +37,7 @@ class _Stage:
                 needed.update(line.arguments)
         self.first: list[Item] = []
         self.second: list[Item] = []
-        for item in emit.with_gates(code, POINT, self.held, frozenset(needed)):
+        for item in emission.with_gates(code, POINT, self.held, frozenset(needed)):
             early = (item if isinstance(item, Instruction) else item.body[0]).result in needed
             (self.first if early else self.second).append(item)
 
@@ -44,7 +45,7 @@ class _Stage:
         """The rates of this stage, and in between the derivatives of the one before."""
         done, ahead = 0, 0 if before is None else len(before.second)
         for number, line in enumerate(self.first, 1):
-            emit.append(self.block, line, POINT, self.held, self.values)
+            emission.append(self.block, line, POINT, self.held, self.values)
             if before is not None:
                 upto = ahead * number // len(self.first)
                 before.print_derivatives(done, upto)
@@ -55,10 +56,10 @@ class _Stage:
     def print_derivatives(self, begin: int = 0, end: int | None = None) -> None:
         """The derivatives of this stage, or some of their instructions."""
         for line in self.second[begin:end]:
-            emit.append(self.block, line, POINT, self.held, self.values)
+            emission.append(self.block, line, POINT, self.held, self.values)
 
     def _value(self, operand: Operand) -> LlvmValue:
-        return LlvmValue(self.block, emit.value_of(self.block, operand, POINT, self.held, self.values))
+        return LlvmValue(self.block, emission.value_of(self.block, operand, POINT, self.held, self.values))
 
     def slopes(self) -> list[LlvmValue]:
         """The rates."""
@@ -88,7 +89,7 @@ def explicit_module(t: TangentSystem, a: Sequence[Sequence[float]], b: Sequence[
     """One whole step, as in `printed.explicit_module`: step(x, u, c, w, h, y), and how long `c` must be."""
     rates = Values(t, t.inner.f)
     along = rates.along(rates.results)
-    printer, block = Printer(), emit.FunctionBody(["h"])
+    printer, block = Printer(), FunctionBody(["h"])
     h, states, s = LlvmValue(block, "%h"), [loaded(block, "x", i) for i in range(t.size)], t.rows(block, "x")
     slopes: list[list[LlvmValue]] = []
     columns: list[list[LlvmValue]] = []
@@ -107,5 +108,5 @@ def explicit_module(t: TangentSystem, a: Sequence[Sequence[float]], b: Sequence[
     stage.print_derivatives()
     columns.append(stage.columns(_after(rows[-1], s, columns, h)))
     stored(_after(b, states, slopes, h) + _after(b, s, columns, h), "y")
-    printer.end("step", ["x", "u", PARAMETERS, "w", "h", "y"], block)
+    printer.end("step", ["x", "u", PARAMETERS, "w", "h"], ["y"], block)
     return printer.module(), printer.held

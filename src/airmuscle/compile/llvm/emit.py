@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Callable, Mapping, Sequence
 
-from ...core.errors import TraceError
-from ..ir.branches import COMMANDED, STEADY, VARYING, skipping
-from ..ir.instructions import Code, Instruction, Operand, Operation
-from ..ir.scheduling import ConditionalBlock, Item
+from ..ir.emission import FunctionBlock, TargetLanguage, unknown_operation
+from ..ir.instructions import Operand, Operation
 from .types import DOUBLE, LlvmType
 
 FLAGS = "nsz arcp contract reassoc afn"
 """Fast-math flags without nnan and ninf: a failed step must remain detectable by NaN or infinity."""
-
-LEVEL = {"u": COMMANDED, "w": STEADY, "h": STEADY}
-"""Arguments that do not depend on the states: inputs, their slopes, and the step size."""
 
 _BINARY = {Operation.ADD: "fadd", Operation.SUBTRACT: "fsub", Operation.MULTIPLY: "fmul", Operation.DIVIDE: "fdiv"}
 _INTRINSICS = {Operation.SQRT: "sqrt", Operation.ABS: "fabs", Operation.FLOOR: "floor"}
@@ -31,7 +27,7 @@ DECLARED = "".join(f"declare double @{name}(double)\n" for name in _OF_ONE) + "d
 """Declarations of the functions that printed code may call."""
 
 
-class FunctionBody:
+class FunctionBody(FunctionBlock):
     """The lines of one LLVM function under construction, with elimination of common subexpressions.
 
     Every value has the type `number`. In lanes, functions that are not LLVM intrinsics are called by the names in
@@ -39,24 +35,15 @@ class FunctionBody:
     """
 
     def __init__(self, scalars: Sequence[str] = (), number: LlvmType = DOUBLE) -> None:
-        self.lines: list[str] = []
-        self.scalars = frozenset(scalars)
+        super().__init__(scalars)
         self.number = number
-        self.needed: dict[str, int] = {}
-        self._known: dict[str, str] = {}
-        self._named = 0
         self._constants: dict[str, float] = {}
 
-    def put(self, expression: str) -> str:
-        """The name of the value of `expression`; the instruction is appended unless it exists already."""
-        if expression not in self._known:
-            self._known[expression] = self._name()
-            self.lines.append(f"  {self._known[expression]} = {expression}")
-        return self._known[expression]
+    def assignment(self, name: str, expression: str) -> str:
+        return f"  {name} = {expression}"
 
-    def _name(self) -> str:
-        self._named += 1
-        return f"%v{self._named}"
+    def new_name(self) -> str:
+        return f"%{super().new_name()}"
 
     def constant(self, value: float) -> str:
         """A constant; in lanes a splat, which LLVM recognises as a constant."""
@@ -122,7 +109,7 @@ class FunctionBody:
 
         In lanes, the block is executed if any lane requires it; the other lanes keep the values of `instead`.
         """
-        number, here = self.number, self._name()[1:]
+        number, here = self.number, self.new_name()[1:]
         self.lines += [f"  br label %{here}.if", f"{here}.if:"]
         tests = [self.put(f"fcmp une {number.text} {gate}, {self.constant(0.0)}") for gate in gates]
         test = functools.reduce(lambda a, b: self.put(f"or {number.mask} {a}, {b}"), tests)
@@ -142,7 +129,7 @@ class FunctionBody:
         self.lines += [f"  br label %{here}.end", f"{here}.end:"]
         joined = {}
         for operand, value in instead.items():
-            joined[operand] = self._name()
+            joined[operand] = self.new_name()
             ways = f"[ {value}, %{here}.if ], [ {inside[operand]}, %{here}.then ]"
             self.lines.append(f"  {joined[operand]} = phi {number.text} {ways}")
         return joined
@@ -181,106 +168,34 @@ class FunctionBody:
             Operation.ASSIGN: lambda: x[0],
         }  # fmt: skip
         if operation not in simple:
-            raise TraceError(f"operation {operation.name} has no LLVM form; write the law over airmuscle.core.ops.")
+            raise unknown_operation(operation, "LLVM")
         return simple[operation]()
 
 
-def computed(
-    block: FunctionBody, code: Code, inputs: Sequence[str], held: Mapping[Operand, int], given: Mapping[Operand, str]
-) -> dict[tuple[int, int], str]:
-    """Append code to a block and return the names of its results by output and index.
+@dataclasses.dataclass(frozen=True)
+class LlvmLanguage(TargetLanguage):
+    """LLVM text, with one number in every value or with one of each lane."""
 
-    `inputs` are the names of the arrays, `held` the indices of precomputed operands in `c`, `given` the names of known
-    values.
-    """
-    values = run(block, with_gates(code, inputs, held), inputs, held, given)
-    return {(o, i): value_of(block, operand, inputs, held, values) for o, i, operand in code.outputs}
+    number: LlvmType = DOUBLE
 
+    def body(self, scalars: Sequence[str] = ()) -> FunctionBody:
+        return FunctionBody(scalars, self.number)
 
-def with_gates(
-    code: Code, inputs: Sequence[str], held: Mapping[Operand, int], early: frozenset[Operand] = frozenset()
-) -> list[Item]:
-    """The instructions of `code`, with those that a zero factor or an inactive clamp makes redundant in blocks."""
+    def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:
+        return function(name, [*inputs, *outputs], body)
 
-    def level(operand: Operand) -> int:
-        return STEADY if operand in held else LEVEL.get(inputs[operand[1]], VARYING)
-
-    return skipping(code, level, early)
+    def preparation(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:
+        """`prepare` runs once for a set of parameters, so it is not worth the time that optimising it would take."""
+        return function(name, [*inputs, *outputs], body, "nounwind noinline optnone")
 
 
-def run(
-    block: FunctionBody,
-    body: Sequence[Item],
-    inputs: Sequence[str],
-    held: Mapping[Operand, int],
-    given: Mapping[Operand, str] | None = None,
-) -> dict[Operand, str]:
-    """Append instructions to a block; return the names of their results and of the operands in `given`."""
-    values = dict(given or {})
-    for line in body:
-        append(block, line, inputs, held, values)
-    return values
-
-
-def append(
-    block: FunctionBody, line: Item, inputs: Sequence[str], held: Mapping[Operand, int], values: dict[Operand, str]
-) -> None:
-    """Append an instruction or a conditional block, and add the names of its results to `values`."""
-    if isinstance(line, ConditionalBlock):
-        instead = {operand: value_of(block, value, inputs, held, values) for operand, value in line.instead}
-        gates = [value_of(block, gate, inputs, held, values) for gate in line.gates]
-        values |= block.unless_zero(gates, lambda: run(block, line.body, inputs, held, values), instead)
-        return
-    arguments = [value_of(block, a, inputs, held, values) for a in line.arguments]
-    values[line.result] = block.operate(line.operation, arguments)
-
-
-def value_of(
-    block: FunctionBody,
-    operand: Operand,
-    inputs: Sequence[str],
-    held: Mapping[Operand, int],
-    values: Mapping[Operand, str],
-) -> str:
-    """The name of the value of an operand, which is loaded if it is an array element."""
-    if operand in values:
-        return values[operand]
-    if operand in held:
-        return block.load("c", held[operand])
-    if operand[0] == "c":
-        return block.constant(float(operand[1]))
-    return block.load(inputs[operand[1]], operand[2])
-
-
-def hand_over(
-    block: FunctionBody,
-    once: Sequence[Instruction],
-    handed: Sequence[Operand],
-    inputs: Sequence[str],
-    places: dict[str, int],
-) -> dict[Operand, int]:
-    """Append the part of a function that depends on parameters only; return the indices of its results in `c`.
-
-    `places` contains the indices of values that are stored already, so that functions share equal values.
-    """
-    values = run(block, once, inputs, {})
-    held = {}
-    for operand in handed:
-        value = value_of(block, operand, inputs, {}, values)
-        if value not in places:
-            places[value] = len(places)
-            block.store("c", places[value], value)
-        held[operand] = places[value]
-    return held
-
-
-def function(name: str, arguments: Sequence[str], block: FunctionBody, attributes: str = "nounwind") -> str:
+def function(name: str, arguments: Sequence[str], block: FunctionBlock, attributes: str = "nounwind") -> str:
     """The LLVM text of a function that returns nothing; arrays are pointers that do not overlap."""
     signature = ", ".join(f"double %{a}" if a in block.scalars else f"ptr noalias nocapture %{a}" for a in arguments)
     return f"define void @{name}({signature}) {attributes} {{\n" + "\n".join(block.lines) + "\n  ret void\n}\n"
 
 
-def function_of_values(name: str, arguments: Sequence[str], block: FunctionBody, number: LlvmType, value: str) -> str:
+def function_of_values(name: str, arguments: Sequence[str], block: FunctionBlock, number: LlvmType, value: str) -> str:
     """The LLVM text of a function within a module, which takes and returns values."""
     signature = ", ".join(f"{number.text} {a}" for a in arguments)
     head = f"define internal {number.text} @{name}({signature}) nounwind {{\n"

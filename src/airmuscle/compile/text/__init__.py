@@ -1,0 +1,1 @@
+"""Source text of printed functions in languages of users: C99, JavaScript, MATLAB and Octave."""

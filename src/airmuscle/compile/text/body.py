@@ -1,0 +1,125 @@
+"""Function body in a language of expressions: each value is named once, choices are conditional expressions."""
+
+from __future__ import annotations
+
+import abc
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+from ..ir.emission import FunctionBlock, unknown_operation
+from ..ir.instructions import Operand, Operation
+
+_BINARY = {
+    Operation.ADD: "+", Operation.SUBTRACT: "-", Operation.MULTIPLY: "*", Operation.DIVIDE: "/", Operation.AND: "*",
+}  # fmt: skip
+FUNCTIONS = {
+    Operation.SQRT: "sqrt", Operation.ABS: "abs", Operation.FLOOR: "floor", Operation.EXP: "exp",
+    Operation.LOG: "log", Operation.SIN: "sin", Operation.COS: "cos", Operation.TAN: "tan", Operation.ATAN: "atan",
+    Operation.SINH: "sinh", Operation.COSH: "cosh", Operation.TANH: "tanh", Operation.ASINH: "asinh",
+    Operation.ASIN: "asin", Operation.ACOS: "acos", Operation.LOG1P: "log1p", Operation.EXPM1: "expm1",
+    Operation.POWER: "pow", Operation.CONSTANT_POWER: "pow",
+}  # fmt: skip
+"""Operations that are calls of a function, under the usual names."""
+
+
+class TextBody(FunctionBlock, abc.ABC):
+    """The lines of one function in a language with infix operators; a subclass states what its language writes.
+
+    `read` and `written` are the arrays that the function uses so far.
+    """
+
+    language: str
+    """Name of the language in messages."""
+    equal, unequal, either = "==", "!=", "||"
+    infinity, not_a_number = "INFINITY", "NAN"
+
+    def __init__(self, scalars: Sequence[str] = ()) -> None:
+        super().__init__(scalars)
+        self.read: set[str] = set()
+        self.written: set[str] = set()
+
+    @abc.abstractmethod
+    def element(self, array: str, index: int) -> str:
+        """An array element as an expression."""
+
+    @abc.abstractmethod
+    def choose(self, test: str, when_true: str, when_false: str) -> str:
+        """The name of one of two values, by a test."""
+
+    @abc.abstractmethod
+    def call(self, function: str, x: Sequence[str]) -> str:
+        """The name of the value of a function of FUNCTIONS."""
+
+    @abc.abstractmethod
+    def variable(self, name: str, value: str) -> str:
+        """The line that declares a value which a branch may change."""
+
+    @abc.abstractmethod
+    def begin_branch(self, test: str) -> str:
+        """The line that opens a branch."""
+
+    end_branch = "  }"
+
+    def literal(self, value: float) -> str:
+        """A finite number; it is read back as the same number."""
+        return repr(value)
+
+    def constant(self, value: float) -> str:
+        if math.isnan(value):
+            return self.not_a_number
+        text = self.infinity if math.isinf(value) else self.literal(abs(value))
+        return f"(-{text})" if math.copysign(1.0, value) < 0 else text
+
+    def load(self, array: str, index: int) -> str:
+        self.read.add(array)
+        return array if array in self.scalars else self.put(self.element(array, index))
+
+    def store(self, array: str, index: int, value: str) -> None:
+        self.written.add(array)
+        self.lines.append(f"  {self.element(array, index)} = {value};")
+
+    def operate(self, operation: Operation, x: Sequence[str]) -> str:
+        if operation in _BINARY:
+            return self.put(f"{x[0]} {_BINARY[operation]} {x[1]}")
+        if operation in FUNCTIONS:
+            return self.call(FUNCTIONS[operation], x)
+        one, zero = self.constant(1.0), self.constant(0.0)
+        simple = {
+            Operation.ASSIGN: lambda: x[0],
+            Operation.NEGATE: lambda: self.put(f"-{x[0]}"),
+            Operation.SQUARE: lambda: self.put(f"{x[0]} * {x[0]}"),
+            Operation.TWICE: lambda: self.put(f"{x[0]} + {x[0]}"),
+            Operation.INVERSE: lambda: self.put(f"{one} / {x[0]}"),
+            Operation.LESS: lambda: self.choose(f"{x[0]} < {x[1]}", one, zero),
+            Operation.LESS_EQUAL: lambda: self.choose(f"{x[0]} <= {x[1]}", one, zero),
+            Operation.EQUAL: lambda: self.choose(f"{x[0]} {self.equal} {x[1]}", one, zero),
+            Operation.NOT_EQUAL: lambda: self.choose(f"{x[0]} {self.unequal} {x[1]}", one, zero),
+            Operation.NOT: lambda: self.choose(f"{x[0]} {self.equal} {zero}", one, zero),
+            Operation.OR: lambda: self.choose(f"{self.put(f'{x[0]} + {x[1]}')} {self.unequal} {zero}", one, zero),
+            Operation.FMIN: lambda: self.choose(f"{x[0]} < {x[1]}", x[0], x[1]),
+            Operation.FMAX: lambda: self.choose(f"{x[0]} > {x[1]}", x[0], x[1]),
+            Operation.MINIMUM: lambda: self.choose(f"{x[0]} < {x[1]}", x[0], x[1]),
+            Operation.MAXIMUM: lambda: self.choose(f"{x[0]} > {x[1]}", x[0], x[1]),
+            Operation.MASK: lambda: self.choose(f"{x[0]} {self.unequal} {zero}", x[1], zero),
+            Operation.SELECT: lambda: self.choose(f"{x[0]} {self.unequal} {zero}", x[1], x[2]),
+            Operation.SIGN: lambda: self.choose(
+                f"{x[0]} > {zero}", one, self.choose(f"{x[0]} < {zero}", self.constant(-1.0), zero)
+            ),
+        }
+        if operation not in simple:
+            raise unknown_operation(operation, self.language)
+        return simple[operation]()
+
+    def unless_zero(
+        self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
+    ) -> dict[Operand, str]:
+        joined = {operand: self.new_name() for operand in instead}
+        self.lines += [self.variable(joined[operand], value) for operand, value in instead.items()]
+        tests = f" {self.either} ".join(f"{gate} {self.unequal} {self.constant(0.0)}" for gate in gates)
+        self.lines.append(self.begin_branch(tests))
+        outside, self._known = self._known, dict(self._known)  # values of the block are not available after it
+        inside = compute()
+        self._known = outside
+        self.lines += [f"  {name} = {inside[operand]};" for operand, name in joined.items()]
+        self.lines.append(self.end_branch)
+        return joined

@@ -1,0 +1,88 @@
+"""Printed programs, built and called: C as a shared library, JavaScript in Node, MATLAB text in Octave."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from airmuscle.compile.program import compile_system
+
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
+"""Warnings that printed C must not cause."""
+
+
+def require(program: str) -> str:
+    """The path of a program; the test is skipped where it is missing."""
+    path = shutil.which(program)
+    if path is None:
+        pytest.skip(f"needs the program {program}")
+    return path
+
+
+def shared_library(text: str, folder, name="printed", level="-O1"):
+    """C text as a loaded shared library."""
+    source, target = folder / f"{name}.c", folder / f"{name}.so"
+    source.write_text(text)
+    command = [require("gcc"), *STRICT, level, "-fPIC", "-shared", str(source), "-o", str(target), "-lm"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[:2000]
+    return ctypes.CDLL(str(target))
+
+
+def call(function, *arrays, kind=np.float64):
+    """Call a C function of arrays; lists are converted to arrays of `kind`."""
+    given = [a if isinstance(a, float) else np.ascontiguousarray(a, dtype=kind) for a in arrays]
+    number = ctypes.c_double if kind is np.float64 else ctypes.c_float
+    function.restype = None
+    function(*(number(a) if isinstance(a, float) else ctypes.c_void_p(a.ctypes.data) for a in given))
+
+
+def run_node(script: str, data, folder):
+    """The JSON that a JavaScript module prints, which finds `data` in data.json beside it."""
+    (folder / "data.json").write_text(json.dumps(data))
+    (folder / "script.mjs").write_text(script)
+    done = subprocess.run([require("node"), "script.mjs"], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[:2000]
+    return json.loads(done.stdout)
+
+
+def points_of(plant, count=6, seed=0):
+    """States and inputs (count, n + m) around a filled muscle, in the middle of the ranges of the inputs and at rest."""
+    rng, ready = np.random.default_rng(seed), compile_system(plant)
+    pressures = rng.uniform(1e5, 4e5, count)
+    states, inputs = [], []
+    for pressure in pressures:
+        state = plant.state_at(pressure=float(pressure))
+        moving = {name for c in plant.mechanism.coordinates for name in (c.name, c.speed)}
+        states.append([
+            state[s.name] + rng.uniform(-0.3, 0.3) * s.nominal * (1.0 if s.name in moving else 0.1)
+            for s in plant.states
+        ])  # fmt: skip
+        known = ready.description
+        low, high = np.maximum(known.input_minimum, -10.0), np.minimum(known.input_maximum, 10.0)
+        inputs.append((low + rng.uniform(0, 1, low.size) * (high - low)) * rng.integers(0, 2, low.size))
+    return np.float32(states).astype(float), np.float32(inputs).astype(float).reshape(count, -1)
+
+
+def library_values(plant, states, inputs):
+    """Rates and non-zeros of the Jacobian at every point, by the library."""
+    ready = compile_system(plant)
+    f, j = np.empty(ready.sizes.states), np.zeros(max(ready.sizes.jacobian, 1))
+    rows = []
+    for x, u in zip(states, inputs, strict=True):
+        ready.call("jac", x.copy(), np.append(u, 0.0), ready.precomputed, f, j)
+        rows.append(np.concatenate([f, j[: ready.sizes.jacobian]]))
+    return np.array(rows)
+
+
+def deviation(found, expected):
+    """Greatest difference of each column relative to the greatest value of the column, over all columns."""
+    scale = np.abs(expected).max(axis=0)
+    difference = np.abs(np.asarray(found) - expected).max(axis=0)
+    assert (difference[scale == 0] == 0).all()
+    return float((difference[scale > 0] / scale[scale > 0]).max(initial=0.0))
