@@ -22,7 +22,7 @@ from airmuscle.compile.llvm.jit import jit_compile
 from airmuscle.compile.program import compile_system
 from airmuscle.compile.text.c import C99
 from airmuscle.compile.text.javascript import JavaScript
-from airmuscle.compile.text.matlab import DEFINITION, Matlab
+from airmuscle.compile.text.matlab import DEFINITION, MatlabLanguage
 from airmuscle.core.errors import TraceError
 
 SOME = ("dmsp-20-300", "overlap", "shaped joint with friction", "manifold on tank and regulator")
@@ -133,7 +133,7 @@ def column(values):
 def test_octave_gives_the_rates_and_slopes_of_the_library(name, tmp_path):
     plant = plants.EXAMPLES[name]
     states, inputs = printed.points_of(plant, 3)
-    text, _ = functions.implicit_module(traced(plant), Matlab())
+    text, _ = functions.implicit_module(traced(plant), MatlabLanguage())
     calls = [
         f"[f, J] = jac({column(x)}, {column([*u, 0.0])}, c); printf('%.17g ', f, J); printf('\\n');"
         for x, u in zip(states, inputs, strict=True)
@@ -197,11 +197,11 @@ def test_every_operation_means_the_same_in_javascript(operation_values, tmp_path
 
 def test_every_operation_means_the_same_in_octave(operation_values, tmp_path):
     calls = [f"printf('%.17g ', f({column(p)})); printf('\\n');" for p in POINTS]
-    script = "\n".join(["1;", DEFINITION, every_operation(Matlab()), *calls])
+    script = "\n".join(["1;", DEFINITION, every_operation(MatlabLanguage()), *calls])
     check_operations([row.split() for row in octave(script, tmp_path).splitlines()], operation_values)
 
 
-@pytest.mark.parametrize("language", [C99(), C99("float"), JavaScript(), Matlab()], ids=repr)
+@pytest.mark.parametrize("language", [C99(), C99("float"), JavaScript(), MatlabLanguage()], ids=repr)
 def test_constants_are_read_back_as_they_were(language):
     body = language.body()
     texts = [body.constant(value) for value in (0.0, -0.0, 1.0, -2.5, 1e300, 5e-324, math.inf, -math.inf, math.nan)]
@@ -211,7 +211,7 @@ def test_constants_are_read_back_as_they_were(language):
     else:
         assert [float(t.strip("()")) for t in texts[:6]] == [0.0, -0.0, 1.0, -2.5, 1e300, 5e-324]
         assert texts[1] == "(-0.0)"
-    infinity, nan = {"C99": ("INFINITY", "NAN"), "JavaScript": ("Infinity", "NaN"), "Matlab": ("Inf", "NaN")}[
+    infinity, nan = {"C99": ("INFINITY", "NAN"), "JavaScript": ("Infinity", "NaN"), "MatlabLanguage": ("Inf", "NaN")}[
         type(language).__name__
     ]
     assert texts[6:] == [infinity, f"(-{infinity})", nan]
@@ -221,7 +221,7 @@ class Unknown(enum.Enum):
     ERF = -1
 
 
-@pytest.mark.parametrize("language", [functions.LLVM, C99(), JavaScript(), Matlab()], ids=repr)
+@pytest.mark.parametrize("language", [functions.LLVM, C99(), JavaScript(), MatlabLanguage()], ids=repr)
 def test_an_operation_without_a_form_is_refused(language):
     with pytest.raises(TraceError, match=r"ERF has no [A-Za-z]+ form; write the law over airmuscle\.core\.ops"):
         language.body().operate(Unknown.ERF, ["x"])
