@@ -1,4 +1,4 @@
-"""Compiled systems: machine code shared by all systems of one structure, and what belongs to one system."""
+"""Compiled systems: machine code shared by all systems of one structure, and the data of one system."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "df_dt", "outputs")
 
 
 class Program:
-    """The compiled functions of one structure; it keeps the machine code alive and is never pickled."""
+    """The compiled functions of one structure; it owns the machine code and cannot be pickled."""
 
     def __init__(self, system: System) -> None:
         self._system = system
@@ -97,7 +97,7 @@ def _prepare_function(engine: Any) -> Callable[[Array, int], Array]:
 
 
 class Description:
-    """Everything that a run needs to know of one system, derived once and kept as long as the system lives."""
+    """Data of one system that runs need, derived once and stored for the lifetime of the system."""
 
     def __init__(self, system: System) -> None:
         self.program = _program(system)
@@ -153,7 +153,7 @@ def _program(system: System) -> Program:
 
 
 def describe(system: System) -> Description:
-    """The description of a system, which is kept as long as the system lives."""
+    """The description of a system, stored for the lifetime of the system."""
     key = id(system)
     stored = _descriptions.get(key)
     if stored is not None and stored[0]() is system:

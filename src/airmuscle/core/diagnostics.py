@@ -1,4 +1,4 @@
-"""Diagnostic: what the reader of a result must know, by code and subject, with the rows it concerns and a hint."""
+"""Diagnostic: remark on a result, with its code, its subject, the rows concerned and a hint."""
 
 from __future__ import annotations
 

@@ -286,7 +286,7 @@ class Plant(System):
         return diagnostics.column_limits(self.muscles, self.prefixes)
 
     def failure_hint(self, state: Mapping[str, float]) -> str:
-        """What to do about the first muscle that is at, or beyond, a limit of its geometry."""
+        """Remedy for the first muscle that is at, or beyond, a limit of its geometry."""
         try:
             enclosures = self._enclosures(state)
         except GeometryLimitError as error:

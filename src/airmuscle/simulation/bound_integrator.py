@@ -20,7 +20,7 @@ _PAUSED, _TOO_MANY = Status.PAUSED.value, Status.TOO_MANY_STEPS.value
 
 
 class RawSolution(NamedTuple):
-    """What an integrator computed: rows (N, n), how many were reached, where and why it stopped, and its counts."""
+    """Result of an integrator: rows (N, n), number of rows reached, end time, status and counts."""
 
     rows: Array
     reached: int
@@ -32,7 +32,7 @@ class RawSolution(NamedTuple):
 
 
 class Binding(NamedTuple):
-    """What binds an integrator to a system: kernel, arguments before and after those of a run, workspace size."""
+    """Binding of an integrator to a system: kernel, arguments before and after those of a run, workspace size."""
 
     kernel: Kernel
     leading: tuple[Any, ...]

@@ -25,7 +25,7 @@ FIRST_SEGMENTS = 4096
 
 
 class CompiledLoop:
-    """A prepared loop whose controller is a control law, with what all runs of it have in common."""
+    """A prepared loop whose controller is a control law, with the data that all its runs share."""
 
     def __init__(self, compiled: CompiledSystem, prepared: SampledLoop) -> None:
         loop, known = prepared.loop, compiled.description
@@ -50,7 +50,7 @@ class CompiledLoop:
 
 
 def can_be_compiled(prepared: SampledLoop) -> bool:
-    """Whether a loop consists of what kernels know: a control law, and drivers of this package."""
+    """Whether a loop consists of a control law and of drivers that kernels implement."""
     loop = prepared.loop
     if not isinstance(loop.controller, ControlLaw) or not are_known(loop):
         return False

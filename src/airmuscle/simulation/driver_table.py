@@ -1,4 +1,4 @@
-"""Drivers of a loop as arrays, for the kernel that computes what they make of commands."""
+"""Drivers of a loop as arrays, for the kernel that passes commands through them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _STATES: dict[type, Any] = {PWM: PwmState, SolenoidDriver: SolenoidState}
 
 
 def are_known(loop: ControlLoop) -> bool:
-    """Whether a kernel knows all drivers of a loop."""
+    """Whether the kernel implements all drivers of a loop."""
     return all(type(driver) in _KINDS for chain in _chains(loop).values() for driver in chain)
 
 

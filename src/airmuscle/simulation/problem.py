@@ -148,7 +148,7 @@ def plain_numbers(values: Mapping[str, float], limits: Mapping[str, float]) -> l
 
 
 def default_state(compiled: CompiledSystem) -> Array:
-    """The default initial state (n,): a Plant's equilibrium at ambient pressure, found once for a system.
+    """The default initial state (n,): a Plant's equilibrium at ambient pressure, computed once for a system.
 
     Raises ParameterError for a system that has none, EquilibriumError for a plant without a stable equilibrium.
     """

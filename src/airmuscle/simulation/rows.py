@@ -70,7 +70,7 @@ def evaluate_rows(
 def recorded_rows(
     compiled: CompiledSystem, states: Array, times: Array, segments: PiecewiseLinear, start: float
 ) -> RowTable:
-    """The same of a system with its own parameters, whose recorder is kept with its description."""
+    """The same for a system with its own parameters, whose recorder is stored in its description."""
     idle = compiled.description.recorders
     recorder = idle.pop() if idle else RowRecorder(compiled)
     table = recorder.evaluate(states, times, segments, start)
@@ -142,7 +142,7 @@ def make_recording(
 
 
 def early_end(compiled: CompiledSystem, raw: RawSolution, end: float) -> Diagnostic:
-    """When, why and at which state a run ended early, and what to do."""
+    """Time, reason and state of an early end of a run, and the remedy."""
     state = dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
     units = [s.unit for s in compiled.system.states]
     at = ", ".join(f"{name} {v:.4g} {unit}" for (name, v), unit in zip(state.items(), units, strict=True))

@@ -132,7 +132,7 @@ _NO_TIMES = np.empty(0)
 def _hold(
     compiled: CompiledSystem, integrator: Integrator, state: Mapping[str, float], inputs: Mapping[str, float], dt: float
 ) -> list[float] | None:
-    """The state after a step with held inputs; None for what `advance` must check in full, or report as failed."""
+    """The state after a step with held inputs; None if `advance` must check the arguments or report a failure."""
     known = compiled.description
     x = plain_numbers(state, known.state_limits)
     if x is None:

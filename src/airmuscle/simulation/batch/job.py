@@ -26,7 +26,7 @@ NOT_RUN = -1
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BatchJob:
-    """N plants to be simulated: initial states (N, n), segments of the inputs of each, rows and columns to be kept.
+    """N plants to be simulated: initial states (N, n), segments of the inputs of each, rows and columns to be stored.
 
     Results are written into `columns` (N, T) by name, `final` (N, n), `status` (N,), the number of rows `reached` (N,),
     and `reasons`, which say why plants failed.
@@ -50,14 +50,14 @@ class BatchJob:
 
     @functools.cached_property
     def names(self) -> tuple[str, ...]:
-        """All columns that can be kept: states, then outputs, then inputs."""
+        """All columns that can be stored: states, then outputs, then inputs."""
         known = self.compiled.description
         of_loop = () if self.loops is None else self.loops.column_names
         return (*known.state_names, *known.output_names, *known.input_names, *of_loop)
 
     @functools.cached_property
     def kept(self) -> npt.NDArray[np.int64]:
-        """Indices of the columns to be kept among `names`."""
+        """Indices of the stored columns among `names`."""
         return np.array([self.names.index(name) for name in self.columns], dtype=np.int64)
 
     @property
