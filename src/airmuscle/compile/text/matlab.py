@@ -69,7 +69,7 @@ class MatlabBody(TextBody):
 
 
 @dataclasses.dataclass(frozen=True)
-class Matlab(TargetLanguage):
+class MatlabLanguage(TargetLanguage):
     """Functions of one MATLAB file; what they compute is returned, `[f, J] = jac(x, u, c)`.
 
     prefix  beginning of the name of every function
