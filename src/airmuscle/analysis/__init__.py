@@ -6,6 +6,7 @@ from .filter_consistency import consistency_band, normalised_error_squared
 from .joint_plot import plot_reachable_region
 from .linear_model import LinearModel, Pole, linearise
 from .lqg import design_lqg
+from .predictive_design import design_predictive
 from .state_estimator import Innovation, StateEstimate, StateEstimator
 from .static_stiffness import Stiffness, StiffnessPair, stiffness
 from .statics_of_joint import JointPoints, JointStatics, joint_statics
@@ -26,6 +27,7 @@ __all__ = [
     "UnscentedKalmanFilter",
     "consistency_band",
     "design_lqg",
+    "design_predictive",
     "find_equilibria",
     "find_equilibrium",
     "joint_statics",

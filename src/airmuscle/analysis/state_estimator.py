@@ -15,11 +15,12 @@ from ..compile.program import CompiledSystem, compile_system
 from ..control.control_loop import COMMAND
 from ..core import tree
 from ..core.arrays import Array
-from ..core.errors import ParameterError, SolveError, suggestion
+from ..core.errors import ParameterError, SolveError
 from ..core.status import Status
 from ..core.system import System
 from ..plant.state import check_system, state_vector
 from ..recording.recording import Recording
+from .design_checks import check_known
 
 DISTURBANCE = ".disturbance"
 """End of the name of an estimated disturbance, after that of its state."""
@@ -100,10 +101,10 @@ class StateEstimator(abc.ABC):
             ("measured", self.measured, columns), ("parameters", self.parameters, leaves),
             ("disturbances", self.disturbances, states),
         ):  # fmt: skip
-            _check_names(owner, argument, names, known)
+            check_known(owner, argument, names, known)
         object.__setattr__(self, "_compiled", compiled)
-        _check_names(owner, "process_noise", self.process_noise, self.states)
-        _check_names(owner, "measurement_noise", self.measurement_noise, self.measured)
+        check_known(owner, "process_noise", self.process_noise, self.states)
+        check_known(owner, "measurement_noise", self.measurement_noise, self.measured)
         for name in self.measured:
             if name not in self.measurement_noise:
                 raise ParameterError(f"{owner}: measurement_noise has no number for '{name}'; give one.")
@@ -161,7 +162,7 @@ class StateEstimator(abc.ABC):
 
         Parameters start at those of the plant and disturbances at 0, unless the state contains them.
         """
-        _check_names(type(self).__name__, "deviations", deviations, self.states)
+        check_known(type(self).__name__, "deviations", deviations, self.states)
         count = len(self._compiled.description.state_names)
         further = {name: self._parameter_values.get(name, 0.0) for name in self.states[count:]}
         own = {name: value for name, value in state.items() if name not in further}
@@ -268,11 +269,3 @@ def _input(recording: Recording, name: str) -> Array:
         if column in recording:
             return np.asarray(recording[column], dtype=float)
     return np.zeros(len(recording["time"]))
-
-
-def _check_names(owner: str, argument: str, names: Sequence[str] | Mapping[str, float], known: Sequence[str]) -> None:
-    for name in names:
-        if name not in known:
-            raise ParameterError(
-                f"{owner}: {argument} names '{name}'; there are {', '.join(known)}.{suggestion(name, known)}"
-            )

@@ -13,6 +13,7 @@ from .feed_forward import StaticFeedForward
 from .gain_schedule import GainSchedule
 from .inputs import ZERO_INPUT, InputSignal, Periodic, SampledSignal, Schedule
 from .iterative_learning import IterativeLearning
+from .linear_model_predictive import LinearModelPredictive
 from .on_off import OnOffController
 from .pid import PID
 from .piecewise_linear import PiecewiseLinear
@@ -47,6 +48,7 @@ __all__ = [
     "GainSchedule",
     "InputSignal",
     "IterativeLearning",
+    "LinearModelPredictive",
     "Measurement",
     "OnOffController",
     "Periodic",
