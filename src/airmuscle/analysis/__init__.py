@@ -3,6 +3,7 @@
 from .equilibrium import Equilibrium, find_equilibria, find_equilibrium
 from .extended_kalman_filter import ExtendedKalmanFilter
 from .filter_consistency import consistency_band, normalised_error_squared
+from .finite_control_set import FiniteControlSet
 from .joint_plot import plot_reachable_region
 from .linear_model import LinearModel, Pole, linearise
 from .lqg import design_lqg
@@ -15,6 +16,7 @@ from .unscented_kalman_filter import UnscentedKalmanFilter
 __all__ = [
     "Equilibrium",
     "ExtendedKalmanFilter",
+    "FiniteControlSet",
     "Innovation",
     "JointPoints",
     "JointStatics",

@@ -81,7 +81,7 @@ def _observer(
     model: LinearModel, sampled: tuple[Array, Array, Array, Array], measured: Sequence[str], sizes: Array, noise: Array,
     deviations: Array,
 ) -> ObserverModel:  # fmt: skip
-    """The observer of states and disturbances, from the sampled matrices of states, inputs, disturbances and columns."""
+    """The observer, from the sampled matrices of states, inputs, disturbances and measured columns."""
     a, b, by_disturbance, c = sampled
     (n, m), d = b.shape, by_disturbance.shape[1]
     wide = np.block([[a, by_disturbance], [np.zeros((d, n)), np.eye(d)]])

@@ -111,11 +111,8 @@ class StateEstimator(abc.ABC):
         for name, value in {**self.process_noise, **self.measurement_noise, "sample_time": self.sample_time}.items():
             if not 0 < value < float("inf"):
                 raise ParameterError(f"{owner}: '{name}' is {value!r}; it must be positive and finite.")
-        places = (
-            [columns.index(name) for name in self.measured], [leaves.index(name) for name in self.parameters],
-            [states.index(name) for name in self.disturbances],
-        )  # fmt: skip
-        object.__setattr__(self, "_functions", augmented_rates(compiled, *places))
+        seen = [columns.index(name) for name in self.measured]
+        object.__setattr__(self, "_functions", augmented_rates(compiled, seen, *self.places))
         object.__setattr__(self, "_idle", [])
 
     @abc.abstractmethod
@@ -138,6 +135,13 @@ class StateEstimator(abc.ABC):
             *self._compiled.description.state_names, *self.parameters,
             *(f"{name}{DISTURBANCE}" for name in self.disturbances),
         )  # fmt: skip
+
+    @property
+    def places(self) -> tuple[list[int], list[int]]:
+        """Indices of the estimated parameters among the leaves, and of the disturbed states."""
+        leaves = [leaf.path for leaf in tree.leaves(self.plant)]
+        states = self._compiled.description.state_names
+        return [leaves.index(name) for name in self.parameters], [states.index(name) for name in self.disturbances]
 
     @property
     def noise(self) -> Array:
