@@ -11,6 +11,8 @@ from .decentralised import Decentralised
 from .driver import PWM, Driver, SolenoidDriver
 from .feed_forward import StaticFeedForward
 from .gain_schedule import GainSchedule
+from .hysteresis_compensation import HysteresisCompensation
+from .hysteresis_operator import HysteresisOperator, InverseHysteresisOperator
 from .inputs import ZERO_INPUT, InputSignal, Periodic, SampledSignal, Schedule
 from .iterative_learning import IterativeLearning
 from .linear_model_predictive import LinearModelPredictive
@@ -46,7 +48,10 @@ __all__ = [
     "Decentralised",
     "Driver",
     "GainSchedule",
+    "HysteresisCompensation",
+    "HysteresisOperator",
     "InputSignal",
+    "InverseHysteresisOperator",
     "IterativeLearning",
     "LinearModelPredictive",
     "Measurement",
