@@ -3,6 +3,7 @@
 from .angle_and_stiffness import AngleAndStiffness
 from .antagonistic_inverse import AntagonisticInverse
 from .cascade import Cascade
+from .computed_torque import ComputedTorque
 from .control_law import ControlLaw
 from .control_loop import ControlLoop, ControlLoopState
 from .controller import Controller, Measurement
@@ -40,6 +41,7 @@ __all__ = [
     "AntagonisticInverse",
     "Cascade",
     "ColumnSensor",
+    "ComputedTorque",
     "ControlLaw",
     "ControlLoop",
     "ControlLoopState",
