@@ -6,6 +6,7 @@ regulator; there is no offset at rest; a limit of a column is kept, and a progra
 from __future__ import annotations
 
 import itertools
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -206,6 +207,12 @@ def test_a_run_is_repeated_to_the_last_bit():
     judged = law(limits={"left.pressure": (0.5e5, 3.1e5)})
     first, second = run(judged, duration=1.0), run(judged, duration=1.0)
     assert (first["angle"] == second["angle"]).all()
+
+
+def test_a_pickled_controller_gives_the_same_command():
+    judged = law(limits={"left.pressure": (0.5e5, 3.1e5)})
+    command, _ = judged.step(judged.init(), measurement(0.1, 0.3), H)
+    assert pickle.loads(pickle.dumps(judged)).step(judged.init(), measurement(0.1, 0.3), H)[0] == command
 
 
 def test_a_continued_run_is_the_undivided_run():

@@ -21,8 +21,9 @@ from .hysteresis_operator import InverseHysteresisOperator
 class HysteresisCompensation(EnclosingLaw):
     """u_k = Gamma^-1[v]_k: an input receives the command v of a law through an inverse hysteresis operator.
 
-    If the plant responds to u as to Gamma[u] without hysteresis, the hysteresis cancels. Plays that are left where the
-    range of the input is exceeded follow the command v. A law with integral action sees the range of u.
+    If the plant responds to u as to Gamma[u] without hysteresis, the hysteresis cancels. Where the
+    input is limited to its range, the plays follow the command v as if it were not. A law with integral action sees the
+    range of u.
     Reference: Kuhnen (2003).
     """
 

@@ -127,6 +127,10 @@ class LinearModelPredictive(Controller):
     def inputs(self) -> tuple[str, ...]:
         return self.commanded
 
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields without the workspaces of the solver, which belong to one process."""
+        return {**self.__dict__, "_solvers": []}
+
     def init(self) -> PredictiveMemory:
         problem, count = self.problem, len(self.problem.hessian) + len(self.problem.rows)
         empty, free = np.zeros((0, problem.inputs)), np.zeros(count, dtype=np.int32)
