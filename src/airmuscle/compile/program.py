@@ -43,7 +43,7 @@ class Program:
         self.output_names = self._form.output_names
         self._engine = load_module(text)
         self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
-        self._prepare = _prepare_function(self._engine)
+        self._prepare = prepare_function(self._engine)
         self._steps: dict[Any, tuple[Any, int]] = {}
         self._compiling = threading.Lock()  # of two threads that need a step, one compiles it: an engine must stay
 
@@ -63,7 +63,7 @@ class Program:
                 text, size = self._step_module(tableau)
                 self._steps[tableau] = load_module(text), size
         engine, size = self._steps[tableau]
-        return int(engine.get_function_address("step")), _prepare_function(engine)(parameters, size)
+        return int(engine.get_function_address("step")), prepare_function(engine)(parameters, size)
 
     def _step_module(self, tableau: Tableau) -> tuple[str, int]:
         if isinstance(self._form, sensitivities.TangentSystem):
@@ -84,7 +84,7 @@ class Program:
 _PREPARE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 
 
-def _prepare_function(engine: Any) -> Callable[[Array, int], Array]:
+def prepare_function(engine: Any) -> Callable[[Array, int], Array]:
     """The function `prepare` of an engine: from parameters to so many values for its other functions."""
     function = _PREPARE(engine.get_function_address("prepare"))
 
