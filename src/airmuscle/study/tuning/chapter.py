@@ -37,7 +37,7 @@ def tuning_chapter(
             "convergence", "Objective over the budget; a failed set of gains is not drawn.", convergence_figure(tuning)
         )
     ]
-    caption = "Mean tracking index over the cases against mean air drawn and switchings; squares and diamonds as below."
+    caption = "Mean tracking index over the cases against mean air drawn and mean switchings, with both fronts."
     plots.append(Plot("pareto", caption, pareto_figure(tuning, tuning.index.unit(unit))))
     if runs:
         plots.append(

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ...control.control_loop import SETPOINT
-from ...core.arrays import Array
 from ...core.plotting import BLACK, BLUE, GREEN, LINES, ORANGE, RED, SKY, legend_below, new_figure
 from ...recording import Recording
 from .result import Tuning
@@ -30,6 +29,7 @@ def convergence_figure(tuning: Tuning) -> Any:
     if tuning.present_objective is not None and np.isfinite(tuning.present_objective):
         axis.axhline(tuning.present_objective, color=RED, linestyle="--", linewidth=1.0, label="present gains")
     axis.set(xlabel="simulated loops", ylabel="objective", yscale="log")
+    _plain_numbers(axis)
     legend_below(figure, axis, columns=3)
     return figure
 
@@ -51,7 +51,8 @@ def pareto_figure(tuning: Tuning, unit: str) -> Any:
         if tuning.start:
             axis.plot(cost[0], error[0], "s", color=RED, markersize=6, label="present gains")
         axis.plot(cost[tuning.best], error[tuning.best], "D", color=BLUE, markersize=6, label="tuned gains")
-        axis.set(xlabel=label, ylabel=f"mean index [{shown}]", yscale="log")
+        axis.set(xlabel=label, ylabel=f"mean index [{shown}]" if shown else "mean index", yscale="log")
+        _plain_numbers(axis)
     legend_below(figure, axes[0, 0], columns=4)
     return figure
 
@@ -63,18 +64,23 @@ def response_figure(runs: Mapping[str, Recording], column: str, unit: str) -> An
     for run, colour, name in zip(runs.values(), (RED, BLUE, GREEN, *LINES), runs, strict=False):
         axis.plot(run["time"], run[column] * factor, color=colour, label=name)
     last = list(runs.values())[-1]
-    axis.plot(*_steps(last, column, factor), color=BLACK, linestyle="--", linewidth=0.9, label="set point")
+    wanted = last[f"{SETPOINT}{column}"] * factor
+    axis.plot(
+        last["time"], wanted, color=BLACK, linestyle="--", linewidth=0.9, drawstyle="steps-post", label="set point"
+    )
     axis.set(xlabel="time [s]", ylabel=f"{column} [{shown}]" if shown else column)
     legend_below(figure, axis, columns=4)
     return figure
 
 
-def _steps(run: Recording, column: str, factor: float) -> tuple[Array, Array]:
-    return run["time"], run[f"{SETPOINT}{column}"] * factor
+def _plain_numbers(axis: Any) -> None:
+    """Numbers without powers on a logarithmic axis."""
+    axis.yaxis.set_major_formatter("{x:g}")
+    axis.yaxis.set_minor_formatter("{x:g}")
 
 
 def _display(unit: str) -> tuple[float, str]:
     """Factor and unit in which a quantity that begins with an SI unit is displayed: Pa s in bar s."""
-    first, _, rest = unit.partition(" ")
+    first, _, rest = ("" if unit == "1" else unit).partition(" ")
     factor, shown = DISPLAY.get(first, (1.0, first))
     return factor, f"{shown} {rest}".strip()

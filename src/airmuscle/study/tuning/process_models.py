@@ -29,6 +29,8 @@ ASTROM_HAGGLUND1984 = Reference(
     year=1984,
     note="relay experiment and describing function; cited after textbooks, not read",
 )
+UNSETTLED = 0.05
+"""Relative change in the last tenth of a step response from which on it is not settled (chosen)."""
 MIN_ROWS = 10
 """Smallest number of rows of an experiment (chosen)."""
 
@@ -118,7 +120,7 @@ def first_order_of_step(time: npt.ArrayLike, output: npt.ArrayLike, step: float)
     t, y = _rows(time, output, step)
     change = float(y[-max(1, y.size // 10) :].mean() - y[0])
     spread = float(np.ptp(y[-max(1, y.size // 10) :]))
-    if change == 0.0 or spread > 0.1 * abs(change):
+    if change == 0.0 or spread > UNSETTLED * abs(change):
         raise ParameterError(
             f"step response: the output changes by {change:.4g} and still by {spread:.4g} in its last tenth; record "
             "until it settles, or identify an integrator."
