@@ -108,23 +108,22 @@ def tune(
       airmuscle tune lift.toml --bounds "gain=5 1/m:500 1/m" --bounds "integral_time=50 ms:5 s" --budget 20000
     """
     loaded = load_scenario_loop(scenario)
-    target = scenario.with_name(f"{scenario.stem}-tuned.toml") if save is None else save
+    target = save or scenario.with_name(f"{scenario.stem}-tuned.toml")
     for folder in (out, target.parent):
         check_writable(folder)
-    perturbations = Perturbations(
-        read_factors(loads, "--loads"), read_factors(supplies, "--supplies"), leak, delay, draws
-    )
+    loaded.check_target(target)
+    factors = read_factors(loads, "--loads"), read_factors(supplies, "--supplies")
     objective = RobustObjective(quantile, quantile_weight, air_weight, switching_weight)
-    request = TuneRequest(read_index(index), objective, perturbations, budget, seed, rules)
+    request = TuneRequest(
+        read_index(index), objective, Perturbations(*factors, leak, delay, draws), budget, seed, rules
+    )  # fmt: skip
     result = _search(loaded, loaded.bounds(bounds or ()), request)
     loaded.save(result.tuning.gains, target)
     page = _write(result, out)
     if json:
         print_json(_to_dict(result.tuning, target))
     else:
-        _print(result)
-        echo(f"scenario: {target}")
-        echo(f"report: {page}")
+        _print(result, f"scenario: {target}", f"report: {page}")
     if result.tuning.interrupted:
         check_interrupted()
         raise KeyboardInterrupt
@@ -166,7 +165,7 @@ def _write(result: TuneResult, out: Path) -> Path:
     return out / "report.html"
 
 
-def _print(result: TuneResult) -> None:
+def _print(result: TuneResult, *files: str) -> None:
     tuning = result.tuning
     present = tuning.present_objective
     before = "" if present is None else f", with the present gains {present:.4g}"
@@ -182,6 +181,8 @@ def _print(result: TuneResult) -> None:
         echo(f"note: '{path}' is on a bound of its range; a wider range may give a smaller objective")
     if tuning.interrupted:
         echo("interrupted: the best gains so far are written", err=True)
+    for line in files:
+        echo(line)
 
 
 def _print_table(table: Table) -> None:

@@ -31,7 +31,7 @@ from .process_models import (
     ultimate_point,
 )
 from .result import Tuning, TuningHistory
-from .rule_starts import StepExperiment, rule_settings, rule_starts, step_experiment
+from .starts import StepExperiment, rule_settings, rule_starts, step_experiment
 from .rules import RuleSettings, amigo_pi, amigo_pid, simc
 from .scenario_loop import ScenarioLoop, load_scenario_loop
 from .tracking import IntegralAbsoluteError, IntegralTimeAbsoluteError, RootMeanSquareError, TrackingIndex

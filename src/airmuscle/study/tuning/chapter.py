@@ -9,6 +9,7 @@ import numpy as np
 
 from ...control.control_loop import ControlLoop
 from ...core.errors import AirmuscleError
+from ...core.reference import cite
 from ...core.tree import leaves
 from ...recording import Recording
 from ...report.chapter import Chapter, Plot, Table
@@ -37,7 +38,7 @@ def tuning_chapter(
             "convergence", "Objective over the budget; a failed set of gains is not drawn.", convergence_figure(tuning)
         )
     ]
-    caption = "Mean tracking index over the cases against mean air drawn and mean switchings, with both fronts."
+    caption = "Mean tracking index over the cases against mean air drawn and mean switchings, with the Pareto fronts."
     plots.append(Plot("pareto", caption, pareto_figure(tuning, tuning.index.unit(unit))))
     if runs:
         plots.append(
@@ -49,7 +50,7 @@ def tuning_chapter(
         summary="\n\n".join([_summary(tuning), *(f"{note[:1].upper()}{note[1:]}." for note in notes)]),
         tables=(gain_table(tuning, units), case_table(tuning), *([rule_table(rules)] if rules else [])),
         plots=tuple(plots),
-        references=tuple(tuning.references),
+        references=(*tuning.references, *cite(tuple(rules))),
         chosen=_settings(tuning),
     )
 

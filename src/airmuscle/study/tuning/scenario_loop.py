@@ -24,6 +24,7 @@ from ...library.uncertainty import ParameterUncertainty
 from ...plant.plant import Plant
 from ...scenario.controller import signal_units
 from ...scenario.scenario import Scenario, build_scenario
+from .case import with_gains as controller_with_gains
 from .perturbations import Perturbations, PerturbedFamily, muscle_paths, perturbed_family
 
 SPAN = 10.0
@@ -133,9 +134,13 @@ class ScenarioLoop:
         return relative_unit(leaf.declared.unit, measured, commanded)
 
     def with_gains(self, gains: Mapping[str, float]) -> str:
-        """The text of the file with other gains [SI]; all else, comments and units included, is unchanged."""
+        """The text of the file with other gains [SI]; all else, comments and units included, is unchanged.
+
+        Raises ParameterError for a gain that the controller does not have, or a value that it does not accept.
+        """
         import tomlkit
 
+        controller_with_gains(self.loop.controller, gains)
         document = tomlkit.parse(self.text)
         known = {leaf.path: leaf for leaf in leaves(self.loop.controller)}
         for path, value in gains.items():
@@ -154,8 +159,7 @@ class ScenarioLoop:
         what `load_scenario` raises.
         """
         text = self.with_gains(gains)
-        with located_errors(f"{path} cannot take the place of {self.path}"):
-            build_scenario(tomllib.loads(text), Location(str(path), "", path.parent))
+        self.check_target(path, text)
         unfinished = path.with_name(f"{path.name}.part")
         try:
             with unfinished.open("w", encoding="utf-8", newline="") as file:
@@ -168,6 +172,13 @@ class ScenarioLoop:
                 f"{path}: cannot be written ({error.strerror}). Name a file in a writable folder."
             ) from None
         return path
+
+    def check_target(self, path: Path, text: str = "") -> None:
+        """Raise what `save` raises for a path that is a folder, or from which files of the scenario are not found."""
+        if path.is_dir():
+            raise FileError(f"{path}: is a folder; name a file in it.")
+        with located_errors(f"{path} cannot take the place of {self.path}"):
+            build_scenario(tomllib.loads(text or self.text), Location(str(path), "", path.parent))
 
 
 def load_scenario_loop(path: str | Path) -> ScenarioLoop:
