@@ -31,9 +31,9 @@ from .process_models import (
     ultimate_point,
 )
 from .result import Tuning, TuningHistory
-from .starts import StepExperiment, rule_settings, rule_starts, step_experiment
 from .rules import RuleSettings, amigo_pi, amigo_pid, simc
 from .scenario_loop import ScenarioLoop, load_scenario_loop
+from .starts import StepExperiment, rule_settings, rule_starts, step_experiment
 from .tracking import IntegralAbsoluteError, IntegralTimeAbsoluteError, RootMeanSquareError, TrackingIndex
 
 __all__ = [
