@@ -236,7 +236,7 @@ def test_drawn_parameters_have_the_covariance_of_the_fit_and_are_equal_in_muscle
     errors = tuple(0.01 * abs(value) for value in values)
     fit = ParameterUncertainty(tuple(f"characteristic.{name}" for name in c), errors, ((1.0, 0.6), (0.6, 1.0)))
     loop = ControlLoop(PID("angle", "left.fill", gain=1.0), 0.01, Schedule({"angle": ((0, 0.0),)}))
-    options = Perturbations((), (), 0.0, 0, 200)
+    options = Perturbations((), (), 0.0, 0, 120)
     family = perturbed_family(JOINT, loop, options, initial_state=lambda plant: {}, uncertainties=[fit, fit], seed=2)
     drawn = np.array([[leaf.value for leaf in am.core.leaves(case.plant.muscles[0].contractile)][:2] for case in family.cases[1:]])  # fmt: skip
     scaled = (drawn - values) / np.array(errors)
