@@ -94,7 +94,7 @@ def tune(
     out: Folder = Path("tuning"),
     json: Json = False,
 ) -> None:
-    """Tune the controller of a scenario for a family of perturbed plants.
+    """Tune the controller of a scenario for a family of plants.
 
     \b
     Differential evolution minimises the mean plus a high quantile of a tracking index over the nominal plant and plants
