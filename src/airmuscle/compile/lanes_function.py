@@ -10,6 +10,7 @@ from ..core.arrays import Array
 from .cache.module import load_module
 from .functions import Printer
 from .llvm import vector_math
+from .llvm.emit import LlvmLanguage
 from .llvm.types import LlvmType
 
 LANES = 8
@@ -28,7 +29,7 @@ class LanesFunction:
         import casadi
 
         number = LlvmType(lanes=LANES)
-        printer = Printer(number)
+        printer = Printer(LlvmLanguage(number))
         printer.add("function", inputs, {name: casadi.densify(casadi.SX(value)) for name, value in outputs.items()})
         parts = [vector_math.definition(name, count, number) for name, count in printer.needed.items()]
         text = "\n".join([vector_math.declarations({number}), *parts, printer.module()])
