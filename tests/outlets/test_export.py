@@ -24,6 +24,7 @@ from airmuscle.control import PID, ControlLoop, SampledSignal, Schedule
 from airmuscle.core import autodiff
 from airmuscle.core.errors import AirmuscleWarning, FileError, ParameterError
 from airmuscle.export import C99, JavaScript, Octave, make_identifiers, write_law, write_program
+from airmuscle.export.building import build_and_run
 from airmuscle.export.identifiers import LONGEST, RESERVED
 from airmuscle.library.files import list_laws
 from airmuscle.library.law_file import load_law
@@ -463,3 +464,27 @@ def test_the_command_refuses_a_wrong_use(arguments, message, tmp_path):
     assert done.exit_code == 2
     assert message in " ".join(done.output.replace("│", " ").split())
     assert not (tmp_path / "out").exists()
+
+
+def test_the_command_builds_and_runs_the_program(tmp_path):
+    printed.require("gcc")
+    done = airmuscle("export", EXAMPLES / "fill_discharge.toml", "--to", "c", "--out", tmp_path, "--build")
+    assert done.exit_code == 0, done.output
+    assert re.search(r"program: 2501 rows; 404 steps, \d+ rejected, time 25 s; code \d+ bytes", done.output)
+    assert {path.suffix for path in tmp_path.iterdir()} == {".c", ".h"}
+
+
+def test_without_a_compiler_it_says_what_can_be_done(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    done = airmuscle("export", EXAMPLES / "fill_discharge.toml", "--to", "c", "--out", tmp_path / "out", "--build")
+    assert done.exit_code == 1
+    message = r"no C compiler \(cc, gcc, clang\) was found\. The sources are in .*out; install gcc or clang, or compile"
+    assert re.search(message, done.stderr), done.stderr
+    assert (tmp_path / "out" / "main.c").exists()
+
+
+def test_a_failing_compiler_is_quoted(tmp_path):
+    printed.require("gcc")
+    (tmp_path / "main.c").write_text("int main(void) { return undeclared; }\n")
+    with pytest.raises(FileError, match=r"cc failed with exit code 1: .*undeclared"):
+        build_and_run([tmp_path / "main.c"])

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ..export import C99, JavaScript, Octave, Target, write_controller, write_law, write_program
+from ..export.building import BuiltProgram, build_and_run
 from ..export.identifiers import make_identifier
 from ..library.law_file import load_law
 from ..report.output_folder import check_writable
@@ -33,6 +34,9 @@ Law = Annotated[bool, typer.Option("--law", help="Export only the static charact
 ControllerOnly = Annotated[
     bool, typer.Option("--controller", help="Export only the controller of a scenario, to C for a microcontroller.")
 ]
+Build = Annotated[
+    bool, typer.Option("--build", help="Compile the C program with the compiler of this machine, and run it.")
+]
 Tunable = Annotated[
     list[str] | None,
     typer.Option(
@@ -44,7 +48,7 @@ Tunable = Annotated[
 
 def export(
     source: Source, to: To, out: Folder = Path("export"), name: ProgramName = "", law: Law = False,
-    controller: ControllerOnly = False, tunable: Tunable = None, json: Json = False,
+    controller: ControllerOnly = False, build: Build = False, tunable: Tunable = None, json: Json = False,
 ) -> None:  # fmt: skip
     """Export a scenario, law or controller to C, JavaScript or MATLAB.
 
@@ -64,6 +68,8 @@ def export(
         raise typer.BadParameter(f"--to {to}: there are {', '.join(TARGETS)}.")
     if controller and (law or to != "c"):
         raise typer.BadParameter("--controller: a controller is exported to C, and without --law; write --to c.")
+    if build and (law or to != "c"):
+        raise typer.BadParameter("--build: there is a program to compile with --to c and without --law.")
     if law and tunable:
         raise typer.BadParameter("--tunable: all parameters of a law can be changed; leave it out.")
     check_writable(out)
@@ -80,12 +86,25 @@ def export(
             scenario.problem, out, TARGETS[to], name=name, title=scenario.title, tunable=tunable,
             columns=scenario.columns,
         )  # fmt: skip
+    built = build_and_run(paths) if build else None
     if json:
-        print_json({"files": [str(path) for path in paths]})
+        result = {} if built is None else {"output": built.output, "code_bytes": built.code_size}
+        print_json({"files": [str(path) for path in paths], **result})
         return
     for path in paths:
         echo(f"file: {path}")
+    if built is not None:
+        _print_build(built, controller)
     echo(f"run: {_instruction(to, paths, law, controller)}")
+
+
+def _print_build(built: BuiltProgram, controller: bool) -> None:
+    """What the program printed; of a run, whose output is CSV, the number of its rows."""
+    text = (
+        built.output.strip() if controller else f"{len(built.output.splitlines()) - 1} rows; {built.messages.strip()}"
+    )
+    size = "unknown" if built.code_size is None else f"{built.code_size} bytes"
+    echo(f"program: {text}; code {size}")
 
 
 def _instruction(to: str, paths: tuple[Path, ...], law: bool, controller: bool) -> str:
