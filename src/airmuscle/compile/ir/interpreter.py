@@ -1,7 +1,7 @@
 """Interpreter of instructions in IEEE 754 double precision, one operation after the other as they are printed.
 
-The numbers are those of printed C that is compiled without contraction to fused operations, bit by bit, with the
-functions of the C library that Python uses.
+The numbers are those of printed C that is compiled without fused operations, bit by bit, with the functions of the C
+library that Python uses.
 """
 
 from __future__ import annotations
