@@ -118,7 +118,7 @@ def test_the_program_makes_the_steps_of_the_library(case, target, tmp_path):
     check_run(*RUN[target](tmp_path), problem)
 
 
-@pytest.mark.parametrize("case", ["one muscle", "fixed steps"])
+@pytest.mark.parametrize("case", ["one muscle", pytest.param("fixed steps", marks=pytest.mark.slow)])
 def test_the_octave_program_makes_the_steps_of_the_library(case, tmp_path):
     problem = problem_of(*CASES[case], duration=0.2)
     write_program(problem, tmp_path, Octave(), name="plant")
@@ -163,6 +163,7 @@ def test_jumps_and_a_later_start_are_met(tmp_path):
     check_run(*run_c(tmp_path), problem)
 
 
+@pytest.mark.slow
 def test_a_system_without_inputs_is_exported(tmp_path):
     plant = plants.EXAMPLES["closed"]
     problem = Problem(plant, Schedule({}), 0.3, plant.state_at(pressure=1e5, position=0.01))
@@ -171,6 +172,7 @@ def test_a_system_without_inputs_is_exported(tmp_path):
         check_run(*RUN[target](tmp_path / type(target).__name__), problem)
 
 
+@pytest.mark.slow
 def test_the_program_has_no_undefined_behaviour(tmp_path):
     write_program(problem_of("overlap", duration=0.2), tmp_path, C99(), name="plant")
     run_c(tmp_path, "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
@@ -356,6 +358,7 @@ def test_identifiers_are_distinct_in_any_case_and_of_limited_length():
     assert all(make_identifiers([word]) == (word,) for word in words)
 
 
+@pytest.mark.slow
 def test_names_of_users_cannot_leave_their_text(tmp_path):
     """Quotes, comment ends, keywords, trigraphs and other alphabets in the name of a muscle, in every language."""
     names = ('*/ "\\', "while'??/", "筋肉 % \u2028")

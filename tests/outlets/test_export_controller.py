@@ -78,7 +78,10 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CASES)
+NAMES = [pytest.param(name, marks=() if name in ("PI", "cascade") else pytest.mark.slow) for name in CASES]
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_the_replay_agrees_bit_by_bit(name, tmp_path):
     law, setpoint = CASES[name]
     write_controller(problem_of(law, setpoint), tmp_path, name="law")
@@ -88,7 +91,7 @@ def test_the_replay_agrees_bit_by_bit(name, tmp_path):
         assert re.match(r"100 samples, 0 commands differ; memory \d+ bytes, parameters \d+ bytes", done.stdout)
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", NAMES)
 def test_the_replayed_commands_are_those_of_the_recorded_run(name):
     """The library computes with fused and reordered operations: equal to 1e-9 of the range of the command."""
     law, setpoint = CASES[name]
