@@ -63,6 +63,7 @@ ARGUMENTS = {
     "coordinate": "name of a coordinate of a mechanism",
     "forces": "generalised forces on the coordinates of a mechanism [N, N m]",
     "values": "values by name",
+    "snapshot": "time, states and inputs of a stepper",
     "friction": "friction model of a muscle",
     "displacement": "displacement of a friction element [m]",
     "bristles": "bristle deflections of a friction model by name",

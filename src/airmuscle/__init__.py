@@ -71,7 +71,7 @@ if TYPE_CHECKING:
     from .pneumatics import Circuit, FillDischarge, Supply, Valve
     from .pneumatics.gas import Ambient, Isothermal, Polytropic
     from .recording import Recording, read, read_csv, write_csv
-    from .simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, Solution, advance, compiled, simulate, solve
+    from .simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, Solution, Stepper, advance, simulate, solve
     from .simulation.batch import simulate_batch
 
 __version__ = "0.1.0"
@@ -94,7 +94,7 @@ _MODULES = {
     "pneumatics": "Circuit FillDischarge Supply Valve",
     "pneumatics.gas": "Ambient Isothermal Polytropic",
     "recording": "Recording read read_csv write_csv",
-    "simulation": "DormandPrince8 Problem Rodas4 RungeKutta4 Solution advance compiled simulate solve",
+    "simulation": "DormandPrince8 Problem Rodas4 RungeKutta4 Solution Stepper advance simulate solve",
     "simulation.batch": "simulate_batch",
 }
 """The module of each public name."""
@@ -131,6 +131,7 @@ __all__ = [
     "Schedule",
     "Solution",
     "Status",
+    "Stepper",
     "Supply",
     "System",
     "Valve",
@@ -138,7 +139,6 @@ __all__ = [
     "advance",
     "characteristic",
     "cite",
-    "compiled",
     "find_equilibrium",
     "fit",
     "geometry",

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.arrays import Array
-from ..core.diagnostics import Columns, Diagnostic, DiagnosticCode
+from ..core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ..core.errors import ParameterError
 from ..core.variables import select_prefix
 from ..friction import NoFriction
@@ -28,16 +28,6 @@ def describe_friction(muscles: Sequence[Muscle]) -> str:
         return f"friction: {muscles[0].friction}"
     parts = [f"{m.name} {'none' if isinstance(m.friction, NoFriction) else m.friction}" for m in muscles]
     return f"friction: {', '.join(parts)}"
-
-
-class ColumnLimit(NamedTuple):
-    """Lower and upper limit of a column of a run, for one muscle."""
-
-    muscle: str
-    code: DiagnosticCode
-    column: str
-    quantity: str
-    bounds: tuple[float, float]
 
 
 def column_limits(muscles: Sequence[Muscle], prefixes: Sequence[str]) -> tuple[ColumnLimit, ...]:

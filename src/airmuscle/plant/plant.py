@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from ..core.declaration import as_finite_float, model
-from ..core.diagnostics import Columns, Diagnostic, DiagnosticCode
+from ..core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ..core.errors import GeometryLimitError, ParameterError
 from ..core.ops import Value
 from ..core.system import System
@@ -279,10 +279,11 @@ class Plant(System):
         names = [(name.removesuffix("."), text) for name, text in remarks.items()]
         components = [Diagnostic(DiagnosticCode.COMPONENT, name, f"{name}: {text}") for name, text in names]
         rated = diagnostics.rated_temperature(self.muscles, self.ambient.temperature)
-        return [*rated, *diagnostics.extrapolation(self._column_limits, columns), *components]
+        return [*rated, *diagnostics.extrapolation(self.column_limits, columns), *components]
 
     @functools.cached_property
-    def _column_limits(self) -> tuple[diagnostics.ColumnLimit, ...]:
+    def column_limits(self) -> tuple[ColumnLimit, ...]:
+        """Validity ranges and ratings of the muscles, and the ranges of their geometries."""
         return diagnostics.column_limits(self.muscles, self.prefixes)
 
     def failure_hint(self, state: Mapping[str, float]) -> str:
