@@ -14,6 +14,9 @@ from .types import DOUBLE, LlvmType
 FLAGS = "nsz arcp contract reassoc afn"
 """Fast-math flags without nnan and ninf: a failed step must remain detectable by NaN or infinity."""
 
+STEADY_POWER = "steadypow"
+"""Name of the power with an exponent that depends on parameters alone, in lanes."""
+
 LEVEL = {"u": COMMANDED, "w": STEADY, "h": STEADY}
 """Arguments that do not depend on the states: inputs, their slopes, and the step size."""
 
@@ -46,6 +49,7 @@ class FunctionBody:
         self._known: dict[str, str] = {}
         self._named = 0
         self._constants: dict[str, float] = {}
+        self._steady: set[str] = set()
 
     def put(self, expression: str) -> str:
         """The name of the value of `expression`; the instruction is appended unless it exists already."""
@@ -74,7 +78,10 @@ class FunctionBody:
         if array in self.scalars:
             return f"%{array}"
         place = self.put(f"getelementptr inbounds {self.number.text}, ptr %{array}, i64 {index}")
-        return self.put(f"load {self.number.text}, ptr {place}, align {self.number.alignment}")
+        value = self.put(f"load {self.number.text}, ptr {place}, align {self.number.alignment}")
+        if array.startswith("c"):
+            self._steady.add(value)
+        return value
 
     def store(self, array: str, index: int, value: str) -> None:
         """Write a value into an array element."""
@@ -102,10 +109,14 @@ class FunctionBody:
         return self.put(f"call {flags} {self.number.text} @{self.number.intrinsic(name)}({arguments})")
 
     def power(self, base: str, exponent: str) -> str:
-        """base**exponent; in lanes, integer and half-integer constants give products, as LLVM does for scalars."""
+        """base**exponent; in lanes, integer and half-integer constants give products, as LLVM does for scalars, and
+        other exponents that are constant or depend on parameters alone the shorter form of `steady_power`."""
         value = self._constants.get(exponent)
         if self.number == DOUBLE or value is None or abs(value) > 16 or not (2 * value).is_integer():
-            return self.call("pow", (base, exponent))
+            if self.number == DOUBLE or (value is None and exponent not in self._steady):
+                return self.call("pow", (base, exponent))
+            self.needed["pow"] = 2  # for arguments beyond the range of the shorter form
+            return self.call(STEADY_POWER, (base, exponent))
         result, square, left = self.constant(1.0), base, int(abs(value))
         while left:
             if left % 2:
