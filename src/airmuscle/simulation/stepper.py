@@ -96,6 +96,13 @@ class Stepper:
         self._given[:] = 0.0
         return self._settle()
 
+    def begin(self, parameters: Array, state: Array) -> Array:
+        """Begin at a state (n,) with other parameters (P,), in the order of `core.tree.leaves`, at time 0 with all
+        inputs 0; the outputs (k,). Nothing is checked: for callers that draw both often."""
+        self._bind(self._compiled.at(parameters, self._compiled.nominal))
+        self.state[:], self.time = state, 0.0
+        return self._settle()
+
     def step(self, inputs: Any, dt: float) -> Array:
         """Advance by `dt` [s] with the inputs held; the outputs (k,) at the end, the array `outputs` itself.
 
