@@ -63,6 +63,8 @@ ARGUMENTS = {
     "coordinate": "name of a coordinate of a mechanism",
     "forces": "generalised forces on the coordinates of a mechanism [N, N m]",
     "values": "values by name",
+    "parameters": "values of all parameters of a plant, in the order of its leaves",
+    "speed": "shortening speed of a muscle [m/s], or speed of an animation, 1 for real time",
     "snapshot": "time, states and inputs of a stepper",
     "friction": "friction model of a muscle",
     "displacement": "displacement of a friction element [m]",

@@ -159,3 +159,8 @@ def geometry_limit_hint(enclosure: Enclosure) -> str:
         "the load from moving it so far: wrap the mechanism in WithEndStops, or choose a higher pressure or a smaller "
         "load."
     )
+
+
+def first_hint(given: Sequence[Enclosure]) -> str:
+    """Remedy for the first muscle that is at a limit of its geometry; empty if none is."""
+    return next(filter(None, map(geometry_limit_hint, given)), "")
