@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import dataclasses
 import pickle
+import re
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -159,3 +161,12 @@ def test_a_step_allocates_no_arrays():
     tracemalloc.stop()
     assert after - before < 1000
     assert peak - before < 2000  # an array alone takes 112 bytes, a view of it too; the frames of Python some hundred
+
+
+def test_the_example_of_the_page_reaches_its_angle():
+    page = Path(__file__).parents[2] / "docs" / "stepping.md"
+    (code,) = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    names: dict[str, object] = {}
+    exec(code, names)
+    assert names["stepper"].time == pytest.approx(0.5)
+    assert names["stepper"]["angle"] == pytest.approx(0.2, abs=0.1)

@@ -4,9 +4,11 @@ one, seeds repeat episodes, what is impossible is refused, and quantities have t
 from __future__ import annotations
 
 import dataclasses
+import re
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -293,3 +295,14 @@ def test_the_package_is_imported_without_gymnasium_which_the_error_names():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.startswith("InputError learning environments need the package gymnasium. Install it: pip")
+
+
+def test_the_example_of_the_page_is_an_environment():
+    page = Path(__file__).parents[2] / "docs" / "environments.md"
+    (code,) = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    names: dict[str, object] = {}
+    exec(code, names)
+    env = gymnasium.make("airmuscle/Joint-v0", task=names["task"], randomisation=names["randomisation"])
+    observation, _ = env.reset(seed=0)
+    assert env.observation_space.contains(observation)
+    assert env.step(env.action_space.sample())[1] > -0.01
