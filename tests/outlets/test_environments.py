@@ -266,6 +266,8 @@ def test_other_impossible_requests_are_refused():
         vector(2, max_episode_steps=0)
     with pytest.raises(ParameterError, match="count is 0"):
         vector(0)
+    with pytest.raises(ParameterError, match=r"call reset\(\) before the first step"):
+        vector(2).step(np.zeros((2, 2)))
     with pytest.raises(ParameterError, match="there are 2 seeds for 3 plants"):
         vector(3).reset(seed=[1, 2])
     with pytest.raises(ParameterError, match="it must have a fixed step"):

@@ -58,7 +58,7 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         _, states = self._draw.begin(np.full((1, self._draw.dimension), 0.5))
         names = [s.name for s in task.states]
         self._stepper = Stepper(task, dict(zip(names, states[0].tolist(), strict=True)), integrator=integrator)
-        self._inputs = [0.0] * (self._actions + 1)
+        self._inputs, self._elapsed = [0.0] * (self._actions + 1), 0
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

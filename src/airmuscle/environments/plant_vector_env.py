@@ -3,7 +3,7 @@ module."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -22,6 +22,14 @@ from .randomisation import Randomisation
 from .task import EnvironmentTask
 
 Booleans = npt.NDArray[np.bool_]
+
+
+class _Stock(NamedTuple):
+    """The next episode of every plant: whether it is drawn (N,), its parameters (N, P) and initial state (N, n)."""
+
+    drawn: Booleans
+    parameters: Array
+    states: Array
 
 
 class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-ignore]
@@ -66,6 +74,8 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         self._elapsed = np.zeros(num_envs, np.int64)
         self._over: Booleans = np.zeros(num_envs, bool)
         self._generators: list[np.random.Generator] = []
+        sizes = plants.parameters.shape[1], plants.states.shape[1]
+        self._stock = _Stock(np.zeros(num_envs, bool), *(np.empty((num_envs, size)) for size in sizes))
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
@@ -76,8 +86,8 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         """
         self._seed(seed)
         plants = self._plants
-        if plants.blocks * plants.width > self.num_envs:  # the further plants of the last block
-            self._place(np.arange(self.num_envs, plants.blocks * plants.width), np.full(self._draw.dimension, 0.5))
+        further = np.arange(self.num_envs, plants.blocks * plants.width)  # plants that fill the last block
+        self._place(further, *self._draw.begin(np.full((1, self._draw.dimension), 0.5)))
         self._begin(np.arange(self.num_envs))
         self._over[:] = False
         return self._observed()[0], {}
@@ -86,6 +96,8 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         """Hold an action (N, m) of every plant for one period: observations (N, k), rewards, terminated and truncated
         (N,), and an empty dictionary. Raises ParameterError for another shape, or an action that is not finite."""
         count = len(self.task.actions)
+        if not self._generators:
+            raise ParameterError("the environment has no state yet; call reset() before the first step.")
         actions = np.asarray(actions)
         if actions.shape != (self.num_envs, count) or not np.isfinite(actions).all():
             raise self._wrong_actions(actions, count)
@@ -117,19 +129,30 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         if len(seeds) != self.num_envs:
             raise ParameterError(f"there are {len(seeds)} seeds for {self.num_envs} plants; give one for each.")
         self._generators = [seeding.np_random(one)[0] for one in seeds]
+        self._stock.drawn[:] = False
 
     def _begin(self, plants: npt.NDArray[np.intp]) -> None:
         """Begin an episode of these plants, and compute the outputs of all."""
-        size = self._draw.dimension
-        self._place(plants, np.array([self._generators[i].random(size) for i in plants]))
+        stock = self._stock
+        if not stock.drawn[plants].all():
+            self._refill()
+        self._place(plants, stock.parameters[plants], stock.states[plants])
+        stock.drawn[plants] = False
         self._elapsed[plants] = 0
         self._inputs[plants] = 0.0
         self._plants.inputs[...] = self._given.transpose(0, 2, 1)
         self._plants.advance(0)
 
-    def _place(self, plants: npt.NDArray[np.intp], uniform: Array) -> None:
-        """Write drawn parameters and states of plants into their lanes; uniform numbers (R, D), or (D,) for all."""
-        parameters, states = self._draw.begin(np.atleast_2d(uniform))
+    def _refill(self) -> None:
+        """Draw the next episode of all plants that have none, which takes little more time than one draw."""
+        stock, size = self._stock, self._draw.dimension
+        plants = np.flatnonzero(~stock.drawn)
+        uniform = np.array([self._generators[i].random(size) for i in plants])
+        stock.parameters[plants], stock.states[plants] = self._draw.begin(uniform)
+        stock.drawn[plants] = True
+
+    def _place(self, plants: npt.NDArray[np.intp], parameters: Array, states: Array) -> None:
+        """Write parameters (R, P) and states (R, n) of plants into their lanes."""
         block, lane = self._plants.lanes_of(plants)
         self._plants.parameters[block, :, lane] = parameters
         self._plants.states[block, :, lane] = states
