@@ -291,8 +291,10 @@ def function(name: str, arguments: Sequence[str], block: FunctionBody, attribute
     return f"define void @{name}({signature}) {attributes} {{\n" + "\n".join(block.lines) + "\n  ret void\n}\n"
 
 
-def function_of_values(name: str, arguments: Sequence[str], block: FunctionBody, number: LlvmType, value: str) -> str:
+def function_of_values(
+    name: str, arguments: Sequence[str], block: FunctionBody, number: LlvmType, value: str, more: str = ""
+) -> str:
     """The LLVM text of a function within a module, which takes and returns values."""
     signature = ", ".join(f"{number.text} {a}" for a in arguments)
-    head = f"define internal {number.text} @{name}({signature}) nounwind {{\n"
+    head = f"define internal {number.text} @{name}({signature}) nounwind{more} {{\n"
     return head + "\n".join(block.lines) + f"\n  ret {number.text} {value}\n}}\n"

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 from .emit import STEADY_POWER, function_of_values
 from .exact import ExactBody
@@ -43,7 +44,8 @@ def steady_power(number: LlvmType) -> str:
         block.put(f"fcmp ole {number.text} {block.size_of(product)}, {block.constant(accuracy.largest)}"),
     )
     value = _otherwise(block, usual, value)
-    return function_of_values(number.function(STEADY_POWER), ["%x", "%y"], block, number, value)
+    inline = " alwaysinline" if number.bits == 64 else ""  # measured: a gain in double precision only
+    return function_of_values(number.function(STEADY_POWER), ["%x", "%y"], block, number, value, inline)
 
 
 def _logarithm(block: ExactBody, x: str, accuracy: _Accuracy) -> str:
@@ -55,7 +57,7 @@ def _logarithm(block: ExactBody, x: str, accuracy: _Accuracy) -> str:
     one = block.constant(1.0)
     s = block.over(block.subtract(m, one), block.add(m, one))
     scale = 2 / math.log(2)
-    series = block.polynomial(block.times(s, s), [scale / (2 * i + 1) for i in range(accuracy.logarithm + 1)])
+    series = _polynomial(block, block.times(s, s), [scale / (2 * i + 1) for i in range(accuracy.logarithm + 1)])
     return block.fused(s, series, n)
 
 
@@ -63,7 +65,14 @@ def _exponential(block: ExactBody, x: str, accuracy: _Accuracy) -> str:
     """2**x for an x of moderate size."""
     n = block.rounded(x)
     terms = [math.log(2) ** i / math.factorial(i) for i in range(accuracy.exponential + 1)]
-    return block.times(block.polynomial(block.subtract(x, n), terms), block.power_of_two(n))
+    return block.times(_polynomial(block, block.subtract(x, n), terms), block.power_of_two(n))
+
+
+def _polynomial(block: ExactBody, x: str, coefficients: Sequence[float]) -> str:
+    """c0 + c1 x + c2 x**2 + ... as the sum of its even and its odd part, which do not wait for each other."""
+    square = block.times(x, x)
+    even, odd = (block.polynomial(square, coefficients[i::2]) for i in (0, 1))
+    return block.fused(odd, x, even)
 
 
 def _all_of(block: ExactBody, *tests: str) -> str:
