@@ -19,6 +19,7 @@ from .default_tasks import arm_task, joint_task, lift_task
 from .episode import EpisodeDraw, whole_steps
 from .plant_env import STEP, action_space, observation_space
 from .randomisation import Randomisation
+from .registration import EPISODE_PERIODS
 from .task import EnvironmentTask
 
 Booleans = npt.NDArray[np.bool_]
@@ -55,7 +56,7 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
 
     def __init__(
         self, num_envs: int, task: EnvironmentTask, randomisation: tuple[Randomisation, ...] = (), *,
-        max_episode_steps: int = EnvironmentTask.episode_periods, integrator: RungeKutta4 = STEP,
+        max_episode_steps: int = EPISODE_PERIODS, integrator: RungeKutta4 = STEP,
         precision: Precision = Double(), cores: int | None = None,
     ) -> None:  # fmt: skip
         if not isinstance(max_episode_steps, int) or max_episode_steps < 1:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import importlib.util
 
 from ..core.errors import InputError
-from .task import EnvironmentTask
 
 ENVIRONMENTS = ("Joint", "Lift", "Arm")
 """Names of the registered environments; the identifiers are airmuscle/Joint-v0 and so on."""
+EPISODE_PERIODS = 500
+"""Periods after which an episode of a registered environment is truncated."""
 
 
 def register_environments() -> None:
@@ -28,5 +29,5 @@ def register_environments() -> None:
                 identifier,
                 entry_point=f"airmuscle.environments.plant_env:make_{name.lower()}",
                 vector_entry_point=f"airmuscle.environments.plant_vector_env:make_{name.lower()}_vector",
-                max_episode_steps=EnvironmentTask.episode_periods,
+                max_episode_steps=EPISODE_PERIODS,
             )

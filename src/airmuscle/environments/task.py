@@ -43,8 +43,6 @@ class EnvironmentTask(System):
     """
 
     from_file: ClassVar[bool] = False
-    episode_periods: ClassVar[int] = 500
-    """Periods after which an episode of the registered environment is truncated."""
 
     plant: Plant
     effort_weight: float
