@@ -20,6 +20,7 @@ import bootstrap
 import calls
 import components
 import derivative
+import environments
 import growth
 import identification
 import live
@@ -53,6 +54,7 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (identification.section, 3),
     (static_fit.section, 15),
     (live.section, 1),
+    (environments.section, 9),
     (bootstrap.section, 5),
     (model_comparison.section, 3),
     (new_plant.section, 7),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 
 import batch
+import environments
 import loops
 import measure
 import new_plant
@@ -94,6 +95,14 @@ def test_the_section_of_the_batch_has_its_rows_and_targets():
     section = batch.section(rounds=1, count=16, seconds=0.02)
     assert section.rows[0][:3] == ("simulate_batch (0.02 s simulated)", "16", "1")
     assert any("NumPy" in target.name for target in section.targets)
+
+
+def test_the_section_of_the_environments_has_a_row_for_each_variant():
+    section = environments.section(rounds=1, count=16)
+    names = [row[0] for row in section.rows]
+    assert names[0] == "Stepper.step, 10 ms"
+    assert ("vector environment, double" in names) == environments.is_installed("gymnasium")
+    assert ("mujoco.rollout" in names) == environments.is_installed("mujoco")
 
 
 def test_lmfit_computes_the_same_coefficients():

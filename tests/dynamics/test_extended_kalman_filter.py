@@ -16,7 +16,7 @@ from airmuscle.analysis import ExtendedKalmanFilter, StateEstimate, consistency_
 from airmuscle.compile.jacobians import derivatives
 from airmuscle.compile.program import compile_system
 from airmuscle.core.errors import ParameterError, SolveError
-from airmuscle.simulation import RungeKutta4, advance, compiled
+from airmuscle.simulation import RungeKutta4, Stepper, advance
 
 H = 5e-3
 PLANT = LIFT
@@ -49,7 +49,7 @@ RUNS = 24
 
 def average_nees(judged, samples=40, seed=1):
     """NEES, averaged over runs, at the last sample; the truth has the noise of `the_filter`, by the simulated plant."""
-    rng, true_filter, truth = np.random.default_rng(seed), the_filter(), compiled(PLANT)
+    rng, true_filter, truth = np.random.default_rng(seed), the_filter(), Stepper(PLANT, START)
     spread = np.sqrt(np.diag(true_filter.noise))
     told = []
     for _ in range(RUNS):
@@ -57,7 +57,9 @@ def average_nees(judged, samples=40, seed=1):
         state = estimate.mean + rng.normal(size=3) * np.sqrt(np.diag(estimate.covariance))
         for k in range(samples):
             inputs = [0.3 * (k % 20 < 5), 0.2 * (k % 20 >= 15)]
-            state = truth.step(state, np.array(inputs), H) + spread * rng.normal(size=3)
+            truth.state[:] = state
+            truth.step(inputs, H)
+            state = truth.state + spread * rng.normal(size=3)
             estimate = judged.predict(estimate, inputs)
             exact = true_filter.columns(StateEstimate(state, estimate.covariance), inputs)
             estimate, _ = judged.correct(estimate, [exact["pressure"] + 500.0 * rng.normal()], inputs)

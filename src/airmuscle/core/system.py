@@ -6,7 +6,7 @@ import abc
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .diagnostics import Columns, Diagnostic
+from .diagnostics import ColumnLimit, Columns, Diagnostic
 from .ops import Value
 from .variables import Input, StateVariable
 
@@ -61,6 +61,11 @@ class System(abc.ABC):
     @property
     def positive_outputs(self) -> Sequence[str]:
         """Outputs that must be positive, such as volumes; a run in which one is not is aborted."""
+        return ()
+
+    @property
+    def column_limits(self) -> Sequence[ColumnLimit]:
+        """Limits of states and outputs beyond which the model is not valid, or a component is not permitted."""
         return ()
 
     @property

@@ -79,14 +79,25 @@ class BoundIntegrator:
         """Advance `state` (n,) in place by `duration` [s] with the inputs (m,) held. Not to be mixed with `run`."""
         self.state[:] = state
         self._inputs[0] = inputs
+        status = self.proceed(duration)
+        state[:] = self.state
+        return status
+
+    def proceed(self, duration: float) -> Status:
+        """Advance `self.state` by `duration` [s] with `self.held` held. Not to be mixed with `run`."""
         if duration != self._duration:
             self._end[0] = self._duration = duration
         self._progress.fill(0)
         status = self._kernel()
         if status == _PAUSED:
             status = self._continue(status, MAX_STEPS)
-        state[:] = self.state
         return Status.DONE if status == 0 else Status(status)
+
+    @property
+    def held(self) -> Array:
+        """The inputs (m,) of `proceed`."""
+        held: Array = self._inputs[0]
+        return held
 
     def run_part(
         self, begin: float, segments: tuple[int, int, int], count: int, times: int, rows: int, wanted: int
