@@ -8,9 +8,27 @@ import numba
 
 from ...core.status import Status
 from .calls import invoke, pointer
-from .kalman_filter import exponential_step
+from .exponential import exponential_step
+from .matrices import PART
 
 DONE, NOT_FINITE = Status.DONE.value, Status.NOT_FINITE.value
+
+
+@PART
+def tracking_cost(y: Any, wanted: Any, weights: Any) -> Any:
+    """The weighted sum of the squared errors."""
+    cost = 0.0
+    for i in range(y.shape[0]):
+        cost += weights[i] * (y[i] - wanted[i]) ** 2
+    return cost
+
+
+@PART
+def keep_best(cost: Any, sequence: Any, best: Any) -> None:
+    """Keep a complete sequence and its cost."""
+    best[0] = cost
+    for k in range(1, best.shape[0]):
+        best[k] = sequence[k]
 
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
@@ -52,17 +70,14 @@ def choose_mode(
         for i in range(total):
             later[i] = x[i] + sizes[i] * e[i, total] if i < n else x[i]
         invoke(measured, (pointer(later), pointer(u), pointer(c), pointer(y), pointer(slopes)))
-        for i in range(y.shape[0]):
-            cost += weights[i] * (y[i] - wanted[i]) ** 2
+        cost += tracking_cost(y, wanted, weights)
         if not cost < best[0]:
             continue
         depth += 1
         costs[depth] = cost
         if depth == horizon:
             count[1] += 1
-            best[0] = cost
-            for k in range(horizon):
-                best[k + 1] = sequence[k + 1]
+            keep_best(cost, sequence, best)
             depth -= 1
         else:
             sequence[depth + 1] = -1

@@ -9,12 +9,14 @@ import numba
 
 from ...core.status import Status
 from .calls import invoke, pointer
-from .kalman_filter import cholesky, exponential_step, solve_row
+from .exponential import exponential_step
+from .kalman_filter import apply_gain
+from .matrices import PART, cholesky, solve_row
 
 DONE, SINGULAR, NOT_FINITE = Status.DONE.value, Status.SINGULAR.value, Status.NOT_FINITE.value
 
 
-@numba.njit(error_model="numpy", nogil=True, inline="always")
+@PART
 def sigma_points(x: Any, covariance: Any, spread: Any, points: Any, root: Any) -> None:
     """`points` (2 N + 1, N): x, then x +- spread times the columns of a Cholesky factor of the covariance.
 
@@ -40,6 +42,36 @@ def sigma_points(x: Any, covariance: Any, spread: Any, points: Any, root: Any) -
             points[1 + total + j, i] -= spread * root[i, j]
 
 
+@PART
+def weighted_mean(points: Any, weights: Any, mean: Any) -> None:
+    """The mean (N,) of points (2 N + 1, N)."""
+    for i in range(mean.shape[0]):
+        value = weights[0] * points[0, i]
+        for q in range(1, points.shape[0]):
+            value += weights[2] * points[q, i]
+        mean[i] = value
+
+
+@PART
+def covariances_of_measurement(
+    points: Any, y: Any, x: Any, mean: Any, weights: Any, noise: Any, s: Any, cross: Any
+) -> None:
+    """Covariance `s` (p, p) of the measurement, and `cross` (N, p) of states and measurement."""
+    for j in range(mean.shape[0]):
+        for i in range(mean.shape[0]):
+            value = noise[i] if i == j else 0.0
+            for q in range(points.shape[0]):
+                weight = weights[2] if q else weights[1]
+                value += weight * (y[q, i] - mean[i]) * (y[q, j] - mean[j])
+            s[i, j] = value
+        for i in range(x.shape[0]):
+            value = 0.0
+            for q in range(points.shape[0]):
+                weight = weights[2] if q else weights[1]
+                value += weight * (points[q, i] - x[i]) * (y[q, j] - mean[j])
+            cross[i, j] = value
+
+
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
 def predict_unscented(
     rates: Any, c: Any, sizes: Any, h: Any, spread: Any, weights: Any, noise: Any, x: Any, u: Any, covariance: Any,
@@ -60,11 +92,7 @@ def predict_unscented(
             return NOT_FINITE
         for i in range(n):
             point[i] += sizes[i] * e[i, total]
-    for i in range(total):
-        value = weights[0] * points[0, i]
-        for q in range(1, points.shape[0]):
-            value += weights[2] * points[q, i]
-        x[i] = value
+    weighted_mean(points, weights, x)
     for i in range(total):
         for j in range(i + 1):
             value = noise[i, j] + weights[1] * (points[0, i] - x[i]) * (points[0, j] - x[j])
@@ -90,25 +118,11 @@ def correct_unscented(
     sigma_points(x, covariance, spread, points, root)
     for q in range(points.shape[0]):
         invoke(measured, (pointer(points[q]), pointer(u), pointer(constants), pointer(y[q]), pointer(c)))
-    for i in range(p):
-        value = weights[0] * y[0, i]
-        for q in range(1, points.shape[0]):
-            value += weights[2] * y[q, i]
-        difference[i] = value
-    for j in range(p):
-        for i in range(p):
-            value = noise[i] if i == j else 0.0
-            for q in range(points.shape[0]):
-                weight = weights[2] if q else weights[1]
-                value += weight * (y[q, i] - difference[i]) * (y[q, j] - difference[j])
-            s[i, j] = value
-        for i in range(total):
-            value = 0.0
-            for q in range(points.shape[0]):
-                weight = weights[2] if q else weights[1]
-                value += weight * (points[q, i] - x[i]) * (y[q, j] - difference[j])
-            cross[i, j] = value
-            gain[i, j] = value
+    weighted_mean(y, weights, difference)
+    covariances_of_measurement(points, y, x, difference, weights, noise, s, cross)
+    for i in range(total):
+        for j in range(p):
+            gain[i, j] = cross[i, j]
     if cholesky(s, factor) != DONE:
         return SINGULAR
     for i in range(total):
@@ -122,6 +136,5 @@ def correct_unscented(
                 value -= gain[i, k] * cross[j, k]
             covariance[i, j] = value
             covariance[j, i] = value
-        for k in range(p):
-            x[i] += gain[i, k] * difference[k]
+    apply_gain(gain, difference, x)
     return DONE
