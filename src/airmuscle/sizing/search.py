@@ -6,7 +6,7 @@ import contextlib
 import dataclasses
 import functools
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -35,6 +35,8 @@ class SizingResult:
     conditions: SizingConditions
     choices: tuple[MuscleChoice, ...]
     unsuitable: tuple[UnsuitableMuscle, ...]
+    entries: tuple[Entry, ...]
+    """All entries that were tried."""
 
     @property
     def best(self) -> MuscleChoice:
@@ -54,10 +56,11 @@ class SizingResult:
 
     def _reachable(self) -> str:
         """What is reachable of the load and of the travel, as sentences."""
-        entries = [load_quietly(item.name) for item in self.unsuitable if item.count]
+        usable = {item.name for item in self.unsuitable if item.count}
+        entries = [entry for entry in self.entries if entry.name in usable]
         parts = [text for what in ("load", "travel") if (text := self._greatest(what, entries))]
         if not parts:
-            return "Give a smaller load, a shorter stroke, more supply pressure, or other muscles."
+            return "Change the requirement or the conditions, or give other muscles."
         return f"Reachable: {' or '.join(parts)}."
 
     def _greatest(self, what: str, entries: list[Entry]) -> str:
@@ -105,13 +108,13 @@ def size_muscles(
     conditions: SizingConditions,
     muscles: Iterable[Entry] | None = None,
     sort: SortKey = by_air,
-    progress: Callable[[Sequence[Entry]], Iterable[Entry]] = iter,
+    progress: Callable[[float], None] | None = None,
 ) -> SizingResult:
     """The muscles that meet a requirement, each at its shortest length, and the others with the reason.
 
     `muscles` are library entries; by default those of `catalogue`. Each is tried with 1 to `conditions.max_count`
     muscles in parallel; a number is a choice if fewer muscles are longer or take more air. `sort` is the criterion of
-    the ranking, `progress` wraps the entries, to show the progress. Raises ParameterError for other arguments.
+    the ranking, `progress` is called with the fraction done. Raises ParameterError for other arguments.
     """
     if not isinstance(requirement, Requirement) or not isinstance(conditions, SizingConditions):
         raise ParameterError(
@@ -123,13 +126,15 @@ def size_muscles(
         raise ParameterError("size_muscles: muscles must be one or more library entries; load them with am.load(NAME).")
     choices: list[MuscleChoice] = []
     unsuitable: list[UnsuitableMuscle] = []
-    for entry in progress(entries):
+    for done, entry in enumerate(entries):
+        if progress is not None:
+            progress(done / len(entries))
         found, failed = _choices_of(entry, requirement, conditions)
         choices += found
         unsuitable += [] if found else [failed]
     unsuitable.sort(key=lambda item: item.count == 0)
     others = products_without_law() if muscles is None else ()
-    return SizingResult(requirement, conditions, rank(choices, sort), (*unsuitable, *others))
+    return SizingResult(requirement, conditions, rank(choices, sort), (*unsuitable, *others), entries)
 
 
 def _choices_of(

@@ -123,7 +123,7 @@ def static_muscle(entry: Entry, conditions: SizingConditions) -> StaticMuscle:
     if rated_pressure is not None and not conditions.supply <= rated_pressure.high * (1 + 1e-9):
         raise ParameterError(
             f"the supply pressure of {conditions.supply / 1e5:.4g} bar exceeds the permitted "
-            f"{rated_pressure.high / 1e5:.4g} bar"
+            f"{rated_pressure.high / 1e5:.4g} bar; reduce it"
         )
     low = max(valid.min_pressure, conditions.min_pressure, rated_pressure.low if rated_pressure else -np.inf)
     high = min(valid.max_pressure, conditions.supply)
