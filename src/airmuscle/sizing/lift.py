@@ -16,6 +16,8 @@ from .static_muscle import StaticMuscle
 
 GRID = 257
 """Contractions at which the limits of an end point are searched, before they are refined (chosen)."""
+ZOOMS = 6
+"""Refinements of a limit, each by a factor of 256, to rounding precision."""
 MOUNTINGS = 65
 """Contractions at the start that are tried for one length (chosen)."""
 ROUNDING = 1e-9
@@ -65,12 +67,13 @@ class LiftSearch:
 
     def _edge(self, muscle: StaticMuscle, load: float, inside: float, outside: float) -> float:
         """The contraction between two neighbours of the grid at which the margin is zero, from inside."""
-        inside, outside = float(inside), float(outside)
-        for _ in range(60):
-            middle = 0.5 * (inside + outside)
-            within = float(self.margin(muscle, np.array(middle), load)) >= 0.0
-            inside, outside = (middle, outside) if within else (inside, middle)
-        return inside
+        for _ in range(ZOOMS):
+            grid = np.linspace(inside, outside, GRID)
+            last = int(np.argmax(self.margin(muscle, grid, load) < 0.0)) - 1
+            if last < 0:  # the neighbours differ by rounding only
+                break
+            inside, outside = float(grid[last]), float(grid[last + 1])
+        return float(inside)
 
     def _no_contraction(self, muscle: StaticMuscle, grid: Array, load: float, place: str) -> str:
         capacity, needed = muscle.capacity(grid), self.conditions.safety_factor * load
@@ -90,7 +93,7 @@ class LiftSearch:
         used = self.requirement.stroke / length
         if used > (high - low) * (1.0 + ROUNDING):
             return None
-        starts = np.linspace(low, max(low, high - used), MOUNTINGS)
+        starts = np.unique(np.linspace(low, max(low, high - used), MOUNTINGS))
         displacement, load = self.requirement.path
         margins = self.margin(muscle, starts[:, None] + displacement / length, load / self.count)
         possible = np.flatnonzero((margins >= -ROUNDING * load / self.count).all(axis=1))

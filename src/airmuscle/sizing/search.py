@@ -218,7 +218,10 @@ def _depends_on_length(entry: Entry, search: Search, lengths: LengthRange) -> bo
     """Whether the force at equal pressure and contraction, or its range, depends on the length."""
     if own_length(entry) is None:
         return False
-    first, second = (static_muscle(at_length(entry, length), search.conditions) for length in lengths)
+    try:
+        first, second = (static_muscle(at_length(entry, length), search.conditions) for length in lengths)
+    except ParameterError:  # the law is not defined for the least length
+        return True
     if not np.allclose(first.contraction_range, second.contraction_range, rtol=1e-12, atol=1e-12):
         return True
     grid = np.linspace(*first.contraction_range, 17)
