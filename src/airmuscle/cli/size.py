@@ -26,10 +26,10 @@ from ..sizing import (
     by_diameter,
     by_length,
     by_reserve,
+    scenario_text,
     size_muscles,
 )
 from ..sizing.choice import Requirement, SortKey
-from ..sizing.scenario import scenario_text
 from .options import Json, OptionalFolder
 from .progress import computation_progress
 from .terminal import echo, print_json, print_table

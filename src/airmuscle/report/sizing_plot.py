@@ -20,9 +20,9 @@ def sizing_plot(choice: MuscleChoice) -> Plot:
     """The chart of one muscle of a choice, as a sizing tool draws it."""
     entry = choice.entry
     valid = validity_range_of(entry.characteristic, entry.validity_range)
-    title = f"{entry.name}, {1e3 * choice.length:.4g} mm, {choice.count} in parallel" + (
-        "" if choice.design.radius is None else f", on each side, radius {1e3 * choice.design.radius:.4g} mm"
-    )
+    title = f"{choice.total_count} x {entry.name}, {1e3 * choice.length:.4g} mm"
+    if choice.design.radius is not None:
+        title += f", radius {1e3 * choice.design.radius:.4g} mm"
     plot = isobar_plot(entry.characteristic, title, compute_isobars(entry.characteristic, valid), valid)
     axes = plot.figure.axes[0]
     _draw_limits(axes, choice)

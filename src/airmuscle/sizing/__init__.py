@@ -15,8 +15,10 @@ from .choice import (
     by_reserve,
 )
 from .requirement import JointRequirement, LiftRequirement, SizingConditions
+from .scenario import scenario_text
 from .search import SizingResult, catalogue, choose, size_muscles
 from .static_muscle import EndPoint, StaticMuscle
+from .valve_sizing import discharge_valve, fill_valve
 
 __all__ = [
     "EndPoint",
@@ -35,5 +37,8 @@ __all__ = [
     "by_reserve",
     "catalogue",
     "choose",
+    "discharge_valve",
+    "fill_valve",
+    "scenario_text",
     "size_muscles",
 ]
