@@ -377,8 +377,7 @@ def test_a_joint_beyond_the_length_states_the_torque():
 def test_wrong_input_is_refused_with_a_sentence(make):
     with pytest.raises(AirmuscleError) as error:
         make()
-    assert str(error.value).endswith((".", "?", "]", "bar'", "units")) or "allowed range" in str(error.value)
-    assert len(str(error.value)) > 40
+    assert re.search(r"allowed range|must be|give |cannot be converted|expected", str(error.value)), str(error.value)
 
 
 def test_a_new_muscle_of_ones_own_is_sized_as_those_of_the_library():

@@ -163,16 +163,16 @@ def _load(text: str) -> dict[str, float]:
 
 def _write(result: SizingResult, out: Path) -> str:
     """Write report and scenario; sentences on both."""
-    text, note = _scenario(result)
+    text, note, simulated = _scenario(result)
     with atomic_folder(out) as folder:
-        write_into(folder, [sizing_chapter(result, note)], title="Sizing")
+        write_into(folder, [sizing_chapter(result, note, simulated)], title="Sizing")
         if text:
             (folder / SCENARIO_FILE).write_text(text, encoding="utf-8")
     return f"{note}\nreport: {out / 'report.html'}"
 
 
-def _scenario(result: SizingResult) -> tuple[str, str]:
-    """The scenario of the best choice that can be simulated, and a sentence on it."""
+def _scenario(result: SizingResult) -> tuple[str, str, MuscleChoice | None]:
+    """The scenario of the best choice that can be simulated, a sentence on it, and the choice; "" and None if none."""
     reasons = []
     for rank, choice in enumerate(result.choices):
         try:
@@ -181,8 +181,9 @@ def _scenario(result: SizingResult) -> tuple[str, str]:
             reasons.append(str(error))
             continue
         size = f"{choice.total_count} x {choice.entry.name}, {1e3 * choice.length:.4g} mm"
-        return text, f"The scenario of choice {rank + 1}, {size}, is {SCENARIO_FILE}; run airmuscle simulate with it."
-    return "", f"No scenario is written: {reasons[0]}"
+        note = f"The scenario of choice {rank + 1}, {size}, is {SCENARIO_FILE}; run airmuscle simulate with it."
+        return text, note, choice
+    return "", f"No scenario is written: {reasons[0]}", None
 
 
 def _print(result: SizingResult) -> None:

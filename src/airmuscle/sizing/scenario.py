@@ -16,7 +16,7 @@ from ..library.write import scenario_toml
 from ..mechanism import AntagonisticJoint, HangingMass, Isotonic, Mechanism, SpringLoad
 from ..muscle import LinearDamper, Muscle
 from ..plant.plant import Plant
-from ..pneumatics import FillDischarge, ProportionalRegulator, SecondOrderLag, Supply
+from ..pneumatics import FillDischarge, ProportionalRegulator, SecondOrderLag, Supply, Valve
 from ..pneumatics.gas import Isothermal
 from .choice import MuscleChoice
 from .requirement import JointRequirement, LiftRequirement
@@ -42,6 +42,14 @@ def scenario_text(choice: MuscleChoice) -> str:
     Raises SolveError for a choice without a geometry, or a joint with several muscles on each side.
     """
     return _lift_text(choice) if isinstance(choice.requirement, LiftRequirement) else _joint_text(choice)
+
+
+def scenario_valves(choice: MuscleChoice | None) -> tuple[Valve, ...]:
+    """Fill and discharge valve of each muscle in the scenario of a choice; none without a choice."""
+    if choice is None:
+        return ()
+    duration = MOVING * choice.conditions.cycle_time
+    return fill_valve(choice, duration), discharge_valve(choice, duration)
 
 
 def _muscles(choice: MuscleChoice, names: tuple[str, ...], damping: float) -> tuple[Muscle, ...]:
@@ -81,11 +89,11 @@ def _load(choice: MuscleChoice, requirement: LiftRequirement) -> tuple[Mechanism
 def _lift_text(choice: MuscleChoice) -> str:
     assert isinstance(choice.requirement, LiftRequirement)
     cycle = choice.conditions.cycle_time
-    valves = fill_valve(choice, MOVING * cycle), discharge_valve(choice, MOVING * cycle)
+    fill, discharge = scenario_valves(choice)
     mechanism, mass = _load(choice, choice.requirement)
     damping = 2.0 * DAMPING_RATIO * math.sqrt(choice.count * _stiffness(choice) * mass) / choice.count
     names = tuple(f"muscle{i + 1}" for i in range(choice.count)) if choice.count > 1 else ("muscle",)
-    circuit = FillDischarge(Supply(choice.conditions.supply), *valves)
+    circuit = FillDischarge(Supply(choice.conditions.supply), fill, discharge)
     plant = _plant(choice, _muscles(choice, names, damping), circuit, mechanism)
     rows = {"fill": (RESTING, RESTING + MOVING), "discharge": (2 * RESTING + MOVING, 1.0)}
     prefixes = [f"{name}." for name in names] if choice.count > 1 else [""]
@@ -118,9 +126,9 @@ def _joint_text(choice: MuscleChoice) -> str:
         design.radius, inertia, weight_torque=weight, min_angle=-1.5 * half, max_angle=1.5 * half,
         offset=0.5 * (design.extended.contraction + design.contracted.contraction),
     )  # fmt: skip
-    valves = (fill_valve(choice, MOVING * cycle), discharge_valve(choice, MOVING * cycle))
+    fill, discharge = scenario_valves(choice)
     regulator = ProportionalRegulator(
-        Supply(choice.conditions.supply), *valves, LAG, BAND, max_setpoint=choice.conditions.supply
+        Supply(choice.conditions.supply), fill, discharge, LAG, BAND, max_setpoint=choice.conditions.supply
     )
     plant = _plant(choice, _muscles(choice, ("left", "right"), damping), regulator, joint)
     low, high = design.extended.pressure, design.contracted.pressure
