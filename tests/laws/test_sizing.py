@@ -18,6 +18,7 @@ from scipy.interpolate import PchipInterpolator
 
 import airmuscle as am
 from airmuscle.characteristic import EffectiveLength, MartensBoblan2017, ValidityRange
+from airmuscle.characteristic.base import PressureLaw
 from airmuscle.core.constants import STANDARD_GRAVITY
 from airmuscle.core.errors import AirmuscleError, ParameterError, SolveError
 from airmuscle.library.entry import Entry
@@ -164,6 +165,32 @@ def test_a_law_of_one_length_is_not_scaled():
     assert choose(fixed, LiftRequirement(stroke=0.004, force=20.0), conditions).length == own
     with pytest.raises(SolveError, match="with 72 mm"):
         choose(fixed, LiftRequirement(stroke=0.04, force=20.0), conditions)
+
+
+@pytest.mark.parametrize(
+    ("name", "limits"),
+    [
+        ("hunt2017-festo-10", None),
+        ("borzikova-monotone", ValidityRange(0.5e5, 3.5e5, 0.0, 0.3)),
+    ],
+)
+def test_a_law_that_is_not_solved_for_the_force_is_sized_by_its_own_direction(name: str, limits: ValidityRange | None):
+    entry = am.load(name)
+    entry = entry if limits is None else dataclasses.replace(entry, validity_range=limits)
+    choice = choose(entry, LiftRequirement(stroke=0.02, force=60.0), SizingConditions(supply=4e5))
+    law = entry.characteristic
+    for point in (choice.design.extended, choice.design.contracted):
+        assert point.force == pytest.approx(60.0, rel=1e-9)
+        if isinstance(law, PressureLaw):
+            assert float(law.pressure(point.contraction, 60.0)) == pytest.approx(point.pressure, rel=1e-9)
+        else:
+            assert float(law.contraction(point.pressure, 60.0)) == pytest.approx(point.contraction, rel=1e-9)
+
+
+def test_a_muscle_is_used_up_to_the_end_of_its_table():
+    for stroke in np.linspace(0.02, 0.06, 9):
+        choice = choose(am.load("festo-tool-dmsp-40"), LiftRequirement(stroke=float(stroke), mass=20.0), SIX_BAR)
+        assert choice.design.contracted.contraction == pytest.approx(0.25, rel=1e-12)
 
 
 # Number in parallel
@@ -369,6 +396,8 @@ def test_a_joint_beyond_the_length_states_the_torque():
     lambda: SizingConditions(supply=6e5, max_count=0),
     lambda: SizingConditions(supply=6e5, max_count=True),
     lambda: SizingConditions(supply=2e4, min_pressure=3e4),
+    lambda: choose(am.load("dmsp-20-300"), LIFT, SIX_BAR, 0),
+    lambda: choose(am.load("dmsp-20-300"), LIFT, SIX_BAR, 1.5),
     lambda: size_muscles(LIFT, SIX_BAR, []),
     lambda: size_muscles(LIFT, SIX_BAR, ["dmsp-20-300"]),
     lambda: size_muscles("20 kg", SIX_BAR),

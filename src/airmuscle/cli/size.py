@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..core.errors import SolveError, UnitError
+from ..core.errors import AirmuscleError, UnitError
 from ..core.units import quantity
 from ..library.law_file import load_law
 from ..report.formatting import format_number
@@ -177,7 +177,7 @@ def _scenario(result: SizingResult) -> tuple[str, str, MuscleChoice | None]:
     for rank, choice in enumerate(result.choices):
         try:
             text = scenario_text(choice)
-        except SolveError as error:
+        except AirmuscleError as error:
             reasons.append(str(error))
             continue
         size = f"{choice.total_count} x {choice.entry.name}, {1e3 * choice.length:.4g} mm"

@@ -68,12 +68,12 @@ class MuscleChoice:
     def air(self) -> float | None:
         """Mass of the air [kg] that all muscles take in a cycle; None without a geometry.
 
-        The difference of m = p V/(R T) between both end points, at ambient temperature, without tubes.
+        The magnitude of the difference of m = p V/(R T) between both end points, at ambient temperature, without tubes.
         """
         masses = [self._air_mass(point) for point in (self.design.contracted, self.design.extended)]
         if masses[0] is None or masses[1] is None:
             return None
-        return self.total_count * (masses[0] - masses[1])
+        return self.total_count * abs(masses[0] - masses[1])
 
     def _air_mass(self, point: EndPoint) -> float | None:
         volume, ambient = self.muscle.volume(point.pressure, point.contraction), self.conditions.ambient

@@ -95,7 +95,8 @@ class LiftSearch:
             return None
         starts = np.unique(np.linspace(low, max(low, high - used), MOUNTINGS))
         displacement, load = self.requirement.path
-        margins = self.margin(muscle, starts[:, None] + displacement / length, load / self.count)
+        contractions = np.minimum(starts[:, None] + displacement / length, muscle.contraction_range[1])
+        margins = self.margin(muscle, contractions, load / self.count)
         possible = np.flatnonzero((margins >= -ROUNDING * load / self.count).all(axis=1))
         return float(starts[possible[0]]) if possible.size else None
 
@@ -115,7 +116,7 @@ class LiftSearch:
         start = self.mounting(muscle, length)
         if start is None:
             return None
-        contractions = (start, start + self.requirement.stroke / length)
+        contractions = (start, min(start + self.requirement.stroke / length, muscle.contraction_range[1]))
         extended, contracted = (
             muscle.end_point(eps, load) for eps, load in zip(contractions, self._loads, strict=True)
         )

@@ -89,8 +89,8 @@ def _load(choice: MuscleChoice, requirement: LiftRequirement) -> tuple[Mechanism
 def _lift_text(choice: MuscleChoice) -> str:
     assert isinstance(choice.requirement, LiftRequirement)
     cycle = choice.conditions.cycle_time
-    fill, discharge = scenario_valves(choice)
     mechanism, mass = _load(choice, choice.requirement)
+    fill, discharge = scenario_valves(choice)
     damping = 2.0 * DAMPING_RATIO * math.sqrt(choice.count * _stiffness(choice) * mass) / choice.count
     names = tuple(f"muscle{i + 1}" for i in range(choice.count)) if choice.count > 1 else ("muscle",)
     circuit = FillDischarge(Supply(choice.conditions.supply), fill, discharge)

@@ -168,6 +168,8 @@ def choose(entry: Entry, requirement: Requirement, conditions: SizingConditions,
 
     Raises SolveError or ParameterError, with the reason, if there are none.
     """
+    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+        raise ParameterError(f"choose: count is {count!r}; it must be an integer of at least 1.")
     kind = LiftSearch if isinstance(requirement, LiftRequirement) else JointSearch
     search: Search = kind(requirement, conditions, count)  # type: ignore[arg-type]
     lengths = length_range(entry, conditions.max_length)
