@@ -33,6 +33,7 @@ from airmuscle.sizing import (
     by_reserve,
     catalogue,
     choose,
+    scenario_text,
     size_muscles,
 )
 from airmuscle.sizing.static_muscle import static_muscle
@@ -204,6 +205,21 @@ def test_two_muscles_in_parallel_each_hold_half_the_force():
     assert two.air == pytest.approx(2 * one.air, rel=1e-9)
     same_load = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR, 2)
     assert same_load.design.extended.force == pytest.approx(0.5 * one.design.extended.force, rel=1e-9)
+
+
+def test_an_exact_number_is_the_only_one_that_is_tried():
+    exact = dataclasses.replace(SIX_BAR, min_count=2, max_count=2)
+    result = size_muscles(LIFT, exact, [am.load(name) for name in MUSCLES])
+    assert {choice.count for choice in result.choices} == {2}
+    with pytest.raises(ParameterError, match="max_count is 2; allowed range: 3 to 20"):
+        dataclasses.replace(exact, min_count=3)
+
+
+def test_a_load_that_decreases_over_the_stroke_takes_air_and_has_no_scenario():
+    choice = choose(am.load("dmsp-20-300"), FALLING, SIX_BAR)
+    assert choice.air > 0.0
+    with pytest.raises(SolveError, match="the scenario of a load that decreases over the stroke is not written"):
+        scenario_text(choice)
 
 
 def test_a_number_that_is_neither_shorter_nor_takes_less_air_is_left_out():

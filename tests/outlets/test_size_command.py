@@ -109,6 +109,11 @@ def test_the_table_names_choices_and_reasons():
     assert re.search(r"festo-tool-dmsp-10 .*with 300 mm, the stroke needs a contraction of", result.output)
 
 
+def test_the_number_of_muscles_can_be_given():
+    found = json.loads(airmuscle(*LIFT, "--muscle", "dmsp-20-300", "--count", "2", "--json").stdout)
+    assert [row["count"] for row in found["choices"]] == [2]
+
+
 def test_a_joint_is_sized_with_its_radius():
     result = airmuscle("size", "--torque", "5 N m", "--angle", "60 deg", "--supply", "6 bar", *ONE)
     assert "radius [mm]" in result.output

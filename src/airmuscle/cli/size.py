@@ -76,6 +76,7 @@ def size(
     max_length: Annotated[str | None, typer.Option(metavar="QUANTITY", help="Greatest nominal length.")] = None,
     max_diameter: Annotated[str | None, typer.Option(metavar="QUANTITY", help="Greatest outer diameter.")] = None,
     max_count: Annotated[int, typer.Option(metavar="N", help="Greatest number of muscles in parallel.")] = 3,
+    count: Annotated[int | None, typer.Option(metavar="N", help="Exact number of muscles in parallel.")] = None,
     muscle: Muscles = None,
     sort: Annotated[str, typer.Option(metavar="KEY", help=f"Criterion of the ranking: {', '.join(SORTS)}.")] = "air",
     out: OptionalFolder = None,
@@ -98,7 +99,8 @@ def size(
     if sort not in SORTS:
         raise typer.BadParameter(f"--sort must be one of {', '.join(SORTS)}, not '{sort}'")
     requirement = _requirement(load, stroke, stiffness, torque, angle, inertia)
-    conditions = _conditions(supply, safety, cycle_time, max_length, max_diameter, max_count)
+    counts = (1, max_count) if count is None else (count, count)
+    conditions = _conditions(supply, safety, cycle_time, max_length, max_diameter, counts)
     entries = None if not muscle else tuple(load_law(name) for name in muscle)
     if out is not None:
         check_writable(out)
@@ -115,7 +117,12 @@ def size(
 
 
 def _conditions(
-    supply: str, safety: float, cycle_time: str, max_length: str | None, max_diameter: str | None, max_count: int
+    supply: str,
+    safety: float,
+    cycle_time: str,
+    max_length: str | None,
+    max_diameter: str | None,
+    counts: tuple[int, int],
 ) -> SizingConditions:
     """The conditions of the options. Raises UnitError or ParameterError."""
     return SizingConditions(
@@ -124,7 +131,8 @@ def _conditions(
         _read("cycle-time", cycle_time, "s"),
         _read("max-length", max_length, "m") if max_length else SizingConditions.max_length,
         _read("max-diameter", max_diameter, "m") if max_diameter else SizingConditions.max_diameter,
-        max_count=max_count,
+        min_count=counts[0],
+        max_count=counts[1],
     )
 
 

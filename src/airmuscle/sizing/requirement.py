@@ -12,6 +12,8 @@ from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..pneumatics.gas import Ambient
 
+MAX_COUNT = 20
+"""Greatest number of muscles in parallel that is tried (chosen)."""
 PATH_POINTS = 33
 """Points of a stroke at which the load is compared with the muscle (chosen)."""
 
@@ -132,13 +134,17 @@ class SizingConditions:
     )
     max_count: int = 3
     """Greatest number of muscles in parallel; with a joint, on each side."""
+    min_count: int = 1
+    """Least number of muscles in parallel."""
     ambient: Ambient = Ambient()
 
     def check(self) -> None:
-        if isinstance(self.max_count, bool) or not 1 <= self.max_count <= 20:
-            raise ParameterError(
-                f"SizingConditions: max_count is {self.max_count!r}; allowed range: 1 to 20 muscles in parallel."
-            )
+        for name, least in (("min_count", 1), ("max_count", self.min_count)):
+            count = getattr(self, name)
+            if isinstance(count, bool) or not least <= count <= MAX_COUNT:
+                raise ParameterError(
+                    f"SizingConditions: {name} is {count!r}; allowed range: {least} to {MAX_COUNT} muscles in parallel."
+                )
         if not self.min_pressure < self.supply:
             raise ParameterError(
                 f"SizingConditions: min_pressure is {self.min_pressure:g} Pa; it must be less than the supply "

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.errors import AirmuscleError, AirmuscleWarning, ParameterError, SolveError
 from ..library.entry import Entry
-from ..library.files import LAWS, entries_of_product, list_laws, list_products, read_toml
+from ..library.files import LAWS, list_laws, list_products, read_toml
 from ..library.law_file import load_law
 from .choice import MuscleChoice, Requirement, SortKey, UnsuitableMuscle, by_air, rank
 from .joint import JointSearch
@@ -88,11 +88,9 @@ def catalogue() -> tuple[Entry, ...]:
 
 def products_without_law() -> tuple[UnsuitableMuscle, ...]:
     """Products of the library of which no law is published, as unsuitable muscles."""
-    return tuple(
-        UnsuitableMuscle(name, 0, "no law of this product is published")
-        for name in list_products()
-        if not entries_of_product(name)
-    )
+    with_law = {read_toml(LAWS / f"{name}.toml").get("product") for name in list_laws()}
+    names = (name for name in list_products() if name not in with_law)
+    return tuple(UnsuitableMuscle(name, 0, "no law of this product is published") for name in names)
 
 
 @functools.cache
@@ -112,9 +110,10 @@ def size_muscles(
 ) -> SizingResult:
     """The muscles that meet a requirement, each at its shortest length, and the others with the reason.
 
-    `muscles` are library entries; by default those of `catalogue`. Each is tried with 1 to `conditions.max_count`
-    muscles in parallel; a number is a choice if fewer muscles are longer or take more air. `sort` is the criterion of
-    the ranking, `progress` is called with the fraction done. Raises ParameterError for other arguments.
+    `muscles` are library entries; by default those of `catalogue`. Each is tried with `conditions.min_count` to
+    `conditions.max_count` muscles in parallel; a number is a choice if fewer muscles are longer or take more air. `sort`
+    is the criterion of the ranking, `progress` is called with the fraction done. Raises ParameterError for other
+    arguments.
     """
     if not isinstance(requirement, Requirement) or not isinstance(conditions, SizingConditions):
         raise ParameterError(
@@ -146,7 +145,7 @@ def _choices_of(
     """
     found: list[MuscleChoice] = []
     failed = UnsuitableMuscle(entry.name, 0, "")
-    for count in range(1, conditions.max_count + 1):
+    for count in range(conditions.min_count, conditions.max_count + 1):
         try:
             choice = choose(entry, requirement, conditions, count)
         except AirmuscleError as error:
@@ -257,7 +256,7 @@ def _any_choice(
     if requirement is None:
         return None
     for entry in entries:
-        for count in (conditions.max_count, 1):
+        for count in (conditions.max_count, conditions.min_count):
             with contextlib.suppress(AirmuscleError):
                 return choose(entry, requirement, conditions, count)
     return None
