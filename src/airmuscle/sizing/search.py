@@ -111,8 +111,8 @@ def size_muscles(
     """The muscles that meet a requirement, each at its shortest length, and the others with the reason.
 
     `muscles` are library entries; by default those of `catalogue`. Each is tried with `conditions.min_count` to
-    `conditions.max_count` muscles in parallel; a number is a choice if fewer muscles are longer or take more air. `sort`
-    is the criterion of the ranking, `progress` is called with the fraction done. Raises ParameterError for other
+    `conditions.max_count` muscles in parallel; a number is a choice if fewer muscles are longer or take more air.
+    `sort` is the criterion of the ranking, `progress` is called with the fraction done. Raises ParameterError for other
     arguments.
     """
     if not isinstance(requirement, Requirement) or not isinstance(conditions, SizingConditions):
