@@ -55,6 +55,8 @@ COMMANDS = (
     CommandRow("size", "size", "size", "Size muscles of the catalogue for a lift or a joint."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("sweep", "sweep", "sweep", "Run a parameter study of a scenario."),
+    CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
+    CommandRow("export", "export", "export", "Export a scenario, law or controller to C, JavaScript or MATLAB."),
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
 )
 """All commands, in the order of use."""

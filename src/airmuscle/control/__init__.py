@@ -3,6 +3,7 @@
 from .angle_and_stiffness import AngleAndStiffness
 from .antagonistic_inverse import AntagonisticInverse
 from .cascade import Cascade
+from .computed_torque import ComputedTorque
 from .control_law import ControlLaw
 from .control_loop import ControlLoop, ControlLoopState
 from .controller import Controller, Measurement
@@ -11,8 +12,11 @@ from .decentralised import Decentralised
 from .driver import PWM, Driver, SolenoidDriver
 from .feed_forward import StaticFeedForward
 from .gain_schedule import GainSchedule
+from .hysteresis_compensation import HysteresisCompensation
+from .hysteresis_operator import HysteresisOperator, InverseHysteresisOperator
 from .inputs import ZERO_INPUT, InputSignal, Periodic, SampledSignal, Schedule
 from .iterative_learning import IterativeLearning
+from .linear_model_predictive import LinearModelPredictive
 from .on_off import OnOffController
 from .pid import PID
 from .piecewise_linear import PiecewiseLinear
@@ -37,6 +41,7 @@ __all__ = [
     "AntagonisticInverse",
     "Cascade",
     "ColumnSensor",
+    "ComputedTorque",
     "ControlLaw",
     "ControlLoop",
     "ControlLoopState",
@@ -45,8 +50,12 @@ __all__ = [
     "Decentralised",
     "Driver",
     "GainSchedule",
+    "HysteresisCompensation",
+    "HysteresisOperator",
     "InputSignal",
+    "InverseHysteresisOperator",
     "IterativeLearning",
+    "LinearModelPredictive",
     "Measurement",
     "OnOffController",
     "Periodic",

@@ -1,6 +1,6 @@
 """Sizing of a lift: muscles of the catalogue, the best choice with its valves, and a check by simulation.
 
-python examples/A8_sizing.py        prints the choices, the valves and the stroke that the lift reaches
+python examples/A9_sizing.py        prints the choices, the valves and the stroke that the lift reaches
 
 Load, stroke, supply, safety factor and cycle time are chosen.
 """
