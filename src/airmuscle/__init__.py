@@ -57,6 +57,9 @@ if TYPE_CHECKING:
         simulation as simulation,
     )
     from . import (
+        sizing as sizing,
+    )
+    from . import (
         units as units,
     )
     from .analysis import linearise
@@ -106,7 +109,7 @@ _MODULES = {
 """The module of each public name."""
 _SUBPACKAGES = (
     "analysis", "characteristic", "control", "environments", "export", "friction", "geometry", "identify", "library",
-    "mechanism", "muscle", "pneumatics", "recording", "simulation", "units",
+    "mechanism", "muscle", "pneumatics", "recording", "simulation", "sizing", "units",
 )  # fmt: skip
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names.split()}
 

@@ -52,6 +52,7 @@ COMMANDS = (
     CommandRow("fit-volume", "fit_volume", "fit_volume_command", "Fit the volume of a muscle over its contraction."),
     CommandRow("plan", "plan", "plan", "Design the most informative static experiments (D-optimal)."),
     CommandRow("bench", "bench", "bench", "Fit a surface while rows arrive; name the next point."),
+    CommandRow("size", "size", "size", "Size muscles of the catalogue for a lift or a joint."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("sweep", "sweep", "sweep", "Run a parameter study of a scenario."),
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
