@@ -3,6 +3,7 @@
 from .angle_and_stiffness import AngleAndStiffness
 from .antagonistic_inverse import AntagonisticInverse
 from .cascade import Cascade
+from .co_contraction import CoContraction
 from .control_law import ControlLaw
 from .control_loop import ControlLoop, ControlLoopState
 from .controller import Controller, Measurement
@@ -16,14 +17,17 @@ from .iterative_learning import IterativeLearning
 from .on_off import OnOffController
 from .pid import PID
 from .piecewise_linear import PiecewiseLinear
+from .proportional_feedback import ProportionalFeedback
 from .sensors import ColumnSensor, WithSensors
 from .setpoint_command import SetpointCommand
+from .setpoint_lead import SetpointLead
 from .sigma_delta import SigmaDelta
 from .siso import SisoController
 from .sliding_mode import SlidingMode
 from .split_range import SplitRange
 from .state_feedback import StateFeedback
 from .static_inverse import StaticInverse
+from .stuck_valve import WithStuckValve
 from .super_twisting import SuperTwisting
 from .trajectory import Trajectory, spline_trajectory
 from .with_drivers import WithDrivers
@@ -36,6 +40,7 @@ __all__ = [
     "AngleAndStiffness",
     "AntagonisticInverse",
     "Cascade",
+    "CoContraction",
     "ColumnSensor",
     "ControlLaw",
     "ControlLoop",
@@ -51,9 +56,11 @@ __all__ = [
     "OnOffController",
     "Periodic",
     "PiecewiseLinear",
+    "ProportionalFeedback",
     "SampledSignal",
     "Schedule",
     "SetpointCommand",
+    "SetpointLead",
     "SigmaDelta",
     "SisoController",
     "SlidingMode",
@@ -67,5 +74,6 @@ __all__ = [
     "WithDrivers",
     "WithFeedForward",
     "WithSensors",
+    "WithStuckValve",
     "spline_trajectory",
 ]

@@ -4,6 +4,7 @@ from .antagonistic_joint import AntagonisticJoint
 from .base import Coordinate, Mechanism
 from .contact import HuntCrossley
 from .end_stops import JointWithEndStops, WithEndStops
+from .external_torque import JointWithExternalTorque
 from .hanging_mass import HangingMass
 from .isometric import Isometric
 from .isotonic import Isotonic
@@ -30,6 +31,7 @@ __all__ = [
     "Isometric",
     "Isotonic",
     "JointWithEndStops",
+    "JointWithExternalTorque",
     "JointWithFriction",
     "Lever",
     "Mechanism",
