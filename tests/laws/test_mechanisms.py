@@ -25,6 +25,7 @@ from airmuscle.mechanism import (
     Isometric,
     Isotonic,
     JointWithEndStops,
+    JointWithExternalTorque,
     JointWithFriction,
     Lever,
     Mechanism,
@@ -87,6 +88,7 @@ MECHANISMS: dict[str, tuple[Mechanism, int]] = {
     ),
     "stopped joint": (JointWithEndStops(JOINT, -0.3, 0.4, 0.05, CONTACT), 2),
     "latched": (WithLatch(JOINT), 2),
+    "loaded": (JointWithExternalTorque(SHAPED), 2),
 }
 LENGTHS = (0.2, 0.25, 0.3)
 each = pytest.mark.parametrize(("mechanism", "count"), MECHANISMS.values(), ids=MECHANISMS)

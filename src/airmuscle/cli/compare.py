@@ -52,7 +52,7 @@ def compare(
         list[str] | None, typer.Option(metavar="NAME", help="A task; repeat it for several. Default: all.")
     ] = None,
     budget: Annotated[
-        int, typer.Option(min=1, max=1_000_000, metavar="N", help="Simulated loops to tune each controller.")
+        int, typer.Option(min=0, max=1_000_000, metavar="N", help="Simulated loops to tune each controller; 0: none.")
     ] = DEFAULT_BUDGET,
     seed: Annotated[int, typer.Option(min=0, max=1_000_000, help="Seed of the optimiser and of the noise.")] = 1,
     trials: Annotated[

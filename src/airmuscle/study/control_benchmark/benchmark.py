@@ -29,7 +29,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class TunedContender:
-    """A contender with the law that commands the valves through the sensors, tuned; `tuning` is None without gains."""
+    """A contender with the law that commands the valves through the sensors; `tuning` is None if it was not tuned."""
 
     contender: Contender
     law: ControlLaw
@@ -96,7 +96,7 @@ def compare_controllers(
     joint       model, truth, sensors
     contenders  their gains are tuned for the joint's family of models, not for the truth
     tasks       STANDARD_TASKS unless given
-    budget      loops that are simulated to tune each contender
+    budget      loops that are simulated to tune each contender; 0: none is tuned
     seed        of the optimiser and of the noise
     progress    called with the name of the present step, the number done and their number
 
@@ -122,7 +122,7 @@ def tune_contender(
     joint: BenchmarkJoint, contender: Contender, law: CompleteLaw, *, budget: int, seed: int, progress: Progress
 ) -> TunedContender:
     """A contender with the gains that are best for the tuning tasks in the joint's family of models."""
-    if not law.bounds:
+    if not law.bounds or not budget:
         return TunedContender(contender, law.law, None)
     cases = []
     for task in TUNING_TASKS:

@@ -12,6 +12,7 @@ from ...control.iterative_learning import IterativeLearning
 from ...control.sensors import WithSensors
 from ...core.arrays import Array
 from ...core.errors import ParameterError
+from ...core.tree import leaves
 from ...plant.plant import Plant
 from ...simulation.run import simulate
 from .benchmark import TunedContender
@@ -79,8 +80,7 @@ def learn(
 
 def _present_signal(contender: TunedContender, signals: TaskSignals) -> Array:
     """The feed-forward signal of a contender before learning, with its lead time."""
-    gains = contender.tuning.gains if contender.tuning else {}
-    lead = next((value for path, value in gains.items() if path.endswith("lead_time")), 0.0)
+    lead = next((leaf.value for leaf in leaves(contender.law) if leaf.path.endswith("lead_time")), 0.0)
     return np.asarray(signals.feed_forward + lead * signals.feed_forward_rate)
 
 

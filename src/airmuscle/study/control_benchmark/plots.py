@@ -37,7 +37,9 @@ def error_plot(result: BenchmarkResult) -> Plot:
         axis.plot(errors, rows + shift, linestyle="none", marker=marker, color=colour, label=each.name)
     axis.set(xscale="log", xlabel="rms error [degree]")
     axis.set_yticks(rows, names)
-    axis.invert_yaxis()
+    axis.set_ylim(len(names) - 0.5, -0.5)
+    for which in (axis.xaxis.set_major_formatter, axis.xaxis.set_minor_formatter):
+        which(lambda value, _: f"{value:g}" if f"{value:.0e}"[0] in "125" else "")
     legend_below(figure, axis, columns=3)
     caption = f"Error in each task on the true joint with {result.joint.name}; {result.joint.valve}."
     return Plot("errors", caption, figure)

@@ -101,10 +101,10 @@ TUNING_TASKS: tuple[ControlTask, ...] = (
         "tuning: motions",
         SumOfMotions(
             (
-                MinimumJerkMotion(12.0 * DEGREE, 0.1, 0.6),
-                MinimumJerkMotion(-20.0 * DEGREE, 1.0, 0.5),
-                SineMotion(6.0 * DEGREE, 0.8),
-                SineMotion(5.0 * DEGREE, 1.7),
+                MinimumJerkMotion(10.0 * DEGREE, 0.1, 0.6),
+                MinimumJerkMotion(-14.0 * DEGREE, 1.0, 0.5),
+                SineMotion(8.0 * DEGREE, 0.8),
+                SineMotion(8.0 * DEGREE, 1.7),
             )
         ),
         3.0,
