@@ -44,7 +44,7 @@ class LearningCurve:
 
 
 def learn(
-    joint: BenchmarkJoint, contender: TunedContender, task: ControlTask, *, trials: int = 30, cutoff: float = 12.0,
+    joint: BenchmarkJoint, contender: TunedContender, task: ControlTask, *, trials: int = 31, cutoff: float = 12.0,
     change_weight: float = 0.03, seed: int = 1,
 ) -> LearningCurve:  # fmt: skip
     """Repeat a task on the truth and improve the feed-forward of a tuned contender by `IterativeLearning`.
