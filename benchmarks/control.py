@@ -23,13 +23,13 @@ import numpy as np
 from airmuscle.study.control_benchmark import (
     BenchmarkJoint,
     compare_controllers,
+    find_tasks,
+    inverse_dynamics,
     learn,
     on_off_joint,
     proportional_joint,
     standard_contenders,
 )
-from airmuscle.study.control_benchmark.task_signals import inverse_dynamics
-from airmuscle.study.control_benchmark.tasks import find_tasks
 
 SINES = (0.5, 1.0, 2.0, 3.0)
 TARGETS = {0.5: 0.25, 1.0: 0.45, 2.0: 0.9, 3.0: 1.3}

@@ -11,9 +11,14 @@ from typing import ClassVar
 
 from airmuscle.control import ControlLaw
 from airmuscle.core import model, ops, parameter, plotting
-from airmuscle.study.control_benchmark import Contender, compare_controllers, proportional_joint, standard_contenders
-from airmuscle.study.control_benchmark.plots import run_plot
-from airmuscle.study.control_benchmark.tasks import find_tasks
+from airmuscle.study.control_benchmark import (
+    Contender,
+    compare_controllers,
+    find_tasks,
+    proportional_joint,
+    run_plot,
+    standard_contenders,
+)
 
 
 @model

@@ -7,11 +7,14 @@ result.scores(), result.metric("mine", "sine 1 Hz", "rmse")
 """
 
 from .benchmark import BenchmarkResult, BenchmarkRun, TunedContender, compare_controllers
+from .chapter import benchmark_chapter, write_benchmark
 from .contenders import Contender, standard_contenders
 from .joints import BenchmarkJoint, on_off_joint, proportional_joint
 from .learning import LearningCurve, learn
 from .motions import JointMotion, MinimumJerkMotion, RampMotion, SineMotion, StepMotion, SumOfMotions
-from .tasks import STANDARD_TASKS, ControlTask, StuckValve
+from .plots import error_plot, run_plot
+from .task_signals import inverse_dynamics
+from .tasks import STANDARD_TASKS, ControlTask, StuckValve, find_tasks
 from .tracking_metrics import TrackingMetrics
 
 __all__ = [
@@ -31,9 +34,15 @@ __all__ = [
     "SumOfMotions",
     "TrackingMetrics",
     "TunedContender",
+    "benchmark_chapter",
     "compare_controllers",
+    "error_plot",
+    "find_tasks",
+    "inverse_dynamics",
     "learn",
     "on_off_joint",
     "proportional_joint",
+    "run_plot",
     "standard_contenders",
+    "write_benchmark",
 ]
