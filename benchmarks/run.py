@@ -23,6 +23,7 @@ import derivative
 import growth
 import identification
 import live
+import loops
 import memory
 import model_comparison
 import mujoco_peer
@@ -42,6 +43,7 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (peers.section, 9),
     (ode8.section, 15),
     (batch.section, 7),
+    (loops.section, 3),
     (mujoco_peer.section, 5),
     (derivative.section, 25),
     (components.section, 25),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 
 import batch
+import loops
 import measure
 import new_plant
 import numpy as np
@@ -99,6 +100,13 @@ def test_lmfit_computes_the_same_coefficients():
     pytest.importorskip("lmfit")
     section = static_fit.section(rounds=1)
     assert all(target.met for target in section.targets)
+
+
+def test_the_section_of_loops_has_a_row_for_each_plant_and_integrator():
+    section = loops.section(rounds=1, count=2, duration=0.02)
+    assert len(section.rows) == 6
+    assert [row[-1] for row in section.rows[::3]] == ["0.0e+00"] * 2
+    assert len(section.targets) == 1
 
 
 def test_a_section_and_its_targets_are_printed():

@@ -54,6 +54,7 @@ COMMANDS = (
     CommandRow("bench", "bench", "bench", "Fit a surface while rows arrive; name the next point."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("sweep", "sweep", "sweep", "Run a parameter study of a scenario."),
+    CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
     CommandRow("compare", "compare", "compare", "Compare controllers of an antagonistic joint on common tasks."),
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
 )

@@ -52,10 +52,17 @@ class BoundIntegrator:
         work = np.zeros(max(binding.work, 1))
         run = (self.state, self._end, self._inputs, slopes, *no_rows)
         end = (self._clock, self._count, INTERRUPT_CHECK_STEPS, work)
+        self._bound_values = (*binding.leading, *binding.trailing)
         self._kernel = binding.kernel.bind(*binding.leading, *run, *binding.trailing, *end)
         self._first = len(binding.leading) + 1
         self._clock_view, self._count_view = flat_view(self._clock), flat_view(self._count)
         self._budget = len(binding.leading) + len(run) + len(binding.trailing) + 2
+
+    def rebind(self, binding: Binding) -> None:
+        """Take the values of the same integrator at a system of the same structure with other parameters."""
+        for own, other in zip(self._bound_values, (*binding.leading, *binding.trailing), strict=True):
+            if isinstance(own, np.ndarray):
+                own[...] = other
 
     def run(
         self, segments: PiecewiseLinear, start: float, state: Array, times: Array, max_steps: int = MAX_STEPS,

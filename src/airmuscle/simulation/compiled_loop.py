@@ -70,14 +70,34 @@ class CompiledRun:
         control_state: ControlLoopState, parameters: Array | None = None,
     ) -> None:  # fmt: skip
         self.loop, self._begin_state = loop, control_state
+        self._integrator, self._precomputed = integrator, compiled.precomputed
         self.bound = integrator.bind(compiled)
         self.bound.state[:] = initial_state
         self.status, self.stopped_at = Status.DONE, float(loop.edges[0])
         self._drivers = DriverTable(loop.prepared, control_state, loop.capacity)
         self._make_arrays(compiled.sizes.states, compiled.sizes.inputs)
-        arguments = self._arguments(compiled, parameters_of(loop.law) if parameters is None else parameters)
+        self._parameters = parameters_of(loop.law) if parameters is None else parameters
+        arguments = self._arguments(compiled, self._parameters)
         self._first_buffer = len(arguments) - 9
         self._kernel = kernel.sampled_loop.bind(*arguments)
+
+    def restart(self, compiled: CompiledSystem, initial_state: Array, parameters: Array) -> None:
+        """Begin again in the same arrays, with a plant of the same structure and other parameters; arguments as before.
+
+        Everything that was returned by this run is overwritten.
+        """
+        self.bound.rebind(self._integrator.binding(compiled))
+        self._precomputed[:], self._parameters[:] = compiled.precomputed, parameters
+        state, inputs = self._begin_state, self.loop.prepared.inputs
+        self.bound.state[:] = self._kept[:] = initial_state
+        self.bound.count[:] = 0
+        self.progress.fill(0)
+        self._memory[:] = [state.controller[name] for name in self.loop.law.initial_memory]
+        self._measured[:], self._command[:] = state.measured, state.commanded
+        self._applied[:] = state.applied_inputs or inputs.values[0]
+        self._kept_inputs[:] = self._applied
+        self._drivers.restart()
+        self.status, self.stopped_at = Status.DONE, float(self.loop.edges[0])
 
     @property
     def prepared(self) -> SampledLoop:

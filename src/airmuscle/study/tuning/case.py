@@ -24,6 +24,8 @@ class LoopCase:
     initial_state    a value for each state [SI]; the equilibrium at ambient pressure unless given
     controller_path  place of the tuned controller within `loop.controller`, such as `law` for a WithSensors around it;
                      empty if it is the controller itself
+
+    Cases with the same loop object and plants of one structure are simulated in one batch.
     """
 
     name: str
@@ -89,7 +91,11 @@ def check_cases(cases: Sequence[LoopCase]) -> tuple[LoopCase, ...]:
 
 def with_gains(controller: Any, gains: Mapping[str, float]) -> Any:
     """A controller with other values of some parameters, validated like a new one. Raises ParameterError."""
-    values = [gains.get(leaf.path, leaf.value) for leaf in leaves(controller)]
+    known = list(leaves(controller))
+    unknown = set(gains) - {leaf.path for leaf in known}
+    if unknown:
+        raise ParameterError(f"{type(controller).__name__} has no parameter '{min(unknown)}'.")
+    values = [gains.get(leaf.path, leaf.value) for leaf in known]
     return with_parameters(controller, values)
 
 

@@ -17,6 +17,7 @@ from ...core.tree import flatten, leaves, structure
 from ...plant.plant import Plant
 from ...simulation.batch import BatchSolution, simulate_batch
 from ...simulation.batch.loops import CONTROLLER
+from ...simulation.batch.thread_pool import hidden_progress
 from ...simulation.integrators import Integrator
 from .case import LoopCase, loop_with_gains, with_gains
 from .objective import CaseMetrics
@@ -112,6 +113,7 @@ class Evaluator:
     duration: float
     index: TrackingIndex
     integrator: Integrator | None
+    start_time: float = 0.0
     reasons: dict[str, int] = dataclasses.field(default_factory=dict)
 
     def metrics(self, gains: Array) -> CaseMetrics:
@@ -171,11 +173,12 @@ class Evaluator:
         else:
             of_set = (loop_with_gains(first, dict(zip(self.paths, row, strict=True))) for row in gains.tolist())
             loop = [each for each in of_set for _ in range(m)]
-        return simulate_batch(
-            group.plant, variations, loop, duration=self.duration, output_times=group.loop.sample_time,
-            initial_states={name: np.tile(values, sets) for name, values in group.initial_states.items()},
-            integrator=self.integrator, keep=group.kept,
-        )  # fmt: skip
+        with hidden_progress():
+            return simulate_batch(
+                group.plant, variations, loop, duration=self.duration, output_times=group.loop.sample_time,
+                initial_states={name: np.tile(values, sets) for name, values in group.initial_states.items()},
+                integrator=self.integrator, keep=group.kept, start_time=self.start_time,
+            )  # fmt: skip
 
 
 def _air_drawn(batch: BatchSolution, group: CaseGroup) -> Array:

@@ -15,6 +15,9 @@ from ...core.arrays import Array
 from ...core.errors import ParameterError, suggestion
 from ...core.tree import Leaf, leaves
 
+DIGITS = 5
+"""Significant digits of a gain, so that a file contains exactly the gains that were simulated (chosen)."""
+
 
 @dataclasses.dataclass(frozen=True)
 class GainRange:
@@ -36,12 +39,12 @@ class GainRange:
         return np.asarray(np.log(values / self.low) / math.log(self.high / self.low))
 
     def from_unit(self, coordinates: Array) -> Array:
-        """Coordinates (E,) within 0 and 1 as gains [SI], exact at both bounds."""
+        """Coordinates (E,) within 0 and 1 as gains [SI] with five significant digits."""
         if self.logarithmic:
             inside = self.low * (self.high / self.low) ** coordinates
         else:
             inside = self.low + (self.high - self.low) * coordinates
-        return np.asarray(np.clip(inside, self.low, self.high), dtype=float)
+        return np.clip(rounded(inside), self.low, self.high)
 
 
 def gain_ranges(controller: Controller, bounds: Any) -> tuple[GainRange, ...]:
@@ -77,6 +80,11 @@ def _range(leaf: Leaf, pair: Any) -> GainRange:
     if low < smallest or high > greatest:
         raise ParameterError(f"{where} is {low:g} to {high:g}; allowed range: {smallest:g} to {greatest:g}.")
     return GainRange(leaf.path, low, high)
+
+
+def rounded(values: Array) -> Array:
+    """Numbers (E,) with DIGITS significant digits."""
+    return np.array([float(f"{value:.{DIGITS - 1}e}") for value in np.ravel(values).tolist()]).reshape(np.shape(values))
 
 
 def to_gains(ranges: Sequence[GainRange], coordinates: Array) -> Array:

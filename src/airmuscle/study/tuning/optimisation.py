@@ -34,6 +34,7 @@ def tune(
     budget: int = 4000,
     seed: int = 0,
     start: Sequence[Mapping[str, float]] = (),
+    start_time: float = 0.0,
     integrator: Integrator | None = None,
     progress: Progress | None = None,
 ) -> Tuning:
@@ -48,7 +49,7 @@ def tune(
     seed        of the optimiser; the same seed gives the same result on any number of cores
     start       sets of gains for the first generation, such as those of tuning rules; the present gains of the
                 controller are always among them if they are within the bounds, so that the result is never worse
-    integrator  as in simulate_batch
+    start_time, integrator  as in simulate_batch
     progress    called with the number of loops simulated so far, and the budget
 
     The optimiser is differential evolution (Storn and Price 1997) as implemented by SciPy, with the same settings for
@@ -65,14 +66,23 @@ def tune(
     duration = _check_options(duration, index, objective, budget, seed, len(family))
     ranges = gain_ranges(family[0].controller, bounds)
     evaluator = Evaluator(
-        family, group_cases(family, index), tuple(each.path for each in ranges), duration, index, integrator
+        family,
+        group_cases(family, index),
+        tuple(each.path for each in ranges),
+        duration,
+        index,
+        integrator,
+        start_time,
     )
     search = _Search(evaluator, ranges, objective, budget, progress or (lambda done, total: None))
     given = search.given(start)
     interrupted = search.run(given, seed)
     if not search.values:
         raise KeyboardInterrupt
-    result = Tuning(family, ranges, index, duration, seed, budget, search.history(), search.present_count, interrupted)
+    result = Tuning(
+        family, ranges, index, evaluator.groups[0].scales, objective, duration, start_time, seed, budget,
+        search.history(), search.present_count, interrupted,
+    )  # fmt: skip
     if not math.isfinite(result.objective):
         raise SimulationError(_nothing_found(evaluator, len(result.history)))
     return result

@@ -14,7 +14,7 @@ from ...core.errors import ColumnError, suggestion
 from ...core.reference import Reference, cite
 from .case import LoopCase, loop_with_gains
 from .gain_ranges import GainRange
-from .objective import CaseMetrics
+from .objective import CaseMetrics, Objective
 from .tracking import TrackingIndex
 
 STORN_PRICE1997 = Reference(
@@ -65,16 +65,21 @@ class TuningHistory:
 class Tuning:
     """The result of tuning: the gains with the smallest objective.
 
-    cases, ranges     for which and within which the gains were sought
-    history           every set of gains that was simulated
-    start             the history's entries of gains that were given: those of the loop first, if within the ranges
-    interrupted       whether the user stopped before the budget was used
+    cases, ranges    for which and within which the gains were sought
+    index, scales    tracking index, and the controlled columns of the nominal case with their scales
+    criterion        the objective, a function of CaseMetrics
+    history          every set of gains that was simulated
+    start            1 if the history begins with the present gains of the controller, otherwise 0
+    interrupted      whether the user stopped before the budget was used
     """
 
     cases: tuple[LoopCase, ...]
     ranges: tuple[GainRange, ...]
     index: TrackingIndex
+    scales: Mapping[str, float]
+    criterion: Objective
     duration: float
+    start_time: float
     seed: int
     budget: int
     history: TuningHistory
