@@ -1,6 +1,6 @@
 """Control benchmark of the antagonistic joint: all standard controllers, learning, on/off valves, and the targets.
 
-    python benchmarks/control.py [--budget 4800] [--seed 1] [--out benchmarks/CONTROL.md]
+    python benchmarks/control.py [--budget 2400] [--seed 1] [--out benchmarks/CONTROL.md]
 
 Every controller is tuned with the same optimiser and budget for perturbed models and judged on the truth. Figures and
 verdicts are computed; a reason is printed for a target that is missed.
@@ -36,8 +36,33 @@ TARGETS = {0.5: 0.25, 1.0: 0.45, 2.0: 0.9, 3.0: 1.3}
 RATIO_TARGET, LEARNING_TARGET, HOLD_TARGET, REST_TARGET, SHARE_TARGET = 3.0, 0.15, 0.5, 10.0, 5.0
 FORWARD, PLAIN, BOTH = "feed-forward + PID", "PID", "angle and stiffness"
 ON_OFF = (PLAIN, FORWARD, "feed-forward + sliding mode")
-REASONS: tuple[tuple[str, str], ...] = ()
-"""Beginning of the name of a target, and the reason where it is missed."""
+REASONS = (
+    (
+        FORWARD,
+        "Feed-forward + PID: the lead time that is best for the models, 4 ms, is too short for the truth, whose tubes, "
+        "friction and smaller valves delay the motion; the derivative acts on the measurement alone and delays it "
+        "further. With 30 ms and all other gains unchanged the errors are 0.35, 0.33, 0.38 and 1.27 degrees at 0.5, 1, "
+        "2 and 3 Hz. This lead time was found with the truth, so that it is no result of the benchmark.",
+    ),
+    (
+        PLAIN,
+        "The ratio of PID to feed-forward + PID is missed for the same reason; with 30 ms it is 2.3, 4.7 and 7.0.",
+    ),
+    (
+        "learning, monotone",
+        "Learning: after the first trials the differences from trial to trial are those of the noise of the sensors.",
+    ),
+    (
+        "on/off valves at rest, feed-forward + sliding mode",
+        "Sliding mode with on/off valves: it has no integral action, and the dead zone that tuning chose is wide.",
+    ),
+    (
+        BOTH,
+        "Angle and stiffness: the stiffness is controlled in open loop with the model. At 2.5 bar and 3 bar in both "
+        "muscles the true stiffness is 5.0 % and 3.5 % greater than that of the model.",
+    ),
+)
+"""Beginning of the name of a target, and the reason where it was missed in the run of CONTROL.md."""
 FURTHER = {"greatest": "Greatest error [degree]", "strokes": "Valve strokes [1/s]", "air": "Air [l/s (ANR)]"}
 PUBLISHED = (
     (
@@ -200,7 +225,7 @@ def target_rows(results: Mapping[str, Any]) -> list[str]:
 
 def part_rows(title: str, part: Mapping[str, Any]) -> list[str]:
     """The results for one kind of valves in Markdown."""
-    valve = part["valve"].capitalize()
+    valve = part["valve"][:1].upper() + part["valve"][1:]
     lines = [f"## {title}", "", f"{valve}. rms error [degree]:", "", *error_rows(part, "rmse")]
     lines += ["", "| controller | score | tuned gains [SI] |", "|---|---|---|"]
     for name, score in part["scores"].items():
@@ -241,7 +266,7 @@ def page(results: Mapping[str, Any]) -> str:
 def main() -> None:
     """Measure and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--budget", type=int, default=4800)
+    parser.add_argument("--budget", type=int, default=2400)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path(__file__).with_name("CONTROL.md"))
     given = parser.parse_args()

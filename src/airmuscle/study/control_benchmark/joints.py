@@ -12,7 +12,7 @@ from ...analysis.equilibrium import find_equilibrium
 from ...control.driver import Driver, SolenoidDriver
 from ...control.sensors import ColumnSensor
 from ...core.errors import ParameterError
-from ...friction import Friction, LuGre
+from ...friction import Dahl, Friction, LuGre
 from ...library.law_file import load_law
 from ...mechanism import AntagonisticJoint, JointWithExternalTorque
 from ...muscle import LinearDamper, Muscle
@@ -165,13 +165,15 @@ def true_plant(conductance: float) -> Plant:
 
 def perturbed_models(conductance: float) -> dict[str, Plant]:
     """The model and perturbed models by name, for which controllers are tuned (chosen)."""
+    model = model_plant(conductance)
     return {
-        "nominal": model_plant(conductance),
+        "nominal": model,
         "inertia x 2": model_plant(conductance, inertia=0.1),
         "inertia x 0.5": model_plant(conductance, inertia=0.025),
         "weight x 2": model_plant(conductance, weight_torque=4.0),
         "supply -20 %": model_plant(conductance, supply=0.8 * SUPPLY),
         "pulley +10 %": model_plant(conductance, radius=0.044),
+        "friction 10 N": replace(model, muscle=tuple(replace(m, friction=Dahl(2e4, 10.0)) for m in model.muscles)),
     }
 
 

@@ -21,7 +21,7 @@ from .task_signals import TaskSignals, disturbance, task_signals
 from .tasks import ControlTask
 
 SIGNAL, RATE = "feed_forward", "feed_forward_rate"
-REPETITIONS = 5
+REPETITIONS = 30
 """Trials with the last signal and other noise (chosen)."""
 STEP = 0.05e5
 """Step of the feed-forward signal [Pa] from which the impulse response of the model is computed (chosen)."""

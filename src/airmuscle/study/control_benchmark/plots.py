@@ -76,8 +76,8 @@ def run_plot(result: BenchmarkResult, names: Sequence[str]) -> Plot:
 
 
 def _first_time(begin: float, event: float | None) -> float:
-    """The time from which a run is drawn: a little before the event."""
-    return max(0.0, (begin if event is None else event) - 0.2)
+    """The time from which a run is drawn: a little before the event and before what is judged."""
+    return max(0.0, (begin if event is None else min(begin, event)) - 0.2)
 
 
 def learning_plot(curves: Sequence[LearningCurve]) -> Plot:
