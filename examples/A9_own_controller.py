@@ -62,7 +62,7 @@ mine = Contender(
 joint = proportional_joint()
 others = [each for each in standard_contenders(joint) if each.name == "feed-forward + PID"]
 tasks = find_tasks(("sine 1 Hz",))
-result = compare_controllers(joint, (*others, mine), tasks, budget=96, seed=1)
+result = compare_controllers(joint, (*others, mine), tasks, budget=112, seed=1)
 
 print(f"valves: {joint.valve}")
 for name, score in result.scores().items():
