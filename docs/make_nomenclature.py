@@ -16,6 +16,8 @@ WORDS = Path(__file__).with_name("words.toml")
 ARGUMENTS = {
     "acceleration_setpoint": "name of the set point of an acceleration",
     "load_setpoint": "name of the set point of a load",
+    "mean_setpoint": "name of the set point of the mean pressure of two muscles",
+    "rate": "name of the set point of the rate of a signal",
     "setpoint_names": "names of the set points of a control law",
     "feed_forward": "control law without measurement, whose commands are added to those of the feedback",
     "feedback": "control law with measurement, whose commands are added to those of the feed-forward",

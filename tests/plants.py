@@ -35,6 +35,7 @@ from airmuscle.mechanism import (
     Isometric,
     Isotonic,
     JointWithEndStops,
+    JointWithExternalTorque,
     JointWithFriction,
     Lever,
     MuscleRoute,
@@ -187,6 +188,7 @@ EXAMPLES = {
             AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.1, 1.5, -1.2, 1.2, PolynomialProfile((0.2, -0.1))), 0.3
         ), 2
     ),
+    "joint with an external torque": pulled(JointWithExternalTorque(AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.1)), 2),
     "arm": pulled(
         PlanarArm(
             (ArmLink(0.3, 1.5, 0.14, 0.01, 0.1, -1.3, 1.3), ArmLink(0.25, 1.0, 0.11, 0.005, 0.1, -1.3, 1.3)),

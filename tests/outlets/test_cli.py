@@ -82,7 +82,8 @@ def assert_failed(result: Result, message: str) -> None:
 
 NAMES = (
     "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "campaign",
-    "fit-volume", "plan", "bench", "size", "simulate", "sweep", "tune", "export", "schema",
+    "fit-volume", "plan", "bench", "size", "simulate", "sweep", "tune", "compare", "export",
+    "schema",
 )  # fmt: skip
 
 

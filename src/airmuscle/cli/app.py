@@ -56,6 +56,7 @@ COMMANDS = (
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("sweep", "sweep", "sweep", "Run a parameter study of a scenario."),
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
+    CommandRow("compare", "compare", "compare", "Compare controllers of an antagonistic joint on common tasks."),
     CommandRow("export", "export", "export", "Export a scenario, law or controller to C, JavaScript or MATLAB."),
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
 )

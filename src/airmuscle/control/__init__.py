@@ -3,6 +3,7 @@
 from .angle_and_stiffness import AngleAndStiffness
 from .antagonistic_inverse import AntagonisticInverse
 from .cascade import Cascade
+from .co_contraction import CoContraction
 from .computed_torque import ComputedTorque
 from .control_law import ControlLaw
 from .control_loop import ControlLoop, ControlLoopState
@@ -20,14 +21,17 @@ from .linear_model_predictive import LinearModelPredictive
 from .on_off import OnOffController
 from .pid import PID
 from .piecewise_linear import PiecewiseLinear
+from .proportional_feedback import ProportionalFeedback
 from .sensors import ColumnSensor, WithSensors
 from .setpoint_command import SetpointCommand
+from .setpoint_lead import SetpointLead
 from .sigma_delta import SigmaDelta
 from .siso import SisoController
 from .sliding_mode import SlidingMode
 from .split_range import SplitRange
 from .state_feedback import StateFeedback
 from .static_inverse import StaticInverse
+from .stuck_valve import WithStuckValve
 from .super_twisting import SuperTwisting
 from .trajectory import Trajectory, spline_trajectory
 from .with_drivers import WithDrivers
@@ -40,6 +44,7 @@ __all__ = [
     "AngleAndStiffness",
     "AntagonisticInverse",
     "Cascade",
+    "CoContraction",
     "ColumnSensor",
     "ComputedTorque",
     "ControlLaw",
@@ -60,9 +65,11 @@ __all__ = [
     "OnOffController",
     "Periodic",
     "PiecewiseLinear",
+    "ProportionalFeedback",
     "SampledSignal",
     "Schedule",
     "SetpointCommand",
+    "SetpointLead",
     "SigmaDelta",
     "SisoController",
     "SlidingMode",
@@ -76,5 +83,6 @@ __all__ = [
     "WithDrivers",
     "WithFeedForward",
     "WithSensors",
+    "WithStuckValve",
     "spline_trajectory",
 ]

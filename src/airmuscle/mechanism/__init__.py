@@ -5,6 +5,7 @@ from .base import Coordinate, Mechanism
 from .contact import HuntCrossley
 from .end_stops import JointWithEndStops, WithEndStops
 from .external_load import ExternalLoad
+from .external_torque import JointWithExternalTorque
 from .hanging_mass import HangingMass
 from .isometric import Isometric
 from .isotonic import Isotonic
@@ -32,6 +33,7 @@ __all__ = [
     "Isometric",
     "Isotonic",
     "JointWithEndStops",
+    "JointWithExternalTorque",
     "JointWithFriction",
     "Lever",
     "Mechanism",
