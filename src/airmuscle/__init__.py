@@ -24,6 +24,9 @@ if TYPE_CHECKING:
         control as control,
     )
     from . import (
+        export as export,
+    )
+    from . import (
         friction as friction,
     )
     from . import (
@@ -99,8 +102,8 @@ _MODULES = {
 }
 """The module of each public name."""
 _SUBPACKAGES = (
-    "analysis", "characteristic", "control", "friction", "geometry", "identify", "library", "mechanism", "muscle",
-    "pneumatics", "recording", "simulation", "units",
+    "analysis", "characteristic", "control", "export", "friction", "geometry", "identify", "library", "mechanism",
+    "muscle", "pneumatics", "recording", "simulation", "units",
 )  # fmt: skip
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names.split()}
 

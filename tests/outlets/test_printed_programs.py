@@ -20,8 +20,8 @@ from airmuscle.compile.ir.instructions import Operation
 from airmuscle.compile.jacobians import derivatives
 from airmuscle.compile.llvm.jit import jit_compile
 from airmuscle.compile.program import compile_system
-from airmuscle.compile.text.c import C99
-from airmuscle.compile.text.javascript import JavaScript
+from airmuscle.compile.text.c import CLanguage
+from airmuscle.compile.text.javascript import JavaScriptLanguage
 from airmuscle.compile.text.matlab import DEFINITION, MatlabLanguage
 from airmuscle.core.errors import TraceError
 
@@ -53,7 +53,7 @@ def traced(plant):
 def c_values(plant, states, inputs, folder, kind=np.float64):
     """Rates and Jacobian at every point by printed C, compiled with all warnings as errors."""
     number = "double" if kind is np.float64 else "float"
-    text, sizes = functions.implicit_module(traced(plant), C99(number, storage=""))
+    text, sizes = functions.implicit_module(traced(plant), CLanguage(number, public=None))
     library = printed.shared_library("#include <math.h>\n" + text, folder, number, "-O0")
     c, rows = np.zeros(sizes.held + 1, kind), []
     printed.call(library.prepare, compile_system(plant).parameters, c, kind=kind)
@@ -99,7 +99,7 @@ def test_javascript_gives_the_rates_and_slopes_of_the_library(names, tmp_path):
     modules, data, expected = [], {}, {}
     for i, name in enumerate(names):
         plant = plants.EXAMPLES[name]
-        text, sizes = functions.implicit_module(traced(plant), JavaScript(f"m{i}_"))
+        text, sizes = functions.implicit_module(traced(plant), JavaScriptLanguage(f"m{i}_"))
         states, inputs = printed.points_of(plant)
         modules.append(text)
         expected[name] = printed.library_values(plant, states, inputs)
@@ -180,7 +180,7 @@ def check_operations(found, expected):
 
 
 def test_every_operation_means_the_same_in_c(operation_values, tmp_path):
-    library = printed.shared_library("#include <math.h>\n" + every_operation(C99(storage="")), tmp_path)
+    library = printed.shared_library("#include <math.h>\n" + every_operation(CLanguage(public=None)), tmp_path)
     rows = np.empty_like(operation_values)
     for row, point in zip(rows, POINTS, strict=True):
         printed.call(library.f, point, row)
@@ -190,7 +190,7 @@ def test_every_operation_means_the_same_in_c(operation_values, tmp_path):
 def test_every_operation_means_the_same_in_javascript(operation_values, tmp_path):
     rows = [list(point) for point in POINTS]
     results = f"{rows}.map((x) => {{ const y = new Array({len(EVERY)}); f(x, y); return y.map(String); }})"
-    module = f"{every_operation(JavaScript())}console.log(JSON.stringify({results}));\n"
+    module = f"{every_operation(JavaScriptLanguage())}console.log(JSON.stringify({results}));\n"
     found = [[number.replace("Infinity", "inf") for number in row] for row in printed.run_node(module, {}, tmp_path)]
     check_operations(found, operation_values)
 
@@ -201,19 +201,23 @@ def test_every_operation_means_the_same_in_octave(operation_values, tmp_path):
     check_operations([row.split() for row in octave(script, tmp_path).splitlines()], operation_values)
 
 
-@pytest.mark.parametrize("language", [C99(), C99("float"), JavaScript(), MatlabLanguage()], ids=repr)
+@pytest.mark.parametrize(
+    "language", [CLanguage(), CLanguage("float"), JavaScriptLanguage(), MatlabLanguage()], ids=repr
+)
 def test_constants_are_read_back_as_they_were(language):
     body = language.body()
     texts = [body.constant(value) for value in (0.0, -0.0, 1.0, -2.5, 1e300, 5e-324, math.inf, -math.inf, math.nan)]
-    if language == C99("float"):
+    if language == CLanguage("float"):
         assert texts[:4] == ["0.0f", "(-0.0f)", "1.0f", "(-2.5f)"]
         assert texts[4:6] == ["INFINITY", "0.0f"]
     else:
         assert [float(t.strip("()")) for t in texts[:6]] == [0.0, -0.0, 1.0, -2.5, 1e300, 5e-324]
         assert texts[1] == "(-0.0)"
-    infinity, nan = {"C99": ("INFINITY", "NAN"), "JavaScript": ("Infinity", "NaN"), "MatlabLanguage": ("Inf", "NaN")}[
-        type(language).__name__
-    ]
+    infinity, nan = {
+        "CLanguage": ("INFINITY", "NAN"),
+        "JavaScriptLanguage": ("Infinity", "NaN"),
+        "MatlabLanguage": ("Inf", "NaN"),
+    }[type(language).__name__]
     assert texts[6:] == [infinity, f"(-{infinity})", nan]
 
 
@@ -221,7 +225,7 @@ class Unknown(enum.Enum):
     ERF = -1
 
 
-@pytest.mark.parametrize("language", [functions.LLVM, C99(), JavaScript(), MatlabLanguage()], ids=repr)
+@pytest.mark.parametrize("language", [functions.LLVM, CLanguage(), JavaScriptLanguage(), MatlabLanguage()], ids=repr)
 def test_an_operation_without_a_form_is_refused(language):
     with pytest.raises(TraceError, match=r"ERF has no [A-Za-z]+ form; write the law over airmuscle\.core\.ops"):
         language.body().operate(Unknown.ERF, ["x"])
@@ -229,6 +233,7 @@ def test_an_operation_without_a_form_is_refused(language):
 
 def test_the_text_is_the_same_every_time():
     texts = {
-        functions.implicit_module(functions.trace_system(plants.EXAMPLES["dmsp-20-300"]), C99())[0] for _ in range(2)
+        functions.implicit_module(functions.trace_system(plants.EXAMPLES["dmsp-20-300"]), CLanguage())[0]
+        for _ in range(2)
     }
     assert len(texts) == 1

@@ -54,6 +54,7 @@ COMMANDS = (
     CommandRow("bench", "bench", "bench", "Fit a surface while rows arrive; name the next point."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("sweep", "sweep", "sweep", "Run a parameter study of a scenario."),
+    CommandRow("export", "export", "export", "Export a scenario or a law as a C, JavaScript or MATLAB program."),
     CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
 )

@@ -165,6 +165,15 @@ def implicit_module(t: TracedSystem, language: TargetLanguage = LLVM) -> tuple[s
     return printer.module(), sizes
 
 
+def rates_module(t: TracedSystem, language: TargetLanguage = LLVM) -> tuple[str, ArraySizes]:
+    """What a caller with an integrator of its own needs: rhs and outputs, as in `implicit_module`."""
+    printer, point = Printer(language), {"x": t.x, "u": t.u, PARAMETERS: t.p}
+    printer.add("rhs", point, {"f": t.f})
+    printer.add("outputs", point, {"o": t.o})
+    sizes = ArraySizes(t.x.numel(), t.u.numel(), t.p.numel(), printer.held, 0, 0, t.o.numel())
+    return printer.module(), sizes
+
+
 def _rates_and_slopes(t: TracedSystem, code: Code) -> tuple[Code, tuple[tuple[int, int], ...], tuple[int, ...]]:
     """The rates and the distinct non-zeros of their Jacobian; its places, and which non-zero stands in each."""
     tape, found = Tape(code.body), {index: operand for _, index, operand in code.outputs}

@@ -21,7 +21,7 @@ from typing import Any
 
 from ..characteristic import Characteristic
 from ..compile.functions import Printer
-from ..compile.text.javascript import JavaScript
+from ..compile.text.javascript import JavaScriptLanguage
 from ..core import autodiff
 from ..core.errors import AirmuscleError, TraceError
 from ..geometry import Braid, Geometry
@@ -52,7 +52,7 @@ def print_law(law: Characteristic, geometry: Geometry | None) -> LawProgram:
     for a law without a closed form.
     """
     (model, shape), p = _symbols(law, geometry)
-    printer, names = Printer(JavaScript(exported=False)), []
+    printer, names = Printer(JavaScriptLanguage(exported=False)), []
     for name, inputs, outputs in _functions(model, shape):
         printer.add(name, {**inputs, "p": p}, {"f": outputs})
         names.append(name)

@@ -50,17 +50,17 @@ class CBody(TextBody):
 
 
 @dataclasses.dataclass(frozen=True)
-class C99(TargetLanguage):
+class CLanguage(TargetLanguage):
     """C99 without memory allocation: void functions of arrays.
 
     number  "double" or "float"
     prefix  beginning of the name of every function
-    storage "static" for functions of one file, "" for functions that others call
+    public  names of the functions that other files may call, without the prefix; None: all
     """
 
     number: str = "double"
     prefix: str = ""
-    storage: str = "static"
+    public: frozenset[str] | None = frozenset()
 
     def body(self, scalars: Sequence[str] = ()) -> CBody:
         return CBody(scalars, self.number)
@@ -72,7 +72,7 @@ class C99(TargetLanguage):
         numbers = [f"{self.number} {a}" for a in inputs]
         given = [numbers[i] if a in body.scalars else arrays[i] for i, a in enumerate(inputs)]
         results = [f"{self.number} *restrict {a}" for a in outputs]
-        storage = f"{self.storage} " if self.storage else ""
+        storage = "" if self.public is None or name in self.public else "static "
         return f"{storage}void {self.prefix}{name}({', '.join([*given, *results])})"
 
     def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:

@@ -36,7 +36,7 @@ class JavaScriptBody(TextBody):
 
 
 @dataclasses.dataclass(frozen=True)
-class JavaScript(TargetLanguage):
+class JavaScriptLanguage(TargetLanguage):
     """An ECMAScript module whose functions write into the arrays that they are given.
 
     prefix    beginning of the name of every function

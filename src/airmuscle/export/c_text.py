@@ -1,0 +1,53 @@
+"""C text of constants: arrays of numbers and of texts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..compile.text.c import CBody
+
+WIDTH = 116
+_PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 _.,:;[](){}<>+-*/=^%!'|~#$@&")
+_BODY = CBody()
+
+
+def c_number(value: float) -> str:
+    """A double; it is read back bit by bit."""
+    return _BODY.constant(float(value)).strip("()")
+
+
+def c_string(text: str) -> str:
+    """A text as a string of ASCII characters; all others are written as octal bytes of their UTF-8 form."""
+    encoded = text.encode("utf-8", "replace")
+    return '"' + "".join(chr(b) if chr(b) in _PLAIN else f"\\{b:03o}" for b in encoded) + '"'
+
+
+def c_strings(declaration: str, texts: Iterable[str]) -> str:
+    """An array of texts, with an empty one at its end."""
+    return f"{declaration} = {{{_wrapped([*map(c_string, texts), c_string('')])}}};\n"
+
+
+def c_array(declaration: str, values: Any, padding: int = 0) -> str:
+    """An array (N,) or a table (N, m) of numbers, each row with so many zeros at its end."""
+    table = np.asarray(values, dtype=float)
+    rows: Sequence[Any] = table.tolist()
+    zeros = ["0.0"] * padding
+    if table.ndim == 1:
+        return f"{declaration} = {{{_wrapped([*map(c_number, rows), *zeros])}}};\n"
+    texts = [f"{{{', '.join([*map(c_number, row), *zeros])}}}" for row in rows]
+    return f"{declaration} = {{{_wrapped(texts)}}};\n"
+
+
+def _wrapped(items: Sequence[str]) -> str:
+    """The items with commas, in one line or in lines of at most WIDTH characters."""
+    if sum(len(item) + 2 for item in items) < WIDTH - 60:
+        return ", ".join(items)
+    lines = [""]
+    for item in items:
+        if lines[-1] and len(lines[-1]) + len(item) > WIDTH:
+            lines.append("")
+        lines[-1] += f" {item},"
+    return "\n" + "\n".join(f" {line}" for line in lines).removesuffix(",") + "\n"

@@ -1,0 +1,94 @@
+"""JavaScript module of a system: functions, solver and the run of a scenario, for Node and browsers."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..compile.text.javascript import JavaScriptLanguage
+from ..simulation.integrators import ExplicitRungeKutta, Rodas4
+from .c_source import COEFFICIENTS, csv_header
+from .printed_system import ExportedSystem
+from .provenance import block_comment
+from .run_data import RunData, tableau_arrays
+from .templates import filled
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class JavaScriptModule:
+    """The ECMAScript module of one system and its run; `name` is the name of the files."""
+
+    name: str
+    system: ExportedSystem
+    run: RunData
+    provenance: Sequence[str]
+
+    def files(self, columns: Sequence[str]) -> dict[str, str]:
+        """Contents of the module, and of a program that writes these columns, after time, as CSV, by file name."""
+        implicit = isinstance(self.run.integrator, Rodas4)
+        functions, sizes = self.system.printed(JavaScriptLanguage(), implicit=implicit)
+        functions = functions.replace("export function outputs(", "export function outputsOf(", 1)
+        constants = {
+            "SIZES": {"held": sizes.held, "jacobian": sizes.jacobian, "factors": sizes.factors},
+            **self._method(),
+        }
+        text = "".join(f"export const {name} = {to_json(value)};\n" for name, value in self._names().items())
+        text += "".join(f"const {name} = {to_json(value)};\n" for name, value in constants.items())
+        comment = block_comment(self.provenance)
+        solver = filled("rodas4.mjs" if implicit else "explicit.mjs", {}, self.name)
+        places = {"provenance": comment, "constants": text, "functions": functions, "solver": solver}
+        run = {
+            "provenance": comment, "file": self.name, "columns": to_json(["time", *columns]),
+            "header": to_json(csv_header(columns)),
+        }  # fmt: skip
+        return {
+            f"{self.name}.mjs": filled("program.mjs", places, self.name),
+            f"{self.name}.run.mjs": filled("run.mjs", run, self.name),
+        }
+
+    def _names(self) -> dict[str, Any]:
+        """The constants that importers can read."""
+        system, run, known = self.system, self.run, self.system.compiled.description
+        return {
+            "states": system.state_names,
+            "inputs": system.input_names,
+            "outputs": system.output_names,
+            "units": system.units,
+            "parameters": [leaf.path for leaf in system.tunable],
+            "defaults": system.defaults,
+            "nominal": system.nominal,
+            "inputMinimum": known.input_minimum,
+            "inputMaximum": known.input_maximum,
+            "run": {
+                "initial": run.initial,
+                "start": run.start,
+                "segments": {
+                    "ends": run.segments.ends, "values": run.segments.values, "slopes": run.segments.slopes,
+                },
+                "times": run.times,
+            },
+        }  # fmt: skip
+
+    def _method(self) -> dict[str, Any]:
+        integrator = self.run.integrator
+        if isinstance(integrator, ExplicitRungeKutta):
+            rows, weights, nodes = tableau_arrays(integrator)
+            close = 1e-9 * integrator.step
+            return {"FIRST_STEP": integrator.step, "CLOSE": close, "ROWS": rows, "WEIGHTS": weights, "NODES": nodes}
+        assert isinstance(integrator, Rodas4)
+        return {"FIRST_STEP": 0.0, "CLOSE": 0.0, "RTOL": integrator.rtol, **COEFFICIENTS}
+
+
+def to_json(value: Any) -> str:
+    """A value as JavaScript text: ASCII only, numbers bit by bit, infinities by name."""
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{json.dumps(key)}: {to_json(each)}' for key, each in value.items())}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(to_json, value))}]"
+    return json.dumps(value)

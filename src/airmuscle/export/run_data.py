@@ -1,0 +1,66 @@
+"""Run of an exported program: initial state, inputs, output times and integrator, as numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ..control.control_loop import ControlLoop
+from ..control.piecewise_linear import PiecewiseLinear
+from ..core.arrays import Array
+from ..core.errors import ParameterError
+from ..simulation import Problem
+from ..simulation.integrators import ExplicitRungeKutta, Integrator, Rodas4
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RunData:
+    """An open-loop run: `initial` (n,), the segments of the inputs, `times` (N,) of the rows, from `start` [s] on."""
+
+    initial: Array
+    segments: PiecewiseLinear
+    times: Array
+    start: float
+    integrator: Integrator
+
+
+def run_data(problem: Problem) -> RunData:
+    """The run of a problem with input signals; drivers are resolved into segments."""
+    assert problem.integrator is not None
+    return RunData(
+        problem.initial_vector,
+        problem.segments,
+        problem.times,
+        problem.start_time,
+        check_integrator(problem.integrator),
+    )
+
+
+def check_integrator(integrator: Integrator) -> Integrator:
+    """The integrator. Raises ParameterError for one that has no printed form."""
+    if not isinstance(integrator, Rodas4 | ExplicitRungeKutta):
+        raise ParameterError(
+            f"the integrator {type(integrator).__name__} has no printed form; choose Rodas4, RungeKutta4 or "
+            "DormandPrince8."
+        )
+    return integrator
+
+
+def check_open_loop(problem: Problem) -> None:
+    """Raise ParameterError for a problem with a controller."""
+    if isinstance(problem.input, ControlLoop):
+        raise ParameterError(
+            f"the controller {type(problem.input.controller).__name__} cannot be exported to this target; export the "
+            "plant with input signals, or the loop to C."
+        )
+
+
+def tableau_arrays(integrator: ExplicitRungeKutta) -> tuple[Array, Array, Array]:
+    """Rows (s, s), weights (s,) and nodes (s,) of an explicit method."""
+    rows, weights = integrator.tableau()
+    count = len(weights)
+    table = np.zeros((count, count))
+    for i, row in enumerate(rows, 1):
+        table[i, : len(row)] = row
+    return table, np.array(weights), np.array([0.0, *(sum(row) for row in rows)])

@@ -1,0 +1,7 @@
+@provenance@
+#include "@file@.h"
+
+#include <math.h>
+
+@constants@
+@functions@

@@ -1,0 +1,465 @@
+"""Exported programs: a scenario in C99, JavaScript and Octave makes the steps of the library and ends where it ends.
+
+What cannot be exported is refused by name; names of users become identifiers; files are complete, and the same each time.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import dataclasses
+import re
+import subprocess
+import warnings
+from pathlib import Path
+
+import numpy as np
+import plants
+import printed
+import pytest
+from typer.testing import CliRunner
+
+from airmuscle.characteristic import Tabulated
+from airmuscle.cli.app import app
+from airmuscle.control import PID, ControlLoop, SampledSignal, Schedule
+from airmuscle.core import autodiff
+from airmuscle.core.errors import AirmuscleWarning, FileError, ParameterError
+from airmuscle.export import C99, JavaScript, Octave, make_identifiers, write_law, write_program
+from airmuscle.export.identifiers import LONGEST, RESERVED
+from airmuscle.library.files import list_laws
+from airmuscle.library.law_file import load_law
+from airmuscle.mechanism import HangingMass
+from airmuscle.simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, solve
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+RAMPS = ((0.0, 0.0), (0.1, 0.5), (0.3, 0.1), (0.5, 0.1), (0.7, 0.4))
+
+
+def problem_of(name, integrator=None, duration=1.0):
+    """A run from 1 bar with inputs that ramp."""
+    plant = plants.EXAMPLES[name]
+    signal = SampledSignal(dict.fromkeys(plant.inputs, RAMPS))
+    return Problem(plant, signal, duration, plant.state_at(pressure=1e5), integrator=integrator)
+
+
+def run_c(folder, *options):
+    """Standard error and CSV rows of the exported C program, which is compiled with all warnings as errors."""
+    sources = [str(path) for path in sorted(folder.glob("*.c"))]
+    command = [
+        printed.require("gcc"),
+        *printed.STRICT,
+        "-pedantic",
+        *(options or ("-O1",)),
+        *sources,
+        "-o",
+        "run",
+        "-lm",
+    ]
+    built = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert built.returncode == 0, built.stderr[:2000]
+    return finished(["./run"], folder)
+
+
+def run_javascript(folder):
+    return finished([printed.require("node"), next(folder.glob("*.run.mjs")).name], folder)
+
+
+def run_octave(folder):
+    function = next(folder.glob("run_*.m")).stem
+    script = f"r = {function}('run.csv'); fprintf(stderr, '%d steps, %d rejected\\n', r.steps, r.rejected);"
+    done = subprocess.run(
+        [printed.require("octave-cli"), "--no-init-file", "--quiet", "--eval", script],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stderr, (folder / "run.csv").read_text()
+
+
+def finished(command, folder):
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stderr, done.stdout
+
+
+def check_run(text, csv, problem):
+    """Steps as the library's; the last row to 1e-10 of the greatest value of each column, every row to 1e-8: rounding
+    moves the error estimate, and with it the steps, which is less than 1 % of the tolerance."""
+    solution = solve(problem)
+    taken, rejected = map(int, re.search(r"(\d+) steps, (\d+) rejected", text).groups())
+    assert (taken, rejected) == (solution.statistics.steps, solution.statistics.rejected_steps)
+    header, *rows = csv.splitlines()
+    names = [heading.split(" [")[0] for heading in header.split(",")]
+    found = np.array([row.split(",") for row in rows], dtype=float)
+    expected = np.column_stack([solution.recording[name] for name in names])
+    assert found.shape == expected.shape
+    scale = np.abs(expected).max(axis=0)
+    assert (np.abs(found[-1] - expected[-1]) <= 1e-10 * scale).all()
+    assert (np.abs(found - expected) <= 1e-8 * scale).all()
+
+
+RUN = {C99(): run_c, JavaScript(): run_javascript, Octave(): run_octave}
+TARGETS = pytest.mark.parametrize("target", RUN, ids=lambda target: type(target).__name__)
+CASES = {
+    "one muscle": ("dmsp-20-300", Rodas4(1e-6)),
+    "two muscles on a spool": ("overlap", Rodas4(1e-6)),
+    "fixed steps": ("heat", RungeKutta4(1e-2)),
+    "fixed steps that the segments are no multiple of": ("heat", RungeKutta4(3e-2)),
+    "order eight": ("heat", DormandPrince8(2e-2)),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("target", [C99(), JavaScript()], ids=lambda target: type(target).__name__)
+def test_the_program_makes_the_steps_of_the_library(case, target, tmp_path):
+    problem = problem_of(*CASES[case])
+    write_program(problem, tmp_path, target, name="plant")
+    check_run(*RUN[target](tmp_path), problem)
+
+
+@pytest.mark.parametrize("case", ["one muscle", "fixed steps"])
+def test_the_octave_program_makes_the_steps_of_the_library(case, tmp_path):
+    problem = problem_of(*CASES[case], duration=0.2)
+    write_program(problem, tmp_path, Octave(), name="plant")
+    check_run(*run_octave(tmp_path), problem)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", plants.EXAMPLES)
+def test_every_plant_makes_the_steps_of_the_library_in_c(name, tmp_path):
+    problem = problem_of(name, Rodas4(1e-6), 0.5)
+    write_program(problem, tmp_path, C99(), name="plant")
+    check_run(*run_c(tmp_path), problem)
+
+
+def test_jumps_and_a_later_start_are_met(tmp_path):
+    plant = plants.EXAMPLES["dmsp-20-300"]
+    jumps = Schedule({"fill": ((2.1, 1.0), (2.35, 0.0)), "discharge": ((2.6, 1.0),)})
+    problem = Problem(plant, jumps, 1.0, plant.state_at(pressure=1e5), start_time=2.0, output_times=0.03)
+    write_program(problem, tmp_path, C99(), name="plant")
+    check_run(*run_c(tmp_path), problem)
+
+
+def test_a_system_without_inputs_is_exported(tmp_path):
+    plant = plants.EXAMPLES["closed"]
+    problem = Problem(plant, Schedule({}), 0.3, plant.state_at(pressure=1e5, position=0.01))
+    for target in (C99(), JavaScript()):
+        write_program(problem, tmp_path / type(target).__name__, target, name="plant")
+        check_run(*RUN[target](tmp_path / type(target).__name__), problem)
+
+
+def test_the_program_has_no_undefined_behaviour(tmp_path):
+    write_program(problem_of("overlap", duration=0.2), tmp_path, C99(), name="plant")
+    run_c(tmp_path, "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+
+
+def test_the_header_can_be_read_by_a_c_plus_plus_compiler(tmp_path):
+    write_program(problem_of("dmsp-20-300"), tmp_path, C99(), name="plant")
+    (tmp_path / "use.cpp").write_text(
+        '#include "plant.h"\nint main() { return PLANT_STATE_AIR_MASS + PLANT_INPUT_FILL; }\n'
+    )
+    command = [printed.require("g++"), "-Wall", "-Werror", "-pedantic", "-c", "use.cpp"]
+    assert subprocess.run(command, cwd=tmp_path, capture_output=True).returncode == 0
+
+
+@TARGETS
+def test_constants_take_the_place_of_parameters_that_are_not_tunable(target, tmp_path):
+    problem = problem_of("dmsp-20-300", duration=0.2)
+    write_program(problem, tmp_path / "all", target, name="plant")
+    write_program(problem, tmp_path / "one", target, name="plant", tunable=["mechanism.mass"])
+    check_run(*RUN[target](tmp_path / "one"), problem)
+    source = {".mjs": "plant.mjs", ".c": "plant.c", ".m": "plant.m"}
+    [name] = [n for n in source.values() if (tmp_path / "one" / n).exists()]
+    whole, less = ((tmp_path / f / name).read_text() for f in ("all", "one"))
+    assert len(less) < len(whole)
+    assert [text.count("'mechanism.mass'") + text.count('"mechanism.mass"') for text in (whole, less)] == [1, 1]
+    assert [text.count("'mechanism.gravity'") + text.count('"mechanism.gravity"') for text in (whole, less)] == [1, 0]
+
+
+def test_a_tunable_parameter_changes_the_run(tmp_path):
+    """JavaScript: a heavier mass as an argument of `simulate`, against the heavier plant of the library."""
+    problem = problem_of("dmsp-20-300", duration=0.2)
+    heavier = dataclasses.replace(problem, system=dataclasses.replace(problem.system, mechanism=HangingMass(12.0)))
+    write_program(problem, tmp_path, JavaScript(), name="plant", tunable=["mechanism.mass"])
+    script = 'import {simulate} from "./plant.mjs";\nconsole.log(JSON.stringify(simulate({parameters: [12.0]}).columns.position));'
+    found = np.array(printed.run_node(script, {}, tmp_path))
+    expected = solve(heavier).recording["position"]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+
+
+# Laws
+
+
+def closed_form_laws():
+    """The laws of the library in closed form, by name."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        laws = {name: load_law(name).characteristic for name in list_laws()}
+    return {name: law for name, law in laws.items() if law.traceable}
+
+
+def law_points(law, count=40):
+    """Points of the two arguments of the closed form of a law."""
+    rng = np.random.default_rng(3)
+    pressure, contraction, force = (
+        rng.uniform(1e4, 5e5, count),
+        rng.uniform(0.005, 0.2, count),
+        rng.uniform(1, 500, count),
+    )
+    for method, (a, b) in {
+        "force": (pressure, contraction),
+        "contraction": (pressure, force),
+        "pressure": (contraction, force),
+    }.items():
+        base = {"force": "ForceLaw", "contraction": "ContractionLaw", "pressure": "PressureLaw"}[method]
+        if base in {cls.__name__ for cls in type(law).__mro__}:
+            return method, a, b
+    raise AssertionError(type(law))
+
+
+def law_values(law):
+    """Value and derivatives (N, 3) of the closed form; of a force law the stiffness."""
+    method, a, b = law_points(law)
+    slopes = [autodiff.derivative(law, method, a, b, wrt=i) for i in range(2)]
+    if method == "force":
+        np.testing.assert_allclose(-slopes[1], law.stiffness(a, b), rtol=1e-13)
+        slopes[1] = -slopes[1]
+    return np.column_stack([getattr(law, method)(a, b), *slopes])
+
+
+def test_every_closed_form_law_has_its_value_and_slopes_in_javascript(tmp_path):
+    printed.require("node")
+    data = {}
+    for i, law in enumerate(closed_form_laws().values()):
+        write_law(law, tmp_path, JavaScript(), name=f"law{i}")
+        data[f"law{i}"] = np.column_stack(law_points(law)[1:]).tolist()
+    script = """
+import {readFileSync} from "fs";
+const found = {};
+for (const [name, points] of Object.entries(JSON.parse(readFileSync("data.json")))) {
+  const {law, results} = await import(`./${name}.mjs`);
+  found[name] = points.map(([a, b]) => { const at = law(a, b); return results.map((r) => at[r]); });
+}
+console.log(JSON.stringify(found));
+"""
+    found = printed.run_node(script, data, tmp_path)
+    worst = {
+        name: printed.deviation(np.array(found[f"law{i}"], dtype=float), law_values(law))
+        for i, (name, law) in enumerate(closed_form_laws().items())
+    }
+    assert {name: d for name, d in worst.items() if not d < 1e-12} == {}
+
+
+def test_every_closed_form_law_has_its_value_and_slopes_in_c(tmp_path):
+    sources = []
+    for i, law in enumerate(closed_form_laws().values()):
+        write_law(law, tmp_path, C99(), name=f"law{i}")
+        sources.append(f'#include "law{i}.c"')
+    library = printed.shared_library("\n".join([*sources, ""]), tmp_path, "laws", "-O0")
+    for i, (name, law) in enumerate(closed_form_laws().items()):
+        _, a, b = law_points(law)
+        c, defaults = np.zeros(500), (ctypes.c_double * 500).in_dll(library, f"law{i}_defaults")
+        getattr(library, f"law{i}_prepare")(defaults, ctypes.c_void_p(c.ctypes.data))
+        rows = np.empty((a.size, 3))
+        for row, x, y in zip(rows, a.tolist(), b.tolist(), strict=True):
+            printed.call(getattr(library, f"law{i}_evaluate"), x, y, c, row)
+        assert printed.deviation(rows, law_values(law)) < 1e-12, name
+
+
+def test_a_law_in_octave_takes_arrays(tmp_path):
+    law = load_law("dmsp-20-300").characteristic
+    write_law(law, tmp_path, Octave(), name="festo")
+    script = "[f, s, k] = festo(3e5, [0.05; 0.1; 0.15]); printf('%.17g ', [f, s, k]');"
+    done = subprocess.run(
+        [printed.require("octave-cli"), "--no-init-file", "--quiet", "--eval", script],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    found = np.array(done.stdout.split(), dtype=float).reshape(3, 3)
+    contraction = np.array([0.05, 0.1, 0.15])
+    slopes = law.slopes(3e5, contraction)
+    expected = np.column_stack([law.force(3e5, contraction), slopes.by_pressure, -slopes.by_contraction])
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+@TARGETS
+def test_a_law_without_closed_form_is_refused_by_name(target, tmp_path):
+    table = Tabulated((0.0, 0.0, 1e5, 1e5), (0.0, 0.1, 0.0, 0.1), (10.0, 0.0, 100.0, 50.0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        exact = load_law("saga2007-exact").characteristic
+    for law in (table, exact):
+        kind = type(law).__name__
+        with pytest.raises(ParameterError, match=rf"{kind} has no closed form .* as_force_law\(law, validity_range\)"):
+            write_law(law, tmp_path / "law", target)
+    assert not (tmp_path / "law").exists()
+
+
+# Names, provenance and files
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("left.pressure", "left_pressure"),
+        ("épaule gauche", "epaule_gauche"),
+        ("筋", "u7B4B"),
+        ("α-muscle", "u3B1_muscle"),
+        ("3 kg", "n_3_kg"),
+        ("_x__y_", "x_y"),
+        ("", "n"),
+        ("while", "while_"),
+        ("End", "End_"),
+        ("NUL", "NUL_"),
+        ("*/ int x;", "int_x"),
+        ("a\nb", "a_b"),
+        ("../../etc", "etc"),
+        ("\ud800", "n"),
+    ],
+)
+def test_a_name_becomes_an_identifier(name, expected):
+    assert make_identifiers([name]) == (expected,)
+
+
+def test_identifiers_are_distinct_in_any_case_and_of_limited_length():
+    names = ["a.b", "a_b", "A b", "x" * 300, "x" * 299 + "y", "X" * 300, *(["same"] * 30), "same_2", "µ", "μ"]
+    words = make_identifiers(names)
+    assert len({word.casefold() for word in words}) == len(names)
+    assert all(re.fullmatch(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*_?", word) for word in words)
+    assert max(map(len, words)) <= LONGEST
+    assert not RESERVED.intersection(words)
+    assert make_identifiers(names) == words
+    assert all(make_identifiers([word]) == (word,) for word in words)
+
+
+def test_names_of_users_cannot_leave_their_text(tmp_path):
+    """Quotes, comment ends, keywords, trigraphs and other alphabets in the name of a muscle, in every language."""
+    names = ('*/ "\\', "while'??/", "筋肉 % \u2028")
+    base = plants.EXAMPLES["joint with stops"]
+    for left in names:
+        muscles = tuple(dataclasses.replace(m, name=n) for m, n in zip(base.muscles, (left, "right"), strict=True))
+        plant = dataclasses.replace(base, muscle=muscles)
+        problem = Problem(plant, Schedule({}), 0.02, plant.state_at(pressure=1e5))
+        for target in (C99(), JavaScript()):
+            folder = tmp_path / f"{names.index(left)}{type(target).__name__}"
+            write_program(problem, folder, target, name="plant", title=f"{left} */ \n int x; \\")
+            _, csv = RUN[target](folder)
+            assert len(csv.splitlines()) > 3
+
+
+@TARGETS
+def test_every_file_states_where_it_comes_from(target, tmp_path):
+    problem = problem_of("dmsp-20-300")
+    for path in write_program(problem, tmp_path, target, name="plant", title="A title"):
+        text = path.read_text()
+        assert re.search(r"Exported by airmuscle \d+\.\d+\.\d+\.", text), path
+        assert re.search(r"SHA-256 of the model: [0-9a-f]{64}", text)
+        assert "BSD-3-Clause" in text
+        assert "mechanism.mass = 10.0 kg" in text
+        assert "Hairer" in text
+        assert "Martens" in text
+
+
+@TARGETS
+def test_files_are_the_same_every_time_and_change_with_the_model(target, tmp_path):
+    def contents(folder, problem):
+        return [path.read_bytes() for path in write_program(problem, tmp_path / folder, target, name="plant")]
+
+    first, second = contents("a", problem_of("dmsp-20-300")), contents("b", problem_of("dmsp-20-300"))
+    assert first == second
+    base = problem_of("dmsp-20-300")
+    heavier = dataclasses.replace(base, system=dataclasses.replace(base.system, mechanism=HangingMass(10.000001)))
+    assert all(a != b for a, b in zip(first, contents("c", heavier), strict=True))
+
+
+def test_nothing_half_written_is_left_where_the_target_cannot_be_written(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("here")
+    with pytest.raises(FileError, match=r"file: cannot be written to: .* Specify a folder with write permission"):
+        write_program(problem_of("dmsp-20-300"), tmp_path / "file", C99())
+    written = Path.write_bytes
+
+    def full(path, data):
+        if path.name == "main.c":
+            raise OSError(28, "No space left on device", str(path))
+        return written(path, data)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_program(problem_of("dmsp-20-300"), tmp_path / "new", C99())
+    assert not (tmp_path / "new").exists()
+
+
+# What is refused
+
+
+def test_a_controller_is_refused_by_name(tmp_path):
+    plant = plants.EXAMPLES["dmsp-20-300"]
+    loop = ControlLoop(PID("pressure", "fill", 1e-5), 0.01, Schedule({"pressure": ((0.0, 2e5),)}))
+    problem = Problem(plant, loop, 0.1, plant.state_at(pressure=1e5))
+    with pytest.raises(ParameterError, match="the controller PID cannot be exported to this target"):
+        write_program(problem, tmp_path, JavaScript())
+
+
+@pytest.mark.parametrize(
+    ("tunable", "message"),
+    [
+        ("mechanism.mas", r"Plant has no parameter 'mechanism\.mas'.*Did you mean 'mechanism\.mass'\?"),
+        ("circuit.segment_count", "has no parameter"),
+        ("mechanism", "'mechanism' is fixed when a program is printed, because it determines the equations"),
+        ("muscle.name", "'muscle.name' is fixed when a program is printed"),
+    ],
+)
+def test_a_parameter_that_cannot_be_tunable_is_refused(tunable, message, tmp_path):
+    with pytest.raises(ParameterError, match=message):
+        write_program(problem_of("dmsp-20-300"), tmp_path, C99(), tunable=[tunable])
+
+
+@pytest.mark.parametrize("name", ["while", "2x", "a b", "a__b", "x" * 300, "../up", "π"])
+def test_a_name_that_is_no_identifier_is_refused_with_one_that_is(name, tmp_path):
+    with pytest.raises(ParameterError, match=r"cannot be the name of an exported program.* Use '\w+'\.") as caught:
+        write_program(problem_of("dmsp-20-300"), tmp_path, C99(), name=name)
+    remedy = re.search(r"Use '(\w+)'", str(caught.value)).group(1)
+    assert write_program(problem_of("dmsp-20-300"), tmp_path, C99(), name=remedy)
+
+
+def test_an_unknown_column_is_refused_with_the_nearest(tmp_path):
+    with pytest.raises(ParameterError, match=r"no column 'presure'.*Did you mean 'pressure'"):
+        write_program(problem_of("dmsp-20-300"), tmp_path, C99(), columns=["presure"])
+
+
+# The command
+
+
+def airmuscle(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
+
+
+def test_the_command_writes_a_program_that_runs(tmp_path):
+    done = airmuscle("export", EXAMPLES / "fill_discharge.toml", "--to", "c", "--out", tmp_path)
+    assert done.exit_code == 0, done.output
+    assert {path.name for path in tmp_path.iterdir()} == {"fill_discharge.h", "fill_discharge.c", "main.c"}
+    assert "cc -O2 fill_discharge.c main.c -lm -o run && ./run run.csv" in done.output
+    text, csv = run_c(tmp_path)
+    assert "404 steps" in text
+    assert csv.startswith("time [s],air_mass [kg],")
+
+
+def test_the_command_exports_a_law(tmp_path):
+    done = airmuscle("export", "dmsp-20-300", "--law", "--to", "js", "--out", tmp_path, "--json")
+    assert done.exit_code == 0, done.output
+    assert [path.name for path in tmp_path.iterdir()] == ["dmsp_20_300.mjs"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--to", "fortran"), "--to fortran: there are c, js, octave"),
+        (("--to", "c", "--law", "--tunable", "x"), "all parameters of a law can be changed"),
+    ],
+)
+def test_the_command_refuses_a_wrong_use(arguments, message, tmp_path):
+    done = airmuscle("export", "dmsp-20-300", *arguments, "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert message in " ".join(done.output.replace("│", " ").split())
+    assert not (tmp_path / "out").exists()
