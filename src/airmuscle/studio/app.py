@@ -16,7 +16,14 @@ from ..core.errors import AirmuscleError
 from ..library.files import LAWS, list_laws, read_toml
 from .page import self_contained_page, server_page, web_files
 from .security import COOKIE, Access, Application, given_token, secured
-from .tasks import sheet_of_law, sheet_of_law_text
+from .tasks import (
+    plant_names,
+    plant_title,
+    sheet_of_law,
+    sheet_of_law_text,
+    sheet_of_offered_plant,
+    sheet_of_scenario_text,
+)
 from .uploads import MAX_TEXT
 from .worker import LimitError, WorkerPool
 
@@ -78,9 +85,10 @@ class Sheets:
 
 
 def library_list() -> dict[str, Any]:
-    """Names and titles of the laws of the library."""
+    """Names and titles of the laws and plants that the page offers."""
     laws = [{"name": name, **_texts(read_toml(LAWS / f"{name}.toml"))} for name in list_laws()]
-    return {"version": metadata.version("airmuscle"), "laws": laws, "plants": []}
+    plants = [{"name": name, **plant_title(name)} for name in plant_names()]
+    return {"version": metadata.version("airmuscle"), "laws": laws, "plants": plants}
 
 
 def _texts(tables: Mapping[str, Any]) -> dict[str, Any]:
@@ -103,6 +111,8 @@ def create_app(
         Route("/api/library", handlers.library),
         Route("/api/law/{name}", handlers.law),
         Route("/api/law", handlers.own_law, methods=["POST"]),
+        Route("/api/plant/{name}", handlers.plant),
+        Route("/api/plant", handlers.own_plant, methods=["POST"]),
         Route("/api/page", handlers.save_page, methods=["POST"]),
     ]
     errors: dict[Any, Any] = {AirmuscleError: _refused, 404: _missing, 405: _missing, 500: _failed}
@@ -161,6 +171,18 @@ class Handlers:
         """The sheet of a text of a user."""
         text = decoded(await limited_body(request, MAX_TEXT))
         return await self._computed(self._sheets.of_text, sheet_of_law_text, text)
+
+    async def plant(self, request: Any) -> Any:
+        """The sheet of a plant that the page offers."""
+        name = request.path_params["name"]
+        if name not in plant_names():
+            raise BadRequest(f"there is no plant '{name[:80]}'.", 404)
+        return await self._computed(self._sheets.of_library, sheet_of_offered_plant, name)
+
+    async def own_plant(self, request: Any) -> Any:
+        """The sheet of a scenario of a user."""
+        text = decoded(await limited_body(request, MAX_TEXT))
+        return await self._computed(self._sheets.of_text, sheet_of_scenario_text, text)
 
     async def _computed(self, function: Callable[..., dict[str, Any]], *arguments: Any) -> Any:
         from starlette.concurrency import run_in_threadpool

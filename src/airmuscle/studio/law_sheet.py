@@ -71,14 +71,14 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
         "toml": _toml(entry, bool(errors) or len(rows) > MAX_PARAMETERS),
     }
     sheet["id"] = hashlib.sha256((program.text + json.dumps(sheet)).encode()).hexdigest()[:32]
-    sheet["script"] = script_text(sheet["id"], program.text, program.functions)
+    sheet["script"] = script_text(sheet["id"], program.text, ("prepare", *program.functions))
     return sheet
 
 
 def script_text(identifier: str, text: str, functions: tuple[str, ...]) -> str:
     """A program as a script that enters its functions into the table of the page."""
-    names = ", ".join(("prepare", *functions))
-    return f'"use strict";\nairmusclePrograms["{identifier}"] = (() => {{\n{text}\nreturn {{ {names} }};\n}})();\n'
+    result = f"return {{ {', '.join(functions)} }};"
+    return f'"use strict";\nairmusclePrograms["{identifier}"] = (() => {{\n{text}\n{result}\n}})();\n'
 
 
 def _in_closed_form(entry: Entry) -> tuple[Characteristic, dict[str, Any] | None]:

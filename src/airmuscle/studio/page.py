@@ -23,6 +23,10 @@ SCRIPTS = (
     "scripts/muscle-chart.js",
     "scripts/muscle-point.js",
     "scripts/muscle-tab.js",
+    "scripts/plant-run.js",
+    "scripts/plant-drawing.js",
+    "scripts/plant-traces.js",
+    "scripts/plant-tab.js",
     "scripts/main.js",
 )
 """Scripts in the order in which the page runs them."""

@@ -153,6 +153,7 @@
       this.about.replaceChildren(...aboutLaw(law.sheet));
       this.curves(false);
       this.showPoint();
+      this.host.dataset.shown = this.laws.map((item) => item.sheet.name).join(" ");
     }
 
     curves(keepAxes) {
