@@ -135,6 +135,8 @@ def _column_rows(columns: Any, units: Mapping[str, str]) -> list[dict[str, Any]]
         factor, unit = display_scale(name)
         if units[name] == "rad":
             factor, unit = 180.0 / np.pi, "deg"
+        elif units[name] == "Pa":
+            factor, unit = 1e-3, "kPa"
         elif not unit:
             factor, unit = 1.0, units[name]
         rows.append({"name": name, "factor": factor, "unit": "" if unit in ("1", "-") else unit})

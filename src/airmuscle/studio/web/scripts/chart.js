@@ -40,7 +40,7 @@
       const colours = Object.fromEntries(["ink", "soft", "line", "c1", "c2", "c3", "c4", "c5", "c6", "shade", "card"].map((n) => [n, airmuscle.colour(n)]));
       this.colours = colours;
       const axis = (label, side) => ({
-        label, stroke: colours.ink, font: FONT, labelFont: FONT, labelSize: 24, size: side === 3 ? 58 : 40, side,
+        ...(label ? { label } : {}), stroke: colours.ink, font: FONT, labelFont: FONT, labelSize: 24, size: side === 3 ? 58 : 40, side,
         grid: { stroke: colours.line, width: 1 }, ticks: { stroke: colours.line, width: 1 },
         values: (u, values) => values.map((v) => (v === null ? "" : airmuscle.shortText(v, 6))),
       });

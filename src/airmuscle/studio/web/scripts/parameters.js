@@ -57,14 +57,18 @@
     return { holder, show };
   }
 
-  /* All parameters of a sheet; changed(index, value) */
+  /* Rows in groups of one part of a plant each; one group without a heading for a law. */
   class ParameterPanel {
     constructor(host) { this.host = host; this.rows = []; }
 
-    show(table, values, changed) {
+    /* changed(index, value); groupOf(path) names the group of a row */
+    show(table, values, changed, groupOf = () => "") {
       this.table = table;
       this.rows = table.map((row, i) => parameterRow(row, values[i], (v) => changed(i, v)));
-      this.host.replaceChildren(...this.rows.map((row) => row.holder));
+      const groups = new Map();
+      table.forEach((row, i) => { const name = groupOf(row.path); groups.set(name, [...(groups.get(name) ?? []), this.rows[i].holder]); });
+      const parts = [...groups].map(([name, holders], k) => (name ? element("details", { open: k === 0 }, element("summary", {}, `${name} (${holders.length})`), ...holders) : element("div", {}, ...holders)));
+      this.host.replaceChildren(...parts);
     }
 
     reset() { this.rows.forEach((row, i) => row.show(this.table[i].value, false)); }

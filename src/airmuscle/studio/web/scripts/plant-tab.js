@@ -95,7 +95,7 @@
       }
       if (state.schedule && validSchedule(state.schedule, sheet)) { this.schedule = state.schedule; this.duration = Math.min(MOST_LIVE, Math.max(0.1, Number(state.duration) || sheet.duration)); }
       this.select.value = sheet.own_text ? "" : sheet.name;
-      this.parameters.show(sheet.parameters, sheet.parameters.map((row) => this.run.values[row.places[0]]), (i, value) => { this.run.set(sheet.parameters[i], value); this.changed(); });
+      this.parameters.show(sheet.parameters, sheet.parameters.map((row) => this.run.values[row.places[0]]), (i, value) => { this.run.set(sheet.parameters[i], value); this.changed(); }, (path) => groupName(path, sheet));
       this.about.replaceChildren(element("p", {}, element("strong", {}, sheet.title)), ...(sheet.warning ? [element("p.message", {}, sheet.warning)] : []), element("p.soft", {}, `Numbers: ${sheet.provenance}. ${sheet.note}`), element("ul", {}, ...sheet.references.map((r) => element("li", {}, r))));
       this.drawing.begin(this.run);
       this.traces.begin(sheet, state.shown);
@@ -105,9 +105,10 @@
     }
 
     buildInputs() {
+      const first = this.run.program.run.segments.values[0] ?? [];
       this.sliders = this.sheet.inputs.map((input, index) => {
         const low = input.minimum ?? 0, high = input.maximum ?? (input.unit === "Pa" ? 6e5 : 1), factor = input.unit === "Pa" ? 1e5 : 1, unit = input.unit === "Pa" ? "bar" : input.unit;
-        const slider = element("input", { type: "range", min: low, max: high, step: (high - low) / 200, value: Math.max(low, 0), "aria-label": `Input ${input.name}` });
+        const slider = element("input", { type: "range", min: low, max: high, step: (high - low) / 200, value: first[index] ?? Math.max(low, 0), "aria-label": `Input ${input.name}` });
         const output = element("output", {}, ""), show = () => { output.textContent = `${shortText(Number(slider.value) / factor, 3)} ${unit}`; slider.setAttribute("aria-valuetext", output.textContent); };
         slider.addEventListener("input", () => { show(); if (this.mode !== "live") this.setMode("live"); this.live.drive(index, Number(slider.value)); this.play(); });
         const push = (value) => { slider.value = String(value); slider.dispatchEvent(new Event("input")); };
@@ -234,6 +235,14 @@
     }
 
     sheets() { return this.sheet ? [this.sheet.id] : []; }
+  }
+
+  /* Part of the plant that a parameter belongs to: "mechanism", "circuit of left", "muscle right". */
+  function groupName(path, sheet) {
+    const [, part, index] = /^(\w+)(?:\[(\d+)\])?/.exec(path);
+    if (index === undefined) return part;
+    const name = sheet.muscles[Number(index)]?.name ?? index;
+    return part === "muscle" ? `muscle ${name}` : `${part} of ${name}`;
   }
 
   /* Whether a schedule of an address fits the inputs. */

@@ -4,7 +4,7 @@
 (() => {
   const { Chart, element } = airmuscle;
   const COLOURS = ["c1", "c2", "c3", "c4", "c5", "c6"], DASHES = [[], [8, 5], [2, 4], [], [8, 5], [2, 4]];
-  const TITLES = { pressure: "gauge pressure", force: "force", contraction: "contraction", angle: "angle", position: "position" };
+  const TITLES = { pressure: "gauge pressure" };
 
   const last = (name) => name.slice(name.lastIndexOf(".") + 1);
 
@@ -12,7 +12,7 @@
   function groupsOf(sheet) {
     const inputs = new Set(sheet.inputs.map((i) => i.name)), groups = new Map();
     for (const column of sheet.columns) {
-      const key = inputs.has(column.name) ? `input [${column.unit || "1"}]` : `${(TITLES[last(column.name)] ?? last(column.name)).replaceAll("_", " ")} [${column.unit || "1"}]`;
+      const key = inputs.has(column.name) ? (column.unit ? `input [${column.unit}]` : "input") : `${(TITLES[last(column.name)] ?? last(column.name)).replaceAll("_", " ")} [${column.unit || "1"}]`;
       if (!groups.has(key)) groups.set(key, []);
       groups.get(key).push(column);
     }
@@ -45,9 +45,9 @@
       for (const key of this.groups.keys()) {
         if (!this.shown.has(key)) continue;
         const host = element("div"), columns = this.groups.get(key);
-        const keyRow = columns.length > 1 ? element("div.row.small", {}, ...columns.slice(0, 6).map((c, i) => element("span.row", {}, element(`span.swatch.${COLOURS[i]}`), c.name))) : null;
-        this.holder.append(element("div", {}, keyRow, host));
-        this.charts.set(key, new Chart(host, { label: `${key} over time`, x: "time [s]", y: key, height: 170, overlay: (...drawing) => this.drawCursor(...drawing) }));
+        const names = columns.length > 1 ? columns.slice(0, 6).map((c, i) => element("span.row.soft", {}, element(`span.swatch.${COLOURS[i]}`), key.startsWith("input") ? c.name : c.name.slice(0, c.name.lastIndexOf(".")))) : [];
+        this.holder.append(element("div", {}, element("div.row.small", {}, element("strong", {}, key), ...names), host));
+        this.charts.set(key, new Chart(host, { label: `${key} over time`, x: "time [s]", y: "", height: 158, overlay: (...drawing) => this.drawCursor(...drawing) }));
       }
     }
 
@@ -77,6 +77,7 @@
       const x = chart.px(this.cursor);
       ctx.strokeStyle = chart.colours.soft;
       ctx.lineWidth = 1;
+      ctx.setLineDash([]);
       ctx.beginPath();
       ctx.moveTo(x, box.top);
       ctx.lineTo(x, box.top + box.height);
