@@ -77,6 +77,7 @@
     stiffness(pressure, contraction) {
       if (this.program.force) { this.printed("force", pressure, contraction); return -this.f[2]; }
       const force = this.force(pressure, contraction);
+      if (Number.isNaN(force)) return NaN;
       if (this.sheet.kind === "contraction") { this.printed("contraction", pressure, force); return -1 / this.f[2]; }
       this.printed("pressure", contraction, force);
       return this.f[1] / this.f[2];
