@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from studio_pages import BEGINNING, run_script, scripts
+from studio_pages import BEGINNING, WEB, run_script, scripts
 
 import airmuscle as am
 from airmuscle.core import flatten, leaves
@@ -278,3 +278,27 @@ def test_a_page_that_cannot_be_written_leaves_no_file(tmp_path):
     with pytest.raises(ParameterError, match="allowed range: at most 12"):
         export_page(["dmsp-20-300"] * 13, tmp_path / "page.html")
     assert list(tmp_path.iterdir()) == []
+
+
+def luminance(colour):
+    """Relative luminance of #rrggbb, WCAG 2.2."""
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+    return float(np.dot([0.2126, 0.7152, 0.0722], linear))
+
+
+def contrast(a, b):
+    low, high = sorted((luminance(a), luminance(b)))
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
+def test_colours_of_the_page_have_the_contrast_of_wcag_aa(theme):
+    """4.5 for texts, 3 for curves and edges of fields."""
+    block = re.findall(r":root[^{]*\{(.*?)\}", (WEB / "style.css").read_text(encoding="utf-8"), re.DOTALL)[theme]
+    colours = dict(re.findall(r"--([\w-]+): (#\w{6})", block))
+    texts = [(a, b) for a in ("ink", "soft", "accent") for b in ("card", "ground")]
+    texts += [("on-accent", "accent"), ("ink", "wash"), ("error", "error-wash"), ("soft", "wash"), ("card", "ink")]
+    curves = [(f"c{i}", "card") for i in range(1, 7)] + [("edge", "card"), ("edge", "ground")]
+    pairs = [*((pair, 4.5) for pair in texts), *((pair, 3.0) for pair in curves)]
+    assert {pair: c for pair, least in pairs if (c := contrast(colours[pair[0]], colours[pair[1]])) < least} == {}
