@@ -82,7 +82,7 @@ def assert_failed(result: Result, message: str) -> None:
 
 NAMES = (
     "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "campaign",
-    "fit-volume", "plan", "bench", "simulate", "sweep", "export", "schema",
+    "fit-volume", "plan", "bench", "simulate", "sweep", "export", "studio", "schema",
 )  # fmt: skip
 
 

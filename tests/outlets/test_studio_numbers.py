@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import re
 import tomllib
 from pathlib import Path
@@ -10,8 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from studio_pages import BEGINNING, WEB, run_script, scripts
+from typer.testing import CliRunner
 
 import airmuscle as am
+from airmuscle.cli.app import app
 from airmuscle.core import flatten, leaves
 from airmuscle.core.errors import FileError, ParameterError, PhysicsError, TraceError
 from airmuscle.core.tree import with_parameters
@@ -21,7 +24,8 @@ from airmuscle.library.files import list_laws, list_plants
 from airmuscle.library.location import Location
 from airmuscle.library.write import to_toml
 from airmuscle.scenario.scenario import build_scenario
-from airmuscle.studio import export_page, law_sheet
+from airmuscle.studio import export_page
+from airmuscle.studio.law_sheet import law_sheet
 from airmuscle.studio.tasks import plant_names, sheet_of_any, sheet_of_scenario_text
 from airmuscle.studio.toml_template import fill_template
 
@@ -302,3 +306,26 @@ def test_colours_of_the_page_have_the_contrast_of_wcag_aa(theme):
     curves = [(f"c{i}", "card") for i in range(1, 7)] + [("edge", "card"), ("edge", "ground")]
     pairs = [*((pair, 4.5) for pair in texts), *((pair, 3.0) for pair in curves)]
     assert {pair: c for pair, least in pairs if (c := contrast(colours[pair[0]], colours[pair[1]])) < least} == {}
+
+
+def test_the_command_writes_a_page_and_names_a_missing_package(tmp_path, monkeypatch):
+    runner = CliRunner()
+    file = tmp_path / "page.html"
+    done = runner.invoke(app, ["studio", "tondu-lopez", "--export", str(file)])
+    assert (done.exit_code, done.stdout) == (0, f"page: {file}\n")
+    assert file.read_text(encoding="utf-8").startswith("<!doctype html>")
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    done = runner.invoke(app, ["studio"])
+    assert done.exit_code == 1
+    assert (
+        "error: the studio needs starlette and uvicorn. Install the extra: pip install 'airmuscle[studio]'"
+        in done.stderr
+    )
+
+
+@pytest.mark.parametrize("name", ["unknown-muscle", "matrix-821", "missing.toml"])
+def test_the_command_names_what_cannot_be_shown(name):
+    done = CliRunner().invoke(app, ["studio", name, "--no-browser"])
+    assert done.exit_code == 1
+    assert done.stderr.startswith("error: ")
+    assert name in done.stderr

@@ -14,7 +14,7 @@ from airmuscle.core.errors import InputError, ParameterError
 from airmuscle.library.write import to_toml
 from airmuscle.studio.app import MAX_PAGE, create_app
 from airmuscle.studio.security import Access, is_loopback
-from airmuscle.studio.serve import access_of, bound_socket
+from airmuscle.studio.server import access_of, bound_socket
 from airmuscle.studio.uploads import MAX_TEXT, read_text_tables
 from airmuscle.studio.worker import LimitError, WorkerPool
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from ..studio import export_page, serve
-from ..studio.export_page import open_sheets
+from ..studio.single_file import open_sheets
 from .terminal import echo
 
 

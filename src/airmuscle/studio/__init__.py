@@ -1,7 +1,6 @@
 """Studio: a page in the browser that shows muscles and plants, computed in the page by printed programs."""
 
-from .export_page import export_page
-from .law_sheet import law_sheet
-from .serve import serve
+from .server import serve
+from .single_file import export_page
 
-__all__ = ["export_page", "law_sheet", "serve"]
+__all__ = ["export_page", "serve"]
