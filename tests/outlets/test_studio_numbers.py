@@ -182,7 +182,7 @@ console.log(JSON.stringify([r.status, r.steps, r.columns]));
 @pytest.mark.parametrize("name", ["lift", "joint-dmsp-20-proportional", pytest.param("joint-dmsp-20-matrix", marks=pytest.mark.slow)])  # fmt: skip
 def test_a_run_of_the_page_is_that_of_the_library(name, tmp_path):
     sheet = sheet_of_any(name)
-    text = scripts("numbers") + sheet.pop("script") + scripts("plant-run") + RUN
+    text = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + RUN
     status, _, columns = run_script(text, sheet, tmp_path)
     assert status == 0
     scenario = scenario_of(name)
@@ -224,7 +224,7 @@ console.log(JSON.stringify([live.schedule, live.columns, again.columns]));
 def test_a_run_by_hand_is_the_run_of_its_schedule(tmp_path):
     """To the tolerance of the integrator: a run by hand meets every row with a step, the schedule interpolates."""
     sheet = sheet_of_any("lift")
-    text = scripts("numbers") + sheet.pop("script") + scripts("plant-run") + BY_HAND
+    text = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + BY_HAND
     schedule, live, again = run_script(text, sheet, tmp_path)
     assert [name for name in schedule if schedule[name]] == ["fill", "discharge"]
     for column in ("pressure", "position", "air_mass"):
@@ -232,8 +232,7 @@ def test_a_run_by_hand_is_the_run_of_its_schedule(tmp_path):
         np.testing.assert_allclose(again[column], live[column], atol=2e-5 * size)
 
 
-def test_a_scenario_of_a_user_is_read_with_its_parameters():
-    text = """
+OWN = """
 title = "own"
 [plant]
 muscle = "dmsp-20-300"
@@ -244,11 +243,49 @@ fill = [["1 s", 1]]
 [run]
 duration = "2 s"
 """
-    sheet = sheet_of_scenario_text(text)
+START = """
+const run = new airmuscle.PlantRun(DATA[0]);
+for (const [path, value] of Object.entries(DATA[1])) run.set(DATA[0].parameters.find((row) => row.path === path), value);
+console.log(JSON.stringify([run.initial.settled, Array.from(run.initial.state), Array.from(run.values)]));
+"""
+CHANGES = {
+    "lift": ({"mechanism.mass": 17.0}, {"muscle.contractile.geometry.radius": 0.012, "ambient.pressure": 9e4}),
+    "joint-dmsp-20-proportional": ({"mechanism.weight_torque": 4.0, "mechanism.radius": 0.035},),
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_run_with_other_parameters_begins_at_their_equilibrium(name, tmp_path):
+    sheet = sheet_of_any(name)
+    text = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + START
+    scenario = scenario_of(name)
+    pressure = 2.5e5 if name.startswith("joint") else 0.0
+    for changes in CHANGES[name]:
+        settled, state, values = run_script(text, [sheet, changes], tmp_path)
+        plant = with_parameters(scenario.plant, values)
+        expected = am.find_equilibrium(plant, pressure=pressure)
+        assert settled
+        for variable, found in zip(plant.states, state, strict=True):
+            assert found == pytest.approx(expected[variable.name], rel=1e-8, abs=1e-9 * variable.nominal)
+
+
+def test_a_start_that_the_page_cannot_find_is_the_original_one(tmp_path):
+    """With an energy balance, the temperature of the air depends on the parameters as well."""
+    sheet = sheet_of_scenario_text(
+        OWN.replace("[plant]", '[plant]\ngas = { model = "EnergyBalance", heat_transfer = 1.0 }')
+    )
+    text = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + START
+    settled, state, _ = run_script(text, [sheet, {"mechanism.mass": 7.0}], tmp_path)
+    assert not settled
+    assert run_script(text, [sheet, {}], tmp_path)[:2] == [True, state]
+
+
+def test_a_scenario_of_a_user_is_read_with_its_parameters():
+    sheet = sheet_of_scenario_text(OWN)
     rows = {row["path"]: row for row in sheet["parameters"]}
     assert rows["mechanism.mass"]["value"] == 5.0
     assert len(rows["muscle.contractile.geometry.radius"]["places"]) == 2
-    assert sheet["own_text"] == text
+    assert sheet["own_text"] == OWN
     values = list(sheet["values"])
     values[rows["mechanism.mass"]["places"][0]] = 7.5
     parts = sheet["toml"]

@@ -23,6 +23,7 @@ SCRIPTS = (
     "scripts/muscle-chart.js",
     "scripts/muscle-point.js",
     "scripts/muscle-tab.js",
+    "scripts/plant-start.js",
     "scripts/plant-run.js",
     "scripts/plant-drawing.js",
     "scripts/plant-traces.js",

@@ -21,7 +21,7 @@ from ..library.write import part_toml, tables_toml
 from ..mechanism import AntagonisticJoint, HangingMass
 from ..plant.plant import Plant
 from ..recording.display_units import display_scale
-from ..scenario.scenario import TABLES, Scenario, build_scenario
+from ..scenario.scenario import TABLES, Scenario, build_scenario, initial_pressure
 from .law_sheet import parameter_row, script_text
 from .toml_template import toml_template
 
@@ -59,6 +59,7 @@ def sheet_of_tables(
         "provenance": str(tables.get("provenance", _SOURCES[0])),
         "note": str(tables.get("note", "")),
         "warning": str(tables.get("warning", "")),
+        "start_equilibrium": initial_pressure(tables, location) is not None,
         "duration": scenario.problem.duration,
         "values": program.system.defaults.tolist(),
         "parameters": _parameter_rows(plant, sources),

@@ -17,7 +17,13 @@
       this.prepare();
     }
 
-    prepare() { this.program.prepare(this.values, this.held); }
+    prepare() {
+      this.program.prepare(this.values, this.held);
+      this.started = null;
+    }
+
+    /* Initial state with the present parameters, and whether it was found. */
+    get initial() { return (this.started ??= airmuscle.startState(this)); }
 
     get start() { return this.program.run.start; }
 
@@ -39,7 +45,7 @@
 
     /* The whole run through segments {ends, values, slopes}; status is "done" or the reason why it ended. */
     scheduled(segments, rowTime) {
-      const solver = new this.program.Solver(this.held, this.start, this.program.run.initial), columns = this.empty();
+      const solver = new this.program.Solver(this.held, this.start, this.initial.state), columns = this.empty();
       let row = 0, status = 0, taken = 0;
       const timeOf = (k) => this.start + k * rowTime, end = segments.ends.at(-1), last = Math.min(MOST_ROWS - 1, Math.round((end - this.start) / rowTime));
       const writeUpTo = (limit) => {
@@ -76,7 +82,7 @@
   class LiveRun {
     constructor(run) {
       this.run = run;
-      this.solver = new run.program.Solver(run.held, run.start, run.program.run.initial);
+      this.solver = new run.program.Solver(run.held, run.start, run.initial.state);
       this.inputs = new Float64Array(run.sheet.inputs.length);
       this.still = new Float64Array(this.inputs.length);
       this.columns = run.empty();

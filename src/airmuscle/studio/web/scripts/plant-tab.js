@@ -141,6 +141,7 @@
       this.result = this.run.scheduled(this.segments(), this.rowTime());
       const taken = performance.now() - begin, { status, steps, time } = this.result;
       this.facts.textContent = `${shortText(this.duration)} s computed in ${shortText(taken, 2)} ms, ${steps} steps.`;
+      if (!this.run.initial.settled) this.facts.textContent += " No equilibrium was found with these parameters: the run begins at the original state.";
       if (status) this.facts.textContent += ` The run ended at ${shortText(time)} s: ${status === 2 ? "the step became too small" : "a value is not finite"}; the parameters are not possible together.`;
       this.cursor = this.cursor > this.run.start && this.cursor <= this.run.start + this.duration ? this.cursor : this.run.start;
       this.showTraces();
@@ -224,7 +225,7 @@
       const rows = Object.entries(schedule ?? {}).filter(([, list]) => list.length).map(([name, list]) => `${quote(name)} = [${list.map(([t, v]) => `[${pythonFloat(t)}, ${pythonFloat(v)}]`).join(", ")}]\n`).join("");
       const duration = this.mode === "live" ? this.live.time - this.run.start : this.duration;
       const run = schedule ? this.sheet.toml.run.replace(/^duration = .*$/m, `duration = ${pythonFloat(Math.max(duration, 0.001))}`) : this.sheet.toml.run;
-      return `# Written by airmuscle studio.${changed ? " Parameters were changed; the run in the page began at the state of the original ones." : ""}\ntitle = ${quote(this.sheet.title)}\n\n${plant}\n${schedule ? `[input]\n${rows}` : this.sheet.toml.input}\n${run}`;
+      return `# Written by airmuscle studio.${this.run.initial.settled ? "" : " The run in the page began at the equilibrium of the original parameters."}\ntitle = ${quote(this.sheet.title)}\n\n${plant}\n${schedule ? `[input]\n${rows}` : this.sheet.toml.input}\n${run}`;
     }
 
     state() {
